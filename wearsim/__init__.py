@@ -1,0 +1,1 @@
+"""wearsim: the wear of rolling contacts, stepped through millions of roller passes."""

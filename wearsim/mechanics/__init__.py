@@ -1,0 +1,1 @@
+"""Kernels and closed forms: plain arrays in, plain arrays out."""

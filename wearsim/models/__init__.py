@@ -1,0 +1,1 @@
+"""The built-in contact models, wear laws and loads, registered through the same hooks as anyone's."""

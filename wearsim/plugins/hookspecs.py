@@ -1,0 +1,157 @@
+"""The four hooks a plugin can implement, each with an example that works as it stands."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import pluggy
+
+from wearsim.plugins.specs import ContactModelSpec, LoadSpec, RandomInputSpec, WearLawSpec
+
+PROJECT = "wearsim"
+
+hookspec = pluggy.HookspecMarker(PROJECT)
+hookimpl = pluggy.HookimplMarker(PROJECT)
+
+
+class HookSpecs:
+    """The hooks of the entry-point group `wearsim`."""
+
+    @hookspec
+    def wearsim_contact_models(self) -> Iterable[ContactModelSpec]:  # type: ignore[empty-body]
+        """Yield contact models, chosen in a scenario by ``contact.model``.
+
+        Returns
+        -------
+        iterable of ContactModelSpec
+
+        Examples
+        --------
+        .. code-block:: python
+
+            from wearsim.plugins import ContactModelSpec, Options, hookimpl
+            from my_package.winkler import Winkler
+
+
+            class WinklerOptions(Options):
+                foundation_modulus: float = 2.0e13  # Pa/m
+
+
+            @hookimpl
+            def wearsim_contact_models():
+                yield ContactModelSpec(
+                    name="winkler",
+                    factory=lambda options: Winkler(options.foundation_modulus),
+                    options=WinklerOptions,
+                    summary="elastic foundation",
+                )
+        """
+
+    @hookspec
+    def wearsim_wear_laws(self) -> Iterable[WearLawSpec]:  # type: ignore[empty-body]
+        """Yield wear laws, chosen in a scenario by ``wear.law``.
+
+        Returns
+        -------
+        iterable of WearLawSpec
+
+        Examples
+        --------
+        .. code-block:: python
+
+            from wearsim.plugins import Options, WearLaw, WearLawSpec, hookimpl
+
+
+            class PerPass(Options):
+                depth: float = 1e-12  # m, wherever there is contact
+
+
+            class Constant(WearLaw):
+                def __init__(self, options):
+                    self.depth = options.depth
+
+                def depth_per_pass(self, body, solution, rolling_speed):
+                    return self.depth * (solution.line_load > 0.0)
+
+
+            @hookimpl
+            def wearsim_wear_laws():
+                yield WearLawSpec(
+                    name="constant-depth",
+                    factory=Constant,
+                    options=PerPass,
+                    summary="the same depth at every pass",
+                )
+        """
+
+    @hookspec
+    def wearsim_loads(self) -> Iterable[LoadSpec]:  # type: ignore[empty-body]
+        """Yield loads, chosen by ``load.kind``, and terms, added by a table ``[load.NAME]``.
+
+        Returns
+        -------
+        iterable of LoadSpec
+
+        Examples
+        --------
+        .. code-block:: python
+
+            import numpy as np
+            from wearsim.plugins import Load, LoadSpec, Options, hookimpl
+
+
+            class RampOptions(Options):
+                start: float = 300.0  # N
+                slope: float = 0.001  # N/s
+
+
+            class Ramp(Load):
+                def __init__(self, options):
+                    self.options = options
+
+                def force(self, time):
+                    return self.options.start + self.options.slope * np.asarray(time)
+
+                def mean(self, start, stop):
+                    return float(self.force(0.5 * (start + stop)))
+
+                def deviation(self, start, stop):
+                    return abs(self.options.slope) * (stop - start) / 12**0.5
+
+
+            @hookimpl
+            def wearsim_loads():
+                yield LoadSpec(
+                    name="ramp", factory=Ramp, options=RampOptions, summary="a rising load"
+                )
+        """
+
+    @hookspec
+    def wearsim_random_inputs(self) -> Iterable[RandomInputSpec]:  # type: ignore[empty-body]
+        """Yield distributions by name, each built as a quantile function of (0, 1).
+
+        Returns
+        -------
+        iterable of RandomInputSpec
+
+        Examples
+        --------
+        .. code-block:: python
+
+            from wearsim.plugins import Options, RandomInputSpec, hookimpl
+
+
+            class Bounds(Options):
+                low: float
+                high: float
+
+
+            @hookimpl
+            def wearsim_random_inputs():
+                yield RandomInputSpec(
+                    name="flat",
+                    factory=lambda o: lambda p: o.low + (o.high - o.low) * p,
+                    options=Bounds,
+                    summary="uniform between two bounds",
+                )
+        """

@@ -1,0 +1,352 @@
+"""What a contact model, a wear law, a load and a load term promise: written down once, and kept."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from wearsim.errors import CapabilityError
+from wearsim.types import (
+    BatchSolution,
+    ContactFields,
+    ContactSolution,
+    FloatArray,
+    Grid,
+    Material,
+    OperatingPoint,
+)
+
+Body: TypeAlias = Literal["cylinder", "roller"]
+
+
+@dataclass(frozen=True)
+class Capabilities:
+    """What a contact model can take; the solver picks the stepper that fits.
+
+    Parameters
+    ----------
+    wear_compliance : bool
+        `solve` honours its `wear_compliance`, so that implicit steps are possible.
+    coupled : bool
+        `solve_coupled` takes several contacts that share a wearing profile.
+    creepage_variation : bool
+        The creepage may vary from strip to strip (`Creepage.variation`).
+    bearing_torque : bool
+        The mean longitudinal creepage can be found from a bearing torque.
+    local_friction : bool
+        Friction may be given per strip.
+    pass_loop : bool
+        `pass_loop` runs the per-pass loop in compiled code.
+    fields : bool
+        `fields` gives the inside of a contact.
+    """
+
+    wear_compliance: bool = False
+    coupled: bool = False
+    creepage_variation: bool = False
+    bearing_torque: bool = False
+    local_friction: bool = False
+    pass_loop: bool = False
+    fields: bool = False
+
+    def names(self) -> list[str]:
+        """Return the names of what the model can take."""
+        return [name for name, able in vars(self).items() if able]
+
+
+@dataclass
+class PassLoop:
+    """A run of roller passes in compiled code; every array is changed in place.
+
+    The contacts take turns, one pass each. A pass solves its contact on the present profiles and
+    wears ``cylinder_wear * P_l`` off the cylinder and ``roller_wear * P_l`` off the roller.
+
+    Parameters
+    ----------
+    nominal_gap : ndarray, shape (contacts, strips)
+        Gap of each contact before wear [m].
+    cylinder_depth : ndarray, shape (strips,)
+        Worn depth of the cylinder [m].
+    roller_depth : ndarray, shape (contacts, strips)
+        Worn depth of each roller [m].
+    longitudinal_curvature : float
+        Relative curvature along rolling [1/m].
+    points : sequence of OperatingPoint, one per contact
+        The operating points; their normal forces are replaced pass by pass.
+    base_load : ndarray, shape (passes,)
+        Load before feedback at each pass [N].
+    stiffness : float
+        Load lost per unit of descent of the roller [N/m].
+    cylinder_wear, roller_wear : float
+        Depth per pass and per unit of dissipation [m/(W/m)].
+    fresh_gap : ndarray, shape (contacts,)
+        Least gap of each contact before wear [m], from which the descent counts.
+    line_load, anchor : ndarray, shape (contacts, strips)
+        Line load after the last pass, and where the factorisation in use was made [N/m].
+    approach : ndarray, shape (contacts,)
+        Approach after the last pass [m].
+    energy : ndarray, shape (contacts,)
+        Sum of the dissipated powers of the passes [W].
+    first_pass : int
+        Number of the first pass of this run, counted from the start of the test.
+    full_solves : int
+        Passes that were solved in full so far.
+    """
+
+    nominal_gap: FloatArray
+    cylinder_depth: FloatArray
+    roller_depth: FloatArray
+    longitudinal_curvature: float
+    points: Sequence[OperatingPoint]
+    base_load: FloatArray
+    stiffness: float
+    cylinder_wear: float
+    roller_wear: float
+    fresh_gap: FloatArray
+    line_load: FloatArray
+    anchor: FloatArray
+    approach: FloatArray
+    energy: FloatArray
+    first_pass: int = 0
+    full_solves: int = 0
+
+
+class ContactModel(ABC):
+    """Turns a gap profile and an operating point into strips.
+
+    Body 1 is the cylinder, body 2 the roller. The undeformed gap at (x, y) is
+    ``longitudinal_curvature * x**2 / 2 + gap(y)``; x points along rolling, so that the leading edge
+    of a strip lies at x = +a(y). Tractions act on body 1, whose rigid slip per unit of rolling
+    velocity is ``(xi - phi y, eta + phi x)``. Hence P = -V (xi F_x + eta F_y + phi M_z), and both
+    sides are positive.
+    """
+
+    capabilities = Capabilities()
+
+    @abstractmethod
+    def prepare(self, grid: Grid, materials: tuple[Material, Material]) -> None:
+        """Take the strips and the two bodies' materials; called once, before any `solve`."""
+
+    @abstractmethod
+    def solve(
+        self,
+        gap: FloatArray,
+        longitudinal_curvature: float,
+        point: OperatingPoint,
+        wear_compliance: FloatArray | None = None,
+        warm: ContactSolution | None = None,
+    ) -> ContactSolution:
+        """Solve one contact.
+
+        Parameters
+        ----------
+        gap : ndarray, shape (strips,)
+            Gap of the undeformed bodies at x = 0 [m]; its zero is arbitrary.
+        longitudinal_curvature : float
+            Relative curvature along rolling, 1/R_1 + 1/R_2 [1/m].
+        point : OperatingPoint
+            Load, velocity, creepage and friction.
+        wear_compliance : ndarray, shape (strips,), optional
+            Gap that opens per unit of line load while the contact carries it [m/(N/m)]: the gap
+            in contact is ``gap + wear_compliance * q``.
+        warm : ContactSolution, optional
+            A solution nearby to start from.
+
+        Returns
+        -------
+        ContactSolution
+
+        Raises
+        ------
+        ContactError
+            If contact is lost, the solver does not converge or a value is not finite.
+        """
+
+    def solve_coupled(
+        self,
+        gap: FloatArray,
+        longitudinal_curvature: float,
+        points: Sequence[OperatingPoint],
+        wear_compliance: FloatArray,
+        coupling: FloatArray,
+        warm: Sequence[ContactSolution] | None = None,
+    ) -> list[ContactSolution]:
+        """Solve several contacts that wear a profile they share.
+
+        Contact k meets the gap ``gap[k] + sum_l coupling[k, l] * wear_compliance[l] * q[l]``.
+
+        Parameters
+        ----------
+        gap : ndarray, shape (contacts, strips)
+            Gap of each contact [m].
+        longitudinal_curvature : float
+            Relative curvature along rolling [1/m].
+        points : sequence of OperatingPoint
+            One per contact.
+        wear_compliance : ndarray, shape (contacts, strips)
+            Wear per unit of line load of each contact [m/(N/m)].
+        coupling : ndarray, shape (contacts, contacts)
+            How much of contact l's wear opens the gap of contact k.
+        warm : sequence of ContactSolution, optional
+            Solutions nearby to start from.
+
+        Returns
+        -------
+        list of ContactSolution
+
+        Raises
+        ------
+        ContactError
+            As `solve`.
+        CapabilityError
+            If there are several contacts and the model solves one at a time.
+        """
+        if len(points) == 1:
+            own = wear_compliance[0] * coupling[0, 0]
+            first = warm[0] if warm is not None else None
+            return [self.solve(gap[0], longitudinal_curvature, points[0], own, first)]
+        raise CapabilityError(
+            f"{type(self).__name__} solves one contact at a time, and rollers that differ share the"
+            " cylinder's wear; use evolution.stepper = 'explicit' or 'per-pass'"
+        )
+
+    def solve_batch(
+        self,
+        gap: FloatArray,
+        longitudinal_curvature: float,
+        points: Sequence[OperatingPoint],
+        wear_compliance: FloatArray | None = None,
+        warm: Sequence[ContactSolution] | None = None,
+    ) -> BatchSolution:
+        """Solve many independent contacts; by default one after another.
+
+        Parameters
+        ----------
+        gap : ndarray, shape (stations, rollers, realisations, strips)
+            Gap of each contact [m].
+        longitudinal_curvature : float
+            Relative curvature along rolling [1/m].
+        points : sequence of OperatingPoint
+            One per contact, in the order of `gap` with its last leading axis fastest.
+        wear_compliance : ndarray, shape as `gap`, optional
+            As in `solve`.
+        warm : sequence of ContactSolution, optional
+            Solutions nearby, in the order of `points`.
+
+        Returns
+        -------
+        BatchSolution
+        """
+        shape = gap.shape[:-1]
+        if len(points) != int(np.prod(shape)):
+            raise ValueError(f"{len(points)} operating points for a batch of shape {shape}")
+        gaps = gap.reshape(-1, gap.shape[-1])
+        compliances = None if wear_compliance is None else wear_compliance.reshape(gaps.shape)
+        solutions = tuple(
+            self.solve(
+                gaps[k],
+                longitudinal_curvature,
+                points[k],
+                None if compliances is None else compliances[k],
+                None if warm is None else warm[k],
+            )
+            for k in range(len(gaps))
+        )
+        return BatchSolution(shape=shape, solutions=solutions)
+
+    def suggest_grid(
+        self,
+        gap_curvature: float,
+        longitudinal_curvature: float,
+        normal_force: float,
+        materials: tuple[Material, Material],
+    ) -> Grid | None:
+        """Return the strips that suit one contact of a fresh profile centred on y = 0, if any.
+
+        `gap_curvature` is the relative curvature across the track [1/m].
+        """
+        return None
+
+    def fields(
+        self,
+        solution: ContactSolution,
+        gap: FloatArray,
+        longitudinal_curvature: float,
+        point: OperatingPoint,
+        points_along: int = 101,
+    ) -> ContactFields:
+        """Return tractions and slip inside a solved contact; only where `capabilities.fields`."""
+        raise CapabilityError(f"{type(self).__name__} gives no fields inside the contact")
+
+    def load_sensitivity(
+        self,
+        solution: ContactSolution,
+        gap: FloatArray,
+        longitudinal_curvature: float,
+        point: OperatingPoint,
+        change: FloatArray,
+    ) -> FloatArray:
+        """Return the fall in line load [N/m] that a small `change` of the gap [m] causes.
+
+        The default solves the contact again with the gap changed; a model that knows its own
+        derivative can do better. The explicit stepper takes its stability limit from it.
+        """
+        scale = 1e-4 * max(solution.approach - float(gap.min()), 1e-12)
+        step = scale / float(np.abs(change).max())
+        nearby = self.solve(gap + step * change, longitudinal_curvature, point, None, solution)
+        return (solution.line_load - nearby.line_load) / step
+
+    def pass_loop(self, loop: PassLoop) -> None:
+        """Run roller passes in compiled code; only where `capabilities.pass_loop`."""
+        raise CapabilityError(f"{type(self).__name__} has no compiled per-pass loop")
+
+
+class WearLaw(ABC):
+    """Turns the dissipation of one pass into worn depth."""
+
+    @abstractmethod
+    def depth_per_pass(
+        self, body: Body, solution: ContactSolution, rolling_speed: float
+    ) -> FloatArray:
+        """Return the depth that one pass wears off `body`, shape (strips,) [m]."""
+
+    def depth_per_dissipation(self, body: Body, rolling_speed: float) -> float | None:
+        """Return depth per pass over dissipation [m/(W/m)] where the law is linear, else None."""
+        return None
+
+
+class Load(ABC):
+    """The load on a roller as a function of time, before any feedback.
+
+    `stiffness` [N/m] is what the load loses per unit of the roller's descent into worn material.
+    """
+
+    stiffness: float = 0.0
+
+    @abstractmethod
+    def force(self, time: FloatArray) -> FloatArray:
+        """Return the load at each `time` [s], shape as `time` [N]."""
+
+    @abstractmethod
+    def mean(self, start: float, stop: float) -> float:
+        """Return the exact mean of the load between two times [s] [N]."""
+
+    def deviation(self, start: float, stop: float) -> float:
+        """Return the exact standard deviation of the load between two times [s] [N]."""
+        return 0.0
+
+
+class LoadTerm(ABC):
+    """A term added to a load, with one number of state per roller that follows the power."""
+
+    @abstractmethod
+    def advance(self, state: FloatArray, power: FloatArray, duration: float) -> FloatArray:
+        """Return the state, shape (rollers,), after `duration` [s] at constant `power` [W]."""
+
+    @abstractmethod
+    def mean_force(self, state: FloatArray, power: FloatArray, duration: float) -> FloatArray:
+        """Return the term's mean over that time, shape (rollers,) [N]."""
