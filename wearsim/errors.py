@@ -23,7 +23,9 @@ class Problem:
     expected: str | None = None
 
     def __str__(self) -> str:
-        where = " ".join(part for part in (f"[{self.table}]" if self.table else "", self.key) if part)
+        where = " ".join(
+            part for part in (f"[{self.table}]" if self.table else "", self.key) if part
+        )
         text = f"{where}: {self.what}" if where else self.what
         if self.got is not None:
             text += f", got {self.got}"

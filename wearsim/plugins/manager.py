@@ -112,7 +112,9 @@ class Registry:
     def all(self) -> list[Registered]:
         """Return everything registered, by kind and then by name."""
         return [
-            items[name] for items in (self._specs[kind] for kind in _HOOKS) for name in sorted(items)
+            items[name]
+            for items in (self._specs[kind] for kind in _HOOKS)
+            for name in sorted(items)
         ]
 
     def names(self, kind: type[Spec]) -> list[str]:

@@ -16,6 +16,7 @@ from wearsim.types import (
     ContactSolution,
     FloatArray,
     Grid,
+    IntArray,
     Material,
     OperatingPoint,
 )
@@ -60,59 +61,73 @@ class Capabilities:
 
 @dataclass
 class PassLoop:
-    """A run of roller passes in compiled code; every array is changed in place.
+    """A run of roller passes in compiled code; arrays marked *state* are changed in place.
 
-    The contacts take turns, one pass each. A pass solves its contact on the present profiles and
-    wears ``cylinder_wear * P_l`` off the cylinder and ``roller_wear * P_l`` off the roller.
+    The physical rollers take turns, one pass each. A pass solves its contact on the present
+    profiles, then wears ``wear[0] * w`` off the cylinder and ``wear[1 + contact] * w`` off the
+    roller, w(y) being the dissipation P_l over V.
 
     Parameters
     ----------
-    nominal_gap : ndarray, shape (contacts, strips)
-        Gap of each contact before wear [m].
-    cylinder_depth : ndarray, shape (strips,)
-        Worn depth of the cylinder [m].
-    roller_depth : ndarray, shape (contacts, strips)
-        Worn depth of each roller [m].
-    longitudinal_curvature : float
-        Relative curvature along rolling [1/m].
-    points : sequence of OperatingPoint, one per contact
-        The operating points; their normal forces are replaced pass by pass.
+    order : ndarray of int, shape (physical rollers,)
+        Which contact each physical roller is.
+    first_pass : int
+        Number of the first pass, counted from the start of the test.
     base_load : ndarray, shape (passes,)
         Load before feedback at each pass [N].
     stiffness : float
-        Load lost per unit of descent of the roller [N/m].
-    cylinder_wear, roller_wear : float
-        Depth per pass and per unit of dissipation [m/(W/m)].
-    fresh_gap : ndarray, shape (contacts,)
-        Least gap of each contact before wear [m], from which the descent counts.
-    line_load, anchor : ndarray, shape (contacts, strips)
-        Line load after the last pass, and where the factorisation in use was made [N/m].
-    approach : ndarray, shape (contacts,)
-        Approach after the last pass [m].
+        Load lost per descent of a roller [N/m].
+    nominal_gap : ndarray, shape (contacts, strips)
+        Gap before wear [m].
+    longitudinal_curvature, rolling_speed : float
+        Relative curvature along rolling [1/m], V [m/s].
+    creepage : ndarray, shape (contacts, 2)
+        Mean longitudinal, and lateral creepage.
+    slip_base : ndarray, shape (contacts, strips)
+        Variation of the longitudinal creepage on unworn bodies.
+    slip_rates : ndarray, shape (2,)
+        What worn depth of the roller adds to it, and of the cylinder takes off it [1/m].
+    friction : ndarray, shape (strips,)
+        Friction coefficient.
+    wear : ndarray, shape (1 + contacts,)
+        Depth per pass and w: the cylinder's, then each roller's [m/(N/m)].
+    term_rates : ndarray, shape (terms, 1 + contacts)
+        Gain of each load term [N/W], and the part of the way to rest that a pass goes.
+    terms : ndarray, shape (terms, contacts)
+        *State*: the load terms [N].
+    cylinder_depth, roller_depth : ndarray, shape (strips,) and (contacts, strips)
+        *State*: worn depths [m].
+    line_load, anchor, anchor_gap : ndarray, shape (contacts, strips)
+        *State*: line load after the last pass; line load [N/m] and gap [m] where the factorisation
+        in use was made, zero where there is none.
+    approach, anchor_approach : ndarray, shape (contacts,)
+        *State*: approach after the last pass, and where the factorisation was made [m].
     energy : ndarray, shape (contacts,)
-        Sum of the dissipated powers of the passes [W].
-    first_pass : int
-        Number of the first pass of this run, counted from the start of the test.
-    full_solves : int
-        Passes that were solved in full so far.
+        *State*: sum over the passes of the dissipated power [W].
     """
 
-    nominal_gap: FloatArray
-    cylinder_depth: FloatArray
-    roller_depth: FloatArray
-    longitudinal_curvature: float
-    points: Sequence[OperatingPoint]
+    order: IntArray
+    first_pass: int
     base_load: FloatArray
     stiffness: float
-    cylinder_wear: float
-    roller_wear: float
-    fresh_gap: FloatArray
+    nominal_gap: FloatArray
+    longitudinal_curvature: float
+    rolling_speed: float
+    creepage: FloatArray
+    slip_base: FloatArray
+    slip_rates: FloatArray
+    friction: FloatArray
+    wear: FloatArray
+    term_rates: FloatArray
+    terms: FloatArray
+    cylinder_depth: FloatArray
+    roller_depth: FloatArray
     line_load: FloatArray
     anchor: FloatArray
+    anchor_gap: FloatArray
     approach: FloatArray
+    anchor_approach: FloatArray
     energy: FloatArray
-    first_pass: int = 0
-    full_solves: int = 0
 
 
 class ContactModel(ABC):
@@ -172,12 +187,11 @@ class ContactModel(ABC):
         longitudinal_curvature: float,
         points: Sequence[OperatingPoint],
         wear_compliance: FloatArray,
-        coupling: FloatArray,
         warm: Sequence[ContactSolution] | None = None,
     ) -> list[ContactSolution]:
         """Solve several contacts that wear a profile they share.
 
-        Contact k meets the gap ``gap[k] + sum_l coupling[k, l] * wear_compliance[l] * q[l]``.
+        Contact k meets the gap ``gap[k] + sum_l wear_compliance[k, l] * q[l]``.
 
         Parameters
         ----------
@@ -187,10 +201,8 @@ class ContactModel(ABC):
             Relative curvature along rolling [1/m].
         points : sequence of OperatingPoint
             One per contact.
-        wear_compliance : ndarray, shape (contacts, strips)
-            Wear per unit of line load of each contact [m/(N/m)].
-        coupling : ndarray, shape (contacts, contacts)
-            How much of contact l's wear opens the gap of contact k.
+        wear_compliance : ndarray, shape (contacts, contacts, strips)
+            Gap that opens at the first contact per unit of line load of the second [m/(N/m)].
         warm : sequence of ContactSolution, optional
             Solutions nearby to start from.
 
@@ -206,8 +218,8 @@ class ContactModel(ABC):
             If there are several contacts and the model solves one at a time.
         """
         if len(points) == 1:
-            own = wear_compliance[0] * coupling[0, 0]
             first = warm[0] if warm is not None else None
+            own = wear_compliance[0, 0]
             return [self.solve(gap[0], longitudinal_curvature, points[0], own, first)]
         raise CapabilityError(
             f"{type(self).__name__} solves one contact at a time, and rollers that differ share the"
@@ -300,8 +312,14 @@ class ContactModel(ABC):
         nearby = self.solve(gap + step * change, longitudinal_curvature, point, None, solution)
         return (solution.line_load - nearby.line_load) / step
 
-    def pass_loop(self, loop: PassLoop) -> None:
-        """Run roller passes in compiled code; only where `capabilities.pass_loop`."""
+    def pass_loop(self, loop: PassLoop) -> int:
+        """Run roller passes in compiled code, where `capabilities.pass_loop`.
+
+        Returns
+        -------
+        int
+            How many of the passes were solved in full, from no factorisation in use.
+        """
         raise CapabilityError(f"{type(self).__name__} has no compiled per-pass loop")
 
 
@@ -350,3 +368,10 @@ class LoadTerm(ABC):
     @abstractmethod
     def mean_force(self, state: FloatArray, power: FloatArray, duration: float) -> FloatArray:
         """Return the term's mean over that time, shape (rollers,) [N]."""
+
+    def lag(self) -> tuple[float, float] | None:
+        """Return gain [N/W] and time constant [s] if the term is a first-order lag, else None.
+
+        A first-order lag can follow the compiled per-pass loop; other terms fall back on Python.
+        """
+        return None

@@ -14,7 +14,9 @@ from wearsim.plugins.protocols import Capabilities, ContactModel, Load, LoadTerm
 class Options(BaseModel):
     """Base of every options model: frozen, and strict about names."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, arbitrary_types_allowed=True, allow_inf_nan=False
+    )
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,352 @@
+"""The contact model `hertz-fastsim`, and FASTSIM on the strips of other contacts."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from tests.reference import STEEL, rows, worn_profile
+from wearsim.errors import CapabilityError, ContactError
+from wearsim.mechanics.elasticity import combine
+from wearsim.mechanics.hertz import hertz
+from wearsim.models.fastsim_theory import FastsimTheory, equivalent_ellipse
+from wearsim.models.hertz_fastsim import SPEC, HertzFastsim, HertzFastsimOptions
+from wearsim.models.tangential import Strips, complete
+from wearsim.types import Creepage, Grid, OperatingPoint
+
+MATERIALS = (STEEL, STEEL)
+PAIR = combine(*MATERIALS)
+SPEED = 1000.0 * 2.0 * math.pi / 60.0 * 25e-3
+RIG = (90.0, 2.0)  # relative curvatures along and across
+
+
+def contact(grid=None, creepage=(1e-3, 0.0, 0.0), load=300.0, mu=0.1, shape=None, **options):
+    """Solve the rig's contact; `options` in the words of a scenario."""
+    model = HertzFastsim(HertzFastsimOptions(**options))
+    if grid is None:
+        grid = model.suggest_grid(RIG[1], RIG[0], load, MATERIALS)
+    model.prepare(grid, MATERIALS)
+    gap = grid.y**2 if shape is None else shape(grid.y)
+    point = OperatingPoint(load, SPEED, Creepage(*creepage), mu)
+    return model, gap, point, model.solve(gap, RIG[0], point)
+
+
+def balance(point, solution):
+    creepage = point.creepage
+    return -point.rolling_speed * (
+        solution.longitudinal_creepage * solution.force_x
+        + creepage.lateral * solution.force_y
+        + creepage.spin * solution.spin_moment
+    )
+
+
+def test_that_the_mean_problem_dissipates_0_073873_watts_in_closed_form():
+    *_, solution = contact(kalker="line-limit", my=1000)
+    assert solution.power == pytest.approx(0.073873, rel=1e-5)
+
+
+def test_that_50_by_50_fastsim_is_within_a_thousandth_of_it():
+    *_, solution = contact(kalker="line-limit", closed_form=False)
+    assert solution.power == pytest.approx(0.073873, rel=1e-3)
+
+
+def test_that_the_table_moves_the_mean_problem_by_less_than_two_thousandths():
+    power = {name: contact(kalker=name)[-1].power for name in ("table", "line-limit")}
+    assert 1e-4 < power["table"] / power["line-limit"] - 1.0 < 2e-3
+
+
+def test_that_given_coefficients_take_the_place_of_the_table():
+    limit = {"c11": math.pi**2 / 2.8, "c22": math.pi**2 / 4.0, "c23": 0.471}
+    given_power = contact(kalker_coefficients=limit)[-1].power
+    assert given_power == pytest.approx(contact(kalker="line-limit")[-1].power, rel=1e-12)
+
+
+def test_that_the_element_sum_reads_low_and_says_so_by_its_order():
+    exact = contact(kalker="line-limit", my=1000)[-1].power
+    low = [
+        contact(kalker="line-limit", dissipation="element-sum", mx=n, my=n)[-1].power / exact - 1.0
+        for n in (25, 50, 100)
+    ]
+    assert low[1] == pytest.approx(-0.0325, abs=5e-4)
+    assert np.log2(np.divide(low[:-1], low[1:])) == pytest.approx(1.0, abs=0.05)
+
+
+def test_that_the_patch_is_that_of_hertz():
+    *_, solution = contact()
+    patch = hertz(45.0, 1.0, 300.0, PAIR.contact_modulus)
+    assert solution.peak_pressure == pytest.approx(patch.peak_pressure, rel=1e-9)
+    assert solution.approach == pytest.approx(patch.approach, rel=1e-9)
+    assert solution.half_length == pytest.approx(patch.half_length(solution.y), rel=1e-9)
+
+
+GRIDS = st.builds(lambda half, strips: Grid.spanning(-half, half, strips),
+                  st.floats(2.4e-3, 9e-3), st.integers(31, 300))  # fmt: skip
+
+
+@settings(deadline=None, max_examples=40)
+@given(GRIDS, st.floats(-0.8e-3, 0.8e-3), st.floats(-1e-3, 1e-3), st.floats(-0.5, 0.5))
+def test_that_any_grid_carries_the_whole_load_and_keeps_the_energy_balance(grid, yc, eta, phi):
+    _, _, point, solution = contact(grid, (1e-3, eta, phi), shape=lambda y: 2e-6 + (y - yc) ** 2)
+    assert solution.line_load.sum() * grid.spacing == pytest.approx(300.0, rel=1e-12)
+    assert solution.power == pytest.approx(balance(point, solution), rel=1e-12)
+    assert np.all(solution.line_load >= 0.0)
+    assert solution.approach == pytest.approx(2e-6 + 3.22274e-6, rel=1e-6)
+
+
+@pytest.mark.parametrize("bound", ["parabolic", "elliptic"])
+def test_that_strips_partly_covered_keep_the_power_smooth(bound):
+    exact = contact(my=1000, bound=bound)[-1].power
+    for half in np.linspace(3.0e-3, 3.2e-3, 9):
+        power = contact(Grid.spanning(-half, half, 81), bound=bound)[-1].power
+        assert power == pytest.approx(exact, rel=1e-3)
+
+
+@pytest.mark.parametrize("closed_form", [True, False])
+def test_that_mirroring_the_contact_mirrors_the_solution(closed_form):
+    grid = Grid.spanning(-3e-3, 3e-3, 60)
+    solutions = [
+        contact(
+            grid,
+            (8e-4, sign * 4e-4, 0.0 if closed_form else sign * 0.4),
+            shape=lambda y, s=sign: (y - s * 3e-4) ** 2,
+            closed_form=closed_form,
+        )[-1]
+        for sign in (1.0, -1.0)
+    ]
+    one, other = solutions
+    assert one.dissipation == pytest.approx(other.dissipation[::-1], rel=1e-9, abs=1e-12)
+    assert one.force_y == pytest.approx(-other.force_y, rel=1e-9)
+    assert one.spin_moment == pytest.approx(-other.spin_moment, rel=1e-9, abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("bound", "kind", "rms", "from_contact"),
+    [
+        ("parabolic", "paper", 0.037, 0.01),
+        ("elliptic", "paper", 0.0515, 0.015),
+        ("parabolic", "partial", 0.057, 0.025),
+        ("elliptic", "partial", 0.078, 0.025),
+    ],
+)
+def test_that_its_error_against_the_exact_theory_is_the_one_we_know(bound, kind, rms, from_contact):
+    # CONTACT's own FASTSIM takes flexibilities that change with creepage, hence the small distance
+    exact, other = [], []
+    for case in rows("rig_random", kind=kind):
+        creepage = (case["xi"], case["eta"], case["phi_per_m"])
+        *_, solution = contact(None, creepage, case["N_N"], case["mu"], bound=bound)
+        exact.append(solution.power / SPEED / case["P_over_V_N"] - 1.0)
+        other.append(solution.power / SPEED / case[f"fastsim_{bound[:3]}_P_over_V_N"] - 1.0)
+    assert np.sqrt(np.mean(np.square(exact))) == pytest.approx(rms, rel=0.03)
+    assert np.sqrt(np.mean(np.square(other))) < from_contact
+
+
+@pytest.mark.parametrize(("bound", "rms"), [("parabolic", 0.093), ("elliptic", 0.030)])
+def test_that_hard_cases_stay_as_far_off_as_kalker_is(bound, rms):
+    errors = []
+    for case in rows("hard_cases"):
+        creepage = Creepage(case["xi"], case["eta"], case["phi_per_m"])
+        curvatures = 2.0 * case["A_per_m"], 2.0 * case["B_per_m"]
+        model = HertzFastsim(HertzFastsimOptions(mx=200, my=100, bound=bound))
+        grid = model.suggest_grid(curvatures[1], curvatures[0], case["N_N"], MATERIALS)
+        model.prepare(grid, MATERIALS)
+        point = OperatingPoint(case["N_N"], 1.0, creepage, case["mu"])
+        power = model.solve(0.5 * curvatures[1] * grid.y**2, curvatures[0], point).power
+        errors.append(power / case["P_over_V_N"] - 1.0)
+    assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(rms, rel=0.03)
+
+
+def groove(depth, offset=0.0):
+    return lambda y: y**2 + 0.95 * np.maximum(depth - (y - offset) ** 2, 0.0)
+
+
+@pytest.mark.parametrize("depth", [1e-6, 5e-6, 17e-6, 48e-6])
+def test_that_a_worn_profile_widens_the_patch_and_still_carries_the_load(depth):
+    grid = Grid.spanning(-9e-3, 9e-3, 181)
+    _, _, point, solution = contact(grid, shape=groove(depth, 2e-4))
+    assert solution.line_load.sum() * grid.spacing == pytest.approx(300.0, rel=1e-12)
+    width = np.count_nonzero(solution.line_load) * grid.spacing
+    assert width > 3.08978e-3
+    assert solution.power == pytest.approx(balance(point, solution), rel=1e-12)
+
+
+def test_that_a_solution_does_not_depend_on_where_it_started():
+    grid = Grid.spanning(-9e-3, 9e-3, 181)
+    model, gap, point, cold = contact(grid, shape=groove(17e-6))
+    warm = model.solve(gap, RIG[0], point, None, cold)
+    assert np.array_equal(warm.dissipation, cold.dissipation)
+
+
+@pytest.mark.parametrize(
+    ("shape", "match"),
+    [
+        (lambda y: -(y**2), "curvature over .* needs it positive"),
+        (lambda y: 1e-3 * y**2, "leaves its strips"),
+        (lambda y: (y - 2.8e-3) ** 2, "leaves its strips"),
+        (lambda y: 1e5 * y**2, "fewer than three strips"),
+        (lambda y: np.where(y > 0.0, np.nan, y**2), "not finite"),
+    ],
+)
+def test_that_what_hertz_cannot_solve_is_told_with_its_state(shape, match):
+    with pytest.raises(ContactError, match=match) as caught:
+        contact(Grid.spanning(-3e-3, 3e-3, 61), shape=shape)
+    assert {"gap", "normal_force"} <= set(caught.value.state)
+
+
+def test_that_an_input_that_is_not_a_number_is_an_error():
+    with pytest.raises(ContactError, match="power is not finite"):
+        contact(creepage=(math.nan, 0.0, 0.0))
+
+
+def test_that_a_lost_contact_is_an_error():
+    with pytest.raises(ContactError, match="contact is lost"):
+        contact(Grid.spanning(-3e-3, 3e-3, 61), load=0.0)
+
+
+def test_that_a_wear_compliance_is_refused():
+    model, gap, point, _ = contact()
+    with pytest.raises(CapabilityError, match="stepper = 'explicit'"):
+        model.solve(gap, RIG[0], point, np.zeros_like(gap))
+
+
+def test_that_a_prescribed_patch_sets_pressure_and_power():
+    patch = {"a": "0.2 mm", "b": "2 mm"}
+    _, _, point, solution = contact(patch=patch)
+    assert solution.peak_pressure == pytest.approx(1.5 * 300.0 / (math.pi * 2e-4 * 2e-3))
+    assert solution.line_load.sum() * (solution.y[1] - solution.y[0]) == pytest.approx(300.0)
+    assert solution.half_length.max() == pytest.approx(2e-4, rel=1e-3)
+    grid = Grid.spanning(-6e-3, 6e-3, 121)
+    worn = contact(grid, patch=patch, shape=lambda y: groove(20e-6)(y - 1e-4))[-1]
+    centre = np.dot(worn.y, worn.line_load) / worn.line_load.sum()
+    assert centre == pytest.approx(1e-4, abs=1e-6)
+    assert worn.power == pytest.approx(solution.power, rel=2e-3)
+    assert solution.power == pytest.approx(balance(point, solution), rel=1e-12)
+    with pytest.raises(ContactError, match="needs it positive"):
+        contact(grid, patch=patch, shape=lambda y: -(y**2))
+    with pytest.raises(ContactError, match="leaves its strips"):
+        contact(Grid.spanning(-1.5e-3, 1.5e-3, 31), patch=patch)
+
+
+def test_that_a_bearing_torque_finds_its_creepage():
+    model, gap, _, _ = contact()
+    point = OperatingPoint(
+        300.0, SPEED, Creepage(0.0), 0.1, bearing_torque=0.1, rolling_radius=np.full(50, 20e-3)
+    )
+    solution = model.solve(gap, RIG[0], point)
+    assert -solution.force_x * 20e-3 == pytest.approx(0.1, rel=1e-9)
+    assert solution.longitudinal_creepage > 0.0
+    with pytest.raises(ContactError, match="skids"):
+        model.solve(
+            gap,
+            RIG[0],
+            OperatingPoint(
+                300.0, SPEED, Creepage(0.0), 0.1, bearing_torque=1.0,
+                rolling_radius=np.full(50, 20e-3),
+            ),
+        )  # fmt: skip
+
+
+def test_that_friction_may_differ_from_strip_to_strip():
+    model, gap, _, whole = contact()
+    friction = np.where(np.arange(50) < 25, 0.1, 0.05)
+    half = model.solve(gap, RIG[0], OperatingPoint(300.0, SPEED, Creepage(1e-3), friction))
+    assert half.dissipation[:25] == pytest.approx(whole.dissipation[:25], rel=1e-12)
+    assert np.all(half.dissipation[25:] < whole.dissipation[25:])
+
+
+def test_that_creepage_may_vary_from_strip_to_strip():
+    model, gap, _, _ = contact()
+    y = model.suggest_grid(RIG[1], RIG[0], 300.0, MATERIALS).y
+    creepage = Creepage(1e-3, variation=200.0 * y**2)
+    point = OperatingPoint(300.0, SPEED, creepage, 0.1)
+    for closed_form in (True, False):
+        chosen = HertzFastsim(HertzFastsimOptions(closed_form=closed_form, mx=400))
+        chosen.prepare(model.suggest_grid(RIG[1], RIG[0], 300.0, MATERIALS), MATERIALS)
+        solution = chosen.solve(gap, RIG[0], point)
+        mean = np.dot(creepage.variation, solution.line_load) / solution.line_load.sum()
+        local = 1e-3 + creepage.variation - mean
+        assert np.all(solution.dissipation[np.abs(local) > 1e-6] > 0.0)
+        powers = solution.power
+    assert powers == pytest.approx(model.solve(gap, RIG[0], point).power, rel=1e-4)
+
+
+@pytest.mark.parametrize("bound", ["parabolic", "elliptic"])
+def test_that_the_fields_are_the_inside_of_the_solution(bound):
+    creepage = (6e-4, 3e-4, 0.0)
+    model, gap, point, solution = contact(creepage=creepage, bound=bound, closed_form=False)
+    fields = model.fields(solution, gap, RIG[0], point, points_along=401)
+    assert fields.x.shape == fields.slip_x.shape == (401, 50)
+    assert np.all(np.diff(fields.x, axis=0) > 0.0)
+    spacing = solution.y[1] - solution.y[0]
+    force = np.trapezoid(fields.traction_x, fields.x, axis=0).sum() * spacing
+    assert force == pytest.approx(solution.force_x, rel=2e-3)
+    load = np.trapezoid(fields.pressure, fields.x, axis=0).sum() * spacing
+    assert load == pytest.approx(300.0, rel=2e-3)
+    power = np.trapezoid(fields.power_density, fields.x, axis=0).sum() * spacing
+    assert power == pytest.approx(solution.power, rel=1e-2)
+    traction = np.hypot(fields.traction_x, fields.traction_y)
+    assert np.all(traction <= 0.1 * fields.pressure + 1e-3)
+    assert np.all(fields.power_density[fields.adhesion] == 0.0)
+    assert np.all(fields.power_density >= -1e-6 * fields.power_density.max())
+
+
+def hertz_strips(strips=81):
+    """Return the strips of the rig's patch as another normal contact would give them."""
+    patch = hertz(45.0, 1.0, 300.0, PAIR.contact_modulus)
+    grid = Grid.spanning(-1.1 * patch.b, 1.1 * patch.b, strips)
+    load = np.diff(
+        patch.load_below(np.append(grid.y, grid.y[-1] + grid.spacing) - 0.5 * grid.spacing)
+    )
+    half = np.sqrt(4.0 * load / grid.spacing / (math.pi * PAIR.contact_modulus * RIG[0]))
+    return patch, Strips(
+        grid.y, half, load / grid.spacing, grid.spacing, RIG[0], 0.0, patch.peak_pressure, 0
+    )
+
+
+def test_that_an_ellipse_cut_into_strips_has_nearly_its_own_equivalent():
+    patch, strips = hertz_strips(401)
+    a, b = equivalent_ellipse(strips)
+    # the line contact's a(y) of Hertz's load is half a per cent from Hertz's
+    assert (a, b) == pytest.approx((patch.a, patch.b), rel=1e-2)
+
+
+def test_that_other_strips_give_nearly_the_power_of_the_ellipse():
+    _, strips = hertz_strips(401)
+    point = OperatingPoint(300.0, SPEED, Creepage(1e-3), 0.1)
+    for bound in ("parabolic", "elliptic"):
+        found = complete(FastsimTheory(bound), strips, PAIR, point)
+        expected = contact(bound=bound)[-1].power
+        # Kalker's parabola loads a strip by 4/3 (1 - y^2/b^2)^(1/2) of Hertz's: more of it slides
+        assert found.power == pytest.approx(expected, rel=0.05 if bound == "parabolic" else 0.01)
+        assert found.power == pytest.approx(balance(point, found), rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["flat", "bump_1um", "bump_10um", "parabola"])
+def test_that_fastsim_takes_the_strips_of_a_worn_profile(name):
+    worn = worn_profile(name)
+    y = worn["y"]
+    strips = Strips(
+        y, worn["a"], worn["q"], y[1] - y[0], 45.0, worn["approach"], worn["peak_pressure"], 0
+    )
+    point = OperatingPoint(300.0, 1.0, Creepage(1e-3), 0.1)
+    found = complete(FastsimTheory("elliptic"), strips, PAIR, point)
+    assert found.power == pytest.approx(worn["P_over_V_mean"], rel=0.05)
+
+
+def test_that_the_options_are_checked_and_every_key_is_described():
+    for bad in ({"mx": 1}, {"my": 2}, {"bound": "flat"}, {"kalker_coefficients": {"c11": -1.0}}):
+        with pytest.raises(ValidationError):
+            HertzFastsimOptions(**bad)
+    for field in HertzFastsimOptions.model_fields.values():
+        assert field.description
+    assert HertzFastsimOptions(patch={"a": "0.1 mm", "b": "1 mm"}).patch.b == 1e-3
+
+
+def test_that_the_spec_builds_the_model_it_names():
+    model = SPEC.factory(SPEC.options())
+    assert isinstance(model, HertzFastsim)
+    assert SPEC.name == "hertz-fastsim"
+    assert not model.capabilities.wear_compliance
+    assert not model.capabilities.pass_loop

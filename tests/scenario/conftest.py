@@ -1,0 +1,44 @@
+"""Fixtures of the scenario room: a registry of small plugins, and a parser of changed text."""
+
+from __future__ import annotations
+
+import textwrap
+
+import pytest
+from scenario_examples import GOOD, Parse, SmallPlugins
+
+import wearsim.scenario.choices
+import wearsim.scenario.known
+import wearsim.scenario.schema
+from wearsim.plugins.manager import Registry
+from wearsim.scenario import Scenario, parse_scenario
+
+
+@pytest.fixture
+def small_registry(monkeypatch: pytest.MonkeyPatch) -> Registry:
+    registry = Registry([SmallPlugins()])
+    for module in (
+        wearsim.scenario.choices,
+        wearsim.scenario.known,
+        wearsim.scenario.schema,
+    ):
+        monkeypatch.setattr(module, "registry", lambda: registry)
+    return registry
+
+
+@pytest.fixture
+def parse(small_registry: Registry) -> Parse:
+    """Parse the good scenario with parts of its text replaced."""
+
+    def parse(
+        *replace: tuple[str, str],
+        files: dict[str, str] | None = None,
+        overrides: dict[str, object] | None = None,
+        text: str = GOOD,
+    ) -> Scenario:
+        for old, new in replace:
+            assert old in text
+            text = text.replace(old, textwrap.dedent(new))
+        return parse_scenario(text, "rig.toml", (files or {}).__getitem__, overrides)
+
+    return parse

@@ -1,0 +1,136 @@
+"""A good scenario, and small plugins, so that these tests stand on the scenario room alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import ModuleType
+
+from pydantic import Field, model_validator
+
+from wearsim.plugins import ContactModelSpec, LoadSpec, Options, WearLawSpec, hookimpl
+from wearsim.quantities import (
+    Duration,
+    InputFile,
+    NonNegativeWearFactor,
+    PerPower,
+    PositiveForce,
+    PositiveStiffness,
+)
+from wearsim.scenario import Scenario
+from wearsim.tables import read_columns
+
+GOOD = """\
+title = "a rig"
+seed = 3
+
+[roller]
+radius = "20 mm"
+crown_radius = "500 mm"
+material = "steel"
+
+[cylinder]
+radius = "25 mm"   # not the diameter
+material = "steel"
+
+[operation]
+speed = "1000 rpm"
+duration = "450 min"
+rollers = 3
+
+[load]
+normal_force = "300 N"
+
+[friction]
+coefficient = 0.1
+
+[creepage]
+longitudinal = 1e-3
+
+[contact]
+model = "slender"
+
+[wear]
+law = "archard-dissipation"
+cylinder = { k_over_h = "1.1e-11 1/Pa" }
+roller = { k_over_h = "0 1/Pa" }
+"""
+
+
+class SlenderOptions(Options):
+    pass
+
+
+class FastsimOptions(Options):
+    mx: int = Field(default=50, ge=2, description="Elements along rolling.")
+    my: int = Field(default=50, ge=2, description="Strips.")
+
+
+class ConstantOptions(Options):
+    normal_force: PositiveForce = Field(description="The load.")
+
+
+class SpringOptions(ConstantOptions):
+    stiffness: PositiveStiffness = Field(description="Stiffness of the mounting.")
+
+
+class RecordedOptions(Options):
+    file: InputFile = Field(description="The log.")
+
+    @model_validator(mode="after")
+    def readable(self) -> RecordedOptions:
+        columns = {"time": "s", "load": "N"}
+        read_columns(self.file.text, self.file.path, columns, rising="time")
+        return self
+
+
+class ThermalOptions(Options):
+    gain: PerPower = Field(description="Load per power.")
+    time_constant: Duration = Field(description="Time constant.")
+
+
+class Factor(Options):
+    k_over_h: NonNegativeWearFactor = Field(description="K/H.")
+
+
+class ArchardOptions(Options):
+    cylinder: Factor = Field(description="The cylinder.")
+    roller: Factor = Field(description="The roller.")
+
+
+def _build(options: Options) -> tuple[str, Options]:
+    return ("built", options)
+
+
+def _plugins() -> ModuleType:
+    module = ModuleType("small_plugins")
+
+    @hookimpl
+    def wearsim_contact_models():
+        yield ContactModelSpec("slender", SlenderOptions, "strips", factory=_build)
+        yield ContactModelSpec("hertz-fastsim", FastsimOptions, "ellipse", factory=_build)
+
+    @hookimpl
+    def wearsim_wear_laws():
+        yield WearLawSpec("archard-dissipation", ArchardOptions, "Archard", factory=_build)
+
+    @hookimpl
+    def wearsim_loads():
+        yield LoadSpec("constant", ConstantOptions, "constant", factory=_build)
+        yield LoadSpec("spring", SpringOptions, "spring", factory=_build)
+        yield LoadSpec("recorded", RecordedOptions, "log", factory=_build)
+        yield LoadSpec("thermal", ThermalOptions, "thermal", factory=_build, role="term")
+
+    module.wearsim_contact_models = wearsim_contact_models
+    module.wearsim_wear_laws = wearsim_wear_laws
+    module.wearsim_loads = wearsim_loads
+    return module
+
+
+class SmallPlugins:
+    name, value, dist = "small", "small_plugins", None
+
+    def load(self) -> ModuleType:
+        return _plugins()
+
+
+Parse = Callable[..., Scenario]

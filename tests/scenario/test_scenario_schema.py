@@ -1,0 +1,118 @@
+"""The JSON Schema of a scenario."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+from scenario_examples import GOOD
+
+from wearsim.scenario import scenario_schema
+
+SCENARIOS = sorted((Path(__file__).parents[2] / "scenarios").glob("*.toml"))
+Schema = dict[str, Any]
+
+
+def _fits(value: object, schema: Schema, defs: Schema) -> bool:
+    """A small validator of the words that the schema uses."""
+    if "$ref" in schema:
+        return _fits(value, defs[schema["$ref"].rsplit("/", 1)[-1]], defs)
+    if "anyOf" in schema:
+        return any(_fits(value, item, defs) for item in schema["anyOf"])
+    if "const" in schema and value != schema["const"]:
+        return False
+    if "enum" in schema and value not in schema["enum"]:
+        return False
+    kind = schema.get("type")
+    if kind == "object":
+        known = schema["properties"]
+        return (
+            isinstance(value, dict)
+            and set(schema.get("required", ())) <= set(value) <= set(known)
+            and all(_fits(item, known[key], defs) for key, item in value.items())
+        )
+    if kind == "array":
+        return isinstance(value, list) and all(_fits(i, schema["items"], defs) for i in value)
+    if kind == "string":
+        return isinstance(value, str) and bool(re.search(schema.get("pattern", ""), value))
+    if kind == "boolean":
+        return isinstance(value, bool)
+    numbers: Any = int if kind == "integer" else (int, float)
+    return isinstance(value, numbers) and not isinstance(value, bool)
+
+
+def _nodes(item: object) -> list[Schema]:
+    if isinstance(item, list):
+        return [node for part in item for node in _nodes(part)]
+    if not isinstance(item, dict):
+        return []
+    return [item, *(node for part in item.values() for node in _nodes(part))]
+
+
+@pytest.fixture
+def schema(small_registry: object) -> Schema:
+    return scenario_schema()
+
+
+@pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: path.stem)
+def test_that_the_schema_takes_every_shipped_scenario(path: Path) -> None:
+    schema = scenario_schema()  # with the installed plugins
+    data = tomllib.loads(path.read_text(encoding="utf-8"))
+    assert _fits(data, schema, schema["$defs"])
+
+
+@pytest.mark.parametrize(
+    ("good", "bad"),
+    [
+        ('"20 mm"', "20"),
+        ("coefficient", "coeficient"),
+        ('model = "slender"', 'model = "slender"\nmx = 3'),
+        ('model = "slender"', 'model = "slendr"'),
+        ("[friction]", "[fricton]"),
+    ],
+)
+def test_that_the_schema_refuses_what_the_parser_refuses(
+    schema: Schema, good: str, bad: str
+) -> None:
+    assert _fits(tomllib.loads(GOOD), schema, schema["$defs"])
+    assert not _fits(tomllib.loads(GOOD.replace(good, bad)), schema, schema["$defs"])
+
+
+def test_that_every_key_is_described() -> None:
+    schema = scenario_schema()  # with the installed plugins
+    for node in _nodes(schema):
+        if node.get("type") == "object":
+            for key, field in node["properties"].items():
+                assert field.get("description"), key
+
+
+def test_that_every_reference_leads_somewhere_and_nothing_is_left_over(schema: Schema) -> None:
+    used = {node["$ref"].rsplit("/", 1)[-1] for node in _nodes(schema) if "$ref" in node}
+    assert used == set(schema["$defs"])
+
+
+def test_that_defaults_are_written_as_a_user_would(schema: Schema) -> None:
+    tables = schema["properties"]
+    assert tables["roller"]["properties"]["offset"]["default"] == "0 m"
+    assert tables["outputs"]["properties"]["checkpoint_every"]["default"] == "30 s"
+    assert "default" not in tables["operation"]["properties"]["duration"]
+    assert not any(node.get("type") == "null" for node in _nodes(schema))
+
+
+def test_that_plugins_are_alternatives_by_name(schema: Schema) -> None:
+    contact = schema["properties"]["contact"]["anyOf"]
+    assert [item["properties"]["model"]["const"] for item in contact] == [
+        "hertz-fastsim",
+        "slender",
+    ]
+    assert "mx" in contact[0]["properties"]
+    loads = schema["properties"]["load"]["anyOf"]
+    assert [item["properties"]["kind"]["const"] for item in loads] == [
+        "constant",
+        "recorded",
+        "spring",
+    ]
+    assert all("thermal" in item["properties"] for item in loads)

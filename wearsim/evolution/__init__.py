@@ -1,0 +1,1 @@
+"""The incremental solver: scene, state, steppers, step-size control and the loop."""

@@ -1,0 +1,264 @@
+"""One step over many passes, implicit or explicit: pure functions from state to state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from wearsim.errors import StepError
+from wearsim.evolution.observables import depth, worn_volume
+from wearsim.evolution.scene import Scene
+from wearsim.evolution.state import WearState, contact_values
+from wearsim.types import ContactSolution, FloatArray, OperatingPoint
+
+FIXED_POINT_TOLERANCE = 1e-8
+MAX_FIXED_POINT = 60
+
+
+@dataclass(frozen=True)
+class Increment:
+    """What a step adds to a state; fields as in `WearState`."""
+
+    cylinder: FloatArray
+    roller: FloatArray
+
+
+def mean_loads(
+    scene: Scene, state: WearState, passes: float, end_gap: FloatArray, power: FloatArray
+) -> FloatArray:
+    """Return the mean load of each contact over a step, shape (S, R, N) [N].
+
+    The load itself is integrated exactly; the feedback takes the mean of the descents at the
+    step's ends, and each term its exact mean at constant `power`.
+    """
+    start, stop = scene.time(state.passes), scene.time(state.passes + passes)
+    loads = np.full(scene.shape, scene.load.mean(start, stop))
+    if scene.load.stiffness != 0.0:
+        before = scene.descent(scene.gap(state.cylinder_depth, state.roller_depth))
+        loads -= scene.load.stiffness * 0.5 * (before + scene.descent(end_gap))
+    for number, term in enumerate(scene.terms.values()):
+        loads += term.mean_force(state.terms[number], power.mean(axis=0), stop - start)
+    return checked_loads(loads, state.passes)
+
+
+def checked_loads(loads: FloatArray, passes: float) -> FloatArray:
+    """Return `loads` if all are positive; a contact that has lost its load cannot go on."""
+    if not (loads > 0.0).all():
+        raise StepError(
+            f"contact is lost at pass {passes:.0f}: the load has fallen to {loads.min():.4g} N;"
+            " the spring has run out of travel or the log falls to zero",
+            {"normal_force": loads, "passes": passes},
+        )
+    return loads
+
+
+def operating_points(
+    scene: Scene, loads: FloatArray, cylinder_depth: FloatArray, roller_depth: FloatArray
+) -> list[OperatingPoint]:
+    """Return the operating point of every contact at given loads and worn depths."""
+    return [
+        scene.point(r, float(loads[s, r, v]), cylinder_depth[s, 0, v], roller_depth[0, r, v])
+        for s, r, v in np.ndindex(scene.shape)
+    ]
+
+
+def _ratio(wear: FloatArray, line_load: FloatArray) -> FloatArray:
+    """Return wear over line load, carried on into strips without load, last axis strips."""
+    places = np.arange(wear.shape[-1])
+    ratio = np.empty_like(wear)
+    for index in np.ndindex(wear.shape[:-1]):
+        loaded = np.flatnonzero(line_load[index] > 0.0)
+        ratio[index] = np.interp(
+            places, places[loaded], wear[index][loaded] / line_load[index][loaded]
+        )
+    return ratio
+
+
+def wear_compliance(
+    scene: Scene, contacts: tuple[ContactSolution, ...], passes: float
+) -> FloatArray:
+    """Return how the wear of a step opens the gaps, per unit of line load.
+
+    Returns
+    -------
+    ndarray, shape (realisations, contacts, contacts, strips)
+        Gap at the first contact per line load of the second [m/(N/m)]; contacts are
+        (station, roller).
+    """
+    stations, rollers, realisations = scene.shape
+    line_load = contact_values(scene, contacts, "line_load")
+    cylinder, roller = scene.wear_per_pass(list(contacts))
+    share = scene.kinematics.cylinder_share[None, :, None, None]
+    own = scene.kinematics.roller_share / stations
+    on_cylinder = _ratio(cylinder * share * passes, line_load)
+    on_roller = _ratio(roller * own * passes, line_load)
+    count = stations * rollers
+    compliance = np.zeros((realisations, count, count, scene.grid.strips))
+    for k, (s, r) in enumerate(np.ndindex(stations, rollers)):
+        for other, (s2, r2) in enumerate(np.ndindex(stations, rollers)):
+            if s == s2:
+                compliance[:, k, other] += on_cylinder[s2, r2]
+            if r == r2:
+                compliance[:, k, other] += on_roller[s2, r2]
+    return compliance
+
+
+def increment(scene: Scene, contacts: tuple[ContactSolution, ...], passes: float) -> Increment:
+    """Return what `passes` passes with these contacts wear off the bodies."""
+    cylinder, roller = scene.shared_wear(*scene.wear_per_pass(list(contacts)))
+    return Increment(cylinder * passes, roller * passes)
+
+
+def _solve_all(
+    scene: Scene,
+    gap: FloatArray,
+    points: list[OperatingPoint],
+    compliance: FloatArray,
+    warm: tuple[ContactSolution, ...],
+) -> tuple[ContactSolution, ...]:
+    """Solve every realisation's coupled contacts; order as `WearState.contacts`."""
+    stations, rollers, realisations = scene.shape
+    curvature = scene.kinematics.longitudinal_curvature
+    solved: dict[tuple[int, ...], ContactSolution] = {}
+    flat = {index: number for number, index in enumerate(np.ndindex(scene.shape))}
+    for v in range(realisations):
+        members = [(s, r, v) for s, r in np.ndindex(stations, rollers)]
+        found = scene.model.solve_coupled(
+            np.array([gap[index] for index in members]),
+            curvature,
+            [points[flat[index]] for index in members],
+            compliance[v],
+            [warm[flat[index]] for index in members],
+        )
+        solved.update(zip(members, found, strict=True))
+    return tuple(solved[index] for index in np.ndindex(scene.shape))
+
+
+def _differs(new: FloatArray, old: FloatArray) -> float:
+    scale = float(np.abs(new).max())
+    return float(np.abs(new - old).max()) / scale if scale > 0.0 else 0.0
+
+
+def implicit_step(scene: Scene, state: WearState, passes: float) -> WearState:
+    """Step over `passes` passes with the contacts solved on the profiles at the step's end.
+
+    The wear of the step enters the contact problem as a compliance, so that no step is too long
+    for stability. Compliance, loads and creepage depend on the answer and are iterated.
+
+    Raises
+    ------
+    StepError
+        If they do not settle.
+    """
+    gap = scene.gap(state.cylinder_depth, state.roller_depth)
+    contacts = state.contacts
+    added = increment(scene, contacts, passes)
+    compliance = wear_compliance(scene, contacts, passes)
+    loads = _end_loads(scene, state, passes, added, contacts)
+    for iteration in range(1, MAX_FIXED_POINT + 1):
+        ends = state.cylinder_depth + added.cylinder, state.roller_depth + added.roller
+        points = operating_points(scene, loads, *ends)
+        contacts = _solve_all(scene, gap, points, compliance, contacts)
+        new_added = increment(scene, contacts, passes)
+        new_compliance = wear_compliance(scene, contacts, passes)
+        new_loads = _end_loads(scene, state, passes, new_added, contacts)
+        change = max(_differs(new_compliance, compliance), _differs(new_loads, loads))
+        if scene.slip_profile is not None:
+            change = max(change, _differs(new_added.cylinder, added.cylinder))
+        added, compliance, loads = new_added, new_compliance, new_loads
+        if change < FIXED_POINT_TOLERANCE:
+            solves = iteration * len(contacts)
+            return _completed(scene, state, passes, added, contacts, solves)
+    raise StepError(
+        f"an implicit step of {passes:.4g} passes from pass {state.passes:.0f} did not settle"
+        f" (last change {change:.1e})",
+        state.to_arrays(),
+    )
+
+
+def _end_loads(
+    scene: Scene,
+    state: WearState,
+    passes: float,
+    added: Increment,
+    contacts: tuple[ContactSolution, ...],
+) -> FloatArray:
+    end_gap = scene.gap(state.cylinder_depth + added.cylinder, state.roller_depth + added.roller)
+    return mean_loads(scene, state, passes, end_gap, contact_values(scene, contacts, "power"))
+
+
+def explicit_step(scene: Scene, state: WearState, passes: float) -> WearState:
+    """Step over `passes` passes at the wear rate of the step's start, then solve anew."""
+    added = increment(scene, state.contacts, passes)
+    cylinder_depth = state.cylinder_depth + added.cylinder
+    roller_depth = state.roller_depth + added.roller
+    worn = _completed(scene, state, passes, added, state.contacts, len(state.contacts))
+    loads = present_loads(scene, worn)
+    points = operating_points(scene, loads, cylinder_depth, roller_depth)
+    return replace(worn, contacts=solve_present(scene, worn, points))
+
+
+def present_loads(scene: Scene, state: WearState) -> FloatArray:
+    """Return the load of each contact at this moment, shape (S, R, N) [N]."""
+    loads = np.full(scene.shape, float(scene.load.force(np.array([scene.time(state.passes)]))[0]))
+    if scene.load.stiffness != 0.0:
+        gap = scene.gap(state.cylinder_depth, state.roller_depth)
+        loads -= scene.load.stiffness * scene.descent(gap)
+    for number in range(len(scene.terms)):
+        loads += state.terms[number]
+    return checked_loads(loads, state.passes)
+
+
+def solve_present(
+    scene: Scene, state: WearState, points: list[OperatingPoint]
+) -> tuple[ContactSolution, ...]:
+    """Solve every contact on the present profiles."""
+    gap = scene.gap(state.cylinder_depth, state.roller_depth)
+    batch = scene.model.solve_batch(
+        gap, scene.kinematics.longitudinal_curvature, points, None, list(state.contacts)
+    )
+    return tuple(batch.solutions)
+
+
+def _completed(
+    scene: Scene,
+    state: WearState,
+    passes: float,
+    added: Increment,
+    contacts: tuple[ContactSolution, ...],
+    solves: int,
+) -> WearState:
+    """Return the state after the step; energy is counted with the same dissipation as the wear."""
+    power = contact_values(scene, contacts, "power")
+    duration = scene.time(state.passes + passes) - scene.time(state.passes)
+    terms = np.array(
+        [
+            term.advance(state.terms[number], power.mean(axis=0), duration)
+            for number, term in enumerate(scene.terms.values())
+        ]
+    ).reshape(state.terms.shape)
+    return replace(
+        state,
+        passes=state.passes + passes,
+        cylinder_depth=state.cylinder_depth + added.cylinder,
+        roller_depth=state.roller_depth + added.roller,
+        terms=terms,
+        contacts=contacts,
+        energy=state.energy + scene.total_power(power) * (passes / scene.kinematics.pass_rate),
+        solves=state.solves + solves,
+    )
+
+
+def cylinder_depth_of(state: WearState) -> FloatArray:
+    """Return the greatest worn depth of the cylinder, shape (realisations,) [m]."""
+    greatest: FloatArray = depth(state.cylinder_depth).max(axis=(0, 1))
+    return greatest
+
+
+def cylinder_volume_of(scene: Scene, state: WearState) -> FloatArray:
+    """Return the cylinder's worn volume, shape (realisations,) [m^3]; stations share it equally."""
+    radius = scene.kinematics.cylinder_radius
+    volume = worn_volume(state.cylinder_depth, scene.grid.spacing, radius)
+    mean: FloatArray = volume.mean(axis=(0, 1))
+    return mean

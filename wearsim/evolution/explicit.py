@@ -1,0 +1,160 @@
+"""The explicit stepper: Euler's method, held under its limit of stability."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from wearsim.errors import StepError
+from wearsim.evolution.advance import (
+    cylinder_depth_of,
+    cylinder_volume_of,
+    explicit_step,
+    increment,
+)
+from wearsim.evolution.control import StepControl
+from wearsim.evolution.observables import oscillation
+from wearsim.evolution.scene import Scene
+from wearsim.evolution.state import WearState
+from wearsim.evolution.stepper import Advance, Stepper, fitted
+from wearsim.types import FloatArray
+
+SAFETY = 0.5  # of the limit of stability
+OSCILLATING = 0.1  # alternate strips differ by this part of the peak line load
+POWER_ITERATIONS = 12
+
+
+class ExplicitStepper(Stepper):
+    """Takes the wear rate of the step's start for the whole step.
+
+    A bump of height h changes the line load by -k h and wear then flattens it at the rate c k per
+    pass; the step must stay below 2/(c k) for the stiffest shape the strips can hold.
+
+    Parameters
+    ----------
+    control : StepControl
+        Step-size control; the limit of stability holds besides.
+    forced_step : float, optional
+        Passes per step, in place of the control's choice.
+    allow_unstable : bool
+        Let a forced step exceed the limit of stability.
+    """
+
+    def __init__(
+        self,
+        control: StepControl,
+        forced_step: float | None = None,
+        allow_unstable: bool = False,
+    ) -> None:
+        self.control = control
+        self.forced_step = forced_step
+        self.allow_unstable = allow_unstable
+
+    def advance(self, scene: Scene, state: WearState, stop: float) -> Advance:
+        """Take one step, under the limit of stability and within the tolerance."""
+        limit = stability_limit(scene, state)
+        left = stop - state.passes
+        proposed = self._proposal(state, limit)
+        rejected = state.rejected
+        while True:
+            step = min(proposed, left) if self.forced_step else fitted(proposed, left)
+            end = explicit_step(scene, state, step)
+            error, in_depth, in_volume = self._errors(scene, state, end, step)
+            if self.forced_step or self.control.accepts(error):
+                break
+            rejected += 1
+            proposed = min(self.control.next_step(step, error), 0.7 * step)
+        chosen = self.control.next_step(step, error)
+        end = replace(
+            end,
+            passes=stop if step == left else end.passes,
+            depth_error=state.depth_error + in_depth,
+            volume_error=state.volume_error + in_volume,
+            step=self.forced_step or (max(chosen, proposed) if step < proposed else chosen),
+            steps=state.steps + 1,
+            rejected=rejected,
+        )
+        return Advance(path=(state, end), warning=self._warning(end, step, limit))
+
+    def _proposal(self, state: WearState, limit: float) -> float:
+        if self.forced_step is None:
+            return min(state.step or np.inf, SAFETY * limit)
+        if self.forced_step > limit and not self.allow_unstable:
+            raise StepError(
+                f"a step of {self.forced_step:g} passes exceeds the limit of stability, which is"
+                f" {limit:.4g} passes at pass {state.passes:.0f}; lower evolution.step, set"
+                " evolution.stepper = 'implicit', or set evolution.allow_unstable = true to see"
+                " what happens",
+                state.to_arrays(),
+            )
+        return self.forced_step
+
+    @staticmethod
+    def _warning(end: WearState, step: float, limit: float) -> str | None:
+        worst = max(oscillation(contact.line_load) for contact in end.contacts)
+        if worst < OSCILLATING:
+            return None
+        return (
+            f"unstable: at pass {end.passes:.0f} the line load alternates from strip to strip by"
+            f" {worst:.0%} of its peak; the step of {step:.4g} passes is"
+            f" {step / limit:.2g} times the limit of stability"
+        )
+
+    @staticmethod
+    def _errors(
+        scene: Scene, start: WearState, end: WearState, step: float
+    ) -> tuple[float, FloatArray, FloatArray]:
+        """Return half the difference between Euler's step and one at the end's wear rate."""
+        again = increment(scene, end.contacts, step)
+        other = replace(
+            end,
+            cylinder_depth=start.cylinder_depth + again.cylinder,
+            roller_depth=start.roller_depth + again.roller,
+        )
+        grown = cylinder_depth_of(end) - cylinder_depth_of(start)
+        in_depth = 0.5 * np.abs(cylinder_depth_of(end) - cylinder_depth_of(other))
+        in_volume = 0.5 * np.abs(cylinder_volume_of(scene, end) - cylinder_volume_of(scene, other))
+        relative = [float(e / g) for e, g in zip(in_depth, grown, strict=True) if g > 0.0]
+        return max(relative, default=0.0), in_depth, in_volume
+
+
+def stability_limit(scene: Scene, state: WearState) -> float:
+    """Return the longest explicit step that is stable [passes].
+
+    Power iteration on the change of wear per pass that a change of the gap causes, from the
+    alternating shape that is nearly the stiffest; the sensitivity of the load comes from the model.
+
+    Returns
+    -------
+    float
+        2 over the greatest rate of decay, infinite where nothing wears.
+    """
+    gap = scene.gap(state.cylinder_depth, state.roller_depth)
+    curvature = scene.kinematics.longitudinal_curvature
+    cylinder, roller = scene.wear_per_pass(list(state.contacts))
+    greatest = 0.0
+    for number, index in enumerate(np.ndindex(scene.shape)):
+        contact = state.contacts[number]
+        s, r, v = index
+        point = scene.point(
+            r,
+            float(contact.line_load.sum() * scene.grid.spacing),
+            state.cylinder_depth[s, 0, v],
+            state.roller_depth[0, r, v],
+        )
+        loaded = contact.line_load > 0.0
+        wear = cylinder[index] + roller[index] * scene.kinematics.roller_share
+        ratio = np.where(loaded, wear / np.where(loaded, contact.line_load, 1.0), 0.0)
+        if not ratio.any():
+            continue
+        shape = np.where(loaded, (-1.0) ** np.arange(len(loaded)), 0.0)
+        rate = 0.0
+        for _ in range(POWER_ITERATIONS):
+            shape /= np.abs(shape).max()
+            fall = scene.model.load_sensitivity(contact, gap[index], curvature, point, shape)
+            new = ratio * fall
+            rate = float(np.dot(shape, new) / np.dot(shape, shape))
+            shape = new
+        greatest = max(greatest, rate)
+    return 2.0 / greatest if greatest > 0.0 else np.inf

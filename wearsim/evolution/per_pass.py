@@ -1,0 +1,195 @@
+"""The per-pass stepper: every roller pass by itself, the truth the others are measured against."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from wearsim.evolution.advance import operating_points, present_loads, solve_present
+from wearsim.evolution.scene import Scene
+from wearsim.evolution.state import WearState
+from wearsim.evolution.stepper import Advance, Stepper
+from wearsim.plugins import PassLoop
+from wearsim.types import ContactSolution, FloatArray, IntArray
+
+CHUNK = 20_000  # passes between looks at the clock, the user and the records
+SLOW_CHUNK = 200  # the same where the loop is not compiled
+
+
+class PerPassStepper(Stepper):
+    """Applies every roller pass by itself, in compiled code where the scene allows it.
+
+    The rollers take turns. Alike rollers that are merged share their profile: each pass by one of
+    them wears it by its share.
+    """
+
+    stops_at_records = True
+
+    def advance(self, scene: Scene, state: WearState, stop: float) -> Advance:
+        """Run the next passes, up to `stop`."""
+        compiled = is_compiled(scene)
+        chunk = CHUNK if compiled else SLOW_CHUNK
+        count = int(min(np.ceil(stop - state.passes), chunk))
+        run = _run_compiled if compiled else _run_in_python
+        end = run(scene, state, count)
+        end = replace(end, passes=state.passes + count, steps=state.steps + count)
+        loads = present_loads(scene, end)
+        points = operating_points(scene, loads, end.cylinder_depth, end.roller_depth)
+        # for the eye only: the loop itself goes on from what it carries
+        end = replace(end, contacts=solve_present(scene, end, points))
+        return Advance(path=(state, end))
+
+
+def is_compiled(scene: Scene) -> bool:
+    """Tell whether the model's compiled loop covers all that the scene asks for."""
+    linear = all(
+        scene.law.depth_per_dissipation(body, scene.kinematics.rolling_speed) is not None
+        for body in ("cylinder", "roller")
+    )
+    lags = all(term.lag() is not None for term in scene.terms.values())
+    prescribed = scene.bearing_torque is None
+    return scene.model.capabilities.pass_loop and linear and lags and prescribed
+
+
+def turn_order(scene: Scene) -> IntArray:
+    """Return which roller of the scene makes each pass of one turn, shape (physical rollers,)."""
+    multiplicity = scene.kinematics.multiplicity.astype(np.int64)
+    return np.repeat(np.arange(len(multiplicity), dtype=np.int64), multiplicity)
+
+
+def _pass_loads(scene: Scene, state: WearState, count: int) -> FloatArray:
+    """Return the load before feedback at the middle of each pass [N]."""
+    passes = state.passes + np.arange(count) + 0.5
+    return np.ascontiguousarray(scene.load.force(passes / scene.kinematics.pass_rate))
+
+
+def _term_rates(scene: Scene) -> FloatArray:
+    """Return each term's gain and, per roller, the part of the way to rest that a pass goes."""
+    kinematics = scene.kinematics
+    own_pass = kinematics.physical_rollers / kinematics.multiplicity / kinematics.pass_rate
+    rates = np.zeros((len(scene.terms), 1 + len(own_pass)))
+    for number, term in enumerate(scene.terms.values()):
+        gain, time_constant = term.lag() or (0.0, np.inf)
+        rates[number] = [gain, *-np.expm1(-own_pass / time_constant)]
+    return rates
+
+
+def _slip_base(scene: Scene) -> tuple[FloatArray, FloatArray]:
+    """Return the variation of creepage on unworn bodies, and what worn depth adds to it."""
+    kinematics = scene.kinematics
+    if scene.slip_profile is not None:
+        rates = np.array([1.0 / kinematics.roller_radius, 1.0 / kinematics.cylinder_radius])
+        return np.ascontiguousarray(scene.slip_profile), rates
+    spins = np.array([creepage.spin for creepage in scene.creepages])
+    return -spins[:, None] * scene.grid.y[None, :], np.zeros(2)
+
+
+def _wear_rates(scene: Scene) -> FloatArray:
+    """Return depth per pass and dissipation over V: the cylinder's, then each roller's."""
+    kinematics = scene.kinematics
+    speed = kinematics.rolling_speed
+    cylinder = scene.law.depth_per_dissipation("cylinder", speed) or 0.0
+    roller = scene.law.depth_per_dissipation("roller", speed) or 0.0
+    ratio = kinematics.cylinder_radius / kinematics.roller_radius
+    return speed * np.array([cylinder, *(roller * ratio / kinematics.multiplicity)])
+
+
+def _run_compiled(scene: Scene, state: WearState, count: int) -> WearState:
+    """Run `count` passes of every realisation in the model's compiled loop."""
+    shape = (*scene.shape, scene.grid.strips)
+    strips = state.loop_strips.copy() if state.loop_strips is not None else np.zeros((3, *shape))
+    approach = np.zeros((2, *scene.shape))
+    if state.loop_approach is not None:
+        approach = state.loop_approach.copy()
+    cylinder, roller = state.cylinder_depth.copy(), state.roller_depth.copy()
+    terms, energy = state.terms.copy(), state.energy.copy()
+    full_solves = state.full_solves
+    slip_base, slip_rates = _slip_base(scene)
+    for v in range(scene.shape[2]):
+        loop = PassLoop(
+            order=turn_order(scene),
+            first_pass=int(state.passes),
+            base_load=_pass_loads(scene, state, count),
+            stiffness=scene.load.stiffness,
+            nominal_gap=np.ascontiguousarray(scene.nominal_gap[0, :, v]),
+            longitudinal_curvature=scene.kinematics.longitudinal_curvature,
+            rolling_speed=scene.kinematics.rolling_speed,
+            creepage=np.array([[c.longitudinal, c.lateral] for c in scene.creepages]),
+            slip_base=slip_base,
+            slip_rates=slip_rates,
+            friction=np.full(scene.grid.strips, scene.friction),
+            wear=_wear_rates(scene),
+            term_rates=_term_rates(scene),
+            terms=np.ascontiguousarray(terms[:, :, v]),
+            cylinder_depth=np.ascontiguousarray(cylinder[0, 0, v]),
+            roller_depth=np.ascontiguousarray(roller[0, :, v]),
+            line_load=np.ascontiguousarray(strips[0, 0, :, v]),
+            anchor=np.ascontiguousarray(strips[1, 0, :, v]),
+            anchor_gap=np.ascontiguousarray(strips[2, 0, :, v]),
+            approach=np.ascontiguousarray(approach[0, 0, :, v]),
+            anchor_approach=np.ascontiguousarray(approach[1, 0, :, v]),
+            energy=np.zeros(scene.shape[1]),
+        )
+        full_solves += scene.model.pass_loop(loop)
+        terms[:, :, v] = loop.terms
+        cylinder[0, 0, v], roller[0, :, v] = loop.cylinder_depth, loop.roller_depth
+        strips[:, 0, :, v] = loop.line_load, loop.anchor, loop.anchor_gap
+        approach[:, 0, :, v] = loop.approach, loop.anchor_approach
+        # every physical roller dissipates all the time, one pass per turn of the cylinder
+        turn = scene.kinematics.physical_rollers / scene.kinematics.pass_rate
+        energy[v] += float(loop.energy.sum()) * turn
+    return replace(
+        state,
+        cylinder_depth=cylinder,
+        roller_depth=roller,
+        terms=terms,
+        energy=energy,
+        full_solves=full_solves,
+        solves=state.solves + count * scene.shape[2],
+        loop_strips=strips,
+        loop_approach=approach,
+    )
+
+
+def _run_in_python(scene: Scene, state: WearState, count: int) -> WearState:
+    """Run `count` passes by solving every one in full: slow, and right for any plugin."""
+    kinematics = scene.kinematics
+    order, loads = turn_order(scene), _pass_loads(scene, state, count)
+    cylinder, roller = state.cylinder_depth.copy(), state.roller_depth.copy()
+    terms, energy = state.terms.copy(), state.energy.copy()
+    contacts: dict[tuple[int, ...], ContactSolution] = dict(
+        zip(np.ndindex(scene.shape), state.contacts, strict=True)
+    )
+    turn = kinematics.physical_rollers / kinematics.pass_rate
+    for number in range(count):
+        r = int(order[(int(state.passes) + number) % len(order)])
+        own_pass = turn / float(kinematics.multiplicity[r])
+        for s, _, v in np.ndindex((scene.shape[0], 1, scene.shape[2])):
+            gap = scene.nominal_gap[s, r, v] + cylinder[s, 0, v] + roller[0, r, v]
+            load = float(loads[number]) + float(terms[:, r, v].sum())
+            load -= scene.load.stiffness * float(gap.min() - scene.nominal_gap[s, r, v].min())
+            point = scene.point(r, load, cylinder[s, 0, v], roller[0, r, v])
+            contact = scene.model.solve(
+                gap, kinematics.longitudinal_curvature, point, None, contacts[s, r, v]
+            )
+            contacts[s, r, v] = contact
+            speed = kinematics.rolling_speed
+            ratio = kinematics.cylinder_radius / kinematics.roller_radius
+            ratio /= float(kinematics.multiplicity[r]) * scene.shape[0]
+            cylinder[s, 0, v] += scene.law.depth_per_pass("cylinder", contact, speed)
+            roller[0, r, v] += ratio * scene.law.depth_per_pass("roller", contact, speed)
+            energy[v] += contact.power * turn / scene.shape[0]
+            power = np.array([contact.power])
+            for t, term in enumerate(scene.terms.values()):
+                terms[t, r, v] = term.advance(terms[t, r : r + 1, v], power, own_pass)[0]
+    return replace(
+        state,
+        cylinder_depth=cylinder,
+        roller_depth=roller,
+        terms=terms,
+        energy=energy,
+        contacts=tuple(contacts[index] for index in np.ndindex(scene.shape)),
+        full_solves=state.full_solves + count * scene.shape[2] * scene.shape[0],
+        solves=state.solves + count * scene.shape[2] * scene.shape[0],
+    )

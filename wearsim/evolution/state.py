@@ -1,0 +1,147 @@
+"""The state of a wear test: everything that evolves, and so exactly what a checkpoint holds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+
+import numpy as np
+import numpy.typing as npt
+
+from wearsim.evolution.scene import Scene
+from wearsim.types import ContactSolution, FloatArray
+
+_CONTACT = "contact_"
+_SHADOW = "shadow_"
+_SCALARS = ("passes", "step", "steps", "rejected", "solves", "full_solves")
+
+
+@dataclass(frozen=True)
+class WearState:
+    """A wear test after some roller passes.
+
+    Leading axes are (station, roller, realisation); a profile has length one where it is shared.
+
+    Parameters
+    ----------
+    passes : float
+        Roller passes done, all rollers together.
+    cylinder_depth : ndarray, shape (stations, 1, realisations, strips)
+        Worn depth of the cylinder [m].
+    roller_depth : ndarray, shape (1, rollers, realisations, strips)
+        Worn depth of each roller [m].
+    terms : ndarray, shape (terms, rollers, realisations)
+        State of each load term.
+    contacts : tuple of ContactSolution
+        The last solution of every contact.
+    energy : ndarray, shape (realisations,)
+        Dissipated energy of all rollers [J].
+    depth_error, volume_error : ndarray, shape (realisations,)
+        Estimated error of depth [m] and of the cylinder's worn volume [m^3] so far.
+    step : float
+        Passes the step-size control proposes next; 0 where it has yet to choose.
+    steps, rejected, solves, full_solves : int
+        Steps taken and refused, contact solves, and passes solved in full.
+    loop_strips : ndarray, shape (3, stations, rollers, realisations, strips), optional
+        What the compiled per-pass loop carries: line load, and the line load [N/m] and gap [m]
+        where the factorisation in use was made.
+    loop_approach : ndarray, shape (2, stations, rollers, realisations), optional
+        Approach now, and there [m].
+    shadow : WearState, optional
+        The same test stepped twice as coarsely; what sets the two apart is the error estimate.
+    """
+
+    passes: float
+    cylinder_depth: FloatArray
+    roller_depth: FloatArray
+    terms: FloatArray
+    contacts: tuple[ContactSolution, ...]
+    energy: FloatArray
+    depth_error: FloatArray
+    volume_error: FloatArray
+    step: float = 0.0
+    steps: int = 0
+    rejected: int = 0
+    solves: int = 0
+    full_solves: int = 0
+    loop_strips: FloatArray | None = None
+    loop_approach: FloatArray | None = None
+    shadow: WearState | None = None
+
+    def to_arrays(self) -> dict[str, npt.NDArray[np.generic]]:
+        """Return the whole state as named arrays, for a checkpoint."""
+        arrays: dict[str, npt.NDArray[np.generic]] = {
+            item.name: np.asarray(getattr(self, item.name))
+            for item in fields(self)
+            if item.name not in {"contacts", "shadow"} and getattr(self, item.name) is not None
+        }
+        for item in fields(ContactSolution):
+            stacked = np.array([getattr(contact, item.name) for contact in self.contacts])
+            arrays[_CONTACT + item.name] = stacked
+        if self.shadow is not None:
+            arrays.update({_SHADOW + name: a for name, a in self.shadow.to_arrays().items()})
+        return arrays
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, npt.NDArray[np.generic]]) -> WearState:
+        """Rebuild a state from what `to_arrays` returned."""
+        values: dict[str, object] = {}
+        shadow = {n[len(_SHADOW) :]: a for n, a in arrays.items() if n.startswith(_SHADOW)}
+        if shadow:
+            values["shadow"] = cls.from_arrays(shadow)
+        arrays = {name: a for name, a in arrays.items() if not name.startswith(_SHADOW)}
+        for name, array in arrays.items():
+            if name in _SCALARS:
+                values[name] = array.item()
+            elif not name.startswith(_CONTACT):
+                values[name] = np.array(array)
+        contact = {
+            name[len(_CONTACT) :]: array
+            for name, array in arrays.items()
+            if name.startswith(_CONTACT)
+        }
+        count = len(contact["power"])
+        values["contacts"] = tuple(
+            ContactSolution(**{name: _unpack(column[k]) for name, column in contact.items()})
+            for k in range(count)
+        )
+        return cls(**values)  # type: ignore[arg-type]
+
+
+def _unpack(value: npt.NDArray[np.generic] | np.generic) -> object:
+    return value.item() if value.ndim == 0 else np.array(value)
+
+
+def contact_values(scene: Scene, contacts: tuple[ContactSolution, ...], name: str) -> FloatArray:
+    """Return the field `name` of all contacts with the leading axes (station, roller, realisation)."""
+    values = np.array([getattr(contact, name) for contact in contacts])
+    return values.reshape(scene.shape + values.shape[1:])
+
+
+def fresh_state(scene: Scene) -> WearState:
+    """Solve the fresh contacts and return the state before the first pass."""
+    stations, rollers, realisations = scene.shape
+    n = scene.grid.strips
+    cylinder_depth = np.zeros((stations, 1, realisations, n))
+    roller_depth = np.zeros((1, rollers, realisations, n))
+    terms = np.zeros((len(scene.terms), rollers, realisations))
+    load = float(scene.load.force(np.zeros(1))[0])
+    contacts = []
+    for index in np.ndindex(scene.shape):
+        point = scene.point(index[1], load, np.zeros(n), np.zeros(n))
+        contacts.append(
+            scene.model.solve(
+                scene.nominal_gap[index], scene.kinematics.longitudinal_curvature, point
+            )
+        )
+    return WearState(
+        passes=0.0,
+        cylinder_depth=cylinder_depth,
+        roller_depth=roller_depth,
+        terms=terms,
+        contacts=tuple(contacts),
+        energy=np.zeros(realisations),
+        depth_error=np.zeros(realisations),
+        volume_error=np.zeros(realisations),
+        solves=len(contacts),
+    )

@@ -1,0 +1,238 @@
+"""FASTSIM as a tangential theory, on the strips of any normal contact."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from wearsim.errors import ContactError
+from wearsim.mechanics.elasticity import ElasticPair
+from wearsim.mechanics.fastsim import closed_form, element_sum, march, march_fields
+from wearsim.mechanics.hertz import HertzContact
+from wearsim.mechanics.kalker import (
+    CreepageCoefficients,
+    Flexibilities,
+    creepage_coefficients,
+    flexibilities,
+    line_limit_coefficients,
+)
+from wearsim.models.tangential import LocalSlip, Strips, TangentialTheory, Tractions
+from wearsim.types import ContactFields, FloatArray
+
+Bound: TypeAlias = Literal["parabolic", "elliptic"]
+Dissipation: TypeAlias = Literal["rigid-slip", "element-sum"]
+Kalker: TypeAlias = Literal["table", "line-limit"]
+
+
+@dataclass(frozen=True)
+class EllipseStrips(Strips):
+    """Strips cut from a Hertzian ellipse, which FASTSIM can then treat as Kalker did.
+
+    `half_length` holds a(y) at the middle of the covered part of each strip, and `line_load` the
+    mean of q(y) over the whole strip.
+
+    Parameters
+    ----------
+    ellipse : HertzContact
+        The patch.
+    from_centre : ndarray, shape (strips,)
+        Distance of the middle of each strip's covered part from the patch's centre [m].
+    coverage : ndarray, shape (strips,)
+        Part of each strip that the patch covers, 0 to 1; sums over a strip are weighted with it.
+    """
+
+    ellipse: HertzContact
+    from_centre: FloatArray
+    coverage: FloatArray
+
+
+def equivalent_ellipse(strips: Strips) -> tuple[float, float]:
+    """Return the semi-axes a and b [m] of the ellipse whose flexibilities the strips get.
+
+    Its half-length a is the greatest of the strips', and its area is theirs: b = area/(pi a). So
+    b changes smoothly as strips come into contact, and a gap between two patches counts for
+    nothing. An ellipse gives itself.
+    """
+    if isinstance(strips, EllipseStrips):
+        return strips.ellipse.a, strips.ellipse.b
+    a = float(strips.half_length.max())
+    area = 2.0 * float(strips.half_length.sum()) * strips.spacing
+    return a, area / (math.pi * a)
+
+
+class FastsimTheory(TangentialTheory):
+    """Kalker's simplified theory with its three flexibilities.
+
+    Parameters
+    ----------
+    bound : {"parabolic", "elliptic"}
+        Traction bound along rolling. On an ellipse the parabolic one is Kalker's
+        ``2N/(pi a b) (1 - x^2/a^2 - y^2/b^2)`` and the elliptic one Hertz's; on other strips each
+        carries the strip's own line load.
+    mx : int
+        Points along each strip.
+    dissipation : {"rigid-slip", "element-sum"}
+        Work of the rigid slip, second order in 1/mx, or the textbook's sum over elements, first
+        order and low.
+    kalker : {"table", "line-limit"}
+        Kalker's table, or its limits for a contact that is long across rolling.
+    coefficients : CreepageCoefficients, optional
+        Coefficients to use in place of either.
+    use_closed_form : bool
+        Whether the exact integral replaces the march where the spin is zero and the dissipation is
+        the work of the rigid slip.
+
+    Notes
+    -----
+    Kalker (1982), DOI 10.1080/00423118208968684.
+    """
+
+    def __init__(
+        self,
+        bound: Bound = "parabolic",
+        mx: int = 50,
+        dissipation: Dissipation = "rigid-slip",
+        kalker: Kalker = "table",
+        coefficients: CreepageCoefficients | None = None,
+        use_closed_form: bool = True,
+    ) -> None:
+        self.elliptic = bound == "elliptic"
+        self.mx = mx
+        self.element_sum = dissipation == "element-sum"
+        self.kalker = kalker
+        self.coefficients = coefficients
+        self.use_closed_form = use_closed_form
+
+    def flexibilities(self, strips: Strips, pair: ElasticPair) -> Flexibilities:
+        """Return L1, L2 and L3 of the strips' equivalent ellipse.
+
+        Raises
+        ------
+        ContactError
+            If the limit of a long contact is asked for where it means nothing.
+        """
+        a, b = equivalent_ellipse(strips)
+        found = self.coefficients
+        if found is None and self.kalker == "table":
+            found = creepage_coefficients(a / b, pair.poisson_ratio)
+        elif found is None:
+            try:
+                found = line_limit_coefficients(a / b, pair.poisson_ratio)
+            except ValueError as error:
+                raise ContactError(
+                    f"{error}; use kalker = 'table'", {"half_length": strips.half_length}
+                ) from error
+        return flexibilities(found, a, b, pair.shear_modulus)
+
+    def tractions(
+        self,
+        strips: Strips,
+        pair: ElasticPair,
+        slip: LocalSlip,
+        friction: FloatArray,
+        rolling_speed: float,
+    ) -> Tractions:
+        """Return the tractions for a local slip; strips outside the contact cost nothing."""
+        part = _touching(strips)
+        flexibility = self.flexibilities(strips, pair)
+        problem = self._problem(strips, flexibility, slip, friction, part)
+        out = np.zeros((5, len(strips.y)))
+        if self.use_closed_form and slip.spin == 0.0 and not self.element_sum:
+            out[:4, part] = closed_form(*problem[:5])
+        else:
+            out[:4, part] = march(*problem, self.mx)
+        force_x, force_y, moment, adhesion, dissipation = out
+        if self.element_sum:
+            fields = march_fields(*problem, self.mx)
+            dissipation[part] = element_sum(
+                fields, flexibility.longitudinal, flexibility.lateral, rolling_speed
+            )
+        else:
+            work = slip.longitudinal * force_x + slip.lateral * force_y + slip.spin * moment
+            dissipation[:] = -rolling_speed * work
+        if isinstance(strips, EllipseStrips):
+            out[[0, 1, 2, 4]] *= strips.coverage
+        return Tractions(force_x, force_y, moment, dissipation, adhesion)
+
+    def fields(
+        self,
+        strips: Strips,
+        pair: ElasticPair,
+        slip: LocalSlip,
+        friction: FloatArray,
+        rolling_speed: float,
+        points_along: int,
+    ) -> ContactFields:
+        """Return traction and slip inside the contact; `pressure` is the one of the bound.
+
+        Slip at a point is that of the step which ends there, and its elastic part takes L1 along
+        rolling and L2 across it, so that it is zero where the surfaces adhere.
+        """
+        flexibility = self.flexibilities(strips, pair)
+        everywhere = slice(0, len(strips.y))
+        problem = self._problem(strips, flexibility, slip, friction, everywhere)
+        steps = points_along - 1
+        traction_x, traction_y, cut_x, cut_y = march_fields(*problem, steps)[:, ::-1]
+        a = strips.half_length
+        inside = a > 0.0
+        place = np.linspace(-1.0, 1.0, points_along)[:, None]
+        shape = np.maximum((1.0 - place) * (1.0 + place), 0.0)
+        step = np.where(inside, 2.0 * a / steps, 1.0)
+        slip_x = -cut_x * flexibility.longitudinal / step
+        slip_y = -cut_y * flexibility.lateral / step
+        # the march starts at the leading edge with nothing cut off: what the first step finds
+        # holds there too
+        slip_x[-1], slip_y[-1] = slip_x[-2], slip_y[-2]
+        return ContactFields(
+            x=place * a,
+            y=strips.y,
+            pressure=self._peak(strips) * (np.sqrt(shape) if self.elliptic else shape),
+            traction_x=traction_x,
+            traction_y=traction_y,
+            slip_x=slip_x,
+            slip_y=slip_y,
+            adhesion=inside & (slip_x == 0.0) & (slip_y == 0.0),
+            power_density=-rolling_speed * (traction_x * slip_x + traction_y * slip_y),
+        )
+
+    def _problem(
+        self,
+        strips: Strips,
+        flexibility: Flexibilities,
+        slip: LocalSlip,
+        friction: FloatArray,
+        part: slice,
+    ) -> tuple[FloatArray, FloatArray, bool, FloatArray, float, float]:
+        """Return what the kernels take, for the strips of `part`."""
+        mean = slip.longitudinal - slip.spin_part
+        gradient_x = mean / flexibility.longitudinal + slip.spin_part / flexibility.spin
+        return (
+            np.ascontiguousarray(strips.half_length[part]),
+            np.ascontiguousarray((friction * self._peak(strips))[part]),
+            self.elliptic,
+            np.ascontiguousarray(gradient_x[part]),
+            float(slip.lateral / flexibility.lateral),
+            float(slip.spin / flexibility.spin),
+        )
+
+    def _peak(self, strips: Strips) -> FloatArray:
+        """Return the pressure of the traction bound at x = 0, shape (strips,) [Pa]."""
+        if isinstance(strips, EllipseStrips):
+            patch = strips.ellipse
+            t = strips.from_centre / patch.b
+            section = np.where(strips.coverage > 0.0, np.maximum((1.0 - t) * (1.0 + t), 0.0), 0.0)
+            if self.elliptic:
+                return patch.peak_pressure * np.sqrt(section)
+            return 2.0 * patch.normal_force / (math.pi * patch.a * patch.b) * section
+        inside = strips.half_length > 0.0
+        mean = strips.line_load / np.where(inside, strips.half_length, 1.0)
+        return np.where(inside, (2.0 / math.pi if self.elliptic else 0.75) * mean, 0.0)
+
+
+def _touching(strips: Strips) -> slice:
+    """Return the strips from the first to the last in contact."""
+    inside = np.flatnonzero(strips.half_length > 0.0)
+    return slice(int(inside[0]), int(inside[-1]) + 1)

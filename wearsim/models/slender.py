@@ -1,0 +1,272 @@
+"""The contact model `slender`: line-contact strips on any gap profile, any tangential theory."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from wearsim.errors import ContactError
+from wearsim.mechanics import slender as kernels
+from wearsim.mechanics.elasticity import ElasticPair, combine
+from wearsim.mechanics.hertz import hertz
+from wearsim.mechanics.influence import HIGHEST, influence_table
+from wearsim.models.strip_theory import StripTheory
+from wearsim.models.tangential import (
+    Strips,
+    TangentialTheory,
+    complete,
+    friction_per_strip,
+    local_slip,
+)
+from wearsim.plugins import Capabilities, ContactModel, ContactModelSpec, Options, PassLoop
+from wearsim.types import (
+    ContactFields,
+    ContactSolution,
+    FloatArray,
+    Grid,
+    Material,
+    OperatingPoint,
+)
+
+_REMEDY = {
+    kernels.SINGULAR: "its equations are singular: are the gap, the load and the materials sound?",
+    kernels.TOO_FINE: (
+        f"a half-length exceeds {np.exp(HIGHEST):.0f} strip widths: lower contact.strips"
+    ),
+    kernels.NO_CONVERGENCE: "Newton's method did not settle on the strips in contact",
+    kernels.NOT_FINITE: "a value is not finite",
+}
+
+
+class SlenderOptions(Options):
+    """Options of the contact model `slender`."""
+
+    tangential: Literal["strip", "fastsim"] = Field(
+        "strip", description="tangential theory: closed-form strips, or a FASTSIM march"
+    )
+    mx: int = Field(50, ge=1, description="points along rolling of a FASTSIM march")
+    bound: Literal["parabolic", "elliptic"] = Field(
+        "elliptic", description="traction bound of a FASTSIM march"
+    )
+
+
+class Slender(ContactModel):
+    """Strips pressed together as lines (Kalker 1972), on any profile, with any wear compliance."""
+
+    capabilities = Capabilities(
+        wear_compliance=True,
+        coupled=True,
+        creepage_variation=True,
+        bearing_torque=True,
+        local_friction=True,
+        pass_loop=True,
+        fields=True,
+    )
+
+    def __init__(self, theory: TangentialTheory) -> None:
+        self.theory = theory
+        if not isinstance(theory, StripTheory):
+            self.capabilities = replace(self.capabilities, pass_loop=False)
+
+    def prepare(self, grid: Grid, materials: tuple[Material, Material]) -> None:
+        """Tabulate the influence of one strip on another."""
+        self._grid = grid
+        self._pair: ElasticPair = combine(*materials)
+        self._table = influence_table(grid.strips)
+
+    def suggest_grid(
+        self,
+        gap_curvature: float,
+        longitudinal_curvature: float,
+        normal_force: float,
+        materials: tuple[Material, Material],
+    ) -> Grid | None:
+        """Return 121 strips over 1.2 times the width of the Hertzian patch."""
+        modulus = combine(*materials).contact_modulus
+        patch = hertz(0.5 * longitudinal_curvature, 0.5 * gap_curvature, normal_force, modulus)
+        return Grid.spanning(-1.2 * patch.b, 1.2 * patch.b, 121)
+
+    def solve(
+        self,
+        gap: FloatArray,
+        longitudinal_curvature: float,
+        point: OperatingPoint,
+        wear_compliance: FloatArray | None = None,
+        warm: ContactSolution | None = None,
+    ) -> ContactSolution:
+        """Solve one contact."""
+        compliance = np.zeros_like(gap) if wear_compliance is None else wear_compliance
+        return self.solve_coupled(
+            gap[None, :],
+            longitudinal_curvature,
+            [point],
+            compliance[None, None, :],
+            None if warm is None else [warm],
+        )[0]
+
+    def solve_coupled(
+        self,
+        gap: FloatArray,
+        longitudinal_curvature: float,
+        points: Sequence[OperatingPoint],
+        wear_compliance: FloatArray,
+        warm: Sequence[ContactSolution] | None = None,
+    ) -> list[ContactSolution]:
+        """Solve several contacts that wear a profile they share, all at once."""
+        line_load = np.zeros(gap.shape)
+        approach = np.zeros(len(points))
+        if warm is not None:
+            line_load[:] = [solution.line_load for solution in warm]
+            approach[:] = [solution.approach for solution in warm]
+        loads = np.array([point.normal_force for point in points])
+        arguments = (
+            np.ascontiguousarray(gap),
+            np.ascontiguousarray(wear_compliance),
+            loads,
+            self._grid.spacing,
+            self._pair.contact_modulus,
+            longitudinal_curvature,
+            self._table,
+        )
+        status, iterations = kernels.solve_slender(*arguments, line_load, approach)
+        if status != kernels.CONVERGED and warm is not None:
+            # a start from far away can mislead Newton; the foundation's guess is always near
+            line_load[:] = 0.0
+            status, iterations = kernels.solve_slender(*arguments, line_load, approach)
+        self._check(status, gap, loads, line_load, approach)
+        return [
+            self._complete(line_load[k], approach[k], iterations, longitudinal_curvature, point)
+            for k, point in enumerate(points)
+        ]
+
+    def _check(
+        self,
+        status: int,
+        gap: FloatArray,
+        loads: FloatArray,
+        line_load: FloatArray,
+        approach: FloatArray,
+    ) -> None:
+        state = {"gap": gap, "line_load": line_load, "approach": approach, "normal_force": loads}
+        if status != kernels.CONVERGED:
+            raise ContactError(f"the slender contact failed: {_REMEDY[status]}", state)
+        at_edge = (line_load[:, 0] > 0.0) | (line_load[:, -1] > 0.0)
+        if self._grid.strips > 2 and at_edge.any():
+            y = self._grid.y
+            raise ContactError(
+                f"the contact reaches the edge of its strips, which span {y[0] * 1e3:.4g} to"
+                f" {y[-1] * 1e3:.4g} mm; raise contact.width or move contact.centre",
+                state,
+            )
+
+    def _strips(
+        self, line_load: FloatArray, approach: float, iterations: int, curvature: float
+    ) -> Strips:
+        modulus = self._pair.contact_modulus
+        half_length = np.sqrt(4.0 * line_load / (np.pi * modulus * curvature))
+        return Strips(
+            y=self._grid.y,
+            half_length=half_length,
+            line_load=line_load,
+            spacing=self._grid.spacing,
+            longitudinal_curvature=curvature,
+            approach=float(approach),
+            peak_pressure=0.5 * modulus * curvature * float(half_length.max()),
+            iterations=iterations,
+        )
+
+    def _complete(
+        self,
+        line_load: FloatArray,
+        approach: float,
+        iterations: int,
+        curvature: float,
+        point: OperatingPoint,
+    ) -> ContactSolution:
+        strips = self._strips(line_load, approach, iterations, curvature)
+        return complete(self.theory, strips, self._pair, point)
+
+    def pass_loop(self, loop: PassLoop) -> int:
+        """Run roller passes in compiled code; strip theory only."""
+        from wearsim.mechanics import slender_pass  # noqa: PLC0415  (slow to load, rarely needed)
+
+        status, done, full_solves = slender_pass.run_passes(
+            loop.order,
+            loop.first_pass,
+            loop.base_load,
+            np.array([loop.stiffness]),
+            loop.terms,
+            loop.term_rates,
+            loop.nominal_gap,
+            loop.nominal_gap.min(axis=1),
+            self._grid.spacing,
+            loop.rolling_speed,
+            loop.longitudinal_curvature,
+            np.array([self._pair.contact_modulus, self._pair.shear_modulus]),
+            self._table,
+            loop.creepage,
+            loop.slip_base,
+            loop.slip_rates,
+            loop.friction,
+            loop.wear,
+            loop.cylinder_depth,
+            loop.roller_depth,
+            loop.line_load,
+            loop.approach,
+            loop.anchor,
+            loop.anchor_gap,
+            loop.anchor_approach,
+            loop.energy,
+        )
+        gap = loop.nominal_gap + loop.cylinder_depth + loop.roller_depth
+        if status == slender_pass.LOST:
+            raise ContactError(
+                f"contact is lost at pass {loop.first_pass + done}: the load is not positive",
+                {"line_load": loop.line_load, "gap": gap},
+            )
+        loads = loop.line_load.sum(axis=1) * self._grid.spacing
+        self._check(status, gap, loads, loop.line_load, loop.approach)
+        return int(full_solves)
+
+    def fields(
+        self,
+        solution: ContactSolution,
+        gap: FloatArray,
+        longitudinal_curvature: float,
+        point: OperatingPoint,
+        points_along: int = 101,
+    ) -> ContactFields:
+        """Return tractions and slip inside a solved contact."""
+        strips = self._strips(
+            solution.line_load, solution.approach, solution.iterations, longitudinal_curvature
+        )
+        slip = local_slip(strips, point, solution.longitudinal_creepage)
+        friction = friction_per_strip(strips, point)
+        return self.theory.fields(
+            strips, self._pair, slip, friction, point.rolling_speed, points_along
+        )
+
+
+def _build(options: SlenderOptions) -> Slender:
+    if options.tangential == "strip":
+        return Slender(StripTheory())
+    from wearsim.models.fastsim_theory import FastsimTheory  # noqa: PLC0415
+
+    return Slender(FastsimTheory(mx=options.mx, bound=options.bound))
+
+
+SPEC = ContactModelSpec(
+    name="slender",
+    factory=_build,
+    options=SlenderOptions,
+    capabilities=Slender.capabilities,
+    summary="line-contact strips on any profile, closed-form strip theory; the default for replays",
+    references=(
+        "Kalker, On elastic line contact, J. Appl. Mech. 39 (1972), DOI 10.1115/1.3422842",
+        "Carter, Proc. R. Soc. A 112 (1926), DOI 10.1098/rspa.1926.0100",
+    ),
+)

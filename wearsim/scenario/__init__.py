@@ -1,0 +1,36 @@
+"""A scenario: TOML with units, validated as a whole, frozen, in SI."""
+
+from wearsim.scenario.bodies import Cylinder, Roller, read_profile
+from wearsim.scenario.choices import ContactChoice, LoadChoice, TermChoice, WearChoice
+from wearsim.scenario.overrides import parse_override
+from wearsim.scenario.reading import load_scenario, parse_scenario
+from wearsim.scenario.scenario import Scenario, require_run
+from wearsim.scenario.schema import scenario_schema
+from wearsim.scenario.sections import (
+    CreepageTable,
+    EvolutionTable,
+    FrictionTable,
+    OperationTable,
+    OutputsTable,
+)
+
+__all__ = [
+    "ContactChoice",
+    "CreepageTable",
+    "Cylinder",
+    "EvolutionTable",
+    "FrictionTable",
+    "LoadChoice",
+    "OperationTable",
+    "OutputsTable",
+    "Roller",
+    "Scenario",
+    "TermChoice",
+    "WearChoice",
+    "load_scenario",
+    "parse_override",
+    "parse_scenario",
+    "read_profile",
+    "require_run",
+    "scenario_schema",
+]

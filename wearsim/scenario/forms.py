@@ -1,0 +1,96 @@
+"""How the fields of an options model are written, in words for messages."""
+
+from __future__ import annotations
+
+import types
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_origin
+
+from annotated_types import Ge, Gt, Le, Lt
+from pydantic import BaseModel, PlainValidator
+
+from wearsim.quantities import Quantity, shown
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from pydantic.fields import FieldInfo
+
+
+def _parts(annotation: Any) -> list[Any]:
+    """Return the alternatives that an annotation allows, without None."""
+    if get_origin(annotation) in {Union, types.UnionType}:
+        return [part for item in get_args(annotation) for part in _parts(item)]
+    return [] if annotation is type(None) else [annotation]
+
+
+def _alternatives(field: FieldInfo) -> list[Any]:
+    inputs = [item for item in field.metadata if isinstance(item, PlainValidator)]
+    return _parts(inputs[0].json_schema_input_type if inputs else field.annotation)
+
+
+def model_at(model: type[BaseModel], loc: Sequence[str | int]) -> type[BaseModel] | None:
+    """Return the model that stands at a location within `model`."""
+    if not loc:
+        return model
+    field = field_at(model, loc)
+    found = [part for part in _alternatives(field) if _is_model(part)] if field else []
+    return found[0] if found else None
+
+
+def _is_model(part: Any) -> bool:
+    return isinstance(part, type) and issubclass(part, BaseModel)
+
+
+def field_at(model: type[BaseModel], loc: Sequence[str | int]) -> FieldInfo | None:
+    """Return the field that a location within `model` means."""
+    names = [part for part in loc if isinstance(part, str)]
+    if not names:
+        return None
+    owner = model_at(model, names[:-1])
+    return owner.model_fields.get(names[-1]) if owner else None
+
+
+def choices(field: FieldInfo | None) -> list[str]:
+    """Return the words that a field can be."""
+    parts = _alternatives(field) if field else []
+    return [str(item) for part in parts if get_origin(part) is Literal for item in get_args(part)]
+
+
+def form(field: FieldInfo) -> str | None:
+    """Return the form in which a field is written, such as "a whole number of at least 1"."""
+    for item in field.metadata:
+        if isinstance(item, Quantity):
+            return item.expected
+    forms = [_form(part) for part in _alternatives(field)]
+    known = list(dict.fromkeys(text for text in forms if text))
+    return " or ".join(known) + _limits(field.metadata) if known else None
+
+
+def _form(part: Any) -> str | None:
+    if get_origin(part) is Annotated:
+        marks = [item for item in part.__metadata__ if isinstance(item, Quantity)]
+        return marks[0].expected if marks else _form(get_args(part)[0])
+    if get_origin(part) is Literal:
+        return "one of " + ", ".join(shown(item) for item in get_args(part))
+    if _is_model(part):
+        return "a table"
+    names = {float: "a number", int: "a whole number", bool: "true or false", str: "text"}
+    return names.get(part)
+
+
+def _plain(limit: Any) -> str:
+    return f"{limit:g}" if isinstance(limit, float) else str(limit)
+
+
+def _limits(metadata: Sequence[Any]) -> str:
+    words = []
+    for item in metadata:
+        if isinstance(item, Gt):
+            words.append(f"above {_plain(item.gt)}")
+        elif isinstance(item, Ge):
+            words.append(f"of at least {_plain(item.ge)}")
+        elif isinstance(item, Lt):
+            words.append(f"below {_plain(item.lt)}")
+        elif isinstance(item, Le):
+            words.append(f"at most {_plain(item.le)}")
+    return f" {' and '.join(words)}" if words else ""

@@ -1,0 +1,140 @@
+"""The scenario: frozen, validated, in SI, with the text and files it came from."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import PurePath
+
+from wearsim.errors import Problem, ScenarioError
+from wearsim.scenario.bodies import Cylinder, Roller
+from wearsim.scenario.choices import ContactChoice, LoadChoice, WearChoice
+from wearsim.scenario.sections import (
+    CreepageTable,
+    EvolutionTable,
+    FrictionTable,
+    OperationTable,
+    OutputsTable,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Scenario:
+    """Everything that is asked of a run, in SI.
+
+    Parameters
+    ----------
+    file : str
+        Where the scenario came from.
+    title : str
+        What it is, in a line.
+    seed : int
+        Seed of every random draw.
+    text : str
+        Its TOML, overrides included.
+    files : mapping of str to str
+        Content of every file it names, by the path as written.
+    roller, cylinder, operation, load, friction, creepage, contact, evolution, outputs
+        The tables.
+    wear : WearChoice, optional
+        The wear law; a scenario of a single contact may leave it out.
+    notes : tuple of str
+        What a user should know before trusting the result.
+    """
+
+    file: str
+    title: str
+    seed: int
+    text: str
+    files: Mapping[str, str]
+    roller: Roller
+    cylinder: Cylinder
+    operation: OperationTable
+    load: LoadChoice
+    friction: FrictionTable
+    creepage: CreepageTable
+    contact: ContactChoice
+    wear: WearChoice | None
+    evolution: EvolutionTable
+    outputs: OutputsTable
+    notes: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """The file's name without folder and suffix."""
+        return PurePath(self.file).stem
+
+    @property
+    def sha256(self) -> str:
+        """Digest of the text and of every file's path and content."""
+        digest = hashlib.sha256()
+        parts = [self.text, *(part for item in sorted(self.files.items()) for part in item)]
+        for part in parts:
+            data = part.encode()
+            digest.update(f"{len(data)}:".encode())
+            digest.update(data)
+        return digest.hexdigest()
+
+    @property
+    def rolling_speed(self) -> float:
+        """Rolling velocity V, the cylinder's surface speed [m/s]."""
+        return self.operation.speed * self.cylinder.radius
+
+    @property
+    def pass_rate(self) -> float:
+        """Roller passes per unit of time, all rollers together [1/s]."""
+        return self.operation.rollers * self.operation.speed / math.tau
+
+    @property
+    def total_passes(self) -> int:
+        """Whole roller passes of the test, at least one; raises as `require_run`."""
+        if self.operation.passes is not None:
+            return self.operation.passes
+        if self.operation.duration is None:
+            raise ScenarioError(self.file, [_no_length()])
+        return max(1, round(self.pass_rate * self.operation.duration))
+
+    @property
+    def total_time(self) -> float:
+        """Simulated time of those passes [s]; raises as `require_run`."""
+        return self.total_passes / self.pass_rate
+
+    def per_roller(self, value: float | tuple[float, ...]) -> tuple[float, ...]:
+        """Return one value per roller.
+
+        Parameters
+        ----------
+        value : float or tuple of float
+            One value for all rollers, or one per roller.
+        """
+        return value if isinstance(value, tuple) else (value,) * self.operation.rollers
+
+
+def _no_length() -> Problem:
+    expected = 'one of them, such as duration = "450 min"'
+    return Problem("operation", "duration or passes", "is needed for a run", "none", expected)
+
+
+def require_run(scenario: Scenario) -> None:
+    """Check that a scenario says all that a run needs.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        May be that of a single contact.
+
+    Raises
+    ------
+    ScenarioError
+        If it has no duration or no wear law; both are told at once.
+    """
+    problems = []
+    if scenario.operation.duration is None and scenario.operation.passes is None:
+        problems.append(_no_length())
+    if scenario.wear is None:
+        expected = 'law = "archard-dissipation" and its options'
+        problems.append(Problem("wear", "", "the table is needed for a run", None, expected))
+    if problems:
+        raise ScenarioError(scenario.file, problems)

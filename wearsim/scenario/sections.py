@@ -1,0 +1,158 @@
+"""The tables with no plugin behind them: operation, friction, creepage, evolution and outputs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Literal
+
+from pydantic import Field
+
+from wearsim.quantities import (
+    Angle,
+    NonNegativeTorque,
+    PerRoller,
+    PositiveDuration,
+    PositiveLength,
+    PositiveRotationSpeed,
+)
+from wearsim.scenario.validation import Report, Table
+
+
+class TopTable(Table):
+    """The keys that stand above the tables."""
+
+    title: str | None = Field(default=None, description="What the scenario is, in a line.")
+    seed: int = Field(default=1, ge=0, le=2**63 - 1, description="Seed of every random draw.")
+
+
+class OperationTable(Table):
+    """How fast, how long and with how many rollers the test runs."""
+
+    speed: PositiveRotationSpeed = Field(description="Rotation speed of the cylinder.")
+    duration: PositiveDuration | None = Field(
+        default=None, description="Simulated time; a run needs it or the passes."
+    )
+    passes: int | None = Field(
+        default=None, gt=0, description="Roller passes of the whole test, all rollers together."
+    )
+    rollers: int = Field(default=1, ge=1, description="Number of rollers on the cylinder.")
+
+
+class FrictionTable(Table):
+    """Friction between roller and cylinder."""
+
+    coefficient: float = Field(gt=0.0, description="Coefficient of friction.")
+
+
+class CreepageTable(Table):
+    """How the rollers slip on the cylinder."""
+
+    drive: Literal["creepage", "free"] = Field(
+        default="creepage",
+        description="What is held: the longitudinal creepage, or the bearing torque of a roller"
+        " that is free to find its own creepage.",
+    )
+    longitudinal: float | None = Field(
+        default=None, description="Mean longitudinal creepage; for drive = creepage."
+    )
+    bearing_torque: NonNegativeTorque | None = Field(
+        default=None, description="Torque of a roller's bearing; for drive = free."
+    )
+    yaw: PerRoller[Angle] = Field(
+        default=0.0, description="Angle about the contact normal, the lateral creepage."
+    )
+    tilt: PerRoller[Angle] = Field(
+        default=0.0, description="Angle about the rolling direction, the source of spin."
+    )
+    differential_slip: bool = Field(
+        default=False, description="Let the creepage follow the rolling radii across the track."
+    )
+    tilt_shifts_contact: bool = Field(
+        default=True, description="Let a tilt also move the contact sideways over the crown."
+    )
+
+
+class EvolutionTable(Table):
+    """How the wear is stepped through the passes."""
+
+    stepper: Literal["auto", "implicit", "explicit", "per-pass"] = Field(
+        default="auto", description="How a step is taken; auto fits the contact model."
+    )
+    tolerance: float = Field(
+        default=1e-3, gt=0.0, le=0.1, description="Relative error of the final depth and volume."
+    )
+    step: int | None = Field(default=None, gt=0, description="Force every step to so many passes.")
+    allow_unstable: bool = Field(
+        default=False, description="Take a forced explicit step beyond its stability limit."
+    )
+    max_steps: int = Field(default=1_000_000, gt=0, description="Stop after so many steps.")
+
+
+class OutputsTable(Table):
+    """What is recorded, and when."""
+
+    records: int | None = Field(
+        default=None,
+        gt=0,
+        description="Number of records over the test, 20 unless another cadence is given.",
+    )
+    spacing: Literal["even", "log"] = Field(
+        default="even", description="Spacing of those records over the passes."
+    )
+    every_passes: int | None = Field(default=None, gt=0, description="Record every so many passes.")
+    every: PositiveDuration | None = Field(
+        default=None, description="Record at every such interval of simulated time."
+    )
+    width_threshold: PositiveLength = Field(
+        default=1e-6, description="Worn depth from which on the width of the groove counts."
+    )
+    checkpoint_every: PositiveDuration = Field(
+        default=30.0, description="Wall time between two checkpoints."
+    )
+
+
+DEFAULT_RECORDS = 20
+CADENCES = ("records", "every_passes", "every")
+
+
+def read_operation(raw: Mapping[str, object], report: Report) -> OperationTable | None:
+    """Return the table [operation], or None after noting its mistakes."""
+    if "duration" in raw and "passes" in raw:
+        report.exactly_one(raw, "operation", ("duration", "passes"))
+    return report.validate(OperationTable, raw, "operation")
+
+
+def read_friction(raw: Mapping[str, object], report: Report) -> FrictionTable | None:
+    """Return the table [friction], or None after noting its mistakes."""
+    return report.validate(FrictionTable, raw, "friction")
+
+
+def read_creepage(raw: Mapping[str, object], report: Report) -> CreepageTable | None:
+    """Return the table [creepage], or None after noting its mistakes."""
+    needed, refused = "longitudinal", "bearing_torque"
+    drive = raw.get("drive", "creepage")
+    if drive == "free":
+        needed, refused = refused, needed
+    if drive in {"creepage", "free"}:
+        if needed not in raw:
+            report.add("creepage", needed, f'is needed with drive = "{drive}"', "none")
+        if refused in raw:
+            report.add("creepage", refused, f'has no meaning with drive = "{drive}"')
+    return report.validate(CreepageTable, raw, "creepage")
+
+
+def read_evolution(raw: Mapping[str, object], report: Report) -> EvolutionTable | None:
+    """Return the table [evolution], or None after noting its mistakes."""
+    return report.validate(EvolutionTable, raw, "evolution")
+
+
+def read_outputs(raw: Mapping[str, object], report: Report) -> OutputsTable | None:
+    """Return the table [outputs], or None after noting its mistakes."""
+    given = [key for key in CADENCES if key in raw]
+    if not given:
+        raw = {**raw, "records": DEFAULT_RECORDS}
+    elif len(given) > 1:
+        report.exactly_one(raw, "outputs", CADENCES)
+    elif "spacing" in raw and given != ["records"]:
+        report.add("outputs", "spacing", f"goes with records, not with {given[0]}")
+    return report.validate(OutputsTable, raw, "outputs")
