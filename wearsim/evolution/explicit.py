@@ -51,21 +51,27 @@ class ExplicitStepper(Stepper):
         self.forced_step = forced_step
         self.allow_unstable = allow_unstable
 
+    def side_step(self, scene: Scene, state: WearState, passes: float) -> WearState:
+        """Return the state `passes` passes later, in one step."""
+        return explicit_step(scene, state, passes)
+
     def advance(self, scene: Scene, state: WearState, stop: float) -> Advance:
         """Take one step, under the limit of stability and within the tolerance."""
         limit = stability_limit(scene, state)
-        left = stop - state.passes
         proposed = self._proposal(state, limit)
         rejected = state.rejected
         while True:
+            left = stop - state.passes
             step = min(proposed, left) if self.forced_step else fitted(proposed, left)
             end = explicit_step(scene, state, step)
-            error, in_depth, in_volume = self._errors(scene, state, end, step)
-            if self.forced_step or self.control.accepts(error):
+            in_depth, in_volume = _errors(scene, state, end, step)
+            added = float(in_depth.max())
+            allowed = self.control.allowance(float(cylinder_depth_of(end).max()), end.passes, stop)
+            chosen = self.control.next_step(step, added, allowed)
+            if self.forced_step or added <= allowed:
                 break
             rejected += 1
-            proposed = min(self.control.next_step(step, error), 0.7 * step)
-        chosen = self.control.next_step(step, error)
+            proposed = min(chosen, 0.7 * step)
         end = replace(
             end,
             passes=stop if step == left else end.passes,
@@ -75,7 +81,7 @@ class ExplicitStepper(Stepper):
             steps=state.steps + 1,
             rejected=rejected,
         )
-        return Advance(path=(state, end), warning=self._warning(end, step, limit))
+        return Advance(path=(state, end), warning=_warning(end, step, limit))
 
     def _proposal(self, state: WearState, limit: float) -> float:
         if self.forced_step is None:
@@ -90,33 +96,28 @@ class ExplicitStepper(Stepper):
             )
         return self.forced_step
 
-    @staticmethod
-    def _warning(end: WearState, step: float, limit: float) -> str | None:
-        worst = max(oscillation(contact.line_load) for contact in end.contacts)
-        if worst < OSCILLATING:
-            return None
-        return (
-            f"unstable: at pass {end.passes:.0f} the line load alternates from strip to strip by"
-            f" {worst:.0%} of its peak; the step of {step:.4g} passes is"
-            f" {step / limit:.2g} times the limit of stability"
-        )
 
-    @staticmethod
-    def _errors(
-        scene: Scene, start: WearState, end: WearState, step: float
-    ) -> tuple[float, FloatArray, FloatArray]:
-        """Return half the difference between Euler's step and one at the end's wear rate."""
-        again = increment(scene, end.contacts, step)
-        other = replace(
-            end,
-            cylinder_depth=start.cylinder_depth + again.cylinder,
-            roller_depth=start.roller_depth + again.roller,
-        )
-        grown = cylinder_depth_of(end) - cylinder_depth_of(start)
-        in_depth = 0.5 * np.abs(cylinder_depth_of(end) - cylinder_depth_of(other))
-        in_volume = 0.5 * np.abs(cylinder_volume_of(scene, end) - cylinder_volume_of(scene, other))
-        relative = [float(e / g) for e, g in zip(in_depth, grown, strict=True) if g > 0.0]
-        return max(relative, default=0.0), in_depth, in_volume
+def _warning(end: WearState, step: float, limit: float) -> str | None:
+    """Return what to say where the contacts have begun to oscillate."""
+    worst = max(oscillation(contact.line_load) for contact in end.contacts)
+    if worst < OSCILLATING:
+        return None
+    return (
+        f"unstable: at pass {end.passes:.0f} the line load alternates from strip to strip by"
+        f" {worst:.0%} of its peak; the step of {step:.4g} passes is"
+        f" {step / limit:.2g} times the limit of stability"
+    )
+
+
+def _errors(
+    scene: Scene, start: WearState, end: WearState, step: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return half the difference to a step at the end's wear rate, in depth and in volume."""
+    again = increment(scene, end.contacts, step)
+    other = replace(end, cylinder_depth=start.cylinder_depth + again.cylinder)
+    in_depth = 0.5 * np.abs(cylinder_depth_of(end) - cylinder_depth_of(other))
+    in_volume = cylinder_volume_of(scene, end) - cylinder_volume_of(scene, other)
+    return in_depth, 0.5 * np.abs(in_volume)
 
 
 def stability_limit(scene: Scene, state: WearState) -> float:

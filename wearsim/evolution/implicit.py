@@ -43,6 +43,10 @@ class ImplicitStepper(Stepper):
         self.control = control
         self.forced_step = forced_step
 
+    def side_step(self, scene: Scene, state: WearState, passes: float) -> WearState:
+        """Return the state `passes` passes later, in one step."""
+        return implicit_step(scene, state, passes)
+
     def advance(self, scene: Scene, state: WearState, stop: float) -> Advance:
         """Take one step, shortened until what it adds to the error is allowed."""
         twin = state.shadow or state

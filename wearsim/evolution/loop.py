@@ -31,10 +31,9 @@ def evolve(
     stop : float
         Passes at which the test ends.
     next_record : callable
-        Passes of the first record after given passes; only steppers whose path cannot be
-        interpolated stop there.
+        Passes of the first record after given passes; a pass-by-pass stepper stops there.
     max_steps : int
-        Steps after which the run is given up.
+        Steps after which the run is given up; passes solved one by one do not count.
 
     Raises
     ------
@@ -42,13 +41,13 @@ def evolve(
         If a value is not finite or `max_steps` is reached.
     """
     while state.passes < stop:
-        if state.steps >= max_steps:
+        if state.steps >= max_steps and not stepper.pass_by_pass:
             raise StepError(
                 f"{max_steps} steps have reached pass {state.passes:.0f} of {stop:.0f};"
                 " raise evolution.max_steps or evolution.tolerance",
                 state.to_arrays(),
             )
-        end = min(stop, next_record(state.passes)) if stepper.stops_at_records else stop
+        end = min(stop, next_record(state.passes)) if stepper.pass_by_pass else stop
         advance = stepper.advance(scene, state, end)
         state = advance.end
         if not (np.isfinite(state.cylinder_depth).all() and np.isfinite(state.energy).all()):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -24,21 +25,27 @@ class PerPassStepper(Stepper):
     them wears it by its share.
     """
 
-    stops_at_records = True
+    pass_by_pass = True
+
+    def side_step(self, scene: Scene, state: WearState, passes: float) -> WearState:
+        """Return the state `passes` whole passes later."""
+        return _run(scene, state, math.ceil(passes))
 
     def advance(self, scene: Scene, state: WearState, stop: float) -> Advance:
         """Run the next passes, up to `stop`."""
-        compiled = is_compiled(scene)
-        chunk = CHUNK if compiled else SLOW_CHUNK
-        count = int(min(np.ceil(stop - state.passes), chunk))
-        run = _run_compiled if compiled else _run_in_python
-        end = run(scene, state, count)
-        end = replace(end, passes=state.passes + count, steps=state.steps + count)
+        chunk = CHUNK if is_compiled(scene) else SLOW_CHUNK
+        end = _run(scene, state, min(math.ceil(stop - state.passes), chunk))
         loads = present_loads(scene, end)
         points = operating_points(scene, loads, end.cylinder_depth, end.roller_depth)
         # for the eye only: the loop itself goes on from what it carries
         end = replace(end, contacts=solve_present(scene, end, points))
         return Advance(path=(state, end))
+
+
+def _run(scene: Scene, state: WearState, count: int) -> WearState:
+    """Run `count` passes, in compiled code where the scene allows it."""
+    end = (_run_compiled if is_compiled(scene) else _run_in_python)(scene, state, count)
+    return replace(end, passes=state.passes + count, steps=state.steps + count)
 
 
 def is_compiled(scene: Scene) -> bool:

@@ -16,8 +16,7 @@ class Advance:
     Parameters
     ----------
     path : tuple of WearState
-        The states the step went through, its start first and its end last; profiles between them
-        may be interpolated.
+        The states the step went through, its start first and its end last.
     warning : str, optional
         What the user should know about this step.
     """
@@ -34,8 +33,9 @@ class Advance:
 class Stepper(ABC):
     """Advances a wear test; all that a later step depends on is in the `WearState`."""
 
-    #: whether a step must end where a record is due, because it cannot be interpolated
-    stops_at_records = False
+    #: whether every pass is a step by itself: the run then pauses where a record is due, and the
+    #: number of steps is the test's own
+    pass_by_pass = False
 
     @abstractmethod
     def advance(self, scene: Scene, state: WearState, stop: float) -> Advance:
@@ -48,6 +48,10 @@ class Stepper(ABC):
         ContactError
             If a contact has no solution.
         """
+
+    @abstractmethod
+    def side_step(self, scene: Scene, state: WearState, passes: float) -> WearState:
+        """Return the state `passes` passes later, for a record on the way; nothing follows it."""
 
 
 def fitted(step: float, left: float) -> float:

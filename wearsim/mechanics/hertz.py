@@ -12,6 +12,8 @@ from wearsim.types import FloatArray
 
 CONVERGED, NOT_CONVERGED, NO_CURVATURE, TOO_FEW_STRIPS, LEAVES_STRIPS = range(5)
 
+HOLLOW = 1.0  # what ln(b'/b) counts for at most, and in the hollow of a groove
+
 
 @dataclass(frozen=True)
 class HertzContact:
@@ -275,7 +277,8 @@ def fit_centred(
 
     Parameters and returns are those of `fit_parabola`, with a status in place of the count.
     """
-    for iteration in range(200):
+    last, last_shift = centre, 0.0
+    for _ in range(100):
         curvature, vertex, height, used = fit_parabola(y, gap, centre, half_width)
         if used < 3:
             return curvature, centre, height, TOO_FEW_STRIPS
@@ -284,9 +287,12 @@ def fit_centred(
         shift = (vertex - centre) / half_width
         if abs(shift) <= tolerance:
             return curvature, vertex, height, CONVERGED
-        # at most half a patch a step; half steps where whole ones keep swinging about the centre
-        shift = min(max(shift, -0.5), 0.5)
-        centre += (shift if iteration < 20 else 0.3 * shift) * half_width
+        # the secant rule: in a hollow groove the vertex moves faster than the stretch, and going
+        # after it would run away from the middle
+        moved = (centre - last) / half_width
+        step = shift if moved == 0.0 else -shift * moved / (shift - last_shift)
+        last, last_shift = centre, shift
+        centre += min(max(step, -0.5), 0.5) * half_width
     return curvature, centre, height, NOT_CONVERGED
 
 
@@ -315,7 +321,8 @@ def hertz_on_profile(
     normal_force, contact_modulus : float
         N [N] and E* [Pa].
     tolerance : float
-        Greatest ln(b'/b), and shift of the centre over b, at which the patch is consistent.
+        Greatest ln(b'/b), and a tenth of the greatest shift of the centre over b, at which the
+        patch is consistent; a shift is felt in second order only.
     limit : int
         Greatest number of patches tried.
 
@@ -338,11 +345,17 @@ def hertz_on_profile(
     side = 0  # the end that moved last
     curvature, height = math.nan, math.nan
     for iteration in range(1, limit + 1):
-        curvature, centre, height, status = fit_centred(y, gap, centre, width, 0.1 * tolerance)
-        if status != CONVERGED:
-            return curvature, width, centre, height, iteration, status
-        found = hertz_ellipse(curvature_x, curvature, normal_force, contact_modulus)[1]
-        value, here = math.log(found / width), math.log(width)
+        curvature, vertex, height, status = fit_centred(y, gap, centre, width, 10.0 * tolerance)
+        here = math.log(width)
+        if status == CONVERGED:
+            centre = vertex
+            found = hertz_ellipse(curvature_x, curvature, normal_force, contact_modulus)[1]
+            value = min(math.log(found / width), HOLLOW)
+        elif status != TOO_FEW_STRIPS and high_value != 0.0:
+            # the stretch lies in the hollow of a groove, where no patch would end: it is too narrow
+            found, value = math.inf, HOLLOW
+        else:
+            return curvature, width, vertex, height, iteration, status
         if abs(value) <= tolerance:
             return curvature, found, centre, height, iteration, CONVERGED
         if value > 0.0:
@@ -353,6 +366,11 @@ def hertz_on_profile(
         else:
             low_value *= 0.5 if side < 0 else 1.0
             high, high_value, side = here, value, -1
+        if low_value != 0.0 and high - low <= tolerance:
+            # either b' answers b steeply here, or it jumps and no patch agrees with its parabola
+            agrees = status == CONVERGED and abs(value) < 1e4 * tolerance
+            status = CONVERGED if agrees else NO_CURVATURE
+            return curvature, found, centre, height, iteration, status
         if low_value == 0.0:
             width = max(found, 0.6 * width)
         else:

@@ -99,7 +99,8 @@ class StripTheory(TangentialTheory):
         shift: FloatArray,
     ) -> tuple[FloatArray, FloatArray]:
         """Return the slip: rigid slip less the strain of an elliptic traction (full sliding), or
-        the square root behind the adhering part."""
+        the square root behind the adhering part.
+        """
         safe_a = np.where(a > 0.0, a, 1.0)
         total = np.hypot(found.force_x, found.force_y)
         share_x = np.divide(-found.force_x, total, out=np.zeros_like(a), where=total > 0.0)

@@ -345,6 +345,11 @@ class Load(ABC):
 
     stiffness: float = 0.0
 
+    @property
+    def span(self) -> tuple[float, float] | None:
+        """First and last time the load is known at [s], or None if at all times."""
+        return None
+
     @abstractmethod
     def force(self, time: FloatArray) -> FloatArray:
         """Return the load at each `time` [s], shape as `time` [N]."""

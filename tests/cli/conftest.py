@@ -1,0 +1,86 @@
+"""Fixtures of the shell: a command that runs in-process, short scenarios, a finished test."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from wearsim.cli.app import app
+
+Command = Callable[..., Result]
+SCENARIOS = Path(__file__).parents[2] / "scenarios"
+SHORT = """\
+title = "a short [test]"
+
+[roller]
+radius = "20 mm"
+crown_radius = "500 mm"
+material = "steel"
+
+[cylinder]
+radius = "25 mm"
+material = "steel"
+
+[operation]
+speed = "1000 rpm"
+duration = "2 min"
+rollers = 3
+
+[load]
+normal_force = "300 N"
+
+[friction]
+coefficient = 0.1
+
+[creepage]
+longitudinal = 1e-3
+
+[wear]
+[wear.cylinder]
+k_over_h = "1.1e-11 1/Pa"
+
+[wear.roller]
+k_over_h = "0 1/Pa"
+"""
+
+
+@pytest.fixture
+def command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Command:
+    """Run `wearsim` with arguments, in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("WEARSIM_TRACEBACK", raising=False)
+
+    def run(*args: object) -> Result:
+        return CliRunner().invoke(app, [str(arg) for arg in args])
+
+    return run
+
+
+@pytest.fixture
+def scenario(tmp_path: Path) -> Path:
+    """A run that takes no time."""
+    path = tmp_path / "short.toml"
+    path.write_text(SHORT)
+    return path
+
+
+@pytest.fixture(scope="session")
+def finished_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("finished")
+    (folder / "short.toml").write_text(SHORT)
+    result = CliRunner().invoke(
+        app, ["run", str(folder / "short.toml"), "-o", str(folder / "short.h5"), "-q"]
+    )
+    assert result.exit_code == 0, result.output
+    return folder / "short.h5"
+
+
+@pytest.fixture
+def finished(finished_once: Path, tmp_path: Path) -> Path:
+    """A finished test's own copy of a results file."""
+    path = tmp_path / "short.h5"
+    path.write_bytes(finished_once.read_bytes())
+    return path

@@ -1,0 +1,142 @@
+"""The figures: that they hold what was computed; how they look is for eyes."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from wearsim.errors import PluginError
+from wearsim.report.contact import contact_figure
+from wearsim.report.measured import Measured
+from wearsim.report.replay import replay_figure
+from wearsim.report.saving import save_figure
+from wearsim.results import Result
+from wearsim.scenario import load_scenario
+from wearsim.studies import replay
+from wearsim.studies.contact import ContactStudy, study_contact
+
+SCENARIOS = Path(__file__).parents[2] / "scenarios"
+SHORT = {"operation.duration": "3 min", "outputs.records": 4}
+
+
+@pytest.fixture(scope="module")
+def result() -> Result:
+    overrides = {**SHORT, "wear.roller.k_over_h": "1e-11 1/Pa"}
+    return replay.run(load_scenario(SCENARIOS / "rig-450min.toml", overrides))
+
+
+@pytest.fixture(scope="module")
+def study() -> ContactStudy:
+    return study_contact(load_scenario(SCENARIOS / "mean-contact.toml"), with_fields=True)
+
+
+def panel(figure: Figure, title: str) -> object:
+    (axes,) = [axes for axes in figure.axes if axes.get_title(loc="left").startswith(title)]
+    return axes
+
+
+def test_that_profiles_are_drawn_downwards_in_mm_and_um(result: Result) -> None:
+    axes = panel(replay_figure(result), "Worn profile")
+    lines = axes.get_lines()  # type: ignore[attr-defined]
+    assert len(lines) == 5 + 1  # the records, and the roller
+    assert lines[4].get_xdata() == pytest.approx(result.y * 1e3)
+    assert lines[4].get_ydata() == pytest.approx(-result.profiles[-1] * 1e6)
+    assert lines[5].get_ydata() == pytest.approx(-result.roller_profiles[-1] * 1e6)
+    assert lines[5].get_linestyle() == "--"
+
+
+def test_that_unworn_rollers_are_not_drawn() -> None:
+    fresh = replay.run(load_scenario(SCENARIOS / "rig-450min.toml", SHORT))
+    axes = panel(replay_figure(fresh), "Worn profile")
+    assert len(axes.get_lines()) == 5  # type: ignore[attr-defined]
+
+
+def test_that_measurements_lie_on_top_and_within_the_panel(result: Result) -> None:
+    probe = Measured("probe", np.array([-9e-3, 9e-3]), np.array([-1e-6, 1e-6]))
+    axes = panel(replay_figure(result, [probe]), "Worn profile")
+    last = axes.get_lines()[-1]  # type: ignore[attr-defined]
+    assert last.get_xdata() == pytest.approx([-9.0, 9.0])
+    assert last.get_ydata() == pytest.approx([-1.0, 1.0])
+    left, right = axes.get_xlim()  # type: ignore[attr-defined]
+    assert left <= -9.0
+    assert right >= 9.0
+
+
+def test_that_depth_is_drawn_for_every_worn_step(result: Result) -> None:
+    axes = panel(replay_figure(result), "Depth")
+    drawn = axes.get_lines()[-1].get_ydata()  # type: ignore[attr-defined]
+    assert drawn[-1] == pytest.approx(result.depth[-1] * 1e6)
+
+
+def test_that_rollers_of_their_own_have_dissipation_of_their_own() -> None:
+    three = replay.run(load_scenario(SCENARIOS / "rig-three-rollers.toml", SHORT))
+    axes = panel(replay_figure(three), "Dissipated")
+    names = axes.get_legend_handles_labels()[1]  # type: ignore[attr-defined]
+    assert names == ["roller 1", "roller 2", "roller 3"]
+    assert len(axes.get_lines()) == 5 * 3 + 3  # type: ignore[attr-defined]
+
+
+def test_that_a_logged_load_is_drawn_beside_that_at_the_steps(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    logged = replay.run(load_scenario(SCENARIOS / "rig-logged-load.toml", SHORT))
+    assert len(panel(replay_figure(logged), "Load").get_lines()) == 2  # type: ignore[attr-defined]
+
+    def fail(self: Result) -> None:
+        raise PluginError("not here")
+
+    monkeypatch.setattr(Result, "scenario", property(fail))
+    assert len(panel(replay_figure(logged), "Load").get_lines()) == 1  # type: ignore[attr-defined]
+
+
+def test_that_a_test_stopped_before_its_first_step_can_be_drawn(
+    result: Result, tmp_path: Path
+) -> None:
+    raw = result.raw
+    fresh = replace(
+        raw,
+        history={name: array[:1] for name, array in raw.history.items()},
+        records={name: array[:1] for name, array in raw.records.items()},
+        finished=False,
+    )
+    save_figure(replay_figure(Result(fresh)), tmp_path / "fresh.png")
+    assert (tmp_path / "fresh.png").stat().st_size > 10_000
+
+
+def test_that_a_contact_shows_its_hertzian_peak_and_all_panels(study: ContactStudy) -> None:
+    figure = contact_figure(study, "title")
+    axes = panel(figure, "Pressure")
+    top = float(np.max(axes.collections[0].get_array()))  # type: ignore[attr-defined]
+    assert top == pytest.approx(study.solution.peak_pressure / 1e6, rel=2e-3)
+    for title in ("Traction", "Adhesion", "Power density", "Line load", "Dissipation"):
+        panel(figure, title)
+
+
+def test_that_a_contact_without_fields_shows_its_strips(study: ContactStudy) -> None:
+    figure = contact_figure(replace(study, fields=None), "title")
+    assert len(figure.axes) == 2
+    line = figure.axes[1].get_lines()[0]
+    assert np.max(line.get_ydata()) == pytest.approx(study.solution.dissipation.max() / 1e3)
+
+
+def test_that_a_figure_is_saved_whole_or_not_at_all(
+    study: ContactStudy, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    figure = contact_figure(replace(study, fields=None), "title")
+    path = tmp_path / "x.png"
+    path.write_text("mine")
+
+    def fail(*_: object, **__: object) -> None:
+        raise OSError("disk full")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(figure, "savefig", fail)
+        with pytest.raises(OSError, match="disk full"):
+            save_figure(figure, path)
+    assert [item.name for item in tmp_path.iterdir()] == ["x.png"]
+    assert path.read_text() == "mine"
+    save_figure(figure, path)
+    assert path.read_bytes().startswith(b"\x89PNG")
+    assert path.stat().st_mode & 0o044  # not private, as a temporary file is

@@ -1,0 +1,72 @@
+"""What figures and tables are made of: units, patch edges and measured profiles."""
+
+import math
+
+import numpy as np
+import pytest
+
+from wearsim.errors import ScenarioError
+from wearsim.report.measured import read_measured
+from wearsim.report.patch import patch_edges
+from wearsim.report.units import count, lapse, shown
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (48.104e-6, "um", "48.10 um"),
+        (680.22e6, "MPa", "680.2 MPa"),
+        (27000.0, "min", "450.0 min"),
+        (0.0, "N", "0 N"),
+        (-28.224, "N", "-28.22 N"),
+        (9999.6, "J", "10000 J"),
+        (0.32541, "%", "32.54 %"),
+        (1e-3, "1", "0.001000"),
+        (1e-9, "um", "0.001000 um"),
+        (3e-12, "um", "3.000e-06 um"),
+        (None, "um", "-"),
+        (math.nan, "um", "-"),
+    ],
+)
+def test_that_values_are_shown_in_engineers_units(
+    value: float | None, unit: str, text: str
+) -> None:
+    assert shown(value, unit) == text
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [(0.05, "0.05 s"), (3.21, "3.2 s"), (9.97, "10 s"), (59.7, "1 min 0 s"), (7500.0, "2 h 5 min")],
+)
+def test_that_wall_times_read_well(seconds: float, text: str) -> None:
+    assert lapse(seconds) == text
+
+
+def test_that_passes_are_counted_with_their_thousands_apart() -> None:
+    assert count(1.35e6) == "1,350,000"
+
+
+@pytest.mark.parametrize("strips", [24, 51, 101])
+def test_that_the_edges_of_an_ellipse_are_found_within_a_fifth_of_a_strip(strips: int) -> None:
+    y = np.linspace(-2.0, 2.0, strips)
+    a = 0.1 * np.sqrt(np.maximum(0.0, 1.0 - ((y - 0.3) / 1.4) ** 2))
+    edges = patch_edges(y, a)
+    assert edges == pytest.approx((-1.1, 1.7), abs=0.2 * (y[1] - y[0]))
+
+
+def test_that_no_contact_has_no_edges() -> None:
+    assert patch_edges(np.linspace(0.0, 1.0, 5), np.zeros(5)) is None
+
+
+def test_that_depth_counts_downwards_and_height_upwards() -> None:
+    deep = read_measured("# probe\ny [mm]; depth [um]\n-1; 2\n1; 3\n", "a/probe.csv")
+    high = read_measured("y [mm], height [um]\n-1, -2\n1, -3\n", "probe.csv")
+    assert deep.label == "probe"
+    assert deep.y == pytest.approx([-1e-3, 1e-3])
+    assert deep.height == pytest.approx([-2e-6, -3e-6])
+    assert high.height == pytest.approx(deep.height)
+
+
+def test_that_a_measurement_without_either_is_refused() -> None:
+    with pytest.raises(ScenarioError, match="column 'height' is missing"):
+        read_measured("y [mm], z [um]\n-1, -2\n1, -3\n", "probe.csv")

@@ -1,0 +1,48 @@
+"""Run as a process: overwrites one file per stage and kills itself there, as an outage would."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from pathlib import Path
+
+from run_examples import some_run
+
+from wearsim.results import writer
+
+
+def stages_of_a_write(path: Path) -> list[str]:
+    """Return every call of the seam, in order; a stage may come more than once."""
+    seen: list[str] = []
+    writer.on_write_stage = seen.append
+    writer.write_results(path, some_run(seed=2, strips=400, records=20))
+    return seen
+
+
+def kill_while_writing(path: Path, at: int) -> int:
+    """Fork, and kill the child at its call number `at` of the seam; return the signal."""
+    child = os.fork()
+    if child:
+        return os.WTERMSIG(os.waitpid(child, 0)[1])
+    calls = iter(range(10**6))
+
+    def kill(stage: str) -> None:
+        if next(calls) == at:
+            os.kill(os.getpid(), signal.SIGKILL)
+
+    writer.on_write_stage = kill
+    writer.write_results(path, some_run(seed=2, strips=400, records=20))
+    os._exit(0)
+
+
+if __name__ == "__main__":
+    folder = Path(sys.argv[1])
+    stages = stages_of_a_write(folder / "whole.h5")
+    for number, name in enumerate(stages):
+        target = folder / f"{number}.h5"
+        writer.on_write_stage = lambda stage: None
+        if number % 2 == 0:  # over an old file, and where there is none
+            writer.write_results(target, some_run(seed=1))
+        killed_by = kill_while_writing(target, number)
+        sys.stdout.write(f"{number},{killed_by},{name}\n")

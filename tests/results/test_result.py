@@ -1,0 +1,98 @@
+"""The result: a user's words, and the end state."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from run_examples import some_run
+
+from wearsim.results import Result, open_results, write_results
+from wearsim.results.layout import VARIABLES
+from wearsim.scenario import load_scenario
+
+SCENARIOS = Path(__file__).parents[2] / "scenarios"
+
+
+def test_that_axes_of_length_one_are_dropped() -> None:
+    result = Result(some_run(steps=5, records=3, strips=7))
+    assert result.depth.shape == result.normal_force.shape == result.passes.shape == (5,)
+    assert result.profiles.shape == result.roller_profiles.shape == (3, 7)
+    assert result.line_load.shape == result.dissipation.shape == (3, 7)
+    assert result.y.shape == (7,)
+    many = Result(some_run(rollers=2, realisations=4))
+    assert many.depth.shape == (5, 4)
+    assert many.normal_force.shape == (5, 2, 4)
+    assert many.line_load.shape == (3, 2, 4, 7)
+
+
+def test_that_the_axes_of_time_and_place_stay() -> None:
+    result = Result(some_run(steps=1, records=1, strips=1))
+    assert result.depth.shape == result.time.shape == (1,)
+    assert result.profiles.shape == (1, 1)
+
+
+def test_that_each_word_names_its_variable() -> None:
+    result = Result(some_run(seed=3, rollers=2))
+    words = {"profiles": "cylinder_profile", "roller_profiles": "roller_profile"}
+    for name in (*VARIABLES, *words):
+        if hasattr(Result, name):
+            np.testing.assert_array_equal(
+                getattr(result, name), result.raw.variables[words.get(name, name)].squeeze()
+            )
+    assert len([name for name in VARIABLES if hasattr(Result, name)]) == 22
+    np.testing.assert_array_equal(
+        result.values("half_length"), result.raw.records["half_length"].squeeze()
+    )
+
+
+def test_that_the_end_state_is_ready_for_json() -> None:
+    result = Result(some_run(rollers=3))
+    final = json.loads(json.dumps(result.final, allow_nan=False))
+    assert final == result.final
+    assert final["depth_m"] == result.depth[-1]
+    assert final["passes"] == 4000.0
+    assert final["peak_pressure_Pa"] == result.peak_pressure[-1].max()
+    assert final["relative_depth_error"] == result.depth_error[-1] / result.depth[-1]
+    assert final["relative_volume_error"] == result.volume_error[-1] / result.worn_volume[-1]
+
+
+def test_that_several_realisations_give_lists() -> None:
+    result = Result(some_run(rollers=3, realisations=2))
+    assert result.final["depth_m"] == result.depth[-1].tolist()
+    assert result.final["peak_pressure_Pa"] == result.peak_pressure[-1].max(axis=0).tolist()
+    assert isinstance(result.final["time_s"], float)
+
+
+def test_that_nothing_worn_has_no_relative_error() -> None:
+    data = some_run()
+    data.history["depth"][:] = 0.0
+    data.history["depth_error"][:] = 0.0
+    assert Result(data).final["relative_depth_error"] == 0.0
+
+
+def test_that_steps_are_those_taken() -> None:
+    assert Result(some_run()).steps == 17
+    assert Result(some_run(checkpoint={})).steps == 4
+
+
+def test_that_the_scenario_is_read_from_the_file_alone(tmp_path: Path) -> None:
+    scenario = load_scenario(SCENARIOS / "rig-logged-load.toml", {"friction.coefficient": 0.2})
+    data = some_run(
+        scenario_text=scenario.text, scenario_file=scenario.file, files=dict(scenario.files)
+    )
+    write_results(tmp_path / "run.h5", data)
+    result = open_results(tmp_path / "run.h5")
+    assert result.scenario.sha256 == scenario.sha256
+    assert result.scenario is result.scenario
+    assert result.path == tmp_path / "run.h5"
+
+
+def test_that_a_result_cannot_be_reassigned() -> None:
+    result = Result(some_run(notes=["a"], warnings=["b"]))
+    assert (result.notes, result.warnings, result.path) == (("a",), ("b",), None)
+    assert (result.model, result.stepper, result.finished) == ("slender", "implicit", False)
+    with pytest.raises(AttributeError):
+        result.depth = result.width  # type: ignore[misc]

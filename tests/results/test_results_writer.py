@@ -1,0 +1,166 @@
+"""Writing: whole or not at all, whatever happens on the way."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from run_examples import some_run
+
+from wearsim.errors import ResultsFileError
+from wearsim.results import check_output, read_results, write_results, writer
+from wearsim.results.data import differences
+
+HERE = Path(__file__).parent
+OLD, NEW = some_run(seed=1), some_run(seed=2, strips=400, records=20)
+
+
+class Fault(Exception):  # noqa: N818
+    pass
+
+
+def _all_calls(folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    calls: list[str] = []
+    monkeypatch.setattr(writer, "on_write_stage", calls.append)
+    write_results(folder / "all.h5", NEW)
+    monkeypatch.undo()
+    return calls
+
+
+def test_that_the_seam_is_called_around_every_stage(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls = _all_calls(tmp_path, monkeypatch)
+    expected = [f"{when} {stage}" for stage in writer.STAGES for when in ("before", "after")]
+    assert list(dict.fromkeys(calls)) == expected
+    assert calls.count("before write") > 1  # a fault may strike a half-written file
+
+
+def test_that_a_failure_at_any_stage_leaves_the_old_file_or_the_new(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "run.h5"
+    calls = _all_calls(tmp_path, monkeypatch)
+    renamed = calls.index("after rename")
+    for at in range(len(calls)):
+        write_results(path, OLD)
+        left = at
+
+        def fail(stage: str) -> None:
+            nonlocal left
+            left -= 1
+            if left < 0:
+                raise Fault(stage)
+
+        monkeypatch.setattr(writer, "on_write_stage", fail)
+        with pytest.raises(Fault):
+            write_results(path, NEW)
+        monkeypatch.undo()
+        assert differences(read_results(path), OLD if at < renamed else NEW) == []
+        assert sorted(tmp_path.iterdir()) == [tmp_path / "all.h5", path]
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork and SIGKILL")
+def test_that_a_kill_at_any_stage_leaves_the_old_file_or_the_new(tmp_path: Path) -> None:
+    environment = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    done = subprocess.run(
+        [sys.executable, str(HERE / "killed_writer.py"), str(tmp_path)],
+        capture_output=True,
+        text=True,
+        check=True,
+        env=environment,
+        cwd=HERE.parents[1],
+    )
+    lines = [line.split(",") for line in done.stdout.splitlines()]
+    assert {name.split(maxsplit=1)[1] for _, _, name in lines} == set(writer.STAGES)
+    renamed = [name for _, _, name in lines].index("after rename")
+    for number, (_, killed_by, _) in enumerate(lines):
+        path = tmp_path / f"{number}.h5"
+        assert int(killed_by) == signal.SIGKILL
+        if number >= renamed:
+            assert differences(read_results(path), NEW) == []
+        elif number % 2 == 0:
+            assert differences(read_results(path), OLD) == []
+        else:
+            assert not path.exists()
+        write_results(path, NEW)  # what the kill left behind is in nobody's way
+        assert differences(read_results(path), NEW) == []
+        assert not path.with_name(f"{number}.h5.part").exists()
+
+
+def test_that_a_full_disk_is_told_in_a_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "run.h5"
+    write_results(path, OLD)
+
+    def fill(stage: str) -> None:
+        if stage == "before fsync":
+            raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(writer, "on_write_stage", fill)
+    with pytest.raises(ResultsFileError) as caught:
+        write_results(path, NEW)
+    assert str(caught.value) == f"{path}: cannot be written (No space left on device)"
+    assert differences(read_results(path), OLD) == []
+
+
+def test_that_a_link_stays_a_link(tmp_path: Path) -> None:
+    (tmp_path / "disk").mkdir()
+    target, link = tmp_path / "disk" / "run.h5", tmp_path / "run.h5"
+    link.symlink_to(target)
+    write_results(link, OLD)
+    write_results(link, NEW)
+    assert link.is_symlink()
+    assert differences(read_results(target), NEW) == []
+
+
+def test_that_equal_runs_give_equal_files(tmp_path: Path) -> None:
+    for name in ("one.h5", "two.h5"):
+        write_results(tmp_path / name, some_run(seed=4, rollers=2))
+    assert (tmp_path / "one.h5").read_bytes() == (tmp_path / "two.h5").read_bytes()
+
+
+def test_that_variables_that_do_not_fit_are_refused(tmp_path: Path) -> None:
+    history = some_run().history
+    for broken in (
+        {name: array for name, array in history.items() if name != "depth"},
+        history | {"speed": history["time"]},
+        history | {"depth": history["depth"][:-1]},
+        history | {"depth": history["time"]},
+    ):
+        with pytest.raises(ValueError, match=r"depth|speed"):
+            write_results(tmp_path / "run.h5", some_run(history=broken))
+    with pytest.raises(ValueError, match="cannot be stored"):
+        write_results(tmp_path / "run.h5", some_run(checkpoint={"a": history["time"] * 1j}))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_that_an_existing_file_is_only_replaced_when_asked(tmp_path: Path) -> None:
+    path = tmp_path / "run.h5"
+    check_output(path, force=False)
+    path.write_bytes(b"precious")
+    with pytest.raises(ResultsFileError) as caught:
+        check_output(path, force=False)
+    assert str(caught.value) == f"{path}: already exists; --force replaces it, -o chooses another"
+    check_output(path, force=True)
+
+
+def test_that_an_output_that_cannot_be_written_is_told_before_the_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(ResultsFileError, match="is a folder"):
+        check_output(tmp_path, force=True)
+    with pytest.raises(ResultsFileError, match="there is no folder"):
+        check_output(tmp_path / "no" / "run.h5", force=False)
+    with pytest.raises(ResultsFileError, match="not a regular file"):
+        check_output("/dev/null", force=True)
+    with pytest.raises(ResultsFileError, match="cannot be written"):
+        write_results(tmp_path / "no" / "run.h5", NEW)
+    monkeypatch.setattr(os, "access", lambda path, mode: False)
+    with pytest.raises(ResultsFileError, match="is not writable"):
+        check_output(tmp_path / "run.h5", force=False)

@@ -1,0 +1,61 @@
+"""The command `wearsim`: its verbs, and the options that stand before them."""
+
+from __future__ import annotations
+
+import os
+from typing import Annotated
+
+import typer
+
+from wearsim.cli.check import check
+from wearsim.cli.contact import contact
+from wearsim.cli.export import export
+from wearsim.cli.plot import plot
+from wearsim.cli.plugins import plugins
+from wearsim.cli.resume import resume
+from wearsim.cli.run import run
+from wearsim.cli.schema import schema
+from wearsim.cli.shell import TRACEBACK, Shell
+from wearsim.cli.show import show
+
+app = typer.Typer(
+    name="wearsim",
+    cls=Shell,
+    help="Wear of rolling contacts, stepped through millions of roller passes.",
+    epilog="Exit codes: 0 done, 1 the run failed, 2 bad input, 130 interrupted.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+for verb in (check, contact, run, resume, show, plot, export, plugins, schema):
+    app.command()(verb)
+
+
+def _show_version(asked: bool) -> None:
+    if asked:
+        from importlib.metadata import version
+
+        typer.echo(f"wearsim {version('wearsim')}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool,
+        typer.Option("--version", help="Show the version.", callback=_show_version, is_eager=True),
+    ] = False,
+    traceback: Annotated[
+        bool, typer.Option("--traceback", help=f"Show where an error arose; or set {TRACEBACK}=1.")
+    ] = False,
+) -> None:
+    """Wear of rolling contacts, stepped through millions of roller passes."""
+    if traceback:
+        os.environ[TRACEBACK] = "1"
+
+
+def main() -> None:
+    """Run the command with the arguments of this process."""
+    app(prog_name="wearsim")

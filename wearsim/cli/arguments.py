@@ -1,0 +1,92 @@
+"""Arguments and options that several verbs take."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, TypeAlias
+
+import typer
+
+if TYPE_CHECKING:
+    from wearsim.scenario import Scenario
+
+ScenarioFile: TypeAlias = Annotated[
+    Path, typer.Argument(metavar="SCENARIO", help="A scenario, a TOML file.", show_default=False)
+]
+ResultsFile: TypeAlias = Annotated[
+    Path, typer.Argument(metavar="FILE.h5", help="A results file.", show_default=False)
+]
+Settings: TypeAlias = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Change a value: load.normal_force='350 N'. May be repeated.",
+        show_default=False,
+    ),
+]
+Json: TypeAlias = Annotated[
+    bool, typer.Option("--json", help="Write one JSON object, in SI, and nothing else.")
+]
+Quiet: TypeAlias = Annotated[bool, typer.Option("--quiet", "-q", help="Show no progress.")]
+Force: TypeAlias = Annotated[
+    bool, typer.Option("--force", "-f", help="Overwrite an output that exists.")
+]
+Figure: TypeAlias = Annotated[
+    Path | None,
+    typer.Option(
+        "--output", "-o", metavar="FIG", help="Figure: .png, .pdf or .svg.", show_default=False
+    ),
+]
+
+
+def read_scenario(path: Path, settings: list[str] | None) -> Scenario:
+    """Return the scenario in a file with the values given by --set.
+
+    Raises
+    ------
+    typer.BadParameter
+        If a setting is not of the form key=value.
+    ScenarioError
+        With every mistake in the file.
+    """
+    from wearsim.scenario import load_scenario, parse_override
+
+    try:
+        overrides = dict(parse_override(text) for text in settings or [])
+    except ValueError as error:
+        raise typer.BadParameter(str(error), param_hint="--set") from error
+    return load_scenario(path, overrides)
+
+
+def check_figure(path: Path) -> None:
+    """Raise unless the name of a figure ends as a kind of figure does.
+
+    Raises
+    ------
+    typer.BadParameter
+        If it does not.
+    """
+    if path.suffix.lower() not in {".png", ".pdf", ".svg"}:
+        raise typer.BadParameter(
+            f"'{path}' ends in no kind of figure, expected .png, .pdf or .svg", param_hint="-o"
+        )
+
+
+def read_text(path: Path) -> str:
+    """Return the content of a text file that the user names.
+
+    Raises
+    ------
+    ScenarioError
+        If it cannot be read.
+    """
+    from wearsim.errors import Problem, ScenarioError
+
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise ScenarioError(str(path), [Problem("", "", "is not text in UTF-8")]) from error
+    except OSError as error:
+        problem = Problem("", "", f"the file cannot be read ({error.strerror})")
+        raise ScenarioError(str(path), [problem]) from error

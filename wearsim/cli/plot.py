@@ -1,0 +1,41 @@
+"""`wearsim plot`: the figure of a wear test."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from wearsim.cli.arguments import Figure, Force, ResultsFile, check_figure, read_text
+from wearsim.cli.output import note, refuse_existing
+
+Measured = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--measured",
+        metavar="CSV",
+        help="Measured profile drawn on top: columns 'y [mm]' and 'depth [um]', or 'height [um]'"
+        " with worn material negative. May be repeated.",
+        show_default=False,
+    ),
+]
+
+
+def plot(
+    file: ResultsFile, figure: Figure = None, measured: Measured = None, force: Force = False
+) -> None:
+    """Draw profiles, depth against passes, P_l(y) and load."""
+    path = figure if figure is not None else Path(f"{file.stem}.png")
+    check_figure(path)
+    refuse_existing(path, force)
+    from wearsim.report.measured import read_measured
+    from wearsim.results import open_results
+
+    result = open_results(file)
+    profiles = [read_measured(read_text(csv), str(csv)) for csv in measured or []]
+    from wearsim.report.replay import replay_figure
+    from wearsim.report.saving import save_figure
+
+    save_figure(replay_figure(result, profiles), path)
+    note(f"figure: {path}")

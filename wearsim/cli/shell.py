@@ -1,0 +1,71 @@
+"""What all verbs share: errors told in a line and turned into exit codes."""
+
+from __future__ import annotations
+
+import os
+import traceback
+from typing import Any
+
+import typer
+from typer.core import TyperGroup
+
+from wearsim.errors import Interrupted, ScenarioError, SolverError, WearsimError
+
+FAILED = 1
+BAD_INPUT = 2
+INTERRUPTED = 130
+TRACEBACK = "WEARSIM_TRACEBACK"
+
+
+class Shell(TyperGroup):
+    """The group of verbs: whatever a verb raises becomes a message and an exit code."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run a verb.
+
+        Raises
+        ------
+        typer.Exit
+            With the error's exit code.
+        """
+        try:
+            return super().invoke(ctx)
+        except WearsimError as error:
+            tell(error)
+            raise typer.Exit(error.exit_code) from error
+        except KeyboardInterrupt as error:
+            typer.echo("interrupted", err=True)
+            raise typer.Exit(INTERRUPTED) from error
+        except BrokenPipeError:  # "wearsim schema | head"
+            raise
+        except OSError as error:
+            tell(error)
+            raise typer.Exit(FAILED) from error
+        except Exception as error:
+            if type(error).__module__.split(".")[0] in {"click", "typer"}:
+                raise
+            tell(error)
+            raise typer.Exit(FAILED) from error
+
+
+def tell(error: BaseException) -> None:
+    """Write an error to stderr: one clear message, with its traceback only where asked for."""
+    if os.environ.get(TRACEBACK, "") not in {"", "0"}:
+        typer.echo("".join(traceback.format_exception(error)), err=True, nl=False)
+        return
+    typer.echo(_message(error), err=True)
+
+
+def _message(error: BaseException) -> str:
+    if isinstance(error, SolverError) and error.state:
+        return f"error: {error}\nstate at the failure: {', '.join(error.state)}"
+    if isinstance(error, ScenarioError | Interrupted):  # each says where it stands
+        return str(error)
+    if isinstance(error, WearsimError):
+        return f"error: {error}"
+    if isinstance(error, OSError):
+        return f"error: {error.filename or 'a file'}: {error.strerror or error}"
+    return (
+        f"internal error: {type(error).__name__}: {error}\n"
+        "this is a fault of wearsim or of a plugin; --traceback shows where"
+    )

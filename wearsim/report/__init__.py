@@ -1,0 +1,1 @@
+"""Figures from a results file or a contact, one module per figure."""

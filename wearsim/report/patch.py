@@ -1,0 +1,42 @@
+"""Size of a contact patch, read from its strips."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wearsim.types import FloatArray
+
+
+def patch_edges(y: FloatArray, half_length: FloatArray) -> tuple[float, float] | None:
+    """Return where the contact begins and ends across the track [m], or None without contact.
+
+    The square of the half-length falls linearly towards an edge of the contact; the edge is where
+    the outermost two strips put its zero, within their own width.
+
+    Parameters
+    ----------
+    y : ndarray, shape (strips,)
+        Axial position of the strips [m].
+    half_length : ndarray, shape (strips,)
+        Half-length a(y) of the contact [m].
+    """
+    touching = np.flatnonzero(half_length > 0.0)
+    if len(touching) == 0:
+        return None
+    first, last = int(touching[0]), int(touching[-1])
+    spacing = float(y[1] - y[0])
+    return (
+        float(y[first]) - spacing * _beyond(half_length, first, 1),
+        float(y[last]) + spacing * _beyond(half_length, last, -1),
+    )
+
+
+def _beyond(half_length: FloatArray, strip: int, inwards: int) -> float:
+    """Return how far the contact goes on past a strip's centre, in strips: a half to one."""
+    inner = strip + inwards
+    if not 0 <= inner < len(half_length):
+        return 0.5
+    outer_square, inner_square = half_length[strip] ** 2, half_length[inner] ** 2
+    if inner_square <= outer_square:
+        return 0.5
+    return float(np.clip(outer_square / (inner_square - outer_square), 0.0, 1.0))

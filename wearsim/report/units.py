@@ -1,0 +1,77 @@
+"""Numbers as an engineer reads them: SI floats in, "12.34 um" out."""
+
+from __future__ import annotations
+
+import math
+
+# One SI unit in each engineer's unit; every SI value that is shown passes through here.
+PER_SI = {
+    "1": 1.0,
+    "%": 1e2,
+    "um": 1e6,
+    "mm": 1e3,
+    "mm^3": 1e9,
+    "m/s": 1.0,
+    "s": 1.0,
+    "min": 1.0 / 60.0,
+    "N": 1.0,
+    "N mm": 1e3,
+    "N/mm": 1e-3,
+    "MPa": 1e-6,
+    "W": 1.0,
+    "W/mm": 1e-3,
+    "W/mm^2": 1e-6,
+    "J": 1.0,
+}
+NOTHING = "-"
+
+
+def shown(value: float | None, unit: str, digits: int = 4) -> str:
+    """Return an SI value in an engineer's unit, with that unit.
+
+    Parameters
+    ----------
+    value : float or None
+        In SI; None and values that are not finite are shown as a dash.
+    unit : str
+        A key of `PER_SI`.
+    digits : int
+        Significant digits.
+
+    Returns
+    -------
+    str
+    """
+    if value is None or not math.isfinite(value):
+        return NOTHING
+    text = _significant(value * PER_SI[unit], digits)
+    return text if unit == "1" else f"{text} {unit}"
+
+
+def _significant(value: float, digits: int) -> str:
+    """Write a number with so many digits; exponents only where zeros would hide it."""
+    size = abs(value)
+    if size != 0.0 and not 1e-4 <= size < 1e7:
+        return f"{value:.{digits - 1}e}"
+    rounded = float(f"{value:.{digits - 1}e}")
+    exponent = math.floor(math.log10(abs(rounded))) if rounded else 0
+    return f"{rounded:.{max(digits - 1 - exponent, 0)}f}" if rounded else "0"
+
+
+def count(value: float) -> str:
+    """Return a number of passes or steps with its thousands apart, "1,350,000"."""
+    return f"{value:,.0f}"
+
+
+def lapse(seconds: float) -> str:
+    """Return a wall time that is easy to read: "0.05 s", "12 s", "3 min 20 s", "2 h 5 min"."""
+    if not math.isfinite(seconds):
+        return NOTHING
+    if seconds < 9.95:
+        return f"{seconds:.2g} s" if seconds < 0.995 else f"{seconds:.1f} s"
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60} s"
+    return f"{whole // 3600} h {whole % 3600 // 60} min"

@@ -1,0 +1,1 @@
+"""What people do with runs: solve one contact, replay a wear test."""

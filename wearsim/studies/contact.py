@@ -1,0 +1,135 @@
+"""One contact by itself: the first roller of a scenario on its cylinder, as it stands."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wearsim.plugins import ContactModel
+from wearsim.scenario import Scenario
+from wearsim.studies.build import (
+    check_model,
+    creepage_of,
+    kinematics,
+    load_range,
+    nominal_gap,
+    slip_profile,
+)
+from wearsim.studies.tracks import MOST_STRIPS, contact_centres, fresh_patch
+from wearsim.types import (
+    ContactFields,
+    ContactSolution,
+    Creepage,
+    FloatArray,
+    Grid,
+    OperatingPoint,
+    Profile,
+)
+
+
+@dataclass(frozen=True)
+class ContactStudy:
+    """A solved contact and what was solved.
+
+    Parameters
+    ----------
+    solution : ContactSolution
+    fields : ContactFields, optional
+        The inside of the contact, where asked for.
+    gap : ndarray, shape (strips,)
+        Gap of the undeformed bodies [m].
+    grid : Grid
+    point : OperatingPoint
+    model : str
+        Name of the contact model.
+    notes : tuple of str
+        What a user should know.
+    """
+
+    solution: ContactSolution
+    fields: ContactFields | None
+    gap: FloatArray
+    grid: Grid
+    point: OperatingPoint
+    model: str
+    notes: tuple[str, ...]
+
+
+def _grid(scenario: Scenario, model: ContactModel, load: float, profile: Profile | None) -> Grid:
+    """Return strips that suit the contact: the model's choice, or the profile's whole width."""
+    choice, centre = scenario.contact, contact_centres(scenario)[0]
+    patch = fresh_patch(scenario, load)
+    if choice.width is None and profile is not None:
+        start, stop = float(profile.y[0]), float(profile.y[-1])
+        strips = choice.strips or int(np.clip(np.ceil(24 * (stop - start) / patch.b), 161, 801))
+        return Grid.spanning(start, stop, min(strips, MOST_STRIPS))
+    if choice.width is None and choice.strips is None:
+        curvature = 1.0 / scenario.cylinder.radius + 1.0 / scenario.roller.radius
+        materials = scenario.cylinder.material, scenario.roller.material
+        grid = model.suggest_grid(1.0 / scenario.roller.crown_radius, curvature, load, materials)
+        if grid is not None:
+            return Grid(grid.y + centre, grid.spacing)
+    if choice.centre is not None:
+        centre = choice.centre
+    width = choice.width if choice.width is not None else 2.4 * patch.b
+    return Grid.spanning(centre - 0.5 * width, centre + 0.5 * width, choice.strips or 121)
+
+
+def study_contact(
+    scenario: Scenario, profile: Profile | None = None, with_fields: bool = False
+) -> ContactStudy:
+    """Solve the contact of the scenario's first roller at the start of its load.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        A run's or a single contact's.
+    profile : Profile, optional
+        The cylinder's profile, in place of the scenario's.
+    with_fields : bool
+        Also return tractions and slip inside the contact.
+
+    Returns
+    -------
+    ContactStudy
+
+    Raises
+    ------
+    ContactError
+        If the contact has no solution.
+    CapabilityError
+        If the model cannot do what is asked.
+    """
+    model, load = scenario.contact.build(), scenario.load.build()
+    check_model(scenario, model)
+    force = load_range(scenario, load, 0.0)[0]
+    profile = profile if profile is not None else scenario.cylinder.profile
+    grid = _grid(scenario, model, force, profile)
+    model.prepare(grid, (scenario.cylinder.material, scenario.roller.material))
+    creepage = creepage_of(scenario, 0)
+    if scenario.creepage.differential_slip:
+        variation = slip_profile(scenario, grid, 0)
+        if profile is not None:
+            worn = -np.interp(grid.y, profile.y, profile.height)
+            variation = variation - worn / scenario.cylinder.radius
+        creepage = Creepage(creepage.longitudinal, creepage.lateral, creepage.spin, variation)
+    free = scenario.creepage.drive == "free"
+    point = OperatingPoint(
+        normal_force=force,
+        rolling_speed=scenario.rolling_speed,
+        creepage=creepage,
+        friction=scenario.friction.coefficient,
+        bearing_torque=scenario.creepage.bearing_torque if free else None,
+        rolling_radius=np.full(grid.strips, scenario.roller.radius) if free else None,
+    )
+    gap = nominal_gap(scenario, grid, 0, profile)
+    curvature = kinematics(scenario, np.ones(1)).longitudinal_curvature
+    solution = model.solve(gap, curvature, point)
+    fields = model.fields(solution, gap, curvature, point) if with_fields else None
+    return ContactStudy(solution, fields, gap, grid, point, scenario.contact.model, scenario.notes)
+
+
+def solve_contact(scenario: Scenario, profile: Profile | None = None) -> ContactSolution:
+    """Solve the contact of the scenario's first roller; see `study_contact`."""
+    return study_contact(scenario, profile).solution

@@ -1,0 +1,168 @@
+"""Keeps the history of a run and its recorded profiles; records never move a step."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from wearsim.evolution.advance import (
+    cylinder_depth_of,
+    cylinder_volume_of,
+    operating_points,
+    present_loads,
+    solve_present,
+)
+from wearsim.evolution.observables import depth, width, worn_volume
+from wearsim.evolution.scene import Scene
+from wearsim.evolution.state import WearState, contact_values
+from wearsim.evolution.stepper import Advance, Stepper
+from wearsim.studies.schedule import RecordSchedule
+from wearsim.types import FloatArray
+
+Row = dict[str, object]
+
+
+def history_row(scene: Scene, state: WearState, before: WearState | None, threshold: float) -> Row:
+    """Return the observables of a state; `threshold` [m] bounds the groove's width."""
+    realisations = range(scene.shape[2])
+    worn = state.cylinder_depth
+    power = contact_values(scene, state.contacts, "power")
+    line_load = contact_values(scene, state.contacts, "line_load")
+    row: Row = {
+        "passes": state.passes,
+        "time": scene.time(state.passes),
+        "step_passes": 0.0 if before is None else state.passes - before.passes,
+        "depth": cylinder_depth_of(state),
+        "width": np.array(
+            [width(scene.grid.y, worn[:, 0, v].max(axis=0), threshold) for v in realisations]
+        ),
+        "worn_volume": cylinder_volume_of(scene, state),
+        "roller_depth": depth(state.roller_depth)[0],
+        "roller_worn_volume": worn_volume(
+            state.roller_depth[0], scene.grid.spacing, scene.kinematics.roller_radius
+        ),
+        "dissipated_energy": state.energy,
+        "power": scene.total_power(power),
+        "normal_force": line_load.sum(axis=-1).mean(axis=0) * scene.grid.spacing,
+        "depth_error": state.depth_error,
+        "volume_error": state.volume_error,
+        "rejected": state.rejected,
+        "solves": state.solves,
+        "full_solves": state.full_solves,
+    }
+    row["peak_pressure"] = contact_values(scene, state.contacts, "peak_pressure").max(axis=0)
+    for name in ("approach", "longitudinal_creepage", "adhesion_fraction"):
+        row[name] = contact_values(scene, state.contacts, name).mean(axis=0)
+    return row
+
+
+def at_record(scene: Scene, stepper: Stepper, start: WearState, passes: float) -> WearState:
+    """Return the state at `passes`, reached from `start` by a step of its own that leads nowhere.
+
+    A profile interpolated between two steps would not fit its contact: line loads feel a tenth of
+    a micrometre. A side step does, and leaves the run as it is.
+    """
+    return replace(stepper.side_step(scene, start, passes - start.passes), passes=passes)
+
+
+def present_contacts(scene: Scene, state: WearState) -> WearState:
+    """Return `state` with its contacts solved at the loads of this moment."""
+    loads = present_loads(scene, state)
+    points = operating_points(scene, loads, state.cylinder_depth, state.roller_depth)
+    return replace(state, contacts=solve_present(scene, state, points))
+
+
+def record_row(scene: Scene, state: WearState) -> Row:
+    """Return the profiles of a state and the contacts at the loads of this moment."""
+    state = present_contacts(scene, state)
+    row: Row = {
+        "record_passes": state.passes,
+        "record_time": scene.time(state.passes),
+        "cylinder_profile": state.cylinder_depth[:, 0],
+        "roller_profile": state.roller_depth[0],
+    }
+    for name in ("line_load", "half_length", "dissipation"):
+        row[name] = contact_values(scene, state.contacts, name)
+    return row
+
+
+class Recorder:
+    """Collects history and records; what it shows is always that of a whole number of steps.
+
+    Parameters
+    ----------
+    scene : Scene
+    stepper : Stepper
+        Takes the side steps to what falls due within a step.
+    schedule : RecordSchedule
+    threshold : float
+        Depth that bounds the groove's width [m].
+    state : WearState
+        Where the run stands.
+    history, records : mapping of str to ndarray, optional
+        What an earlier part of the run collected; without it `state` is recorded as the first.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        stepper: Stepper,
+        schedule: RecordSchedule,
+        threshold: float,
+        state: WearState,
+        history: Mapping[str, FloatArray] | None = None,
+        records: Mapping[str, FloatArray] | None = None,
+    ) -> None:
+        self.scene = scene
+        self.stepper = stepper
+        self.schedule = schedule
+        self.threshold = threshold
+        self._history = _rows(history or {}) or [history_row(scene, state, None, threshold)]
+        self._records = _rows(records or {}) or [record_row(scene, state)]
+        self._kept = len(self._history), len(self._records), state
+
+    def add(self, advance: Advance, stop: float) -> None:
+        """Take note of a step, and record what fell due on its way or at the end of the test."""
+        start, end = advance.path[0], advance.end
+        due = []
+        for first, last in zip(advance.path[:-1], advance.path[1:], strict=True):
+            passes = self.schedule.next_record(first.passes)
+            while passes < last.passes:
+                due.append(at_record(self.scene, self.stepper, first, passes))
+                passes = self.schedule.next_record(passes)
+            if passes == last.passes or last.passes >= stop:
+                due.append(last)
+        self._records += [record_row(self.scene, state) for state in due]
+        self._history.append(history_row(self.scene, end, start, self.threshold))
+        # one assignment: an interrupt in the lines above leaves the step before in force
+        self._kept = len(self._history), len(self._records), end
+
+    def drop_unfinished(self) -> None:
+        """Forget what an interrupted `add` left behind."""
+        del self._history[self._kept[0] :], self._records[self._kept[1] :]
+
+    @property
+    def state(self) -> WearState:
+        """The state after the last step that was noted."""
+        return self._kept[2]
+
+    @property
+    def history(self) -> dict[str, FloatArray]:
+        """The history as arrays, first axis step."""
+        return _columns(self._history)
+
+    @property
+    def records(self) -> dict[str, FloatArray]:
+        """The records as arrays, first axis record."""
+        return _columns(self._records)
+
+
+def _rows(columns: Mapping[str, FloatArray]) -> list[Row]:
+    count = len(next(iter(columns.values()))) if columns else 0
+    return [{name: column[k] for name, column in columns.items()} for k in range(count)]
+
+
+def _columns(rows: list[Row]) -> dict[str, FloatArray]:
+    return {name: np.array([row[name] for row in rows]) for name in rows[0]} if rows else {}

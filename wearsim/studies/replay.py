@@ -1,0 +1,343 @@
+"""A wear test from start to end: run it, stop it anywhere, and go on from its file."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import numpy as np
+
+from wearsim.errors import Interrupted, ResultsFileError, SolverError
+from wearsim.evolution.loop import evolve
+from wearsim.evolution.scene import Scene
+from wearsim.evolution.state import WearState, fresh_state
+from wearsim.evolution.stepper import Advance, Stepper
+from wearsim.plugins import ContactModelSpec, LoadSpec, Spec, WearLawSpec, registry
+from wearsim.results import Result, RunData, check_output, read_results, write_results
+from wearsim.scenario import Scenario, parse_scenario
+from wearsim.studies.build import build_scene
+from wearsim.studies.events import Checkpointed, Event, Finished, Started, Stepped, Warned
+from wearsim.studies.recorder import Recorder
+from wearsim.studies.schedule import RecordSchedule
+from wearsim.types import Grid
+
+Watcher = Callable[[Event], None]
+SOFTWARE = ("wearsim", "numpy", "scipy", "numba", "h5py")
+
+
+def run(
+    scenario: Scenario,
+    output: str | Path | None = None,
+    *,
+    force: bool = False,
+    on_event: Watcher | None = None,
+    stop_requested: Callable[[], bool] | None = None,
+) -> Result:
+    """Run a wear test from fresh bodies to its end.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    output : path, optional
+        Results file; without it the result is kept in memory only.
+    force : bool
+        Overwrite an existing file.
+    on_event : callable, optional
+        Told what happens, see `wearsim.studies.events`.
+    stop_requested : callable, optional
+        Asked after every step; True ends the run after a checkpoint.
+
+    Returns
+    -------
+    Result
+
+    Raises
+    ------
+    ScenarioError, CapabilityError, ResultsFileError
+        If the run cannot start.
+    SolverError
+        If it fails; the file then holds everything up to the last good step.
+    Interrupted
+        If it was stopped; `resume` goes on from the file.
+    """
+    path = Path(output) if output is not None else None
+    if path is not None:
+        check_output(path, force)
+    scene, stepper, name = build_scene(scenario)
+    replay = _Replay(scenario, scene, stepper, name, path, on_event, stop_requested)
+    replay.begin(fresh_state(scene), float(scenario.total_passes))
+    return replay.finish()
+
+
+def resume(
+    file: str | Path,
+    until: float | None = None,
+    *,
+    on_event: Watcher | None = None,
+    stop_requested: Callable[[], bool] | None = None,
+) -> Result:
+    """Go on with a run from its file alone; the end is the same, bit for bit, as if unbroken.
+
+    Parameters
+    ----------
+    file : path
+        Results file of a run that was stopped, or finished.
+    until : float, optional
+        New simulated end of the test [s], to extend it.
+    on_event, stop_requested
+        As in `run`.
+
+    Returns
+    -------
+    Result
+
+    Raises
+    ------
+    ResultsFileError
+        If the file cannot be read, or holds a test that is already past `until`.
+    SolverError, Interrupted
+        As in `run`.
+    """
+    path = Path(file)
+    data = read_results(path)
+    overrides = {"operation.duration": f"{until!r} s"} if until is not None else None
+    scenario = parse_scenario(
+        data.scenario_text, data.scenario_file, data.files.__getitem__, overrides
+    )
+    state = WearState.from_arrays(
+        {name: array for name, array in data.checkpoint.items() if name not in _EXTRA}
+    )
+    if scenario.total_passes < state.passes:
+        raise ResultsFileError(
+            f"{path}: the test stands at {state.passes / scenario.pass_rate / 60.0:.6g} min"
+            f" already, which is past {(until or 0.0) / 60.0:.6g} min; give a later --until"
+        )
+    if data.finished and scenario.total_passes == state.passes:
+        return Result(data, path)
+    grid = Grid(data.static["y"], float(data.checkpoint["spacing"]))
+    scene, stepper, name = build_scene(scenario, grid)
+    replay = _Replay(scenario, scene, stepper, name, path, on_event, stop_requested)
+    replay.go_on(data, state)
+    return replay.finish()
+
+
+#: what a checkpoint holds besides the state
+_EXTRA = ("record_base", "spacing")
+
+
+class _Replay:
+    """One run in this process: it owns the recorder, the clock and the file."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        scene: Scene,
+        stepper: Stepper,
+        stepper_name: str,
+        path: Path | None,
+        on_event: Watcher | None,
+        stop_requested: Callable[[], bool] | None,
+    ) -> None:
+        self.scenario, self.scene = scenario, scene
+        self.stepper, self.stepper_name = stepper, stepper_name
+        self.path = path
+        self.tell: Watcher = on_event or (lambda event: None)
+        self.stop_requested = stop_requested or (lambda: False)
+        self.stop = float(scenario.total_passes)
+        self.warnings: list[str] = []
+        self.created = datetime.now(UTC).isoformat(timespec="seconds")
+        self.wall_before, self.started = 0.0, time.monotonic()
+
+    def begin(self, state: WearState, record_base: float) -> None:
+        """Start from fresh bodies."""
+        self.record_base = record_base
+        self.recorder = self._recorder(state)
+        self._write()
+
+    def go_on(self, data: RunData, state: WearState) -> None:
+        """Start from what a file holds."""
+        self.record_base = float(data.checkpoint["record_base"])
+        self.recorder = self._recorder(state, data)
+        self.warnings, self.created = list(data.warnings), data.created
+        self.wall_before = data.wall_seconds
+        for name, present in _software().items():
+            if data.software.get(name, present) != present:
+                self._warn(
+                    f"this file was written with {name} {data.software[name]} and goes on with"
+                    f" {present}: the last digits may differ from those of an unbroken run"
+                )
+
+    def _recorder(self, state: WearState, data: RunData | None = None) -> Recorder:
+        schedule = RecordSchedule.of(self.scenario, self.record_base)
+        threshold = self.scenario.outputs.width_threshold
+        if data is None:
+            return Recorder(self.scene, self.stepper, schedule, threshold, state)
+        return Recorder(
+            self.scene, self.stepper, schedule, threshold, state, data.history, data.records
+        )
+
+    def finish(self) -> Result:
+        """Step to the end of the test and return the result."""
+        state = self.recorder.state
+        self.tell(
+            Started(
+                self.stop,
+                self.scene.time(self.stop),
+                state.passes,
+                self.stepper_name,
+                self.scenario.contact.model,
+            )
+        )
+        try:
+            self._step_through()
+        except KeyboardInterrupt:
+            self._interrupted()
+        except SolverError:
+            # nothing is lost: the file keeps the last good step, and the user sees how it got there
+            self.recorder.drop_unfinished()
+            self._write()
+            raise
+        self._write(finished=True)
+        self.tell(Finished(self._wall()))
+        return Result(self._data(finished=True), self.path)
+
+    def _step_through(self) -> None:
+        every = self.scenario.outputs.checkpoint_every
+        written = time.monotonic()
+        for advance in evolve(
+            self.scene,
+            self.recorder.state,
+            self.stepper,
+            self.stop,
+            self.recorder.schedule.next_record,
+            self.scenario.evolution.max_steps,
+        ):
+            self.recorder.add(advance, self.stop)
+            self._report(advance)
+            if self.stop_requested() and self.recorder.state.passes < self.stop:
+                self._interrupted()
+            # a slow disk must not hold up the run: at most a fiftieth of the time goes into files
+            if time.monotonic() - written > max(every, 50.0 * self._last_write):
+                self._write()
+                written = time.monotonic()
+
+    def _report(self, advance: Advance) -> None:
+        state = advance.end
+        if advance.warning is not None:
+            self._warn(advance.warning)
+        self.tell(
+            Stepped(
+                passes=state.passes,
+                total_passes=self.stop,
+                time=self.scene.time(state.passes),
+                depth=float(state.cylinder_depth.max()),
+                step_passes=state.passes - advance.path[0].passes,
+                depth_error=float(state.depth_error.max()),
+                wall_seconds=self._wall(),
+            )
+        )
+
+    def _warn(self, message: str) -> None:
+        """Tell a warning; of one kind only the first is kept, or a long run would keep thousands."""
+        kind = message.split(":", maxsplit=1)[0]
+        if not any(known.split(":")[0] == kind for known in self.warnings):
+            self.warnings.append(message)
+            self.tell(Warned(message))
+
+    def _interrupted(self) -> None:
+        self.recorder.drop_unfinished()
+        self._write()
+        passes = self.recorder.state.passes
+        kept = f"go on with: wearsim resume {self.path}" if self.path else "nothing was written"
+        raise Interrupted(f"stopped at pass {passes:.0f} of {self.stop:.0f}; {kept}") from None
+
+    def _wall(self) -> float:
+        return self.wall_before + time.monotonic() - self.started
+
+    _last_write = 0.0
+
+    def _write(self, finished: bool = False) -> None:
+        if self.path is None:
+            return
+        begun = time.monotonic()
+        write_results(self.path, self._data(finished))
+        self._last_write = time.monotonic() - begun
+        self.tell(Checkpointed(str(self.path), self.recorder.state.passes))
+
+    def _data(self, finished: bool) -> RunData:
+        scenario, scene = self.scenario, self.scene
+        kinematics = scene.kinematics
+        checkpoint = self.recorder.state.to_arrays()
+        checkpoint["record_base"] = np.asarray(self.record_base)
+        checkpoint["spacing"] = np.asarray(scene.grid.spacing)
+        return RunData(
+            scenario_text=scenario.text,
+            scenario_file=scenario.file,
+            title=scenario.title,
+            sha256=scenario.sha256,
+            files=dict(scenario.files),
+            seed=scenario.seed,
+            software=_software(),
+            plugins=_plugins(scenario),
+            model=scenario.contact.model,
+            stepper=self.stepper_name,
+            tolerance=scenario.evolution.tolerance,
+            width_threshold=scenario.outputs.width_threshold,
+            total_passes=self.stop,
+            notes=list(scenario.notes),
+            warnings=self.warnings,
+            kinematics={
+                "rolling_speed": kinematics.rolling_speed,
+                "cylinder_radius": kinematics.cylinder_radius,
+                "roller_radius": kinematics.roller_radius,
+                "crown_radius": kinematics.crown_radius,
+                "pass_rate": kinematics.pass_rate,
+                "physical_rollers": kinematics.physical_rollers,
+            },
+            static={
+                "y": scene.grid.y,
+                "nominal_gap": scene.nominal_gap,
+                "multiplicity": kinematics.multiplicity,
+            },
+            history=self.recorder.history,
+            records=self.recorder.records,
+            checkpoint=checkpoint,
+            finished=finished,
+            wall_seconds=self._wall(),
+            created=self.created,
+        )
+
+
+def _software() -> dict[str, str]:
+    found = {}
+    for name in SOFTWARE:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "unknown"
+    return found
+
+
+def _plugins(scenario: Scenario) -> list[dict[str, str]]:
+    used: list[tuple[type[Spec], str]] = [
+        (ContactModelSpec, scenario.contact.model),
+        (LoadSpec, scenario.load.kind),
+    ]
+    used += [(LoadSpec, term.name) for term in scenario.load.terms]
+    if scenario.wear is not None:
+        used.append((WearLawSpec, scenario.wear.law))
+    rows = []
+    for kind, name in used:
+        item = registry().registered(kind, name)
+        rows.append(
+            {
+                "kind": kind.kind,
+                "name": name,
+                "distribution": item.distribution,
+                "version": item.version,
+            }
+        )
+    return rows

@@ -1,0 +1,51 @@
+"""When profiles are recorded: after how many roller passes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from wearsim.scenario import Scenario
+
+DEFAULT_RECORDS = 20
+_ROUND_OFF = 1e-9
+
+
+@dataclass(frozen=True)
+class RecordSchedule:
+    """Records at equal intervals of passes, or at a constant ratio from one to the next.
+
+    Parameters
+    ----------
+    interval : float
+        Passes from one record to the next, or 0 for a constant ratio.
+    base, count : float
+        Record number k comes after base^(k/count) passes where the ratio is constant.
+    """
+
+    interval: float
+    base: float
+    count: float
+
+    @classmethod
+    def of(cls, scenario: Scenario, base: float) -> RecordSchedule:
+        """Return the cadence a scenario asks for; `base` is the length of the test [passes].
+
+        The base stays that of the first run when a test is extended, so that the records go on in
+        the same rhythm.
+        """
+        outputs = scenario.outputs
+        count = outputs.records if outputs.records is not None else DEFAULT_RECORDS
+        if outputs.every_passes is not None:
+            return cls(float(outputs.every_passes), base, count)
+        if outputs.every is not None:
+            return cls(outputs.every * scenario.pass_rate, base, count)
+        even = outputs.spacing == "even" or base <= 1.0
+        return cls(base / count if even else 0.0, base, count)
+
+    def next_record(self, passes: float) -> float:
+        """Return the passes of the first record after `passes`."""
+        if self.interval > 0.0:
+            return (math.floor(passes / self.interval + _ROUND_OFF) + 1) * self.interval
+        place = self.count * math.log(max(passes, 1.0)) / math.log(self.base)
+        return float(self.base ** ((math.floor(place + _ROUND_OFF) + 1) / self.count))

@@ -1,0 +1,85 @@
+"""The strips a scenario runs on: how wide, how many, centred where."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wearsim.errors import Problem, ScenarioError
+from wearsim.mechanics.elasticity import combine
+from wearsim.mechanics.hertz import HertzContact, hertz
+from wearsim.scenario import Scenario
+from wearsim.types import Grid
+
+STRIPS_PER_HALF_WIDTH = 12  # of the fresh patch; a run's error in y is then about 1e-3
+MOST_STRIPS = 801
+FREE_CREEPAGE = 3e-3  # reckoned with where the creepage is not prescribed
+
+
+def contact_centres(scenario: Scenario) -> tuple[float, ...]:
+    """Return where each roller first touches the cylinder [m]."""
+    offsets = scenario.per_roller(scenario.roller.offset)
+    if not scenario.creepage.tilt_shifts_contact:
+        return offsets
+    tilts = scenario.per_roller(scenario.creepage.tilt)
+    crown = scenario.roller.crown_radius
+    return tuple(y - crown * tilt for y, tilt in zip(offsets, tilts, strict=True))
+
+
+def fresh_patch(scenario: Scenario, load: float) -> HertzContact:
+    """Return the Hertzian patch of the unworn bodies under `load` [N]."""
+    modulus = combine(scenario.cylinder.material, scenario.roller.material).contact_modulus
+    along = 0.5 * (1.0 / scenario.cylinder.radius + 1.0 / scenario.roller.radius)
+    return hertz(along, 0.5 / scenario.roller.crown_radius, load, modulus)
+
+
+def foreseen_half_width(scenario: Scenario, load: float) -> float:
+    """Return half the width of the groove that full slip would leave at the end [m].
+
+    Rigid bodies in full slip wear d = [(3/4) c N n / sqrt(2 R)]^(2/3) deep and 2 sqrt(2 R d) wide,
+    c being depth per pass and load; wear of the roller counts like that of the cylinder.
+    """
+    if scenario.wear is None:
+        return 0.0
+    law, speed = scenario.wear.build(), scenario.rolling_speed
+    factors = [law.depth_per_dissipation(body, speed) for body in ("cylinder", "roller")]
+    share = scenario.cylinder.radius / scenario.roller.radius / scenario.operation.rollers
+    wear = ((factors[0] or 0.0) + share * (factors[1] or 0.0)) * speed
+    creepage = scenario.creepage
+    yaw = max(abs(angle) for angle in scenario.per_roller(creepage.yaw))
+    longitudinal = abs(creepage.longitudinal or 0.0)
+    if creepage.drive == "free" or creepage.differential_slip:
+        longitudinal += FREE_CREEPAGE
+    slip = float(np.hypot(longitudinal, yaw))
+    per_load = wear * scenario.friction.coefficient * slip
+    crown = 2.0 * scenario.roller.crown_radius
+    depth = (0.75 * per_load * load * scenario.total_passes / np.sqrt(crown)) ** (2.0 / 3.0)
+    if scenario.cylinder.profile is not None:
+        depth += float(np.ptp(scenario.cylinder.profile.height))
+    return float(np.sqrt(crown * depth))
+
+
+def run_grid(scenario: Scenario, load: float) -> Grid:
+    """Return the strips of a run whose greatest load is `load` [N].
+
+    Raises
+    ------
+    ScenarioError
+        If the strips that were asked for cannot hold the contact.
+    """
+    patch, centres = fresh_patch(scenario, load), contact_centres(scenario)
+    choice = scenario.contact
+    centre = choice.centre if choice.centre is not None else 0.5 * (min(centres) + max(centres))
+    reach = max(abs(y - centre) for y in centres)
+    half = reach + 1.1 * foreseen_half_width(scenario, load) + 1.3 * patch.b
+    width = choice.width if choice.width is not None else 2.0 * half
+    strips = choice.strips
+    if strips is None:
+        strips = int(np.ceil(width / (patch.b / STRIPS_PER_HALF_WIDTH)))
+        strips = min(strips + (strips + 1) % 2, MOST_STRIPS)
+    if width < 2.0 * (reach + patch.b):
+        needed = f"at least {2e3 * (reach + patch.b):.4g} mm"
+        problem = Problem(
+            "contact", "width", "the fresh contact does not fit", f"{width * 1e3:.4g} mm", needed
+        )
+        raise ScenarioError(scenario.file, [problem])
+    return Grid.spanning(centre - 0.5 * width, centre + 0.5 * width, strips)
