@@ -14,7 +14,7 @@ class WearsimError(Exception):
 
 @dataclass(frozen=True)
 class Problem:
-    """One mistake in an input file: where it stands, what it is, what was got and what was expected."""
+    """One mistake in an input file: where it stands, what it is, what was got and expected."""
 
     table: str
     key: str

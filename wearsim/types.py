@@ -54,7 +54,7 @@ class Grid:
         spacing = (stop - start) / strips
         centre = 0.5 * (start + stop)
         # counted from the middle, so that a symmetric interval gives a grid symmetric to the bit
-        offsets = np.arange(strips) - 0.5 * (strips - 1)
+        offsets = np.arange(strips, dtype=np.float64) - 0.5 * (strips - 1)
         return cls(y=centre + offsets * spacing, spacing=spacing)
 
     @property
@@ -83,10 +83,10 @@ class Profile:
 class Creepage:
     """Rigid slip of body 1 (the cylinder) on body 2 (the roller), per unit of rolling velocity.
 
-    The local longitudinal creepage of a strip is ``longitudinal + g(y) - <g>``, where ``<g>`` is the
-    mean of g weighted by the line load, so that `longitudinal` is always the mean creepage of the
-    contact. g is `variation` where it is given and ``-spin * y`` otherwise; either way `spin` times
-    x is the lateral part that varies along rolling.
+    The local longitudinal creepage of a strip is ``longitudinal + g(y) - <g>``, where ``<g>`` is
+    the mean of g weighted by the line load, so that `longitudinal` is always the mean creepage of
+    the contact. g is `variation` where it is given and ``-spin * y`` otherwise; either way `spin`
+    times x is the lateral part that varies along rolling.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ class OperatingPoint:
 
 @dataclass(frozen=True)
 class ContactSolution:
-    """One solved contact, strip by strip. Tractions act on body 1, so they oppose positive creepage.
+    """One solved contact, strip by strip; tractions act on body 1 and oppose positive creepage.
 
     Parameters
     ----------

@@ -115,6 +115,12 @@ def test_that_a_figure_of_no_known_kind_is_bad_input(command: Command) -> None:
     assert ".png, .pdf or .svg" in result.stderr
 
 
+def test_that_a_figure_in_no_folder_is_bad_input(command: Command) -> None:
+    result = command("contact", SCENARIOS / "mean-contact.toml", "-o", "nowhere/contact.png")
+    assert result.exit_code == 2
+    assert "there is no folder nowhere" in result.stderr
+
+
 def test_that_schema_is_json_with_every_table(command: Command) -> None:
     result = command("schema")
     assert result.exit_code == 0

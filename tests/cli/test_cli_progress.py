@@ -37,7 +37,7 @@ def shown_steps(steps: list[tuple[float, float]]) -> list[str]:
 def test_that_the_first_and_the_last_step_are_always_shown() -> None:
     lines = shown_steps([(0.0, 10.0), (0.1, 500.0), (0.2, 1000.0)])
     assert [line.split(",")[0] for line in lines] == ["pass 10 (1 %)", "pass 1"]
-    assert lines[-1].startswith("pass 1,000 (100 %), 1.000 min, depth 1.000 um, step 10 passes")
+    assert lines[-1].startswith("pass 1,000 (100 %), 1.000 min, depth 1.000 um, step 10")
 
 
 def test_that_lines_are_a_second_apart() -> None:

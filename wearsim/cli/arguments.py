@@ -60,7 +60,7 @@ def read_scenario(path: Path, settings: list[str] | None) -> Scenario:
 
 
 def check_figure(path: Path) -> None:
-    """Raise unless the name of a figure ends as a kind of figure does.
+    """Raise unless a figure's name ends as a kind of figure does, in a folder that exists.
 
     Raises
     ------
@@ -71,6 +71,8 @@ def check_figure(path: Path) -> None:
         raise typer.BadParameter(
             f"'{path}' ends in no kind of figure, expected .png, .pdf or .svg", param_hint="-o"
         )
+    if not path.parent.is_dir():
+        raise typer.BadParameter(f"there is no folder {path.parent}", param_hint="-o")
 
 
 def read_text(path: Path) -> str:

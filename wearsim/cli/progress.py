@@ -12,10 +12,12 @@ from wearsim.report.units import count, lapse, shown
 from wearsim.studies.events import Event, Finished, Started, Stepped, Warned
 
 if TYPE_CHECKING:
+    from rich.console import Console
     from rich.progress import Progress
 
 Watcher: TypeAlias = Callable[[Event], None]
 BETWEEN_LINES = 1.0  # s
+_ROOM_FOR_BAR = 115  # columns
 
 
 @contextmanager
@@ -34,7 +36,7 @@ def watching(quiet: bool) -> Iterator[Watcher]:
     if not screen.is_terminal:
         yield PlainLines(note)
         return
-    with _bar() as progress:
+    with _bar(screen) as progress:
         yield LiveLine(progress)
 
 
@@ -81,7 +83,7 @@ def details(event: Stepped) -> str:
     """Return where a run stands, but for its passes."""
     return (
         f"{shown(event.time, 'min')}, depth {shown(event.depth, 'um')},"
-        f" step {count(event.step_passes)} passes"
+        f" step {count(event.step_passes)}"
     )
 
 
@@ -123,13 +125,14 @@ class PlainLines:
         )
 
 
-def _bar() -> Progress:
+def _bar(screen: Console) -> Progress:
     from rich.progress import BarColumn, Progress, TextColumn
 
     text = "{task.percentage:3.0f} %  {task.fields[passes]}  {task.fields[details]}"
-    return Progress(
-        BarColumn(bar_width=24), TextColumn(text, markup=False), console=console(err=True)
-    )
+    columns = [TextColumn(text, markup=False)]
+    if screen.width >= _ROOM_FOR_BAR:
+        return Progress(BarColumn(bar_width=24), *columns, console=screen)
+    return Progress(*columns, console=screen)
 
 
 class LiveLine:
@@ -143,14 +146,13 @@ class LiveLine:
 
     def __init__(self, progress: Progress) -> None:
         self._progress, self._clock = progress, Clock()
-        self._task = progress.add_task("", total=1.0, passes="", details="", start=False)
+        self._task = progress.add_task("", total=1.0, passes="", details="")
 
     def __call__(self, event: Event) -> None:
         """Take note of an event."""
         if isinstance(event, Started):
             self._clock.start(event)
             self._progress.console.print(opening(event))
-            self._progress.start_task(self._task)
             self._progress.update(self._task, total=event.total_passes, completed=event.from_passes)
         elif isinstance(event, Stepped):
             self._progress.update(

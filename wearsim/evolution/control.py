@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 
@@ -36,7 +37,7 @@ class StepControl:
         The final depth is foretold with an exponent below that of any groove, so that it is not
         overrated.
         """
-        return self.tolerance * self.share * depth * (stop / passes) ** 0.5
+        return self.tolerance * self.share * depth * math.sqrt(stop / passes)
 
     def next_step(self, step: float, error: float, allowed: float) -> float:
         """Return the next step for a first-order scheme, whose local error grows as its square."""

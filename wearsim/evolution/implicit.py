@@ -121,7 +121,8 @@ def _depth_error(end: WearState, whole: WearState) -> FloatArray:
     worn = end.cylinder_depth
     apart = np.abs(worn - whole.cylinder_depth)
     deep = worn >= DEEP * worn.max(axis=(0, 1, 3), keepdims=True)
-    return COVER * np.where(deep, apart, 0.0).max(axis=(0, 1, 3))
+    greatest: FloatArray = np.where(deep, apart, 0.0).max(axis=(0, 1, 3))
+    return COVER * greatest
 
 
 def _volume_gap(scene: Scene, end: WearState, whole: WearState) -> FloatArray:

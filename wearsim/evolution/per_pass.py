@@ -67,7 +67,7 @@ def turn_order(scene: Scene) -> IntArray:
 
 def _pass_loads(scene: Scene, state: WearState, count: int) -> FloatArray:
     """Return the load before feedback at the middle of each pass [N]."""
-    passes = state.passes + np.arange(count) + 0.5
+    passes = state.passes + np.arange(count, dtype=np.float64) + 0.5
     return np.ascontiguousarray(scene.load.force(passes / scene.kinematics.pass_rate))
 
 

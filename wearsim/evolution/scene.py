@@ -117,7 +117,8 @@ class Scene:
         It is the rise of the least gap: rigid bodies would approach by that much. On one track it
         equals the worn depth.
         """
-        return gap.min(axis=-1) - self.nominal_gap.min(axis=-1)
+        risen: FloatArray = gap.min(axis=-1) - self.nominal_gap.min(axis=-1)
+        return risen
 
     def point(
         self, roller: int, load: float, cylinder_depth: FloatArray, roller_depth: FloatArray

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -102,18 +103,18 @@ class WearState:
         }
         count = len(contact["power"])
         values["contacts"] = tuple(
-            ContactSolution(**{name: _unpack(column[k]) for name, column in contact.items()})
+            ContactSolution(**_unpack({name: column[k] for name, column in contact.items()}))
             for k in range(count)
         )
         return cls(**values)  # type: ignore[arg-type]
 
 
-def _unpack(value: npt.NDArray[np.generic] | np.generic) -> object:
-    return value.item() if value.ndim == 0 else np.array(value)
+def _unpack(values: dict[str, Any]) -> dict[str, Any]:
+    return {n: v.item() if v.ndim == 0 else np.array(v) for n, v in values.items()}
 
 
 def contact_values(scene: Scene, contacts: tuple[ContactSolution, ...], name: str) -> FloatArray:
-    """Return the field `name` of all contacts with the leading axes (station, roller, realisation)."""
+    """Return the field `name` of all contacts, leading axes (station, roller, realisation)."""
     values = np.array([getattr(contact, name) for contact in contacts])
     return values.reshape(scene.shape + values.shape[1:])
 

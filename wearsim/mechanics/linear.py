@@ -1,4 +1,4 @@
-"""Dense linear algebra small enough to own: it gives the same bits whatever the BLAS and its threads."""
+"""Dense linear algebra small enough to own: the same bits whatever the BLAS and its threads."""
 
 from __future__ import annotations
 
@@ -67,8 +67,7 @@ def solve_in_place(matrix: FloatArray, size: int, width: int) -> bool:
     bool
         False if a pivot vanished or is not finite.
     """
-    start = 0
-    while start < size:
+    for start in range(0, size, PANEL):
         stop = min(start + PANEL, size)
         if not _factor_panel(matrix, size, width, start, stop):
             return False
@@ -79,7 +78,6 @@ def solve_in_place(matrix: FloatArray, size: int, width: int) -> bool:
                 for i in range(k + 1, stop):
                     for j in range(stop, width):
                         matrix[i, j] -= matrix[i, k] * matrix[k, j]
-        start = stop
     for c in range(size, width):
         _substitute_back(matrix, size, c)
     return True

@@ -77,12 +77,13 @@ def foundation_guess(
             low = depth
     for i in range(n):
         line_load[k, i] = max(0.0, high + lowest - gap[k, i]) / (soft + compliance[k, k, i])
-    return high + lowest
+    approach: float = high + lowest
+    return approach
 
 
 @kernel
 def _number_contacts(line_load: FloatArray, index: IntArray) -> int:
-    """Number the strips that carry load through all contacts, the others -1; return the count."""
+    """Give the strips that carry load their rows, the others -1; return the number of rows."""
     contacts, n = line_load.shape
     count = 0
     for k in range(contacts):
@@ -112,7 +113,7 @@ def _press(
     """
     contacts, n = line_load.shape
     value, tangent = work[0], work[1]
-    widest = -1e300
+    widest: float = -np.inf
     for k in range(contacts):
         for j in range(n):
             column = index[k, j]
@@ -232,7 +233,7 @@ def _update(
             for other in range(contacts):
                 new += matrix[row, size + 1 + other] * approach[other]
             if not new > 0.0:
-                if new != new:
+                if np.isnan(new):
                     return np.inf, left
                 # a strip that Newton empties is dropped; while cautious it shrinks first
                 new = 0.1 * old if cautious and old > 1e-6 * peak else 0.0

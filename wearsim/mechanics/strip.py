@@ -29,7 +29,7 @@ def strip_force(
     contact_modulus: float,
     shear_modulus: float,
 ) -> tuple[float, float, float]:
-    """Return the traction of one strip along (x, y) [N/m], opposed to slip, and its adhesion length.
+    """Return the force of one strip along x and y [N/m], and the length that adheres.
 
     Parameters
     ----------

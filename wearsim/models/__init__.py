@@ -1,4 +1,4 @@
-"""The built-in contact models, wear laws and loads, registered through the same hooks as anyone's."""
+"""The built-in contact models, wear laws and loads, registered through everyone's hooks."""
 
 from __future__ import annotations
 

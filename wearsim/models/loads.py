@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from pydantic import Field
 
@@ -125,13 +127,13 @@ class ThermalTerm(LoadTerm):
     def advance(self, state: FloatArray, power: FloatArray, duration: float) -> FloatArray:
         """Return the term after `duration` [s] at constant `power` [W], shape (rollers,) [N]."""
         target = self.gain * power
-        return target + (state - target) * np.exp(-duration / self.time_constant)
+        return target + (state - target) * math.exp(-duration / self.time_constant)
 
     def mean_force(self, state: FloatArray, power: FloatArray, duration: float) -> FloatArray:
         """Return the term's exact mean over that time, shape (rollers,) [N]."""
         target = self.gain * power
         ratio = duration / self.time_constant
-        part = -np.expm1(-ratio) / ratio if ratio > 0.0 else 1.0
+        part = -math.expm1(-ratio) / ratio if ratio > 0.0 else 1.0
         return target + (state - target) * part
 
     def lag(self) -> tuple[float, float]:

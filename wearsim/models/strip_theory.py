@@ -98,8 +98,10 @@ class StripTheory(TangentialTheory):
         stick: FloatArray,
         shift: FloatArray,
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the slip: rigid slip less the strain of an elliptic traction (full sliding), or
-        the square root behind the adhering part.
+        """Return the slip where the strip slides.
+
+        It is the rigid slip less the strain of an elliptic traction in full sliding, and the
+        square root behind the part that adheres otherwise.
         """
         safe_a = np.where(a > 0.0, a, 1.0)
         total = np.hypot(found.force_x, found.force_y)

@@ -1,4 +1,4 @@
-"""What every tangential theory shares: local creepage, the balance of torque, the sums over strips."""
+"""What every tangential theory shares: local creepage, balance of torque, sums over strips."""
 
 from __future__ import annotations
 

@@ -20,17 +20,17 @@ def is_run(scenario: Scenario) -> bool:
 def _bodies(scenario: Scenario) -> Rows:
     roller, cylinder = scenario.roller, scenario.cylinder
     pair = combine(cylinder.material, roller.material)
+    elasticity = (
+        f"contact modulus {pair.contact_modulus / 1e9:.4g} GPa,"
+        f" shear modulus {pair.shear_modulus / 1e9:.4g} GPa"
+    )
     return [
         (
             "roller",
             f"radius {roller.radius * 1e3:.6g} mm, crown radius {roller.crown_radius * 1e3:.6g} mm",
         ),
         ("cylinder", f"radius {cylinder.radius * 1e3:.6g} mm"),
-        (
-            "elasticity",
-            f"contact modulus {pair.contact_modulus / 1e9:.4g} GPa,"
-            f" shear modulus {pair.shear_modulus / 1e9:.4g} GPa",
-        ),
+        ("elasticity", elasticity),
         ("rolling speed", f"{scenario.rolling_speed:.4g} m/s"),
     ]
 
@@ -50,15 +50,15 @@ def _creepage(scenario: Scenario) -> str:
 
 def _contact(scenario: Scenario, load: float) -> Rows:
     patch = fresh_patch(scenario, load)
+    size = (
+        f"{2e3 * patch.a:.4g} x {2e3 * patch.b:.4g} mm,"
+        f" peak pressure {patch.peak_pressure / 1e6:.4g} MPa"
+    )
     return [
         ("friction", f"{scenario.friction.coefficient:.4g}"),
         ("creepage", _creepage(scenario)),
         ("contact model", f"{scenario.contact.model} ({scenario.contact.spec.summary})"),
-        (
-            "fresh patch (Hertz)",
-            f"{2e3 * patch.a:.4g} x {2e3 * patch.b:.4g} mm,"
-            f" peak pressure {patch.peak_pressure / 1e6:.4g} MPa",
-        ),
+        ("fresh patch (Hertz)", size),
     ]
 
 
@@ -68,6 +68,10 @@ def _test(scenario: Scenario) -> Rows:
     counts = scene.kinematics.multiplicity
     alike = ", all alike" if len(counts) == 1 and counts[0] > 1 else ""
     solved = f"{len(counts)} solved{alike}" if counts.sum() > 1 else "1"
+    strips = (
+        f"{grid.strips} of {grid.spacing * 1e3:.4g} mm,"
+        f" {grid.y[0] * 1e3:.4g} to {grid.y[-1] * 1e3:.4g} mm"
+    )
     return [
         ("rollers", f"{counts.sum():.0f} ({solved})" if counts.sum() > 1 else "1"),
         (
@@ -75,11 +79,7 @@ def _test(scenario: Scenario) -> Rows:
             f"{scenario.total_time / 60.0:.6g} min, {scenario.total_passes:,} roller passes",
         ),
         ("wear law", "" if law is None else f"{law.law} ({law.spec.summary})"),
-        (
-            "strips",
-            f"{grid.strips} of {grid.spacing * 1e3:.4g} mm,"
-            f" {grid.y[0] * 1e3:.4g} to {grid.y[-1] * 1e3:.4g} mm",
-        ),
+        ("strips", strips),
         ("stepper", f"{stepper}, tolerance {scenario.evolution.tolerance:.1e}"),
     ]
 

@@ -241,7 +241,7 @@ class _Replay:
         )
 
     def _warn(self, message: str) -> None:
-        """Tell a warning; of one kind only the first is kept, or a long run would keep thousands."""
+        """Tell a warning; only the first of a kind is kept, or a long run would keep thousands."""
         kind = message.split(":", maxsplit=1)[0]
         if not any(known.split(":")[0] == kind for known in self.warnings):
             self.warnings.append(message)
