@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from conftest import SCENARIOS, SHORT, Command
+from cli_examples import SCENARIOS, SHORT, Command
 
 import wearsim.plugins
 from wearsim.plugins.manager import Broken, Registry

@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 import pytest
-from conftest import SCENARIOS, Command
+from cli_examples import SCENARIOS, Command
 
 from wearsim.results import open_results
 

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from conftest import SCENARIOS, Command
+from cli_examples import SCENARIOS, Command
 
 from wearsim.errors import Interrupted
 from wearsim.results import open_results

@@ -4,7 +4,7 @@ import sys
 from importlib.metadata import version
 
 import pytest
-from conftest import Command
+from cli_examples import Command
 
 import wearsim.cli.check
 from wearsim.errors import CapabilityError, PluginError, ResultsFileError, SolverError

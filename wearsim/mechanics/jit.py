@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import ParamSpec, TypeVar
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, ParamSpec, TypeVar
 
 import numba
 
@@ -23,4 +26,25 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
     except RuntimeError:
         # neither the source tree nor the user's cache folder can be written: compile afresh
         compiled = numba.njit(error_model="numpy")(function)
-    return compiled  # type: ignore[no-any-return]
+    else:
+        _renew_with_any_kernel(compiled)
+    return compiled
+
+
+def _renew_with_any_kernel(compiled: Any) -> None:
+    """Make the cache stale when any kernel's source changes, not the function's own file alone.
+
+    A kernel holds compiled copies of those it calls; numba does not look at their files.
+    """
+    cache_file = getattr(compiled._cache, "_cache_file", None)
+    if cache_file is not None:
+        cache_file._source_stamp = (cache_file._source_stamp, _sources())
+
+
+@cache
+def _sources() -> str:
+    """Return a digest of all kernels' sources."""
+    digest = sha256()
+    for path in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()

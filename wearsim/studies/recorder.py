@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -128,16 +129,21 @@ class Recorder:
         start, end = advance.path[0], advance.end
         due = []
         for first, last in zip(advance.path[:-1], advance.path[1:], strict=True):
-            passes = self.schedule.next_record(first.passes)
+            passes = self._next_record(first.passes)
             while passes < last.passes:
                 due.append(at_record(self.scene, self.stepper, first, passes))
-                passes = self.schedule.next_record(passes)
+                passes = self._next_record(passes)
             if passes == last.passes or last.passes >= stop:
                 due.append(last)
         self._records += [record_row(self.scene, state) for state in due]
         self._history.append(history_row(self.scene, end, start, self.threshold))
         # one assignment: an interrupt in the lines above leaves the step before in force
         self._kept = len(self._history), len(self._records), end
+
+    def _next_record(self, passes: float) -> float:
+        """Return the passes of the first record after `passes`; a pass by itself has no parts."""
+        due = self.schedule.next_record(passes)
+        return float(math.ceil(due)) if self.stepper.pass_by_pass else due
 
     def drop_unfinished(self) -> None:
         """Forget what an interrupted `add` left behind."""

@@ -163,11 +163,13 @@ class _Replay:
         self.recorder = self._recorder(state, data)
         self.warnings, self.created = list(data.warnings), data.created
         self.wall_before = data.wall_seconds
-        for name, present in _software().items():
-            if data.software.get(name, present) != present:
+        before = _origins(data.software, data.plugins)
+        now = _origins(_software(), _plugins(self.scenario))
+        for name in now:
+            if before.get(name, now[name]) != now[name]:
                 self._warn(
-                    f"this file was written with {name} {data.software[name]} and goes on with"
-                    f" {present}: the last digits may differ from those of an unbroken run"
+                    f"this file was written with {name} {before[name]} and goes on with"
+                    f" {now[name]}: the last digits may differ from those of an unbroken run"
                 )
 
     def _recorder(self, state: WearState, data: RunData | None = None) -> Recorder:
@@ -319,6 +321,16 @@ def _software() -> dict[str, str]:
         except PackageNotFoundError:
             found[name] = "unknown"
     return found
+
+
+def _origins(software: dict[str, str], plugins: list[dict[str, str]]) -> dict[str, str]:
+    """Return the version of every package, and where every plugin in use comes from, by name."""
+    origins = dict(software)
+    for row in plugins:
+        known = row["distribution"] in software
+        origin = row["distribution"] if known else f"{row['distribution']} {row['version']}"
+        origins[f"the {row['kind']} '{row['name']}' of"] = origin
+    return origins
 
 
 def _plugins(scenario: Scenario) -> list[dict[str, str]]:

@@ -46,6 +46,10 @@ class RecordSchedule:
     def next_record(self, passes: float) -> float:
         """Return the passes of the first record after `passes`."""
         if self.interval > 0.0:
-            return (math.floor(passes / self.interval + _ROUND_OFF) + 1) * self.interval
-        place = self.count * math.log(max(passes, 1.0)) / math.log(self.base)
-        return float(self.base ** ((math.floor(place + _ROUND_OFF) + 1) / self.count))
+            due = (math.floor(passes / self.interval + _ROUND_OFF) + 1) * self.interval
+        else:
+            place = self.count * math.log(max(passes, 1.0)) / math.log(self.base)
+            due = float(self.base ** ((math.floor(place + _ROUND_OFF) + 1) / self.count))
+        # a record due at the end of the test must not fall a round-off before it
+        whole = float(round(due))
+        return whole if abs(due - whole) <= 1e-12 * whole and whole > passes else due

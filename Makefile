@@ -1,0 +1,48 @@
+# make demo    replay the 450-minute wear test: a summary, results and a figure in out/
+# make test    everything that must hold: style, types, layers, tests
+# make bench   measure speed beside error; writes out/benchmarks.md
+# make clean   remove what these made, the environment included
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+JOBS ?= 2
+
+.PHONY: demo test lint bench clean
+.DEFAULT_GOAL := demo
+
+demo: $(VENV)/.installed
+	mkdir -p out
+	$(BIN)/wearsim run scenarios/rig-450min.toml -o out/rig-450min.h5 --force
+	$(BIN)/wearsim plot out/rig-450min.h5 -o out/rig-450min.png
+
+test: lint
+	$(BIN)/pytest -n $(JOBS) --dist worksteal
+
+lint: $(VENV)/.installed-dev
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+
+bench: $(VENV)/.installed-dev
+	mkdir -p out
+	$(BIN)/python -m tests.benchmarks.report -o out/benchmarks.md
+
+# the two stamps tell what the environment holds; a change of pyproject.toml renews it
+$(VENV)/bin/python:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
+		|| { echo "wearsim needs Python 3.11 or newer; set PYTHON=/path/to/python3"; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/.installed: pyproject.toml | $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
+	@touch $@
+
+$(VENV)/.installed-dev: pyproject.toml | $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
+	@touch $@ $(VENV)/.installed
+
+clean:
+	rm -rf $(VENV) out build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis .benchmarks \
+		.import_linter_cache
+	find wearsim tests plugins -name __pycache__ -type d -prune -exec rm -rf {} +

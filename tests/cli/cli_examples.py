@@ -1,0 +1,44 @@
+"""What the shell's tests share: the type of their command, and a scenario that takes no time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from typer.testing import Result
+
+Command = Callable[..., Result]
+SCENARIOS = Path(__file__).parents[2] / "scenarios"
+SHORT = """\
+title = "a short [test]"
+
+[roller]
+radius = "20 mm"
+crown_radius = "500 mm"
+material = "steel"
+
+[cylinder]
+radius = "25 mm"
+material = "steel"
+
+[operation]
+speed = "1000 rpm"
+duration = "2 min"
+rollers = 3
+
+[load]
+normal_force = "300 N"
+
+[friction]
+coefficient = 0.1
+
+[creepage]
+longitudinal = 1e-3
+
+[wear]
+[wear.cylinder]
+k_over_h = "1.1e-11 1/Pa"
+
+[wear.roller]
+k_over_h = "0 1/Pa"
+"""

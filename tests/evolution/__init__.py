@@ -1,0 +1,39 @@
+"""Tests of the evolution, and the scenes they run on."""
+
+from pathlib import Path
+
+from wearsim.evolution.loop import evolve
+from wearsim.evolution.state import fresh_state
+from wearsim.scenario import load_scenario
+from wearsim.studies.build import build_scene
+
+SCENARIOS = Path(__file__).parents[2] / "scenarios"
+
+
+def never(passes):
+    """Record nothing."""
+    return float("inf")
+
+
+def built(name="rig-450min", **changes):
+    """Return scene, stepper and passes of a scenario; a key's dots are written as `__`."""
+    overrides = {key.replace("__", "."): value for key, value in changes.items()}
+    scenario = load_scenario(SCENARIOS / f"{name}.toml", overrides=overrides)
+    scene, stepper, _ = build_scene(scenario)
+    return scene, stepper, float(scenario.total_passes)
+
+
+def stepped(scene, stepper, stop, state=None):
+    """Return the state at `stop` passes, and the advances that led there."""
+    state = state if state is not None else fresh_state(scene)
+    advances = []
+    for advance in evolve(scene, state, stepper, stop, never, 10**6):
+        state = advance.end
+        advances.append(advance)
+    return state, advances
+
+
+def worn(name="rig-450min", **changes):
+    """Run a scenario and return its scene and end state."""
+    scene, stepper, stop = built(name, **changes)
+    return scene, stepped(scene, stepper, stop)[0]

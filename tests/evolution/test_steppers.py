@@ -1,0 +1,236 @@
+"""Steppers against each other: order, error estimates, stability."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.evolution import built, stepped
+from wearsim.errors import SolverError, StepError
+from wearsim.evolution.advance import cylinder_depth_of, cylinder_volume_of
+from wearsim.evolution.control import StepControl
+from wearsim.evolution.explicit import ExplicitStepper, stability_limit
+from wearsim.evolution.implicit import ImplicitStepper
+from wearsim.evolution.observables import centroid, oscillation
+from wearsim.evolution.per_pass import PerPassStepper, _run_compiled, _run_in_python
+from wearsim.evolution.state import fresh_state
+
+THREE = {"roller__offset": ["-1 mm", "0.3 mm", "1 mm"]}
+SPIKE = "time [min], load [N]\n0, 300\n3, 300\n3.1, 900\n4.5, 900\n4.6, 300\n450, 300\n"
+CASES = {
+    "constant": {},
+    "spring": {"load__kind": "spring", "load__stiffness": "690 N/mm"},
+    "three rollers": THREE,
+    "tilted": {"creepage__tilt": ["1 mrad", "-0.5 mrad", "2 mrad"]},
+    "both wear": {"wear__roller__k_over_h": "1.1e-11 1/Pa"},
+    "partial slip": {"creepage__longitudinal": 3e-4},
+    "yaw": {"creepage__yaw": "1 mrad"},
+    "differential slip": {"creepage__differential_slip": True},
+    "fast wear": {"wear__cylinder__k_over_h": "2e-10 1/Pa"},
+}
+
+
+def compared(truth_name="per-pass", passes=45_000, **changes):
+    """Return scene, truth and implicit replay of the same test."""
+    common = {"operation__passes": passes, "contact__strips": 91, **changes}
+    scene, truth_stepper, stop = built(evolution__stepper=truth_name, **common)
+    truth, _ = stepped(scene, truth_stepper, stop)
+    scene, stepper, _ = built(**common)
+    return scene, truth, stepped(scene, stepper, stop)[0]
+
+
+@pytest.mark.parametrize("case", list(CASES))
+def test_that_the_implicit_replay_meets_per_pass_truth_and_its_own_estimate(case):
+    scene, truth, found = compared(**CASES[case])
+    depth, exact = cylinder_depth_of(found)[0], cylinder_depth_of(truth)[0]
+    assert depth == pytest.approx(exact, rel=5e-3)
+    assert abs(depth - exact) <= found.depth_error[0]
+    assert found.depth_error[0] < 1e-2 * exact
+    volume, whole = cylinder_volume_of(scene, found)[0], cylinder_volume_of(scene, truth)[0]
+    assert volume == pytest.approx(whole, rel=5e-3)
+    assert abs(volume - whole) <= found.volume_error[0] + 1e-9 * whole
+
+
+def test_that_no_step_skips_over_a_spike_in_the_log(tmp_path):
+    log = tmp_path / "log.csv"
+    log.write_text(SPIKE)
+    changes = {"load": {"kind": "recorded", "file": str(log)}}
+    _, truth, found = compared(**changes)
+    depth, exact = cylinder_depth_of(found)[0], cylinder_depth_of(truth)[0]
+    assert depth == pytest.approx(exact, rel=5e-3)
+    assert abs(depth - exact) <= found.depth_error[0]
+    _, flat, _ = compared(passes=45_000)
+    assert exact > 1.1 * cylinder_depth_of(flat)[0]
+
+
+def test_that_a_tighter_tolerance_gives_a_smaller_error():
+    errors = []
+    for tolerance in (1e-2, 1e-3, 1e-4):
+        _, truth, found = compared(passes=30_000, evolution__tolerance=tolerance)
+        errors.append(abs(cylinder_depth_of(found)[0] / cylinder_depth_of(truth)[0] - 1.0))
+    assert errors[2] < errors[1] < errors[0]
+    assert errors[2] < 0.2 * errors[0]
+
+
+def test_that_three_offset_rollers_converge_as_the_step_shrinks():
+    passes = 60_000
+    scene, _, _ = built(operation__passes=passes, **THREE)
+    truth, _ = stepped(scene, PerPassStepper(), passes)
+    y = scene.grid.y
+    depth_errors, centre_errors = [], []
+    for steps in (10, 20, 40):
+        stepper = ImplicitStepper(StepControl(1.0), forced_step=passes / steps)
+        found, _ = stepped(scene, stepper, passes)
+        depth_errors.append(abs(cylinder_depth_of(found)[0] - cylinder_depth_of(truth)[0]))
+        ours, exact = (centroid(y, s.cylinder_depth[0, 0, 0]) for s in (found, truth))
+        centre_errors.append(abs(ours - exact))
+    for errors in (depth_errors, centre_errors):
+        orders = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
+        assert (orders > 0.7).all()
+        assert (orders < 1.6).all()
+    assert depth_errors[-1] < 5e-3 * cylinder_depth_of(truth)[0]
+
+
+def test_that_the_compiled_loop_is_the_python_loop():
+    scene, _, _ = built(
+        roller__offset=["0 mm", "0 mm", "1 mm"],
+        load__kind="spring",
+        load__stiffness="690 N/mm",
+        wear__roller__k_over_h="5e-12 1/Pa",
+        creepage__yaw="0.3 mrad",
+        creepage__differential_slip=True,
+        contact__strips=61,
+        operation__passes=500_000,
+        **{"load.thermal": {"gain": "50 N/W", "time_constant": "2 s"}},
+    )
+    state = fresh_state(scene)
+    slow, fast = _run_in_python(scene, state, 300), _run_compiled(scene, state, 300)
+    for name in ("cylinder_depth", "roller_depth", "terms", "energy"):
+        one, other = getattr(slow, name), getattr(fast, name)
+        assert np.abs(one - other).max() < 2e-8 * np.abs(one).max(), name
+    assert fast.terms.max() > 0.1
+    assert fast.full_solves < 30
+
+
+def test_that_a_pass_followed_by_the_chord_method_keeps_its_residual_below_1e_8():
+    scene, _, _ = built(operation__passes=200_000, contact__strips=91)
+    state, _ = stepped(scene, PerPassStepper(), 5_000)
+    last = _run_compiled(scene, state, 1)
+    assert last.full_solves == state.full_solves
+    q = last.loop_strips[0, 0, 0, 0]
+    gap = scene.gap(state.cylinder_depth, state.roller_depth)[0, 0, 0]
+    exact = scene.model.solve(gap, 90.0, scene.point(0, 300.0, gap * 0.0, gap * 0.0))
+    # what the line load misses, pressed through the stiffness of one strip, in parts of approach
+    assert np.abs(q - exact.line_load).max() < 1e-7 * exact.line_load.max()
+    assert last.loop_approach[0, 0, 0, 0] == pytest.approx(exact.approach, rel=1e-8)
+    assert q.sum() * scene.grid.spacing == pytest.approx(300.0, rel=1e-10)
+
+
+@pytest.fixture(scope="module")
+def half_worn():
+    scene, stepper, _ = built(contact__strips=161)
+    state, _ = stepped(scene, stepper, 300_000.0)
+    return scene, replace(state, shadow=None, step=0.0)
+
+
+def roughened(state):
+    """Return the state with a nanometre scratched off every other strip in contact."""
+    loaded = state.contacts[0].line_load > 0.0
+    scratch = np.where(loaded & (np.arange(len(loaded)) % 2 == 0), 1e-9, 0.0)
+    return replace(state, cylinder_depth=state.cylinder_depth + scratch)
+
+
+@pytest.mark.parametrize(("factor", "unstable"), [(0.9, False), (1.4, True)])
+def test_that_the_limit_of_stability_is_where_explicit_steps_begin_to_oscillate(
+    half_worn, factor, unstable
+):
+    scene, state = half_worn
+    limit = stability_limit(scene, state)
+    stepper = ExplicitStepper(StepControl(1.0), factor * limit, allow_unstable=True)
+    state, warnings = roughened(state), []
+    first = None
+    for _ in range(25):
+        advance = stepper.advance(scene, state, 1e12)
+        state = advance.end
+        first = first if first is not None else oscillation(state.contacts[0].line_load)
+        warnings.append(advance.warning)
+    last = oscillation(state.contacts[0].line_load)
+    if unstable:
+        assert last > 0.1
+        assert any(w is not None and w.startswith("unstable: ") for w in warnings)
+    else:
+        assert last < first
+        assert not any(warnings)
+
+
+def test_that_implicit_steps_of_ten_times_the_limit_do_not_oscillate(half_worn):
+    scene, state = half_worn
+    step = 10.0 * stability_limit(scene, state)
+    state, stepper = roughened(state), ImplicitStepper(StepControl(1.0), forced_step=step)
+    for _ in range(10):
+        state = stepper.advance(scene, state, 1e12).end
+        assert oscillation(state.contacts[0].line_load) < 1e-3
+
+
+def test_that_the_limit_is_the_interpenetration_of_the_strips(half_worn):
+    scene, state = half_worn
+    cylinder, _ = scene.shared_wear(*scene.wear_per_pass(list(state.contacts)))
+    wear = stability_limit(scene, state) * cylinder.max()
+    # 0.6 of twice the interpenetration: about 0.2 um for worn strips of 0.1 mm
+    assert 0.1e-6 < wear < 0.4e-6
+
+
+def test_that_a_forced_step_past_the_limit_is_refused(half_worn):
+    scene, state = half_worn
+    step = 2.0 * stability_limit(scene, state)
+    with pytest.raises(StepError, match=r"exceeds the limit of stability.*allow_unstable = true"):
+        ExplicitStepper(StepControl(1.0), step).advance(scene, state, 1e12)
+
+
+def test_that_the_explicit_replay_stays_under_the_limit_and_meets_the_truth():
+    _, truth, _ = compared(passes=45_000)
+    scene, stepper, stop = built(
+        operation__passes=45_000, contact__strips=91, evolution__stepper="explicit"
+    )
+    state, advances = stepped(scene, stepper, stop)
+    assert not any(advance.warning for advance in advances)
+    depth, exact = cylinder_depth_of(state)[0], cylinder_depth_of(truth)[0]
+    assert depth == pytest.approx(exact, rel=5e-3)
+    assert abs(depth - exact) <= state.depth_error[0]
+
+
+def test_that_a_free_roller_finds_its_creepage_at_every_step():
+    scene, stepper, stop = built(
+        creepage={"drive": "free", "bearing_torque": "100 N mm", "differential_slip": True},
+        operation__passes=300_000,
+    )
+    state, _ = stepped(scene, stepper, stop)
+    contact = state.contacts[0]
+    radius = 0.02 - state.roller_depth[0, 0, 0]
+    assert scene.bearing_torque == 0.1
+    assert contact.force_x * -0.02 == pytest.approx(0.1, rel=1e-6)
+    assert radius.max() == 0.02
+    # the groove shortens the cylinder's radius by d, and the roller's slip follows it
+    assert contact.longitudinal_creepage > 0.0
+
+
+def test_that_a_load_that_falls_to_nothing_is_an_error_that_names_the_cause(tmp_path):
+    log = tmp_path / "log.csv"
+    log.write_text("time [min], load [N]\n0, 300\n2, 300\n2.1, -10\n450, -10\n")
+    for name in ("implicit", "explicit", "per-pass"):
+        scene, stepper, stop = built(
+            load={"kind": "recorded", "file": str(log)},
+            evolution__stepper=name,
+            operation__passes=30_000,
+            contact__width="8 mm",
+        )
+        with pytest.raises(SolverError, match=r"contact is lost at pass \d+: the load") as caught:
+            stepped(scene, stepper, stop)
+        assert caught.value.state
+
+
+def test_that_a_stiff_spring_brings_wear_to_rest():
+    scene, stepper, stop = built(load__kind="spring", load__stiffness="40 kN/mm")
+    state, _ = stepped(scene, stepper, stop)
+    depth = cylinder_depth_of(state)[0]
+    assert 0.9 * 300.0 / 40e6 < depth < 300.0 / 40e6

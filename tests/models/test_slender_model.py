@@ -1,0 +1,210 @@
+"""The contact model `slender` against the exact theory, and its balances."""
+
+import math
+
+import numpy as np
+import pytest
+
+from tests.reference import CREEPAGES, STEEL, WORN, rows, worn_profile
+from wearsim.errors import ContactError
+from wearsim.models.slender import SPEC, Slender, SlenderOptions
+from wearsim.models.strip_theory import StripTheory
+from wearsim.types import Creepage, Grid, OperatingPoint
+
+MATERIALS = (STEEL, STEEL)
+SPEED = 1000.0 * 2.0 * math.pi / 60.0 * 25e-3
+RIG = 90.0
+
+
+def contact(grid=None, gap=None, creepage=None, load=300.0, curvature=RIG, mu=0.1, **options):
+    model = SPEC.factory(SlenderOptions(**options))
+    if grid is None:
+        grid = model.suggest_grid(2.0, curvature, load, MATERIALS)
+    model.prepare(grid, MATERIALS)
+    gap = grid.y**2 if gap is None else gap(grid.y)
+    torque = creepage.pop("bearing_torque", None) if isinstance(creepage, dict) else None
+    creep = Creepage(**(creepage or {"longitudinal": 1e-3}))
+    radius = np.full(grid.strips, 0.02) if torque is not None else None
+    point = OperatingPoint(load, SPEED, creep, mu, torque, radius)
+    return model, gap, point, model.solve(gap, curvature, point)
+
+
+def test_that_the_rigs_power_is_within_a_hundredth_of_the_exact_theory():
+    *_, solution = contact()
+    assert solution.power == pytest.approx(0.0771, rel=1e-2)
+    assert solution.line_load.sum() * np.diff(solution.y)[0] == pytest.approx(300.0, rel=1e-10)
+
+
+@pytest.mark.parametrize("tangential", ["strip", "fastsim"])
+@pytest.mark.parametrize(
+    "creepage",
+    [
+        {"longitudinal": 4e-4},
+        {"longitudinal": 4e-4, "lateral": 5e-4},
+        {"longitudinal": -3e-4, "lateral": 2e-4, "spin": 0.4},
+        {"longitudinal": 0.0, "spin": 1.0},
+    ],
+)
+def test_that_power_is_the_work_of_the_rigid_slip(creepage, tangential):
+    *_, point, solution = contact(creepage=creepage, tangential=tangential)
+    creep = point.creepage
+    work = -SPEED * (
+        creep.longitudinal * solution.force_x
+        + creep.lateral * solution.force_y
+        + creep.spin * solution.spin_moment
+    )
+    assert solution.power == pytest.approx(work, rel=1e-12)
+    assert solution.power > 0.0
+    assert solution.power == pytest.approx(
+        solution.dissipation.sum() * np.diff(solution.y)[0], rel=1e-12
+    )
+
+
+def test_that_forces_and_slip_have_the_signs_of_the_exact_theory():
+    for row in rows("mean_problem", case="combined"):
+        *_, solution = contact(
+            gap=lambda y: 0.5 * y**2,
+            curvature=45.0,
+            grid=Grid.spanning(-2.4e-3, 2.4e-3, 121),
+            creepage={
+                "longitudinal": row["xi"],
+                "lateral": row["eta"],
+                "spin": row["phi_per_m"],
+            },
+        )
+        assert solution.force_x == pytest.approx(row["Fx_N"], rel=5e-2)
+        assert solution.force_y == pytest.approx(row["Fy_N"], rel=5e-2)
+        # strips know no traction along x that phi x makes, and so only part of the moment
+        assert solution.spin_moment * row["Mz_Nm"] > 0.0
+        assert solution.power / SPEED == pytest.approx(row["P_over_V_N"], rel=1e-2)
+
+
+@pytest.mark.parametrize("name", WORN)
+def test_that_worn_profiles_carry_the_line_load_of_the_exact_theory(name):
+    exact = worn_profile(name)
+    *_, solution = contact(
+        grid=Grid.spanning(-4e-3, 4e-3, 321),
+        gap=lambda y: np.interp(y, exact["y"], exact["w"]),
+        curvature=45.0,
+    )
+    q = np.interp(exact["y"], solution.y, solution.line_load)
+    assert np.abs(q - exact["q"]).sum() / exact["q"].sum() < 0.03
+    assert solution.approach == pytest.approx(exact["approach"], rel=0.01)
+
+
+@pytest.mark.parametrize("name", WORN)
+@pytest.mark.parametrize("case", list(CREEPAGES))
+def test_that_worn_profiles_dissipate_like_the_exact_theory(name, case):
+    exact = worn_profile(name)
+    xi, eta, phi = CREEPAGES[case]
+    *_, solution = contact(
+        grid=Grid.spanning(-4e-3, 4e-3, 321),
+        gap=lambda y: np.interp(y, exact["y"], exact["w"]),
+        curvature=45.0,
+        creepage={"longitudinal": xi, "lateral": eta, "spin": phi},
+    )
+    assert solution.power / SPEED == pytest.approx(exact[f"P_over_V_{case}"], rel=0.015)
+
+
+@pytest.mark.parametrize(
+    "creepage", [{"longitudinal": 2e-4}, {"longitudinal": 2e-4, "lateral": 2e-4}]
+)
+def test_that_the_fields_add_up_to_the_strips(creepage):
+    model, gap, point, solution = contact(creepage=creepage)
+    fields = model.fields(solution, gap, RIG, point, points_along=4001)
+    spacing = np.diff(solution.y)[0]
+
+    def total(values):
+        return np.trapezoid(values, fields.x, axis=0).sum() * spacing
+
+    assert total(fields.pressure) == pytest.approx(300.0, rel=1e-4)
+    assert total(fields.traction_x) == pytest.approx(solution.force_x, rel=1e-3)
+    assert total(fields.traction_y) == pytest.approx(solution.force_y, rel=1e-3, abs=1e-9)
+    # with lateral creep, traction and slip are not quite parallel in this theory
+    exact = "lateral" not in creepage
+    assert total(fields.power_density) == pytest.approx(solution.power, rel=2e-3 if exact else 2e-2)
+    assert total(fields.adhesion.astype(float)) / total(np.ones_like(fields.x)) == pytest.approx(
+        solution.adhesion_fraction, abs=2e-3
+    )
+    bound = point.friction * fields.pressure
+    traction = np.hypot(fields.traction_x, fields.traction_y)
+    assert (traction <= bound * (1.0 + 1e-9) + 1.0).all()
+    slip = np.hypot(fields.slip_x, fields.slip_y)
+    assert slip[fields.adhesion].max() == 0.0
+
+
+def test_that_spin_and_its_slip_profile_are_the_same_thing():
+    grid = Grid.spanning(-1.9e-3, 1.9e-3, 101)
+    spin = {"longitudinal": 3e-4, "spin": 0.5}
+    profile = {"longitudinal": 3e-4, "spin": 0.0, "variation": -0.5 * grid.y + 7.0}
+    *_, first = contact(grid=grid, creepage=spin)
+    *_, second = contact(grid=grid, creepage=profile)
+    np.testing.assert_allclose(second.dissipation, first.dissipation, rtol=1e-7)
+
+
+def test_that_a_mirrored_contact_has_mirrored_dissipation_and_opposite_moment():
+    grid = Grid.spanning(-3e-3, 3e-3, 100)
+    one = {"longitudinal": 3e-4, "lateral": 1e-4, "spin": 0.5}
+    two = {"longitudinal": 3e-4, "lateral": -1e-4, "spin": -0.5}
+    *_, first = contact(grid=grid, gap=lambda y: (y - 0.5e-3) ** 2, creepage=one)
+    *_, second = contact(grid=grid, gap=lambda y: (y + 0.5e-3) ** 2, creepage=two)
+    np.testing.assert_allclose(second.dissipation[::-1], first.dissipation, rtol=1e-9)
+    assert second.force_y == pytest.approx(-first.force_y, rel=1e-10)
+    assert second.spin_moment == pytest.approx(-first.spin_moment, rel=1e-9)
+
+
+@pytest.mark.parametrize("torque", [0.0, 1e-3, 0.1, 0.5, -0.3])
+def test_that_a_free_roller_carries_its_bearing_torque(torque):
+    *_, solution = contact(creepage={"longitudinal": 0.0, "bearing_torque": torque, "spin": 0.2})
+    assert -0.02 * solution.force_x == pytest.approx(torque, rel=1e-9, abs=1e-12)
+    if torque == 0.0:
+        assert abs(solution.longitudinal_creepage) < 1e-12
+
+
+def test_that_a_roller_that_must_skid_is_an_error():
+    with pytest.raises(ContactError, match=r"the roller skids: its bearing torque of 0\.7 N m"):
+        contact(creepage={"longitudinal": 0.0, "bearing_torque": 0.7})
+
+
+def test_that_a_contact_at_the_edge_of_its_strips_is_an_error():
+    with pytest.raises(ContactError, match="raise contact.width or move contact.centre") as caught:
+        contact(grid=Grid.spanning(-1e-3, 1e-3, 51))
+    assert set(caught.value.state) >= {"gap", "line_load", "approach"}
+
+
+def test_that_strips_too_narrow_are_an_error():
+    with pytest.raises(ContactError, match=r"lower contact\.strips"):
+        contact(grid=Grid.spanning(-1.8e-5, 1.8e-5, 51))
+
+
+def test_that_friction_may_be_given_per_strip():
+    grid = Grid.spanning(-1.9e-3, 1.9e-3, 101)
+    local = np.where(grid.y > 0.0, 0.2, 0.1)
+    *_, mixed = contact(grid=grid, creepage={"longitudinal": 5e-3}, mu=local)
+    *_, low = contact(grid=grid, creepage={"longitudinal": 5e-3}, mu=0.1)
+    np.testing.assert_allclose(mixed.dissipation, low.dissipation * local / 0.1, rtol=1e-10)
+
+
+def test_that_wear_compliance_makes_the_contact_softer_and_conserves_the_load():
+    model, gap, point, hard = contact(grid=Grid.spanning(-4e-3, 4e-3, 81))
+    soft = model.solve(gap, RIG, point, np.full(81, 5e-11), hard)
+    assert soft.line_load.sum() == pytest.approx(hard.line_load.sum(), rel=1e-12)
+    assert soft.peak_pressure < hard.peak_pressure
+    assert (soft.line_load > 0).sum() > (hard.line_load > 0).sum()
+
+
+def test_that_only_strip_theory_claims_the_compiled_loop():
+    assert Slender(StripTheory()).capabilities.pass_loop
+    assert not SPEC.factory(SlenderOptions(tangential="fastsim")).capabilities.pass_loop
+
+
+def test_that_the_load_sensitivity_is_the_derivative_of_the_load():
+    model, gap, point, solution = contact(grid=Grid.spanning(-3e-3, 3e-3, 81))
+    change = np.exp(-((solution.y / 3e-4) ** 2))
+    fall = model.load_sensitivity(solution, gap, RIG, point, change)
+    step = 1e-11
+    plus = model.solve(gap + step * change, RIG, point, None, solution).line_load
+    minus = model.solve(gap - step * change, RIG, point, None, solution).line_load
+    expected = (minus - plus) / (2.0 * step)
+    np.testing.assert_allclose(fall, expected, atol=2e-3 * np.abs(expected).max())
+    assert abs(fall.sum()) < 1e-6 * np.abs(fall).sum()

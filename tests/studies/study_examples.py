@@ -1,0 +1,146 @@
+"""Short wear tests of every sort, and how to stop, finish and compare them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from wearsim.errors import Interrupted
+from wearsim.results import Result, RunData
+from wearsim.results.data import differences
+from wearsim.scenario import Scenario, parse_scenario
+from wearsim.studies import replay
+
+RIG = """\
+title = "a rig"
+
+[roller]
+radius = "20 mm"
+crown_radius = "500 mm"
+material = "steel"
+
+[cylinder]
+radius = "25 mm"
+material = "steel"
+
+[operation]
+speed = "1000 rpm"
+passes = 6000
+rollers = 3
+
+[load]
+normal_force = "300 N"
+
+[friction]
+coefficient = 0.1
+
+[creepage]
+longitudinal = 1e-3
+
+[contact]
+strips = 41
+width = "5 mm"
+
+[wear]
+cylinder = { k_over_h = "1.1e-11 1/Pa" }
+roller = { k_over_h = "0 1/Pa" }
+
+
+[outputs]
+records = 4
+"""
+
+# 50 passes a second: a log of 12 minutes lasts 36 000 passes
+LOG = "time [min],load [N]\n" + "".join(
+    f"{k / 4},{300 + 60 * (-1) ** k + k}\n" for k in range(49)
+)
+
+STEPPERS: dict[str, dict[str, object]] = {
+    "implicit": {},
+    "explicit": {"evolution.stepper": "explicit"},
+    "compiled passes": {"evolution.stepper": "per-pass"},
+    "passes in Python": {
+        "evolution.stepper": "per-pass",
+        "contact.tangential": "fastsim",
+        "contact.mx": 4,
+        "operation.passes": 100,
+    },
+}
+LOADS: dict[str, dict[str, object]] = {
+    "constant": {},
+    "spring": {"load.kind": "spring", "load.stiffness": "20000 N/mm"},
+    "recorded and thermal": {
+        "load": {
+            "kind": "recorded",
+            "file": "load.csv",
+            "thermal": {"gain": "300 N/W", "time_constant": "30 s"},
+        }
+    },
+}
+ROLLERS: dict[str, dict[str, object]] = {
+    "alike": {},
+    "offset": {"roller.offset": ["-1 mm", "0.3 mm", "1 mm"], "contact.width": "7 mm"},
+    "wearing": {"wear.roller.k_over_h": "1e-11 1/Pa"},
+}
+OTHERS: dict[str, dict[str, object]] = {
+    "hertz-fastsim": {
+        "contact.model": "hertz-fastsim",
+        "contact.mx": 10,
+        "contact.my": 10,
+        "contact.width": "6 mm",
+    },
+    "free rollers": {
+        "creepage": {"drive": "free", "bearing_torque": "0.3 N*m", "differential_slip": True}
+    },
+    "tilted and yawed": {
+        "creepage.tilt": ["0.05 deg", "0 deg", "-0.05 deg"],
+        "creepage.yaw": "0.02 deg",
+        "contact.width": "6 mm",
+    },
+    "log spacing": {"outputs.records": 30, "outputs.spacing": "log"},
+    "forced steps": {"evolution.step": 700},
+}
+
+
+def short(**overrides: object) -> Scenario:
+    """Return the rig's scenario with overrides; two underscores stand for the dot of a key."""
+    dotted = {key.replace("__", "."): value for key, value in overrides.items()}
+    return parse_scenario(RIG, "rig.toml", {"load.csv": LOG}.__getitem__, dotted)
+
+
+def unlike(one: Result | RunData, other: Result | RunData) -> list[str]:
+    """Return what differs between two runs by a bit, apart from the wall clock."""
+    first, second = (item.raw if isinstance(item, Result) else item for item in (one, other))
+    return [
+        name for name in differences(first, second) if name not in {"wall_seconds", "created"}
+    ]
+
+
+def after(steps: int) -> Callable[[], bool]:
+    """Return something that asks a run to stop after so many steps."""
+    left = steps
+
+    def requested() -> bool:
+        nonlocal left
+        left -= 1
+        return left <= 0
+
+    return requested
+
+
+def run_in_parts(scenario: Scenario, path: Path, *steps: int) -> tuple[Result, int]:
+    """Run a test that is stopped after so many steps again and again; return the parts too.
+
+    The last number counts for all parts that follow.
+    """
+    counts = list(steps)
+    parts = 0
+    while True:
+        stop = after(counts.pop(0) if len(counts) > 1 else counts[0])
+        parts += 1
+        try:
+            if parts == 1:
+                return replay.run(scenario, path, stop_requested=stop), parts
+            return replay.resume(path, stop_requested=stop), parts
+        except Interrupted:
+            continue
