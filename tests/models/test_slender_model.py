@@ -167,7 +167,9 @@ def test_that_a_roller_that_must_skid_is_an_error():
 
 
 def test_that_a_contact_at_the_edge_of_its_strips_is_an_error():
-    with pytest.raises(ContactError, match="raise contact.width or move contact.centre") as caught:
+    with pytest.raises(
+        ContactError, match=r"raise contact\.width or move contact\.centre"
+    ) as caught:
         contact(grid=Grid.spanning(-1e-3, 1e-3, 51))
     assert set(caught.value.state) >= {"gap", "line_load", "approach"}
 

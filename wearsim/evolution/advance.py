@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import cached_property
+from typing import TypeAlias
 
 import numpy as np
 
@@ -12,16 +14,10 @@ from wearsim.evolution.scene import Scene
 from wearsim.evolution.state import WearState, contact_values
 from wearsim.types import ContactSolution, FloatArray, OperatingPoint
 
+Contacts: TypeAlias = tuple[ContactSolution, ...]
+
 FIXED_POINT_TOLERANCE = 1e-8
 MAX_FIXED_POINT = 60
-
-
-@dataclass(frozen=True)
-class Increment:
-    """What a step adds to a state; fields as in `WearState`."""
-
-    cylinder: FloatArray
-    roller: FloatArray
 
 
 def mean_loads(
@@ -59,55 +55,62 @@ def operating_points(
     """Return the operating point of every contact at given loads and worn depths."""
     return [
         scene.point(r, float(loads[s, r, v]), cylinder_depth[s, 0, v], roller_depth[0, r, v])
-        for s, r, v in np.ndindex(scene.shape)
+        for s, r, v in scene.contacts
     ]
 
 
-def _ratio(wear: FloatArray, line_load: FloatArray) -> FloatArray:
+def _ratio(scene: Scene, wear: FloatArray, contacts: Contacts) -> FloatArray:
     """Return wear over line load, carried on into strips without load, last axis strips."""
-    places = np.arange(wear.shape[-1])
-    ratio = np.empty_like(wear)
-    for index in np.ndindex(wear.shape[:-1]):
-        loaded = np.flatnonzero(line_load[index] > 0.0)
+    ratio = np.zeros_like(wear)
+    if not wear.any():
+        return ratio
+    places = np.arange(wear.shape[-1], dtype=np.float64)
+    for index, contact in zip(scene.contacts, contacts, strict=True):
+        loaded = contact.line_load > 0.0
         ratio[index] = np.interp(
-            places, places[loaded], wear[index][loaded] / line_load[index][loaded]
+            places, places[loaded], wear[index][loaded] / contact.line_load[loaded]
         )
     return ratio
 
 
-def wear_compliance(
-    scene: Scene, contacts: tuple[ContactSolution, ...], passes: float
-) -> FloatArray:
-    """Return how the wear of a step opens the gaps, per unit of line load.
+class Wearing:
+    """What a step of `passes` passes with given contacts does to the bodies.
 
-    Returns
-    -------
-    ndarray, shape (realisations, contacts, contacts, strips)
-        Gap at the first contact per line load of the second [m/(N/m)]; contacts are
-        (station, roller).
+    Attributes
+    ----------
+    cylinder, roller : ndarray
+        Depth the step adds, shapes as in `WearState` [m].
     """
-    stations, rollers, realisations = scene.shape
-    line_load = contact_values(scene, contacts, "line_load")
-    cylinder, roller = scene.wear_per_pass(list(contacts))
-    share = scene.kinematics.cylinder_share[None, :, None, None]
-    own = scene.kinematics.roller_share / stations
-    on_cylinder = _ratio(cylinder * share * passes, line_load)
-    on_roller = _ratio(roller * own * passes, line_load)
-    count = stations * rollers
-    compliance = np.zeros((realisations, count, count, scene.grid.strips))
-    for k, (s, r) in enumerate(np.ndindex(stations, rollers)):
-        for other, (s2, r2) in enumerate(np.ndindex(stations, rollers)):
-            if s == s2:
-                compliance[:, k, other] += on_cylinder[s2, r2]
-            if r == r2:
-                compliance[:, k, other] += on_roller[s2, r2]
-    return compliance
 
+    def __init__(self, scene: Scene, contacts: Contacts, passes: float) -> None:
+        cylinder, roller = scene.wear_per_pass(contacts)
+        worn = scene.shared_wear(cylinder, roller)
+        self.cylinder, self.roller = worn[0] * passes, worn[1] * passes
+        self._scene, self._contacts, self._passes = scene, contacts, passes
+        self._per_pass = cylinder, roller
 
-def increment(scene: Scene, contacts: tuple[ContactSolution, ...], passes: float) -> Increment:
-    """Return what `passes` passes with these contacts wear off the bodies."""
-    cylinder, roller = scene.shared_wear(*scene.wear_per_pass(list(contacts)))
-    return Increment(cylinder * passes, roller * passes)
+    @cached_property
+    def compliance(self) -> FloatArray:
+        """Gap that opens at one contact per unit of line load of another [m/(N/m)].
+
+        Shape (realisations, contacts, contacts, strips); contacts are (station, roller).
+        """
+        scene, passes = self._scene, self._passes
+        stations, rollers, realisations = scene.shape
+        cylinder, roller = self._per_pass
+        share = passes * scene.kinematics.cylinder_share[None, :, None, None]
+        own = passes * scene.kinematics.roller_share / stations
+        on_cylinder = _ratio(scene, cylinder * share, self._contacts)
+        on_roller = _ratio(scene, roller * own, self._contacts)
+        members = [(s, r) for s in range(stations) for r in range(rollers)]
+        compliance = np.zeros((realisations, len(members), len(members), scene.grid.strips))
+        for k, (s, r) in enumerate(members):
+            for other, (s2, r2) in enumerate(members):
+                if s == s2:
+                    compliance[:, k, other] += on_cylinder[s2, r2]
+                if r == r2:
+                    compliance[:, k, other] += on_roller[s2, r2]
+        return compliance
 
 
 def _solve_all(
@@ -115,13 +118,13 @@ def _solve_all(
     gap: FloatArray,
     points: list[OperatingPoint],
     compliance: FloatArray,
-    warm: tuple[ContactSolution, ...],
-) -> tuple[ContactSolution, ...]:
+    warm: Contacts,
+) -> Contacts:
     """Solve every realisation's coupled contacts; order as `WearState.contacts`."""
     stations, rollers, realisations = scene.shape
     curvature = scene.kinematics.longitudinal_curvature
     solved: dict[tuple[int, ...], ContactSolution] = {}
-    flat = {index: number for number, index in enumerate(np.ndindex(scene.shape))}
+    flat = {index: number for number, index in enumerate(scene.contacts)}
     for v in range(realisations):
         members = [(s, r, v) for s, r in np.ndindex(stations, rollers)]
         found = scene.model.solve_coupled(
@@ -132,7 +135,7 @@ def _solve_all(
             [warm[flat[index]] for index in members],
         )
         solved.update(zip(members, found, strict=True))
-    return tuple(solved[index] for index in np.ndindex(scene.shape))
+    return tuple(solved[index] for index in scene.contacts)
 
 
 def _differs(new: FloatArray, old: FloatArray) -> float:
@@ -153,23 +156,21 @@ def implicit_step(scene: Scene, state: WearState, passes: float) -> WearState:
     """
     gap = scene.gap(state.cylinder_depth, state.roller_depth)
     contacts = state.contacts
-    added = increment(scene, contacts, passes)
-    compliance = wear_compliance(scene, contacts, passes)
-    loads = _end_loads(scene, state, passes, added, contacts)
+    wearing = Wearing(scene, contacts, passes)
+    loads = _end_loads(scene, state, passes, wearing, contacts)
     for iteration in range(1, MAX_FIXED_POINT + 1):
-        ends = state.cylinder_depth + added.cylinder, state.roller_depth + added.roller
+        ends = state.cylinder_depth + wearing.cylinder, state.roller_depth + wearing.roller
         points = operating_points(scene, loads, *ends)
-        contacts = _solve_all(scene, gap, points, compliance, contacts)
-        new_added = increment(scene, contacts, passes)
-        new_compliance = wear_compliance(scene, contacts, passes)
-        new_loads = _end_loads(scene, state, passes, new_added, contacts)
-        change = max(_differs(new_compliance, compliance), _differs(new_loads, loads))
+        contacts = _solve_all(scene, gap, points, wearing.compliance, contacts)
+        new = Wearing(scene, contacts, passes)
+        new_loads = _end_loads(scene, state, passes, new, contacts)
+        change = max(_differs(new.compliance, wearing.compliance), _differs(new_loads, loads))
         if scene.slip_profile is not None:
-            change = max(change, _differs(new_added.cylinder, added.cylinder))
-        added, compliance, loads = new_added, new_compliance, new_loads
+            change = max(change, _differs(new.cylinder, wearing.cylinder))
+        wearing, loads = new, new_loads
         if change < FIXED_POINT_TOLERANCE:
             solves = iteration * len(contacts)
-            return _completed(scene, state, passes, added, contacts, solves)
+            return _completed(scene, state, passes, wearing, contacts, solves)
     raise StepError(
         f"an implicit step of {passes:.4g} passes from pass {state.passes:.0f} did not settle"
         f" (last change {change:.1e})",
@@ -181,21 +182,21 @@ def _end_loads(
     scene: Scene,
     state: WearState,
     passes: float,
-    added: Increment,
-    contacts: tuple[ContactSolution, ...],
+    wearing: Wearing,
+    contacts: Contacts,
 ) -> FloatArray:
-    end_gap = scene.gap(state.cylinder_depth + added.cylinder, state.roller_depth + added.roller)
+    end_gap = scene.gap(
+        state.cylinder_depth + wearing.cylinder, state.roller_depth + wearing.roller
+    )
     return mean_loads(scene, state, passes, end_gap, contact_values(scene, contacts, "power"))
 
 
 def explicit_step(scene: Scene, state: WearState, passes: float) -> WearState:
     """Step over `passes` passes at the wear rate of the step's start, then solve anew."""
-    added = increment(scene, state.contacts, passes)
-    cylinder_depth = state.cylinder_depth + added.cylinder
-    roller_depth = state.roller_depth + added.roller
-    worn = _completed(scene, state, passes, added, state.contacts, len(state.contacts))
+    wearing = Wearing(scene, state.contacts, passes)
+    worn = _completed(scene, state, passes, wearing, state.contacts, len(state.contacts))
     loads = present_loads(scene, worn)
-    points = operating_points(scene, loads, cylinder_depth, roller_depth)
+    points = operating_points(scene, loads, worn.cylinder_depth, worn.roller_depth)
     return replace(worn, contacts=solve_present(scene, worn, points))
 
 
@@ -210,9 +211,7 @@ def present_loads(scene: Scene, state: WearState) -> FloatArray:
     return checked_loads(loads, state.passes)
 
 
-def solve_present(
-    scene: Scene, state: WearState, points: list[OperatingPoint]
-) -> tuple[ContactSolution, ...]:
+def solve_present(scene: Scene, state: WearState, points: list[OperatingPoint]) -> Contacts:
     """Solve every contact on the present profiles."""
     gap = scene.gap(state.cylinder_depth, state.roller_depth)
     batch = scene.model.solve_batch(
@@ -225,8 +224,8 @@ def _completed(
     scene: Scene,
     state: WearState,
     passes: float,
-    added: Increment,
-    contacts: tuple[ContactSolution, ...],
+    wearing: Wearing,
+    contacts: Contacts,
     solves: int,
 ) -> WearState:
     """Return the state after the step; energy is counted with the same dissipation as the wear."""
@@ -241,8 +240,8 @@ def _completed(
     return replace(
         state,
         passes=state.passes + passes,
-        cylinder_depth=state.cylinder_depth + added.cylinder,
-        roller_depth=state.roller_depth + added.roller,
+        cylinder_depth=state.cylinder_depth + wearing.cylinder,
+        roller_depth=state.roller_depth + wearing.roller,
         terms=terms,
         contacts=contacts,
         energy=state.energy + scene.total_power(power) * (passes / scene.kinematics.pass_rate),

@@ -8,10 +8,10 @@ import numpy as np
 
 from wearsim.errors import StepError
 from wearsim.evolution.advance import (
+    Wearing,
     cylinder_depth_of,
     cylinder_volume_of,
     explicit_step,
-    increment,
 )
 from wearsim.evolution.control import StepControl
 from wearsim.evolution.observables import oscillation
@@ -113,7 +113,7 @@ def _errors(
     scene: Scene, start: WearState, end: WearState, step: float
 ) -> tuple[FloatArray, FloatArray]:
     """Return half the difference to a step at the end's wear rate, in depth and in volume."""
-    again = increment(scene, end.contacts, step)
+    again = Wearing(scene, end.contacts, step)
     other = replace(end, cylinder_depth=start.cylinder_depth + again.cylinder)
     in_depth = 0.5 * np.abs(cylinder_depth_of(end) - cylinder_depth_of(other))
     in_volume = cylinder_volume_of(scene, end) - cylinder_volume_of(scene, other)
@@ -133,9 +133,9 @@ def stability_limit(scene: Scene, state: WearState) -> float:
     """
     gap = scene.gap(state.cylinder_depth, state.roller_depth)
     curvature = scene.kinematics.longitudinal_curvature
-    cylinder, roller = scene.wear_per_pass(list(state.contacts))
+    cylinder, roller = scene.wear_per_pass(state.contacts)
     greatest = 0.0
-    for number, index in enumerate(np.ndindex(scene.shape)):
+    for number, index in enumerate(scene.contacts):
         contact = state.contacts[number]
         s, r, v = index
         point = scene.point(

@@ -98,7 +98,7 @@ class ImplicitStepper(Stepper):
 
 def _first_step(scene: Scene, state: WearState) -> float:
     """Return the passes that wear a tenth of the elastic approach off the fresh contact."""
-    cylinder, roller = scene.shared_wear(*scene.wear_per_pass(list(state.contacts)))
+    cylinder, roller = scene.shared_wear(*scene.wear_per_pass(state.contacts))
     rate = float((cylinder + roller).max())
     gap = scene.gap(state.cylinder_depth, state.roller_depth)
     approach = contact_values(scene, state.contacts, "approach") - gap.min(axis=-1)

@@ -166,7 +166,7 @@ def _run_in_python(scene: Scene, state: WearState, count: int) -> WearState:
     cylinder, roller = state.cylinder_depth.copy(), state.roller_depth.copy()
     terms, energy = state.terms.copy(), state.energy.copy()
     contacts: dict[tuple[int, ...], ContactSolution] = dict(
-        zip(np.ndindex(scene.shape), state.contacts, strict=True)
+        zip(scene.contacts, state.contacts, strict=True)
     )
     turn = kinematics.physical_rollers / kinematics.pass_rate
     for number in range(count):
@@ -196,7 +196,7 @@ def _run_in_python(scene: Scene, state: WearState, count: int) -> WearState:
         roller_depth=roller,
         terms=terms,
         energy=energy,
-        contacts=tuple(contacts[index] for index in np.ndindex(scene.shape)),
+        contacts=tuple(contacts[index] for index in scene.contacts),
         full_solves=state.full_solves + count * scene.shape[2] * scene.shape[0],
         solves=state.solves + count * scene.shape[2] * scene.shape[0],
     )

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from wearsim.plugins import ContactModel, Load, LoadTerm, WearLaw
+from wearsim.plugins import BODIES, ContactModel, Load, LoadTerm, WearLaw
 from wearsim.types import ContactSolution, Creepage, FloatArray, Grid, OperatingPoint
 
 
@@ -103,6 +104,12 @@ class Scene:
         stations, rollers, realisations = self.nominal_gap.shape[:3]
         return stations, rollers, realisations
 
+    @cached_property
+    def contacts(self) -> tuple[tuple[int, int, int], ...]:
+        """Station, roller and realisation of every contact, in their order."""
+        stations, rollers, realisations = (range(count) for count in self.shape)
+        return tuple((s, r, v) for s in stations for r in rollers for v in realisations)
+
     def time(self, passes: float) -> float:
         """Return the time at which `passes` roller passes are done [s]."""
         return passes / self.kinematics.pass_rate
@@ -144,7 +151,7 @@ class Scene:
             rolling_radius=radius,
         )
 
-    def wear_per_pass(self, contacts: list[ContactSolution]) -> tuple[FloatArray, FloatArray]:
+    def wear_per_pass(self, contacts: Sequence[ContactSolution]) -> tuple[FloatArray, FloatArray]:
         """Return the depth one pass of each contact wears off either body, where it touches.
 
         Returns
@@ -154,9 +161,11 @@ class Scene:
         """
         speed = self.kinematics.rolling_speed
         shape = (*self.shape, self.grid.strips)
-        cylinder = np.array([self.law.depth_per_pass("cylinder", c, speed) for c in contacts])
-        roller = np.array([self.law.depth_per_pass("roller", c, speed) for c in contacts])
-        return cylinder.reshape(shape), roller.reshape(shape)
+        cylinder, roller = (
+            np.array([self.law.depth_per_pass(body, c, speed) for c in contacts]).reshape(shape)
+            for body in BODIES
+        )
+        return cylinder, roller
 
     def shared_wear(
         self, cylinder: FloatArray, roller: FloatArray

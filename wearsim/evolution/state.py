@@ -128,7 +128,7 @@ def fresh_state(scene: Scene) -> WearState:
     terms = np.zeros((len(scene.terms), rollers, realisations))
     load = float(scene.load.force(np.zeros(1))[0])
     contacts = []
-    for index in np.ndindex(scene.shape):
+    for index in scene.contacts:
         point = scene.point(index[1], load, np.zeros(n), np.zeros(n))
         contacts.append(
             scene.model.solve(

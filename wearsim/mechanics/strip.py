@@ -8,7 +8,8 @@ creepage that varies across the track. In a strip of half-length a and greatest 
 
 (X, Y) being the rigid slip per unit of rolling velocity. The traction opposes (d_x, d_y) in a strip
 that adheres and (X, Y) in one that slides; in between, a mean of the two weighted with 1 - (t/a)^4
-keeps the force continuous and comes nearest to the exact theory. The dissipation is the work of the rigid slip, P_l = V F . (X, Y).
+keeps the force continuous and comes nearest to the exact theory. The dissipation is the work of the
+rigid slip, P_l = V F . (X, Y).
 """
 
 from __future__ import annotations

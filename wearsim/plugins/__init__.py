@@ -3,6 +3,7 @@
 from wearsim.plugins.hookspecs import hookimpl
 from wearsim.plugins.manager import registry
 from wearsim.plugins.protocols import (
+    BODIES,
     Body,
     Capabilities,
     ContactModel,
@@ -21,6 +22,7 @@ from wearsim.plugins.specs import (
 )
 
 __all__ = [
+    "BODIES",
     "Body",
     "Capabilities",
     "ContactModel",

@@ -22,6 +22,7 @@ from wearsim.types import (
 )
 
 Body: TypeAlias = Literal["cylinder", "roller"]
+BODIES: tuple[Body, ...] = ("cylinder", "roller")
 
 
 @dataclass(frozen=True)

@@ -147,6 +147,7 @@ class _Replay:
         self.tell: Watcher = on_event or (lambda event: None)
         self.stop_requested = stop_requested or (lambda: False)
         self.stop = float(scenario.total_passes)
+        self.software, self.plugins = _software(), _plugins(scenario)
         self.warnings: list[str] = []
         self.created = datetime.now(UTC).isoformat(timespec="seconds")
         self.wall_before, self.started = 0.0, time.monotonic()
@@ -164,7 +165,7 @@ class _Replay:
         self.warnings, self.created = list(data.warnings), data.created
         self.wall_before = data.wall_seconds
         before = _origins(data.software, data.plugins)
-        now = _origins(_software(), _plugins(self.scenario))
+        now = _origins(self.software, self.plugins)
         for name in now:
             if before.get(name, now[name]) != now[name]:
                 self._warn(
@@ -282,8 +283,8 @@ class _Replay:
             sha256=scenario.sha256,
             files=dict(scenario.files),
             seed=scenario.seed,
-            software=_software(),
-            plugins=_plugins(scenario),
+            software=self.software,
+            plugins=self.plugins,
             model=scenario.contact.model,
             stepper=self.stepper_name,
             tolerance=scenario.evolution.tolerance,
