@@ -96,7 +96,7 @@ def test_that_an_interrupted_run_ends_with_130(
 def test_that_a_signal_stops_a_run_at_a_checkpoint_that_resume_finishes(
     command: Command, scenario: Path, tmp_path: Path, number: signal.Signals
 ) -> None:
-    per_pass = ["--set", "evolution.stepper=per-pass", "--set", "operation.duration=4000 min"]
+    per_pass = ["--set", "evolution.stepper=per-pass", "--set", "operation.duration=600 min"]
     arguments = [sys.executable, "-m", "wearsim", "run", str(scenario), *per_pass]
     with subprocess.Popen(arguments, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as running:
         assert running.stderr is not None

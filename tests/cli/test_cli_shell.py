@@ -81,7 +81,7 @@ def test_that_wrong_usage_is_bad_input(command: Command, arguments: list[str]) -
         (
             SolverError("lost contact", {"gap": 1, "load": 2}),
             1,
-            "error: lost contact\nstate at the failure: gap, load\n",
+            "error: lost contact\nstate at the failure: gap 1, load 2\n",
         ),
         (FileNotFoundError(2, "No such file or directory", "x"), 1, "error: x: No such file"),
         (ZeroDivisionError("oh"), 1, "internal error: ZeroDivisionError: oh\n"),

@@ -287,7 +287,10 @@ def test_that_the_fields_are_the_inside_of_the_solution(bound):
     power = np.trapezoid(fields.power_density, fields.x, axis=0).sum() * spacing
     assert power == pytest.approx(solution.power, rel=1e-2)
     traction = np.hypot(fields.traction_x, fields.traction_y)
-    assert np.all(traction <= 0.1 * fields.pressure + 1e-3)
+    # a parabola over an ellipse: up to 4/3 of the pressure, and for all strips together no more
+    excess = 1.0 if bound == "elliptic" else 4.0 / 3.0
+    assert np.all(traction <= 0.1 * excess * fields.pressure + 1e-3)
+    assert fields.pressure.max() == pytest.approx(solution.peak_pressure, rel=2e-3)
     assert np.all(fields.power_density[fields.adhesion] == 0.0)
     assert np.all(fields.power_density >= -1e-6 * fields.power_density.max())
 

@@ -56,9 +56,21 @@ def tell(error: BaseException) -> None:
     typer.echo(_message(error), err=True)
 
 
+def _state(state: dict[str, Any]) -> str:
+    """Return the numbers of a state that fit on a line; an array is told by its range."""
+    parts = []
+    for name, value in state.items():
+        numeric = isinstance(value, int | float) or (hasattr(value, "min") and value.size)
+        if not numeric or name.startswith(("contact_", "shadow_", "loop_")):
+            continue
+        low, high = (value, value) if not hasattr(value, "min") else (value.min(), value.max())
+        parts.append(f"{name} {low:.6g}" if low == high else f"{name} {low:.6g} to {high:.6g}")
+    return ", ".join(parts)
+
+
 def _message(error: BaseException) -> str:
     if isinstance(error, SolverError) and error.state:
-        return f"error: {error}\nstate at the failure: {', '.join(error.state)}"
+        return f"error: {error}\nstate at the failure: {_state(error.state)}"
     if isinstance(error, ScenarioError | Interrupted):  # each says where it stands
         return str(error)
     if isinstance(error, WearsimError):

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cached_property
-from typing import TypeAlias
 
 import numpy as np
 
@@ -12,9 +10,8 @@ from wearsim.errors import StepError
 from wearsim.evolution.observables import depth, worn_volume
 from wearsim.evolution.scene import Scene
 from wearsim.evolution.state import WearState, contact_values
+from wearsim.evolution.wearing import Contacts, Wearing, exponents_between
 from wearsim.types import ContactSolution, FloatArray, OperatingPoint
-
-Contacts: TypeAlias = tuple[ContactSolution, ...]
 
 FIXED_POINT_TOLERANCE = 1e-8
 MAX_FIXED_POINT = 60
@@ -59,60 +56,6 @@ def operating_points(
     ]
 
 
-def _ratio(scene: Scene, wear: FloatArray, contacts: Contacts) -> FloatArray:
-    """Return wear over line load, carried on into strips without load, last axis strips."""
-    ratio = np.zeros_like(wear)
-    if not wear.any():
-        return ratio
-    places = np.arange(wear.shape[-1], dtype=np.float64)
-    for index, contact in zip(scene.contacts, contacts, strict=True):
-        loaded = contact.line_load > 0.0
-        ratio[index] = np.interp(
-            places, places[loaded], wear[index][loaded] / contact.line_load[loaded]
-        )
-    return ratio
-
-
-class Wearing:
-    """What a step of `passes` passes with given contacts does to the bodies.
-
-    Attributes
-    ----------
-    cylinder, roller : ndarray
-        Depth the step adds, shapes as in `WearState` [m].
-    """
-
-    def __init__(self, scene: Scene, contacts: Contacts, passes: float) -> None:
-        cylinder, roller = scene.wear_per_pass(contacts)
-        worn = scene.shared_wear(cylinder, roller)
-        self.cylinder, self.roller = worn[0] * passes, worn[1] * passes
-        self._scene, self._contacts, self._passes = scene, contacts, passes
-        self._per_pass = cylinder, roller
-
-    @cached_property
-    def compliance(self) -> FloatArray:
-        """Gap that opens at one contact per unit of line load of another [m/(N/m)].
-
-        Shape (realisations, contacts, contacts, strips); contacts are (station, roller).
-        """
-        scene, passes = self._scene, self._passes
-        stations, rollers, realisations = scene.shape
-        cylinder, roller = self._per_pass
-        share = passes * scene.kinematics.cylinder_share[None, :, None, None]
-        own = passes * scene.kinematics.roller_share / stations
-        on_cylinder = _ratio(scene, cylinder * share, self._contacts)
-        on_roller = _ratio(scene, roller * own, self._contacts)
-        members = [(s, r) for s in range(stations) for r in range(rollers)]
-        compliance = np.zeros((realisations, len(members), len(members), scene.grid.strips))
-        for k, (s, r) in enumerate(members):
-            for other, (s2, r2) in enumerate(members):
-                if s == s2:
-                    compliance[:, k, other] += on_cylinder[s2, r2]
-                if r == r2:
-                    compliance[:, k, other] += on_roller[s2, r2]
-        return compliance
-
-
 def _solve_all(
     scene: Scene,
     gap: FloatArray,
@@ -147,7 +90,8 @@ def implicit_step(scene: Scene, state: WearState, passes: float) -> WearState:
     """Step over `passes` passes with the contacts solved on the profiles at the step's end.
 
     The wear of the step enters the contact problem as a compliance, so that no step is too long
-    for stability. Compliance, loads and creepage depend on the answer and are iterated.
+    for stability. Compliance, loads and creepage depend on the answer and are iterated; where wear
+    is no multiple of the line load, its exponent is learnt from one iterate to the next.
 
     Raises
     ------
@@ -156,18 +100,22 @@ def implicit_step(scene: Scene, state: WearState, passes: float) -> WearState:
     """
     gap = scene.gap(state.cylinder_depth, state.roller_depth)
     contacts = state.contacts
+    exponents = np.ones((*scene.shape, scene.grid.strips))
     wearing = Wearing(scene, contacts, passes)
     loads = _end_loads(scene, state, passes, wearing, contacts)
     for iteration in range(1, MAX_FIXED_POINT + 1):
         ends = state.cylinder_depth + wearing.cylinder, state.roller_depth + wearing.roller
         points = operating_points(scene, loads, *ends)
-        contacts = _solve_all(scene, gap, points, wearing.compliance, contacts)
-        new = Wearing(scene, contacts, passes)
-        new_loads = _end_loads(scene, state, passes, new, contacts)
-        change = max(_differs(new.compliance, wearing.compliance), _differs(new_loads, loads))
+        new = _solve_all(scene, gap + wearing.offset, points, wearing.compliance, contacts)
+        foreseen = wearing.foreseen(contact_values(scene, new, "line_load"))
+        exponents = exponents_between(scene, contacts, new, exponents)
+        before, contacts = wearing, new
+        wearing = Wearing(scene, contacts, passes, exponents)
+        new_loads = _end_loads(scene, state, passes, wearing, contacts)
+        change = max(_differs(wearing.opening, foreseen), _differs(new_loads, loads))
         if scene.slip_profile is not None:
-            change = max(change, _differs(new.cylinder, wearing.cylinder))
-        wearing, loads = new, new_loads
+            change = max(change, _differs(wearing.cylinder, before.cylinder))
+        loads = new_loads
         if change < FIXED_POINT_TOLERANCE:
             solves = iteration * len(contacts)
             return _completed(scene, state, passes, wearing, contacts, solves)

@@ -5,13 +5,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+FLOOR = 0.02  # of the budget: what a step may always add, so that a run never stalls
+
 
 @dataclass(frozen=True)
 class StepControl:
-    """Holds the error that each step adds to a small part of the final depth.
+    """Holds the error that each step adds to a part of what the tolerance leaves.
 
     Wear forgets: a groove that is too deep in one place carries less load there, so that errors of
-    shape die out while the groove deepens. Hence one allowance for all steps, absolute in depth.
+    shape die out while the groove deepens. Hence a budget that is absolute in depth, and spent
+    against the error that is there now, not against the sum of all that was.
 
     Parameters
     ----------
@@ -26,20 +29,32 @@ class StepControl:
     """
 
     tolerance: float
-    share: float = 0.3
+    share: float = 0.7
     safety: float = 0.7
     shrink: float = 0.2
     grow: float = 5.0
 
-    def allowance(self, depth: float, passes: float, stop: float) -> float:
-        """Return the error [m] that a step to `depth` [m] at `passes` may add.
+    def allowance(self, reached: float, exponent: float, spent: float, part: float) -> float:
+        """Return the error that a step may add.
 
-        The final depth is foretold with an exponent below that of any groove, so that it is not
-        overrated.
+        Parameters
+        ----------
+        reached : float
+            Depth or volume at the step's end.
+        exponent : float
+            Lower bound of the exponent with which it will grow to the end.
+        spent : float
+            Its estimated error before the step.
+        part : float
+            Part of all passes done at the step's end.
         """
-        return self.tolerance * self.share * depth * math.sqrt(stop / passes)
+        budget = self.tolerance * reached / math.pow(part, exponent)
+        return self.share * max(budget - spent, FLOOR * budget)
 
-    def next_step(self, step: float, error: float, allowed: float) -> float:
-        """Return the next step for a first-order scheme, whose local error grows as its square."""
-        factor = self.grow if error == 0.0 else self.safety * (allowed / error) ** 0.5
+    def next_step(self, step: float, excess: float) -> float:
+        """Return the next step where this one's error was `excess` times its allowance.
+
+        The local error of a first-order scheme grows as the square of the step.
+        """
+        factor = self.grow if excess == 0.0 else self.safety / math.sqrt(excess)
         return step * min(self.grow, max(self.shrink, factor))

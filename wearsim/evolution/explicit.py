@@ -8,7 +8,6 @@ import numpy as np
 
 from wearsim.errors import StepError
 from wearsim.evolution.advance import (
-    Wearing,
     cylinder_depth_of,
     cylinder_volume_of,
     explicit_step,
@@ -18,6 +17,7 @@ from wearsim.evolution.observables import oscillation
 from wearsim.evolution.scene import Scene
 from wearsim.evolution.state import WearState
 from wearsim.evolution.stepper import Advance, Stepper, fitted
+from wearsim.evolution.wearing import Wearing
 from wearsim.types import FloatArray
 
 SAFETY = 0.5  # of the limit of stability
@@ -65,10 +65,11 @@ class ExplicitStepper(Stepper):
             step = min(proposed, left) if self.forced_step else fitted(proposed, left)
             end = explicit_step(scene, state, step)
             in_depth, in_volume = _errors(scene, state, end, step)
-            added = float(in_depth.max())
-            allowed = self.control.allowance(float(cylinder_depth_of(end).max()), end.passes, stop)
-            chosen = self.control.next_step(step, added, allowed)
-            if self.forced_step or added <= allowed:
+            reached = float(cylinder_depth_of(end).max())
+            allowed = self.control.allowance(reached, 0.0, 0.0, end.passes / stop)
+            excess = float(in_depth.max()) / allowed if allowed > 0.0 else 0.0
+            chosen = self.control.next_step(step, excess)
+            if self.forced_step or excess <= 1.0:
                 break
             rejected += 1
             proposed = min(chosen, 0.7 * step)

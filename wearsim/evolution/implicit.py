@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 
@@ -21,7 +22,11 @@ from wearsim.types import FloatArray
 
 SMALLEST_STEP = 1e-3  # passes
 COVER = 1.5  # a first-order scheme's twin differs by the error itself; half as much for safety
+DEPTH_EXPONENT, VOLUME_EXPONENT = 0.5, 0.75  # below those of any groove: 2/3 to 1, and about 1
 DEEP = 0.5  # depths are compared where the groove is deeper than this part of its depth
+
+
+Pair: TypeAlias = tuple[WearState, WearState]  # a test and its twin
 
 
 class ImplicitStepper(Stepper):
@@ -65,11 +70,9 @@ class ImplicitStepper(Stepper):
                 cause, rejected, proposed = failure, rejected + 1, 0.2 * step
                 continue
             spread = _load_spread(scene, state, end)
-            added = _distance(state, twin, end, whole) + spread
-            depth = float(cylinder_depth_of(end).max())
-            allowed = self.control.allowance(depth, end.passes, stop)
-            if self.forced_step or added <= allowed:
-                chosen = self.control.next_step(step, added, allowed)
+            excess = self._excess(scene, (state, twin), (end, whole), spread, stop)
+            if self.forced_step or excess <= 1.0:
+                chosen = self.control.next_step(step, excess)
                 # a step cut short by the stop says little about how long the next may be
                 chosen = max(chosen, proposed) if step < proposed else chosen
                 passes = stop if step == left else end.passes
@@ -86,7 +89,7 @@ class ImplicitStepper(Stepper):
                 )
                 return Advance(path=(state, half, end))
             rejected += 1
-            proposed = min(self.control.next_step(step, added, allowed), 0.7 * step)
+            proposed = min(self.control.next_step(step, excess), 0.7 * step)
         if isinstance(cause, ContactError):
             raise cause
         raise StepError(
@@ -94,6 +97,21 @@ class ImplicitStepper(Stepper):
             f" {SMALLEST_STEP:g} passes); {cause or 'the error does not fall with the step'}",
             state.to_arrays(),
         )
+
+    def _excess(self, scene: Scene, start: Pair, end: Pair, spread: float, stop: float) -> float:
+        """Return what a step adds to the errors of depth and volume over what it may add."""
+        part = end[0].passes / stop
+        reached = float(cylinder_depth_of(end[0]).max())
+        spent = float(start[0].depth_error.max())
+        allowed = self.control.allowance(reached, DEPTH_EXPONENT, spent, part)
+        added = COVER * (_distance(*start, *end) + spread)
+        if reached <= 0.0:
+            return 0.0
+        volume = cylinder_volume_of(scene, end[0])
+        spent = float(start[0].volume_error.max())
+        in_volume = self.control.allowance(float(volume.max()), VOLUME_EXPONENT, spent, part)
+        apart = _volume_gap(scene, *end) - _volume_gap(scene, *start)
+        return max(added / allowed, COVER * float(np.abs(apart).max()) / in_volume)
 
 
 def _first_step(scene: Scene, state: WearState) -> float:

@@ -166,10 +166,11 @@ class FastsimTheory(TangentialTheory):
         rolling_speed: float,
         points_along: int,
     ) -> ContactFields:
-        """Return traction and slip inside the contact; `pressure` is the one of the bound.
+        """Return pressure, traction and slip inside the contact.
 
-        Slip at a point is that of the step which ends there, and its elastic part takes L1 along
-        rolling and L2 across it, so that it is zero where the surfaces adhere.
+        The pressure is elliptic along rolling whatever the bound, which may exceed it. Slip at a
+        point is that of the step which ends there, and its elastic part takes L1 along rolling and
+        L2 across it, so that it is zero where the surfaces adhere.
         """
         flexibility = self.flexibilities(strips, pair)
         everywhere = slice(0, len(strips.y))
@@ -189,7 +190,7 @@ class FastsimTheory(TangentialTheory):
         return ContactFields(
             x=place * a,
             y=strips.y,
-            pressure=self._peak(strips) * (np.sqrt(shape) if self.elliptic else shape),
+            pressure=self._peak(strips, elliptic=True) * np.sqrt(shape),
             traction_x=traction_x,
             traction_y=traction_y,
             slip_x=slip_x,
@@ -211,25 +212,26 @@ class FastsimTheory(TangentialTheory):
         gradient_x = mean / flexibility.longitudinal + slip.spin_part / flexibility.spin
         return (
             np.ascontiguousarray(strips.half_length[part]),
-            np.ascontiguousarray((friction * self._peak(strips))[part]),
+            np.ascontiguousarray((friction * self._peak(strips, self.elliptic))[part]),
             self.elliptic,
             np.ascontiguousarray(gradient_x[part]),
             float(slip.lateral / flexibility.lateral),
             float(slip.spin / flexibility.spin),
         )
 
-    def _peak(self, strips: Strips) -> FloatArray:
-        """Return the pressure of the traction bound at x = 0, shape (strips,) [Pa]."""
+    @staticmethod
+    def _peak(strips: Strips, elliptic: bool) -> FloatArray:
+        """Return the elliptic or parabolic pressure at x = 0, shape (strips,) [Pa]."""
         if isinstance(strips, EllipseStrips):
             patch = strips.ellipse
             t = strips.from_centre / patch.b
             section = np.where(strips.coverage > 0.0, np.maximum((1.0 - t) * (1.0 + t), 0.0), 0.0)
-            if self.elliptic:
+            if elliptic:
                 return patch.peak_pressure * np.sqrt(section)
             return 2.0 * patch.normal_force / (math.pi * patch.a * patch.b) * section
         inside = strips.half_length > 0.0
         mean = strips.line_load / np.where(inside, strips.half_length, 1.0)
-        return np.where(inside, (2.0 / math.pi if self.elliptic else 0.75) * mean, 0.0)
+        return np.where(inside, (2.0 / math.pi if elliptic else 0.75) * mean, 0.0)
 
 
 def _touching(strips: Strips) -> slice:

@@ -192,6 +192,8 @@ class Slender(ContactModel):
 
     def pass_loop(self, loop: PassLoop) -> int:
         """Run roller passes in compiled code; strip theory only."""
+        if not self.capabilities.pass_loop:
+            return super().pass_loop(loop)
         from wearsim.mechanics import slender_pass  # noqa: PLC0415  (slow to load, rarely needed)
 
         status, done, full_solves = slender_pass.run_passes(

@@ -82,10 +82,10 @@ class Registry:
             }
         except pluggy.PluginValidationError as error:
             raise PluginError(
-                f"plugin '{point.name}' of {name} {version} implements no such hook: {error};"
-                f" the hooks are {', '.join(_HOOKS.values())}"
+                f"plugin '{point.name}' of {name} {version} does not fit the hooks: {error};"
+                f" the hooks are {', '.join(_HOOKS.values())}, without arguments"
             ) from error
-        except Exception as error:  # a plugin may fail in any way; it must not take us along
+        except (Exception, SystemExit) as error:  # whatever it does, it must not take us along
             cause = f"{type(error).__name__}: {error}"
             self.broken.append(Broken(point.name, name, version, cause))
             return

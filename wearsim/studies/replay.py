@@ -196,6 +196,7 @@ class _Replay:
         )
         try:
             self._step_through()
+            self._write(finished=True)
         except KeyboardInterrupt:
             self._interrupted()
         except SolverError:
@@ -203,7 +204,6 @@ class _Replay:
             self.recorder.drop_unfinished()
             self._write()
             raise
-        self._write(finished=True)
         self.tell(Finished(self._wall()))
         return Result(self._data(finished=True), self.path)
 

@@ -52,4 +52,4 @@ class RecordSchedule:
             due = float(self.base ** ((math.floor(place + _ROUND_OFF) + 1) / self.count))
         # a record due at the end of the test must not fall a round-off before it
         whole = float(round(due))
-        return whole if abs(due - whole) <= 1e-12 * whole and whole > passes else due
+        return whole if abs(due - whole) <= 1e-15 * whole and whole > passes else due

@@ -12,7 +12,6 @@ from wearsim.types import Grid
 
 STRIPS_PER_HALF_WIDTH = 12  # of the fresh patch; a run's error in y is then about 1e-3
 MOST_STRIPS = 801
-FREE_CREEPAGE = 3e-3  # reckoned with where the creepage is not prescribed
 
 
 def contact_centres(scenario: Scenario) -> tuple[float, ...]:
@@ -44,18 +43,29 @@ def foreseen_half_width(scenario: Scenario, load: float) -> float:
     factors = [law.depth_per_dissipation(body, speed) for body in ("cylinder", "roller")]
     share = scenario.cylinder.radius / scenario.roller.radius / scenario.operation.rollers
     wear = ((factors[0] or 0.0) + share * (factors[1] or 0.0)) * speed
-    creepage = scenario.creepage
-    yaw = max(abs(angle) for angle in scenario.per_roller(creepage.yaw))
-    longitudinal = abs(creepage.longitudinal or 0.0)
-    if creepage.drive == "free" or creepage.differential_slip:
-        longitudinal += FREE_CREEPAGE
-    slip = float(np.hypot(longitudinal, yaw))
-    per_load = wear * scenario.friction.coefficient * slip
     crown = 2.0 * scenario.roller.crown_radius
-    depth = (0.75 * per_load * load * scenario.total_passes / np.sqrt(crown)) ** (2.0 / 3.0)
+    start = 0.0
     if scenario.cylinder.profile is not None:
-        depth += float(np.ptp(scenario.cylinder.profile.height))
-    return float(np.sqrt(crown * depth))
+        start = float(np.ptp(scenario.cylinder.profile.height))
+    half = fresh_patch(scenario, load).b
+    for _ in range(20):  # the slip at the groove's sides depends on its width, weakly
+        per_load = wear * scenario.friction.coefficient * greatest_slip(scenario, half)
+        depth = (0.75 * per_load * load * scenario.total_passes / np.sqrt(crown)) ** (2.0 / 3.0)
+        half = float(np.sqrt(crown * (depth + start)))
+    return half
+
+
+def greatest_slip(scenario: Scenario, half_width: float) -> float:
+    """Return the greatest rigid slip within `half_width` [m] of a contact's middle."""
+    creepage, roller = scenario.creepage, scenario.roller
+    longitudinal = abs(creepage.longitudinal or 0.0)
+    tilt = max(abs(angle) for angle in scenario.per_roller(creepage.tilt))
+    longitudinal += tilt / roller.radius * half_width
+    if creepage.drive == "free" or creepage.differential_slip:
+        curvature = 1.0 / roller.radius + 1.0 / scenario.cylinder.radius
+        longitudinal += half_width**2 / (2.0 * roller.crown_radius) * curvature
+    yaw = max(abs(angle) for angle in scenario.per_roller(creepage.yaw))
+    return float(np.hypot(longitudinal, yaw))
 
 
 def run_grid(scenario: Scenario, load: float) -> Grid:

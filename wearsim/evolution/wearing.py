@@ -1,0 +1,135 @@
+"""What the wear of one step does to the bodies, and how it yields under the contacts."""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+import numpy as np
+
+from wearsim.evolution.scene import Scene
+from wearsim.types import ContactSolution, FloatArray
+
+Contacts: TypeAlias = tuple[ContactSolution, ...]
+
+LEAST_EXPONENT, GREATEST_EXPONENT = 0.4, 1.0  # wear goes as q^(1/2) in adhesion, as q in sliding
+FELT = 1e-7  # relative change of a line load from which an exponent can be read
+
+
+class Wearing:
+    """What a step of `passes` passes with given contacts wears off the bodies.
+
+    Near the contacts' line loads the wear of each strip is taken as linear in its line load:
+    u = (1 - e) u_0 + e (u_0/q_0) q, with the exponent e of u ~ q^e. The second term is a
+    compliance, the first a wear that does not yield.
+
+    Parameters
+    ----------
+    scene : Scene
+    contacts : tuple of ContactSolution
+    passes : float
+        Length of the step.
+    exponents : ndarray, shape (stations, rollers, realisations, strips), optional
+        e of every strip; 1 where left out, which full sliding makes exact.
+
+    Attributes
+    ----------
+    cylinder, roller : ndarray
+        Depth the step adds, shapes as in `WearState` [m].
+    compliance : ndarray, shape (realisations, contacts, contacts, strips)
+        Gap that opens at one contact per unit of line load of another [m/(N/m)]; contacts are
+        (station, roller).
+    offset : ndarray, shape (stations, rollers, realisations, strips)
+        Gap that opens whatever the line load [m].
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        contacts: Contacts,
+        passes: float,
+        exponents: FloatArray | None = None,
+    ) -> None:
+        cylinder, roller = scene.wear_per_pass(contacts)
+        rates = scene.shared_wear(cylinder, roller)
+        self.cylinder, self.roller = rates[0] * passes, rates[1] * passes
+        share = passes * scene.kinematics.cylinder_share[None, :, None, None]
+        own = passes * scene.kinematics.roller_share / scene.shape[0]
+        on_cylinder, on_roller = cylinder * share, roller * own
+        self.offset = np.zeros_like(on_cylinder)
+        if exponents is not None:
+            kept = 1.0 - exponents
+            self.offset += (kept * on_cylinder).sum(axis=1, keepdims=True)
+            self.offset += (kept * on_roller).sum(axis=0, keepdims=True)
+            on_cylinder, on_roller = exponents * on_cylinder, exponents * on_roller
+        self.compliance = _between_contacts(
+            scene, _ratio(scene, on_cylinder, contacts), _ratio(scene, on_roller, contacts)
+        )
+
+    @property
+    def opening(self) -> FloatArray:
+        """Gap that the step opens at every contact, (stations, rollers, realisations, strips)."""
+        return self.cylinder + self.roller
+
+    def foreseen(self, line_load: FloatArray) -> FloatArray:
+        """Return the opening that compliance and offset make of a line load, shape as `opening`."""
+        stations, rollers, realisations, strips = line_load.shape
+        flat = line_load.transpose(2, 0, 1, 3).reshape(realisations, -1, strips)
+        yielding = np.einsum("vkli,vli->vki", self.compliance, flat)
+        shaped = yielding.reshape(realisations, stations, rollers, strips)
+        opening: FloatArray = shaped.transpose(1, 2, 0, 3) + self.offset
+        return opening
+
+
+def _ratio(scene: Scene, wear: FloatArray, contacts: Contacts) -> FloatArray:
+    """Return wear over line load, carried on into strips without load, last axis strips."""
+    ratio = np.zeros_like(wear)
+    if not wear.any():
+        return ratio
+    places = np.arange(wear.shape[-1], dtype=np.float64)
+    for index, contact in zip(scene.contacts, contacts, strict=True):
+        loaded = contact.line_load > 0.0
+        ratio[index] = np.interp(
+            places, places[loaded], wear[index][loaded] / contact.line_load[loaded]
+        )
+    return ratio
+
+
+def _between_contacts(scene: Scene, on_cylinder: FloatArray, on_roller: FloatArray) -> FloatArray:
+    """Return how the wear of each contact opens the gaps of all that share a body with it."""
+    stations, rollers, realisations = scene.shape
+    members = [(s, r) for s in range(stations) for r in range(rollers)]
+    compliance = np.zeros((realisations, len(members), len(members), scene.grid.strips))
+    for k, (s, r) in enumerate(members):
+        for other, (s2, r2) in enumerate(members):
+            if s == s2:
+                compliance[:, k, other] += on_cylinder[s2, r2]
+            if r == r2:
+                compliance[:, k, other] += on_roller[s2, r2]
+    return compliance
+
+
+def exponents_between(scene: Scene, old: Contacts, new: Contacts, known: FloatArray) -> FloatArray:
+    """Return the exponents with which dissipation followed the line load from `old` to `new`.
+
+    Parameters
+    ----------
+    scene : Scene
+    old, new : tuple of ContactSolution
+        Two solutions of the same contacts.
+    known : ndarray, shape (stations, rollers, realisations, strips)
+        What to take where a strip tells nothing.
+
+    Returns
+    -------
+    ndarray, shape as `known`
+    """
+    exponents = known.copy()
+    for index, before, after in zip(scene.contacts, old, new, strict=True):
+        both = (before.dissipation > 0.0) & (after.dissipation > 0.0)
+        load = np.log(after.line_load[both] / before.line_load[both])
+        power = np.log(after.dissipation[both] / before.dissipation[both])
+        felt = np.abs(load) > FELT
+        strips = np.flatnonzero(both)[felt]
+        slopes = power[felt] / load[felt]
+        exponents[index][strips] = np.clip(slopes, LEAST_EXPONENT, GREATEST_EXPONENT)
+    return exponents
