@@ -14,7 +14,7 @@ JOBS ?= 2
 demo: $(VENV)/.installed
 	mkdir -p out
 	$(BIN)/wearsim run scenarios/rig-450min.toml -o out/rig-450min.h5 --force
-	$(BIN)/wearsim plot out/rig-450min.h5 -o out/rig-450min.png
+	$(BIN)/wearsim plot out/rig-450min.h5 -o out/rig-450min.png --force
 
 test: lint
 	$(BIN)/pytest -n $(JOBS) --dist worksteal

@@ -31,6 +31,7 @@ def mean_loads(
         before = scene.descent(scene.gap(state.cylinder_depth, state.roller_depth))
         loads -= scene.load.stiffness * 0.5 * (before + scene.descent(end_gap))
     for number, term in enumerate(scene.terms.values()):
+        # a station's power counts like any other's
         loads += term.mean_force(state.terms[number], power.mean(axis=0), stop - start)
     return checked_loads(loads, state.passes)
 
@@ -100,25 +101,22 @@ def implicit_step(scene: Scene, state: WearState, passes: float) -> WearState:
     """
     gap = scene.gap(state.cylinder_depth, state.roller_depth)
     contacts = state.contacts
-    exponents = np.ones((*scene.shape, scene.grid.strips))
     wearing = Wearing(scene, contacts, passes)
     loads = _end_loads(scene, state, passes, wearing, contacts)
     for iteration in range(1, MAX_FIXED_POINT + 1):
         ends = state.cylinder_depth + wearing.cylinder, state.roller_depth + wearing.roller
         points = operating_points(scene, loads, *ends)
-        new = _solve_all(scene, gap + wearing.offset, points, wearing.compliance, contacts)
-        foreseen = wearing.foreseen(contact_values(scene, new, "line_load"))
-        exponents = exponents_between(scene, contacts, new, exponents)
-        before, contacts = wearing, new
-        wearing = Wearing(scene, contacts, passes, exponents)
-        new_loads = _end_loads(scene, state, passes, wearing, contacts)
-        change = max(_differs(wearing.opening, foreseen), _differs(new_loads, loads))
+        found = _solve_all(scene, gap + wearing.offset, points, wearing.compliance, contacts)
+        new = Wearing(scene, found, passes)
+        new_loads = _end_loads(scene, state, passes, new, found)
+        foreseen = wearing.foreseen(contact_values(scene, found, "line_load"))
+        change = max(_differs(new.opening, foreseen), _differs(new_loads, loads))
         if scene.slip_profile is not None:
-            change = max(change, _differs(wearing.cylinder, before.cylinder))
-        loads = new_loads
+            change = max(change, _differs(new.cylinder, wearing.cylinder))
         if change < FIXED_POINT_TOLERANCE:
-            solves = iteration * len(contacts)
-            return _completed(scene, state, passes, wearing, contacts, solves)
+            return _completed(scene, state, passes, new, found, iteration * len(found))
+        new.exponents = exponents_between(scene, contacts, found, wearing.exponents)
+        contacts, wearing, loads = found, new, new_loads
     raise StepError(
         f"an implicit step of {passes:.4g} passes from pass {state.passes:.0f} did not settle"
         f" (last change {change:.1e})",

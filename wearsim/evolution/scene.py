@@ -32,28 +32,28 @@ class Kinematics:
     rolling_speed: float
     multiplicity: FloatArray
 
-    @property
+    @cached_property
     def physical_rollers(self) -> float:
         """Number of rollers on the cylinder."""
         return float(self.multiplicity.sum())
 
-    @property
+    @cached_property
     def pass_rate(self) -> float:
         """Roller passes per second, all rollers together."""
         turns = self.rolling_speed / (2.0 * np.pi * self.cylinder_radius)
         return self.physical_rollers * turns
 
-    @property
+    @cached_property
     def longitudinal_curvature(self) -> float:
         """Relative curvature along rolling [1/m]."""
         return 1.0 / self.cylinder_radius + 1.0 / self.roller_radius
 
-    @property
+    @cached_property
     def cylinder_share(self) -> FloatArray:
         """Part of all passes that each roller of the scene makes, shape (rollers,)."""
         return self.multiplicity / self.physical_rollers
 
-    @property
+    @cached_property
     def roller_share(self) -> float:
         """Times a point of one roller is rolled over, per pass of all rollers."""
         return self.cylinder_radius / self.roller_radius / self.physical_rollers
@@ -98,7 +98,7 @@ class Scene:
     bearing_torque: float | None = None
     slip_profile: FloatArray | None = None
 
-    @property
+    @cached_property
     def shape(self) -> tuple[int, int, int]:
         """Leading axes: stations, rollers, realisations."""
         stations, rollers, realisations = self.nominal_gap.shape[:3]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
@@ -28,42 +29,52 @@ class Wearing:
     contacts : tuple of ContactSolution
     passes : float
         Length of the step.
-    exponents : ndarray, shape (stations, rollers, realisations, strips), optional
-        e of every strip; 1 where left out, which full sliding makes exact.
 
     Attributes
     ----------
     cylinder, roller : ndarray
         Depth the step adds, shapes as in `WearState` [m].
-    compliance : ndarray, shape (realisations, contacts, contacts, strips)
-        Gap that opens at one contact per unit of line load of another [m/(N/m)]; contacts are
-        (station, roller).
-    offset : ndarray, shape (stations, rollers, realisations, strips)
-        Gap that opens whatever the line load [m].
+    exponents : ndarray, shape (stations, rollers, realisations, strips), optional
+        e of every strip, to be set before compliance or offset are first asked for; 1 where left
+        out, which full sliding makes exact.
     """
 
-    def __init__(
-        self,
-        scene: Scene,
-        contacts: Contacts,
-        passes: float,
-        exponents: FloatArray | None = None,
-    ) -> None:
+    def __init__(self, scene: Scene, contacts: Contacts, passes: float) -> None:
         cylinder, roller = scene.wear_per_pass(contacts)
         rates = scene.shared_wear(cylinder, roller)
         self.cylinder, self.roller = rates[0] * passes, rates[1] * passes
+        self.exponents: FloatArray | None = None
+        self._scene, self._contacts = scene, contacts
+        # each contact's own part in the wear of the bodies
         share = passes * scene.kinematics.cylinder_share[None, :, None, None]
         own = passes * scene.kinematics.roller_share / scene.shape[0]
-        on_cylinder, on_roller = cylinder * share, roller * own
-        self.offset = np.zeros_like(on_cylinder)
-        if exponents is not None:
-            kept = 1.0 - exponents
-            self.offset += (kept * on_cylinder).sum(axis=1, keepdims=True)
-            self.offset += (kept * on_roller).sum(axis=0, keepdims=True)
-            on_cylinder, on_roller = exponents * on_cylinder, exponents * on_roller
-        self.compliance = _between_contacts(
+        self._parts = cylinder * share, roller * own
+
+    @cached_property
+    def compliance(self) -> FloatArray:
+        """Gap that opens at one contact per unit of line load of another [m/(N/m)].
+
+        Shape (realisations, contacts, contacts, strips); contacts are (station, roller).
+        """
+        on_cylinder, on_roller = self._parts
+        if self.exponents is not None:
+            on_cylinder, on_roller = self.exponents * on_cylinder, self.exponents * on_roller
+        scene, contacts = self._scene, self._contacts
+        return _between_contacts(
             scene, _ratio(scene, on_cylinder, contacts), _ratio(scene, on_roller, contacts)
         )
+
+    @cached_property
+    def offset(self) -> FloatArray | float:
+        """Gap that opens whatever the line load, (stations, rollers, realisations, strips) [m]."""
+        if self.exponents is None:
+            return 0.0
+        kept = 1.0 - self.exponents
+        on_cylinder, on_roller = self._parts
+        on_cylinder = (kept * on_cylinder).sum(axis=1, keepdims=True)
+        on_roller = (kept * on_roller).sum(axis=0, keepdims=True)
+        opening: FloatArray = on_cylinder + on_roller
+        return opening
 
     @property
     def opening(self) -> FloatArray:
@@ -73,8 +84,8 @@ class Wearing:
     def foreseen(self, line_load: FloatArray) -> FloatArray:
         """Return the opening that compliance and offset make of a line load, shape as `opening`."""
         stations, rollers, realisations, strips = line_load.shape
-        flat = line_load.transpose(2, 0, 1, 3).reshape(realisations, -1, strips)
-        yielding = np.einsum("vkli,vli->vki", self.compliance, flat)
+        flat = line_load.transpose(2, 0, 1, 3).reshape(realisations, 1, -1, strips)
+        yielding = (self.compliance * flat).sum(axis=2)
         shaped = yielding.reshape(realisations, stations, rollers, strips)
         opening: FloatArray = shaped.transpose(1, 2, 0, 3) + self.offset
         return opening
@@ -108,7 +119,9 @@ def _between_contacts(scene: Scene, on_cylinder: FloatArray, on_roller: FloatArr
     return compliance
 
 
-def exponents_between(scene: Scene, old: Contacts, new: Contacts, known: FloatArray) -> FloatArray:
+def exponents_between(
+    scene: Scene, old: Contacts, new: Contacts, known: FloatArray | None
+) -> FloatArray:
     """Return the exponents with which dissipation followed the line load from `old` to `new`.
 
     Parameters
@@ -116,14 +129,14 @@ def exponents_between(scene: Scene, old: Contacts, new: Contacts, known: FloatAr
     scene : Scene
     old, new : tuple of ContactSolution
         Two solutions of the same contacts.
-    known : ndarray, shape (stations, rollers, realisations, strips)
-        What to take where a strip tells nothing.
+    known : ndarray, shape (stations, rollers, realisations, strips), optional
+        What to take where a strip tells nothing; 1 where left out.
 
     Returns
     -------
-    ndarray, shape as `known`
+    ndarray, shape (stations, rollers, realisations, strips)
     """
-    exponents = known.copy()
+    exponents = np.ones((*scene.shape, scene.grid.strips)) if known is None else known.copy()
     for index, before, after in zip(scene.contacts, old, new, strict=True):
         both = (before.dissipation > 0.0) & (after.dissipation > 0.0)
         load = np.log(after.line_load[both] / before.line_load[both])

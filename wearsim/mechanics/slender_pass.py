@@ -78,12 +78,13 @@ def set_anchor(
         False if the Jacobian is singular.
     """
     n = line_load.shape[1]
-    m = 0
+    reach = min(BAND, n)
+    count[g] = 0
     for i in range(n):
         if line_load[g, i] > 0.0:
-            active[g, m] = i
-            m += 1
-    count[g] = m
+            active[g, count[g]] = i
+            count[g] += 1
+    m = count[g]
     guards = 0
     for i in range(n):
         beside = (i > 0 and line_load[g, i - 1] > 0.0) or (i < n - 1 and line_load[g, i + 1] > 0.0)
@@ -99,12 +100,12 @@ def set_anchor(
         q = line_load[g, j]
         tau = log_scale + 0.5 * np.log(q)
         read_influence(table, tau, n, work[0], work[1])
-        read_influence(table, tau + small, BAND, work[2], work[3])
-        read_influence(table, tau - small, BAND, work[4], work[5])
+        read_influence(table, tau + small, reach, work[2], work[3])
+        read_influence(table, tau - small, reach, work[4], work[5])
         for r in range(m):
             matrix[r, c] = unit * work[1, abs(active[g, r] - j)]
         matrix[c, m + c] = 1.0
-        for k in range(min(BAND, n)):
+        for k in range(reach):
             near[g, c, 0, k] = unit * q * work[0, k]
             near[g, c, 1, k] = unit * work[1, k]
             near[g, c, 2, k] = 0.125 * unit * (work[3, k] - work[5, k]) / (small * q)

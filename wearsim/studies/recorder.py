@@ -30,7 +30,6 @@ def history_row(scene: Scene, state: WearState, before: WearState | None, thresh
     realisations = range(scene.shape[2])
     worn = state.cylinder_depth
     power = contact_values(scene, state.contacts, "power")
-    line_load = contact_values(scene, state.contacts, "line_load")
     row: Row = {
         "passes": state.passes,
         "time": scene.time(state.passes),
@@ -46,7 +45,7 @@ def history_row(scene: Scene, state: WearState, before: WearState | None, thresh
         ),
         "dissipated_energy": state.energy,
         "power": scene.total_power(power),
-        "normal_force": line_load.sum(axis=-1).mean(axis=0) * scene.grid.spacing,
+        "normal_force": present_loads(scene, state).mean(axis=0),
         "depth_error": state.depth_error,
         "volume_error": state.volume_error,
         "rejected": state.rejected,

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -147,7 +148,7 @@ class _Replay:
         self.tell: Watcher = on_event or (lambda event: None)
         self.stop_requested = stop_requested or (lambda: False)
         self.stop = float(scenario.total_passes)
-        self.software, self.plugins = _software(), _plugins(scenario)
+        self.software, self.plugins = dict(_software()), _plugins(scenario)
         self.warnings: list[str] = []
         self.created = datetime.now(UTC).isoformat(timespec="seconds")
         self.wall_before, self.started = 0.0, time.monotonic()
@@ -314,7 +315,8 @@ class _Replay:
         )
 
 
-def _software() -> dict[str, str]:
+@cache
+def _software() -> Mapping[str, str]:
     found = {}
     for name in SOFTWARE:
         try:

@@ -1,0 +1,85 @@
+"""One contact: Hertz, the mean problem by three routes, and slender solves."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from tests.benchmarks.table import Effort, Row, best_short, part
+from wearsim.mechanics.elasticity import combine
+from wearsim.mechanics.hertz import HertzContact, hertz
+from wearsim.plugins import ContactModelSpec, registry
+from wearsim.types import ContactSolution, Creepage, Grid, Material, OperatingPoint
+
+STEEL = Material(youngs_modulus=200e9, poisson_ratio=0.3)
+ALONG, CROWN, LOAD = 1 / 0.020 + 1 / 0.025, 0.5, 300.0
+POINT = OperatingPoint(LOAD, 1000 / 60 * 2 * 3.141592653589793 * 0.025, Creepage(1e-3), 0.1)
+PEAK_PRESSURE = 680.22e6  # Pa, of the rig
+EXACT_POWER = 0.0771  # W, exact rolling theory for the mean problem
+FASTSIM_POWER = 0.073873  # W, what FASTSIM tends to in the limit of a long patch
+
+
+class Mean:
+    """The mean problem: the rig's contact, fresh, on strips of a model's choice or given."""
+
+    def __init__(self, name: str, strips: int | None = None, **options: Any) -> None:
+        spec = registry().get(ContactModelSpec, name)
+        self.model = spec.factory(spec.options(**options))
+        grid = self.model.suggest_grid(1 / CROWN, ALONG, LOAD, (STEEL, STEEL))
+        if strips is not None:
+            half = 0.5 * grid.strips * grid.spacing
+            grid = Grid.spanning(-half, half, strips)
+        self.model.prepare(grid, (STEEL, STEEL))
+        self.gap = grid.y**2 / (2 * CROWN)
+
+    def solve(self, warm: ContactSolution | None = None) -> ContactSolution:
+        """Solve it, from nothing or from a solution nearby."""
+        return self.model.solve(self.gap, ALONG, POINT, None, warm)
+
+
+def rig_hertz() -> HertzContact:
+    """Return the rig's Hertzian contact."""
+    return hertz(ALONG / 2, 0.5 / CROWN, LOAD, combine(STEEL, STEEL).contact_modulus)
+
+
+def hertz_rows(effort: Effort) -> list[Row]:
+    """Time the exact Hertz solution."""
+    error = part(rig_hertz().peak_pressure / PEAK_PRESSURE - 1)
+    seconds = best_short(rig_hertz, effort.repetitions)
+    return [Row("Hertz, the rig", seconds, "", f"{error} in p0, of 680.22 MPa")]
+
+
+ROUTES: dict[str, dict[str, Any]] = {
+    "closed form": {},
+    "FASTSIM, work of the rigid slip": {"closed_form": False},
+    "FASTSIM, the textbook's element sum": {"closed_form": False, "dissipation": "element-sum"},
+}
+ASKED = {"FASTSIM, work of the rigid slip": "0.1 % in power"}
+
+
+def mean_rows(effort: Effort) -> list[Row]:
+    """Time the mean problem by FASTSIM's three routes, 50 x 50 elements."""
+    rows = []
+    for route, options in ROUTES.items():
+        mean = Mean("hertz-fastsim", kalker="line-limit", **options)
+        error = part(mean.solve().power / FASTSIM_POWER - 1)
+        seconds = best_short(mean.solve, effort.repetitions)
+        what = f"mean problem, 50 x 50, {route}"
+        rows.append(Row(what, seconds, ASKED.get(route, ""), f"{error} in power, of 0.073873 W"))
+    return rows
+
+
+def slender_rows(effort: Effort) -> list[Row]:
+    """Time a slender solve on 81 strips, from nothing and from a neighbour."""
+    mean = Mean("slender", strips=81)
+    warm = mean.solve()
+    error = f"{part(warm.power / EXACT_POWER - 1)} in power, of 0.0771 W"
+    peak = f"{part(warm.peak_pressure / PEAK_PRESSURE - 1)} in p0"
+    return [
+        Row("slender, 81 strips, cold", best_short(mean.solve, effort.repetitions), "", error),
+        Row(
+            "slender, 81 strips, warm",
+            best_short(lambda: mean.solve(warm), effort.repetitions),
+            "",
+            peak,
+        ),
+    ]

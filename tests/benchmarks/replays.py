@@ -1,0 +1,82 @@
+"""Whole wear tests: the default replay beside the truth, every pass by itself."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import wearsim
+from tests.benchmarks.table import Effort, Row, best, part, timed
+from wearsim.results import Result, open_results, write_results
+from wearsim.scenario import Scenario
+
+SCENARIOS = Path(__file__).parents[2] / "scenarios"
+SPRING = {"load.kind": "spring", "load.stiffness": "690 N/mm"}
+REPLAYS: dict[str, tuple[str, dict[str, object]]] = {
+    "rig-450min": ("rig-450min.toml", {}),
+    "rig-450min with a spring": ("rig-450min.toml", SPRING),
+    "rig-logged-load": ("rig-logged-load.toml", {}),
+    "rig-three-rollers": ("rig-three-rollers.toml", {}),
+}
+MUST = {"rig-450min": "0.5 s, aim 0.05 s; 0.5 % in depth and volume"}
+
+
+def scenario(name: str, effort: Effort, stepper: str = "auto") -> Scenario:
+    """Return a replay of `REPLAYS`, shortened where little effort is asked for."""
+    file, overrides = REPLAYS[name]
+    changes = overrides | {
+        "evolution.stepper": stepper,
+        "operation.duration": f"{450 * effort.part:.12g} min",
+    }
+    return wearsim.load_scenario(SCENARIOS / file, changes)
+
+
+def beside(result: Result, truth: Result) -> str:
+    """Return the true error in depth and volume, and the error that the run itself estimates."""
+    depth, volume = float(result.depth[-1]), float(result.worn_volume[-1])
+    true = (
+        f"depth {part(depth / float(truth.depth[-1]) - 1)},"
+        f" volume {part(volume / float(truth.worn_volume[-1]) - 1)}"
+    )
+    estimate = (
+        f"estimated {part(float(result.depth_error[-1]) / depth)},"
+        f" {part(float(result.volume_error[-1]) / volume)}"
+    )
+    return f"{true} ({estimate.replace('+', '')})"
+
+
+def replay_rows(effort: Effort) -> list[Row]:
+    """Time each replay by default and pass by pass; the latter once, for it takes long."""
+    rows = []
+    for name in REPLAYS:
+        every_pass = scenario(name, effort, "per-pass")
+        wearsim.run(scenario(name, Effort(part=1e-4), "per-pass"))  # compiles
+        truths: list[Result] = []
+        slow = timed(lambda run=every_pass, kept=truths: kept.append(wearsim.run(run)))
+        default = scenario(name, effort)
+        result = wearsim.run(default)
+        quick = best(lambda run=default: wearsim.run(run), effort.repetitions)
+        steps = f"{int(result.steps)} steps, {int(result.solves[-1])} contact solves"
+        asked = MUST.get(name, "")
+        rows.append(Row(f"{name}, {steps}", quick, asked, beside(result, truths[0])))
+        passes = f"{float(truths[0].passes[-1]):,.0f} passes".replace(",", " ")
+        asked = "2 min, aim 20 s" if name == "rig-450min" else ""
+        in_full = f"{int(truths[0].full_solves[-1])} solved in full"
+        rows.append(Row(f"{name}, pass by pass, {passes}", slow, asked, in_full))
+    return rows
+
+
+def file_rows(effort: Effort) -> list[Row]:
+    """Time the writing and the reading of a results file."""
+    result = wearsim.run(scenario("rig-450min", effort))
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "rig.h5"
+        write = best(lambda: write_results(path, result.raw), effort.repetitions)
+        read = best(lambda: open_results(path), effort.repetitions)
+        same = (open_results(path).depth == result.depth).all()
+        size = path.stat().st_size / 1024
+    told = "reads back bit for bit" if same else "DIFFERS"
+    return [
+        Row(f"results file, written ({size:.0f} KiB)", write, "", told),
+        Row("results file, opened", read),
+    ]

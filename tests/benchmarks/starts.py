@@ -1,0 +1,70 @@
+"""Processes of their own: how soon the command answers."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from tests.benchmarks.replays import SCENARIOS
+from tests.benchmarks.table import Effort, Row, best, timed
+
+WEARSIM = [sys.executable, "-m", "wearsim"]
+
+
+def call(*command: str, **environment: str) -> None:
+    """Run a command to its end, silently."""
+    subprocess.run(command, env=os.environ | environment, capture_output=True, check=True)
+
+
+def import_rows(effort: Effort) -> list[Row]:
+    """Time `wearsim --help` and `import wearsim`, Python's own start included."""
+    python = best(lambda: call(sys.executable, "-c", "pass"), effort.repetitions)
+    plain = best(lambda: call(sys.executable, "-c", "import wearsim"), effort.repetitions)
+    usage = best(lambda: call(*WEARSIM, "--help"), effort.repetitions)
+    own = f"Python alone {python * 1e3:.0f} ms of it"
+    return [
+        Row("`wearsim --help`", usage, "0.4 s", own),
+        Row("`import wearsim`", plain, "0.3 s", own),
+    ]
+
+
+def run_command(folder: str) -> list[str]:
+    """Return the command of a replay of the rig."""
+    scenario = str(SCENARIOS / "rig-450min.toml")
+    return [*WEARSIM, "run", scenario, "-o", str(Path(folder) / "rig.h5"), "--force"]
+
+
+def first_output(folder: str, cache: str) -> float:
+    """Return how long a replay takes to say something [s]."""
+    start = time.perf_counter()
+    with subprocess.Popen(
+        run_command(folder),
+        env=os.environ | {"NUMBA_CACHE_DIR": cache},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        bufsize=0,
+    ) as process:
+        assert process.stdout is not None
+        process.stdout.read(1)
+        seconds = time.perf_counter() - start
+        process.stdout.read()
+    return seconds
+
+
+def run_rows(effort: Effort) -> list[Row]:
+    """Time the first run after an install, and runs after it."""
+    with TemporaryDirectory() as folder:
+        command = run_command(folder)
+        cache = str(Path(folder) / "cache")
+        first = timed(lambda: call(*command, NUMBA_CACHE_DIR=cache))
+        heard = min(first_output(folder, cache) for _ in range(effort.repetitions))
+        later = best(lambda: call(*command, NUMBA_CACHE_DIR=cache), effort.repetitions)
+    return [
+        Row("first `wearsim run` after install, compiling", first, "20 s"),
+        Row("later `wearsim run`, to its first output", heard, "1.5 s"),
+        Row("later `wearsim run`, to its end", later),
+    ]

@@ -1,0 +1,54 @@
+"""Benchmarks to compare with earlier ones: ``pytest tests/benchmarks --benchmark-enable``.
+
+Without that option each runs once, so that none falls out of use.
+"""
+
+from __future__ import annotations
+
+import pytest
+
+import wearsim
+from tests.benchmarks import contacts, replays, table
+from tests.benchmarks.report import QUICK, TABLES
+
+
+def test_speed_of_hertz(benchmark):
+    assert benchmark(contacts.rig_hertz).peak_pressure == pytest.approx(680.22e6, rel=1e-5)
+
+
+@pytest.mark.parametrize("route", contacts.ROUTES)
+def test_speed_of_the_mean_problem(benchmark, route):
+    mean = contacts.Mean("hertz-fastsim", kalker="line-limit", **contacts.ROUTES[route])
+    assert benchmark(mean.solve).power == pytest.approx(contacts.FASTSIM_POWER, rel=0.05)
+
+
+@pytest.mark.parametrize("start", ["cold", "warm"])
+def test_speed_of_a_slender_contact(benchmark, start):
+    mean = contacts.Mean("slender", strips=81)
+    warm = mean.solve() if start == "warm" else None
+    assert benchmark(mean.solve, warm).power == pytest.approx(contacts.EXACT_POWER, rel=0.02)
+
+
+@pytest.mark.parametrize("name", replays.REPLAYS)
+def test_speed_of_a_replay(benchmark, name):
+    assert benchmark(wearsim.run, replays.scenario(name, QUICK)).finished
+
+
+def test_that_the_in_process_rows_of_the_report_hold_numbers():
+    functions = [*TABLES["One contact"], replays.replay_rows, replays.file_rows]
+    rows = [row for function in functions for row in function(QUICK)]
+    assert all(row.seconds > 0.0 for row in rows)
+    text = table.markdown("One contact", rows)
+    assert "| what | measured | asked | error beside it |" in text
+    assert "nan" not in text
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"), [(2.5e-6, "2.5 us"), (0.0312, "31.2 ms"), (1.5, "1.5 s"), (84.0, "84 s")]
+)
+def test_that_a_lapse_is_told_in_a_unit_that_suits_it(seconds, text):
+    assert table.lapse(seconds) == text
+
+
+def test_that_the_machine_is_named():
+    assert "cores, Python 3." in table.machine()

@@ -1,0 +1,120 @@
+"""A third party's plugin: an elastic foundation, a wear law without shear and a drifting load."""
+
+import numpy as np
+from scipy.optimize import brentq
+
+from wearsim.plugins import (
+    ContactModel,
+    ContactModelSpec,
+    LoadSpec,
+    LoadTerm,
+    Options,
+    WearLaw,
+    WearLawSpec,
+    hookimpl,
+)
+from wearsim.types import ContactSolution
+
+
+class Winkler(ContactModel):
+    """Springs side by side, sliding everywhere; it claims nothing beyond `solve`."""
+
+    def __init__(self, foundation_modulus):
+        self.modulus = foundation_modulus
+
+    def prepare(self, grid, materials):
+        self.grid = grid
+
+    def _line_load(self, gap, curvature, approach):
+        depth = np.maximum(approach - gap, 0.0)
+        half_length = np.sqrt(2.0 * depth / curvature)
+        return 4.0 / 3.0 * self.modulus * depth * half_length, half_length
+
+    def solve(self, gap, longitudinal_curvature, point, wear_compliance=None, warm=None):
+        if wear_compliance is not None:
+            raise ValueError("a caller must not give what is not claimed")
+        spacing, force = self.grid.spacing, point.normal_force
+
+        def excess(approach):
+            return self._line_load(gap, longitudinal_curvature, approach)[0].sum() * spacing - force
+
+        approach = brentq(excess, gap.min(), gap.min() + 1e-3, xtol=1e-18)
+        load, half_length = self._line_load(gap, longitudinal_curvature, approach)
+        creepage = point.creepage
+        slip = np.hypot(creepage.longitudinal, creepage.lateral)
+        dissipation = point.friction * load * slip * point.rolling_speed
+        traction = -point.friction * force / slip
+        return ContactSolution(
+            y=self.grid.y,
+            half_length=half_length,
+            line_load=load,
+            dissipation=dissipation,
+            force_x=traction * creepage.longitudinal,
+            force_y=traction * creepage.lateral,
+            spin_moment=0.0,
+            approach=approach,
+            peak_pressure=self.modulus * (approach - gap.min()),
+            adhesion_fraction=0.0,
+            power=dissipation.sum() * spacing,
+            longitudinal_creepage=creepage.longitudinal,
+            iterations=1,
+        )
+
+
+class WinklerOptions(Options):
+    foundation_modulus: float = 2.0e13  # Pa/m
+
+
+class Abrasion(WearLaw):
+    """Depth per pass in proportion to the line load, on the cylinder alone."""
+
+    def __init__(self, options):
+        self.factor = options.factor
+
+    def depth_per_pass(self, body, solution, rolling_speed):
+        return (self.factor if body == "cylinder" else 0.0) * solution.line_load
+
+
+class AbrasionOptions(Options):
+    factor: float = 1e-15  # m/(N/m)
+
+
+class Drift(LoadTerm):
+    """A load that grows with dissipated energy and never comes to rest."""
+
+    def __init__(self, options):
+        self.rate = options.rate
+
+    def advance(self, state, power, duration):
+        return state + self.rate * power * duration
+
+    def mean_force(self, state, power, duration):
+        return state + 0.5 * self.rate * power * duration
+
+
+class DriftOptions(Options):
+    rate: float = 0.1  # N/J
+
+
+@hookimpl
+def wearsim_contact_models():
+    yield ContactModelSpec(
+        name="winkler",
+        factory=lambda options: Winkler(options.foundation_modulus),
+        options=WinklerOptions,
+        summary="elastic foundation",
+    )
+
+
+@hookimpl
+def wearsim_wear_laws():
+    yield WearLawSpec(
+        name="abrasion", factory=Abrasion, options=AbrasionOptions, summary="wear by load alone"
+    )
+
+
+@hookimpl
+def wearsim_loads():
+    yield LoadSpec(
+        name="drift", factory=Drift, options=DriftOptions, role="term", summary="load by energy"
+    )

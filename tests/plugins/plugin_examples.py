@@ -1,0 +1,78 @@
+"""Plugins made up on the spot, and a scenario to use them in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+
+from wearsim.plugins import LoadSpec, Options, hookimpl
+from wearsim.scenario import Scenario, parse_scenario
+
+DATA = Path(__file__).parent / "data"
+HOOKS = (
+    "wearsim_contact_models",
+    "wearsim_wear_laws",
+    "wearsim_loads",
+    "wearsim_random_inputs",
+)
+RIG = """\
+[roller]
+radius = "20 mm"
+crown_radius = "500 mm"
+material = "steel"
+
+[cylinder]
+radius = "25 mm"
+material = "steel"
+
+[operation]
+speed = "1000 rpm"
+duration = "2 min"
+rollers = 3
+
+[friction]
+coefficient = 0.1
+
+[creepage]
+longitudinal = 1e-3
+"""
+TABLES = {
+    "contact": 'model = "slender"',
+    "load": 'kind = "constant"\nnormal_force = "300 N"',
+    "wear": 'cylinder = { k_over_h = "1.1e-11 1/Pa" }\nroller = { k_over_h = "0 1/Pa" }',
+}
+
+
+class Point:
+    """An entry point of a distribution that is not installed."""
+
+    def __init__(
+        self,
+        load: Callable[[], ModuleType],
+        name: str = "made-up",
+        distribution: str = "wearsim-made-up",
+        version: str = "0.1",
+    ) -> None:
+        self.load, self.name, self.value = load, name, name
+        self.dist = SimpleNamespace(name=distribution, version=version)
+
+
+def module(**hooks: Callable[..., object]) -> Callable[[], ModuleType]:
+    """Return a loader of a module that implements hooks."""
+    made = ModuleType("made_up")
+    for name, function in hooks.items():
+        function.__name__ = name
+        setattr(made, name, hookimpl(function))
+    return lambda: made
+
+
+def load_named(name: str) -> Callable[[], list[LoadSpec]]:
+    """Return a hook that yields a load of this name."""
+    return lambda: [LoadSpec(name, Options, "a load", factory=lambda options: None)]
+
+
+def rig(overrides: dict[str, object] | None = None, **tables: str) -> Scenario:
+    """Return a short test of the rig, with some of its tables replaced."""
+    text = RIG + "".join(f"\n[{name}]\n{body}\n" for name, body in (TABLES | tables).items())
+    return parse_scenario(text, "rig.toml", {}.__getitem__, overrides)

@@ -1,0 +1,113 @@
+"""Capabilities are honest: a built-in model does what it claims and refuses the rest."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from wearsim.errors import CapabilityError
+from wearsim.plugins import ContactModelSpec, registry
+from wearsim.types import Creepage, Grid, Material, OperatingPoint
+
+STEEL = Material(youngs_modulus=210e9, poisson_ratio=0.3)
+CURVATURE = 1 / 0.025 + 1 / 0.020
+POINT = OperatingPoint(300.0, 2.618, Creepage(1e-3), 0.1)
+MODELS = {
+    "slender": {},
+    "slender-fastsim": {"tangential": "fastsim"},
+    "hertz-fastsim": {},
+    "hertz-fastsim-march": {"closed_form": False},
+}
+
+
+class Case:
+    """A model, prepared, and a contact to solve."""
+
+    def __init__(self, name: str) -> None:
+        model = "slender" if name.startswith("slender") else "hertz-fastsim"
+        self.spec = registry().get(ContactModelSpec, model)
+        self.model = self.spec.factory(self.spec.options(**MODELS[name]))
+        self.grid = Grid.spanning(-2.5e-3, 2.5e-3, 61)
+        self.model.prepare(self.grid, (STEEL, STEEL))
+        self.gap = self.grid.y**2 / (2 * 0.5)
+        self.solution = self.solve(POINT)
+
+    def solve(self, point: OperatingPoint, compliance=None):
+        return self.model.solve(self.gap, CURVATURE, point, compliance)
+
+
+@pytest.fixture(params=MODELS)
+def case(request):
+    return Case(request.param)
+
+
+def test_that_a_spec_claims_no_less_than_its_models(case):
+    assert set(case.model.capabilities.names()) <= set(case.spec.describe())
+
+
+def test_wear_compliance(case):
+    compliance = np.full(case.grid.strips, 1e-12)
+    if not case.model.capabilities.wear_compliance:
+        with pytest.raises(CapabilityError, match="wear compliance"):
+            case.solve(POINT, compliance)
+        return
+    softer = case.solve(POINT, compliance)
+    opened = case.model.solve(case.gap + compliance * softer.line_load, CURVATURE, POINT)
+    assert softer.line_load.max() < 0.99 * case.solution.line_load.max()
+    assert opened.line_load == pytest.approx(softer.line_load, rel=1e-5, abs=1.0)
+
+
+def test_coupled(case):
+    gap, points = np.array([case.gap, case.gap]), [POINT, POINT]
+    compliance = np.full((2, 2, case.grid.strips), 1e-12)
+    if not case.model.capabilities.coupled:
+        with pytest.raises(CapabilityError, match="one contact at a time"):
+            case.model.solve_coupled(gap, CURVATURE, points, compliance)
+        return
+    one, other = case.model.solve_coupled(gap, CURVATURE, points, compliance)
+    alone = case.solve(POINT, 2 * compliance[0, 0])
+    assert one.line_load == pytest.approx(other.line_load, rel=1e-9)
+    assert one.line_load == pytest.approx(alone.line_load, rel=1e-6, abs=1e-3)
+
+
+def test_creepage_variation(case):
+    assert case.model.capabilities.creepage_variation
+    variation = 2e-4 * np.sign(case.grid.y)
+    varied = case.solve(replace(POINT, creepage=Creepage(2e-4, variation=variation)))
+    left = varied.dissipation[case.grid.y < 0].sum()
+    right = varied.dissipation[case.grid.y > 0].sum()
+    assert right > 5 * left
+
+
+def test_bearing_torque(case):
+    assert case.model.capabilities.bearing_torque
+    radius = np.full(case.grid.strips, 0.020)
+    point = replace(POINT, bearing_torque=0.3, rolling_radius=radius)
+    solution = case.solve(point)
+    assert solution.force_x * 0.020 == pytest.approx(-0.3, rel=1e-9)
+    assert 0.0 < solution.longitudinal_creepage < 1e-3
+
+
+def test_local_friction(case):
+    assert case.model.capabilities.local_friction
+    friction = np.where(case.grid.y > 0, 0.2, 0.1)
+    solution = case.solve(replace(POINT, friction=friction))
+    assert not np.allclose(solution.dissipation, solution.dissipation[::-1], rtol=0.1, atol=0.0)
+
+
+def test_pass_loop(case):
+    if not case.model.capabilities.pass_loop:
+        with pytest.raises(CapabilityError, match="per-pass loop"):
+            case.model.pass_loop(None)
+        return
+    assert "pass_loop" in vars(type(case.model))
+
+
+def test_fields(case):
+    assert case.model.capabilities.fields
+    fields = case.model.fields(case.solution, case.gap, CURVATURE, POINT)
+    middle = case.grid.strips // 2
+    power = np.trapezoid(fields.power_density[:, middle], fields.x[:, middle])
+    assert abs(power) == pytest.approx(case.solution.dissipation[middle], rel=0.1)

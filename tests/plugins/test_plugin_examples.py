@@ -1,0 +1,112 @@
+"""The example in every hook's docstring runs as it stands, and no hook goes without one."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import sys
+import textwrap
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+from plugin_examples import HOOKS, Point, rig
+
+import wearsim
+from wearsim.plugins import LoadSpec, RandomInputSpec, WearLawSpec, hookspecs, registry
+
+
+def example_of(hook: str) -> str:
+    """Return the code of a hook's docstring."""
+    text = inspect.getdoc(getattr(hookspecs.HookSpecs, hook)) or ""
+    marker = ".. code-block:: python\n"
+    assert marker in text, f"{hook} shows no example"
+    return textwrap.dedent(text.split(marker, 1)[1])
+
+
+@pytest.fixture
+def example(install, monkeypatch, request):
+    """Install the example of a hook, as an author who copied it would."""
+
+    def example(hook: str) -> ModuleType:
+        made = ModuleType(f"my_{hook}")
+        monkeypatch.setitem(sys.modules, made.__name__, made)
+        exec(compile(example_of(hook), hook, "exec", dont_inherit=True), vars(made))
+        install(Point(lambda: made, distribution="my-package"))
+        return made
+
+    return example
+
+
+def test_that_every_hook_is_in_the_list_of_these_tests():
+    specified = {name for name in vars(hookspecs.HookSpecs) if name.startswith("wearsim_")}
+    assert specified == set(HOOKS)
+
+
+@pytest.mark.parametrize("hook", HOOKS)
+def test_that_every_hook_is_documented(hook):
+    text = inspect.getdoc(getattr(hookspecs.HookSpecs, hook)) or ""
+    assert text[0].isupper()
+    assert "Returns\n-------\n" in text
+    assert f"@hookimpl\ndef {hook}():" in example_of(hook)
+
+
+@pytest.mark.parametrize("hook", HOOKS)
+def test_that_every_hook_is_tested(hook):
+    used = f'example("{hook}")'
+    assert used in Path(__file__).read_text(), f"no test here runs the example of {hook}"
+
+
+def test_that_the_example_of_a_contact_model_runs(example, monkeypatch):
+    package, winkler = ModuleType("my_package"), ModuleType("my_package.winkler")
+    monkeypatch.syspath_prepend(Path(__file__).parent / "data" / "tiny")
+    winkler.Winkler = importlib.import_module("wearsim_tiny").Winkler
+    monkeypatch.setitem(sys.modules, "my_package", package)
+    monkeypatch.setitem(sys.modules, "my_package.winkler", winkler)
+    example("wearsim_contact_models")
+    result = wearsim.run(
+        rig(contact='model = "winkler"\nfoundation_modulus = 4e13\nwidth = "8 mm"\nstrips = 81')
+    )
+    assert result.stepper == "explicit"
+    assert result.finished
+    assert result.depth[-1] > 0.0
+
+
+@pytest.mark.parametrize("stepper", ["implicit", "explicit", "per-pass"])
+def test_that_the_example_of_a_wear_law_runs(example, stepper):
+    example("wearsim_wear_laws")
+    scenario = rig(
+        {"evolution.stepper": stepper, "operation.duration": "6 s"},
+        wear='law = "constant-depth"\ndepth = 1e-11',
+    )
+    assert registry().registered(WearLawSpec, "constant-depth").distribution == "my-package"
+    result = wearsim.run(scenario)
+    # 300 passes wear the middle of the cylinder, and every roller by its share of 25/20/3
+    assert result.depth[-1] == pytest.approx(300 * 1e-11, rel=1e-9)
+    assert result.roller_depth[-1] == pytest.approx(300 * 1e-11 * 25 / 20 / 3, rel=1e-9)
+
+
+@pytest.mark.parametrize("stepper", ["implicit", "explicit", "per-pass"])
+def test_that_the_example_of_a_load_runs(example, stepper):
+    example("wearsim_loads")
+    scenario = rig({"evolution.stepper": stepper}, load='kind = "ramp"\nstart = 200.0\nslope = 0.5')
+    assert registry().registered(LoadSpec, "ramp").distribution == "my-package"
+    result = wearsim.run(scenario)
+    assert result.normal_force[0] == pytest.approx(200.0, rel=1e-3)
+    assert result.normal_force[-1] == pytest.approx(200.0 + 0.5 * 120.0, rel=5e-3)
+
+
+def test_that_the_load_of_the_example_has_exact_moments(example):
+    made = example("wearsim_loads")
+    load = made.Ramp(made.RampOptions(start=200.0, slope=0.5))
+    forces = load.force(np.linspace(10.0, 50.0, 100_001))
+    assert load.mean(10.0, 50.0) == pytest.approx(forces.mean(), rel=1e-9)
+    assert load.deviation(10.0, 50.0) == pytest.approx(forces.std(), rel=1e-4)
+
+
+def test_that_the_example_of_a_random_input_runs(example):
+    example("wearsim_random_inputs")
+    spec = registry().get(RandomInputSpec, "flat")
+    quantile = spec.factory(spec.options(low=2.0, high=4.0))
+    assert quantile(np.array([0.25, 0.5])) == pytest.approx([2.5, 3.0])

@@ -1,0 +1,74 @@
+"""Distributions found on Python's path by their entry points, in processes of their own."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+from plugin_examples import DATA, RIG, TABLES
+
+
+def wearsim(*arguments: object, plugins: tuple[str, ...]) -> subprocess.CompletedProcess[str]:
+    path = os.pathsep.join(str(DATA / name) for name in plugins)
+    return subprocess.run(
+        [sys.executable, "-m", "wearsim", *map(str, arguments)],
+        env=os.environ | {"PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def write_rig(folder: Path, contact: str) -> Path:
+    tables = TABLES | {"contact": contact}
+    text = RIG + "".join(f"\n[{name}]\n{body}\n" for name, body in tables.items())
+    path = folder / "rig.toml"
+    path.write_text(text)
+    return path
+
+
+def test_that_an_installed_plugin_is_listed_with_its_distribution():
+    done = wearsim("plugins", "--json", plugins=("tiny",))
+    assert done.returncode == 0, done.stderr
+    listed = json.loads(done.stdout)
+    own = {item["name"]: item for item in listed["plugins"] if item["distribution"] != "wearsim"}
+    assert set(own) == {"winkler", "abrasion", "drift"}
+    assert own["winkler"]["kind"] == "contact model"
+    assert own["winkler"]["capabilities"] == []
+    assert own["drift"]["capabilities"] == ["term"]
+    assert {(item["distribution"], item["version"]) for item in own.values()} == {
+        ("wearsim-tiny", "1.2")
+    }
+    assert listed["broken"] == []
+
+
+def test_that_a_broken_distribution_is_listed_with_its_cause():
+    done = wearsim("plugins", "--json", plugins=("broken", "tiny"))
+    assert done.returncode == 0, done.stderr
+    listed = json.loads(done.stdout)
+    assert "winkler" in {item["name"] for item in listed["plugins"]}
+    (broken,) = listed["broken"]
+    assert (broken["distribution"], broken["version"]) == ("wearsim-broken", "0.3")
+    assert broken["cause"] == "ModuleNotFoundError: No module named 'a_library_nobody_has'"
+
+
+def test_that_a_run_uses_an_installed_plugin_and_its_file_names_it(tmp_path):
+    path = write_rig(tmp_path, 'model = "winkler"\nwidth = "8 mm"\nstrips = 81')
+    done = wearsim("run", path, "-o", tmp_path / "rig.h5", "--json", plugins=("tiny",))
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert (told["model"], told["stepper"]) == ("winkler", "explicit")
+    shown = wearsim("show", tmp_path / "rig.h5", plugins=("tiny",))
+    assert "wearsim-tiny" in shown.stdout
+
+
+def test_that_asking_for_a_missing_plugin_tells_what_failed_to_load(tmp_path):
+    path = write_rig(tmp_path, 'model = "sparse"')
+    done = wearsim("check", path, plugins=("broken",))
+    assert done.returncode == 2
+    assert "'sparse'" in done.stderr
+    assert "wearsim-broken 0.3 failed to load" in done.stderr
+    assert "a_library_nobody_has" in done.stderr

@@ -1,0 +1,83 @@
+"""A third party's contact model that claims nothing runs wherever the steppers allow it."""
+
+from __future__ import annotations
+
+import pytest
+from plugin_examples import rig
+
+import wearsim
+from wearsim.errors import CapabilityError
+
+WINKLER = 'model = "winkler"\nwidth = "8 mm"\nstrips = 81'
+
+pytestmark = pytest.mark.usefixtures("tiny")
+
+
+def winkler(overrides=None, **tables):
+    return rig(overrides, **({"contact": WINKLER} | tables))
+
+
+def test_that_a_single_contact_is_solved():
+    solution = wearsim.solve_contact(winkler())
+    spacing = solution.y[1] - solution.y[0]
+    assert solution.line_load.sum() * spacing == pytest.approx(300.0, rel=1e-10)
+    assert solution.power == pytest.approx(0.1 * 300.0 * 1e-3 * 2.618, rel=1e-4)
+
+
+def test_that_auto_takes_explicit_steps_for_a_model_without_wear_compliance():
+    result = wearsim.run(winkler())
+    assert result.stepper == "explicit"
+    assert result.worn_volume[-1] == pytest.approx(1.1e-11 * result.dissipated_energy[-1], rel=1e-9)
+
+
+def test_that_explicit_steps_agree_with_every_pass_by_itself():
+    short = {"operation.duration": "12 s"}
+    steps = wearsim.run(winkler(short))
+    truth = wearsim.run(winkler(short | {"evolution.stepper": "per-pass"}))
+    assert truth.stepper == "per-pass"
+    assert int(truth.full_solves[-1]) == 600
+    assert steps.depth[-1] == pytest.approx(float(truth.depth[-1]), rel=5e-3)
+    assert steps.worn_volume[-1] == pytest.approx(float(truth.worn_volume[-1]), rel=5e-3)
+
+
+def test_that_rollers_which_differ_run_one_after_another():
+    offsets = {"roller.offset": ["-0.5 mm", "0 mm", "0.5 mm"]}
+    result = wearsim.run(winkler(offsets))
+    assert result.stepper == "explicit"
+    assert result.finished
+
+
+@pytest.mark.parametrize("stepper", ["auto", "per-pass"])
+def test_that_a_law_and_a_term_of_its_own_run_with_it(stepper):
+    scenario = winkler(
+        {"evolution.stepper": stepper, "operation.duration": "12 s"},
+        wear='law = "abrasion"\nfactor = 1e-15',
+        load='normal_force = "300 N"\n[load.drift]\nrate = 1.0',
+    )
+    result = wearsim.run(scenario)
+    # each roller gains what it dissipates: 0.0785 W for 12 s, at 1 N/J
+    assert result.normal_force[-1] == pytest.approx(300.0 + 0.0785 * 12.0, rel=1e-3)
+    assert result.worn_volume[-1] == pytest.approx(
+        600 * 1e-15 * 300.0 * 2 * 3.14159265 * 0.025, rel=5e-3
+    )
+
+
+@pytest.mark.parametrize(
+    ("overrides", "told"),
+    [
+        ({"evolution.stepper": "implicit"}, "takes no wear compliance"),
+        ({"creepage.differential_slip": True}, "differential_slip"),
+    ],
+)
+def test_that_what_it_does_not_claim_is_refused_by_name(overrides, told):
+    with pytest.raises(CapabilityError, match=f"'winkler'.*{told}"):
+        wearsim.run(winkler(overrides))
+
+
+def test_that_a_bearing_torque_is_refused():
+    scenario = rig(contact=WINKLER).text.replace(
+        "longitudinal = 1e-3", 'drive = "free"\nbearing_torque = "0.1 N m"'
+    )
+    parsed = wearsim.scenario.parse_scenario(scenario, "rig.toml", {}.__getitem__)
+    with pytest.raises(CapabilityError, match="free"):
+        wearsim.run(parsed)

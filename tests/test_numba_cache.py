@@ -1,0 +1,170 @@
+"""The cache of compiled kernels: shared by processes, and wherever it can be kept."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+SCENARIOS = ROOT / "scenarios"
+
+CONTACT = f"""
+import hashlib, json, sys
+import wearsim
+solution = wearsim.solve_contact(wearsim.load_scenario(r"{SCENARIOS / "rig-450min.toml"}"))
+from wearsim.mechanics.slender import solve_slender as kernel
+stats = getattr(kernel, "stats")
+print(json.dumps({{
+    "bits": hashlib.sha256(solution.dissipation.tobytes()).hexdigest(),
+    "hits": sum(stats.cache_hits.values()),
+    "misses": sum(stats.cache_misses.values()),
+    "path": stats.cache_path,
+    "file": wearsim.__file__,
+}}))
+"""
+
+STRIP = """
+import json
+import wearsim
+from wearsim.mechanics.strip import strip_force as kernel
+kernel(1e-4, 1e5, 0.1, 1e-3, 0.0, 1.15e11, 8e10)
+stats = kernel.stats
+print(json.dumps({"hits": sum(stats.cache_hits.values()), "path": stats.cache_path,
+    "file": wearsim.__file__}))
+"""
+
+EVERYTHING = f"""
+import importlib, json, pkgutil
+import wearsim, wearsim.mechanics
+from pathlib import Path
+
+def scenario(name, **overrides):
+    overrides = {{key.replace("__", "."): value for key, value in overrides.items()}}
+    return wearsim.load_scenario(Path(r"{SCENARIOS}") / name, overrides)
+
+def run(name="rig-450min.toml", **overrides):
+    wearsim.run(scenario(name, operation__duration="1 min", **overrides))
+
+for stepper in ("implicit", "explicit", "per-pass"):
+    for name in ("rig-450min.toml", "rig-three-rollers.toml"):
+        run(name, evolution__stepper=stepper)
+run(contact__tangential="fastsim")
+run(contact__model="hertz-fastsim")
+march = {{"contact__closed_form": False, "creepage__yaw": "0.5 mrad", "creepage__tilt": "1 mrad"}}
+for more in ({{}}, march, march | {{"contact__dissipation": "element-sum"}}):
+    wearsim.study_contact(scenario("mean-contact.toml", **more))
+counts = {{}}
+for module in pkgutil.iter_modules(wearsim.mechanics.__path__):
+    held = importlib.import_module(f"wearsim.mechanics.{{module.name}}")
+    for name, value in vars(held).items():
+        if hasattr(value, "signatures") and value.__module__ == held.__name__:
+            counts[f"{{module.name}}.{{name}}"] = [str(types) for types in value.signatures]
+print(json.dumps(counts))
+"""
+
+
+def start(code: str, environment: dict[str, str]) -> subprocess.Popen[str]:
+    clean = {k: v for k, v in os.environ.items() if k not in {"NUMBA_CACHE_DIR", "XDG_CACHE_HOME"}}
+    return subprocess.Popen(
+        [sys.executable, "-P", "-c", code],
+        env=clean | environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def finish(process: subprocess.Popen[str]) -> Any:
+    told, complaints = process.communicate()
+    assert process.returncode == 0, complaints
+    return json.loads(told)
+
+
+def run(code: str, **environment: object) -> Any:
+    return finish(start(code, {key: str(value) for key, value in environment.items()}))
+
+
+@pytest.fixture
+def copied(tmp_path: Path) -> Path:
+    """The package by itself, without anything compiled, as another install would have it."""
+    ignore = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(ROOT / "wearsim", tmp_path / "site" / "wearsim", ignore=ignore)
+    return tmp_path / "site"
+
+
+def make_read_only(site: Path) -> None:
+    """Deny numba its folder beside the kernels, to root as well: a file stands in its place."""
+    (site / "wearsim" / "mechanics" / "__pycache__").write_text("not a folder")
+
+
+@pytest.mark.slow
+def test_that_processes_starting_together_share_an_empty_cache(copied: Path, tmp_path: Path):
+    environment = {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(copied)}
+    together = [start(CONTACT, environment) for _ in range(4)]
+    solved = [finish(process) for process in together]
+    later = run(CONTACT, **environment)
+    assert {item["bits"] for item in solved} == {later["bits"]}
+    assert later["hits"] == 1
+    assert later["misses"] == 0
+    assert Path(later["path"]).is_relative_to(tmp_path / "cache")
+
+
+@pytest.mark.slow
+def test_that_every_kernel_is_compiled_for_one_signature_only(tmp_path: Path):
+    counts = run(EVERYTHING, NUMBA_CACHE_DIR=tmp_path)
+    assert "slender.solve_slender" in counts
+    unused = [name for name, signatures in counts.items() if not signatures]
+    assert not unused, f"not reached by this test's runs: {unused}"
+    several = {name: signatures for name, signatures in counts.items() if len(signatures) > 1}
+    assert not several, json.dumps(several, indent=1)
+
+
+def test_that_a_writable_install_keeps_its_cache_beside_the_kernels(copied: Path):
+    first, second = (run(STRIP, PYTHONPATH=copied) for _ in range(2))
+    assert Path(first["file"]).is_relative_to(copied)
+    assert Path(first["path"]) == copied / "wearsim" / "mechanics" / "__pycache__"
+    assert (first["hits"], second["hits"]) == (0, 1)
+
+
+def test_that_a_read_only_install_caches_in_the_users_folder(copied: Path, tmp_path: Path):
+    make_read_only(copied)
+    environment = {"PYTHONPATH": copied, "XDG_CACHE_HOME": tmp_path / "cache"}
+    first, second = (run(STRIP, **environment) for _ in range(2))
+    assert Path(first["file"]).is_relative_to(copied)
+    assert Path(first["path"]).is_relative_to(tmp_path / "cache")
+    assert (first["hits"], second["hits"]) == (0, 1)
+
+
+@pytest.mark.slow
+def test_that_a_read_only_install_runs_where_nothing_can_be_cached(copied: Path, tmp_path: Path):
+    make_read_only(copied)
+    (tmp_path / "nowhere").write_text("not a folder")
+    nowhere = tmp_path / "nowhere" / "home"
+    environment = {"PYTHONPATH": copied, "XDG_CACHE_HOME": nowhere, "HOME": nowhere}
+    solved = run(CONTACT, **environment)
+    assert Path(solved["file"]).is_relative_to(copied)
+    assert solved["path"] is None
+    assert solved["bits"] == run(CONTACT)["bits"]
+
+
+def test_that_the_cache_is_renewed_when_a_kernel_in_another_file_changes(
+    copied: Path, tmp_path: Path
+):
+    folder = copied / "wearsim" / "mechanics"
+    head = "from wearsim.mechanics.jit import kernel\n"
+    body = "\n\n@kernel\ndef {name}(x: float) -> float:\n    return {value}\n"
+    outer = body.format(name="outer", value="2.0 * inner(x)")
+    (folder / "outer.py").write_text(head + "from wearsim.mechanics.inner import inner\n" + outer)
+    found = []
+    for value in ("x + 1.0", "x + 3.0"):
+        (folder / "inner.py").write_text(head + body.format(name="inner", value=value))
+        code = "from wearsim.mechanics.outer import outer; print(outer(1.0))"
+        found.append(run(code, PYTHONPATH=copied, NUMBA_CACHE_DIR=tmp_path / "cache"))
+    assert found == [4.0, 8.0]
