@@ -51,13 +51,11 @@ records = 4
 """
 
 # 50 passes a second: a log of 12 minutes lasts 36 000 passes
-LOG = "time [min],load [N]\n" + "".join(
-    f"{k / 4},{300 + 60 * (-1) ** k + k}\n" for k in range(49)
-)
+LOG = "time [min],load [N]\n" + "".join(f"{k / 4},{300 + 60 * (-1) ** k + k}\n" for k in range(49))
 
 STEPPERS: dict[str, dict[str, object]] = {
-    "implicit": {},
-    "explicit": {"evolution.stepper": "explicit"},
+    "implicit": {"evolution.tolerance": 0.005},
+    "explicit": {"evolution.stepper": "explicit", "evolution.tolerance": 0.02},
     "compiled passes": {"evolution.stepper": "per-pass"},
     "passes in Python": {
         "evolution.stepper": "per-pass",
@@ -111,9 +109,7 @@ def short(**overrides: object) -> Scenario:
 def unlike(one: Result | RunData, other: Result | RunData) -> list[str]:
     """Return what differs between two runs by a bit, apart from the wall clock."""
     first, second = (item.raw if isinstance(item, Result) else item for item in (one, other))
-    return [
-        name for name in differences(first, second) if name not in {"wall_seconds", "created"}
-    ]
+    return [name for name in differences(first, second) if name not in {"wall_seconds", "created"}]
 
 
 def after(steps: int) -> Callable[[], bool]:

@@ -1,0 +1,138 @@
+"""Run as a process: has runs killed, finishes what they left, and tells what came of it.
+
+One process does all: it compiles and runs once, and forks for every run that is to be killed.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from study_examples import LOADS, ROLLERS, short, unlike
+
+from wearsim.results import Result, open_results, writer
+from wearsim.scenario import Scenario
+from wearsim.studies import replay
+from wearsim.studies.events import Event, Started
+
+OFTEN = {"outputs.checkpoint_every": "1e-9 s"}
+SMALL_CHUNK = 1 << 15  # several writes to a file
+
+
+def go(scenario: Scenario, path: Path) -> float:
+    """Run a test, or go on with what there is of it; return where it stood, -1 for nowhere."""
+    if not path.exists():
+        replay.run(scenario, path)
+        return -1.0
+    stood = [float(scenario.total_passes)]  # nothing is told of a finished run
+
+    def watch(event: Event) -> None:
+        if isinstance(event, Started):
+            stood.append(event.from_passes)
+
+    replay.resume(path, on_event=watch)
+    return stood[-1]
+
+
+def forked(work: Callable[[], object]) -> int:
+    """Do `work` in a child, and return its process id."""
+    child = os.fork()
+    if child:
+        return child
+    try:
+        work()
+    except BaseException as error:
+        sys.stderr.write(f"{error!r}\n")
+        os._exit(1)
+    os._exit(0)
+
+
+def ended(child: int) -> int:
+    """Wait for a child; return the signal that killed it, or minus its exit code."""
+    return -os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+
+
+def stages_of(work: Callable[[], object]) -> list[str]:
+    """Return every call of the seam while `work` is done."""
+    seen: list[str] = []
+    writer.on_write_stage = seen.append
+    work()
+    writer.on_write_stage = lambda _: None
+    return seen
+
+
+def killing(at: int) -> Callable[[str], None]:
+    """Return a seam that kills the process at one of its calls."""
+    calls = iter(range(10**6))
+
+    def kill(_: str) -> None:
+        if next(calls) == at:
+            os.kill(os.getpid(), signal.SIGKILL)
+
+    return kill
+
+
+def kill_at_stages(scenario: Scenario, folder: Path) -> None:
+    """Kill a run at every call of the seam, and every fifth once more as it goes on."""
+    whole = replay.run(scenario)
+    writer._CHUNK = SMALL_CHUNK
+    stages = stages_of(lambda: go(scenario, folder / "whole.h5"))
+    for number, stage in enumerate(stages):
+        path = folder / f"{number}.h5"
+        again = [7 * number % 50] if number % 5 == 0 else []
+        killed = []
+        for at in (number, *again):
+
+            def work(at: int = at) -> None:
+                writer.on_write_stage = killing(at)
+                go(scenario, path)  # noqa: B023  (done before the next turn)
+
+            killed.append(ended(forked(work)))
+        tell(stage=stage, killed=killed, **finished(scenario, path, whole))
+        assert not path.with_name(f"{path.name}.part").exists()
+
+
+def kill_at_moments(scenario: Scenario, folder: Path, count: int) -> None:
+    """Kill runs at random moments, half of them once more as they go on."""
+    whole = replay.run(scenario)
+    times = []
+    for name in ("one.h5", "two.h5"):
+        begun = time.perf_counter()
+        ended(forked(lambda at=folder / name: go(scenario, at)))
+        times.append(time.perf_counter() - begun)
+    moments = random.Random(7)
+    for number in range(count):
+        path, killed = folder / f"{number}.h5", []
+        for _ in range(1 + number % 2):
+            child = forked(lambda path=path: go(scenario, path))
+            time.sleep(moments.uniform(0.0, 1.0) * min(times))
+            os.kill(child, signal.SIGKILL)
+            killed.append(ended(child))
+        tell(killed=killed, **finished(scenario, path, whole))
+
+
+def finished(scenario: Scenario, path: Path, whole: Result) -> dict[str, object]:
+    """Finish a run; return where it stood and what sets its file apart from the unbroken one."""
+    stood = go(scenario, path)
+    return {"stood": stood, "unlike": unlike(open_results(path), whole)}
+
+
+def tell(**row: object) -> None:
+    """Write a line for the test."""
+    sys.stdout.write(json.dumps(row) + "\n")
+
+
+if __name__ == "__main__":
+    replay._Replay._last_write = property(lambda _: 0.0, lambda _, seconds: None)
+    mode, where = sys.argv[1], Path(sys.argv[2])
+    if mode == "stages":
+        kill_at_stages(short(**OFTEN, evolution__step=3000), where)
+    else:
+        kinds = {**LOADS["spring"], **ROLLERS["wearing"], **OFTEN}
+        kill_at_moments(short(**kinds, evolution__step=1500), where, int(sys.argv[3]))

@@ -1,0 +1,100 @@
+"""Whatever kills a run, and whenever: its file opens, and goes on to the same bits."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+from study_examples import RIG, unlike
+
+import wearsim
+from wearsim.results import open_results, writer
+from wearsim.scenario import Scenario
+
+HERE = Path(__file__).parent
+ROOT = HERE.parents[1]
+# one thread, since the process forks; and the same wearsim as here
+ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)}
+
+pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork and SIGKILL")
+
+
+def _killed_runs(*arguments: object) -> list[dict[str, Any]]:
+    done = subprocess.run(
+        [sys.executable, str(HERE / "killed_run.py"), *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=False,
+        env=os.environ | ENVIRONMENT,
+        cwd=ROOT,
+    )
+    assert done.returncode == 0, done.stderr
+    return [json.loads(line) for line in done.stdout.splitlines()]
+
+
+def test_that_a_kill_around_every_write_flush_and_rename_costs_nothing(tmp_path: Path) -> None:
+    rows = _killed_runs("stages", tmp_path)
+    stages = [row["stage"] for row in rows]
+    # fresh bodies, two steps, and the end: four files, each written through all stages
+    assert {stage.split(maxsplit=1)[1] for stage in stages} == set(writer.STAGES)
+    assert stages.count("before rename") == stages.count("after rename") == 4
+    assert stages.count("before write") > 4
+    for row in rows:
+        assert row["killed"][0] == signal.SIGKILL
+        assert row["unlike"] == []
+    assert sum(row["killed"][1:] == [signal.SIGKILL] for row in rows) >= 5  # killed twice
+    once = [row for row in rows if len(row["killed"]) == 1]
+    renamed = 0
+    for row, stage in zip(rows, stages, strict=True):
+        renamed += stage == "after rename"
+        if row in once:  # the file is that of the last rename, neither older nor newer
+            assert row["stood"] == [-1.0, 0.0, 3000.0, 6000.0, 6000.0][renamed]
+
+
+def test_that_a_kill_at_any_moment_costs_nothing(tmp_path: Path) -> None:
+    rows = _killed_runs("moments", tmp_path, 20)
+    assert len(rows) == 20
+    for row in rows:
+        assert row["unlike"] == []
+        assert set(row["killed"]) <= {signal.SIGKILL, 0}
+    assert sum(signal.SIGKILL in row["killed"] for row in rows) >= 10
+    assert sum(0.0 <= row["stood"] < 6000.0 for row in rows) >= 3  # some in the midst of it
+
+
+@pytest.fixture(scope="module")
+def long_run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Scenario, wearsim.Result]:
+    path = tmp_path_factory.mktemp("long") / "rig.toml"
+    path.write_text(
+        RIG.replace("passes = 6000", "passes = 120_000").replace("5 mm", "8 mm")
+        + '[evolution]\nstepper = "per-pass"\n'
+    )
+    scenario = wearsim.load_scenario(str(path))
+    return path, scenario, wearsim.run(scenario)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_that_a_signal_ends_wearsim_run_with_130_and_costs_nothing(
+    number: signal.Signals,
+    long_run: tuple[Path, Scenario, wearsim.Result],
+    path: Path,
+) -> None:
+    source, _, unbroken = long_run
+    arguments = [sys.executable, "-m", "wearsim", "run", str(source), "-o", str(path), "-q"]
+    with subprocess.Popen(arguments, cwd=ROOT, stderr=subprocess.PIPE, text=True) as running:
+        while not path.exists() and running.poll() is None:
+            time.sleep(0.005)
+        running.send_signal(number)
+        said = running.communicate(timeout=60)[1]
+    assert running.returncode == 130, said
+    assert f"wearsim resume {path}" in said
+    stopped = open_results(path)
+    assert 0.0 < stopped.passes[-1] < 120_000
+    assert not stopped.finished
+    assert unlike(wearsim.resume(path), unbroken) == []
