@@ -122,7 +122,7 @@ def test_that_a_pass_followed_by_the_chord_method_keeps_its_residual_below_1e_8(
     exact = scene.model.solve(gap, 90.0, scene.point(0, 300.0, gap * 0.0, gap * 0.0))
     # what the line load misses, pressed through the stiffness of one strip, in parts of approach
     assert np.abs(q - exact.line_load).max() < 1e-7 * exact.line_load.max()
-    assert last.loop_approach[0, 0, 0, 0] == pytest.approx(exact.approach, rel=1e-8)
+    assert last.loop_contacts[0, 0, 0, 0] == pytest.approx(exact.approach, rel=1e-8)
     assert q.sum() * scene.grid.spacing == pytest.approx(300.0, rel=1e-10)
 
 

@@ -35,10 +35,11 @@ class PerPassStepper(Stepper):
         """Run the next passes, up to `stop`."""
         chunk = CHUNK if is_compiled(scene) else SLOW_CHUNK
         end = _run(scene, state, min(math.ceil(stop - state.passes), chunk))
-        loads = present_loads(scene, end)
-        points = operating_points(scene, loads, end.cylinder_depth, end.roller_depth)
-        # for the eye only: the loop itself goes on from what it carries
-        end = replace(end, contacts=solve_present(scene, end, points))
+        if is_compiled(scene):
+            # for the eye only: the compiled loop goes on from what it carries itself
+            loads = present_loads(scene, end)
+            points = operating_points(scene, loads, end.cylinder_depth, end.roller_depth)
+            end = replace(end, contacts=solve_present(scene, end, points))
         return Advance(path=(state, end))
 
 
@@ -106,9 +107,9 @@ def _run_compiled(scene: Scene, state: WearState, count: int) -> WearState:
     """Run `count` passes of every realisation in the model's compiled loop."""
     shape = (*scene.shape, scene.grid.strips)
     strips = state.loop_strips.copy() if state.loop_strips is not None else np.zeros((3, *shape))
-    approach = np.zeros((2, *scene.shape))
-    if state.loop_approach is not None:
-        approach = state.loop_approach.copy()
+    carried = np.zeros((3, *scene.shape))
+    if state.loop_contacts is not None:
+        carried = state.loop_contacts.copy()
     cylinder, roller = state.cylinder_depth.copy(), state.roller_depth.copy()
     terms, energy = state.terms.copy(), state.energy.copy()
     full_solves = state.full_solves
@@ -134,18 +135,18 @@ def _run_compiled(scene: Scene, state: WearState, count: int) -> WearState:
             line_load=np.ascontiguousarray(strips[0, 0, :, v]),
             anchor=np.ascontiguousarray(strips[1, 0, :, v]),
             anchor_gap=np.ascontiguousarray(strips[2, 0, :, v]),
-            approach=np.ascontiguousarray(approach[0, 0, :, v]),
-            anchor_approach=np.ascontiguousarray(approach[1, 0, :, v]),
-            energy=np.zeros(scene.shape[1]),
+            approach=np.ascontiguousarray(carried[0, 0, :, v]),
+            anchor_approach=np.ascontiguousarray(carried[1, 0, :, v]),
+            energy=np.ascontiguousarray(carried[2, 0, :, v]),
         )
         full_solves += scene.model.pass_loop(loop)
         terms[:, :, v] = loop.terms
         cylinder[0, 0, v], roller[0, :, v] = loop.cylinder_depth, loop.roller_depth
         strips[:, 0, :, v] = loop.line_load, loop.anchor, loop.anchor_gap
-        approach[:, 0, :, v] = loop.approach, loop.anchor_approach
+        carried[:, 0, :, v] = loop.approach, loop.anchor_approach, loop.energy
         # every physical roller dissipates all the time, one pass per turn of the cylinder
         turn = scene.kinematics.physical_rollers / scene.kinematics.pass_rate
-        energy[v] += float(loop.energy.sum()) * turn
+        energy[v] = float(loop.energy.sum()) * turn
     return replace(
         state,
         cylinder_depth=cylinder,
@@ -155,7 +156,7 @@ def _run_compiled(scene: Scene, state: WearState, count: int) -> WearState:
         full_solves=full_solves,
         solves=state.solves + count * scene.shape[2],
         loop_strips=strips,
-        loop_approach=approach,
+        loop_contacts=carried,
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -46,8 +46,8 @@ class WearState:
     loop_strips : ndarray, shape (3, stations, rollers, realisations, strips), optional
         What the compiled per-pass loop carries: line load, and the line load [N/m] and gap [m]
         where the factorisation in use was made.
-    loop_approach : ndarray, shape (2, stations, rollers, realisations), optional
-        Approach now, and there [m].
+    loop_contacts : ndarray, shape (3, stations, rollers, realisations), optional
+        Approach now, and there [m], and the sum of the dissipated powers of all passes [W].
     shadow : WearState, optional
         The same test stepped twice as coarsely; what sets the two apart is the error estimate.
     """
@@ -66,7 +66,7 @@ class WearState:
     solves: int = 0
     full_solves: int = 0
     loop_strips: FloatArray | None = None
-    loop_approach: FloatArray | None = None
+    loop_contacts: FloatArray | None = None
     shadow: WearState | None = None
 
     def to_arrays(self) -> dict[str, npt.NDArray[np.generic]]:
@@ -111,6 +111,44 @@ class WearState:
 
 def _unpack(values: dict[str, Any]) -> dict[str, Any]:
     return {n: v.item() if v.ndim == 0 else np.array(v) for n, v in values.items()}
+
+
+def widened(array: FloatArray, strips: int) -> FloatArray:
+    """Return `array` with `strips` zeros added at both ends of its last axis."""
+    margins = [(0, 0)] * (array.ndim - 1) + [(strips, strips)]
+    return np.pad(array, margins)
+
+
+def widened_state(state: WearState, y: FloatArray, strips: int) -> WearState:
+    """Return a state on strips added on both sides, unworn and without load.
+
+    Parameters
+    ----------
+    state : WearState
+    y : ndarray, shape (wider strips,)
+        Position of all strips [m].
+    strips : int
+        How many are added on each side.
+    """
+    contacts = tuple(
+        replace(
+            contact,
+            y=y,
+            half_length=widened(contact.half_length, strips),
+            line_load=widened(contact.line_load, strips),
+            dissipation=widened(contact.dissipation, strips),
+        )
+        for contact in state.contacts
+    )
+    loop, shadow = state.loop_strips, state.shadow
+    return replace(
+        state,
+        cylinder_depth=widened(state.cylinder_depth, strips),
+        roller_depth=widened(state.roller_depth, strips),
+        contacts=contacts,
+        loop_strips=None if loop is None else widened(loop, strips),
+        shadow=None if shadow is None else widened_state(shadow, y, strips),
+    )
 
 
 def contact_values(scene: Scene, contacts: tuple[ContactSolution, ...], name: str) -> FloatArray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -14,15 +15,17 @@ import numpy as np
 from wearsim.errors import Interrupted, ResultsFileError, SolverError
 from wearsim.evolution.loop import evolve
 from wearsim.evolution.scene import Scene
-from wearsim.evolution.state import WearState, fresh_state
+from wearsim.evolution.state import WearState, fresh_state, widened, widened_state
 from wearsim.evolution.stepper import Advance, Stepper
 from wearsim.plugins import ContactModelSpec, LoadSpec, Spec, WearLawSpec, registry
 from wearsim.results import Result, RunData, check_output, read_results, write_results
+from wearsim.results.layout import VARIABLES
 from wearsim.scenario import Scenario, parse_scenario
-from wearsim.studies.build import build_scene
+from wearsim.studies.build import build_scene, load_range
 from wearsim.studies.events import Checkpointed, Event, Finished, Started, Stepped, Warned
 from wearsim.studies.recorder import Recorder
 from wearsim.studies.schedule import RecordSchedule
+from wearsim.studies.tracks import run_grid
 from wearsim.types import Grid
 
 Watcher = Callable[[Event], None]
@@ -118,11 +121,35 @@ def resume(
         )
     if data.finished and scenario.total_passes == state.passes:
         return Result(data, path)
+    data, state = _widened(scenario, data, state)
     grid = Grid(data.static["y"], float(data.checkpoint["spacing"]))
     scene, stepper, name = build_scene(scenario, grid)
     replay = _Replay(scenario, scene, stepper, name, path, on_event, stop_requested)
     replay.go_on(data, state)
     return replay.finish()
+
+
+def _widened(scenario: Scenario, data: RunData, state: WearState) -> tuple[RunData, WearState]:
+    """Return data and state on as many more strips as an extended test needs, if any.
+
+    The strips that are there stay as they are, so that nothing is interpolated.
+    """
+    y, spacing = data.static["y"], float(data.checkpoint["spacing"])
+    greatest = load_range(scenario, scenario.load.build(), scenario.total_time)[1]
+    needed = run_grid(scenario, greatest)
+    lacking = 0.5 * (needed.spacing * needed.strips - spacing * len(y))
+    # a little more costs less than a contact that runs off its strips
+    strips = int(np.ceil(lacking / spacing)) if lacking > 1e-6 * spacing else 0
+    if strips == 0 or scenario.total_passes == data.total_passes:
+        return data, state
+    margin = spacing * np.arange(1, strips + 1)
+    wider = np.concatenate([y[0] - margin[::-1], y, y[-1] + margin])
+    records = {
+        name: widened(array, strips) if VARIABLES[name].dims[-1] == "y" else array
+        for name, array in data.records.items()
+    }
+    data = replace(data, static={**data.static, "y": wider}, records=records)
+    return data, widened_state(state, wider, strips)
 
 
 #: what a checkpoint holds besides the state

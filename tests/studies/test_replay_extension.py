@@ -1,0 +1,38 @@
+"""A test extended far beyond the strips that were chosen for it."""
+
+import numpy as np
+import pytest
+
+import wearsim
+from tests.evolution import SCENARIOS
+
+
+@pytest.mark.parametrize("stepper", ["implicit", "per-pass"])
+def test_that_a_test_can_be_extended_until_its_groove_outgrows_its_strips(tmp_path, stepper):
+    short = wearsim.load_scenario(
+        SCENARIOS / "rig-450min.toml",
+        overrides={
+            "operation.duration": "30 s",
+            "evolution.stepper": stepper,
+            "wear.cylinder.k_over_h": "1e-9 1/Pa",
+        },
+    )
+    path = tmp_path / "short.h5"
+    first = wearsim.run(short, path)
+    result = wearsim.resume(path, until=600.0)
+    assert result.finished
+    assert result.time[-1] == pytest.approx(600.0)
+    assert len(result.y) > len(first.y)
+    margin = (len(result.y) - len(first.y)) // 2
+    np.testing.assert_array_equal(result.y[margin:-margin], first.y)
+    np.testing.assert_array_equal(result.profiles[1][margin:-margin], first.profiles[1])
+    assert result.profiles[1][:margin].max() == 0.0
+    # a run of that length from the start has other strips, and the same depth
+    whole = wearsim.run(
+        wearsim.load_scenario(
+            SCENARIOS / "rig-450min.toml",
+            overrides={"operation.duration": "600 s", "wear.cylinder.k_over_h": "1e-9 1/Pa"},
+        )
+    )
+    assert result.depth[-1] == pytest.approx(whole.depth[-1], rel=3e-3)
+    assert wearsim.open_results(path).depth[-1] == result.depth[-1]
