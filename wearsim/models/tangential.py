@@ -118,6 +118,9 @@ def load_weighted_mean(strips: Strips, values: FloatArray) -> float:
 def local_slip(strips: Strips, point: OperatingPoint, longitudinal: float) -> LocalSlip:
     """Spread the mean creepage `longitudinal` over the strips, as `Creepage` says."""
     creepage = point.creepage
+    if creepage.variation is None and creepage.spin == 0.0:
+        zero = np.zeros_like(strips.y)
+        return LocalSlip(zero + longitudinal, zero, creepage.lateral, 0.0)
     if creepage.variation is None:
         variation = -creepage.spin * strips.y
         spin_part = variation - load_weighted_mean(strips, variation)
@@ -129,7 +132,9 @@ def local_slip(strips: Strips, point: OperatingPoint, longitudinal: float) -> Lo
 
 def friction_per_strip(strips: Strips, point: OperatingPoint) -> FloatArray:
     """Return the friction coefficient of every strip, shape (strips,)."""
-    return np.ascontiguousarray(np.broadcast_to(point.friction, strips.y.shape), dtype=np.float64)
+    friction = np.empty_like(strips.y)
+    friction[:] = point.friction
+    return friction
 
 
 def _balanced_creepage(
