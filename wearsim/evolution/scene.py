@@ -81,6 +81,8 @@ class Scene:
         Friction coefficient mu.
     bearing_torque : float, optional
         Torque each roller's bearing takes [N m]; the creepage is prescribed where it is not given.
+    rolling_radius : ndarray, shape (rollers, strips), optional
+        Radius of the unworn rollers at every strip [m]; needed with a bearing torque.
     slip_profile : ndarray, shape (rollers, strips), optional
         Differential slip of the unworn bodies; worn depth adds to it. Without it creepage varies
         with spin alone.
@@ -96,6 +98,7 @@ class Scene:
     creepages: tuple[Creepage, ...]
     friction: float
     bearing_torque: float | None = None
+    rolling_radius: FloatArray | None = None
     slip_profile: FloatArray | None = None
 
     @cached_property
@@ -140,8 +143,8 @@ class Scene:
                 - cylinder_depth / kinematics.cylinder_radius
             )
             creepage = Creepage(creepage.longitudinal, creepage.lateral, creepage.spin, variation)
-        if self.bearing_torque is not None:
-            radius = kinematics.roller_radius - roller_depth
+        if self.rolling_radius is not None:
+            radius = self.rolling_radius[roller] - roller_depth
         return OperatingPoint(
             normal_force=load,
             rolling_speed=kinematics.rolling_speed,

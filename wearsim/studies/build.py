@@ -69,6 +69,12 @@ def creepage_of(scenario: Scenario, roller: int) -> Creepage:
     )
 
 
+def rolling_radius(scenario: Scenario, grid: Grid, roller: int) -> FloatArray:
+    """Return the unworn roller's radius at every strip, shape (strips,) [m]."""
+    s = grid.y - scenario.per_roller(scenario.roller.offset)[roller]
+    return scenario.roller.radius - s * s / (2.0 * scenario.roller.crown_radius)
+
+
 def slip_profile(scenario: Scenario, grid: Grid, roller: int) -> FloatArray:
     """Return the differential slip of the unworn bodies, shape (strips,).
 
@@ -180,8 +186,9 @@ def build_scene(scenario: Scenario, grid: Grid | None = None) -> tuple[Scene, St
     grid = grid if grid is not None else run_grid(scenario, greatest)
     model.prepare(grid, (scenario.cylinder.material, scenario.roller.material))
     gaps = [nominal_gap(scenario, grid, r, scenario.cylinder.profile) for r in first]
+    creepage, free = scenario.creepage, scenario.creepage.drive == "free"
     slips = [slip_profile(scenario, grid, r) for r in first]
-    creepage = scenario.creepage
+    radii = [rolling_radius(scenario, grid, r) for r in first]
     scene = Scene(
         grid=grid,
         model=model,
@@ -192,7 +199,8 @@ def build_scene(scenario: Scenario, grid: Grid | None = None) -> tuple[Scene, St
         nominal_gap=np.array(gaps)[None, :, None, :],
         creepages=tuple(creepage_of(scenario, r) for r in first),
         friction=scenario.friction.coefficient,
-        bearing_torque=creepage.bearing_torque if creepage.drive == "free" else None,
+        bearing_torque=creepage.bearing_torque if free else None,
+        rolling_radius=np.array(radii) if free else None,
         slip_profile=np.array(slips) if creepage.differential_slip else None,
     )
     return scene, build_stepper(scenario, name), name

@@ -14,6 +14,7 @@ from wearsim.studies.build import (
     kinematics,
     load_range,
     nominal_gap,
+    rolling_radius,
     slip_profile,
 )
 from wearsim.studies.tracks import MOST_STRIPS, contact_centres, fresh_patch
@@ -121,7 +122,7 @@ def study_contact(
         creepage=creepage,
         friction=scenario.friction.coefficient,
         bearing_torque=scenario.creepage.bearing_torque if free else None,
-        rolling_radius=np.full(grid.strips, scenario.roller.radius) if free else None,
+        rolling_radius=rolling_radius(scenario, grid, 0) if free else None,
     )
     gap = nominal_gap(scenario, grid, 0, profile)
     curvature = kinematics(scenario, np.ones(1)).longitudinal_curvature
