@@ -53,7 +53,7 @@ def test_that_a_hard_case_runs_to_its_end_smooth_and_balanced(case):
     factor = float(str(CASES[case].get("wear__cylinder__k_over_h", "1.1e-11 1/Pa")).split()[0])
     volume = cylinder_volume_of(scene, state)[0]
     assert volume == pytest.approx(factor * state.energy[0], rel=1e-10)
-    assert state.depth_error[0] < 5e-3 * cylinder_depth_of(state)[0]
+    assert state.depth_error[0] < 5e-3 * max(depth.max(), state.roller_depth.max())
     for contact in state.contacts:
         assert contact.line_load.sum() * scene.grid.spacing == pytest.approx(300.0, rel=1e-10)
         if scene.grid.strips > 10:

@@ -33,11 +33,19 @@ def end_state(result: Result) -> Rows:
         ("power", each(result.power[-1], "W")),
         ("load at the end", each(result.normal_force[-1], "N")),
         ("peak pressure", each(result.peak_pressure[-1], "MPa")),
-        ("estimated error of depth", _with_part(error, depth)),
     ]
+    if result.stepper == "per-pass":
+        rows.append(("error of stepping", "none: every pass was solved by itself"))
+    else:
+        rows.append(("estimated error of depth", _with_part(error, _deepest(result))))
     if np.any(np.asarray(result.roller_depth[-1]) > 0.0):
         rows.insert(1, ("depth of roller", each(result.roller_depth[-1], "um")))
     return rows
+
+
+def _deepest(result: Result) -> float:
+    """Return the greatest depth on either body [m], which the error of depth refers to."""
+    return float(max(np.max(result.depth[-1]), np.max(result.roller_depth[-1])))
 
 
 def _with_part(error: Any, depth: Any) -> str:

@@ -7,15 +7,18 @@ from dataclasses import replace
 import numpy as np
 
 from wearsim.errors import StepError
-from wearsim.evolution.advance import (
-    cylinder_depth_of,
-    cylinder_volume_of,
-    explicit_step,
-)
+from wearsim.evolution.advance import contacts_at, explicit_step, mean_loads
 from wearsim.evolution.control import StepControl
+from wearsim.evolution.errors_of_steps import (
+    COVER,
+    depth_between,
+    excess,
+    load_spread,
+    whole_volume,
+)
 from wearsim.evolution.observables import oscillation
 from wearsim.evolution.scene import Scene
-from wearsim.evolution.state import WearState
+from wearsim.evolution.state import WearState, contact_values
 from wearsim.evolution.stepper import Advance, Stepper, fitted
 from wearsim.evolution.wearing import Wearing
 from wearsim.types import FloatArray
@@ -64,20 +67,18 @@ class ExplicitStepper(Stepper):
             left = stop - state.passes
             step = min(proposed, left) if self.forced_step else fitted(proposed, left)
             end = explicit_step(scene, state, step)
-            in_depth, in_volume = _errors(scene, state, end, step)
-            reached = float(cylinder_depth_of(end).max())
-            allowed = self.control.allowance(reached, 0.0, 0.0, end.passes / stop)
-            excess = float(in_depth.max()) / allowed if allowed > 0.0 else 0.0
-            chosen = self.control.next_step(step, excess)
-            if self.forced_step or excess <= 1.0:
+            added = _errors(scene, state, end, step)
+            over = excess(self.control, scene, state, end, added, stop)
+            chosen = self.control.next_step(step, over)
+            if self.forced_step or over <= 1.0:
                 break
             rejected += 1
             proposed = min(chosen, 0.7 * step)
         end = replace(
             end,
             passes=stop if step == left else end.passes,
-            depth_error=state.depth_error + in_depth,
-            volume_error=state.volume_error + in_volume,
+            depth_error=state.depth_error + added[0],
+            volume_error=state.volume_error + added[1],
             step=self.forced_step or (max(chosen, proposed) if step < proposed else chosen),
             steps=state.steps + 1,
             rejected=rejected,
@@ -110,15 +111,22 @@ def _warning(end: WearState, step: float, limit: float) -> str | None:
     )
 
 
-def _errors(
-    scene: Scene, start: WearState, end: WearState, step: float
-) -> tuple[FloatArray, FloatArray]:
-    """Return half the difference to a step at the end's wear rate, in depth and in volume."""
-    again = Wearing(scene, end.contacts, step)
-    other = replace(end, cylinder_depth=start.cylinder_depth + again.cylinder)
-    in_depth = 0.5 * np.abs(cylinder_depth_of(end) - cylinder_depth_of(other))
-    in_volume = cylinder_volume_of(scene, end) - cylinder_volume_of(scene, other)
-    return in_depth, 0.5 * np.abs(in_volume)
+def _errors(scene: Scene, start: WearState, end: WearState, step: float) -> FloatArray:
+    """Return half the difference to a step at the end's wear rate, and the load's spread.
+
+    Shape (2, realisations): depth [m] and volume worn off both bodies [m^3].
+    """
+    gap = scene.gap(end.cylinder_depth, end.roller_depth)
+    loads = mean_loads(scene, start, step, gap, contact_values(scene, end.contacts, "power"))
+    again = Wearing(scene, contacts_at(scene, end, loads), step)
+    other = replace(
+        end,
+        cylinder_depth=start.cylinder_depth + again.cylinder,
+        roller_depth=start.roller_depth + again.roller,
+    )
+    volumes = np.abs(whole_volume(scene, end) - whole_volume(scene, other))
+    apart = np.array([depth_between(end, other), volumes])
+    return COVER * 0.5 * apart + load_spread(scene, end, start.passes, step)
 
 
 def stability_limit(scene: Scene, state: WearState) -> float:
@@ -132,31 +140,38 @@ def stability_limit(scene: Scene, state: WearState) -> float:
     float
         2 over the greatest rate of decay, infinite where nothing wears.
     """
+    return min(_limit_of(scene, state, v) for v in range(scene.shape[2]))
+
+
+def _limit_of(scene: Scene, state: WearState, v: int) -> float:
+    """Return the limit of realisation `v`: all rollers together on the cylinder they share.
+
+    A roller's own wear is counted as if every roller had the same share of the shape; that can
+    only lower the limit.
+    """
     gap = scene.gap(state.cylinder_depth, state.roller_depth)
     curvature = scene.kinematics.longitudinal_curvature
     cylinder, roller = scene.wear_per_pass(state.contacts)
-    greatest = 0.0
-    for number, index in enumerate(scene.contacts):
-        contact = state.contacts[number]
-        s, r, v = index
-        point = scene.point(
-            r,
-            float(contact.line_load.sum() * scene.grid.spacing),
-            state.cylinder_depth[s, 0, v],
-            state.roller_depth[0, r, v],
-        )
+    parts = []
+    for (s, r, realisation), contact in zip(scene.contacts, state.contacts, strict=True):
         loaded = contact.line_load > 0.0
-        wear = cylinder[index] + roller[index] * scene.kinematics.roller_share
+        wear = cylinder[s, r, v] * scene.kinematics.cylinder_share[r]
+        wear = wear + roller[s, r, v] * scene.kinematics.roller_share
         ratio = np.where(loaded, wear / np.where(loaded, contact.line_load, 1.0), 0.0)
-        if not ratio.any():
-            continue
-        shape = np.where(loaded, (-1.0) ** np.arange(len(loaded)), 0.0)
-        rate = 0.0
-        for _ in range(POWER_ITERATIONS):
-            shape /= np.abs(shape).max()
-            fall = scene.model.load_sensitivity(contact, gap[index], curvature, point, shape)
-            new = ratio * fall
-            rate = float(np.dot(shape, new) / np.dot(shape, shape))
-            shape = new
-        greatest = max(greatest, rate)
-    return 2.0 / greatest if greatest > 0.0 else np.inf
+        if realisation == v and ratio.any():
+            load = float(contact.line_load.sum() * scene.grid.spacing)
+            depths = state.cylinder_depth[s, 0, v], state.roller_depth[0, r, v]
+            parts.append((contact, gap[s, r, v], scene.point(r, load, *depths), ratio))
+    if not parts:
+        return np.inf
+    anywhere = np.any([contact.line_load > 0.0 for contact, *_ in parts], axis=0)
+    shape, rate = np.where(anywhere, (-1.0) ** np.arange(len(anywhere)), 0.0), 0.0
+    for _ in range(POWER_ITERATIONS):
+        shape /= np.abs(shape).max()
+        new = np.zeros_like(shape)
+        for contact, gap_here, point, ratio in parts:
+            fall = scene.model.load_sensitivity(contact, gap_here, curvature, point, shape)
+            new += ratio * fall
+        rate = float(np.dot(shape, new) / np.dot(shape, shape))
+        shape = new
+    return 2.0 / rate if rate > 0.0 else np.inf

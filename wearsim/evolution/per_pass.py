@@ -56,7 +56,7 @@ def is_compiled(scene: Scene) -> bool:
         for body in ("cylinder", "roller")
     )
     lags = all(term.lag() is not None for term in scene.terms.values())
-    prescribed = scene.bearing_torque is None
+    prescribed = scene.bearing_torque is None and scene.shape[0] == 1
     return scene.model.capabilities.pass_loop and linear and lags and prescribed
 
 

@@ -38,7 +38,9 @@ class WearState:
     energy : ndarray, shape (realisations,)
         Dissipated energy of all rollers [J].
     depth_error, volume_error : ndarray, shape (realisations,)
-        Estimated error of depth [m] and of the cylinder's worn volume [m^3] so far.
+        Estimated error of depth, on either body [m], and of the volume worn off both [m^3] so far.
+    spread : ndarray, shape (2, realisations)
+        Part of those errors that the load's variation within the steps has made.
     step : float
         Passes the step-size control proposes next; 0 where it has yet to choose.
     steps, rejected, solves, full_solves : int
@@ -60,6 +62,7 @@ class WearState:
     energy: FloatArray
     depth_error: FloatArray
     volume_error: FloatArray
+    spread: FloatArray
     step: float = 0.0
     steps: int = 0
     rejected: int = 0
@@ -182,5 +185,6 @@ def fresh_state(scene: Scene) -> WearState:
         energy=np.zeros(realisations),
         depth_error=np.zeros(realisations),
         volume_error=np.zeros(realisations),
+        spread=np.zeros((2, realisations)),
         solves=len(contacts),
     )

@@ -105,6 +105,12 @@ class RecordedLoad(Load):
             return float(self.force(np.array([start]))[0])
         return (self._integrals(stop)[0] - self._integrals(start)[0]) / (stop - start)
 
+    def extremes(self, start: float, stop: float) -> tuple[float, float]:
+        """Return the exact least and greatest load between two times [s] [N]."""
+        inside = self._load[(self._time >= start) & (self._time <= stop)]
+        forces = np.concatenate([self.force(np.array([start, stop])), inside])
+        return float(forces.min()), float(forces.max())
+
     def deviation(self, start: float, stop: float) -> float:
         """Return the exact standard deviation of the load between two times [s] [N]."""
         if stop <= start:

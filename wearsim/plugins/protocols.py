@@ -359,6 +359,11 @@ class Load(ABC):
     def mean(self, start: float, stop: float) -> float:
         """Return the exact mean of the load between two times [s] [N]."""
 
+    def extremes(self, start: float, stop: float) -> tuple[float, float]:
+        """Return the least and greatest load between two times [s] [N]; by default sampled."""
+        forces = self.force(np.linspace(start, stop, 10_001))
+        return float(forces.min()), float(forces.max())
+
     def deviation(self, start: float, stop: float) -> float:
         """Return the exact standard deviation of the load between two times [s] [N]."""
         return 0.0

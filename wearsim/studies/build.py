@@ -75,16 +75,21 @@ def rolling_radius(scenario: Scenario, grid: Grid, roller: int) -> FloatArray:
     return scenario.roller.radius - s * s / (2.0 * scenario.roller.crown_radius)
 
 
-def slip_profile(scenario: Scenario, grid: Grid, roller: int) -> FloatArray:
-    """Return the differential slip of the unworn bodies, shape (strips,).
+def slip_profile(
+    scenario: Scenario, grid: Grid, roller: int, profile: Profile | None
+) -> FloatArray:
+    """Return the differential slip before wear, shape (strips,).
 
-    s^2/(2 R_crown R_roller), s from the roller's apex. The tilt counts once: as the shift of the
+    s^2/(2 R_crown R_roller), s from the roller's apex, and the start profile's height over
+    R_cylinder. The tilt counts once: as the shift of the
     contact away from the apex, or, where it shifts nothing, as the spin's -phi y.
     """
     s = grid.y - scenario.per_roller(scenario.roller.offset)[roller]
     slip = s * s / (2.0 * scenario.roller.crown_radius * scenario.roller.radius)
     if not scenario.creepage.tilt_shifts_contact:
         slip = slip - creepage_of(scenario, roller).spin * s
+    if profile is not None:
+        slip = slip + np.interp(grid.y, profile.y, profile.height) / scenario.cylinder.radius
     return slip
 
 
@@ -129,6 +134,17 @@ def chosen_stepper(scenario: Scenario, model: ContactModel, contacts: int) -> st
 def build_stepper(scenario: Scenario, name: str) -> Stepper:
     """Return the stepper called `name` with the scenario's tolerance and step."""
     evolution = scenario.evolution
+    idle = {
+        "step": name == "per-pass" and evolution.step is not None,
+        "allow_unstable": name != "explicit" and evolution.allow_unstable,
+    }
+    problems = [
+        Problem("evolution", key, f'has no meaning with stepper = "{name}"')
+        for key, told in idle.items()
+        if told
+    ]
+    if problems:
+        raise ScenarioError(scenario.file, problems)
     control = StepControl(evolution.tolerance)
     forced = float(evolution.step) if evolution.step is not None else None
     if name == "implicit":
@@ -155,8 +171,17 @@ def load_range(scenario: Scenario, load: Load, stop: float) -> tuple[float, floa
             f"0 to {stop / 60.0:.6g} min; log longer or shorten operation.duration",
         )
         raise ScenarioError(scenario.file, [problem])
-    forces = load.force(np.linspace(0.0, stop, 10_001))
-    return float(forces.min()), float(forces.max())
+    low, high = load.extremes(0.0, stop)
+    if low <= 0.0 and not scenario.load.terms:
+        problem = Problem(
+            "load",
+            scenario.load.kind,
+            "the load falls to nothing, and contact with it",
+            f"{low:.6g} N",
+            "a load above zero at all times",
+        )
+        raise ScenarioError(scenario.file, [problem])
+    return low, high
 
 
 def build_scene(scenario: Scenario, grid: Grid | None = None) -> tuple[Scene, Stepper, str]:
@@ -187,7 +212,7 @@ def build_scene(scenario: Scenario, grid: Grid | None = None) -> tuple[Scene, St
     model.prepare(grid, (scenario.cylinder.material, scenario.roller.material))
     gaps = [nominal_gap(scenario, grid, r, scenario.cylinder.profile) for r in first]
     creepage, free = scenario.creepage, scenario.creepage.drive == "free"
-    slips = [slip_profile(scenario, grid, r) for r in first]
+    slips = [slip_profile(scenario, grid, r, scenario.cylinder.profile) for r in first]
     radii = [rolling_radius(scenario, grid, r) for r in first]
     scene = Scene(
         grid=grid,

@@ -60,6 +60,8 @@ class ContactStudy:
 def _grid(scenario: Scenario, model: ContactModel, load: float, profile: Profile | None) -> Grid:
     """Return strips that suit the contact: the model's choice, or the profile's whole width."""
     choice, centre = scenario.contact, contact_centres(scenario)[0]
+    if choice.centre is not None:
+        centre = choice.centre
     patch = fresh_patch(scenario, load)
     if choice.width is None and profile is not None:
         start, stop = float(profile.y[0]), float(profile.y[-1])
@@ -71,8 +73,6 @@ def _grid(scenario: Scenario, model: ContactModel, load: float, profile: Profile
         grid = model.suggest_grid(1.0 / scenario.roller.crown_radius, curvature, load, materials)
         if grid is not None:
             return Grid(grid.y + centre, grid.spacing)
-    if choice.centre is not None:
-        centre = choice.centre
     width = choice.width if choice.width is not None else 2.4 * patch.b
     return Grid.spanning(centre - 0.5 * width, centre + 0.5 * width, choice.strips or 121)
 
@@ -110,10 +110,7 @@ def study_contact(
     model.prepare(grid, (scenario.cylinder.material, scenario.roller.material))
     creepage = creepage_of(scenario, 0)
     if scenario.creepage.differential_slip:
-        variation = slip_profile(scenario, grid, 0)
-        if profile is not None:
-            worn = -np.interp(grid.y, profile.y, profile.height)
-            variation = variation - worn / scenario.cylinder.radius
+        variation = slip_profile(scenario, grid, 0, profile)
         creepage = Creepage(creepage.longitudinal, creepage.lateral, creepage.spin, variation)
     free = scenario.creepage.drive == "free"
     point = OperatingPoint(

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from wearsim.evolution.advance import (
+    contacts_at,
     cylinder_depth_of,
     cylinder_volume_of,
     operating_points,
@@ -24,11 +25,12 @@ from wearsim.types import FloatArray
 
 Row = dict[str, object]
 
-SAME_LOAD = 1e-9  # relative change of a load that asks for no new solution
 
-
-def history_row(scene: Scene, state: WearState, before: WearState | None, threshold: float) -> Row:
+def history_row(
+    scene: Scene, state: WearState, before: WearState | None, threshold: float, pass_by_pass: bool
+) -> Row:
     """Return the observables of a state; `threshold` [m] bounds the groove's width."""
+    state = present_contacts(scene, state, pass_by_pass)
     realisations = range(scene.shape[2])
     worn = state.cylinder_depth
     power = contact_values(scene, state.contacts, "power")
@@ -70,15 +72,10 @@ def at_record(scene: Scene, stepper: Stepper, start: WearState, passes: float) -
 
 
 def present_contacts(scene: Scene, state: WearState, pass_by_pass: bool) -> WearState:
-    """Return `state` with its contacts solved at the loads of this moment.
-
-    A step over many passes leaves them solved on the profile it leads to, under its mean load;
-    where the load has not changed there is nothing left to solve.
-    """
+    """Return `state` with its contacts at the loads of this moment."""
     loads = present_loads(scene, state)
-    carried = contact_values(scene, state.contacts, "line_load").sum(axis=-1) * scene.grid.spacing
-    if not pass_by_pass and np.abs(carried - loads).max() <= SAME_LOAD * loads.max():
-        return state
+    if not pass_by_pass:
+        return replace(state, contacts=contacts_at(scene, state, loads))
     points = operating_points(scene, loads, state.cylinder_depth, state.roller_depth)
     return replace(state, contacts=solve_present(scene, state, points))
 
@@ -128,7 +125,9 @@ class Recorder:
         self.stepper = stepper
         self.schedule = schedule
         self.threshold = threshold
-        self._history = _rows(history or {}) or [history_row(scene, state, None, threshold)]
+        self._history = _rows(history or {}) or [
+            history_row(scene, state, None, threshold, stepper.pass_by_pass)
+        ]
         self._records = _rows(records or {}) or [record_row(scene, state, stepper.pass_by_pass)]
         self._kept = len(self._history), len(self._records), state
 
@@ -145,7 +144,7 @@ class Recorder:
                 due.append(last)
         pass_by_pass = self.stepper.pass_by_pass
         self._records += [record_row(self.scene, state, pass_by_pass) for state in due]
-        self._history.append(history_row(self.scene, end, start, self.threshold))
+        self._history.append(history_row(self.scene, end, start, self.threshold, pass_by_pass))
         # one assignment: an interrupt in the lines above leaves the step before in force
         self._kept = len(self._history), len(self._records), end
 

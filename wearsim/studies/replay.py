@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from wearsim.errors import Interrupted, ResultsFileError, SolverError
+from wearsim.evolution.errors_of_steps import deepest, whole_volume
 from wearsim.evolution.loop import evolve
 from wearsim.evolution.scene import Scene
 from wearsim.evolution.state import WearState, fresh_state, widened, widened_state
@@ -224,6 +225,7 @@ class _Replay:
         )
         try:
             self._step_through()
+            self._judge()
             self._write(finished=True)
         except KeyboardInterrupt:
             self._interrupted()
@@ -234,6 +236,19 @@ class _Replay:
             raise
         self.tell(Finished(self._wall()))
         return Result(self._data(finished=True), self.path)
+
+    def _judge(self) -> None:
+        """Warn where the estimated error has outgrown the tolerance in spite of all."""
+        state, tolerance = self.recorder.state, self.scenario.evolution.tolerance
+        sizes = deepest(state), whole_volume(self.scene, state)
+        errors = state.depth_error, state.volume_error
+        for name, size, error in zip(("depth", "worn volume"), sizes, errors, strict=True):
+            relative = float((error / np.where(size > 0.0, size, np.inf)).max())
+            if relative > tolerance:
+                self._warn(
+                    f"estimated error of {name}: {relative:.2%} is more than the tolerance of"
+                    f" {tolerance:.2%}; lower evolution.tolerance or evolution.step"
+                )
 
     def _step_through(self) -> None:
         every = self.scenario.outputs.checkpoint_every
