@@ -42,7 +42,7 @@ def test_that_each_word_names_its_variable() -> None:
             np.testing.assert_array_equal(
                 getattr(result, name), result.raw.variables[words.get(name, name)].squeeze()
             )
-    assert len([name for name in VARIABLES if hasattr(Result, name)]) == 22
+    assert len([name for name in VARIABLES if hasattr(Result, name)]) == 23
     np.testing.assert_array_equal(
         result.values("half_length"), result.raw.records["half_length"].squeeze()
     )
@@ -55,8 +55,11 @@ def test_that_the_end_state_is_ready_for_json() -> None:
     assert final["depth_m"] == result.depth[-1]
     assert final["passes"] == 4000.0
     assert final["peak_pressure_Pa"] == result.peak_pressure[-1].max()
-    assert final["relative_depth_error"] == result.depth_error[-1] / result.depth[-1]
-    assert final["relative_volume_error"] == result.volume_error[-1] / result.worn_volume[-1]
+    deepest = max(result.depth[-1], np.max(result.roller_depth[-1]))
+    assert final["relative_depth_error"] == result.depth_error[-1] / deepest
+    rollers = np.sum(result.raw.static["multiplicity"] * result.roller_worn_volume[-1])
+    whole = result.worn_volume[-1] + rollers
+    assert final["relative_volume_error"] == pytest.approx(result.volume_error[-1] / whole)
 
 
 def test_that_several_realisations_give_lists() -> None:

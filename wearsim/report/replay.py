@@ -118,15 +118,16 @@ def _draw_profiles(
 ) -> None:
     y = result.y * MM
     worn = np.asarray(result.profiles)
+    start = result.start_height
     for record in colours.records:
-        axes.plot(y, -worn[record] * UM, color=colours.of(record), lw=1.1)
+        axes.plot(y, (start - worn[record]) * UM, color=colours.of(record), lw=1.1)
     _draw_rollers(axes, y, _per_roller(np.asarray(result.roller_profiles))[-1])
     for number, profile in enumerate(measured):
         axes.plot(
             profile.y * MM, profile.height * UM, MARKS[number % len(MARKS)], ms=3.2, mew=0.7,
             mfc="white", mec=RED, label=f"measured: {profile.label}", zorder=5,
         )  # fmt: skip
-    name_axes(axes, "Worn profile of the cylinder", "y [mm]", "height above unworn [um]")
+    name_axes(axes, "Worn profile of the cylinder", "y [mm]", "height above nominal [um]")
     if axes.get_legend_handles_labels()[0]:
         axes.legend(loc="lower right")
 

@@ -81,6 +81,7 @@ VARIABLES: Mapping[str, Variable] = {
     for variable in (
         Variable("y", ("y",), "m", "axial position", "static"),
         Variable("nominal_gap", _FRESH, "m", "gap before wear", "static"),
+        Variable("start_height", ("y",), "m", "cylinder above nominal before wear", "static"),
         Variable("multiplicity", ("roller",), "1", "physical rollers behind a roller", "static"),
         Variable("passes", _STEP, "1", "roller passes done, all rollers together", "history"),
         Variable("time", _STEP, "s", "simulated time", "history"),
@@ -99,8 +100,8 @@ VARIABLES: Mapping[str, Variable] = {
         Variable("approach", _ROLLER, "m", "approach of the bodies", "history"),
         Variable("longitudinal_creepage", _ROLLER, "1", "mean longitudinal creepage", "history"),
         Variable("adhesion_fraction", _ROLLER, "1", "part of the contact that adheres", "history"),
-        Variable("depth_error", _TEST, "m", "estimated error of the depth", "history"),
-        Variable("volume_error", _TEST, "m^3", "estimated error of the worn volume", "history"),
+        Variable("depth_error", _TEST, "m", "estimated error of depth, on either body", "history"),
+        Variable("volume_error", _TEST, "m^3", "estimated error of the volume worn off", "history"),
         Variable("rejected", _STEP, "1", "steps refused so far", "history"),
         Variable("solves", _STEP, "1", "contacts solved so far", "history"),
         Variable("full_solves", _STEP, "1", "passes solved in full so far", "history"),

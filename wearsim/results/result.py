@@ -7,6 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+import numpy as np
 import numpy.typing as npt
 
 from wearsim.results.data import RunData
@@ -60,6 +61,11 @@ class Result:
 
         raw = self.raw
         return parse_scenario(raw.scenario_text, raw.scenario_file, raw.files.__getitem__)
+
+    @property
+    def start_height(self) -> FloatArray:
+        """Height of the cylinder above its nominal shape before the test, shape (strips,) [m]."""
+        return self.raw.static["start_height"]
 
     @property
     def title(self) -> str:
@@ -227,6 +233,10 @@ class Result:
         last = {name: array[-1] for name, array in self.raw.history.items()}
         of_rollers = ("roller_depth", "roller_worn_volume", "normal_force", "peak_pressure")
         last.update({name: last[name].max(axis=0) for name in of_rollers})
+        # the errors are those of either body's depth, and of all volume worn off
+        deepest = np.maximum(last["depth"], last["roller_depth"])
+        multiplicity = self.raw.static["multiplicity"]
+        volume = last["worn_volume"] + multiplicity @ self.raw.history["roller_worn_volume"][-1]
         return {
             "passes": _number(last["passes"]),
             "time_s": _number(last["time"]),
@@ -241,8 +251,8 @@ class Result:
             "peak_pressure_Pa": _number(last["peak_pressure"]),
             "depth_error_m": _number(last["depth_error"]),
             "volume_error_m3": _number(last["volume_error"]),
-            "relative_depth_error": _number(_relative(last["depth_error"], last["depth"])),
-            "relative_volume_error": _number(_relative(last["volume_error"], last["worn_volume"])),
+            "relative_depth_error": _number(_relative(last["depth_error"], deepest)),
+            "relative_volume_error": _number(_relative(last["volume_error"], volume)),
         }
 
 

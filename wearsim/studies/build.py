@@ -44,6 +44,14 @@ def kinematics(scenario: Scenario, multiplicity: FloatArray) -> Kinematics:
     )
 
 
+def start_height(scenario: Scenario, grid: Grid) -> FloatArray:
+    """Return the cylinder's height above nominal before the run, shape (strips,) [m]."""
+    profile = scenario.cylinder.profile
+    if profile is None:
+        return np.zeros_like(grid.y)
+    return np.interp(grid.y, profile.y, profile.height)
+
+
 def nominal_gap(scenario: Scenario, grid: Grid, roller: int, profile: Profile | None) -> FloatArray:
     """Return the gap of one roller before wear, shape (strips,) [m].
 

@@ -22,7 +22,7 @@ from wearsim.plugins import ContactModelSpec, LoadSpec, Spec, WearLawSpec, regis
 from wearsim.results import Result, RunData, check_output, read_results, write_results
 from wearsim.results.layout import VARIABLES
 from wearsim.scenario import Scenario, parse_scenario
-from wearsim.studies.build import build_scene, load_range
+from wearsim.studies.build import build_scene, load_range, start_height
 from wearsim.studies.events import Checkpointed, Event, Finished, Started, Stepped, Warned
 from wearsim.studies.recorder import Recorder
 from wearsim.studies.schedule import RecordSchedule
@@ -346,6 +346,7 @@ class _Replay:
             static={
                 "y": scene.grid.y,
                 "nominal_gap": scene.nominal_gap,
+                "start_height": start_height(scenario, scene.grid),
                 "multiplicity": kinematics.multiplicity,
             },
             history=self.recorder.history,

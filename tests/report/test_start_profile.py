@@ -1,0 +1,45 @@
+"""A test that starts from a measured groove is drawn from that groove on."""
+
+import numpy as np
+
+import wearsim
+from tests.evolution import SCENARIOS
+from wearsim.report.replay import _draw_profiles
+
+
+class Lines:
+    """Stand in for axes: keep what is plotted."""
+
+    def __init__(self):
+        self.heights = []
+
+    def plot(self, y, height, **style):
+        self.heights.append(np.asarray(height))
+
+    def __getattr__(self, name):
+        return lambda *values, **named: ([], [])
+
+
+class Colours:
+    """Stand in for the colours of two records."""
+
+    records = (0, -1)
+
+    def of(self, record):
+        return "black"
+
+
+def test_that_profiles_are_drawn_from_the_start_profile_on(tmp_path):
+    path = tmp_path / "start.csv"
+    path.write_text("y [mm], height [um]\n-12, 0\n-3, 0\n0, -9\n3, 0\n12, 0\n")
+    scenario = wearsim.load_scenario(
+        SCENARIOS / "rig-450min.toml",
+        overrides={"cylinder.profile": str(path), "operation.passes": 3000},
+    )
+    result = wearsim.run(scenario)
+    axes = Lines()
+    _draw_profiles(axes, result, Colours(), ())
+    expected = np.interp(result.y, [-3e-3, 0.0, 3e-3], [0.0, -9.0, 0.0])
+    np.testing.assert_allclose(axes.heights[0], expected, atol=1e-9)
+    np.testing.assert_allclose(axes.heights[1], expected - result.profiles[-1] * 1e6, atol=1e-9)
+    assert result.start_height.min() < -8e-6
