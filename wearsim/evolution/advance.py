@@ -145,9 +145,7 @@ def explicit_step(scene: Scene, state: WearState, passes: float) -> WearState:
     contacts = contacts_at(scene, state, mean)
     solves = len(contacts) if contacts is state.contacts else 2 * len(contacts)
     worn = _completed(scene, state, passes, Wearing(scene, contacts, passes), contacts, solves)
-    loads = present_loads(scene, worn)
-    points = operating_points(scene, loads, worn.cylinder_depth, worn.roller_depth)
-    return replace(worn, contacts=solve_present(scene, worn, points))
+    return replace(worn, contacts=solve_present(scene, worn, present_loads(scene, worn)))
 
 
 def present_loads(scene: Scene, state: WearState) -> FloatArray:
@@ -171,12 +169,12 @@ def contacts_at(scene: Scene, state: WearState, loads: FloatArray) -> Contacts:
     carried = line_load.sum(axis=-1) * scene.grid.spacing
     if np.abs(carried - loads).max() <= SAME_LOAD * loads.max():
         return state.contacts
+    return solve_present(scene, state, loads)
+
+
+def solve_present(scene: Scene, state: WearState, loads: FloatArray) -> Contacts:
+    """Solve every contact on the present profiles under `loads`, shape (S, R, N) [N]."""
     points = operating_points(scene, loads, state.cylinder_depth, state.roller_depth)
-    return solve_present(scene, state, points)
-
-
-def solve_present(scene: Scene, state: WearState, points: list[OperatingPoint]) -> Contacts:
-    """Solve every contact on the present profiles."""
     gap = scene.gap(state.cylinder_depth, state.roller_depth)
     batch = scene.model.solve_batch(
         gap, scene.kinematics.longitudinal_curvature, points, None, list(state.contacts)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from wearsim.evolution.advance import operating_points, solve_present
+from wearsim.evolution.advance import solve_present
 from wearsim.evolution.control import StepControl
 from wearsim.evolution.observables import worn_volume
 from wearsim.evolution.scene import Scene
@@ -85,14 +85,14 @@ def load_spread(scene: Scene, end: WearState, first: float, passes: float) -> Fl
     if deviation <= 1e-9 * float(loads.max()):
         return spread
     depths = end.cylinder_depth, end.roller_depth
-    worn = []
-    for shift in (-deviation, 0.0, deviation):
-        points = operating_points(scene, loads + shift, *depths)
-        worn.append(Wearing(scene, solve_present(scene, end, points), passes))
-    bias = [
-        0.5 * (getattr(worn[0], b) - 2.0 * getattr(worn[1], b) + getattr(worn[2], b))
-        for b in ("cylinder", "roller")
-    ]
+    less, mean, more = (
+        Wearing(scene, solve_present(scene, end, loads + shift), passes)
+        for shift in (-deviation, 0.0, deviation)
+    )
+    bias = (
+        0.5 * (less.cylinder - 2.0 * mean.cylinder + more.cylinder),
+        0.5 * (less.roller - 2.0 * mean.roller + more.roller),
+    )
     radii = scene.kinematics.cylinder_radius, scene.kinematics.roller_radius
     weights = np.ones(1), scene.kinematics.multiplicity
     for change, depth, radius, weight in zip(bias, depths, radii, weights, strict=True):

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from wearsim.evolution.advance import operating_points, present_loads, solve_present
+from wearsim.evolution.advance import present_loads, solve_present
 from wearsim.evolution.scene import Scene
 from wearsim.evolution.state import WearState
 from wearsim.evolution.stepper import Advance, Stepper
@@ -37,9 +37,7 @@ class PerPassStepper(Stepper):
         end = _run(scene, state, min(math.ceil(stop - state.passes), chunk))
         if is_compiled(scene):
             # for the eye only: the compiled loop goes on from what it carries itself
-            loads = present_loads(scene, end)
-            points = operating_points(scene, loads, end.cylinder_depth, end.roller_depth)
-            end = replace(end, contacts=solve_present(scene, end, points))
+            end = replace(end, contacts=solve_present(scene, end, present_loads(scene, end)))
         return Advance(path=(state, end))
 
 

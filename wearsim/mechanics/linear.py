@@ -65,7 +65,7 @@ def solve_in_place(matrix: FloatArray, size: int, width: int) -> bool:
     Returns
     -------
     bool
-        False if a pivot vanished or is not finite.
+        False if a pivot vanished or is not a number.
     """
     for start in range(0, size, PANEL):
         stop = min(start + PANEL, size)

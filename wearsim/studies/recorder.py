@@ -12,7 +12,6 @@ from wearsim.evolution.advance import (
     contacts_at,
     cylinder_depth_of,
     cylinder_volume_of,
-    operating_points,
     present_loads,
     solve_present,
 )
@@ -74,10 +73,8 @@ def at_record(scene: Scene, stepper: Stepper, start: WearState, passes: float) -
 def present_contacts(scene: Scene, state: WearState, pass_by_pass: bool) -> WearState:
     """Return `state` with its contacts at the loads of this moment."""
     loads = present_loads(scene, state)
-    if not pass_by_pass:
-        return replace(state, contacts=contacts_at(scene, state, loads))
-    points = operating_points(scene, loads, state.cylinder_depth, state.roller_depth)
-    return replace(state, contacts=solve_present(scene, state, points))
+    solve = solve_present if pass_by_pass else contacts_at
+    return replace(state, contacts=solve(scene, state, loads))
 
 
 def record_row(scene: Scene, state: WearState, pass_by_pass: bool) -> Row:

@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 from wearsim.scenario import Scenario
+from wearsim.scenario.sections import DEFAULT_RECORDS
 
-DEFAULT_RECORDS = 20
 _ROUND_OFF = 1e-9
 
 
