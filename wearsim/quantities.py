@@ -350,6 +350,63 @@ PositiveSpeed: TypeAlias = Annotated[float, Quantity(SPEED, "positive")]
 PerPower: TypeAlias = Annotated[float, Quantity(PER_POWER)]
 
 
+@dataclass(frozen=True)
+class HostQuantity:
+    """Marks an option that is measured like the value which its random input stands for.
+
+    The validation context says what that is: ``{"quantity": Quantity(FORCE)}``, or nothing for a
+    plain number.
+
+    Parameters
+    ----------
+    bound : {"any", "positive", "not negative"}
+        Which values are allowed.
+    infinite : bool
+        Whether "inf" and "-inf" are values too.
+    """
+
+    bound: Bound = "any"
+    infinite: bool = False
+
+    def parse(self, value: object, info: ValidationInfo) -> float:
+        """Return `value` in SI; raises QuantityError."""
+        host: Quantity | None = (info.context or {}).get("quantity")
+        endless = {"inf": float("inf"), "+inf": float("inf"), "-inf": -float("inf")}
+        if self.infinite and isinstance(value, str) and value.strip().lower() in endless:
+            return endless[value.strip().lower()]
+        if host is not None:
+            return Quantity(host.kind, self.bound).parse(value)
+        expected = {"any": "a plain number", "positive": "a number above zero"}.get(
+            self.bound, "a number of zero or more"
+        )
+        expected += ' or "inf"' if self.infinite else ""
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise QuantityError("is not a number", shown(value), expected)
+        result = float(value)
+        if result - result != 0.0:  # infinite or not a number
+            raise QuantityError("must be finite", shown(value), expected)
+        if (self.bound == "positive" and result <= 0.0) or (
+            self.bound == "not negative" and result < 0.0
+        ):
+            raise QuantityError("is out of range", shown(value), expected)
+        return result
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        return core_schema.with_info_plain_validator_function(self.parse)
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        return {"type": ["string", "number"], "examples": ["300 N", 0.1]}
+
+
+Value: TypeAlias = Annotated[float, HostQuantity()]
+PositiveValue: TypeAlias = Annotated[float, HostQuantity("positive")]
+Limit: TypeAlias = Annotated[float, HostQuantity(infinite=True)]
+
+
 class _OneOrMany:
     """Lets a field hold one value or a list of values; see `PerRoller`."""
 

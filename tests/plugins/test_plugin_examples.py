@@ -108,5 +108,7 @@ def test_that_the_load_of_the_example_has_exact_moments(example):
 def test_that_the_example_of_a_random_input_runs(example):
     example("wearsim_random_inputs")
     spec = registry().get(RandomInputSpec, "flat")
-    quantile = spec.factory(spec.options(low=2.0, high=4.0))
-    assert quantile(np.array([0.25, 0.5])) == pytest.approx([2.5, 3.0])
+    flat = spec.factory(spec.options(low=2.0, high=4.0))
+    assert flat.quantile(np.array([0.25, 0.5])) == pytest.approx([2.5, 3.0])
+    assert (*flat.support, flat.mean) == pytest.approx((2.0, 4.0, 3.0))
+    assert flat.std == pytest.approx(1.0 / np.sqrt(3.0), rel=1e-6)

@@ -12,6 +12,15 @@ from wearsim.plugins.protocols import (
     PassLoop,
     WearLaw,
 )
+from wearsim.plugins.random_inputs import (
+    FRAMES,
+    Distribution,
+    Frame,
+    FrictionField,
+    JointDistribution,
+    Process,
+    Uniforms,
+)
 from wearsim.plugins.specs import (
     ContactModelSpec,
     LoadSpec,
@@ -23,17 +32,24 @@ from wearsim.plugins.specs import (
 
 __all__ = [
     "BODIES",
+    "FRAMES",
     "Body",
     "Capabilities",
     "ContactModel",
     "ContactModelSpec",
+    "Distribution",
+    "Frame",
+    "FrictionField",
+    "JointDistribution",
     "Load",
     "LoadSpec",
     "LoadTerm",
     "Options",
     "PassLoop",
+    "Process",
     "RandomInputSpec",
     "Spec",
+    "Uniforms",
     "WearLaw",
     "WearLawSpec",
     "hookimpl",

@@ -128,7 +128,10 @@ class HookSpecs:
 
     @hookspec
     def wearsim_random_inputs(self) -> Iterable[RandomInputSpec]:  # type: ignore[empty-body]
-        """Yield distributions by name, each built as a quantile function of (0, 1).
+        """Yield random inputs, chosen by ``distribution`` in the table that stands for a value.
+
+        Options that are measured like the value itself have the types `Value`, `PositiveValue`
+        and `Limit`: "300 N" for a load, a plain number for a coefficient.
 
         Returns
         -------
@@ -138,19 +141,28 @@ class HookSpecs:
         --------
         .. code-block:: python
 
-            from wearsim.plugins import Options, RandomInputSpec, hookimpl
+            from wearsim.plugins import Distribution, Options, RandomInputSpec, hookimpl
+            from wearsim.quantities import Value
 
 
             class Bounds(Options):
-                low: float
-                high: float
+                low: Value
+                high: Value
+
+
+            class Flat(Distribution):
+                def __init__(self, options):
+                    self.options = options
+
+                def quantile(self, probability):
+                    return self.options.low + (self.options.high - self.options.low) * probability
 
 
             @hookimpl
             def wearsim_random_inputs():
                 yield RandomInputSpec(
                     name="flat",
-                    factory=lambda o: lambda p: o.low + (o.high - o.low) * p,
+                    factory=Flat,
                     options=Bounds,
                     summary="uniform between two bounds",
                 )

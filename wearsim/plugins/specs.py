@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Literal
 from pydantic import BaseModel, ConfigDict
 
 from wearsim.plugins.protocols import Capabilities, ContactModel, Load, LoadTerm, WearLaw
+from wearsim.plugins.random_inputs import Distribution, FrictionField, JointDistribution, Process
 
 
 class Options(BaseModel):
@@ -86,8 +87,25 @@ class LoadSpec(Spec):
 
 @dataclass(frozen=True)
 class RandomInputSpec(Spec):
-    """A distribution for a scalar input: `factory(options)` builds its quantile function."""
+    """A random input, chosen by the key `distribution` of the table that stands for a value.
+
+    Parameters
+    ----------
+    factory : callable
+        `factory(options)` builds a Distribution or, with ``role = "joint"``, a JointDistribution;
+        with ``role = "field"`` and ``role = "process"`` it is `factory(options, marginal)`, the
+        marginal Distribution being read from the sub-table `marginal`.
+    role : {"scalar", "joint", "field", "process"}
+        What it builds.
+    """
 
     kind: ClassVar[str] = "random input"
 
-    factory: Callable[[Any], Callable[[Any], Any]] = field(kw_only=True)
+    factory: Callable[..., Distribution | JointDistribution | FrictionField | Process] = field(
+        kw_only=True
+    )
+    role: Literal["scalar", "joint", "field", "process"] = "scalar"
+
+    def describe(self) -> list[str]:
+        """Return the role as a word."""
+        return [self.role]

@@ -1,0 +1,1 @@
+"""Uncertainty itself: keyed draws, sampling plans, maximum entropy; plain arrays in and out."""
