@@ -1,11 +1,19 @@
-"""The built-in contact models, wear laws and loads, registered through everyone's hooks."""
+"""The built-in models, laws, loads and random inputs, registered through everyone's hooks."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
-from wearsim.models import archard, hertz_fastsim, loads, slender
-from wearsim.plugins import ContactModelSpec, LoadSpec, WearLawSpec, hookimpl
+from wearsim.models import (
+    archard,
+    distributions,
+    friction_fields,
+    hertz_fastsim,
+    loads,
+    processes,
+    slender,
+)
+from wearsim.plugins import ContactModelSpec, LoadSpec, RandomInputSpec, WearLawSpec, hookimpl
 
 
 @hookimpl
@@ -24,3 +32,9 @@ def wearsim_wear_laws() -> Iterable[WearLawSpec]:
 def wearsim_loads() -> Iterable[LoadSpec]:
     """Yield the built-in loads and load terms."""
     return loads.SPECS
+
+
+@hookimpl
+def wearsim_random_inputs() -> Iterable[RandomInputSpec]:
+    """Yield the built-in distributions, friction fields and processes."""
+    return (*distributions.SPECS, *friction_fields.SPECS, *processes.SPECS)

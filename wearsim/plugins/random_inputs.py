@@ -57,7 +57,8 @@ class Distribution(ABC):
         from scipy.special import ndtr  # noqa: PLC0415  (slow to import, and rarely needed)
 
         scores, weights = np.polynomial.hermite_e.hermegauss(120)
-        values = self.quantile(ndtr(scores))
+        # far out the weights are nothing, but an infinite end of the support would be felt
+        values = self.quantile(np.clip(ndtr(scores), 2.0**-53, 1.0 - 2.0**-53))
         weights = weights / weights.sum()
         mean = float(np.dot(weights, values))
         return mean, float(np.sqrt(np.dot(weights, (values - mean) ** 2)))

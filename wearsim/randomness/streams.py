@@ -18,7 +18,7 @@ from wearsim.types import FloatArray
 Purpose: TypeAlias = Literal["test", "pass", "field", "process", "plan"]
 
 _LANES = 4  # 64-bit words that the generator yields per count
-_HALF_STEP = 2.0**-54
+_STEP = 2.0**-52  # one bit short of a float's 53, so that half a step more is exact, and below 1
 
 
 @dataclass(frozen=True)
@@ -65,4 +65,4 @@ class Stream:
     def uniforms(self, first: int, count: int, realisation: int = 0, block: int = 0) -> FloatArray:
         """Return uniform numbers between 0 and 1, both excluded; parameters as of `words`."""
         words = self.words(first, count, realisation, block)
-        return np.asarray((words >> np.uint64(11)) * 2.0**-53 + _HALF_STEP)
+        return np.asarray(((words >> np.uint64(12)) + 0.5) * _STEP)

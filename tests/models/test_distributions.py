@@ -1,0 +1,224 @@
+"""The built-in distributions: their numbers, what they refuse, and how they are registered."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+from scipy import stats
+
+from wearsim.errors import ScenarioError
+from wearsim.plugins import Distribution, JointDistribution, RandomInputSpec, registry
+from wearsim.quantities import FORCE, Quantity
+from wearsim.types import FloatArray
+
+NAMES = ("maxent", "normal", "lognormal", "uniform", "truncated-normal", "constant", "table")
+NEWTON = {"quantity": Quantity(FORCE)}
+
+
+def build(name: str, context: dict[str, Any] | None = None, /, **options: object) -> Any:
+    spec = registry().get(RandomInputSpec, name)
+    return spec.factory(spec.options.model_validate(options, context=context))
+
+
+def reader(text: str) -> Callable[[str], str]:
+    return {"data.csv": text}.__getitem__
+
+
+SAMPLES = "value [kN]\n0.3\n0.1\n0.2\n0.4\n0.8\n"
+QUANTILES = "probability; value\n0; 1\n0.5; 2\n1; 5\n"
+CASES = {
+    "maxent": {"support": [0.0, "inf"], "mean": 307.0, "std": 200.0},
+    "maxent, gamma": {"support": [0.0, "inf"], "mean": 307.0, "mean_log": 5.5},
+    "maxent, mean": {"support": [0.0, 1.0], "mean": 0.3},
+    "maxent, dented": {"support": [0.0, 1.0], "mean": 0.5, "std": 0.4},
+    "normal": {"mean": -3.0, "std": 2.0},
+    "lognormal": {"mean": 300.0, "std": 90.0},
+    "lognormal, factor": {"median": 300.0, "factor": 1.4},
+    "uniform": {"low": -1.0, "high": 3.0},
+    "truncated-normal": {"parent_mean": 0.0, "parent_std": 2.0, "support": [1.0, 5.0]},
+    "truncated-normal, tail": {"parent_mean": 0.0, "parent_std": 1.0, "support": [7.0, "inf"]},
+    "constant": {"value": 4.0},
+    "table": {"file": "data.csv"},
+}
+
+
+@pytest.fixture(scope="module")
+def uniforms() -> FloatArray:
+    return np.random.default_rng(11).random(1_000_000)
+
+
+@pytest.fixture(params=CASES)
+def distribution(request: pytest.FixtureRequest) -> Distribution:
+    context = {"read": reader(QUANTILES)}
+    made: Distribution = build(request.param.split(",")[0], context, **CASES[request.param])
+    return made
+
+
+def test_that_all_are_registered_under_their_roles() -> None:
+    roles = {name: registry().get(RandomInputSpec, name).role for name in (*NAMES, "disc")}
+    assert roles == dict.fromkeys(NAMES, "scalar") | {"disc": "joint"}
+
+
+def test_that_a_million_draws_have_the_mean_and_the_std(
+    distribution: Distribution, uniforms: FloatArray
+) -> None:
+    draws = distribution.quantile(uniforms)
+    centred = draws - distribution.mean
+    assert abs(centred.mean()) <= 4.0 * distribution.std / 1e3
+    if distribution.std > 0.0:
+        fourth = np.sqrt((centred**4).mean() / distribution.std**4 - 1.0)
+        assert abs((centred**2).mean() / distribution.std**2 - 1.0) < 4.0 * fourth / 1e3
+
+
+def test_that_quantiles_go_from_end_to_end_and_rise(distribution: Distribution) -> None:
+    values = distribution.quantile(np.linspace(0.0, 1.0, 201))
+    assert (values[0], values[-1]) == distribution.support
+    assert np.all(np.diff(values) >= 0.0)
+    assert distribution.quantile(np.full((3, 2), 0.4)).shape == (3, 2)
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "law"),
+    [
+        ("normal", {"mean": -3.0, "std": 2.0}, stats.norm(-3.0, 2.0)),
+        ("lognormal", {"median": 300.0, "factor": 1.4}, stats.lognorm(math.log(1.4), scale=300.0)),
+        ("uniform", {"low": -1.0, "high": 3.0}, stats.uniform(-1.0, 4.0)),
+        (
+            "truncated-normal",
+            {"parent_mean": 0.0, "parent_std": 2.0, "support": [1.0, 5.0]},
+            stats.truncnorm(0.5, 2.5, scale=2.0),
+        ),
+        (
+            "truncated-normal",
+            {"parent_mean": 0.0, "parent_std": 1.0, "support": [7.0, "inf"]},
+            stats.truncnorm(7.0, np.inf),
+        ),
+    ],
+)
+def test_that_laws_are_scipys(name: str, options: dict[str, object], law: Any) -> None:
+    made = build(name, **options)
+    probabilities = np.array([1e-6, 0.01, 0.4, 0.9, 0.9999])
+    assert made.quantile(probabilities) == pytest.approx(law.ppf(probabilities), rel=1e-9)
+    assert made.mean == pytest.approx(law.mean(), rel=1e-9)
+    assert made.std == pytest.approx(law.std(), rel=1e-7)
+
+
+def test_that_mean_and_std_of_a_lognormal_are_of_the_value_itself() -> None:
+    made = build("lognormal", mean=300.0, std=90.0)
+    assert (made.mean, made.std) == (pytest.approx(300.0), pytest.approx(90.0))
+    assert build("lognormal", median=2.0, factor=1.5).quantile(np.array(0.5)) == pytest.approx(2.0)
+
+
+def test_that_maxent_keeps_mean_and_std_where_a_truncated_normal_does_not() -> None:
+    known = build("maxent", support=[0.0, 1.0], mean=1e-3, std=9e-4)
+    cut = build("truncated-normal", support=[0.0, 1.0], parent_mean=1e-3, parent_std=9e-4)
+    assert known.mean == pytest.approx(1e-3, rel=1e-12)
+    assert cut.mean == pytest.approx(1.22e-3, rel=5e-3)
+
+
+def test_that_options_are_measured_like_their_host() -> None:
+    made = build("maxent", NEWTON, support=["0 N", "inf"], mean="0.307 kN", std="32 N")
+    assert made.support == (0.0, math.inf)
+    assert (made.mean, made.std) == (pytest.approx(307.0), pytest.approx(32.0))
+
+
+def test_that_warnings_of_a_law_are_passed_on() -> None:
+    (told,) = build("maxent", support=[0.0, 1.0], mean=1e-3, std=1.1e-3).warnings
+    assert "spike" in told
+    assert build("normal", mean=0.0, std=1.0).warnings == ()
+
+
+def test_that_samples_of_a_table_are_read_in_the_unit_of_the_host() -> None:
+    made = build("table", {**NEWTON, "read": reader(SAMPLES)}, file="data.csv")
+    assert made.support == (100.0, 800.0)
+    assert made.quantile(np.array([0.25, 0.5, 0.875])) == pytest.approx([200.0, 300.0, 600.0])
+
+
+def test_that_a_table_of_quantiles_is_linear_between_them() -> None:
+    made = build("table", {"read": reader(QUANTILES)}, file="data.csv")
+    assert made.quantile(np.array([0.25, 0.75])) == pytest.approx([1.5, 3.5])
+    # half of the draws uniform on 1 to 2, half on 2 to 5
+    assert made.mean == pytest.approx(0.5 * 1.5 + 0.5 * 3.5)
+    assert made.std**2 == pytest.approx(0.5 * (7.0 / 3.0 + 13.0) - 2.5**2)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("probability, value\n0.1, 1\n1, 2\n", "must go from 0 to 1, got 0.1 to 1"),
+        ("probability, value\n0, 3\n1, 2\n", "column 'value' must not fall, got 2 after 3"),
+        ("probability, value\n0, 3\n0, 4\n1, 5\n", "column 'probability' must rise"),
+        ("value [N]\n1\n2\n", "a plain number has no unit"),
+        ("number\n1\n2\n", "column 'value' is missing"),
+    ],
+)
+def test_that_a_bad_table_is_told(text: str, told: str) -> None:
+    with pytest.raises(ScenarioError, match=r"data\.csv") as caught:
+        build("table", {"read": reader(text)}, file="data.csv")
+    assert told in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "context", "options", "told"),
+    [
+        (
+            "maxent",
+            NEWTON,
+            {"support": ["0 N", "inf"], "mean": "0.3 kN", "std": "320 N"},
+            "std 320 is more than mean - low = 300",
+        ),
+        (
+            "maxent",
+            NEWTON,
+            {"support": ["0 N", "inf"], "mean": "0.3 kN", "std": "320 N"},
+            "(numbers in N)",
+        ),
+        ("maxent", None, {"support": [0.0, "inf"]}, "alone gives no law"),
+        ("maxent", None, {"support": [0.0, 1.0], "mean": 0.5, "std": -1.0}, "is out of range"),
+        ("lognormal", None, {"mean": 1.0, "factor": 2.0}, "got mean and factor"),
+        ("lognormal", None, {}, "expected either mean and std, or median and factor"),
+        ("lognormal", None, {"median": 1.0, "factor": 1.0}, "greater than 1"),
+        ("uniform", None, {"low": 2.0, "high": 2.0}, "must lie above the lower one, got 2 to 2"),
+        (
+            "truncated-normal",
+            None,
+            {"parent_mean": 0.0, "parent_std": 1.0, "support": ["inf", 0.0]},
+            "must lie above",
+        ),
+    ],
+)
+def test_that_what_cannot_be_is_refused(
+    name: str, context: dict[str, Any] | None, options: dict[str, object], told: str
+) -> None:
+    with pytest.raises(ValidationError) as caught:
+        build(name, context, **options)
+    assert told in str(caught.value)
+
+
+def test_that_the_disc_is_filled_evenly(uniforms: FloatArray) -> None:
+    disc: JointDistribution = build("disc", radius=0.002)
+    assert disc.components == ("yaw", "tilt")
+    points = disc.values(uniforms.reshape(-1, 2)) / 0.002
+    square = (points**2).sum(axis=1)
+    angle = np.arctan2(points[:, 1], points[:, 0]) / np.pi
+    # evenly filled: area within a radius and angle are uniform, and know nothing of each other
+    assert stats.kstest(square, "uniform").pvalue > 1e-3
+    assert stats.kstest(angle, stats.uniform(-1.0, 2.0).cdf).pvalue > 1e-3
+    assert abs(np.corrcoef(square, angle)[0, 1]) < 4.0 / math.sqrt(len(square))
+    assert points.std(axis=0) == pytest.approx([0.5, 0.5], rel=5e-3)  # 1 mrad on 2 mrad
+    assert disc.mean == (0.0, 0.0)
+    assert np.all(np.abs(points) <= np.array(disc.reach) / 0.002)
+
+
+def test_that_the_disc_turns_over_with_its_uniforms() -> None:
+    disc = build("disc", radius=0.002)
+    uniform = np.random.default_rng(2).random((100, 2))
+    assert disc.values(1.0 - uniform) == pytest.approx(-disc.values(uniform), abs=1e-17)
+    assert disc.values(np.array([[0.5, 0.5], [0.0, 0.5]])) == pytest.approx(
+        np.array([[0.0, 0.0], [-0.002, 0.0]])
+    )

@@ -1,0 +1,90 @@
+"""The Ornstein-Uhlenbeck process."""
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+from scipy import stats
+from scipy.special import ndtr
+
+from wearsim.models.processes import OrnsteinUhlenbeck, OrnsteinUhlenbeckOptions
+from wearsim.plugins import Distribution, RandomInputSpec, registry
+from wearsim.randomness.streams import Stream
+
+
+class Gumbel(Distribution):
+    """A skew law with closed forms all through."""
+
+    def quantile(self, probability):
+        return -np.log(-np.log(probability))
+
+    @property
+    def warnings(self):
+        return ("skew",)
+
+
+def process(**options):
+    return OrnsteinUhlenbeck(OrnsteinUhlenbeckOptions(**options), Gumbel())
+
+
+def uniforms(realisation):
+    stream = Stream(6, "load.normal_force", "process")
+    return lambda first, count: stream.uniforms(first, count, realisation)
+
+
+def scores(values):
+    """Return the normal scores of the law's values."""
+    return stats.norm.ppf(np.exp(-np.exp(-values)))
+
+
+@pytest.mark.parametrize("spacing", [{}, {"spacing": "20 s"}, {"spacing": "30 s"}])
+def test_that_scores_forget_themselves_exponentially(spacing):
+    made = process(correlation_time="1 min", **spacing)
+    runs, points = 4000, 13
+    paths = scores(np.array([made.path(points, uniforms(k)) for k in range(runs)]))
+    time = made.spacing * np.arange(points)
+    found = np.mean(paths * paths[:, :1], axis=0)
+    expected = np.exp(-time / 60.0)
+    # the product of two scores of correlation r has the variance 1 + r^2
+    np.testing.assert_array_less(np.abs(found - expected), 4.0 * np.sqrt((1 + expected**2) / runs))
+
+
+def test_that_it_has_its_marginal_at_every_time():
+    made = process(correlation_time="1 min")
+    path = made.path(200_000, uniforms(0))
+    thinned = path[:: 10 * 10]  # ten correlation times apart
+    assert stats.kstest(thinned, "gumbel_r").pvalue > 1e-4
+    starts = [made.path(1, uniforms(k))[0] for k in range(1000)]
+    assert stats.kstest(starts, "gumbel_r").pvalue > 1e-4
+
+
+@pytest.mark.parametrize("points", [1, 2, 3, 100, 777])
+def test_that_a_longer_path_begins_with_the_shorter_one(points):
+    made = process(correlation_time="5 min")
+    np.testing.assert_array_equal(
+        made.path(points, uniforms(3)), made.path(1000, uniforms(3))[:points]
+    )
+
+
+def test_that_the_first_value_is_the_draw_itself():
+    made = process(correlation_time="5 min")
+    first = uniforms(9)(0, 1)
+    np.testing.assert_allclose(
+        made.path(5, uniforms(9))[:1], Gumbel().quantile(ndtr(stats.norm.ppf(first))), rtol=1e-12
+    )
+
+
+def test_that_its_time_grid_is_a_tenth_of_its_memory_unless_given():
+    assert process(correlation_time="5 min").spacing == 30.0
+    assert process(correlation_time="5 min", spacing="1 min").spacing == 60.0
+
+
+def test_that_a_spacing_beyond_half_the_correlation_time_is_refused():
+    with pytest.raises(ValidationError, match=r'does not resolve.*"31 s".*60 s.*"30 s"'):
+        process(correlation_time="1 min", spacing="31 s")
+
+
+def test_that_it_is_found_by_name_and_passes_on_warnings():
+    spec = registry().get(RandomInputSpec, "ornstein-uhlenbeck")
+    made = spec.factory(spec.options(correlation_time="1 min"), Gumbel())
+    assert spec.role == "process"
+    assert made.warnings == ("skew",)

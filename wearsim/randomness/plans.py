@@ -1,0 +1,131 @@
+"""Sampling plans: the uniform numbers that one input takes in each realisation of a study.
+
+Whatever the plan, they follow from the seed and the input's own name and dimension, so that no
+other input, no order and no batch of realisations changes them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Literal, TypeAlias, get_args
+
+import numpy as np
+
+from wearsim.randomness import sobol
+from wearsim.randomness.streams import Stream
+from wearsim.types import FloatArray, IntArray
+
+PlanName: TypeAlias = Literal["monte-carlo", "latin-hypercube", "sobol"]
+PLANS: tuple[PlanName, ...] = get_args(PlanName)
+
+Draw: TypeAlias = Callable[[str, int, int, int], FloatArray]
+"""Uniform numbers, shape (count, dimension), by name, dimension, first realisation and count."""
+
+BELOW_ONE = 1.0 - 2.0**-53
+
+
+def monte_carlo(seed: int, name: str, dimension: int, first: int, count: int) -> FloatArray:
+    """Return independent uniform numbers.
+
+    Parameters
+    ----------
+    seed : int
+        Seed of the scenario.
+    name : str
+        Name of the input.
+    dimension : int
+        How many uniform numbers it takes.
+    first, count : int
+        The first realisation, and how many.
+
+    Returns
+    -------
+    ndarray, shape (count, dimension)
+        Strictly between 0 and 1.
+    """
+    stream = Stream(seed, name, "test")
+    return np.stack([stream.uniforms(first, count, block=k) for k in range(dimension)], axis=1)
+
+
+def latin_hypercube(
+    seed: int, total: int, name: str, dimension: int, first: int, count: int
+) -> FloatArray:
+    """Return a part of a Latin hypercube of `total` realisations: one of them in every stratum.
+
+    Parameters
+    ----------
+    seed, name, dimension, first, count
+        As of `monte_carlo`.
+    total : int
+        Realisations of the whole plan, and strata of each component.
+
+    Returns
+    -------
+    ndarray, shape (count, dimension)
+        Strictly between 0 and 1.
+
+    Raises
+    ------
+    ValueError
+        If the realisations go beyond `total`.
+
+    Notes
+    -----
+    McKay, Beckman, Conover, Technometrics 21 (1979), DOI 10.1080/00401706.1979.10489755.
+    """
+    if first + count > total:
+        raise ValueError(
+            f"realisation {first + count - 1} is beyond this latin-hypercube plan, whose total is"
+            f" {total} (counted from 0); plan with a greater total, or take sobol, which has no end"
+        )
+    within = monte_carlo(seed, name, dimension, first, count)
+    strata = np.stack(
+        [_strata(seed, total, name, k)[first : first + count] for k in range(dimension)], axis=1
+    )
+    # the greatest number of a stratum may be rounded up into the next
+    return np.minimum((strata + within) / total, np.nextafter((strata + 1.0) / total, 0.0))
+
+
+@lru_cache(maxsize=64)
+def _strata(seed: int, total: int, name: str, component: int) -> IntArray:
+    """Return a random order of the strata, by sorting so that no numpy release changes it."""
+    words = Stream(seed, name, "plan").words(0, total, block=component)
+    order = np.argsort(words, kind="stable").astype(np.int64)
+    order.flags.writeable = False
+    return order
+
+
+def drawing(plan: PlanName, seed: int, total: int | None) -> Draw:
+    """Return how a plan draws one input.
+
+    Parameters
+    ----------
+    plan : {"monte-carlo", "latin-hypercube", "sobol"}
+        Name of the plan.
+    seed : int
+        Seed of the scenario.
+    total : int, optional
+        Realisations of the whole plan, needed by "latin-hypercube".
+
+    Returns
+    -------
+    callable
+        Of name, dimension, first and count.
+
+    Raises
+    ------
+    ValueError
+        If the plan is unknown, or `total` is missing or not positive.
+    """
+    if plan not in PLANS:
+        raise ValueError(f'unknown sampling plan "{plan}", expected one of {", ".join(PLANS)}')
+    if total is not None and total < 1:
+        raise ValueError(f"total must be 1 or more realisations, got {total}")
+    if plan == "monte-carlo":
+        return lambda *where: monte_carlo(seed, *where)
+    if plan == "sobol":
+        return lambda *where: sobol.scrambled(seed, *where)
+    if total is None:
+        raise ValueError("a latin-hypercube plan needs total, the realisations of the whole plan")
+    return lambda *where: latin_hypercube(seed, total, *where)

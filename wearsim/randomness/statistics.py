@@ -1,0 +1,266 @@
+"""Estimates from realisations, and how far each of them can be trusted."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from wearsim.types import FloatArray, IntArray
+
+CONFIDENCE = 0.95
+_BLOCK = 256  # rows that are summed at once, whatever the batches they come in
+_FAR = 10.0  # standard deviations of a rank beyond which no probability is left
+
+
+@dataclass(frozen=True)
+class Quantile:
+    """An estimated quantile.
+
+    Parameters
+    ----------
+    probability : float
+        Part of the realisations below it.
+    value : float
+        The estimate, linear between order statistics.
+    low, high : float
+        Confidence interval; infinite where there are too few realisations for an end.
+    """
+
+    probability: float
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What realisations of one number tell; nan where there are too few for it.
+
+    Parameters
+    ----------
+    count : int
+        Realisations.
+    mean, std : float
+        Estimates of mean and standard deviation.
+    mean_error, std_error : float
+        Standard errors of both.
+    skewness : float
+        Estimate of the skewness.
+    least, greatest : float
+        Extremes.
+    quantiles : tuple of Quantile
+        Those that were asked for.
+    """
+
+    count: int
+    mean: float
+    std: float
+    mean_error: float
+    std_error: float
+    skewness: float
+    least: float
+    greatest: float
+    quantiles: tuple[Quantile, ...]
+
+    def quantile(self, probability: float) -> Quantile:
+        """Return the quantile of this probability."""
+        return next(item for item in self.quantiles if item.probability == probability)
+
+
+@dataclass(frozen=True)
+class Convergence:
+    """Mean and standard deviation of the first n realisations, with their standard errors.
+
+    Parameters
+    ----------
+    count : ndarray of int, shape (points,)
+        The n.
+    mean, mean_error, std, std_error : ndarray, shape (points,)
+        As of `Summary`.
+    """
+
+    count: IntArray
+    mean: FloatArray
+    mean_error: FloatArray
+    std: FloatArray
+    std_error: FloatArray
+
+
+def summarise(values: FloatArray, probabilities: tuple[float, ...] = ()) -> Summary:
+    """Return what independent realisations of one number tell.
+
+    Parameters
+    ----------
+    values : ndarray, shape (realisations,)
+        At least one.
+    probabilities : tuple of float
+        Of the quantiles wanted.
+
+    Returns
+    -------
+    Summary
+
+    Notes
+    -----
+    The standard error of the standard deviation s is sqrt((m4 - s^4 (n - 3)/(n - 1))/n)/(2 s), m4
+    being the fourth central moment: no law is assumed.
+    """
+    count = len(values)
+    at_end = converge(values, np.array([count]))
+    deviation = values - float(values.mean())
+    second, third = float((deviation**2).mean()), float((deviation**3).mean())
+    skewness = math.nan
+    if count > 2 and second > 0.0:
+        skewness = third / second**1.5 * math.sqrt(count * (count - 1.0)) / (count - 2.0)
+    ordered = np.sort(values)
+    return Summary(
+        count=count,
+        mean=float(at_end.mean[0]),
+        std=float(at_end.std[0]),
+        mean_error=float(at_end.mean_error[0]),
+        std_error=float(at_end.std_error[0]),
+        skewness=skewness,
+        least=float(ordered[0]),
+        greatest=float(ordered[-1]),
+        quantiles=tuple(_quantile(ordered, probability) for probability in probabilities),
+    )
+
+
+def converge(values: FloatArray, counts: IntArray) -> Convergence:
+    """Return mean and standard deviation as they settle with the number of realisations.
+
+    Parameters
+    ----------
+    values : ndarray, shape (realisations,)
+        In the order of the realisations.
+    counts : ndarray of int, shape (points,)
+        The numbers of realisations to look at, from 1 on.
+
+    Returns
+    -------
+    Convergence
+        Nothing but nan where the spread of a single realisation is asked for.
+    """
+    centre = float(values.mean())
+    deviation = values - centre
+    n = counts.astype(np.float64)
+    # raw moments about a value nearby, from which the central ones follow without loss
+    r1, r2, r3, r4 = (np.cumsum(deviation**power)[counts - 1] / n for power in (1, 2, 3, 4))
+    second = np.maximum(r2 - r1**2, 0.0)
+    fourth = np.maximum(r4 - 4.0 * r1 * r3 + 6.0 * r1**2 * r2 - 3.0 * r1**4, 0.0)
+    several = np.where(n > 1.0, n, np.nan)
+    variance = second * n / (several - 1.0)
+    std = np.sqrt(variance)
+    of_variance = np.maximum(fourth - variance**2 * (n - 3.0) / (several - 1.0), 0.0) / n
+    spread = np.where(std > 0.0, std, 1.0)
+    return Convergence(
+        count=counts,
+        mean=centre + r1,
+        mean_error=std / np.sqrt(n),
+        std=std,
+        std_error=np.sqrt(of_variance) / (2.0 * spread) + 0.0 * several,
+    )
+
+
+def _quantile(ordered: FloatArray, probability: float) -> Quantile:
+    low, high = order_ranks(len(ordered), probability)
+    return Quantile(
+        probability=probability,
+        value=float(np.quantile(ordered, probability)),
+        low=float(ordered[low - 1]) if low > 0 else -math.inf,
+        high=float(ordered[high - 1]) if high <= len(ordered) else math.inf,
+    )
+
+
+def order_ranks(count: int, probability: float, confidence: float = CONFIDENCE) -> tuple[int, int]:
+    """Return between which order statistics a quantile lies, whatever the continuous law.
+
+    The number of realisations below the quantile is binomial, so that each end is missed with at
+    most half of what the confidence leaves.
+
+    Parameters
+    ----------
+    count : int
+        Realisations.
+    probability : float
+        Of the quantile, between 0 and 1.
+    confidence : float
+        Least probability that the interval holds the quantile.
+
+    Returns
+    -------
+    low, high : int
+        Ranks from 1 on; 0 and `count` + 1 stand for no such order statistic.
+
+    Notes
+    -----
+    David and Nagaraja, Order Statistics (2003), section 7.1.
+    """
+    from scipy.special import bdtr  # noqa: PLC0415  (slow to import, and rarely needed)
+
+    miss = 0.5 * (1.0 - confidence)
+    middle, far = count * probability, _FAR * math.sqrt(count * probability * (1.0 - probability))
+    first = max(math.floor(middle - far) - 1, 0)
+    below = np.arange(first, min(math.ceil(middle + far) + 1, count) + 1)
+    chance = bdtr(below.astype(np.float64), count, probability)
+    # rank r lies above the quantile with the chance of fewer than r below it
+    low = first + int(np.searchsorted(chance, miss, side="right"))
+    high = first + int(np.searchsorted(chance, 1.0 - miss, side="left")) + 1
+    return low, high
+
+
+class RowMoments:
+    """Mean and standard deviation of rows, to the same bits whatever batches they come in.
+
+    Parameters
+    ----------
+    columns : int
+        Length of a row.
+
+    Notes
+    -----
+    Chan, Golub, LeVeque, The American Statistician 37 (1983), DOI 10.1080/00031305.1983.10483115.
+    """
+
+    def __init__(self, columns: int) -> None:
+        self._waiting = np.empty((_BLOCK, columns))
+        self._held = 0
+        self._merged: tuple[int, FloatArray, FloatArray] = (0, np.zeros(columns), np.zeros(columns))
+
+    def add(self, rows: FloatArray) -> None:
+        """Take rows, shape (rows, columns)."""
+        taken = 0
+        while taken < len(rows):
+            part = rows[taken : taken + _BLOCK - self._held]
+            self._waiting[self._held : self._held + len(part)] = part
+            self._held += len(part)
+            taken += len(part)
+            if self._held == _BLOCK:
+                self._merged = _merge(self._merged, self._waiting)
+                self._held = 0
+
+    def mean_and_std(self) -> tuple[FloatArray, FloatArray]:
+        """Return the mean and the standard deviation so far, each (columns,); nan for one row."""
+        count, mean, square = self._merged
+        if self._held:
+            count, mean, square = _merge(self._merged, self._waiting[: self._held])
+        if count < 2:
+            return mean, np.full_like(mean, np.nan)
+        return mean, np.sqrt(square / (count - 1))
+
+
+def _merge(
+    so_far: tuple[int, FloatArray, FloatArray], rows: FloatArray
+) -> tuple[int, FloatArray, FloatArray]:
+    """Return count, mean and sum of squared deviations with `rows` among them."""
+    before, mean, square = so_far
+    own = rows.mean(axis=0)
+    own_square = ((rows - own) ** 2).sum(axis=0)
+    count, apart = before + len(rows), own - mean
+    return (
+        count,
+        mean + apart * (len(rows) / count),
+        square + own_square + apart**2 * (before * len(rows) / count),
+    )
