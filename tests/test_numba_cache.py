@@ -44,6 +44,8 @@ EVERYTHING = f"""
 import importlib, json, pkgutil
 import wearsim, wearsim.mechanics
 from pathlib import Path
+from wearsim.models.hertz_fastsim import HertzFastsim
+from wearsim.types import Creepage, Grid, Material, OperatingPoint
 
 def scenario(name, **overrides):
     overrides = {{key.replace("__", "."): value for key, value in overrides.items()}}
@@ -57,9 +59,12 @@ for stepper in ("implicit", "explicit", "per-pass"):
         run(name, evolution__stepper=stepper)
 run(contact__tangential="fastsim")
 run(contact__model="hertz-fastsim")
-march = {{"contact__closed_form": False, "creepage__yaw": "0.5 mrad", "creepage__tilt": "1 mrad"}}
+march = {{"contact__closed_form": "never", "creepage__yaw": "0.5 mrad", "creepage__tilt": "1 mrad"}}
 for more in ({{}}, march, march | {{"contact__dissipation": "element-sum"}}):
     wearsim.study_contact(scenario("mean-contact.toml", **more))
+model, grid = HertzFastsim(), Grid.spanning(-3e-3, 3e-3, 61)
+model.prepare(grid, (Material(200e9, 0.3), Material(200e9, 0.3)))
+model.friction_points(grid.y**2, 90.0, OperatingPoint(300.0, 2.6, Creepage(1e-3), 0.1))
 counts = {{}}
 for module in pkgutil.iter_modules(wearsim.mechanics.__path__):
     held = importlib.import_module(f"wearsim.mechanics.{{module.name}}")

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import TypeAlias
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import TypeAlias, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -118,14 +119,18 @@ class OperatingPoint:
         Rolling velocity V [m/s].
     creepage : Creepage
         Prescribed creepage; under a bearing torque its longitudinal value is only a first guess.
-    friction : float or ndarray, shape (strips,)
-        Friction coefficient mu, one value or one per strip.
+    friction : float or ndarray, shape (strips,) or (points, strips)
+        Friction coefficient mu: one value, one per strip, or one for each of a strip's points,
+        from the leading edge on, which the model names (`ContactModel.friction_points`).
     bearing_torque : float, optional
         Torque [N m] that the contact must carry to the roller's bearing. When given, the mean
         longitudinal creepage follows from the balance of torque.
     rolling_radius : ndarray, shape (strips,), optional
         Arm of each strip's longitudinal traction about the roller's axis [m]; needed with a
         bearing torque.
+    friction_carried : bool
+        Each of a strip's points is a particle that keeps its friction while it crosses the contact,
+        as where the pattern is fixed to a body; what is solved is the mean over the particles.
     """
 
     normal_force: float
@@ -134,6 +139,103 @@ class OperatingPoint:
     friction: float | FloatArray
     bearing_torque: float | None = None
     rolling_radius: FloatArray | None = None
+    friction_carried: bool = False
+
+
+@dataclass(frozen=True)
+class OperatingPoints(Sequence[OperatingPoint]):
+    """Many operating points without a bearing torque, as columns; a sequence of `OperatingPoint`.
+
+    Parameters
+    ----------
+    normal_force, longitudinal, lateral, spin : ndarray, shape (contacts,)
+        Load [N], longitudinal and lateral creepage, and spin [1/m].
+    friction : ndarray, shape (contacts,), (contacts, strips) or (contacts, points, strips)
+        Friction coefficient, as in `OperatingPoint`.
+    rolling_speed : float
+        Rolling velocity V [m/s].
+    variation : ndarray, shape (contacts, strips), optional
+        Variation of the longitudinal creepage, as in `Creepage`.
+    friction_carried : bool
+        As in `OperatingPoint`.
+    """
+
+    normal_force: FloatArray
+    longitudinal: FloatArray
+    lateral: FloatArray
+    spin: FloatArray
+    friction: FloatArray
+    rolling_speed: float
+    variation: FloatArray | None = None
+    friction_carried: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ("longitudinal", "lateral", "spin", "friction", "variation"):
+            column = getattr(self, name)
+            if column is not None and len(column) != len(self.normal_force):
+                raise ValueError(
+                    f"{name} has {len(column)} values for {len(self.normal_force)} contacts;"
+                    " give every contact one"
+                )
+
+    @classmethod
+    def of(cls, points: Sequence[OperatingPoint]) -> OperatingPoints | None:
+        """Return `points` as columns, or None where they are not all of one kind."""
+        if isinstance(points, cls):
+            return points
+        kinds = {
+            (
+                point.rolling_speed,
+                point.bearing_torque,
+                np.shape(point.friction),
+                point.friction_carried,
+                point.creepage.variation is None,
+            )
+            for point in points
+        }
+        if len(kinds) != 1 or points[0].bearing_torque is not None:
+            return None
+        creepages = [point.creepage for point in points]
+        plain = creepages[0].variation is None
+        return cls(
+            normal_force=np.array([point.normal_force for point in points], dtype=np.float64),
+            longitudinal=np.array([creepage.longitudinal for creepage in creepages]),
+            lateral=np.array([creepage.lateral for creepage in creepages]),
+            spin=np.array([creepage.spin for creepage in creepages]),
+            friction=np.array([point.friction for point in points]),
+            rolling_speed=points[0].rolling_speed,
+            variation=None if plain else np.array([item.variation for item in creepages]),
+            friction_carried=points[0].friction_carried,
+        )
+
+    def __len__(self) -> int:
+        return len(self.normal_force)
+
+    @overload
+    def __getitem__(self, index: int) -> OperatingPoint: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> OperatingPoints: ...
+
+    def __getitem__(self, index: int | slice) -> OperatingPoint | OperatingPoints:
+        variation = None if self.variation is None else self.variation[index]
+        if isinstance(index, slice):
+            names = ("normal_force", "longitudinal", "lateral", "spin", "friction")
+            columns = {name: getattr(self, name)[index] for name in names}
+            return replace(self, **columns, variation=variation)
+        friction = self.friction[index]
+        return OperatingPoint(
+            normal_force=float(self.normal_force[index]),
+            rolling_speed=self.rolling_speed,
+            creepage=Creepage(
+                float(self.longitudinal[index]),
+                float(self.lateral[index]),
+                float(self.spin[index]),
+                variation,
+            ),
+            friction=float(friction) if self.friction.ndim == 1 else friction,
+            friction_carried=self.friction_carried,
+        )
 
 
 @dataclass(frozen=True)
@@ -216,20 +318,52 @@ class ContactFields:
 
 @dataclass(frozen=True)
 class BatchSolution:
-    """Many solved contacts: the fields of `ContactSolution`, each with the batch's leading axes.
+    """Many solved contacts, column by column.
 
     Parameters
     ----------
     shape : tuple of int
         Leading axes: (station, roller, realisation).
-    solutions : sequence of ContactSolution
-        The contacts, last axis fastest.
+    y : ndarray, shape (strips,)
+        Axial position of the strips [m], the same for all contacts.
+    columns : mapping of str to ndarray
+        The other fields of `ContactSolution`, each with the leading axes first.
     """
 
     shape: tuple[int, ...]
-    solutions: Sequence[ContactSolution] = field(default_factory=tuple)
+    y: FloatArray
+    columns: Mapping[str, npt.NDArray[np.generic]]
+
+    @classmethod
+    def of(cls, shape: tuple[int, ...], solutions: Sequence[ContactSolution]) -> BatchSolution:
+        """Gather contacts that were solved one after another, last axis fastest."""
+        columns = {}
+        for name in _COLUMNS:
+            values = np.array([getattr(solution, name) for solution in solutions])
+            columns[name] = values.reshape(shape + values.shape[1:])
+        return cls(shape, solutions[0].y, columns)
 
     def stack(self, name: str) -> npt.NDArray[np.generic]:
         """Return the field `name` of every contact as one array with the leading axes first."""
-        values = np.array([getattr(solution, name) for solution in self.solutions])
-        return values.reshape(self.shape + values.shape[1:])
+        if name == "y":
+            return np.broadcast_to(self.y, self.shape + self.y.shape)
+        return self.columns[name]
+
+    @cached_property
+    def solutions(self) -> tuple[ContactSolution, ...]:
+        """The contacts one by one, last axis fastest."""
+        axes = len(self.shape)
+        # to lists where a contact has one number, so that it is a plain one of Python's
+        flat = [
+            self.columns[name].ravel().tolist()
+            if self.columns[name].ndim == axes
+            else self.columns[name].reshape(-1, len(self.y))
+            for name in _COLUMNS
+        ]
+        return tuple(
+            ContactSolution(self.y, **dict(zip(_COLUMNS, values, strict=True)))
+            for values in zip(*flat, strict=True)
+        )
+
+
+_COLUMNS = tuple(item.name for item in fields(ContactSolution) if item.name != "y")

@@ -1,14 +1,24 @@
-"""One contact: Hertz, the mean problem by three routes, and slender solves."""
+"""One contact: Hertz, the mean problem by three routes, slender solves; and many at once."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from tests.benchmarks.table import Effort, Row, best_short, part
+import numpy as np
+
+from tests.benchmarks.table import Effort, Row, best, best_short, part
 from wearsim.mechanics.elasticity import combine
 from wearsim.mechanics.hertz import HertzContact, hertz
+from wearsim.models.hertz_fastsim import HertzFastsim, HertzFastsimOptions
 from wearsim.plugins import ContactModelSpec, registry
-from wearsim.types import ContactSolution, Creepage, Grid, Material, OperatingPoint
+from wearsim.types import (
+    ContactSolution,
+    Creepage,
+    Grid,
+    Material,
+    OperatingPoint,
+    OperatingPoints,
+)
 
 STEEL = Material(youngs_modulus=200e9, poisson_ratio=0.3)
 ALONG, CROWN, LOAD = 1 / 0.020 + 1 / 0.025, 0.5, 300.0
@@ -50,8 +60,8 @@ def hertz_rows(effort: Effort) -> list[Row]:
 
 ROUTES: dict[str, dict[str, Any]] = {
     "closed form": {},
-    "FASTSIM, work of the rigid slip": {"closed_form": False},
-    "FASTSIM, the textbook's element sum": {"closed_form": False, "dissipation": "element-sum"},
+    "FASTSIM, work of the rigid slip": {"closed_form": "never"},
+    "FASTSIM, the textbook's element sum": {"closed_form": "never", "dissipation": "element-sum"},
 }
 ASKED = {"FASTSIM, work of the rigid slip": "0.1 % in power"}
 
@@ -65,6 +75,45 @@ def mean_rows(effort: Effort) -> list[Row]:
         seconds = best_short(mean.solve, effort.repetitions)
         what = f"mean problem, 50 x 50, {route}"
         rows.append(Row(what, seconds, ASKED.get(route, ""), f"{error} in power, of 0.073873 W"))
+    return rows
+
+
+def draws(contacts: int) -> OperatingPoints:
+    """Draw loads, creepages, yaws and tilts, and friction much as the paper does."""
+    random = np.random.default_rng(0)
+    angle, size = 2 * np.pi * random.random(contacts), 2e-3 * np.sqrt(random.random(contacts))
+    return OperatingPoints(
+        normal_force=random.normal(307.0, 32.0, contacts),
+        longitudinal=np.abs(random.normal(1e-3, 4e-4, contacts)),
+        lateral=size * np.cos(angle),
+        spin=size * np.sin(angle) / 0.020,
+        friction=np.abs(random.normal(0.1, 0.02, contacts)),
+        rolling_speed=POINT.rolling_speed,
+    )
+
+
+def many_rows(effort: Effort) -> list[Row]:
+    """Time a thousand contacts with spin, solved together; their error is that of the mean."""
+    points = draws(1000)
+    steps = 400 if not effort.quick else 100
+
+    def case(elements: int, strips: int, form: str) -> tuple[float, float]:
+        model = HertzFastsim(HertzFastsimOptions(mx=elements, closed_form=form))
+        grid = Grid.spanning(-1.8e-3, 1.8e-3, strips)
+        model.prepare(grid, (STEEL, STEEL))
+        gap = np.broadcast_to(grid.y**2 / (2 * CROWN), (1, 1, len(points), strips))
+        power = float(model.solve_batch(gap, ALONG, points).stack("power").mean())
+        return best(lambda: model.solve_batch(gap, ALONG, points), effort.repetitions), power
+
+    truth = case(steps, steps, "never")[1]
+    rows = []
+    for what, elements, strips, form, asked in (
+        ("50 x 50, FASTSIM", 50, 50, "never", "0.1 s, aim 0.02 s"),
+        ("24 strips, closed form", 50, 24, "always", ""),
+    ):
+        seconds, power = case(elements, strips, form)
+        error = f"{part(power / truth - 1)} in mean power, against {steps} x {steps}"
+        rows.append(Row(f"1000 contacts with spin at once, {what}", seconds, asked, error))
     return rows
 
 

@@ -15,6 +15,7 @@ from tests.benchmarks.table import Effort, Row, machine, markdown
 
 TABLES: dict[str, list[Callable[[Effort], list[Row]]]] = {
     "One contact": [contacts.hertz_rows, contacts.mean_rows, contacts.slender_rows],
+    "Many contacts at once": [contacts.many_rows],
     "Whole tests, in-process, once compiled": [replays.replay_rows, replays.file_rows],
     "At the shell": [starts.import_rows, starts.run_rows],
 }

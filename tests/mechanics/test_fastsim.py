@@ -9,13 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.reference import rows, table
-from wearsim.mechanics.fastsim import (
-    closed_form,
-    closed_form_parabolic,
-    element_sum,
-    march,
-    march_fields,
-)
+from wearsim.mechanics.fastsim import march, march_local, new_sums
+from wearsim.mechanics.fastsim_closed_form import closed_form, closed_form_parabolic
+from wearsim.mechanics.fastsim_fields import element_sum, march_fields, march_local_fields
 from wearsim.mechanics.hertz import hertz
 from wearsim.mechanics.kalker import flexibilities, line_limit_coefficients
 
@@ -98,6 +94,17 @@ def twin(half_length, bound_peak, elliptic, gradient_x, gradient_y, gradient_spi
     return sums
 
 
+def local(case, friction, first=0):
+    """March under a field of friction; `case` was cut with a coefficient of 0.1."""
+    sums = new_sums(len(case.half_length))
+    half_length, bound_peak, elliptic, *gradients = case.arguments
+    flexible = case.flex.longitudinal, case.flex.lateral
+    march_local(
+        half_length, bound_peak / 0.1, friction, first, elliptic, *gradients, *flexible, sums
+    )
+    return sums
+
+
 SCENES = [
     {"xi": 1e-3},
     {"xi": -4e-4, "eta": 5e-4, "phi": 0.5},
@@ -132,6 +139,43 @@ def test_that_the_fields_add_up_to_the_sums_of_the_march(scene, elliptic):
         assert found == pytest.approx(expected, rel=1e-9, abs=1e-10 * np.abs(whole).max() * dx[5])
     sticks = ((cut_x == 0.0) & (cut_y == 0.0))[1:].sum(axis=0)
     assert sums[3] == pytest.approx(sticks * dx, rel=1e-12)
+
+
+@pytest.mark.parametrize("elliptic", [False, True])
+@pytest.mark.parametrize("scene", SCENES)
+def test_that_a_uniform_field_of_friction_is_a_coefficient(scene, elliptic):
+    case = rig(strips=11, elliptic=elliptic, **scene)
+    found, expected = local(case, np.full((24, 11), 0.1)), march(*case.arguments, 24)
+    scale = np.abs(expected).max(axis=1)
+    for row, name in enumerate(("force_x", "force_y", "moment", "adhesion")):
+        assert getattr(found, name) == pytest.approx(expected[row], abs=1e-14 * scale[row])
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_that_a_field_of_friction_adds_up_as_its_inside_does(scene):
+    case = rig(strips=11, **scene)
+    friction = np.random.default_rng(0).uniform(0.02, 0.2, (30, 14))
+    half_length, bound_peak, elliptic, *gradients = case.arguments
+    own = np.ascontiguousarray(friction[:, 2:13])
+    inside = march_local_fields(half_length, bound_peak / 0.1, own, elliptic, *gradients)
+    size = np.hypot(inside[0], inside[1])[1:]
+    place = np.linspace(1.0, -1.0, 31)[1:, None]
+    bound = own * (1.0 - place**2) * bound_peak / 0.1
+    assert np.all(size <= bound * (1.0 + 1e-12) + 1e-3)
+    found, dx = local(case, friction, first=2), half_length / 15.0
+    scale = size.max() * dx.max()
+    assert found.force_x == pytest.approx(inside[0].sum(axis=0) * dx, abs=1e-12 * scale)
+    assert found.force_y == pytest.approx(inside[1].sum(axis=0) * dx, abs=1e-12 * scale)
+    expected = element_sum(inside, case.flex.longitudinal, case.flex.lateral, 1.0)
+    assert found.work == pytest.approx(expected, rel=1e-10, abs=1e-12 * expected.max())
+
+
+def test_that_full_sliding_integrates_friction_times_pressure():
+    # mu = 0.1 (1 + s^2) with s = x/a: the integral of (1 - s^2)(1 + s^2) is 8/5
+    case = rig(strips=11, xi=0.5)
+    place = np.linspace(1.0, -1.0, 401)[1:, None]
+    sums = local(case, 0.1 * (1.0 + place**2) + np.zeros(11))
+    assert sums.force_x == pytest.approx(-1.6 * case.bound_peak * case.half_length, rel=1e-4)
 
 
 def test_that_no_traction_exceeds_the_bound_and_all_vanish_at_both_edges():

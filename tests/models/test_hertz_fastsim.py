@@ -1,6 +1,7 @@
 """The contact model `hertz-fastsim`, and FASTSIM on the strips of other contacts."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from wearsim.mechanics.hertz import hertz
 from wearsim.models.fastsim_theory import FastsimTheory, equivalent_ellipse
 from wearsim.models.hertz_fastsim import SPEC, HertzFastsim, HertzFastsimOptions
 from wearsim.models.tangential import Strips, complete
-from wearsim.types import Creepage, Grid, OperatingPoint
+from wearsim.types import Creepage, Grid, OperatingPoint, OperatingPoints
 
 MATERIALS = (STEEL, STEEL)
 PAIR = combine(*MATERIALS)
@@ -49,7 +50,7 @@ def test_that_the_mean_problem_dissipates_0_073873_watts_in_closed_form():
 
 
 def test_that_50_by_50_fastsim_is_within_a_thousandth_of_it():
-    *_, solution = contact(kalker="line-limit", closed_form=False)
+    *_, solution = contact(kalker="line-limit", closed_form="never")
     assert solution.power == pytest.approx(0.073873, rel=1e-3)
 
 
@@ -104,13 +105,13 @@ def test_that_strips_partly_covered_keep_the_power_smooth(bound):
         assert power == pytest.approx(exact, rel=1e-3)
 
 
-@pytest.mark.parametrize("closed_form", [True, False])
+@pytest.mark.parametrize("closed_form", ["exact", "always", "never"])
 def test_that_mirroring_the_contact_mirrors_the_solution(closed_form):
     grid = Grid.spanning(-3e-3, 3e-3, 60)
     solutions = [
         contact(
             grid,
-            (8e-4, sign * 4e-4, 0.0 if closed_form else sign * 0.4),
+            (8e-4, sign * 4e-4, 0.0 if closed_form == "exact" else sign * 0.4),
             shape=lambda y, s=sign: (y - s * 3e-4) ** 2,
             closed_form=closed_form,
         )[-1]
@@ -261,7 +262,7 @@ def test_that_creepage_may_vary_from_strip_to_strip():
     y = model.suggest_grid(RIG[1], RIG[0], 300.0, MATERIALS).y
     creepage = Creepage(1e-3, variation=200.0 * y**2)
     point = OperatingPoint(300.0, SPEED, creepage, 0.1)
-    for closed_form in (True, False):
+    for closed_form in ("exact", "never"):
         chosen = HertzFastsim(HertzFastsimOptions(closed_form=closed_form, mx=400))
         chosen.prepare(model.suggest_grid(RIG[1], RIG[0], 300.0, MATERIALS), MATERIALS)
         solution = chosen.solve(gap, RIG[0], point)
@@ -275,7 +276,7 @@ def test_that_creepage_may_vary_from_strip_to_strip():
 @pytest.mark.parametrize("bound", ["parabolic", "elliptic"])
 def test_that_the_fields_are_the_inside_of_the_solution(bound):
     creepage = (6e-4, 3e-4, 0.0)
-    model, gap, point, solution = contact(creepage=creepage, bound=bound, closed_form=False)
+    model, gap, point, solution = contact(creepage=creepage, bound=bound, closed_form="never")
     fields = model.fields(solution, gap, RIG[0], point, points_along=401)
     assert fields.x.shape == fields.slip_x.shape == (401, 50)
     assert np.all(np.diff(fields.x, axis=0) > 0.0)
@@ -293,6 +294,258 @@ def test_that_the_fields_are_the_inside_of_the_solution(bound):
     assert fields.pressure.max() == pytest.approx(solution.peak_pressure, rel=2e-3)
     assert np.all(fields.power_density[fields.adhesion] == 0.0)
     assert np.all(fields.power_density >= -1e-6 * fields.power_density.max())
+
+
+CONTACTS = 60
+
+
+def draws(contacts=CONTACTS, seed=0):
+    """Return operating points like the paper's: load, creepage, yaw and tilt, and friction."""
+    random = np.random.default_rng(seed)
+    radius, angle = 2e-3 * np.sqrt(random.random(contacts)), 2 * np.pi * random.random(contacts)
+    return OperatingPoints(
+        normal_force=random.normal(307.0, 32.0, contacts),
+        longitudinal=np.abs(random.normal(1e-3, 4e-4, contacts)),
+        lateral=radius * np.cos(angle),
+        spin=radius * np.sin(angle) / 20e-3,
+        friction=np.abs(random.normal(0.1, 0.02, contacts)),
+        rolling_speed=SPEED,
+    )
+
+
+def batch(points, shape=None, half=3e-3, strips=50, **options):
+    """Solve the rig's contacts under `points` together, on one gap or on the shape of each."""
+    model, grid = HertzFastsim(HertzFastsimOptions(**options)), Grid.spanning(-half, half, strips)
+    model.prepare(grid, MATERIALS)
+    gap = np.broadcast_to(grid.y**2, (1, 1, len(points), strips))
+    if shape is not None:
+        gap = np.array([shape(grid.y, k) for k in range(len(points))])[None, None]
+    return model, gap, model.solve_batch(gap, RIG[0], points)
+
+
+def assert_same(found, expected):
+    for name, value in vars(expected).items():
+        # adhesion is counted in points; a moment is what is left of the forces times their arms
+        scale = 300.0 * 3e-3 if name == "spin_moment" else np.abs(value).max()
+        assert getattr(found, name) == pytest.approx(value, rel=0.0, abs=1e-13 * scale), name
+        assert type(getattr(found, name)) is type(value)
+
+
+OPTIONS = [
+    {},
+    {"closed_form": "always"},
+    {"closed_form": "never", "bound": "elliptic", "mx": 17},
+    {"dissipation": "element-sum"},
+    {"kalker": "line-limit"},
+    {"kalker_coefficients": {"c11": 4.0, "c22": 3.0, "c23": 0.5}},
+    {"patch": {"a": "0.2 mm", "b": "2 mm"}},
+]
+
+
+@pytest.mark.parametrize("spin", [True, False])
+@pytest.mark.parametrize("options", OPTIONS)
+def test_that_a_batch_is_solved_as_each_contact_alone(options, spin):
+    points = draws() if spin else replace(draws(), spin=np.zeros(CONTACTS))
+    model, gap, found = batch(points, **options)
+    assert found.stack("line_load").shape == (1, 1, CONTACTS, 50)
+    for k in range(0, CONTACTS, 4):
+        assert_same(found.solutions[k], model.solve(gap[0, 0, k], RIG[0], points[k]))
+
+
+def test_that_a_batch_takes_any_gaps_friction_per_strip_and_varied_creepage():
+    random = np.random.default_rng(1)
+    shapes = [groove(depth, offset) for depth, offset in random.random((CONTACTS, 2)) * 3e-6]
+    points = replace(
+        draws(),
+        friction=random.uniform(0.05, 0.15, (CONTACTS, 81)),
+        variation=random.normal(size=(CONTACTS, 81)) * 1e-4,
+    )
+    model, gap, found = batch(points, lambda y, k: shapes[k](y), 9e-3, 81)
+    for k in range(0, CONTACTS, 4):
+        assert_same(found.solutions[k], model.solve(gap[0, 0, k], RIG[0], points[k]))
+
+
+def test_that_a_list_of_points_is_solved_as_their_columns():
+    points = draws()
+    model, gap, found = batch(points)
+    listed = model.solve_batch(gap, RIG[0], list(points))
+    assert np.array_equal(listed.stack("power"), found.stack("power"))
+    part = model.solve_batch(gap[:, :, 10:20], RIG[0], points[10:20])
+    assert np.array_equal(part.stack("dissipation"), found.stack("dissipation")[:, :, 10:20])
+
+
+def test_that_columns_of_different_lengths_are_refused():
+    with pytest.raises(ValueError, match="spin has 2 values for 60 contacts"):
+        replace(draws(), spin=np.zeros(2))
+
+
+def test_that_a_batch_under_bearing_torques_is_solved_too():
+    model, gap, _, _ = contact()
+    points = [
+        OperatingPoint(
+            300.0, SPEED, Creepage(0.0), 0.1, bearing_torque=torque,
+            rolling_radius=np.full(50, 20e-3),
+        )
+        for torque in (0.1, 0.2)
+    ]  # fmt: skip
+    found = model.solve_batch(np.array([gap, gap]), RIG[0], points)
+    assert -found.stack("force_x") * 20e-3 == pytest.approx([0.1, 0.2], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("change", "match"),
+    [
+        ({"normal_force": 0.0}, "contact is lost"),
+        ({"normal_force": 1e5}, "leaves its strips"),
+        ({"lateral": math.nan}, "power is not finite"),
+    ],
+)
+def test_that_a_batch_names_the_contact_that_fails(change, match):
+    points = draws()
+    for name, value in change.items():
+        getattr(points, name)[17] = value
+    with pytest.raises(ContactError, match=f"^realisation 17: .*{match}") as caught:
+        batch(points)
+    assert caught.value.state["contact"] == [0, 0, 17]
+    assert "gap" in caught.value.state
+
+
+def test_that_a_batch_needs_a_curvature_along_rolling_and_friction_of_a_shape_it_knows():
+    points = draws()
+    model, gap, _ = batch(points)
+    with pytest.raises(ContactError, match="curvature along rolling is -1 1/m"):
+        model.solve_batch(gap, -1.0, points)
+    with pytest.raises(ValueError, match=r"friction has the shape \(7, 50\)"):
+        batch(replace(points, friction=np.full((CONTACTS, 7, 50), 0.1)))
+    with pytest.raises(ValueError, match="60 operating points for a batch of 59 contacts"):
+        model.solve_batch(gap[:, :, 1:], RIG[0], points)
+    with pytest.raises(CapabilityError, match="stepper = 'explicit'"):
+        model.solve_batch(gap, RIG[0], points, np.zeros_like(gap))
+
+
+def test_that_leaving_out_the_spins_slip_along_rolling_costs_what_we_say():
+    points = draws(300)
+    powers = {
+        name: batch(points, None, 1.8e-3, strips, closed_form=form, mx=mx)[2].stack("power").ravel()
+        for name, form, strips, mx in (
+            ("truth", "never", 200, 200),
+            ("strips", "always", 200, 200),
+            ("quick", "always", 24, 50),
+        )
+    }
+    truth = powers["truth"]
+    error = powers["strips"] / truth - 1.0
+    assert np.sqrt(np.mean(error**2)) < 2.5e-3
+    assert np.abs(error).max() < 0.03
+    for name, tolerance in (("strips", 2e-4), ("quick", 1e-3)):
+        assert powers[name].mean() == pytest.approx(truth.mean(), rel=tolerance)
+        assert powers[name].std() == pytest.approx(truth.std(), rel=tolerance)
+
+
+def test_that_the_closed_form_with_spin_keeps_the_energy_balance():
+    *_, point, solution = contact(creepage=(6e-4, 3e-4, 0.2), closed_form="always")
+    assert solution.power == pytest.approx(balance(point, solution), rel=1e-12)
+
+
+FIELD_OPTIONS = [{}, {"bound": "elliptic"}, {"dissipation": "element-sum"}]
+
+
+@pytest.mark.parametrize("options", FIELD_OPTIONS)
+def test_that_a_uniform_field_of_friction_is_one_coefficient(options):
+    options = options | {"closed_form": "never"}
+    model, gap, point, expected = contact(creepage=(4e-4, 5e-4, 0.3), **options)
+    for carried in (False, True):
+        field = replace(point, friction=np.full((50, 50), 0.1), friction_carried=carried)
+        found = model.solve(gap, RIG[0], field)
+        assert found.dissipation == pytest.approx(expected.dissipation, rel=1e-13)
+        assert found.adhesion_fraction == pytest.approx(expected.adhesion_fraction, rel=1e-12)
+        assert found.force_y == pytest.approx(expected.force_y, rel=1e-13)
+
+
+def test_that_carried_friction_gives_the_mean_over_its_particles():
+    model, gap, point, _ = contact(creepage=(4e-4, 5e-4, 0.0), mx=6)
+    friction = np.random.default_rng(3).uniform(0.05, 0.2, (6, 50))
+    found = model.solve(gap, RIG[0], replace(point, friction=friction, friction_carried=True))
+    alone = [model.solve(gap, RIG[0], replace(point, friction=row)) for row in friction]
+    for name in ("dissipation", "force_x", "force_y", "adhesion_fraction", "power"):
+        mean = np.mean([getattr(solution, name) for solution in alone], axis=0)
+        assert getattr(found, name) == pytest.approx(mean, rel=1e-13), name
+
+
+def noise(points_along, strips, carried=False, contacts=12):
+    """Return the mean power, and its standard error, with friction drawn for every point."""
+    random = np.random.default_rng(points_along)
+    same = np.ones(contacts)
+    points = OperatingPoints(
+        normal_force=300.0 * same,
+        longitudinal=1e-3 * same,
+        lateral=0.0 * same,
+        spin=0.0 * same,
+        friction=random.normal(0.1, 0.02, (contacts, points_along, strips)),
+        rolling_speed=SPEED,
+        friction_carried=carried,
+    )
+    options = {"mx": points_along, "kalker": "line-limit"}
+    half = 0.5 * strips * contact(my=strips)[0]._grid.spacing
+    power = batch(points, None, half, strips, **options)[2].stack("power").ravel()
+    return power.mean(), power.std() / math.sqrt(contacts)
+
+
+@pytest.mark.parametrize(
+    ("cells", "expected"),
+    [(25, 0.0689), (50, 0.0653), (100, 0.0614), (200, 0.0569), (400, 0.0527), (800, 0.0487)],
+)
+def test_that_white_noise_falls_with_its_grid_as_we_know(cells, expected):
+    mean, deviation = noise(cells, strips=50)
+    assert deviation < 0.01 * expected
+    assert mean == pytest.approx(expected, rel=0.02)
+
+
+def test_that_white_noise_carried_through_the_contact_has_a_limit():
+    # that limit is the mean of the power over the coefficient's own distribution
+    nodes, weights = np.polynomial.hermite_e.hermegauss(21)
+    powers = [contact(mu=0.1 + 0.02 * z, kalker="line-limit")[-1].power for z in nodes]
+    limit = np.dot(weights, powers) / weights.sum()
+    for cells in (25, 100, 400):
+        mean, deviation = noise(cells, 50, carried=True)
+        assert mean == pytest.approx(limit, abs=4.0 * deviation)
+    assert deviation < 1e-3 * limit
+
+
+def test_that_friction_is_asked_for_where_the_steps_of_the_march_end():
+    model, gap, point, solution = contact(Grid.spanning(-3e-3, 3e-3, 60), mx=10)
+    x, y = model.friction_points(gap, RIG[0], point)
+    assert np.array_equal(y, solution.y)
+    expected = (1.0 - 0.2 * np.arange(1, 11))[:, None] * solution.half_length
+    assert x == pytest.approx(expected, abs=1e-18)
+    points = draws()
+    model, gap, found = batch(points, mx=10)
+    many, _ = model.friction_points_batch(gap, RIG[0], points)
+    assert many.shape == (CONTACTS, 10, 50)
+    assert np.array_equal(-many[:, -1], found.stack("half_length")[0, 0])
+    listed, _ = model.friction_points_batch(gap, RIG[0], list(points))
+    assert np.array_equal(listed, many)
+    points.normal_force[3] = -1.0
+    with pytest.raises(ContactError, match="realisation 3: the contact is lost"):
+        model.friction_points_batch(gap, RIG[0], points)
+
+
+def test_that_the_fields_know_friction_that_differs_from_point_to_point():
+    model, gap, point, _ = contact(creepage=(6e-4, 3e-4, 0.1), mx=200)
+    friction = np.random.default_rng(4).uniform(0.05, 0.15, (200, 50))
+    local = replace(point, friction=friction)
+    solution = model.solve(gap, RIG[0], local)
+    fields = model.fields(solution, gap, RIG[0], local)
+    assert fields.x.shape == (201, 50)
+    spacing = solution.y[1] - solution.y[0]
+    force = np.trapezoid(fields.traction_x, fields.x, axis=0).sum() * spacing
+    assert force == pytest.approx(solution.force_x, rel=1e-12)
+    bound = friction[::-1] * 4.0 / 3.0 * fields.pressure[:-1]
+    assert np.all(np.hypot(fields.traction_x, fields.traction_y)[:-1] <= bound + 1e-3)
+    with pytest.raises(CapabilityError, match="no one field inside"):
+        model.fields(solution, gap, RIG[0], replace(local, friction_carried=True))
+    with pytest.raises(CapabilityError, match="without a bearing torque"):
+        model.solve(gap, RIG[0], replace(local, bearing_torque=0.1, rolling_radius=np.ones(50)))
 
 
 def hertz_strips(strips=81):

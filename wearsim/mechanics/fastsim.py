@@ -3,11 +3,28 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from wearsim.mechanics.jit import kernel
 from wearsim.types import FloatArray
+
+
+class Sums(NamedTuple):
+    """What a march sums up in every strip, and the traction where it stands; all (strips,).
+
+    Integrals of the longitudinal and the lateral traction [N/m] and of x times the latter [N],
+    length in adhesion [m], the element sum over V [N/m] and the tractions [Pa].
+    """
+
+    force_x: FloatArray
+    force_y: FloatArray
+    moment: FloatArray
+    adhesion: FloatArray
+    work: FloatArray
+    traction_x: FloatArray
+    traction_y: FloatArray
 
 
 @kernel
@@ -52,26 +69,123 @@ def march(
     -----
     Kalker (1982), DOI 10.1080/00423118208968684.
     """
-    strips = len(half_length)
-    out = np.zeros((4, strips))
-    force_x, force_y, moment, adhesion = out[0], out[1], out[2], out[3]
-    traction_x, traction_y = np.zeros(strips), np.zeros(strips)
+    sums = new_sums(len(half_length))
+    march_into(
+        half_length,
+        bound_peak,
+        elliptic,
+        gradient_x,
+        gradient_y,
+        gradient_spin,
+        points,
+        sums,
+    )
+    return stacked(sums)
+
+
+@kernel
+def new_sums(strips: int) -> Sums:
+    """Return room for what the march of so many strips sums up.
+
+    Parameters
+    ----------
+    strips : int
+        Number of strips.
+    """
+    rows = np.zeros((7, strips))
+    return Sums(rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6])
+
+
+@kernel
+def part_of(sums: Sums, first: int, stop: int) -> Sums:
+    """Return the room of the strips from `first` to before `stop`.
+
+    Parameters
+    ----------
+    sums : Sums
+        The room of all strips.
+    first, stop : int
+        Number of the first strip, and of the one after the last.
+    """
+    return Sums(
+        sums.force_x[first:stop],
+        sums.force_y[first:stop],
+        sums.moment[first:stop],
+        sums.adhesion[first:stop],
+        sums.work[first:stop],
+        sums.traction_x[first:stop],
+        sums.traction_y[first:stop],
+    )
+
+
+@kernel
+def stacked(sums: Sums) -> FloatArray:
+    """Return the first four of the sums as one array, shape (4, strips)."""
+    out = np.empty((4, len(sums.force_x)))
+    out[0], out[1], out[2], out[3] = sums.force_x, sums.force_y, sums.moment, sums.adhesion
+    return out
+
+
+@kernel
+def clear(sums: Sums) -> None:
+    """Set the sums to zero, as at the leading edge.
+
+    Parameters
+    ----------
+    sums : Sums
+        Overwritten.
+    """
+    for j in range(len(sums.force_x)):
+        sums.force_x[j] = sums.force_y[j] = sums.moment[j] = 0.0
+        sums.adhesion[j] = sums.work[j] = 0.0
+        sums.traction_x[j] = sums.traction_y[j] = 0.0
+
+
+@kernel
+def _times_step(sums: Sums, half_length: FloatArray, cell: float) -> None:
+    """Turn sums over the points into integrals along the strips."""
+    for j in range(len(half_length)):
+        dx = cell * half_length[j]
+        sums.force_x[j] *= dx
+        sums.force_y[j] *= dx
+        sums.moment[j] *= dx * half_length[j]
+        sums.adhesion[j] *= dx
+
+
+@kernel
+def march_into(
+    half_length: FloatArray,
+    bound_peak: FloatArray,
+    elliptic: bool,
+    gradient_x: FloatArray,
+    gradient_y: float,
+    gradient_spin: float,
+    points: int,
+    sums: Sums,
+) -> None:
+    """March as `march` does, into room that is there already.
+
+    Parameters
+    ----------
+    half_length, bound_peak, elliptic, gradient_x, gradient_y, gradient_spin, points
+        As in `march`.
+    sums : Sums
+        Overwritten.
+    """
+    force_x, force_y, moment = sums.force_x, sums.force_y, sums.moment
+    adhesion, traction_x, traction_y = sums.adhesion, sums.traction_x, sums.traction_y
+    clear(sums)
     cell = 2.0 / points
     for k in range(1, points + 1):
-        place = 1.0 - cell * k if k < points else -1.0
+        place = place_of(k, points)
         middle = place + 0.5 * cell
-        shape = (1.0 - place) * (1.0 + place)
-        if elliptic:
-            shape = math.sqrt(shape)
-        for j in range(strips):
+        shape = bound_shape(place, elliptic)
+        for j in range(len(half_length)):
             a = half_length[j]
             dx = cell * a
             tx = traction_x[j] - gradient_x[j] * dx
             ty = traction_y[j] - (gradient_y + gradient_spin * middle * a) * dx
-            bound = shape * bound_peak[j]
-            square = tx * tx + ty * ty
-            sticks = square <= bound * bound
-            scale = 1.0 if sticks else bound / math.sqrt(square)
+            sticks, scale = hold(tx, ty, shape * bound_peak[j])
             tx *= scale
             ty *= scale
             traction_x[j] = tx
@@ -80,196 +194,104 @@ def march(
             force_y[j] += ty
             moment[j] += place * ty
             adhesion[j] += 1.0 if sticks else 0.0
-    for j in range(strips):
-        dx = cell * half_length[j]
-        force_x[j] *= dx
-        force_y[j] *= dx
-        moment[j] *= dx * half_length[j]
-        adhesion[j] *= dx
-    return out
+    _times_step(sums, half_length, cell)
 
 
 @kernel
-def march_fields(
+def place_of(step: int, points: int) -> float:
+    """Return x/a where a step ends, from just behind the leading edge to -1.
+
+    Parameters
+    ----------
+    step, points : int
+        Number of the step, from 1 on, and steps mx along the strip.
+    """
+    return 1.0 - 2.0 / points * step if step < points else -1.0
+
+
+@kernel
+def bound_shape(place: float, elliptic: bool) -> float:
+    """Return the traction bound at x/a = `place` over that at x = 0.
+
+    Parameters
+    ----------
+    place : float
+        x/a, from -1 to 1.
+    elliptic : bool
+        As in `march`.
+    """
+    shape = (1.0 - place) * (1.0 + place)
+    return math.sqrt(shape) if elliptic else shape
+
+
+@kernel
+def hold(traction_x: float, traction_y: float, bound: float) -> tuple[bool, float]:
+    """Return whether the traction keeps to the bound, and the factor that holds it there.
+
+    Parameters
+    ----------
+    traction_x, traction_y, bound : float
+        Trial traction and its bound [Pa].
+    """
+    square = traction_x * traction_x + traction_y * traction_y
+    sticks = square <= bound * bound
+    return sticks, 1.0 if sticks else bound / math.sqrt(square)
+
+
+@kernel
+def march_local(
     half_length: FloatArray,
     bound_peak: FloatArray,
+    friction: FloatArray,
+    first: int,
     elliptic: bool,
     gradient_x: FloatArray,
     gradient_y: float,
     gradient_spin: float,
-    points: int,
-) -> FloatArray:
-    """March as `march` does, and keep what it passes.
+    longitudinal: float,
+    lateral: float,
+    sums: Sums,
+) -> None:
+    """March as `march` does under friction that differs from point to point.
 
     Parameters
     ----------
-    half_length, bound_peak, elliptic, gradient_x, gradient_y, gradient_spin, points
+    half_length, elliptic, gradient_x, gradient_y, gradient_spin
         As in `march`.
-
-    Returns
-    -------
-    ndarray, shape (4, points + 1, strips)
-        Longitudinal and lateral traction [Pa], and what the bound cut off each of them [Pa]; from
-        the leading edge x = a to the trailing edge x = -a. Slip over the rolling velocity is
-        ``-cut * L / dx`` in each direction, with its flexibility L.
+    bound_peak : ndarray, shape (strips,)
+        The traction bound's pressure at x = 0 [Pa], without friction.
+    friction : ndarray, shape (points, all strips)
+        Friction coefficient where each step ends, from the leading edge on.
+    first : int
+        Where in `friction` the strips begin.
+    longitudinal, lateral : float
+        Flexibilities L1 and L2 [m/Pa], for the element sum alone.
+    sums : Sums
+        Overwritten; `work` is the textbook's element sum over the rolling velocity.
     """
-    strips = len(half_length)
-    out = np.zeros((4, points + 1, strips))
+    force_x, force_y, moment, work = sums.force_x, sums.force_y, sums.moment, sums.work
+    adhesion, traction_x, traction_y = sums.adhesion, sums.traction_x, sums.traction_y
+    clear(sums)
+    points = len(friction)
     cell = 2.0 / points
     for k in range(1, points + 1):
-        place = 1.0 - cell * k if k < points else -1.0
+        place = place_of(k, points)
         middle = place + 0.5 * cell
-        shape = (1.0 - place) * (1.0 + place)
-        if elliptic:
-            shape = math.sqrt(shape)
-        for j in range(strips):
+        shape = bound_shape(place, elliptic)
+        for j in range(len(half_length)):
             a = half_length[j]
             dx = cell * a
-            tx = out[0, k - 1, j] - gradient_x[j] * dx
-            ty = out[1, k - 1, j] - (gradient_y + gradient_spin * middle * a) * dx
-            bound = shape * bound_peak[j]
-            square = tx * tx + ty * ty
-            scale = 1.0 if square <= bound * bound else bound / math.sqrt(square)
-            out[0, k, j] = scale * tx
-            out[1, k, j] = scale * ty
-            out[2, k, j] = (1.0 - scale) * tx
-            out[3, k, j] = (1.0 - scale) * ty
-    return out
-
-
-def element_sum(
-    fields: FloatArray, longitudinal: float, lateral: float, rolling_speed: float
-) -> FloatArray:
-    """Return the textbook's dissipation: each element's new traction times its slip, added up.
-
-    First order in dx, and low; kept to show what it costs against the work of the rigid slip.
-
-    Parameters
-    ----------
-    fields : ndarray, shape (4, points + 1, strips)
-        As `march_fields` returns them.
-    longitudinal, lateral : float
-        Flexibilities L1 and L2 [m/Pa].
-    rolling_speed : float
-        V [m/s].
-
-    Returns
-    -------
-    ndarray, shape (strips,)
-        P_l [W/m].
-    """
-    traction_x, traction_y, cut_x, cut_y = fields
-    work = longitudinal * traction_x * cut_x + lateral * traction_y * cut_y
-    return np.asarray(rolling_speed * work.sum(axis=0))
-
-
-def closed_form(
-    half_length: FloatArray,
-    bound_peak: FloatArray,
-    elliptic: bool,
-    gradient_x: FloatArray,
-    gradient_y: float,
-) -> FloatArray:
-    """Return what `march` tends to without spin, where each traction keeps one direction.
-
-    With G = |gradient| the traction climbs as G s behind the leading edge until it meets the bound,
-    where it stays: at s = 2a - kappa, kappa = G a^2/bound_peak, for the parabolic bound, and at
-    s = 2a/(1 + k^2), k = G a/bound_peak, for the elliptic one.
-
-    Parameters
-    ----------
-    half_length, bound_peak, elliptic, gradient_x, gradient_y
-        As in `march`.
-
-    Returns
-    -------
-    ndarray, shape (4, strips)
-        As `march` returns, the moment being that of the same tractions.
-
-    Notes
-    -----
-    Integrated here from the march of Kalker (1982), DOI 10.1080/00423118208968684.
-    """
-    size = np.hypot(gradient_x, gradient_y)
-    inside = (half_length > 0.0) & (size > 0.0) & (bound_peak > 0.0)
-    a = np.where(inside, half_length, 1.0)
-    steep = np.where(inside, size, 1.0)
-    peak = np.where(inside, bound_peak, 1.0)
-    stick, force, moment = (_elliptic if elliptic else _parabolic)(a, steep, peak)
-    idle = (half_length > 0.0) & (size == 0.0)
-    adhesion = np.where(inside, stick, np.where(idle, 2.0 * half_length, 0.0))
-    toward_x = np.where(inside, -gradient_x / steep, 0.0)
-    toward_y = np.where(inside, -gradient_y / steep, 0.0)
-    return np.stack([force * toward_x, force * toward_y, moment * toward_y, adhesion])
-
-
-def _parabolic(
-    a: FloatArray, steep: FloatArray, peak: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return adhesion length, force and moment (x times traction) for the parabolic bound."""
-    kappa = np.minimum(steep * a**2 / peak, 2.0 * a)
-    stick = 2.0 * a - kappa
-    # x = a - s; in adhesion the traction is G s, in slip peak s(2a - s)/a^2
-    slip_force = peak * kappa**2 * (3.0 * a - kappa) / (3.0 * a**2)
-    edge = kappa - a  # x where slip starts
-    slip_moment = -0.25 * peak * (a**2 - edge**2) ** 2 / a**2
-    force = 0.5 * steep * stick**2 + slip_force
-    moment = steep * stick**2 * (0.5 * a - stick / 3.0) + slip_moment
-    return stick, force, moment
-
-
-def _elliptic(
-    a: FloatArray, steep: FloatArray, peak: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return adhesion length, force and moment (x times traction) for the elliptic bound."""
-    k = steep * a / peak
-    stick = 2.0 * a / (1.0 + k**2)
-    cosine = (k**2 - 1.0) / (k**2 + 1.0)  # x/a where slip starts
-    sine = 2.0 * k / (1.0 + k**2)
-    slip_force = 0.5 * peak * a * (cosine * sine + np.arctan2(cosine, sine) + 0.5 * np.pi)
-    slip_moment = -peak * a**2 * sine**3 / 3.0
-    force = 0.5 * steep * stick**2 + slip_force
-    moment = steep * stick**2 * (0.5 * a - stick / 3.0) + slip_moment
-    return stick, force, moment
-
-
-def closed_form_parabolic(
-    semi_axis_x: float,
-    semi_axis_y: float,
-    normal_force: float,
-    friction: float,
-    creepage: float,
-    flexibility: float,
-    half_length: FloatArray,
-) -> FloatArray:
-    """Return the force per strip of Kalker's ellipse under one creepage, in closed form.
-
-    With kappa = v a^2/(L mu pp), pp = 2N/(pi a b), the same for every strip of half-length A:
-    F = (v/L)(2 A^2 - A kappa + kappa^2/6) where kappa < 2A, else (4/3) mu pp A^3/a^2. The
-    dissipation is V v F.
-
-    Parameters
-    ----------
-    semi_axis_x, semi_axis_y : float
-        a and b [m].
-    normal_force : float
-        N [N].
-    friction : float
-        mu.
-    creepage : float
-        Magnitude v of the creepage.
-    flexibility : float
-        L of its direction [m/Pa].
-    half_length : ndarray, shape (strips,)
-        A = a(y) [m].
-
-    Returns
-    -------
-    ndarray, shape (strips,)
-        Magnitude of the force per unit of axial length [N/m].
-    """
-    peak = friction * 2.0 * normal_force / (math.pi * semi_axis_x * semi_axis_y)
-    bound_peak = peak * (half_length / semi_axis_x) ** 2
-    gradient = np.full_like(half_length, creepage / flexibility)
-    force_x: FloatArray = closed_form(half_length, bound_peak, False, gradient, 0.0)[0]
-    return -force_x
+            tx = traction_x[j] - gradient_x[j] * dx
+            ty = traction_y[j] - (gradient_y + gradient_spin * middle * a) * dx
+            bound = shape * (friction[k - 1, first + j] * bound_peak[j])
+            sticks, scale = hold(tx, ty, bound)
+            work[j] += scale * (1.0 - scale) * (longitudinal * tx * tx + lateral * ty * ty)
+            tx *= scale
+            ty *= scale
+            traction_x[j] = tx
+            traction_y[j] = ty
+            force_x[j] += tx
+            force_y[j] += ty
+            moment[j] += place * ty
+            adhesion[j] += 1.0 if sticks else 0.0
+    _times_step(sums, half_length, cell)

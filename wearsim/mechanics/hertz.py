@@ -12,6 +12,7 @@ from wearsim.types import FloatArray
 
 CONVERGED, NOT_CONVERGED, NO_CURVATURE, TOO_FEW_STRIPS, LEAVES_STRIPS = range(5)
 
+ROUND_OFF = 4e-15  # of the gap's greatest height: how far a parabola may lie from its own fit
 HOLLOW = 1.0  # what ln(b'/b) counts for at most, and in the hollow of a groove
 
 
@@ -140,11 +141,52 @@ def hertz_ellipse(
     -------
     a, b, peak_pressure, approach : float
     """
-    least = min(curvature_x, curvature_y)
-    ratio = axis_ratio(max(curvature_x, curvature_y) / least)
+    shape = ellipse_shape(curvature_x, curvature_y)
+    return ellipse_under(curvature_x, curvature_y, shape, normal_force, contact_modulus)
+
+
+@kernel
+def ellipse_shape(curvature_x: float, curvature_y: float) -> tuple[float, float, float]:
+    """Return what the curvatures alone decide: b/a with the major axis below, and its K and D.
+
+    Parameters
+    ----------
+    curvature_x, curvature_y : float
+        As for `hertz`.
+
+    Returns
+    -------
+    ratio, first, d_integral : float
+    """
+    ratio = axis_ratio(max(curvature_x, curvature_y) / min(curvature_x, curvature_y))
     first, d_integral = elliptic_integrals(ratio)
+    return ratio, first, d_integral
+
+
+@kernel
+def ellipse_under(
+    curvature_x: float,
+    curvature_y: float,
+    shape: tuple[float, float, float],
+    normal_force: float,
+    contact_modulus: float,
+) -> tuple[float, float, float, float]:
+    """Return a, b [m], p0 [Pa] and approach [m] of an ellipse whose shape is known.
+
+    Parameters
+    ----------
+    curvature_x, curvature_y, normal_force, contact_modulus : float
+        As for `hertz`.
+    shape : tuple of float
+        As `ellipse_shape` returns it.
+
+    Returns
+    -------
+    a, b, peak_pressure, approach : float
+    """
+    ratio, first, d_integral = shape
     scale = 1.5 * normal_force / (math.pi * contact_modulus)
-    major = (scale * d_integral / least) ** (1.0 / 3.0)
+    major = (scale * d_integral / min(curvature_x, curvature_y)) ** (1.0 / 3.0)
     minor = ratio * major
     peak = 1.5 * normal_force / (math.pi * major * minor)
     approach = scale * first / major
@@ -235,10 +277,13 @@ def fit_parabola(
     used : int
         Strips with weight; fewer than three fix no parabola.
     """
-    moments = np.zeros(5)
-    sums = np.zeros(3)
+    m0 = m1 = m2 = m3 = m4 = 0.0
+    s0 = s1 = s2 = 0.0
     used = 0
-    nearest = np.argmin(np.abs(y - centre))
+    nearest = 0
+    for i in range(1, len(y)):
+        if abs(y[i] - centre) < abs(y[nearest] - centre):
+            nearest = i
     shift = gap[nearest]  # the heights' common part would only cost digits
     for i in range(len(y)):
         t = (y[i] - centre) / half_width
@@ -246,17 +291,18 @@ def fit_parabola(
         if weight <= 1e-12:
             continue
         used += 1
-        power = weight
+        first, second = weight * t, weight * t * t
         height = gap[i] - shift
-        for k in range(5):
-            moments[k] += power
-            if k < 3:
-                sums[k] += power * height
-            power *= t
+        m0 += weight
+        m1 += first
+        m2 += second
+        m3 += second * t
+        m4 += second * t * t
+        s0 += weight * height
+        s1 += first * height
+        s2 += second * height
     if used < 3:
         return math.nan, math.nan, math.nan, used
-    m0, m1, m2, m3, m4 = moments
-    s0, s1, s2 = sums
     det = m0 * (m2 * m4 - m3 * m3) - m1 * (m1 * m4 - m2 * m3) + m2 * (m1 * m3 - m2 * m2)
     constant = s0 * (m2 * m4 - m3 * m3) - m1 * (s1 * m4 - s2 * m3) + m2 * (s1 * m3 - s2 * m2)
     slope = m0 * (s1 * m4 - s2 * m3) - s0 * (m1 * m4 - m2 * m3) + m2 * (m1 * s2 - m2 * s1)
@@ -297,6 +343,46 @@ def fit_centred(
 
 
 @kernel
+def is_parabola(
+    y: FloatArray, gap: FloatArray, curvature: float, centre: float, height: float
+) -> bool:
+    """Return whether the gap is ``height + curvature (y - centre)^2`` to round-off.
+
+    Then any stretch of it fits the same parabola, and one fit serves every patch.
+
+    Parameters
+    ----------
+    y, gap : ndarray, shape (strips,)
+        Position and gap [m].
+    curvature, centre, height : float
+        B [1/m], yc [m] and w0 [m].
+    """
+    worst, most = 0.0, 0.0
+    for i in range(len(y)):
+        rise = curvature * (y[i] - centre) ** 2
+        worst = max(worst, abs(gap[i] - height - rise))
+        most = max(most, rise)
+    return worst <= ROUND_OFF * most
+
+
+@kernel
+def strips_within(y: FloatArray, centre: float, half_width: float) -> int:
+    """Return how many strips lie within `half_width` [m] of `centre` [m].
+
+    Parameters
+    ----------
+    y : ndarray, shape (strips,)
+        Position [m].
+    centre, half_width : float
+        The stretch [m].
+    """
+    count = 0
+    for i in range(len(y)):
+        count += 1 if abs(y[i] - centre) < half_width else 0
+    return count
+
+
+@kernel
 def hertz_on_profile(
     y: FloatArray,
     gap: FloatArray,
@@ -310,7 +396,8 @@ def hertz_on_profile(
 
     The parabola fitted over a patch of half-width b, centred on the parabola's own vertex, makes
     a Hertz patch of half-width b'. The b that equals b' is approached from the widest patch inside
-    the strips, at most to 0.6 b, and then by regula falsi (Illinois) on ln(b'/b).
+    the strips, at most to 0.6 b, and then by regula falsi (Illinois) on ln(b'/b). A gap that is a
+    parabola already gives its patch at once.
 
     Parameters
     ----------
@@ -350,6 +437,9 @@ def hertz_on_profile(
         if status == CONVERGED:
             centre = vertex
             found = hertz_ellipse(curvature_x, curvature, normal_force, contact_modulus)[1]
+            enough = found <= width and strips_within(y, centre, found) >= 3
+            if iteration == 1 and enough and is_parabola(y, gap, curvature, centre, height):
+                return curvature, found, centre, height, iteration, CONVERGED
             value = min(math.log(found / width), HOLLOW)
         elif status != TOO_FEW_STRIPS and high_value != 0.0:
             # the stretch lies in the hollow of a groove, where no patch would end: it is too narrow

@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
+from wearsim.mechanics.jit import kernel
 from wearsim.types import FloatArray
 
 # The table of Kalker (1990), Three-Dimensional Elastic Bodies in Rolling Contact: a row per ratio,
@@ -61,6 +63,17 @@ class CreepageCoefficients:
     c33: float
 
 
+class Spline(NamedTuple):
+    """Cubic splines of ln C over ln(a/b), a column per Poisson's ratio 0, 1/4, 1/2.
+
+    Knots (knots,); values and slopes (knots, 3).
+    """
+
+    knots: FloatArray
+    values: FloatArray
+    slopes: FloatArray
+
+
 @dataclass(frozen=True)
 class Flexibilities:
     """FASTSIM's flexibilities: displacement over traction [m/Pa].
@@ -76,6 +89,7 @@ class Flexibilities:
     spin: float
 
 
+@kernel
 def short_limit(ratio: float, nu: float) -> tuple[float, float, float, float]:
     """Return C11, C22, C23 and C33 for a/b -> 0, a contact that is long across rolling.
 
@@ -95,6 +109,7 @@ def short_limit(ratio: float, nu: float) -> tuple[float, float, float, float]:
     )
 
 
+@kernel
 def long_limit(ratio: float, nu: float) -> tuple[float, float, float, float]:
     """Return C11, C22, C23 and C33 for b/a -> 0, a contact that is long in the rolling direction.
 
@@ -117,6 +132,7 @@ def long_limit(ratio: float, nu: float) -> tuple[float, float, float, float]:
     )
 
 
+@kernel
 def _approach_short(which: int, ratio: float, edge: float, value: float, nu: float) -> float:
     """Continue the coefficient from its `value` at a/b = `edge` towards its limit at a/b = 0."""
     excess = value / short_limit(edge, nu)[which] - 1.0
@@ -124,35 +140,12 @@ def _approach_short(which: int, ratio: float, edge: float, value: float, nu: flo
     return short_limit(ratio, nu)[which] * (1.0 + excess * fade)
 
 
+@kernel
 def _approach_long(which: int, ratio: float, edge: float, value: float, nu: float) -> float:
     """Continue the coefficient from its `value` at b/a = `edge` towards its limit at b/a = 0."""
     excess = value / long_limit(edge, nu)[which] - 1.0
     fade = math.log(16.0 / edge**2) / math.log(16.0 / ratio**2)
     return long_limit(ratio, nu)[which] * (1.0 + excess * fade**2)
-
-
-@dataclass(frozen=True)
-class _Spline:
-    """Cubic splines of ln C over ln(a/b), one column per `_NODES`, slopes kept at the knots."""
-
-    knots: tuple[float, ...]
-    values: tuple[tuple[float, ...], ...]
-    slopes: tuple[tuple[float, ...], ...]
-
-    def at(self, place: float) -> list[float]:
-        """Return C at ``ln(a/b) = place``, one value per column."""
-        knots = self.knots
-        i = 0
-        while i < len(knots) - 2 and place > knots[i + 1]:
-            i += 1
-        step = knots[i + 1] - knots[i]
-        t = (place - knots[i]) / step
-        h00, h01 = (1.0 + 2.0 * t) * (1.0 - t) ** 2, t * t * (3.0 - 2.0 * t)
-        h10, h11 = step * t * (1.0 - t) ** 2, step * t * t * (t - 1.0)
-        columns = zip(
-            self.values[i], self.values[i + 1], self.slopes[i], self.slopes[i + 1], strict=True
-        )
-        return [math.exp(h00 * v0 + h01 * v1 + h10 * s0 + h11 * s1) for v0, v1, s0, s1 in columns]
 
 
 def _spline_slopes(
@@ -170,8 +163,14 @@ def _spline_slopes(
 
 
 @lru_cache(maxsize=4)
-def _spline(which: int) -> _Spline:
-    """Build the spline of coefficient `which`: the table, meeting its limits with equal slopes."""
+def spline(which: int) -> Spline:
+    """Return the spline of a coefficient: the table, meeting its limits with equal slopes.
+
+    Parameters
+    ----------
+    which : int
+        0 to 3 for C11, C22, C23 and C33.
+    """
     short = np.array(_SHORT.split(), dtype=np.float64).reshape(-1, 4, 3)[:, which]
     long = np.array(_LONG.split(), dtype=np.float64).reshape(-1, 4, 3)[::-1, which]
     ratios = [*_RATIOS, *(1.0 / ratio for ratio in _RATIOS[-2::-1])]
@@ -189,30 +188,52 @@ def _spline(which: int) -> _Spline:
         first[k] = (values[0, k] - math.log(below)) / small
         last[k] = (math.log(above) - values[-1, k]) / small
     slopes = _spline_slopes(knots, values, first, last)
-    return _Spline(
-        tuple(knots.tolist()),
-        tuple(tuple(row) for row in values.tolist()),
-        tuple(tuple(row) for row in slopes.tolist()),
-    )
+    return Spline(knots, values, slopes)
 
 
-def _between_columns(which: int, columns: list[float], nu: float) -> float:
-    """Return the parabola in nu through the columns, in terms that are nearly linear in nu."""
-    n0, n1, n2 = _NODES
-    w0 = (nu - n1) * (nu - n2) / ((n0 - n1) * (n0 - n2))
-    w1 = (nu - n0) * (nu - n2) / ((n1 - n0) * (n1 - n2))
-    w2 = (nu - n0) * (nu - n1) / ((n2 - n0) * (n2 - n1))
-    if which == 3:
-        terms = [value * (1.0 - node) for value, node in zip(columns, _NODES, strict=True)]
-        return (w0 * terms[0] + w1 * terms[1] + w2 * terms[2]) / (1.0 - nu)
-    return 1.0 / (w0 / columns[0] + w1 / columns[1] + w2 / columns[2])
+@kernel
+def _at(knots: FloatArray, values: FloatArray, slopes: FloatArray, k: int, place: float) -> float:
+    """Return C at ``ln(a/b) = place`` for Poisson's ratio of column k."""
+    i = 0
+    while i < len(knots) - 2 and place > knots[i + 1]:
+        i += 1
+    step = knots[i + 1] - knots[i]
+    t = (place - knots[i]) / step
+    h00, h01 = (1.0 + 2.0 * t) * (1.0 - t) ** 2, t * t * (3.0 - 2.0 * t)
+    h10, h11 = step * t * (1.0 - t) ** 2, step * t * t * (t - 1.0)
+    logarithm = h00 * values[i, k] + h01 * values[i + 1, k]
+    return math.exp(logarithm + h10 * slopes[i, k] + h11 * slopes[i + 1, k])
 
 
-def _coefficient(which: int, ratio: float, nu: float) -> float:
-    spline = _spline(which)
+@kernel
+def _weight(k: int, nu: float) -> float:
+    """Return what column k counts for in the parabola through all three."""
+    own, one, other = _NODES[k], _NODES[(k + 1) % 3], _NODES[(k + 2) % 3]
+    return (nu - one) * (nu - other) / ((own - one) * (own - other))
+
+
+@kernel
+def coefficient(which: int, ratio: float, nu: float, table: Spline) -> float:
+    """Return one creepage coefficient, interpolated as `creepage_coefficients` says.
+
+    Parameters
+    ----------
+    which : int
+        0 to 3 for C11, C22, C23 and C33.
+    ratio, nu : float
+        a/b and Poisson's ratio.
+    table : Spline
+        Its spline.
+    """
     place = math.log(ratio)
-    low, high = spline.knots[0], spline.knots[-1]
-    value = _between_columns(which, spline.at(min(max(place, low), high)), nu)
+    low, high = table.knots[0], table.knots[-1]
+    inside = min(max(place, low), high)
+    # the parabola in nu through the columns, in terms that are nearly linear in nu
+    total = 0.0
+    for k in range(len(_NODES)):
+        column = _at(table.knots, table.values, table.slopes, k, inside)
+        total += _weight(k, nu) * (column * (1.0 - _NODES[k]) if which == 3 else 1.0 / column)
+    value = total / (1.0 - nu) if which == 3 else 1.0 / total
     if place < low:
         return _approach_short(which, ratio, math.exp(low), value, nu)
     if place > high:
@@ -255,7 +276,8 @@ def creepage_coefficients(ratio: float, poisson_ratio: float) -> CreepageCoeffic
     across nu a parabola of 1/C11, 1/C22, 1/C23 and (1 - nu) C33, which are nearly linear.
     """
     _check(ratio, poisson_ratio)
-    c11, c22, c23, c33 = (_coefficient(which, ratio, poisson_ratio) for which in range(4))
+    at = float(ratio), float(poisson_ratio)
+    c11, c22, c23, c33 = (coefficient(which, *at, spline(which)) for which in range(4))
     return CreepageCoefficients(c11, c22, c23, c33)
 
 
@@ -280,7 +302,7 @@ def line_limit_coefficients(ratio: float, poisson_ratio: float) -> CreepageCoeff
         (C23 is not positive).
     """
     _check(ratio, poisson_ratio)
-    limits = CreepageCoefficients(*short_limit(ratio, poisson_ratio))
+    limits = CreepageCoefficients(*short_limit(float(ratio), float(poisson_ratio)))
     if limits.c23 <= 0.0:
         raise ValueError(f"a/b = {ratio:.3g} is too large for the limit of a long contact")
     return limits

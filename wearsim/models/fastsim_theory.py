@@ -9,8 +9,11 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from wearsim.errors import ContactError
+from wearsim.mechanics import hertz_fastsim_batch as batches
 from wearsim.mechanics.elasticity import ElasticPair
-from wearsim.mechanics.fastsim import closed_form, element_sum, march, march_fields
+from wearsim.mechanics.fastsim import march
+from wearsim.mechanics.fastsim_closed_form import closed_form
+from wearsim.mechanics.fastsim_fields import element_sum, march_fields, march_local_fields
 from wearsim.mechanics.hertz import HertzContact
 from wearsim.mechanics.kalker import (
     CreepageCoefficients,
@@ -18,6 +21,7 @@ from wearsim.mechanics.kalker import (
     creepage_coefficients,
     flexibilities,
     line_limit_coefficients,
+    spline,
 )
 from wearsim.models.tangential import LocalSlip, Strips, TangentialTheory, Tractions
 from wearsim.types import ContactFields, FloatArray
@@ -25,6 +29,9 @@ from wearsim.types import ContactFields, FloatArray
 Bound: TypeAlias = Literal["parabolic", "elliptic"]
 Dissipation: TypeAlias = Literal["rigid-slip", "element-sum"]
 Kalker: TypeAlias = Literal["table", "line-limit"]
+ClosedForm: TypeAlias = Literal["exact", "always", "never"]
+
+_CLOSED_FORM = {"never": batches.NEVER, "exact": batches.EXACT, "always": batches.ALWAYS}
 
 
 @dataclass(frozen=True)
@@ -81,9 +88,12 @@ class FastsimTheory(TangentialTheory):
         Kalker's table, or its limits for a contact that is long across rolling.
     coefficients : CreepageCoefficients, optional
         Coefficients to use in place of either.
-    use_closed_form : bool
-        Whether the exact integral replaces the march where the spin is zero and the dissipation is
-        the work of the rigid slip.
+    closed_form : {"exact", "always", "never"}
+        Where the integral of the march replaces it, if the dissipation is the work of the rigid
+        slip: where there is no spin and it is exact; with spin too, whose phi x along the strip is
+        then left out of the slip; or nowhere. Over the paper's inputs leaving it out moves the mean
+        and the standard deviation of the power by less than 1e-4 of them, and one power by 0.2 %
+        rms, 2.5 % at most.
 
     Notes
     -----
@@ -97,14 +107,14 @@ class FastsimTheory(TangentialTheory):
         dissipation: Dissipation = "rigid-slip",
         kalker: Kalker = "table",
         coefficients: CreepageCoefficients | None = None,
-        use_closed_form: bool = True,
+        closed_form: ClosedForm = "exact",
     ) -> None:
         self.elliptic = bound == "elliptic"
         self.mx = mx
         self.element_sum = dissipation == "element-sum"
         self.kalker = kalker
         self.coefficients = coefficients
-        self.use_closed_form = use_closed_form
+        self.closed_form = closed_form
 
     def flexibilities(self, strips: Strips, pair: ElasticPair) -> Flexibilities:
         """Return L1, L2 and L3 of the strips' equivalent ellipse.
@@ -140,8 +150,12 @@ class FastsimTheory(TangentialTheory):
         flexibility = self.flexibilities(strips, pair)
         problem = self._problem(strips, flexibility, slip, friction, part)
         out = np.zeros((5, len(strips.y)))
-        if self.use_closed_form and slip.spin == 0.0 and not self.element_sum:
+        always = self.closed_form == "always"
+        exact = self.closed_form == "exact" and slip.spin == 0.0
+        if (always or exact) and not self.element_sum:
             out[:4, part] = closed_form(*problem[:5])
+            if slip.spin != 0.0:
+                out[2] = 0.0  # phi x is left out, of the work as of the traction
         else:
             out[:4, part] = march(*problem, self.mx)
         force_x, force_y, moment, adhesion, dissipation = out
@@ -170,16 +184,25 @@ class FastsimTheory(TangentialTheory):
 
         The pressure is elliptic along rolling whatever the bound, which may exceed it. Slip at a
         point is that of the step which ends there, and its elastic part takes L1 along rolling and
-        L2 across it, so that it is zero where the surfaces adhere.
+        L2 across it, so that it is zero where the surfaces adhere. Where `friction` has the shape
+        (points, strips) its points are those of the march, and `points_along` counts for nothing.
         """
         flexibility = self.flexibilities(strips, pair)
         everywhere = slice(0, len(strips.y))
         problem = self._problem(strips, flexibility, slip, friction, everywhere)
-        steps = points_along - 1
-        traction_x, traction_y, cut_x, cut_y = march_fields(*problem, steps)[:, ::-1]
+        half_length, _, elliptic, gradient_x, gradient_y, gradient_spin = problem
+        steps = len(friction) if friction.ndim == 2 else points_along - 1
+        local = np.require(
+            np.broadcast_to(friction, (steps, len(strips.y))), np.float64, ["C", "W"]
+        )
+        peak = self._peak(strips, self.elliptic)
+        marched = march_local_fields(
+            half_length, peak, local, elliptic, gradient_x, gradient_y, gradient_spin
+        )[:, ::-1]
+        traction_x, traction_y, cut_x, cut_y = marched
         a = strips.half_length
         inside = a > 0.0
-        place = np.linspace(-1.0, 1.0, points_along)[:, None]
+        place = np.linspace(-1.0, 1.0, steps + 1)[:, None]
         shape = np.maximum((1.0 - place) * (1.0 + place), 0.0)
         step = np.where(inside, 2.0 * a / steps, 1.0)
         slip_x = -cut_x * flexibility.longitudinal / step
@@ -199,6 +222,22 @@ class FastsimTheory(TangentialTheory):
             power_density=-rolling_speed * (traction_x * slip_x + traction_y * slip_y),
         )
 
+    def compiled(self, pair: ElasticPair) -> batches.Theory:
+        """Return the theory as the kernels for many contacts take it."""
+        given = self.coefficients
+        chosen = batches.TABLE if self.kalker == "table" else batches.LINE_LIMIT
+        return batches.Theory(
+            shear_modulus=pair.shear_modulus,
+            poisson_ratio=pair.poisson_ratio,
+            elliptic=self.elliptic,
+            closed_form=_CLOSED_FORM[self.closed_form],
+            element_sum=self.element_sum,
+            points=self.mx,
+            kalker=chosen if given is None else batches.GIVEN,
+            given=np.zeros(3) if given is None else np.array([given.c11, given.c22, given.c23]),
+            tables=(spline(0), spline(1), spline(2)),
+        )
+
     def _problem(
         self,
         strips: Strips,
@@ -212,7 +251,7 @@ class FastsimTheory(TangentialTheory):
         gradient_x = mean / flexibility.longitudinal + slip.spin_part / flexibility.spin
         return (
             np.ascontiguousarray(strips.half_length[part]),
-            np.ascontiguousarray((friction * self._peak(strips, self.elliptic))[part]),
+            np.ascontiguousarray((friction * self._peak(strips, self.elliptic))[..., part]),
             self.elliptic,
             np.ascontiguousarray(gradient_x[part]),
             float(slip.lateral / flexibility.lateral),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,18 +13,30 @@ from wearsim.errors import CapabilityError, ContactError
 from wearsim.mechanics import hertz as kernels
 from wearsim.mechanics.elasticity import ElasticPair, combine
 from wearsim.mechanics.hertz import HertzContact, given_ellipse, hertz
+from wearsim.mechanics.hertz_patches import fit_within
 from wearsim.mechanics.kalker import CreepageCoefficients
-from wearsim.models.fastsim_theory import Bound, Dissipation, EllipseStrips, FastsimTheory, Kalker
+from wearsim.models.fastsim_theory import (
+    Bound,
+    ClosedForm,
+    Dissipation,
+    EllipseStrips,
+    FastsimTheory,
+    Kalker,
+)
+from wearsim.models.hertz_fastsim_batch import HertzFastsimBatch
 from wearsim.models.tangential import complete, friction_per_strip, local_slip
 from wearsim.plugins import Capabilities, ContactModel, ContactModelSpec, Options
+from wearsim.plugins.protocols import naming_contact
 from wearsim.quantities import PositiveLength
 from wearsim.types import (
+    BatchSolution,
     ContactFields,
     ContactSolution,
     FloatArray,
     Grid,
     Material,
     OperatingPoint,
+    OperatingPoints,
 )
 
 TOLERANCE = 1e-10
@@ -58,8 +70,10 @@ class HertzFastsimOptions(Options):
         "rigid-slip",
         description="work of the rigid slip, or the textbook's element-sum (first order, low)",
     )
-    closed_form: bool = Field(
-        True, description="integrate exactly instead of marching where there is no spin"
+    closed_form: ClosedForm = Field(
+        "exact",
+        description="integrate instead of marching: exact (where there is no spin), always (with"
+        " spin, its part along rolling left out: fast, 0.2 % rms in power) or never",
     )
     kalker: Kalker = Field(
         "table",
@@ -88,7 +102,11 @@ class HertzFastsim(ContactModel):
     """
 
     capabilities = Capabilities(
-        creepage_variation=True, bearing_torque=True, local_friction=True, fields=True
+        creepage_variation=True,
+        bearing_torque=True,
+        local_friction=True,
+        friction_field=True,
+        fields=True,
     )
 
     def __init__(self, options: HertzFastsimOptions | None = None) -> None:
@@ -102,13 +120,16 @@ class HertzFastsim(ContactModel):
             coefficients=None
             if given is None
             else CreepageCoefficients(given.c11, given.c22, given.c23, math.nan),
-            use_closed_form=self.options.closed_form,
+            closed_form=self.options.closed_form,
         )
 
     def prepare(self, grid: Grid, materials: tuple[Material, Material]) -> None:
         """Take the strips and the two bodies' materials."""
         self._grid = grid
         self._pair: ElasticPair = combine(*materials)
+        patch = self.options.patch
+        given = (0.0, 0.0) if patch is None else (patch.a, patch.b)
+        self._batch = HertzFastsimBatch(grid, self._pair, self.theory, given, TOLERANCE, LIMIT)
 
     def suggest_grid(
         self,
@@ -141,21 +162,82 @@ class HertzFastsim(ContactModel):
             If the gap's curvature over the patch is not positive, the patch leaves the strips or
             holds too few of them, the fit does not settle, or a value is not finite.
         CapabilityError
-            If a wear compliance is given.
+            If a wear compliance is given, or a bearing torque where friction differs from point to
+            point.
         """
-        if wear_compliance is not None:
-            raise CapabilityError(
-                "hertz-fastsim takes no wear compliance; use evolution.stepper = 'explicit' or"
-                " 'per-pass', or contact.model = 'slender'"
-            )
+        _refuse(wear_compliance)
+        if np.ndim(point.friction) > 1 and point.bearing_torque is None:
+            return self.solve_batch(gap[None, :], longitudinal_curvature, [point]).solutions[0]
         strips = self._strips(gap, longitudinal_curvature, point)
         solution = complete(self.theory, strips, self._pair, point)
         if not math.isfinite(solution.power):
-            raise ContactError(
-                "the dissipated power is not finite; check creepage, friction and rolling speed",
-                {"gap": gap, "point": point},
-            )
+            raise _not_finite(gap, point)
         return solution
+
+    def solve_batch(
+        self,
+        gap: FloatArray,
+        longitudinal_curvature: float,
+        points: Sequence[OperatingPoint],
+        wear_compliance: FloatArray | None = None,
+        warm: Sequence[ContactSolution] | None = None,
+    ) -> BatchSolution:
+        """Solve many contacts in one call of compiled code, as `solve` does to round-off.
+
+        Points under a bearing torque, or of several kinds, are solved one after another.
+
+        Raises
+        ------
+        ContactError, CapabilityError
+            As `solve`, naming the first contact that fails.
+        """
+        _refuse(wear_compliance)
+        columns = OperatingPoints.of(points)
+        if columns is None:
+            return super().solve_batch(gap, longitudinal_curvature, points)
+        batch, failed = self._batch.solve(gap, longitudinal_curvature, columns)
+        if failed is not None:
+            raise self._failure_of(failed, gap, longitudinal_curvature, points)
+        return batch
+
+    def friction_points(
+        self, gap: FloatArray, longitudinal_curvature: float, point: OperatingPoint
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return where friction is asked for: where each of the `mx` steps of the march ends."""
+        x, y = self.friction_points_batch(gap[None, :], longitudinal_curvature, [point])
+        return x[0], y
+
+    def friction_points_batch(
+        self, gap: FloatArray, longitudinal_curvature: float, points: Sequence[OperatingPoint]
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return `friction_points` of every contact, x of shape (contacts, mx, strips)."""
+        if isinstance(points, OperatingPoints):
+            forces = points.normal_force
+        else:
+            forces = np.array([point.normal_force for point in points])
+        half_length, failed = self._batch.half_lengths(gap, longitudinal_curvature, forces)
+        if failed is not None:
+            raise self._failure_of(failed, gap, longitudinal_curvature, points)
+        places = np.linspace(1.0, -1.0, self.options.mx + 1)[1:, None]
+        return places * half_length[:, None, :], self._grid.y
+
+    def _failure_of(
+        self,
+        number: int,
+        gap: FloatArray,
+        longitudinal_curvature: float,
+        points: Sequence[OperatingPoint],
+    ) -> ContactError:
+        """Return the error of a contact of a batch that failed."""
+        shape = gap.shape[:-1]
+        own, point = gap[np.unravel_index(number, shape)], points[number]
+        try:
+            strips = self._strips(own, longitudinal_curvature, point)
+            self.theory.flexibilities(strips, self._pair)
+            error = _not_finite(own, point)
+        except ContactError as caught:
+            error = caught
+        return naming_contact(error, number, shape)
 
     def fields(
         self,
@@ -168,7 +250,15 @@ class HertzFastsim(ContactModel):
         """Return tractions and slip inside a solved contact."""
         strips = self._strips(gap, longitudinal_curvature, point)
         slip = local_slip(strips, point, solution.longitudinal_creepage)
-        friction = friction_per_strip(strips, point)
+        if np.ndim(point.friction) > 1:
+            if point.friction_carried:
+                raise CapabilityError(
+                    "friction that particles carry through the contact has no one field inside it;"
+                    " give friction that stays in the contact (frame = 'contact')"
+                )
+            friction = np.asarray(point.friction)
+        else:
+            friction = friction_per_strip(strips, point)
         return self.theory.fields(
             strips, self._pair, slip, friction, point.rolling_speed, points_along
         )
@@ -177,7 +267,7 @@ class HertzFastsim(ContactModel):
         self, gap: FloatArray, longitudinal_curvature: float, point: OperatingPoint
     ) -> EllipseStrips:
         """Solve the normal problem and cut its patch into the grid's strips."""
-        gap = np.ascontiguousarray(gap, dtype=np.float64)
+        gap = np.require(gap, np.float64, ["C", "W"])
         _check(gap, longitudinal_curvature, point.normal_force)
         if self.options.patch is None:
             patch, centre, height, iterations = self._fitted(
@@ -243,14 +333,9 @@ class HertzFastsim(ContactModel):
         self, patch: Patch, gap: FloatArray, normal_force: float
     ) -> tuple[HertzContact, float, float]:
         """Return the prescribed patch, its centre and the fitted gap there."""
-        y = self._grid.y
-        middle, span = 0.5 * float(y[0] + y[-1]), 0.5 * self._grid.spacing * self._grid.strips
-        _, vertex, _, used = kernels.fit_parabola(y, gap, middle, span)
-        status = kernels.TOO_FEW_STRIPS if used < 3 else kernels.NO_CURVATURE
-        curvature, centre, height = math.nan, middle, math.nan
-        if abs(vertex - middle) < span:  # and so not nan
-            span -= abs(vertex - middle)
-            curvature, centre, height, status = kernels.fit_centred(y, gap, vertex, span, TOLERANCE)
+        curvature, centre, height, span, status = fit_within(
+            self._grid.y, gap, self._grid.spacing, TOLERANCE
+        )
         if status != kernels.CONVERGED:
             state = {"gap": gap, "normal_force": normal_force, "half_width": span}
             raise _failure(status, state | {"curvature": curvature}, self._grid.spacing)
@@ -265,6 +350,21 @@ class HertzFastsim(ContactModel):
             " raise contact.width or move contact.centre",
             dict(state),
         )
+
+
+def _refuse(wear_compliance: FloatArray | None) -> None:
+    if wear_compliance is not None:
+        raise CapabilityError(
+            "hertz-fastsim takes no wear compliance; use evolution.stepper = 'explicit' or"
+            " 'per-pass', or contact.model = 'slender'"
+        )
+
+
+def _not_finite(gap: FloatArray, point: OperatingPoint) -> ContactError:
+    return ContactError(
+        "the dissipated power is not finite; check creepage, friction and rolling speed",
+        {"gap": gap, "point": point},
+    )
 
 
 def _check(gap: FloatArray, longitudinal_curvature: float, normal_force: float) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wearsim.errors import ContactError
+from wearsim.errors import CapabilityError, ContactError
 from wearsim.mechanics.elasticity import ElasticPair
 from wearsim.types import ContactFields, ContactSolution, FloatArray, OperatingPoint
 
@@ -132,6 +132,11 @@ def local_slip(strips: Strips, point: OperatingPoint, longitudinal: float) -> Lo
 
 def friction_per_strip(strips: Strips, point: OperatingPoint) -> FloatArray:
     """Return the friction coefficient of every strip, shape (strips,)."""
+    if np.ndim(point.friction) > 1:
+        raise CapabilityError(
+            "this contact model takes one friction coefficient per strip, and not one per point;"
+            " use contact.model = 'hertz-fastsim', without a bearing torque"
+        )
     friction = np.empty_like(strips.y)
     friction[:] = point.friction
     return friction

@@ -1,0 +1,336 @@
+"""Thousands of contacts with Hertz patches and FASTSIM, one after another in compiled code."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from wearsim.mechanics.fastsim import (
+    Sums,
+    clear,
+    march_into,
+    march_local,
+    new_sums,
+    part_of,
+)
+from wearsim.mechanics.fastsim_closed_form import closed_form_into
+from wearsim.mechanics.hertz import CONVERGED
+from wearsim.mechanics.hertz_patches import Bodies, Patches, cut_into_strips, find_patches
+from wearsim.mechanics.jit import kernel
+from wearsim.mechanics.kalker import Spline, coefficient, short_limit
+from wearsim.types import FloatArray, IntArray
+
+NEVER, EXACT, ALWAYS = range(3)  # where the closed form takes the march's place
+TABLE, LINE_LIMIT, GIVEN = range(3)  # where Kalker's coefficients come from
+NO_LIMIT, NOT_FINITE = 30, 31  # statuses beside those of `hertz_patches`
+
+
+class Theory(NamedTuple):
+    """How tractions are found; `models.fastsim_theory.FastsimTheory` has the words.
+
+    G [Pa], nu, the bound, the closed form, the dissipation, the steps along a strip, where the
+    creepage coefficients come from, (3,) given ones and the tables of C11, C22 and C23.
+    """
+
+    shear_modulus: float
+    poisson_ratio: float
+    elliptic: bool
+    closed_form: int
+    element_sum: bool
+    points: int
+    kalker: int
+    given: FloatArray
+    tables: tuple[Spline, Spline, Spline]
+
+
+class Asked(NamedTuple):
+    """What is asked of every contact.
+
+    Loads [N], creepages and spins [1/m], all (contacts,); friction (contacts, points, strips), with
+    one point where it is the same along a strip, and one strip where it is the same in all; whether
+    particles carry it; the creepage's variation (contacts, strips), or (0, strips) for none; V.
+    """
+
+    normal_force: FloatArray
+    longitudinal: FloatArray
+    lateral: FloatArray
+    spin: FloatArray
+    friction: FloatArray
+    carried: bool
+    variation: FloatArray
+    rolling_speed: float
+
+
+class Found(NamedTuple):
+    """What comes out: a(y) [m], q(y) [N/m] and P_l [W/m] (contacts, strips), the rest (contacts,).
+
+    Forces [N] and spin moment [N m] on body 1, adhering part of the area and power [W].
+    """
+
+    half_length: FloatArray
+    line_load: FloatArray
+    dissipation: FloatArray
+    force_x: FloatArray
+    force_y: FloatArray
+    spin_moment: FloatArray
+    adhesion_fraction: FloatArray
+    power: FloatArray
+
+
+class Work(NamedTuple):
+    """Room for one contact, all (strips,): coverage, slip, gradients, bounds."""
+
+    middle: FloatArray
+    coverage: FloatArray
+    longitudinal: FloatArray
+    spin_part: FloatArray
+    gradient_x: FloatArray
+    peak: FloatArray
+    bound: FloatArray
+
+
+@kernel
+def solve_contacts(
+    bodies: Bodies,
+    theory: Theory,
+    gaps: FloatArray,
+    row: IntArray,
+    asked: Asked,
+    patches: Patches,
+    found: Found,
+) -> int:
+    """Solve every contact; their order and company change nothing.
+
+    Parameters
+    ----------
+    bodies, theory : Bodies, Theory
+        What the contacts share.
+    gaps : ndarray, shape (rows, strips)
+        Gaps [m].
+    row : ndarray of int, shape (contacts,)
+        The row of each contact's gap.
+    asked : Asked
+        Loads, creepage and friction.
+    patches, found : Patches, Found
+        Overwritten; of a contact that failed only `patches.status` means anything.
+
+    Returns
+    -------
+    int
+        The first contact that failed, or their number.
+    """
+    strips = len(bodies.y)
+    room = np.empty((7, strips))
+    work = Work(room[0], room[1], room[2], room[3], room[4], room[5], room[6])
+    total, sums = new_sums(strips), new_sums(strips)
+    alike = np.ones((theory.points, strips))
+    given = theory.given
+    find_patches(bodies, gaps, row, asked.normal_force, patches)
+    last_ratio, last = math.nan, (math.nan, math.nan, math.nan)
+    for k in range(len(row)):
+        if patches.status[k] != CONVERGED:
+            return k
+        a, b, ratio = patches.a[k], patches.b[k], patches.ratio[k]
+        if theory.kalker == GIVEN:
+            last = given[0], given[1], given[2]
+        elif ratio != last_ratio:
+            last_ratio, last = ratio, _coefficients(theory, ratio)
+        if not last[2] > 0.0:
+            patches.status[k] = NO_LIMIT
+            return k
+        first, stop = cut_into_strips(
+            bodies,
+            a,
+            b,
+            patches.centre[k],
+            asked.normal_force[k],
+            found.half_length[k],
+            found.line_load[k],
+            work.middle,
+            work.coverage,
+        )
+        _spread(k, bodies, asked, found.line_load[k], work)
+        _solve_tractions(
+            k, first, stop, last, theory, asked, patches, found, work, alike, sums, total
+        )
+        _sum_up(k, bodies, theory, asked, found, work, total)
+        if not math.isfinite(found.power[k]):
+            patches.status[k] = NOT_FINITE
+            return k
+    return len(row)
+
+
+@kernel
+def _coefficients(theory: Theory, ratio: float) -> tuple[float, float, float]:
+    """Return C11, C22 and C23 at a/b = `ratio`."""
+    nu = theory.poisson_ratio
+    if theory.kalker == LINE_LIMIT:
+        limits = short_limit(ratio, nu)
+        return limits[0], limits[1], limits[2]
+    found = (math.nan, math.nan, math.nan)
+    for which in range(3):
+        found = found[1], found[2], coefficient(which, ratio, nu, theory.tables[which])
+    return found
+
+
+@kernel
+def _load_weighted_mean(values: FloatArray, line_load: FloatArray) -> float:
+    product, load = 0.0, 0.0
+    for j in range(len(values)):
+        product += values[j] * line_load[j]
+        load += line_load[j]
+    return product / load
+
+
+@kernel
+def _spread(k: int, bodies: Bodies, asked: Asked, line_load: FloatArray, work: Work) -> None:
+    """Spread the mean creepage over the strips, as `Creepage` says."""
+    strips, mean = len(bodies.y), asked.longitudinal[k]
+    varied = len(asked.variation) > 0
+    for j in range(strips):
+        work.longitudinal[j] = mean
+        work.spin_part[j] = 0.0
+    if varied:
+        shift = _load_weighted_mean(asked.variation[k], line_load)
+        for j in range(strips):
+            work.longitudinal[j] = mean + (asked.variation[k, j] - shift)
+    elif asked.spin[k] != 0.0:
+        for j in range(strips):
+            work.spin_part[j] = -asked.spin[k] * bodies.y[j]
+        shift = _load_weighted_mean(work.spin_part, line_load)
+        for j in range(strips):
+            work.spin_part[j] -= shift
+            work.longitudinal[j] = mean + work.spin_part[j]
+
+
+@kernel
+def _solve_tractions(
+    k: int,
+    first: int,
+    stop: int,
+    coefficients: tuple[float, float, float],
+    theory: Theory,
+    asked: Asked,
+    patches: Patches,
+    found: Found,
+    work: Work,
+    alike: FloatArray,
+    sums: Sums,
+    total: Sums,
+) -> None:
+    """Sum the tractions of contact `k` along its strips into `total`."""
+    a, b = patches.a[k], patches.b[k]
+    c11, c22, c23 = coefficients
+    longitudinal = 8.0 * a / (3.0 * c11 * theory.shear_modulus)
+    lateral = 8.0 * a / (3.0 * c22 * theory.shear_modulus)
+    turning = math.pi * a * math.sqrt(a / b) / (4.0 * c23 * theory.shear_modulus)
+    parabola = 2.0 * asked.normal_force[k] / (math.pi * a * b)
+    strips = len(work.peak)
+    for j in range(strips):
+        t = work.middle[j] / b
+        section = max((1.0 - t) * (1.0 + t), 0.0) if work.coverage[j] > 0.0 else 0.0
+        if theory.elliptic:
+            work.peak[j] = patches.peak_pressure[k] * math.sqrt(section)
+        else:
+            work.peak[j] = parabola * section
+        mean = work.longitudinal[j] - work.spin_part[j]
+        work.gradient_x[j] = mean / longitudinal + work.spin_part[j] / turning
+    gradient_y, gradient_spin = asked.lateral[k] / lateral, asked.spin[k] / turning
+    closed = theory.closed_form == ALWAYS
+    closed = closed or (theory.closed_form == EXACT and asked.spin[k] == 0.0)
+    closed = closed and not theory.element_sum
+    half_length = found.half_length[k][first:stop]
+    gradient_x, peak = work.gradient_x[first:stop], work.peak[first:stop]
+    bound, part = work.bound[first:stop], part_of(sums, first, stop)
+    friction = asked.friction[k]
+    lanes, columns = friction.shape
+    clear(total)
+    if lanes > 1 and not asked.carried:
+        march_local(
+            half_length,
+            peak,
+            friction,
+            first,
+            theory.elliptic,
+            gradient_x,
+            gradient_y,
+            gradient_spin,
+            longitudinal,
+            lateral,
+            part,
+        )
+        _add(part, 1.0, first, total)
+        return
+    for lane in range(lanes):  # the particles of a pattern that rolls through, or one for all
+        for j in range(stop - first):
+            bound[j] = friction[lane, first + j if columns > 1 else 0] * peak[j]
+        if closed:
+            closed_form_into(half_length, bound, theory.elliptic, gradient_x, gradient_y, part)
+            if asked.spin[k] != 0.0:
+                part.moment[:] = 0.0  # phi x is left out, of the work as of the traction
+        elif theory.element_sum:
+            march_local(
+                half_length,
+                bound,
+                alike,
+                first,
+                theory.elliptic,
+                gradient_x,
+                gradient_y,
+                gradient_spin,
+                longitudinal,
+                lateral,
+                part,
+            )
+        else:
+            march_into(
+                half_length,
+                bound,
+                theory.elliptic,
+                gradient_x,
+                gradient_y,
+                gradient_spin,
+                theory.points,
+                part,
+            )
+        _add(part, 1.0 / lanes, first, total)
+
+
+@kernel
+def _add(part: Sums, weight: float, first: int, total: Sums) -> None:
+    """Add the weighted sums of the strips from `first` on to those of all."""
+    for j in range(len(part.force_x)):
+        total.force_x[first + j] += weight * part.force_x[j]
+        total.force_y[first + j] += weight * part.force_y[j]
+        total.moment[first + j] += weight * part.moment[j]
+        total.adhesion[first + j] += weight * part.adhesion[j]
+        total.work[first + j] += weight * part.work[j]
+
+
+@kernel
+def _sum_up(
+    k: int, bodies: Bodies, theory: Theory, asked: Asked, found: Found, work: Work, total: Sums
+) -> None:
+    """Turn the sums along the strips into the solution of contact `k`."""
+    eta, phi, speed = asked.lateral[k], asked.spin[k], asked.rolling_speed
+    centre = _load_weighted_mean(bodies.y, found.line_load[k])
+    force_x, force_y, moment, power, sticking, length = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for j in range(len(bodies.y)):
+        part = work.coverage[j]
+        tx, ty, turning = total.force_x[j], total.force_y[j], total.moment[j]
+        if theory.element_sum:
+            dissipation = part * (speed * total.work[j])
+        else:
+            dissipation = part * (-speed * (work.longitudinal[j] * tx + eta * ty + phi * turning))
+        found.dissipation[k, j] = dissipation
+        power += dissipation
+        force_x += part * tx
+        force_y += part * ty
+        moment += part * turning - (bodies.y[j] - centre) * (part * tx)
+        sticking += total.adhesion[j]
+        length += found.half_length[k, j]
+    found.force_x[k], found.force_y[k] = force_x * bodies.spacing, force_y * bodies.spacing
+    found.spin_moment[k], found.power[k] = moment * bodies.spacing, power * bodies.spacing
+    found.adhesion_fraction[k] = sticking / (2.0 * length)
