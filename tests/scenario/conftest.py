@@ -5,10 +5,13 @@ from __future__ import annotations
 import textwrap
 
 import pytest
+from random_examples import SmallRandomInputs
 from scenario_examples import GOOD, Parse, SmallPlugins
 
 import wearsim.scenario.choices
 import wearsim.scenario.known
+import wearsim.scenario.random_reading
+import wearsim.scenario.random_schema
 import wearsim.scenario.schema
 from wearsim.plugins.manager import Registry
 from wearsim.scenario import Scenario, parse_scenario
@@ -16,10 +19,12 @@ from wearsim.scenario import Scenario, parse_scenario
 
 @pytest.fixture
 def small_registry(monkeypatch: pytest.MonkeyPatch) -> Registry:
-    registry = Registry([SmallPlugins()])
+    registry = Registry([SmallPlugins(), SmallRandomInputs()])
     for module in (
         wearsim.scenario.choices,
         wearsim.scenario.known,
+        wearsim.scenario.random_reading,
+        wearsim.scenario.random_schema,
         wearsim.scenario.schema,
     ):
         monkeypatch.setattr(module, "registry", lambda: registry)

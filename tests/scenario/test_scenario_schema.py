@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 from scenario_examples import GOOD
 
-from wearsim.scenario import scenario_schema
+from wearsim.errors import ScenarioError
+from wearsim.scenario import parse_scenario, scenario_schema
 
 SCENARIOS = sorted((Path(__file__).parents[2] / "scenarios").glob("*.toml"))
 Schema = dict[str, Any]
@@ -27,6 +28,8 @@ def _fits(value: object, schema: Schema, defs: Schema) -> bool:
     if "enum" in schema and value not in schema["enum"]:
         return False
     kind = schema.get("type")
+    if isinstance(kind, list):
+        return any(_fits(value, {**schema, "type": item}, defs) for item in kind)
     if kind == "object":
         known = schema["properties"]
         return (
@@ -34,6 +37,10 @@ def _fits(value: object, schema: Schema, defs: Schema) -> bool:
             and set(schema.get("required", ())) <= set(value) <= set(known)
             and all(_fits(item, known[key], defs) for key, item in value.items())
         )
+    if kind == "array" and "prefixItems" in schema:
+        items = schema["prefixItems"]
+        alike = isinstance(value, list) and len(value) == len(items)
+        return alike and all(map(_fits, value, items, [defs] * len(items)))
     if kind == "array":
         return isinstance(value, list) and all(_fits(i, schema["items"], defs) for i in value)
     if kind == "string":
@@ -42,6 +49,29 @@ def _fits(value: object, schema: Schema, defs: Schema) -> bool:
         return isinstance(value, bool)
     numbers: Any = int if kind == "integer" else (int, float)
     return isinstance(value, numbers) and not isinstance(value, bool)
+
+
+RANDOM = """
+[load]
+normal_force = {distribution = "maxent", support = ["0 N", "inf"], mean = "307 N", std = "32 N"}
+[load.thermal]
+gain = {distribution = "uniform", low = "1 N/W", high = "3 N/W"}
+time_constant = "20 min"
+[friction.coefficient]
+distribution = "gaussian-field"
+correlation_length = "50 um"
+marginal = {distribution = "maxent", support = [0, "inf"], mean = 0.1, std = 0.02}
+[creepage]
+longitudinal = {distribution = "normal", mean = 1e-3, std = 4e-4, persistence = "per-pass"}
+misalignment = {distribution = "disc", radius = "2 mrad", persistence = "per-roller"}
+[wear]
+cylinder.k_over_h = {distribution = "lognormal", median = "1.1e-11 1/Pa", factor = 1.5}
+roller.k_over_h = "0 1/Pa"
+[sampling]
+plan = "sobol"
+realisation = 3
+correlation = [["load.normal_force", "load.thermal.gain", 0.5]]
+"""
 
 
 def _nodes(item: object) -> list[Schema]:
@@ -79,6 +109,47 @@ def test_that_the_schema_refuses_what_the_parser_refuses(
 ) -> None:
     assert _fits(tomllib.loads(GOOD), schema, schema["$defs"])
     assert not _fits(tomllib.loads(GOOD.replace(good, bad)), schema, schema["$defs"])
+
+
+def _random() -> str:
+    """A scenario with the installed random inputs in every table that takes them."""
+    bodies = GOOD[: GOOD.index("[load]")]
+    offset = 'offset = {distribution = "normal", mean = "0 mm", std = "1 mm"}'
+    return bodies.replace("[roller]", f"[roller]\n{offset}") + RANDOM
+
+
+def test_that_the_schema_takes_random_inputs_as_the_parser_does() -> None:
+    schema = scenario_schema()  # with the installed plugins
+    assert _fits(tomllib.loads(_random()), schema, schema["$defs"])
+    scenario = parse_scenario(_random(), "rig.toml", {}.__getitem__)
+    assert len(scenario.random) == 7
+
+
+@pytest.mark.parametrize(
+    ("good", "bad"),
+    [
+        ('"maxent", support = ["0', '"maxnt", support = ["0'),
+        ('std = "32 N"', 'sdt = "32 N"'),
+        ('persistence = "per-pass"', 'persistence = "per-pas"'),
+        ('"uniform", low = "1 N/W", ', '"uniform", '),
+        ("marginal =", "margin ="),
+        ('"disc", radius = "2 mrad"', '"normal", mean = "0 rad", std = "2 mrad"'),
+        ('plan = "sobol"', 'plan = "halton"'),
+        ('radius = "20 mm"', 'radius = {distribution = "uniform", low = "1 mm", high = "2 mm"}'),
+        (
+            '{distribution = "uniform", low = "1 N/W", high = "3 N/W"}',
+            '{distribution = "white", marginal = {distribution = "constant", value = "3 N/W"}}',
+        ),
+    ],
+)
+def test_that_the_schema_refuses_random_inputs_that_the_parser_refuses(good: str, bad: str) -> None:
+    text = _random()
+    assert good in text
+    text = text.replace(good, bad, 1)
+    schema = scenario_schema()  # with the installed plugins
+    assert not _fits(tomllib.loads(text), schema, schema["$defs"])
+    with pytest.raises(ScenarioError):
+        parse_scenario(text, "rig.toml", {}.__getitem__)
 
 
 def test_that_every_key_is_described() -> None:

@@ -194,7 +194,11 @@ def read_load(raw: Mapping[str, object], report: Report) -> LoadChoice | None:
     ours, rest = _split(raw, LoadTable)
     table = report.validate(LoadTable, ours, "load")
     spec = _find(LoadSpec, table.kind, "load", "kind", report) if table else None
-    tables = {key: value for key, value in rest.items() if isinstance(value, dict)}
+    tables = {
+        key: value
+        for key, value in rest.items()
+        if isinstance(value, dict) and ("distribution" not in value or _is_term(key))
+    }
     if spec:
         tables = {k: v for k, v in tables.items() if k not in spec.options.model_fields}
     else:

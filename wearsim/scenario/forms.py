@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_
 from annotated_types import Ge, Gt, Le, Lt
 from pydantic import BaseModel, PlainValidator
 
-from wearsim.quantities import Quantity, shown
+from wearsim.quantities import HostQuantity, Quantity, shown
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,7 +23,8 @@ def _parts(annotation: Any) -> list[Any]:
     return [] if annotation is type(None) else [annotation]
 
 
-def _alternatives(field: FieldInfo) -> list[Any]:
+def alternatives(field: FieldInfo) -> list[Any]:
+    """Return the types that a field's value may have, without None."""
     inputs = [item for item in field.metadata if isinstance(item, PlainValidator)]
     return _parts(inputs[0].json_schema_input_type if inputs else field.annotation)
 
@@ -33,7 +34,7 @@ def model_at(model: type[BaseModel], loc: Sequence[str | int]) -> type[BaseModel
     if not loc:
         return model
     field = field_at(model, loc)
-    found = [part for part in _alternatives(field) if _is_model(part)] if field else []
+    found = [part for part in alternatives(field) if _is_model(part)] if field else []
     return found[0] if found else None
 
 
@@ -52,27 +53,45 @@ def field_at(model: type[BaseModel], loc: Sequence[str | int]) -> FieldInfo | No
 
 def choices(field: FieldInfo | None) -> list[str]:
     """Return the words that a field can be."""
-    parts = _alternatives(field) if field else []
+    parts = alternatives(field) if field else []
     return [str(item) for part in parts if get_origin(part) is Literal for item in get_args(part)]
 
 
-def form(field: FieldInfo) -> str | None:
-    """Return the form in which a field is written, such as "a whole number of at least 1"."""
+def form(field: FieldInfo, host: Quantity | None = None) -> str | None:
+    """Return the form in which a field is written, such as "a whole number of at least 1".
+
+    Parameters
+    ----------
+    field : FieldInfo
+        A field of an options model.
+    host : Quantity, optional
+        What the random input's values measure, where the field is one of its options.
+    """
     for item in field.metadata:
         if isinstance(item, Quantity):
             return item.expected
-    forms = [_form(part) for part in _alternatives(field)]
+    forms = [_form(part, host) for part in _marked(field)]
     known = list(dict.fromkeys(text for text in forms if text))
     return " or ".join(known) + _limits(field.metadata) if known else None
 
 
-def _form(part: Any) -> str | None:
+def _marked(field: FieldInfo) -> list[Any]:
+    """Return the field's alternatives, one that takes its mark from the field with that mark."""
+    marks = [item for item in field.metadata if isinstance(item, HostQuantity)]
+    return [Annotated[part, marks[0]] if marks else part for part in alternatives(field)]
+
+
+def _form(part: Any, host: Quantity | None = None) -> str | None:
     if get_origin(part) is Annotated:
-        marks = [item for item in part.__metadata__ if isinstance(item, Quantity)]
-        return marks[0].expected if marks else _form(get_args(part)[0])
+        for item in part.__metadata__:
+            if isinstance(item, HostQuantity) and host:
+                return host.kind.expected(item.bound)
+            if isinstance(item, Quantity):
+                return item.expected
+        return _form(get_args(part)[0])
     if get_origin(part) is Literal:
         return "one of " + ", ".join(shown(item) for item in get_args(part))
-    if _is_model(part):
+    if _is_model(part) or get_origin(part) is dict:
         return "a table"
     names = {float: "a number", int: "a whole number", bool: "true or false", str: "text"}
     return names.get(part)

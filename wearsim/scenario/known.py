@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from wearsim.plugins import ContactModelSpec, LoadSpec, WearLawSpec, registry
+from wearsim.plugins import ContactModelSpec, LoadSpec, RandomInputSpec, WearLawSpec, registry
 from wearsim.scenario.bodies import CylinderTable, RollerTable
 from wearsim.scenario.choices import ContactTable, LoadTable, WearTable
 from wearsim.scenario.names import Names
+from wearsim.scenario.random_inputs import RandomInputTable
+from wearsim.scenario.sampling import SamplingTable
 from wearsim.scenario.sections import (
     CreepageTable,
     EvolutionTable,
@@ -27,12 +29,17 @@ TABLES: dict[str, type[Table]] = {
     "wear": WearTable,
     "evolution": EvolutionTable,
     "outputs": OutputsTable,
+    "sampling": SamplingTable,
 }
 REQUIRED = ("roller", "cylinder", "operation", "load", "friction", "creepage")
 
 
 def all_names() -> Names:
     """Return the keys of every table and of every plugin."""
+    return Names(_places)
+
+
+def _places() -> dict[str, set[str]]:
     places = {"the top of the file": set(TopTable.model_fields)}
     places |= {f"[{table}]": set(model.model_fields) for table, model in TABLES.items()}
     for kind, table, key in (
@@ -45,4 +52,8 @@ def all_names() -> Names:
             term = isinstance(spec, LoadSpec) and spec.role == "term"
             place = f"[load.{name}]" if term else f'[{table}] with {key} = "{name}"'
             places[place] = set(spec.options.model_fields)
-    return Names(places)
+    places["a random input"] = set(RandomInputTable.model_fields)
+    for name in registry().names(RandomInputSpec):
+        options = registry().get(RandomInputSpec, name).options
+        places[f'a random input with distribution = "{name}"'] = set(options.model_fields)
+    return places

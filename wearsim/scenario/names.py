@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
+from functools import cached_property
 
 
 class Names:
@@ -11,12 +12,17 @@ class Names:
 
     Parameters
     ----------
-    places : mapping of str to collection of str
-        The keys of each table, by the table as a message names it: "[load]".
+    find : callable
+        Returns the keys of each table, by the table as a message names it: "[load]"; called with
+        the first mistake.
     """
 
-    def __init__(self, places: Mapping[str, Collection[str]]) -> None:
-        self._places = places
+    def __init__(self, find: Callable[[], Mapping[str, Collection[str]]]) -> None:
+        self._find = find
+
+    @cached_property
+    def _places(self) -> Mapping[str, Collection[str]]:
+        return self._find()
 
     def hint(self, key: str, here: Collection[str]) -> str:
         """Return a hint in parentheses for an unknown key of a table with the keys `here`."""

@@ -15,6 +15,7 @@ _ALTERNATIVES = {
     "roller": (("radius", "diameter"), ("crown_radius", "crown_diameter")),
     "cylinder": (("radius", "diameter"),),
     "operation": (("duration", "passes"),),
+    "creepage": (("misalignment", "yaw"), ("misalignment", "tilt")),
     "outputs": (CADENCES,),
 }
 

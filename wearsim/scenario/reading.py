@@ -14,7 +14,10 @@ from wearsim.quantities import shown
 from wearsim.scenario.bodies import Cylinder, Roller, read_cylinder, read_roller
 from wearsim.scenario.choices import read_contact, read_load, read_wear
 from wearsim.scenario.known import REQUIRED, TABLES, all_names
+from wearsim.scenario.lifting import put_all
 from wearsim.scenario.overrides import apply_overrides
+from wearsim.scenario.random_inputs import RandomInput
+from wearsim.scenario.sampling import check_correlation, read_sampling
 from wearsim.scenario.scenario import Scenario
 from wearsim.scenario.sections import (
     TopTable,
@@ -28,7 +31,7 @@ from wearsim.scenario.validation import Report
 
 DUNDURS_LIMIT = 0.1
 
-_READERS: dict[str, Callable[[Mapping[str, object], Report], Any]] = {
+READERS: dict[str, Callable[[Mapping[str, object], Report], Any]] = {
     "roller": read_roller,
     "cylinder": read_cylinder,
     "operation": read_operation,
@@ -39,6 +42,7 @@ _READERS: dict[str, Callable[[Mapping[str, object], Report], Any]] = {
     "wear": read_wear,
     "evolution": read_evolution,
     "outputs": read_outputs,
+    "sampling": read_sampling,
 }
 _OPTIONAL = {"wear"}  # tables that stay None where they are left out
 
@@ -123,15 +127,19 @@ def parse_scenario(
     report = Report(name, read_and_keep, all_names())
     top = _read_top(data, report)
     sections = {table: _read_table(table, data, report) for table in TABLES}
-    _check_lists(data, report)
+    check_lists(data, report)
+    check_correlation(sections["sampling"], report)
     report.raise_any()
+    random = tuple(sorted(report.random, key=lambda item: item.name))
     return Scenario(
         file=name,
         title=top.title or PurePath(name).stem,
         seed=top.seed,
         text=text,
         files=files,
-        notes=_notes(sections["roller"], sections["cylinder"]),
+        notes=_notes(sections["roller"], sections["cylinder"], random),
+        random=random,
+        _tables=put_all(data, report.means),
         **sections,
     )
 
@@ -183,10 +191,10 @@ def _read_table(table: str, data: Mapping[str, object], report: Report) -> Any:
     if not isinstance(raw, dict):
         report.add("", table, "is not a table", shown(raw), f"a line [{table}] and its keys below")
         return None
-    return _READERS[table](raw, report)
+    return READERS[table](raw, report)
 
 
-def _check_lists(data: Mapping[str, Any], report: Report) -> None:
+def check_lists(data: Mapping[str, Any], report: Report) -> None:
     """Check that lists have one value per roller."""
 
     def raw(table: str, key: str, default: object = None) -> object:
@@ -204,12 +212,13 @@ def _check_lists(data: Mapping[str, Any], report: Report) -> None:
             report.add(table, key, "a list has one value per roller", got, expected)
 
 
-def _notes(roller: Roller, cylinder: Cylinder) -> tuple[str, ...]:
+def _notes(roller: Roller, cylinder: Cylinder, random: tuple[RandomInput, ...]) -> tuple[str, ...]:
+    warnings = tuple(f"{item.name}: {text}" for item in random for text in item.warnings)
     dundurs = combine(cylinder.material, roller.material).dundurs
     if abs(dundurs) <= DUNDURS_LIMIT:
-        return ()
+        return warnings
     note = (
         f"the materials' Dundurs constant is {dundurs:.3g}: beyond {DUNDURS_LIMIT} the coupling of"
         " pressure and traction, which is neglected, is no longer small"
     )
-    return (note,)
+    return (note, *warnings)

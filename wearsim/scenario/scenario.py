@@ -5,12 +5,15 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import PurePath
+from typing import Any, TypeAlias
 
 from wearsim.errors import Problem, ScenarioError
 from wearsim.scenario.bodies import Cylinder, Roller
 from wearsim.scenario.choices import ContactChoice, LoadChoice, WearChoice
+from wearsim.scenario.random_inputs import RandomInput
+from wearsim.scenario.sampling import SamplingTable
 from wearsim.scenario.sections import (
     CreepageTable,
     EvolutionTable,
@@ -18,6 +21,8 @@ from wearsim.scenario.sections import (
     OperationTable,
     OutputsTable,
 )
+
+Drawn: TypeAlias = float | tuple[float, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,12 +41,16 @@ class Scenario:
         Its TOML, overrides included.
     files : mapping of str to str
         Content of every file it names, by the path as written.
-    roller, cylinder, operation, load, friction, creepage, contact, evolution, outputs
-        The tables.
+    roller, cylinder, operation, load, friction, creepage, contact, evolution, outputs, sampling
+        The tables; what is random has its mean in them.
     wear : WearChoice, optional
         The wear law; a scenario of a single contact may leave it out.
     notes : tuple of str
         What a user should know before trusting the result.
+    random : tuple of RandomInput
+        The random inputs, by name.
+    drawn : mapping of str to float or tuple of float
+        Values that stand for random inputs, by dotted key, in SI; one per roller as a tuple.
     """
 
     file: str
@@ -59,7 +68,11 @@ class Scenario:
     wear: WearChoice | None
     evolution: EvolutionTable
     outputs: OutputsTable
+    sampling: SamplingTable
     notes: tuple[str, ...] = ()
+    random: tuple[RandomInput, ...] = ()
+    drawn: Mapping[str, Drawn] = field(default_factory=dict)
+    _tables: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     @property
     def name(self) -> str:

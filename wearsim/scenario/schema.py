@@ -9,6 +9,13 @@ from pydantic.json_schema import GenerateJsonSchema, models_json_schema
 from wearsim.plugins import ContactModelSpec, LoadSpec, Spec, WearLawSpec, registry
 from wearsim.scenario.choices import ContactTable, LoadTable, WearTable
 from wearsim.scenario.known import REQUIRED, TABLES
+from wearsim.scenario.random_inputs import RandomInputTable
+from wearsim.scenario.random_schema import (
+    admit_random,
+    models_within,
+    random_definitions,
+    random_specs,
+)
 from wearsim.scenario.sections import TopTable
 
 if TYPE_CHECKING:
@@ -53,6 +60,8 @@ def scenario_schema() -> Schema:
     specs = {table: _specs(kind) for table, (_, _, kind) in _CHOICES.items()}
     models: list[type[BaseModel]] = [TopTable, *TABLES.values()]
     models += [spec.options for found in specs.values() for spec in found]
+    models += [RandomInputTable, *(spec.options for spec in random_specs())]
+    models = [part for model in models for part in models_within(model)]
     refs, definitions = models_json_schema(
         [(model, "validation") for model in dict.fromkeys(models)],
         schema_generator=_ScenarioSchema,
@@ -63,6 +72,9 @@ def scenario_schema() -> Schema:
         found: Schema = shared[refs[model, "validation"]["$ref"].rsplit("/", 1)[-1]]
         return found
 
+    shared |= random_definitions(resolve)
+    for model, table in _homes(specs):
+        admit_random(model, table, shared, resolve)
     tables = {
         table: _choice(table, specs[table], resolve)
         if table in _CHOICES
@@ -79,6 +91,16 @@ def scenario_schema() -> Schema:
         "additionalProperties": False,
         "$defs": _needed(shared, tables),
     }
+
+
+def _homes(specs: dict[str, list[Any]]) -> list[tuple[type[BaseModel], str]]:
+    """Return the models of tables and options, each with the table that they stand in."""
+    homes: dict[type[BaseModel], str] = {model: table for table, model in TABLES.items()}
+    for table, found in specs.items():
+        for spec in found:
+            term = getattr(spec, "role", "base") == "term"
+            homes.setdefault(spec.options, f"{table}.{spec.name}" if term else table)
+    return list(homes.items())
 
 
 def _needed(shared: Schema, *users: object) -> Schema:

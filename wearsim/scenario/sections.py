@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from wearsim.quantities import (
+    ANGLE,
     Angle,
     NonNegativeTorque,
     PerRoller,
     PositiveDuration,
     PositiveLength,
     PositiveRotationSpeed,
+    Quantity,
 )
+from wearsim.scenario.hosts import Joint
 from wearsim.scenario.validation import Report, Table
 
 
@@ -44,6 +47,9 @@ class FrictionTable(Table):
     coefficient: float = Field(gt=0.0, description="Coefficient of friction.")
 
 
+SLACK = Joint(("yaw", "tilt"), Quantity(ANGLE), '{distribution = "disc", radius = "2 mrad"}')
+
+
 class CreepageTable(Table):
     """How the rollers slip on the cylinder."""
 
@@ -63,6 +69,9 @@ class CreepageTable(Table):
     )
     tilt: PerRoller[Angle] = Field(
         default=0.0, description="Angle about the rolling direction, the source of spin."
+    )
+    misalignment: Annotated[None, SLACK] = Field(
+        default=None, description="A joint random input that sets yaw and tilt together."
     )
     differential_slip: bool = Field(
         default=False, description="Let the creepage follow the rolling radii across the track."
@@ -84,6 +93,13 @@ class EvolutionTable(Table):
     step: int | None = Field(default=None, gt=0, description="Force every step to so many passes.")
     allow_unstable: bool = Field(
         default=False, description="Take a forced explicit step beyond its stability limit."
+    )
+    nodes: int | None = Field(
+        default=None,
+        ge=4,
+        multiple_of=4,
+        description="Contacts that stand for the passes of a roller whose inputs are drawn at every"
+        " pass; chosen if left out.",
     )
     max_steps: int = Field(default=1_000_000, gt=0, description="Stop after so many steps.")
 

@@ -11,13 +11,16 @@ from wearsim.errors import Problem, ScenarioError
 from wearsim.plugins import Options
 from wearsim.quantities import QuantityError, shown
 from wearsim.scenario.forms import choices, field_at, form, model_at
+from wearsim.scenario.lifting import lift
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from pydantic_core import ErrorDetails
 
+    from wearsim.quantities import Quantity
     from wearsim.scenario.names import Names
+    from wearsim.scenario.random_inputs import RandomInput
 
 M = TypeVar("M", bound=BaseModel)
 
@@ -29,7 +32,7 @@ class Table(Options):
 
 
 class Report:
-    """Everything that is wrong with one scenario.
+    """Everything that is wrong with one scenario, and the random inputs found on the way.
 
     Parameters
     ----------
@@ -39,12 +42,24 @@ class Report:
         Returns the content of a file that the scenario names.
     names : Names
         The keys and tables there are, for suggestions.
+
+    Attributes
+    ----------
+    random : list of RandomInput
+        The random inputs.
+    tried : set of str
+        Dotted keys where a random input stands, be it right or wrong.
+    means : dict of str to object
+        What took the place of the random inputs, as written, by dotted key; None for nothing.
     """
 
     def __init__(self, file: str, read: Callable[[str], str], names: Names) -> None:
         self.file = file
         self.names = names
         self.problems: list[Problem] = []
+        self.random: list[RandomInput] = []
+        self.tried: set[str] = set()
+        self.means: dict[str, object] = {}
         self._read = read
 
     def add(
@@ -81,13 +96,38 @@ class Report:
 
         `beside` is the model of the keys that stand in the same table and were taken out.
         """
+        raw, refused = lift(self, model, raw, table)
+        return self._validate(model, raw, table, beside, refused=refused)
+
+    def validate_options(
+        self,
+        model: type[M],
+        raw: Mapping[str, object],
+        table: str,
+        host: Quantity | None = None,
+        beside: type[BaseModel] | None = None,
+    ) -> M | None:
+        """Return a random input's options, as `validate`; `host` is what its values measure."""
+        return self._validate(model, raw, table, beside, host)
+
+    def _validate(
+        self,
+        model: type[M],
+        raw: Mapping[str, object],
+        table: str,
+        beside: type[BaseModel] | None,
+        host: Quantity | None = None,
+        refused: Sequence[Sequence[str | int]] = (),
+    ) -> M | None:
         # as JSON, whose strict mode takes no "3" for 3 and yet a list for a tuple
         text = json.dumps(raw, default=str)
+        context = {"read": self._read, "quantity": host}
         try:
-            return model.model_validate_json(text, strict=True, context={"read": self._read})
+            return model.model_validate_json(text, strict=True, context=context)
         except ValidationError as error:
             for details in error.errors(include_url=False):
-                self._translate(details, model, raw, table, beside)
+                if not any(_same_way(details["loc"], place) for place in refused):
+                    self._translate(details, model, raw, table, beside, host)
         except ScenarioError as error:
             self.add_file(error, table, key_of_file(raw, error.file))
         return None
@@ -105,11 +145,12 @@ class Report:
         raw: object,
         table: str,
         beside: type[BaseModel] | None,
+        host: Quantity | None,
     ) -> None:
         place, key = _where(details["loc"], raw, table)
         field = field_at(model, details["loc"])
         kind, value = details["type"], details["input"]
-        expected = form(field) if field else None
+        expected = form(field, host) if field else None
         if kind == "value_error":
             self._add_value_error(place, key, details["ctx"]["error"], value)
         elif kind == "extra_forbidden":
@@ -155,6 +196,11 @@ _WHAT = {
 def key_of_file(raw: Mapping[str, object], file: str) -> str:
     """Return the key of a table that names `file`, or nothing."""
     return next((key for key, value in raw.items() if value == file), "")
+
+
+def _same_way(loc: Sequence[str | int], refused: Sequence[str | int]) -> bool:
+    """Tell whether a mistake comes of a refused random input, which still stands in its place."""
+    return bool(loc) and all(one == other for one, other in zip(loc, refused, strict=False))
 
 
 def _where(loc: Sequence[str | int], raw: object, table: str) -> tuple[str, str]:
