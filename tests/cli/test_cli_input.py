@@ -43,6 +43,19 @@ def test_that_check_passes_on_the_notes(command: Command, scenario: Path) -> Non
     assert "note: the materials' Dundurs constant" in result.stderr
 
 
+def test_that_check_tells_what_is_random(command: Command, scenario: Path) -> None:
+    load = 'load.normal_force={distribution = "maxent", support = ["0 N", "inf"], mean = "307 N"'
+    slack = 'creepage.misalignment={distribution = "disc", radius = "2 mrad"'
+    result = command(
+        *("check", scenario, "--set", load + ', std = "32 N"}', "--set", 'sampling.plan="sobol"'),
+        *("--set", slack + ', persistence = "per-roller"}', "--set", "load.normal_force.std=30 N"),
+    )
+    rows = " ".join(result.stdout.split())
+    assert "random load.normal_force maxent, mean 307 N, std 30 N, on [0, inf), per-test" in rows
+    assert "random creepage.misalignment disc, yaw up to 2 mrad, tilt up to 2 mrad" in rows
+    assert "sampling sobol, realisation 0" in rows
+
+
 def test_that_a_setting_without_a_value_is_bad_input(command: Command, scenario: Path) -> None:
     result = command("check", scenario, "--set", "seed")
     assert result.exit_code == 2

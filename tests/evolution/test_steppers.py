@@ -156,7 +156,7 @@ def test_that_a_pass_followed_by_the_chord_method_keeps_its_residual_below_1e_8(
     assert last.full_solves == state.full_solves
     q = last.loop_strips[0, 0, 0, 0]
     gap = scene.gap(state.cylinder_depth, state.roller_depth)[0, 0, 0]
-    exact = scene.model.solve(gap, 90.0, scene.point(0, 300.0, gap * 0.0, gap * 0.0))
+    exact = scene.model.solve(gap, 90.0, scene.point(0, 0, 300.0, gap * 0.0, gap * 0.0))
     # what the line load misses, pressed through the stiffness of one strip, in parts of approach
     assert np.abs(q - exact.line_load).max() < 1e-7 * exact.line_load.max()
     assert last.loop_contacts[0, 0, 0, 0] == pytest.approx(exact.approach, rel=1e-8)
@@ -243,7 +243,7 @@ def test_that_a_free_roller_finds_its_creepage_at_every_step():
     )
     state, _ = stepped(scene, stepper, stop)
     contact = state.contacts[0]
-    assert scene.bearing_torque == 0.1
+    assert scene.inputs.bearing_torque == 0.1
     # the arm is the roller's own radius, which its crown makes smaller to the sides
     assert 1.0 < contact.force_x * -0.02 / 0.1 < 1.003
     # the groove shortens the cylinder's radius by d, and the roller's slip follows it

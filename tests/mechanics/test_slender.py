@@ -9,6 +9,7 @@ from tests.mechanics.test_influence import direct
 from wearsim.mechanics.hertz import hertz
 from wearsim.mechanics.influence import influence_table
 from wearsim.mechanics.slender import CONVERGED, TOO_FINE, solve_slender
+from wearsim.plugins import SharedWear
 from wearsim.types import Grid
 
 MODULUS = 200e9 / (2.0 * (1.0 - 0.3**2))
@@ -16,17 +17,16 @@ CURVATURE = 90.0
 PATCH = hertz(45.0, 1.0, 300.0, MODULUS)
 
 
-def solve(grid, gaps, loads, compliance=None, start=None):
+def solve(grid, gaps, loads, wear=None, start=None):
     """Solve one or several contacts; return status, line loads, approaches and iterations."""
     gaps = np.atleast_2d(gaps)
     count, n = gaps.shape
-    if compliance is None:
-        compliance = np.zeros((count, count, n))
+    wear = no_wear(count, n) if wear is None else wear
     line_load = np.zeros((count, n)) if start is None else start.copy()
     approach = np.zeros(count)
     status, iterations = solve_slender(
         np.ascontiguousarray(gaps),
-        compliance,
+        *wear.reduced,
         np.atleast_1d(np.asarray(loads, dtype=float)),
         grid.spacing,
         MODULUS,
@@ -38,23 +38,26 @@ def solve(grid, gaps, loads, compliance=None, start=None):
     return status, line_load, approach, iterations
 
 
-def surface(grid, gaps, line_load, compliance):
+def no_wear(count, n):
+    """Return the wear of contacts that wear nothing."""
+    return SharedWear(np.zeros((count, 2), dtype=np.int64), np.zeros((count, 2, n)))
+
+
+def surface(grid, gaps, line_load, wear):
     """Return gap, wear and displacement together, written out without any table."""
     count, n = gaps.shape
-    total = gaps.copy()
+    total = gaps + wear.opening(line_load)
     for k in range(count):
         for j in np.flatnonzero(line_load[k]):
             a = np.sqrt(4.0 * line_load[k, j] / (np.pi * MODULUS * CURVATURE))
             shape = direct(np.log(a / grid.spacing), n)
             total[k] += line_load[k, j] / (np.pi * MODULUS) * shape[np.abs(np.arange(n) - j)]
-        for other in range(count):
-            total[k] += compliance[k, other] * line_load[other]
     return total
 
 
-def assert_solved(grid, gaps, loads, compliance, line_load, approach):
+def assert_solved(grid, gaps, loads, wear, line_load, approach):
     """Hold a solution against the equations of contact themselves."""
-    total = surface(grid, gaps, line_load, compliance)
+    total = surface(grid, gaps, line_load, wear)
     scale = np.ptp(approach[:, None] - gaps) + np.abs(approach).max()
     assert (line_load >= 0.0).all()
     np.testing.assert_allclose(line_load.sum(axis=1) * grid.spacing, loads, rtol=1e-10)
@@ -96,7 +99,7 @@ def test_that_every_profile_is_solved_to_the_equations(name, strips):
     gap = shape_of(name, grid.y)[None, :]
     status, q, approach, _ = solve(grid, gap, 300.0)
     assert status == CONVERGED
-    assert_solved(grid, gap, [300.0], np.zeros((1, 1, strips)), q, approach)
+    assert_solved(grid, gap, [300.0], no_wear(1, strips), q, approach)
 
 
 def test_that_the_ten_micrometre_bump_makes_two_patches():
@@ -122,22 +125,43 @@ def test_that_random_rough_profiles_are_solved_to_the_equations(
     grid = Grid.spanning(-3e-3, 3e-3, strips)
     random = np.random.default_rng(seed)
     gap = (curvature * grid.y**2 + roughness * 1e-6 * random.random(strips))[None, :]
-    wear = compliance * random.random((1, 1, strips))
+    wear = SharedWear.of_one(compliance * random.random(strips))
     status, q, approach, _ = solve(grid, gap, load, wear)
     assert status in {CONVERGED, TOO_FINE}
     if status == CONVERGED:
         assert_solved(grid, gap, [load], wear, q, approach)
 
 
-def test_that_coupled_contacts_are_solved_to_the_equations():
+GROUPS = {
+    "one cylinder, three rollers": [(0, 0), (0, 1), (0, 2)],
+    "one cylinder, one roller": [(0, 0), (0, 0), (0, 0)],
+    "one cylinder, two rollers": [(0, 0), (0, 1), (0, 0)],
+    "two stations, two rollers": [(0, 0), (1, 1), (1, 0)],
+}
+
+
+@pytest.mark.parametrize("bodies", GROUPS.values(), ids=GROUPS)
+def test_that_coupled_contacts_are_solved_to_the_equations(bodies):
     grid = Grid.spanning(-4e-3, 4e-3, 81)
     gaps = np.array([(grid.y - offset) ** 2 for offset in (-1e-3, 0.3e-3, 1e-3)])
-    compliance = np.full((3, 3, 81), 2e-11)
-    for k in range(3):
-        compliance[k, k] += 1e-11
-    status, q, approach, _ = solve(grid, gaps, [300.0, 250.0, 400.0], compliance)
+    random = np.random.default_rng(3)
+    wear = SharedWear(np.array(bodies), 2e-11 * random.random((3, 2, 81)))
+    status, q, approach, iterations = solve(grid, gaps, [300.0, 250.0, 400.0], wear)
     assert status == CONVERGED
-    assert_solved(grid, gaps, [300.0, 250.0, 400.0], compliance, q, approach)
+    assert iterations < 20
+    assert_solved(grid, gaps, [300.0, 250.0, 400.0], wear, q, approach)
+
+
+def test_that_fifty_contacts_on_one_body_are_solved_to_the_equations():
+    grid = Grid.spanning(-4e-3, 4e-3, 81)
+    random = np.random.default_rng(4)
+    gaps = (grid.y - random.uniform(-1e-3, 1e-3, (50, 1))) ** 2
+    wear = SharedWear(np.zeros((50, 2), dtype=np.int64), np.full((50, 2, 81), 1e-11))
+    loads = random.uniform(200.0, 400.0, 50)
+    status, q, approach, iterations = solve(grid, gaps, loads, wear)
+    assert status == CONVERGED
+    assert iterations < 20
+    assert_solved(grid, gaps, loads, wear, q, approach)
 
 
 def test_that_uncoupled_contacts_are_solved_as_if_alone():

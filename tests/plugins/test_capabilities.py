@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wearsim.errors import CapabilityError
-from wearsim.plugins import ContactModelSpec, registry
-from wearsim.types import Creepage, Grid, Material, OperatingPoint
+from wearsim.errors import CapabilityError, ContactError
+from wearsim.plugins import ContactModelSpec, SharedWear, registry
+from wearsim.types import Creepage, Grid, Material, OperatingPoint, OperatingPoints
 
 STEEL = Material(youngs_modulus=210e9, poisson_ratio=0.3)
 CURVATURE = 1 / 0.025 + 1 / 0.020
@@ -18,7 +18,7 @@ MODELS = {
     "slender": {},
     "slender-fastsim": {"tangential": "fastsim"},
     "hertz-fastsim": {},
-    "hertz-fastsim-march": {"closed_form": False},
+    "hertz-fastsim-march": {"closed_form": "never"},
 }
 
 
@@ -61,13 +61,13 @@ def test_wear_compliance(case):
 
 def test_coupled(case):
     gap, points = np.array([case.gap, case.gap]), [POINT, POINT]
-    compliance = np.full((2, 2, case.grid.strips), 1e-12)
+    wear = SharedWear(np.zeros((2, 2), dtype=np.int64), np.full((2, 2, case.grid.strips), 5e-13))
     if not case.model.capabilities.coupled:
         with pytest.raises(CapabilityError, match="one contact at a time"):
-            case.model.solve_coupled(gap, CURVATURE, points, compliance)
+            case.model.solve_coupled(gap, CURVATURE, points, wear)
         return
-    one, other = case.model.solve_coupled(gap, CURVATURE, points, compliance)
-    alone = case.solve(POINT, 2 * compliance[0, 0])
+    one, other = case.model.solve_coupled(gap, CURVATURE, points, wear)
+    alone = case.solve(POINT, 2 * wear.total[0])
     assert one.line_load == pytest.approx(other.line_load, rel=1e-9)
     assert one.line_load == pytest.approx(alone.line_load, rel=1e-6, abs=1e-3)
 
@@ -95,6 +95,41 @@ def test_local_friction(case):
     friction = np.where(case.grid.y > 0, 0.2, 0.1)
     solution = case.solve(replace(POINT, friction=friction))
     assert not np.allclose(solution.dissipation, solution.dissipation[::-1], rtol=0.1, atol=0.0)
+
+
+def test_friction_field(case):
+    if not case.model.capabilities.friction_field:
+        with pytest.raises(CapabilityError, match="one friction coefficient per strip"):
+            case.solve(replace(POINT, friction=np.full((50, case.grid.strips), 0.1)))
+        with pytest.raises(CapabilityError, match="from point to point"):
+            case.model.friction_points(case.gap, CURVATURE, POINT)
+        return
+    x, y = case.model.friction_points(case.gap, CURVATURE, POINT)
+    friction = np.where(x > 0.0, 0.05, 0.15) + np.zeros_like(y)
+    changed = case.solve(replace(POINT, friction=friction))
+    assert changed.power == pytest.approx(case.solution.power, rel=0.2)
+    assert changed.power != pytest.approx(case.solution.power, rel=1e-3)
+    carried = case.solve(replace(POINT, friction=friction, friction_carried=True))
+    assert carried.power != pytest.approx(changed.power, rel=1e-3)
+
+
+def test_that_many_contacts_are_solved_as_each_alone(case):
+    loads = np.array([250.0, 300.0, 320.0])
+    points = OperatingPoints(loads, np.full(3, 1e-3), 3e-4 + 0 * loads, 0.02 + 0 * loads,
+                             np.full(3, 0.1), 2.618)  # fmt: skip
+    gaps = np.broadcast_to(case.gap, (1, 1, 3, case.grid.strips))
+    batch = case.model.solve_batch(gaps, CURVATURE, points)
+    assert batch.stack("y").shape == batch.stack("line_load").shape == gaps.shape
+    for k, found in enumerate(batch.solutions):
+        alone = case.solve(points[k])
+        assert found.dissipation == pytest.approx(alone.dissipation, rel=1e-12, abs=1e-12)
+        assert batch.stack("power")[0, 0, k] == found.power == pytest.approx(alone.power)
+        assert [type(value) for value in vars(found).values()] == [
+            type(value) for value in vars(alone).values()
+        ]
+    bad = replace(points, normal_force=np.array([300.0, 300.0, 1e7]))
+    with pytest.raises(ContactError, match=r"^realisation 2: "):
+        case.model.solve_batch(gaps, CURVATURE, bad)
 
 
 def test_pass_loop(case):

@@ -51,10 +51,10 @@ def run(
 
 def report(result: Result, json: bool) -> None:
     """Write how a run ended to stdout."""
-    from wearsim.cli.summary import as_json, effort, end_state, standing
+    from wearsim.cli.summary import as_json, draws, effort, end_state, standing
 
     if json:
         write_json(as_json(result))
         return
-    rows = [("test", standing(result)), *end_state(result), *effort(result)]
+    rows = [("test", standing(result)), *draws(result), *end_state(result), *effort(result)]
     write_table(result.title, [*rows, ("results file", str(result.path))])

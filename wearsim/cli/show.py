@@ -8,14 +8,17 @@ from wearsim.cli.arguments import Json, ResultsFile
 from wearsim.cli.output import note, write_json, write_table
 
 if TYPE_CHECKING:
-    from wearsim.results import Result
+    from wearsim.results import DissipationData, DissipationResult, Result, RunData
 
 
 def show(file: ResultsFile, json: Json = False) -> None:
     """Tell what is in a results file, and its end state."""
     from wearsim.cli.summary import end_state
-    from wearsim.results import open_results
+    from wearsim.results import is_dissipation, open_dissipation, open_results
 
+    if is_dissipation(file):
+        _show_study(open_dissipation(file), json)
+        return
     result = open_results(file)
     if json:
         write_json(_data(result))
@@ -28,25 +31,62 @@ def show(file: ResultsFile, json: Json = False) -> None:
         note(f"warning: {text}")
 
 
+def _show_study(result: DissipationResult, json: bool) -> None:
+    from wearsim.cli.dissipation import tell
+    from wearsim.cli.spread import as_json, write_spread
+
+    raw = result.raw
+    if json:
+        write_json({**as_json(result), **_origin(raw)})
+        return
+    more = [
+        ("scenario", raw.scenario_file),
+        ("input files", ", ".join(raw.files) or "none"),
+        ("plugins", "\n".join(_plugins(raw))),
+        ("software", ", ".join(f"{name} {number}" for name, number in raw.software.items())),
+        ("written", raw.created),
+    ]
+    write_spread(result, more)
+    tell(result)
+
+
+def _plugins(raw: RunData | DissipationData) -> list[str]:
+    return [
+        f"{item['kind']} {item['name']} ({item['distribution']} {item['version']})"
+        for item in raw.plugins
+    ]
+
+
+def _origin(raw: RunData | DissipationData) -> dict[str, Any]:
+    """Return what a file was made from, and with what."""
+    return {
+        "scenario_file": raw.scenario_file,
+        "scenario_sha256": raw.sha256,
+        "scenario": raw.scenario_text,
+        "files": list(raw.files),
+        "plugins": raw.plugins,
+        "software": raw.software,
+        "seed": raw.seed,
+        "created": raw.created,
+    }
+
+
 def _contents(result: Result) -> list[tuple[str, str]]:
-    from wearsim.cli.summary import effort, standing
+    from wearsim.cli.summary import draws, effort, standing
     from wearsim.report.units import count
 
     raw = result.raw
     records = f"{len(result.record_passes)}, at passes {count(float(result.record_passes[0]))} to"
-    plugins = (
-        f"{item['kind']} {item['name']} ({item['distribution']} {item['version']})"
-        for item in raw.plugins
-    )
     return [
         ("test", standing(result)),
         ("scenario", raw.scenario_file),
         ("input files", ", ".join(raw.files) or "none"),
         ("contact model", result.model),
         ("stepper", f"{result.stepper}, tolerance {raw.tolerance:g}"),
-        ("plugins", "\n".join(plugins)),
+        ("plugins", "\n".join(_plugins(raw))),
         ("software", ", ".join(f"{name} {number}" for name, number in raw.software.items())),
         ("seed", str(raw.seed)),
+        *draws(result),
         ("written", raw.created),
         ("records", f"{records} {count(float(result.record_passes[-1]))}"),
         ("strips", str(len(result.y))),
@@ -61,14 +101,7 @@ def _data(result: Result) -> dict[str, Any]:
     return {
         **as_json(result),
         "total_passes": raw.total_passes,
-        "scenario_file": raw.scenario_file,
-        "scenario_sha256": raw.sha256,
-        "scenario": raw.scenario_text,
-        "files": list(raw.files),
-        "plugins": raw.plugins,
-        "software": raw.software,
-        "seed": raw.seed,
+        **_origin(raw),
         "tolerance": raw.tolerance,
-        "created": raw.created,
         "record_passes": result.record_passes,
     }

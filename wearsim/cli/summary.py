@@ -54,6 +54,15 @@ def _with_part(error: Any, depth: Any) -> str:
     return f"{text}, {shown(worst / whole, '%', 2)}" if whole > 0.0 else text
 
 
+def draws(result: Result) -> Rows:
+    """Return what was drawn in the place of random inputs, in SI."""
+    rows = []
+    for key, drawn in result.raw.drawn.items():
+        unit = "" if drawn["unit"] == "1" else f" {drawn['unit']}"
+        rows.append((f"drawn {key}", " / ".join(f"{v:.6g}" for v in drawn["values"]) + unit))
+    return rows
+
+
 def effort(result: Result) -> Rows:
     """Return what the run took."""
     solves = count(_int(result.solves))
@@ -94,6 +103,7 @@ def as_json(result: Result) -> dict[str, Any]:
         "solves": _int(result.solves),
         "full_solves": _int(result.full_solves),
         "wall_seconds": result.raw.wall_seconds,
+        "drawn": result.raw.drawn,
         "output": str(result.path) if result.path else None,
         "notes": list(result.notes),
         "warnings": list(result.warnings),

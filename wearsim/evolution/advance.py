@@ -11,6 +11,7 @@ from wearsim.evolution.observables import depth, worn_volume
 from wearsim.evolution.scene import Scene
 from wearsim.evolution.state import WearState, contact_values
 from wearsim.evolution.wearing import Contacts, Wearing, exponents_between
+from wearsim.plugins import SharedWear
 from wearsim.types import ContactSolution, FloatArray, OperatingPoint
 
 FIXED_POINT_TOLERANCE = 1e-8
@@ -21,20 +22,27 @@ SAME_LOAD = 1e-9  # relative change of a load that asks for no new solution
 def mean_loads(
     scene: Scene, state: WearState, passes: float, end_gap: FloatArray, power: FloatArray
 ) -> FloatArray:
-    """Return the mean load of each contact over a step, shape (S, R, N) [N].
+    """Return the mean load of each contact over a step, shape (S, C, N) [N].
 
     The load itself is integrated exactly; the feedback takes the mean of the descents at the
     step's ends, and each term its exact mean at constant `power`.
     """
     start, stop = scene.time(state.passes), scene.time(state.passes + passes)
-    loads = np.full(scene.shape, scene.load.mean(start, stop))
+    scene = scene.at_time(start, stop)
+    loads = _loads(scene, scene.load.mean(start, stop))
     if scene.load.stiffness != 0.0:
         before = scene.descent(scene.gap(state.cylinder_depth, state.roller_depth))
         loads -= scene.load.stiffness * 0.5 * (before + scene.descent(end_gap))
     for number, term in enumerate(scene.terms.values()):
         # a station's power counts like any other's
-        loads += term.mean_force(state.terms[number], power.mean(axis=0), stop - start)
+        mean = scene.per_roller(power).mean(axis=0)
+        loads += term.mean_force(state.terms[number], mean, stop - start)[scene.roller]
     return checked_loads(loads, state.passes)
+
+
+def _loads(scene: Scene, force: float) -> FloatArray:
+    """Return the load of every contact before feedback where that of the scene is `force` [N]."""
+    return np.broadcast_to(force + scene.inputs.normal_force, scene.shape).copy()
 
 
 def checked_loads(loads: FloatArray, passes: float) -> FloatArray:
@@ -53,8 +61,14 @@ def operating_points(
 ) -> list[OperatingPoint]:
     """Return the operating point of every contact at given loads and worn depths."""
     return [
-        scene.point(r, float(loads[s, r, v]), cylinder_depth[s, 0, v], roller_depth[0, r, v])
-        for s, r, v in scene.contacts
+        scene.point(
+            c,
+            v,
+            float(loads[s, c, v]),
+            cylinder_depth[s, 0, v],
+            roller_depth[0, scene.roller[c], v],
+        )
+        for s, c, v in scene.contacts
     ]
 
 
@@ -62,16 +76,16 @@ def _solve_all(
     scene: Scene,
     gap: FloatArray,
     points: list[OperatingPoint],
-    compliance: FloatArray,
+    compliance: list[SharedWear],
     warm: Contacts,
 ) -> Contacts:
     """Solve every realisation's coupled contacts; order as `WearState.contacts`."""
-    stations, rollers, realisations = scene.shape
+    stations, contacts, realisations = scene.shape
     curvature = scene.kinematics.longitudinal_curvature
     solved: dict[tuple[int, ...], ContactSolution] = {}
     flat = {index: number for number, index in enumerate(scene.contacts)}
     for v in range(realisations):
-        members = [(s, r, v) for s, r in np.ndindex(stations, rollers)]
+        members = [(s, r, v) for s, r in np.ndindex(stations, contacts)]
         found = scene.model.solve_coupled(
             np.array([gap[index] for index in members]),
             curvature,
@@ -100,6 +114,7 @@ def implicit_step(scene: Scene, state: WearState, passes: float) -> WearState:
     StepError
         If they do not settle.
     """
+    scene = scene.at_time(scene.time(state.passes), scene.time(state.passes + passes))
     gap = scene.gap(state.cylinder_depth, state.roller_depth)
     contacts = state.contacts
     wearing = Wearing(scene, contacts, passes)
@@ -140,6 +155,7 @@ def _end_loads(
 
 def explicit_step(scene: Scene, state: WearState, passes: float) -> WearState:
     """Step over `passes` passes on the profiles of the step's start, under its mean load."""
+    scene = scene.at_time(scene.time(state.passes), scene.time(state.passes + passes))
     foreseen = Wearing(scene, state.contacts, passes)
     mean = _end_loads(scene, state, passes, foreseen, state.contacts)
     contacts = contacts_at(scene, state, mean)
@@ -148,32 +164,41 @@ def explicit_step(scene: Scene, state: WearState, passes: float) -> WearState:
     return replace(worn, contacts=solve_present(scene, worn, present_loads(scene, worn)))
 
 
+def present_scene(scene: Scene, state: WearState) -> Scene:
+    """Return the scene with every process at its value of this moment."""
+    now = scene.time(state.passes)
+    return scene.at_time(now, now)
+
+
 def present_loads(scene: Scene, state: WearState) -> FloatArray:
-    """Return the load of each contact at this moment, shape (S, R, N) [N]."""
-    loads = np.full(scene.shape, float(scene.load.force(np.array([scene.time(state.passes)]))[0]))
+    """Return the load of each contact at this moment, shape (S, C, N) [N]."""
+    scene = present_scene(scene, state)
+    loads = _loads(scene, float(scene.load.force(np.array([scene.time(state.passes)]))[0]))
     if scene.load.stiffness != 0.0:
         gap = scene.gap(state.cylinder_depth, state.roller_depth)
         loads -= scene.load.stiffness * scene.descent(gap)
     for number in range(len(scene.terms)):
-        loads += state.terms[number]
+        loads += state.terms[number][scene.roller]
     return checked_loads(loads, state.passes)
 
 
 def contacts_at(scene: Scene, state: WearState, loads: FloatArray) -> Contacts:
-    """Return the contacts on the present profiles under `loads`, shape (S, R, N) [N].
+    """Return the contacts on the present profiles under `loads`, shape (S, C, N) [N].
 
     A step over many passes leaves them solved on the profile it leads to; where they carry these
     loads already there is nothing left to solve.
     """
     line_load = contact_values(scene, state.contacts, "line_load")
     carried = line_load.sum(axis=-1) * scene.grid.spacing
-    if np.abs(carried - loads).max() <= SAME_LOAD * loads.max():
+    same = scene.steady and not scene.varying
+    if same and np.abs(carried - loads).max() <= SAME_LOAD * loads.max():
         return state.contacts
     return solve_present(scene, state, loads)
 
 
 def solve_present(scene: Scene, state: WearState, loads: FloatArray) -> Contacts:
-    """Solve every contact on the present profiles under `loads`, shape (S, R, N) [N]."""
+    """Solve every contact on the present profiles under `loads`, shape (S, C, N) [N]."""
+    scene = present_scene(scene, state)
     points = operating_points(scene, loads, state.cylinder_depth, state.roller_depth)
     gap = scene.gap(state.cylinder_depth, state.roller_depth)
     batch = scene.model.solve_batch(
@@ -195,7 +220,7 @@ def _completed(
     duration = scene.time(state.passes + passes) - scene.time(state.passes)
     terms = np.array(
         [
-            term.advance(state.terms[number], power.mean(axis=0), duration)
+            term.advance(state.terms[number], scene.per_roller(power).mean(axis=0), duration)
             for number, term in enumerate(scene.terms.values())
         ]
     ).reshape(state.terms.shape)

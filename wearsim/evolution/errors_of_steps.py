@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 
@@ -15,6 +17,7 @@ from wearsim.evolution.wearing import Wearing
 from wearsim.types import FloatArray
 
 DEPTH_EXPONENT, VOLUME_EXPONENT = 0.5, 0.75  # below those of any groove: 2/3 to 1, and about 1
+Step: TypeAlias = Callable[[Scene, WearState, float], WearState]
 COVER = 1.5  # an estimate of first order is about the error itself; half as much for safety
 DEEP = 0.5  # depths are compared where the groove is deeper than this part of its depth
 DEPTHS = ("cylinder_depth", "roller_depth")
@@ -57,12 +60,12 @@ def depth_between(
     return greatest
 
 
-def load_spread(scene: Scene, end: WearState, first: float, passes: float) -> FloatArray:
-    """Return the error that the load's variation within a step can make.
+def variation_error(scene: Scene, end: WearState, first: float, passes: float) -> FloatArray:
+    """Return the error that the variation of load and processes within a step can make.
 
-    The step takes the load's exact mean, but wear is no linear function of the load. Half the
-    second difference of the wear at the mean load and a standard deviation to either side, on the
-    profile of the step's end, is the bias that the variance makes.
+    The step takes their exact means, but wear is no linear function of them. Half the second
+    difference of the wear at the mean and a standard deviation to either side, on the profile of
+    the step's end, is the bias that the variance makes.
 
     Parameters
     ----------
@@ -77,30 +80,115 @@ def load_spread(scene: Scene, end: WearState, first: float, passes: float) -> Fl
     ndarray, shape (2, realisations)
         In depth [m], and in the volume worn off both bodies [m^3].
     """
-    spread = np.zeros((2, scene.shape[2]))
     start, stop = scene.time(first), scene.time(first + passes)
-    deviation = scene.load.deviation(start, stop)
+    spread = np.zeros((2, scene.shape[2]))
+    here = scene.at_time(start, stop)
     loads = contact_values(scene, end.contacts, "line_load").sum(axis=-1) * scene.grid.spacing
-    deviation = min(deviation, 0.9 * float(loads.min()))
-    if deviation <= 1e-9 * float(loads.max()):
-        return spread
-    depths = end.cylinder_depth, end.roller_depth
-    less, mean, more = (
-        Wearing(scene, solve_present(scene, end, loads + shift), passes)
-        for shift in (-deviation, 0.0, deviation)
-    )
-    bias = (
+    shift = min(scene.load.deviation(start, stop), 0.9 * float(loads.min()))
+    mean: Wearing | None = None
+    if shift > 1e-9 * float(loads.max()):
+        mean = _worn_at(here, end, loads, passes)
+        pair = [_worn_at(here, end, loads + sign * shift, passes) for sign in (-1.0, 1.0)]
+        spread += _bias(scene, end, mean, pair)
+    for item in scene.varying:
+        deviation = item.path.deviation(start, stop)
+        values = getattr(here.inputs, item.name)
+        if deviation <= 1e-9 * float(np.abs(values).max()):
+            continue
+        mean = mean if mean is not None else _worn_at(here, end, loads, passes)
+        chosen = np.isin(scene.roller, item.rollers)[:, None]
+        pair = []
+        for sign in (-1.0, 1.0):
+            inputs = here.inputs.with_values({item.name: values + sign * deviation * chosen})
+            pair.append(_worn_at(replace(here, inputs=inputs), end, loads, passes))
+        spread += _bias(scene, end, mean, pair)
+    return COVER * spread
+
+
+def _worn_at(scene: Scene, end: WearState, loads: FloatArray, passes: float) -> Wearing:
+    """Return what `passes` passes on the profiles of `end` would wear off under `loads`."""
+    return Wearing(scene, solve_present(scene, end, loads), passes)
+
+
+def _bias(scene: Scene, end: WearState, mean: Wearing, pair: list[Wearing]) -> FloatArray:
+    """Return half the second difference of depth and volume, shape (2, realisations)."""
+    less, more = pair
+    changes = (
         0.5 * (less.cylinder - 2.0 * mean.cylinder + more.cylinder),
         0.5 * (less.roller - 2.0 * mean.roller + more.roller),
     )
+    size = np.zeros((2, scene.shape[2]))
+    depths = end.cylinder_depth, end.roller_depth
     radii = scene.kinematics.cylinder_radius, scene.kinematics.roller_radius
     weights = np.ones(1), scene.kinematics.multiplicity
-    for change, depth, radius, weight in zip(bias, depths, radii, weights, strict=True):
+    for change, depth, radius, weight in zip(changes, depths, radii, weights, strict=True):
         deep = depth >= DEEP * depth.max(axis=(0, 1, 3), keepdims=True)
-        spread[0] = np.maximum(spread[0], np.where(deep, np.abs(change), 0.0).max(axis=(0, 1, 3)))
+        size[0] = np.maximum(size[0], np.where(deep, np.abs(change), 0.0).max(axis=(0, 1, 3)))
         volume = worn_volume(change, scene.grid.spacing, radius)
-        spread[1] += np.abs((volume * weight[None, :, None]).sum(axis=1).mean(axis=0))
-    return COVER * spread
+        size[1] += np.abs((volume * weight[None, :, None]).sum(axis=1).mean(axis=0))
+    return size
+
+
+def coarse_start(scene: Scene, state: WearState) -> WearState:
+    """Return the twin of a test whose rollers have half the contacts, where it has yet to begin."""
+    chosen = set(np.flatnonzero(scene.half == 0))
+    contacts = zip(scene.contacts, state.contacts, strict=True)
+    return replace(
+        state,
+        contacts=tuple(contact for (_, c, _), contact in contacts if c in chosen),
+        shadow=None,
+    )
+
+
+def with_pass_errors(
+    scene: Scene, start: WearState, end: WearState, whole: WearState, step: Step, passes: float
+) -> WearState:
+    """Return `end` with what the draws at every pass of a step make uncertain.
+
+    A twin of the test is stepped beside it with half the contacts of each roller. What sets it
+    apart from the same steps with all of them, with all that wear has forgotten of earlier
+    differences, is the estimate of the quadrature's error. What the draws of so many passes leave
+    to chance scatters the volume, and the depth as much.
+
+    Parameters
+    ----------
+    scene : Scene
+    start, end : WearState
+        The test before and after the step.
+    whole : WearState
+        The test stepped as the twin is.
+    step : callable
+        Takes a scene, a state and a number of passes to the state after them.
+    passes : float
+        Length of the step.
+    """
+    if not scene.has_nodes:
+        return end
+    halved = scene.halved
+    coarse = step(halved, start.coarse or coarse_start(scene, start), passes)
+    volume = whole_volume(scene, end)
+    variance = start.scatter[1] + _volume_variance(scene, end, passes)
+    depth = np.square(deepest(end) / np.where(volume > 0.0, volume, 1.0)) * variance
+    apart = np.abs(whole_volume(scene, whole) - whole_volume(scene, coarse))
+    return replace(
+        end,
+        quadrature=np.array([depth_between(whole, coarse), apart]),
+        scatter=np.array([depth, variance]),
+        coarse=coarse,
+    )
+
+
+def _volume_variance(scene: Scene, end: WearState, passes: float) -> FloatArray:
+    """Return the variance of the volume that so many passes wear, shape (realisations,) [m^6]."""
+    kinematics, spacing = scene.kinematics, scene.grid.spacing
+    cylinder, roller = scene.wear_per_pass(end.contacts)
+    ratio = kinematics.roller_share * kinematics.physical_rollers
+    volume = worn_volume(cylinder, spacing, kinematics.cylinder_radius)
+    volume = volume + worn_volume(roller * ratio, spacing, kinematics.roller_radius)
+    # what differs from roller to roller is no chance
+    apart = volume - scene.per_roller(volume)[:, scene.roller]
+    variance: FloatArray = (scene.cylinder_share[None, :, None] * apart**2).sum(axis=1).max(axis=0)
+    return passes * variance
 
 
 def excess(
@@ -126,7 +214,9 @@ def excess(
     """
     part, worst = end.passes / stop, 0.0
     sizes = deepest(end), whole_volume(scene, end)
-    spent = start.depth_error, start.volume_error
+    # what no shorter step would take away must not shorten it
+    reducible = np.array([start.depth_error, start.volume_error]) - start.irreducible
+    spent = reducible[0], reducible[1]
     for kind, exponent in enumerate((DEPTH_EXPONENT, VOLUME_EXPONENT)):
         for size, before, error in zip(sizes[kind], spent[kind], added[kind], strict=True):
             if size > 0.0:

@@ -7,14 +7,15 @@ from dataclasses import replace
 import numpy as np
 
 from wearsim.errors import StepError
-from wearsim.evolution.advance import contacts_at, explicit_step, mean_loads
+from wearsim.evolution.advance import contacts_at, explicit_step, mean_loads, present_scene
 from wearsim.evolution.control import StepControl
 from wearsim.evolution.errors_of_steps import (
     COVER,
     depth_between,
     excess,
-    load_spread,
+    variation_error,
     whole_volume,
+    with_pass_errors,
 )
 from wearsim.evolution.observables import oscillation
 from wearsim.evolution.scene import Scene
@@ -74,6 +75,8 @@ class ExplicitStepper(Stepper):
                 break
             rejected += 1
             proposed = min(chosen, 0.7 * step)
+        end = with_pass_errors(scene, state, end, end, explicit_step, step)
+        added = added + end.irreducible - state.irreducible
         end = replace(
             end,
             passes=stop if step == left else end.passes,
@@ -126,7 +129,7 @@ def _errors(scene: Scene, start: WearState, end: WearState, step: float) -> Floa
     )
     volumes = np.abs(whole_volume(scene, end) - whole_volume(scene, other))
     apart = np.array([depth_between(end, other), volumes])
-    return COVER * 0.5 * apart + load_spread(scene, end, start.passes, step)
+    return COVER * 0.5 * apart + variation_error(scene, end, start.passes, step)
 
 
 def stability_limit(scene: Scene, state: WearState) -> float:
@@ -149,19 +152,20 @@ def _limit_of(scene: Scene, state: WearState, v: int) -> float:
     A roller's own wear is counted as if every roller had the same share of the shape; that can
     only lower the limit.
     """
+    scene = present_scene(scene, state)
     gap = scene.gap(state.cylinder_depth, state.roller_depth)
     curvature = scene.kinematics.longitudinal_curvature
     cylinder, roller = scene.wear_per_pass(state.contacts)
     parts = []
-    for (s, r, realisation), contact in zip(scene.contacts, state.contacts, strict=True):
+    for (s, c, realisation), contact in zip(scene.contacts, state.contacts, strict=True):
         loaded = contact.line_load > 0.0
-        wear = cylinder[s, r, v] * scene.kinematics.cylinder_share[r]
-        wear = wear + roller[s, r, v] * scene.kinematics.roller_share
+        wear = cylinder[s, c, v] * scene.cylinder_share[c]
+        wear = wear + roller[s, c, v] * scene.weight[c] * scene.kinematics.roller_share
         ratio = np.where(loaded, wear / np.where(loaded, contact.line_load, 1.0), 0.0)
         if realisation == v and ratio.any():
             load = float(contact.line_load.sum() * scene.grid.spacing)
-            depths = state.cylinder_depth[s, 0, v], state.roller_depth[0, r, v]
-            parts.append((contact, gap[s, r, v], scene.point(r, load, *depths), ratio))
+            depths = state.cylinder_depth[s, 0, v], state.roller_depth[0, scene.roller[c], v]
+            parts.append((contact, gap[s, c, v], scene.point(c, v, load, *depths), ratio))
     if not parts:
         return np.inf
     anywhere = np.any([contact.line_load > 0.0 for contact, *_ in parts], axis=0)

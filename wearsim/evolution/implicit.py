@@ -14,8 +14,9 @@ from wearsim.evolution.errors_of_steps import (
     DEPTHS,
     depth_between,
     excess,
-    load_spread,
+    variation_error,
     whole_volume,
+    with_pass_errors,
 )
 from wearsim.evolution.scene import Scene
 from wearsim.evolution.state import WearState, contact_values
@@ -64,7 +65,7 @@ class ImplicitStepper(Stepper):
                     raise
                 cause, rejected, proposed = failure, rejected + 1, 0.2 * step
                 continue
-            new_spread = load_spread(scene, end, state.passes, step)
+            new_spread = variation_error(scene, end, state.passes, step)
             spread = state.spread + new_spread
             moved = tuple(getattr(state, name) - getattr(twin, name) for name in DEPTHS)
             apart = whole_volume(scene, end) - whole_volume(scene, whole)
@@ -76,11 +77,13 @@ class ImplicitStepper(Stepper):
                 # a step cut short by the stop says little about how long the next may be
                 chosen = max(chosen, proposed) if step < proposed else chosen
                 passes = stop if step == left else end.passes
+                end = with_pass_errors(scene, state, end, whole, implicit_step, step)
+                fixed = spread + end.irreducible
                 end = replace(
                     end,
                     passes=passes,
-                    depth_error=COVER * depth_between(end, whole) + spread[0],
-                    volume_error=COVER * np.abs(apart) + spread[1],
+                    depth_error=COVER * depth_between(end, whole) + fixed[0],
+                    volume_error=COVER * np.abs(apart) + fixed[1],
                     spread=spread,
                     step=self.forced_step or chosen,
                     steps=state.steps + 1,

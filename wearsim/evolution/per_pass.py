@@ -54,7 +54,7 @@ def is_compiled(scene: Scene) -> bool:
         for body in ("cylinder", "roller")
     )
     lags = all(term.lag() is not None for term in scene.terms.values())
-    prescribed = scene.bearing_torque is None and scene.shape[0] == 1
+    prescribed = not scene.free and scene.shape[0] == 1
     return scene.model.capabilities.pass_loop and linear and lags and prescribed
 
 
@@ -64,10 +64,18 @@ def turn_order(scene: Scene) -> IntArray:
     return np.repeat(np.arange(len(multiplicity), dtype=np.int64), multiplicity)
 
 
-def _pass_loads(scene: Scene, state: WearState, count: int) -> FloatArray:
-    """Return the load before feedback at the middle of each pass [N]."""
-    passes = state.passes + np.arange(count, dtype=np.float64) + 0.5
-    return np.ascontiguousarray(scene.load.force(passes / scene.kinematics.pass_rate))
+def _passes(scene: Scene, state: WearState, count: int) -> tuple[IntArray, FloatArray, Scene]:
+    """Return roller, load before feedback [N] and the scene of each of the next passes.
+
+    A pass sees the load and the processes of its middle.
+    """
+    first, order = int(state.passes), turn_order(scene)
+    rollers = order[(first + np.arange(count)) % len(order)]
+    passes_done = state.passes + np.arange(count, dtype=np.float64)
+    times = (passes_done + 0.5) / scene.kinematics.pass_rate
+    passes = scene.single_passes(rollers, first, times)
+    force = scene.load.force(times)[:, None] + passes.inputs.normal_force
+    return rollers, force, passes
 
 
 def _term_rates(scene: Scene) -> FloatArray:
@@ -81,14 +89,15 @@ def _term_rates(scene: Scene) -> FloatArray:
     return rates
 
 
-def _slip_base(scene: Scene) -> tuple[FloatArray, FloatArray]:
-    """Return the variation of creepage on unworn bodies, and what worn depth adds to it."""
-    kinematics = scene.kinematics
-    if scene.slip_profile is not None:
-        rates = np.array([1.0 / kinematics.roller_radius, 1.0 / kinematics.cylinder_radius])
-        return np.ascontiguousarray(scene.slip_profile), rates
-    spins = np.array([creepage.spin for creepage in scene.creepages])
-    return -spins[:, None] * scene.grid.y[None, :], np.zeros(2)
+def _slip_base(scene: Scene) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the variation of creepage on unworn bodies, its fall per spin, and per worn depth."""
+    kinematics, nothing = scene.kinematics, np.zeros_like(scene.from_apex)
+    if scene.slip_profile is None:
+        arm = np.broadcast_to(scene.grid.y, nothing.shape)
+        return nothing, np.ascontiguousarray(arm), np.zeros(2)
+    rates = np.array([1.0 / kinematics.roller_radius, 1.0 / kinematics.cylinder_radius])
+    arm = nothing if scene.tilt_shifts else np.ascontiguousarray(scene.from_apex)
+    return np.ascontiguousarray(scene.slip_profile), arm, rates
 
 
 def _wear_rates(scene: Scene) -> FloatArray:
@@ -111,22 +120,29 @@ def _run_compiled(scene: Scene, state: WearState, count: int) -> WearState:
     cylinder, roller = state.cylinder_depth.copy(), state.roller_depth.copy()
     terms, energy = state.terms.copy(), state.energy.copy()
     full_solves = state.full_solves
-    slip_base, slip_rates = _slip_base(scene)
+    slip_base, spin_arm, slip_rates = _slip_base(scene)
+    _, force, passes = _passes(scene, state, count)
+    inputs, lever = passes.inputs, 1.0 if scene.tilt_shifts else 0.0
     for v in range(scene.shape[2]):
         loop = PassLoop(
             order=turn_order(scene),
             first_pass=int(state.passes),
-            base_load=_pass_loads(scene, state, count),
+            base_load=np.ascontiguousarray(force[:, v]),
+            creepage=np.stack([inputs.longitudinal[:, v], inputs.yaw[:, v]], axis=1),
+            friction=np.ascontiguousarray(inputs.friction[:, v]),
+            tilt=lever * inputs.tilt[:, v],
+            spin=np.ascontiguousarray(passes.spin[:, v]),
             stiffness=scene.load.stiffness,
-            nominal_gap=np.ascontiguousarray(scene.nominal_gap[0, :, v]),
+            nominal_gap=np.ascontiguousarray(scene.flat_gap[0, :, v]),
+            from_apex=np.ascontiguousarray(scene.from_apex),
             longitudinal_curvature=scene.kinematics.longitudinal_curvature,
             rolling_speed=scene.kinematics.rolling_speed,
-            creepage=np.array([[c.longitudinal, c.lateral] for c in scene.creepages]),
             slip_base=slip_base,
+            spin_arm=spin_arm,
             slip_rates=slip_rates,
-            friction=np.full(scene.grid.strips, scene.friction),
             wear=_wear_rates(scene),
             term_rates=_term_rates(scene),
+            similar=scene.redraw is None,
             terms=np.ascontiguousarray(terms[:, :, v]),
             cylinder_depth=np.ascontiguousarray(cylinder[0, 0, v]),
             roller_depth=np.ascontiguousarray(roller[0, :, v]),
@@ -161,21 +177,21 @@ def _run_compiled(scene: Scene, state: WearState, count: int) -> WearState:
 def _run_in_python(scene: Scene, state: WearState, count: int) -> WearState:
     """Run `count` passes by solving every one in full: slow, and right for any plugin."""
     kinematics = scene.kinematics
-    order, loads = turn_order(scene), _pass_loads(scene, state, count)
+    rollers, force, passes = _passes(scene, state, count)
     cylinder, roller = state.cylinder_depth.copy(), state.roller_depth.copy()
     terms, energy = state.terms.copy(), state.energy.copy()
     contacts: dict[tuple[int, ...], ContactSolution] = dict(
         zip(scene.contacts, state.contacts, strict=True)
     )
     turn = kinematics.physical_rollers / kinematics.pass_rate
-    for number in range(count):
-        r = int(order[(int(state.passes) + number) % len(order)])
+    for number, r in enumerate(rollers):
         own_pass = turn / float(kinematics.multiplicity[r])
         for s, _, v in np.ndindex((scene.shape[0], 1, scene.shape[2])):
-            gap = scene.nominal_gap[s, r, v] + cylinder[s, 0, v] + roller[0, r, v]
-            load = float(loads[number]) + float(terms[:, r, v].sum())
-            load -= scene.load.stiffness * float(gap.min() - scene.nominal_gap[s, r, v].min())
-            point = scene.point(r, load, cylinder[s, 0, v], roller[0, r, v])
+            unworn = passes.nominal_gap[s, number, v]
+            gap = unworn + cylinder[s, 0, v] + roller[0, r, v]
+            load = float(force[number, v]) + float(terms[:, r, v].sum())
+            load -= scene.load.stiffness * float(gap.min() - unworn.min())
+            point = passes.point(number, v, load, cylinder[s, 0, v], roller[0, r, v])
             contact = scene.model.solve(
                 gap, kinematics.longitudinal_curvature, point, None, contacts[s, r, v]
             )

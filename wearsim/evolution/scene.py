@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from wearsim.plugins import BODIES, ContactModel, Load, LoadTerm, WearLaw
-from wearsim.types import ContactSolution, Creepage, FloatArray, Grid, OperatingPoint
+from wearsim.evolution.inputs import ContactInputs, Redraw, Varying
+from wearsim.plugins import BODIES, Body, ContactModel, Load, LoadTerm, WearLaw
+from wearsim.types import ContactSolution, Creepage, FloatArray, Grid, IntArray, OperatingPoint
 
 
 @dataclass(frozen=True)
@@ -49,19 +50,31 @@ class Kinematics:
         return 1.0 / self.cylinder_radius + 1.0 / self.roller_radius
 
     @cached_property
-    def cylinder_share(self) -> FloatArray:
-        """Part of all passes that each roller of the scene makes, shape (rollers,)."""
-        return self.multiplicity / self.physical_rollers
-
-    @cached_property
     def roller_share(self) -> float:
         """Times a point of one roller is rolled over, per pass of all rollers."""
         return self.cylinder_radius / self.roller_radius / self.physical_rollers
 
 
+class NoWear(WearLaw):
+    """The law of a scene in which nothing wears, such as a contact by itself."""
+
+    def depth_per_pass(
+        self, body: Body, solution: ContactSolution, rolling_speed: float
+    ) -> FloatArray:
+        """Return zeros, shape (strips,) [m]."""
+        return np.zeros_like(solution.dissipation)
+
+    def depth_per_dissipation(self, body: Body, rolling_speed: float) -> float:
+        """Return zero [m/(W/m)]."""
+        return 0.0
+
+
 @dataclass(frozen=True)
 class Scene:
-    """A wear test, ready to be stepped. Contacts are numbered (station, roller, realisation).
+    """A wear test, ready to be stepped.
+
+    Contacts are numbered (station, contact, realisation). A roller has one contact, or several
+    that stand for the passes it makes with inputs drawn anew: each counts by its weight.
 
     Parameters
     ----------
@@ -74,18 +87,31 @@ class Scene:
     terms : mapping of str to LoadTerm
         Terms added to the load, in a fixed order.
     kinematics : Kinematics
-    nominal_gap : ndarray, shape (stations, rollers, realisations, strips)
-        Gap before wear [m].
-    creepages : sequence of Creepage, one per roller
-    friction : float
-        Friction coefficient mu.
-    bearing_torque : float, optional
-        Torque each roller's bearing takes [N m]; the creepage is prescribed where it is not given.
-    rolling_radius : ndarray, shape (rollers, strips), optional
-        Radius of the unworn rollers at every strip [m]; needed with a bearing torque.
+    flat_gap : ndarray, shape (stations, rollers, realisations, strips)
+        Gap of rollers without tilt before wear [m].
+    from_apex : ndarray, shape (rollers, strips)
+        Axial distance from each roller's apex [m].
+    inputs : ContactInputs
+        Inputs of every contact.
+    roller : ndarray of int, shape (contacts,)
+        The roller that makes each contact.
+    weight : ndarray, shape (contacts,)
+        Part of its roller's passes that each contact stands for.
+    half : ndarray of int, shape (contacts,)
+        0 or 1: which half of a roller's contacts each belongs to; either is a quadrature by itself.
+    tilt_shifts : bool
+        A tilt moves the contact over the crown.
+    free : bool
+        Rollers find their creepage from the bearing torque.
     slip_profile : ndarray, shape (rollers, strips), optional
-        Differential slip of the unworn bodies; worn depth adds to it. Without it creepage varies
-        with spin alone.
+        Differential slip of the unworn bodies without tilt; worn depth adds to it. Without it
+        creepage varies with spin alone.
+    varying : sequence of Varying
+        Inputs that follow processes in time.
+    steady : bool
+        Whether the inputs are the same at all times, but for `varying`.
+    redraw : callable, optional
+        Draws the inputs of single passes, see `Redraw`.
     """
 
     grid: Grid
@@ -94,24 +120,112 @@ class Scene:
     load: Load
     terms: Mapping[str, LoadTerm]
     kinematics: Kinematics
-    nominal_gap: FloatArray
-    creepages: tuple[Creepage, ...]
-    friction: float
-    bearing_torque: float | None = None
-    rolling_radius: FloatArray | None = None
+    flat_gap: FloatArray
+    from_apex: FloatArray
+    inputs: ContactInputs
+    roller: IntArray
+    weight: FloatArray
+    half: IntArray
+    tilt_shifts: bool = True
+    free: bool = False
     slip_profile: FloatArray | None = None
+    varying: tuple[Varying, ...] = ()
+    steady: bool = True
+    redraw: Redraw | None = None
 
     @cached_property
     def shape(self) -> tuple[int, int, int]:
-        """Leading axes: stations, rollers, realisations."""
-        stations, rollers, realisations = self.nominal_gap.shape[:3]
-        return stations, rollers, realisations
+        """Leading axes: stations, contacts, realisations."""
+        stations, _, realisations = self.flat_gap.shape[:3]
+        return stations, len(self.roller), realisations
+
+    @cached_property
+    def rollers(self) -> int:
+        """Number of rollers of the scene."""
+        return len(self.kinematics.multiplicity)
+
+    @property
+    def has_nodes(self) -> bool:
+        """Whether a roller's passes are stood for by several contacts."""
+        return len(self.roller) > self.rollers
+
+    @cached_property
+    def halved(self) -> Scene:
+        """The scene with the first half of every roller's contacts in the place of all."""
+        chosen = np.flatnonzero(self.half == 0)
+        return replace(
+            self,
+            inputs=self.inputs.at(chosen),
+            roller=self.roller[chosen],
+            weight=2.0 * self.weight[chosen],
+            half=self.half[chosen],
+        )
 
     @cached_property
     def contacts(self) -> tuple[tuple[int, int, int], ...]:
-        """Station, roller and realisation of every contact, in their order."""
-        stations, rollers, realisations = (range(count) for count in self.shape)
-        return tuple((s, r, v) for s in stations for r in rollers for v in realisations)
+        """Station, contact and realisation of every contact, in their order."""
+        stations, contacts, realisations = (range(count) for count in self.shape)
+        return tuple((s, c, v) for s in stations for c in contacts for v in realisations)
+
+    @cached_property
+    def nominal_gap(self) -> FloatArray:
+        """Gap before wear, shape (stations, contacts, realisations, strips) [m].
+
+        A tilted roller keeps its crown and turns about its apex: tilt adds a linear term, which
+        moves the contact by R_crown times tilt.
+        """
+        gap = self.flat_gap[:, self.roller]
+        if self.tilt_shifts and self.inputs.tilt.any():
+            gap = gap + self.inputs.tilt[:, :, None] * self.from_apex[self.roller][:, None, :]
+        return gap
+
+    @cached_property
+    def spin(self) -> FloatArray:
+        """Spin of every contact, shape (contacts, realisations) [1/m]."""
+        spin: FloatArray = self.inputs.tilt / self.kinematics.roller_radius
+        return spin
+
+    @cached_property
+    def cylinder_share(self) -> FloatArray:
+        """Part of all passes that each contact makes, shape (contacts,)."""
+        kinematics = self.kinematics
+        share = kinematics.multiplicity[self.roller] * self.weight
+        return np.asarray(share / kinematics.physical_rollers)
+
+    def at_time(self, start: float, stop: float) -> Scene:
+        """Return the scene with every process at its mean between two times [s]."""
+        if not self.varying:
+            return self
+        inputs = self.inputs
+        for item in self.varying:
+            chosen = np.isin(self.roller, item.rollers)[:, None]
+            values = np.where(chosen, item.path.mean(start, stop), getattr(inputs, item.name))
+            inputs = inputs.with_values({item.name: values})
+        return replace(self, inputs=inputs, varying=(), steady=False)
+
+    def single_passes(self, rollers: IntArray, first: int, times: FloatArray) -> Scene:
+        """Return a scene whose contacts are passes number `first` on.
+
+        Parameters
+        ----------
+        rollers : ndarray of int, shape (passes,)
+            Which roller makes each pass.
+        first : int
+            Number of the first pass.
+        times : ndarray, shape (passes,)
+            When each is made [s].
+        """
+        inputs = self.inputs.at(rollers)
+        for item in self.varying:
+            chosen = np.isin(rollers, item.rollers)[:, None]
+            now = item.path.at(times)[:, None]
+            inputs = inputs.with_values(
+                {item.name: np.where(chosen, now, getattr(inputs, item.name))}
+            )
+        if self.redraw is not None:
+            inputs = self.redraw(inputs, first)
+        alone = np.ones(len(rollers))
+        return replace(self, inputs=inputs, roller=rollers, weight=alone, varying=())
 
     def time(self, passes: float) -> float:
         """Return the time at which `passes` roller passes are done [s]."""
@@ -119,10 +233,10 @@ class Scene:
 
     def gap(self, cylinder_depth: FloatArray, roller_depth: FloatArray) -> FloatArray:
         """Return the gap of every contact [m]; depths as in `WearState`."""
-        return self.nominal_gap + cylinder_depth + roller_depth
+        return self.nominal_gap + cylinder_depth + roller_depth[:, self.roller]
 
     def descent(self, gap: FloatArray) -> FloatArray:
-        """Return how far each roller has sunk into worn material, shape (S, R, N) [m].
+        """Return how far each contact's roller has sunk into worn material, shape (S, C, N) [m].
 
         It is the rise of the least gap: rigid bodies would approach by that much. On one track it
         equals the worn depth.
@@ -130,27 +244,49 @@ class Scene:
         risen: FloatArray = gap.min(axis=-1) - self.nominal_gap.min(axis=-1)
         return risen
 
-    def point(
-        self, roller: int, load: float, cylinder_depth: FloatArray, roller_depth: FloatArray
-    ) -> OperatingPoint:
-        """Return the operating point of one contact at its worn depths, shape (strips,) [m]."""
-        creepage, radius = self.creepages[roller], None
-        kinematics = self.kinematics
+    def creepage(
+        self, contact: int, realisation: int, cylinder_depth: FloatArray, roller_depth: FloatArray
+    ) -> Creepage:
+        """Return the creepage of one contact: yaw gives the lateral part, tilt the spin.
+
+        The tilt counts once in differential slip: as the shift of the contact away from the apex,
+        or, where it shifts nothing, as the spin's -phi y.
+        """
+        inputs, place, kinematics = self.inputs, (contact, realisation), self.kinematics
+        spin, variation = float(self.spin[place]), None
         if self.slip_profile is not None:
+            roller = self.roller[contact]
             variation = (
                 self.slip_profile[roller]
                 + roller_depth / kinematics.roller_radius
                 - cylinder_depth / kinematics.cylinder_radius
             )
-            creepage = Creepage(creepage.longitudinal, creepage.lateral, creepage.spin, variation)
-        if self.rolling_radius is not None:
-            radius = self.rolling_radius[roller] - roller_depth
+            if not self.tilt_shifts:
+                variation = variation - spin * self.from_apex[roller]
+        longitudinal, yaw = float(inputs.longitudinal[place]), float(inputs.yaw[place])
+        return Creepage(longitudinal, yaw, spin, variation)
+
+    def point(
+        self,
+        contact: int,
+        realisation: int,
+        load: float,
+        cylinder_depth: FloatArray,
+        roller_depth: FloatArray,
+    ) -> OperatingPoint:
+        """Return the operating point of one contact at its worn depths, shape (strips,) [m]."""
+        kinematics, place = self.kinematics, (contact, realisation)
+        radius = None
+        if self.free:
+            s = self.from_apex[self.roller[contact]]
+            radius = kinematics.roller_radius - s * s / (2.0 * kinematics.crown_radius)
+            radius = radius - roller_depth
         return OperatingPoint(
             normal_force=load,
             rolling_speed=kinematics.rolling_speed,
-            creepage=creepage,
-            friction=self.friction,
-            bearing_torque=self.bearing_torque,
+            creepage=self.creepage(contact, realisation, cylinder_depth, roller_depth),
+            friction=float(self.inputs.friction[place]),
+            bearing_torque=float(self.inputs.bearing_torque[place]) if self.free else None,
             rolling_radius=radius,
         )
 
@@ -159,7 +295,7 @@ class Scene:
 
         Returns
         -------
-        cylinder, roller : ndarray, shape (stations, rollers, realisations, strips)
+        cylinder, roller : ndarray, shape (stations, contacts, realisations, strips)
             Depth per pass of that contact [m].
         """
         speed = self.kinematics.rolling_speed
@@ -175,7 +311,8 @@ class Scene:
     ) -> tuple[FloatArray, FloatArray]:
         """Return depth per roller pass of the bodies, from that of the contacts.
 
-        Every station of the cylinder is worn by all rollers in turn, every roller by all stations.
+        Every station of the cylinder is worn by all contacts in turn, every roller by its own at
+        all stations.
 
         Returns
         -------
@@ -183,13 +320,25 @@ class Scene:
         roller_rate : ndarray, shape (1, rollers, realisations, strips)
             Depth per roller pass [m].
         """
-        share = self.kinematics.cylinder_share[None, :, None, None]
+        share = self.cylinder_share[None, :, None, None]
         cylinder_rate = (cylinder * share).sum(axis=1, keepdims=True)
-        roller_rate = roller.mean(axis=0, keepdims=True) * self.kinematics.roller_share
-        return cylinder_rate, roller_rate
+        own = self.per_roller(roller).mean(axis=0, keepdims=True)
+        return cylinder_rate, own * self.kinematics.roller_share
+
+    def per_roller(self, values: FloatArray) -> FloatArray:
+        """Return the weighted mean over each roller's contacts, (S, C, ...) to (S, R, ...)."""
+        if not self.has_nodes:
+            return values
+        weighted = values * self.weight.reshape(1, -1, *(1,) * (values.ndim - 2))
+        return self.of_roller(weighted, np.add)
+
+    def of_roller(self, values: FloatArray, gather: np.ufunc) -> FloatArray:
+        """Return `gather` of each roller's contacts, such as np.add, (S, C, ...) to (S, R, ...)."""
+        found = [gather.reduce(values[:, self.roller == r], axis=1) for r in range(self.rollers)]
+        return np.stack(found, axis=1)
 
     def total_power(self, power: FloatArray) -> FloatArray:
-        """Return the power of all physical rollers, shape (N,) [W], from (S, R, N)."""
-        weight = self.kinematics.multiplicity[None, :, None]
-        total: FloatArray = (power * weight).sum(axis=1).mean(axis=0)
+        """Return the power of all physical rollers, shape (N,) [W], from (S, C, N)."""
+        share = self.cylinder_share[None, :, None] * self.kinematics.physical_rollers
+        total: FloatArray = (power * share).sum(axis=1).mean(axis=0)
         return total

@@ -12,8 +12,9 @@ import numpy.typing as npt
 from wearsim.evolution.scene import Scene
 from wearsim.types import ContactSolution, FloatArray
 
+SIGMAS = 2.0  # of the scatter that draws at every pass leave, counted as error
 _CONTACT = "contact_"
-_SHADOW = "shadow_"
+_TWINS = ("shadow", "coarse")
 _SCALARS = ("passes", "step", "steps", "rejected", "solves", "full_solves")
 
 
@@ -40,7 +41,11 @@ class WearState:
     depth_error, volume_error : ndarray, shape (realisations,)
         Estimated error of depth, on either body [m], and of the volume worn off both [m^3] so far.
     spread : ndarray, shape (2, realisations)
-        Part of those errors that the load's variation within the steps has made.
+        Part of those errors that the variation of load and processes within the steps has made.
+    quadrature : ndarray, shape (2, realisations)
+        Part of those errors that the quadrature over inputs drawn at every pass has made.
+    scatter : ndarray, shape (2, realisations)
+        Variance of depth [m^2] and volume [m^6] from test to test that such draws leave.
     step : float
         Passes the step-size control proposes next; 0 where it has yet to choose.
     steps, rejected, solves, full_solves : int
@@ -52,6 +57,8 @@ class WearState:
         Approach now, and there [m], and the sum of the dissipated powers of all passes [W].
     shadow : WearState, optional
         The same test stepped twice as coarsely; what sets the two apart is the error estimate.
+    coarse : WearState, optional
+        The shadow with half the contacts that stand for inputs drawn at every pass.
     """
 
     passes: float
@@ -63,6 +70,8 @@ class WearState:
     depth_error: FloatArray
     volume_error: FloatArray
     spread: FloatArray
+    quadrature: FloatArray
+    scatter: FloatArray
     step: float = 0.0
     steps: int = 0
     rejected: int = 0
@@ -71,29 +80,40 @@ class WearState:
     loop_strips: FloatArray | None = None
     loop_contacts: FloatArray | None = None
     shadow: WearState | None = None
+    coarse: WearState | None = None
+
+    @property
+    def irreducible(self) -> FloatArray:
+        """The errors of depth and volume that shorter steps would not lessen, (2, realisations)."""
+        total: FloatArray = self.quadrature + SIGMAS * np.sqrt(self.scatter)
+        return total
 
     def to_arrays(self) -> dict[str, npt.NDArray[np.generic]]:
         """Return the whole state as named arrays, for a checkpoint."""
         arrays: dict[str, npt.NDArray[np.generic]] = {
             item.name: np.asarray(getattr(self, item.name))
             for item in fields(self)
-            if item.name not in {"contacts", "shadow"} and getattr(self, item.name) is not None
+            if item.name not in {"contacts", *_TWINS} and getattr(self, item.name) is not None
         }
         for item in fields(ContactSolution):
             stacked = np.array([getattr(contact, item.name) for contact in self.contacts])
             arrays[_CONTACT + item.name] = stacked
-        if self.shadow is not None:
-            arrays.update({_SHADOW + name: a for name, a in self.shadow.to_arrays().items()})
+        for name in _TWINS:
+            twin = getattr(self, name)
+            if twin is not None:
+                arrays.update({f"{name}_{key}": a for key, a in twin.to_arrays().items()})
         return arrays
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, npt.NDArray[np.generic]]) -> WearState:
         """Rebuild a state from what `to_arrays` returned."""
         values: dict[str, object] = {}
-        shadow = {n[len(_SHADOW) :]: a for n, a in arrays.items() if n.startswith(_SHADOW)}
-        if shadow:
-            values["shadow"] = cls.from_arrays(shadow)
-        arrays = {name: a for name, a in arrays.items() if not name.startswith(_SHADOW)}
+        for twin in _TWINS:
+            start = f"{twin}_"
+            part = {name[len(start) :]: a for name, a in arrays.items() if name.startswith(start)}
+            if part:
+                values[twin] = cls.from_arrays(part)
+            arrays = {name: a for name, a in arrays.items() if not name.startswith(start)}
         for name, array in arrays.items():
             if name in _SCALARS:
                 values[name] = array.item()
@@ -104,6 +124,8 @@ class WearState:
             for name, array in arrays.items()
             if name.startswith(_CONTACT)
         }
+        for name in ("quadrature", "scatter"):  # files of version 0.1.0 have none
+            values.setdefault(name, np.zeros_like(arrays["spread"], dtype=np.float64))
         count = len(contact["power"])
         values["contacts"] = tuple(
             ContactSolution(**_unpack({name: column[k] for name, column in contact.items()}))
@@ -143,34 +165,40 @@ def widened_state(state: WearState, y: FloatArray, strips: int) -> WearState:
         )
         for contact in state.contacts
     )
-    loop, shadow = state.loop_strips, state.shadow
+    loop = state.loop_strips
+    shadow, coarse = (
+        None if twin is None else widened_state(twin, y, strips)
+        for twin in (state.shadow, state.coarse)
+    )
     return replace(
         state,
         cylinder_depth=widened(state.cylinder_depth, strips),
         roller_depth=widened(state.roller_depth, strips),
         contacts=contacts,
         loop_strips=None if loop is None else widened(loop, strips),
-        shadow=None if shadow is None else widened_state(shadow, y, strips),
+        shadow=shadow,
+        coarse=coarse,
     )
 
 
 def contact_values(scene: Scene, contacts: tuple[ContactSolution, ...], name: str) -> FloatArray:
-    """Return the field `name` of all contacts, leading axes (station, roller, realisation)."""
+    """Return the field `name` of all contacts, leading axes (station, contact, realisation)."""
     values = np.array([getattr(contact, name) for contact in contacts])
     return values.reshape(scene.shape + values.shape[1:])
 
 
 def fresh_state(scene: Scene) -> WearState:
     """Solve the fresh contacts and return the state before the first pass."""
-    stations, rollers, realisations = scene.shape
+    scene = scene.at_time(0.0, 0.0)
+    stations, _, realisations = scene.shape
     n = scene.grid.strips
     cylinder_depth = np.zeros((stations, 1, realisations, n))
-    roller_depth = np.zeros((1, rollers, realisations, n))
-    terms = np.zeros((len(scene.terms), rollers, realisations))
-    load = float(scene.load.force(np.zeros(1))[0])
+    roller_depth = np.zeros((1, scene.rollers, realisations, n))
+    terms = np.zeros((len(scene.terms), scene.rollers, realisations))
+    force = float(scene.load.force(np.zeros(1))[0]) + scene.inputs.normal_force
     contacts = []
     for index in scene.contacts:
-        point = scene.point(index[1], load, np.zeros(n), np.zeros(n))
+        point = scene.point(*index[1:], float(force[index[1:]]), np.zeros(n), np.zeros(n))
         contacts.append(
             scene.model.solve(
                 scene.nominal_gap[index], scene.kinematics.longitudinal_curvature, point
@@ -186,5 +214,7 @@ def fresh_state(scene: Scene) -> WearState:
         depth_error=np.zeros(realisations),
         volume_error=np.zeros(realisations),
         spread=np.zeros((2, realisations)),
+        quadrature=np.zeros((2, realisations)),
+        scatter=np.zeros((2, realisations)),
         solves=len(contacts),
     )

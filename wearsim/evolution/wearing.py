@@ -8,6 +8,7 @@ from typing import TypeAlias
 import numpy as np
 
 from wearsim.evolution.scene import Scene
+from wearsim.plugins import SharedWear
 from wearsim.types import ContactSolution, FloatArray
 
 Contacts: TypeAlias = tuple[ContactSolution, ...]
@@ -34,7 +35,7 @@ class Wearing:
     ----------
     cylinder, roller : ndarray
         Depth the step adds, shapes as in `WearState` [m].
-    exponents : ndarray, shape (stations, rollers, realisations, strips), optional
+    exponents : ndarray, shape (stations, contacts, realisations, strips), optional
         e of every strip, to be set before compliance or offset are first asked for; 1 where left
         out, which full sliding makes exact.
     """
@@ -46,47 +47,48 @@ class Wearing:
         self.exponents: FloatArray | None = None
         self._scene, self._contacts = scene, contacts
         # each contact's own part in the wear of the bodies
-        share = passes * scene.kinematics.cylinder_share[None, :, None, None]
+        share = passes * scene.cylinder_share[None, :, None, None]
         own = passes * scene.kinematics.roller_share / scene.shape[0]
-        self._parts = cylinder * share, roller * own
+        self._parts = cylinder * share, roller * own * scene.weight[None, :, None, None]
 
     @cached_property
-    def compliance(self) -> FloatArray:
-        """Gap that opens at one contact per unit of line load of another [m/(N/m)].
-
-        Shape (realisations, contacts, contacts, strips); contacts are (station, roller).
-        """
-        on_cylinder, on_roller = self._parts
+    def compliance(self) -> list[SharedWear]:
+        """How the step's wear yields, one per realisation; contacts are (station, contact)."""
+        parts = self._parts
         if self.exponents is not None:
-            on_cylinder, on_roller = self.exponents * on_cylinder, self.exponents * on_roller
-        scene, contacts = self._scene, self._contacts
-        return _between_contacts(
-            scene, _ratio(scene, on_cylinder, contacts), _ratio(scene, on_roller, contacts)
-        )
+            parts = self.exponents * parts[0], self.exponents * parts[1]
+        scene = self._scene
+        stations, contacts, realisations = scene.shape
+        station, contact = np.divmod(np.arange(stations * contacts), contacts)
+        bodies = np.stack([station, scene.roller[contact]], axis=1)
+        # to (realisations, stations, contacts, sides, strips)
+        ratios = np.stack([_ratio(scene, part, self._contacts) for part in parts])
+        ratios = ratios.transpose(3, 1, 2, 0, 4).reshape(realisations, -1, 2, scene.grid.strips)
+        return [SharedWear(bodies, ratio) for ratio in ratios]
 
     @cached_property
     def offset(self) -> FloatArray | float:
-        """Gap that opens whatever the line load, (stations, rollers, realisations, strips) [m]."""
+        """Gap that opens whatever the line load, (stations, contacts, realisations, strips) [m]."""
         if self.exponents is None:
             return 0.0
         kept = 1.0 - self.exponents
         on_cylinder, on_roller = self._parts
         on_cylinder = (kept * on_cylinder).sum(axis=1, keepdims=True)
-        on_roller = (kept * on_roller).sum(axis=0, keepdims=True)
-        opening: FloatArray = on_cylinder + on_roller
+        on_roller = self._scene.of_roller((kept * on_roller).sum(axis=0, keepdims=True), np.add)
+        opening: FloatArray = on_cylinder + on_roller[:, self._scene.roller]
         return opening
 
     @property
     def opening(self) -> FloatArray:
-        """Gap that the step opens at every contact, (stations, rollers, realisations, strips)."""
-        return self.cylinder + self.roller
+        """Gap that the step opens at every contact, (stations, contacts, realisations, strips)."""
+        return self.cylinder + self.roller[:, self._scene.roller]
 
     def foreseen(self, line_load: FloatArray) -> FloatArray:
         """Return the opening that compliance and offset make of a line load, shape as `opening`."""
-        stations, rollers, realisations, strips = line_load.shape
-        flat = line_load.transpose(2, 0, 1, 3).reshape(realisations, 1, -1, strips)
-        yielding = (self.compliance * flat).sum(axis=2)
-        shaped = yielding.reshape(realisations, stations, rollers, strips)
+        stations, contacts, realisations, strips = line_load.shape
+        flat = line_load.transpose(2, 0, 1, 3).reshape(realisations, -1, strips)
+        yielding = [wear.opening(q) for wear, q in zip(self.compliance, flat, strict=True)]
+        shaped = np.reshape(yielding, (realisations, stations, contacts, strips))
         opening: FloatArray = shaped.transpose(1, 2, 0, 3) + self.offset
         return opening
 
@@ -105,20 +107,6 @@ def _ratio(scene: Scene, wear: FloatArray, contacts: Contacts) -> FloatArray:
     return ratio
 
 
-def _between_contacts(scene: Scene, on_cylinder: FloatArray, on_roller: FloatArray) -> FloatArray:
-    """Return how the wear of each contact opens the gaps of all that share a body with it."""
-    stations, rollers, realisations = scene.shape
-    members = [(s, r) for s in range(stations) for r in range(rollers)]
-    compliance = np.zeros((realisations, len(members), len(members), scene.grid.strips))
-    for k, (s, r) in enumerate(members):
-        for other, (s2, r2) in enumerate(members):
-            if s == s2:
-                compliance[:, k, other] += on_cylinder[s2, r2]
-            if r == r2:
-                compliance[:, k, other] += on_roller[s2, r2]
-    return compliance
-
-
 def exponents_between(
     scene: Scene, old: Contacts, new: Contacts, known: FloatArray | None
 ) -> FloatArray:
@@ -129,12 +117,12 @@ def exponents_between(
     scene : Scene
     old, new : tuple of ContactSolution
         Two solutions of the same contacts.
-    known : ndarray, shape (stations, rollers, realisations, strips), optional
+    known : ndarray, shape (stations, contacts, realisations, strips), optional
         What to take where a strip tells nothing; 1 where left out.
 
     Returns
     -------
-    ndarray, shape (stations, rollers, realisations, strips)
+    ndarray, shape (stations, contacts, realisations, strips)
     """
     exponents = np.ones((*scene.shape, scene.grid.strips)) if known is None else known.copy()
     for index, before, after in zip(scene.contacts, old, new, strict=True):

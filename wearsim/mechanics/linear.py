@@ -5,6 +5,7 @@ from __future__ import annotations
 from wearsim.mechanics.jit import kernel
 from wearsim.types import FloatArray
 
+MANY = 8  # right-hand sides from which whole rows are substituted
 PANEL = 4  # columns eliminated together; the update below is written out for four
 
 
@@ -78,9 +79,34 @@ def solve_in_place(matrix: FloatArray, size: int, width: int) -> bool:
                 for i in range(k + 1, stop):
                     for j in range(stop, width):
                         matrix[i, j] -= matrix[i, k] * matrix[k, j]
-    for c in range(size, width):
-        _substitute_back(matrix, size, c)
+    if width - size < MANY:
+        for c in range(size, width):
+            _substitute_back(matrix, size, c)
+    else:
+        _substitute_rows_back(matrix, size, width)
     return True
+
+
+@kernel
+def _substitute_rows_back(matrix: FloatArray, size: int, width: int) -> None:
+    """Solve the upper triangle for many right-hand sides at once, row by row."""
+    for i in range(size - 1, -1, -1):
+        row = matrix[i]
+        k = i + 1
+        while k + 3 < size:
+            f0, f1, f2, f3 = row[k], row[k + 1], row[k + 2], row[k + 3]
+            r0, r1, r2, r3 = matrix[k], matrix[k + 1], matrix[k + 2], matrix[k + 3]
+            for j in range(size, width):
+                row[j] -= (f0 * r0[j] + f1 * r1[j]) + (f2 * r2[j] + f3 * r3[j])
+            k += 4
+        while k < size:
+            factor, other = row[k], matrix[k]
+            for j in range(size, width):
+                row[j] -= factor * other[j]
+            k += 1
+        pivot = row[i]
+        for j in range(size, width):
+            row[j] /= pivot
 
 
 @kernel

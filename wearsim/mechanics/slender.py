@@ -2,12 +2,12 @@
 
 Strip i of contact k meets the gap z_i and is pressed down by every strip j (see `influence`):
 
-    sum_j W_ij(a_j) q_j + sum_l c_kli q_li + z_i = delta_k   where q_i > 0,
+    sum_j W_ij(a_j) q_j + c_i q_i + D_i + z_i = delta_k   where q_i > 0,
     a_j = sqrt(4 q_j / (pi E* kappa)),   sum_i q_i dy = N_k,
 
-kappa being the relative curvature along rolling and c_kl the gap that contact l's wear opens at
-contact k. Newton's method with the exact derivative of W, an active set of strips in contact, and
-delta as one more unknown.
+kappa being the relative curvature along rolling, c the contact's own wear compliance and D what all
+contacts wear off the bodies that they share (see `shared_bodies`). Newton's method with the exact
+derivative of W, an active set of strips in contact, and delta as one more unknown.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import numpy as np
 from wearsim.mechanics.influence import HIGHEST, read_influence
 from wearsim.mechanics.jit import kernel
 from wearsim.mechanics.linear import solve_in_place
+from wearsim.mechanics.shared_bodies import add_depths, solve_depths
 from wearsim.types import FloatArray, IntArray
 
 CONVERGED = 0
@@ -48,8 +49,8 @@ def foundation_guess(
         Which contact.
     gap, line_load : ndarray, shape (contacts, strips)
         Gap [m]; line load, whose row is filled [N/m].
-    compliance : ndarray, shape (contacts, contacts, strips)
-        Wear compliance [m/(N/m)].
+    compliance : ndarray, shape (contacts, strips)
+        Wear compliance of each contact by itself [m/(N/m)].
     contact_modulus, load, spacing : float
         E* [Pa], N [N] and the strips' width [m].
 
@@ -64,40 +65,39 @@ def foundation_guess(
     for i in range(n):
         lowest = min(lowest, gap[k, i])
         highest = max(highest, gap[k, i])
-        softest = max(softest, compliance[k, k, i])
+        softest = max(softest, compliance[k, i])
     low, high = 0.0, load / spacing * (soft + softest) + highest - lowest
     for _ in range(60):
         depth = 0.5 * (low + high)
         total = 0.0
         for i in range(n):
-            total += max(0.0, depth + lowest - gap[k, i]) / (soft + compliance[k, k, i])
+            total += max(0.0, depth + lowest - gap[k, i]) / (soft + compliance[k, i])
         if total * spacing > load:
             high = depth
         else:
             low = depth
     for i in range(n):
-        line_load[k, i] = max(0.0, high + lowest - gap[k, i]) / (soft + compliance[k, k, i])
+        line_load[k, i] = max(0.0, high + lowest - gap[k, i]) / (soft + compliance[k, i])
     approach: float = high + lowest
     return approach
 
 
 @kernel
-def _number_contacts(line_load: FloatArray, index: IntArray) -> int:
-    """Give the strips that carry load their rows, the others -1; return the number of rows."""
-    contacts, n = line_load.shape
+def _number_strips(k: int, line_load: FloatArray, index: IntArray) -> int:
+    """Give the strips of contact `k` that carry load their rows, the others -1; return how many."""
     count = 0
-    for k in range(contacts):
-        for i in range(n):
-            if line_load[k, i] > 0.0:
-                index[k, i] = count
-                count += 1
-            else:
-                index[k, i] = -1
+    for i in range(line_load.shape[1]):
+        if line_load[k, i] > 0.0:
+            index[k, i] = count
+            count += 1
+        else:
+            index[k, i] = -1
     return count
 
 
 @kernel
 def _press(
+    k: int,
     line_load: FloatArray,
     index: IntArray,
     table: FloatArray,
@@ -107,112 +107,109 @@ def _press(
     surface: FloatArray,
     matrix: FloatArray,
 ) -> float:
-    """Add the elastic displacement to `surface` and its derivative to `matrix`.
+    """Add contact `k`'s elastic displacement to `surface` and its derivative to `matrix`.
 
     Returns the greatest ln(a/dy) met; past HIGHEST nothing more is added.
     """
-    contacts, n = line_load.shape
+    n = line_load.shape[1]
     value, tangent = work[0], work[1]
     widest: float = -np.inf
-    for k in range(contacts):
-        for j in range(n):
-            column = index[k, j]
-            if column < 0:
-                continue
-            q = line_load[k, j]
-            tau = log_scale + 0.5 * np.log(q)
-            widest = max(widest, tau)
-            if widest > HIGHEST:
-                return widest
-            read_influence(table, tau, max(j + 1, n - j), value, tangent)
-            for i in range(n):
-                surface[k, i] += unit * q * value[abs(i - j)]
-            for i in range(n):
-                row = index[k, i]
-                if row >= 0:
-                    matrix[row, column] += unit * tangent[abs(i - j)]
+    for j in range(n):
+        column = index[k, j]
+        if column < 0:
+            continue
+        q = line_load[k, j]
+        tau = log_scale + 0.5 * np.log(q)
+        widest = max(widest, tau)
+        if widest > HIGHEST:
+            return widest
+        read_influence(table, tau, max(j + 1, n - j), value, tangent)
+        for i in range(n):
+            surface[k, i] += unit * q * value[abs(i - j)]
+        for i in range(n):
+            row = index[k, i]
+            if row >= 0:
+                matrix[row, column] += unit * tangent[abs(i - j)]
     return widest
 
 
 @kernel
 def _assemble(
-    gap: FloatArray,
-    compliance: FloatArray,
+    k: int,
+    own: FloatArray,
     table: FloatArray,
     unit: float,
     log_scale: float,
     line_load: FloatArray,
     index: IntArray,
-    size: int,
+    coupled: bool,
     work: FloatArray,
     surface: FloatArray,
     matrix: FloatArray,
 ) -> float:
-    """Fill the bordered Newton system; return the greatest ln(a/dy).
+    """Add contact `k`'s Newton system to `matrix`; return the greatest ln(a/dy).
 
-    `surface` receives gap, wear and displacement together; it equals delta in contact. Columns
-    after the first `size` hold the residual and one unit load per contact.
+    `surface` holds gap and shared wear, and receives displacement and own wear; it equals delta in
+    contact. Columns after those of the strips hold the residual, a unit approach and, where
+    contacts share a body, a unit rise of every strip's gap.
     """
-    contacts, n = gap.shape
-    matrix[:size, : size + contacts + 1] = 0.0
-    for k in range(contacts):
-        for i in range(n):
-            surface[k, i] = gap[k, i]
-        for other in range(contacts):
-            for i in range(n):
-                wear = compliance[k, other, i]
-                surface[k, i] += wear * line_load[other, i]
-                row, column = index[k, i], index[other, i]
-                if row >= 0 and column >= 0:
-                    matrix[row, column] += wear
-    widest = _press(line_load, index, table, unit, log_scale, work, surface, matrix)
-    for k in range(contacts):
-        for i in range(n):
-            row = index[k, i]
-            if row >= 0:
-                matrix[row, size] = -surface[k, i]
-                matrix[row, size + 1 + k] = 1.0
+    n, size = line_load.shape[1], index[k].max() + 1
+    for i in range(n):
+        surface[k, i] += own[k, i] * line_load[k, i]
+        row = index[k, i]
+        if row >= 0:
+            matrix[row, row] = own[k, i]
+            if coupled:
+                matrix[row, size + 2 + row] = 1.0
+    widest = _press(k, line_load, index, table, unit, log_scale, work, surface, matrix)
+    for i in range(n):
+        row = index[k, i]
+        if row >= 0:
+            matrix[row, size] = -surface[k, i]
+            matrix[row, size + 1] = 1.0
     return widest
 
 
 @kernel
-def _approaches(
-    matrix: FloatArray,
+def _answer(
+    k: int,
     size: int,
-    line_load: FloatArray,
-    index: IntArray,
-    loads: FloatArray,
-    spacing: float,
-    small: FloatArray,
+    coupled: bool,
+    missing: float,
+    matrix: FloatArray,
+    step: FloatArray,
     approach: FloatArray,
+    response: FloatArray,
+    lift: FloatArray,
 ) -> bool:
-    """Choose every approach so that each contact carries its load exactly after the step."""
-    contacts, n = line_load.shape
-    small[:] = 0.0
-    for k in range(contacts):
-        missing = loads[k] / spacing
-        for i in range(n):
-            row = index[k, i]
-            if row >= 0:
-                missing -= line_load[k, i] + matrix[row, size]
-                for other in range(contacts):
-                    small[k, other] += matrix[row, size + 1 + other]
-        small[k, contacts] = missing
-    if not solve_in_place(small, contacts, contacts + 1):
+    """Take contact `k`'s step and approach, and how both follow its gap, from its solved system.
+
+    The approach is chosen so that the loads of the strips grow by `missing` in all [N/m].
+    """
+    risen = 0.0
+    for row in range(size):
+        missing -= matrix[row, size]
+        risen += matrix[row, size + 1]
+    if not abs(risen) > 0.0:
         return False
-    for k in range(contacts):
-        approach[k] = small[k, contacts]
+    approach[k] = missing / risen
+    for row in range(size):
+        step[k, row] = matrix[row, size] + matrix[row, size + 1] * approach[k]
+    if coupled:
+        for column in range(size):
+            total = 0.0
+            for row in range(size):
+                total += matrix[row, size + 2 + column]
+            lift[k, column] = total / risen
+            for row in range(size):
+                fall = matrix[row, size + 2 + column] - matrix[row, size + 1] * lift[k, column]
+                response[k, column, row] = fall
     return True
 
 
 @kernel
 def _update(
-    matrix: FloatArray,
-    size: int,
-    line_load: FloatArray,
-    index: IntArray,
-    approach: FloatArray,
-    cautious: bool,
+    line_load: FloatArray, index: IntArray, step: FloatArray, cautious: bool
 ) -> tuple[float, bool]:
     """Take the Newton step; strips that would pull leave the contact.
 
@@ -229,9 +226,7 @@ def _update(
             if row < 0:
                 continue
             old = line_load[k, i]
-            new = old + matrix[row, size]
-            for other in range(contacts):
-                new += matrix[row, size + 1 + other] * approach[other]
+            new = old + step[k, row]
             if not new > 0.0:
                 if np.isnan(new):
                     return np.inf, left
@@ -282,7 +277,9 @@ def _admit(
 @kernel
 def solve_slender(
     gap: FloatArray,
-    compliance: FloatArray,
+    own: FloatArray,
+    members: IntArray,
+    shared: FloatArray,
     loads: FloatArray,
     spacing: float,
     contact_modulus: float,
@@ -297,8 +294,12 @@ def solve_slender(
     ----------
     gap : ndarray, shape (contacts, strips)
         Gap [m].
-    compliance : ndarray, shape (contacts, contacts, strips)
-        Gap that opens at the first contact per unit of line load of the second [m/(N/m)].
+    own : ndarray, shape (contacts, strips)
+        Gap that a contact opens for itself alone per unit of line load [m/(N/m)].
+    members : ndarray of int, shape (contacts, 2)
+        Bodies that each contact shares with others, numbered from 0; -1 for none.
+    shared : ndarray, shape (contacts, 2, strips)
+        Depth that a contact wears off those bodies per unit of line load [m/(N/m)].
     loads : ndarray, shape (contacts,)
         Loads N [N].
     spacing, contact_modulus, longitudinal_curvature : float
@@ -319,29 +320,41 @@ def solve_slender(
     unit = 1.0 / (np.pi * contact_modulus)
     log_scale = 0.5 * np.log(4.0 / (np.pi * contact_modulus * longitudinal_curvature))
     log_scale -= np.log(spacing)
+    coupled = members.max() >= 0
+    per_strip = 2 if coupled else 1
+    kept = contacts if coupled else 0
     index = np.empty((contacts, n), np.int64)
-    surface = np.empty((contacts, n))
-    work = np.empty((2, n))
-    small = np.empty((contacts, contacts + 1))
+    surface, step = np.empty((contacts, n)), np.empty((contacts, n))
+    response, lift = np.empty((kept, n, n)), np.empty((kept, n))
+    work, matrix = np.empty((2, n)), np.empty((n, 2 + per_strip * n))
     for k in range(contacts):
         if not line_load[k].max() > 0.0:
+            total = own + shared[:, 0] + shared[:, 1]
             approach[k] = foundation_guess(
-                k, gap, compliance, contact_modulus, loads[k], spacing, line_load
+                k, gap, total, contact_modulus, loads[k], spacing, line_load
             )
-    matrix = np.empty((contacts * n, contacts * n + contacts + 1))
     for iteration in range(1, MAX_ITERATIONS + 1):
         cautious = iteration > 12
-        size = _number_contacts(line_load, index)
-        widest = _assemble(
-            gap, compliance, table, unit, log_scale, line_load, index, size, work, surface, matrix
-        )
-        if widest > HIGHEST:
-            return TOO_FINE, iteration
-        if not solve_in_place(matrix, size, size + contacts + 1):
+        surface[:] = gap
+        if coupled:
+            add_depths(members, shared, line_load, surface)
+        for k in range(contacts):
+            size = _number_strips(k, line_load, index)
+            width = 2 + per_strip * size
+            matrix[:size, :width] = 0.0
+            widest = _assemble(
+                k, own, table, unit, log_scale, line_load, index, coupled, work, surface, matrix
+            )
+            if widest > HIGHEST:
+                return TOO_FINE, iteration
+            if not solve_in_place(matrix, size, width):
+                return SINGULAR, iteration
+            missing = loads[k] / spacing - line_load[k].sum()
+            if not _answer(k, size, coupled, missing, matrix, step, approach, response, lift):
+                return SINGULAR, iteration
+        if coupled and not solve_depths(members, shared, index, response, step, lift, approach):
             return SINGULAR, iteration
-        if not _approaches(matrix, size, line_load, index, loads, spacing, small, approach):
-            return SINGULAR, iteration
-        change, left = _update(matrix, size, line_load, index, approach, cautious)
+        change, left = _update(line_load, index, step, cautious)
         if not change < np.inf:
             return NOT_FINITE, iteration
         settled = not cautious or (change < 1e-3 and not left)

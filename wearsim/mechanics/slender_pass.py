@@ -83,13 +83,22 @@ class Follower(NamedTuple):
     matrix: FloatArray
 
 
+class Passes(NamedTuple):
+    """The inputs of every pass, in turn; shapes as in `run_passes`."""
+
+    base_load: FloatArray
+    creepage: FloatArray
+    friction: FloatArray
+    tilt: FloatArray
+    spin: FloatArray
+
+
 class Wear(NamedTuple):
     """How strips slip and wear; shapes as in `run_passes`."""
 
-    creepage: FloatArray
     slip_base: FloatArray
+    spin_arm: FloatArray
     slip_rates: FloatArray
-    friction: FloatArray
     depth_per_work: FloatArray
     cylinder_depth: FloatArray
     roller_depth: FloatArray
@@ -323,10 +332,11 @@ def _follow(g: int, load: float, lowest: float, loads: Loads, m: Medium, f: Foll
 
 
 @kernel
-def _solve_fully(g: int, load: float, loads: Loads, m: Medium, f: Follower) -> int:
-    """Solve contact `g` by Newton's method and set its anchor there; return the status."""
+def _solve_fully(g: int, load: float, anchored: bool, loads: Loads, m: Medium, f: Follower) -> int:
+    """Solve contact `g` by Newton's method, and set its anchor there; return the status."""
     n = f.gap.shape[0]
-    gap, line_load, no_wear = np.empty((1, n)), np.empty((1, n)), np.zeros((1, 1, n))
+    gap, line_load, no_wear = np.empty((1, n)), np.empty((1, n)), np.zeros((1, n))
+    no_body, no_depth = np.full((1, 2), -1), np.zeros((1, 2, n))
     approach, force = np.empty(1), np.empty(1)
     approach[0], force[0] = loads.approach[g], load
     for i in range(n):
@@ -334,6 +344,8 @@ def _solve_fully(g: int, load: float, loads: Loads, m: Medium, f: Follower) -> i
     status, _ = solve_slender(
         gap,
         no_wear,
+        no_body,
+        no_depth,
         force,
         m.spacing,
         m.contact_modulus,
@@ -344,39 +356,43 @@ def _solve_fully(g: int, load: float, loads: Loads, m: Medium, f: Follower) -> i
     )
     if status != CONVERGED:
         return status
-    for i in range(n):
-        loads.line_load[g, i], loads.anchor[g, i] = line_load[0, i], line_load[0, i]
-        loads.anchor_gap[g, i], f.beyond[g, i] = f.gap[i], 0.0
-    loads.approach[g] = loads.anchor_approach[g] = approach[0]
+    loads.line_load[g], loads.approach[g] = line_load[0], approach[0]
+    if not anchored:
+        _number_strips(g, loads.line_load, f)
+        return CONVERGED
+    loads.anchor[g], loads.anchor_gap[g] = line_load[0], f.gap
+    loads.anchor_approach[g], f.beyond[g] = approach[0], 0.0
     return CONVERGED if set_anchor(g, loads.anchor, m, f) else SINGULAR
 
 
 @kernel
-def _local_slip(g: int, i: int, w: Wear) -> float:
+def _local_slip(g: int, i: int, spin: float, w: Wear) -> float:
     """Return the variation of the longitudinal creepage at strip `i`, worn depth included."""
     worn = w.slip_rates[0] * w.roller_depth[g, i] - w.slip_rates[1] * w.cylinder_depth[i]
-    variation: float = w.slip_base[g, i] + worn
+    variation: float = w.slip_base[g, i] - spin * w.spin_arm[g, i] + worn
     return variation
 
 
 @kernel
-def _wear_strips(g: int, line_load: FloatArray, m: Medium, f: Follower, w: Wear) -> float:
-    """Wear both bodies by one pass of contact `g`; return the sum of dissipation over V [N/m]."""
-    mean, total = 0.0, 0.0
+def _wear_strips(
+    g: int, p: int, line_load: FloatArray, passes: Passes, m: Medium, f: Follower, w: Wear
+) -> float:
+    """Wear both bodies by pass `p` of contact `g`; return the sum of dissipation over V [N/m]."""
+    mean, total, spin = 0.0, 0.0, passes.spin[p]
     dissipated: float = 0.0
     for r in range(f.loaded[g]):
         i = f.active[g, r]
-        mean += line_load[g, i] * _local_slip(g, i, w)
+        mean += line_load[g, i] * _local_slip(g, i, spin, w)
         total += line_load[g, i]
     mean /= total
+    slip_y, friction = passes.creepage[p, 1], passes.friction[p]
     for r in range(f.loaded[g]):
         i = f.active[g, r]
         q = line_load[g, i]
-        slip_x = w.creepage[g, 0] - mean + _local_slip(g, i, w)
-        slip_y = w.creepage[g, 1]
+        slip_x = passes.creepage[p, 0] - mean + _local_slip(g, i, spin, w)
         a = np.sqrt(m.half_length_scale * q)
         force_x, force_y, _ = strip_force(
-            a, q, w.friction[i], slip_x, slip_y, m.contact_modulus, m.shear_modulus
+            a, q, friction, slip_x, slip_y, m.contact_modulus, m.shear_modulus
         )
         work = -(force_x * slip_x + force_y * slip_y)
         w.cylinder_depth[i] += w.depth_per_work[0] * work
@@ -386,15 +402,30 @@ def _wear_strips(g: int, line_load: FloatArray, m: Medium, f: Follower, w: Wear)
 
 
 @kernel
+def _meet(
+    g: int, tilt: float, nominal_gap: FloatArray, from_apex: FloatArray, f: Follower, w: Wear
+) -> tuple[float, float]:
+    """Fill the gap of contact `g`; return its least value, worn and unworn [m]."""
+    lowest, fresh = np.inf, np.inf
+    for i in range(nominal_gap.shape[1]):
+        unworn = nominal_gap[g, i] + tilt * from_apex[g, i]
+        f.gap[i] = unworn + w.cylinder_depth[i] + w.roller_depth[g, i]
+        lowest, fresh = min(lowest, f.gap[i]), min(fresh, unworn)
+    return lowest, fresh
+
+
+@kernel
 def run_passes(
     order: IntArray,
     first: int,
-    base_load: FloatArray,
+    passes: Passes,
     stiffness: float,
     terms: FloatArray,
     term_rates: FloatArray,
     nominal_gap: FloatArray,
+    from_apex: FloatArray,
     rolling_speed: float,
+    similar: bool,
     m: Medium,
     w: Wear,
     loads: Loads,
@@ -409,24 +440,27 @@ def run_passes(
         Which contact each physical roller is, in the order of their passes.
     first : int
         Number of the first pass, counted from the start of the test.
-    base_load : ndarray, shape (passes,)
-        Load before feedback at each pass [N].
+    passes : Passes
+        Load before feedback [N], friction, tilt [rad] and spin [1/m] of every pass, (passes,), and
+        its mean longitudinal and lateral creepage (passes, 2).
     stiffness : float
         Load lost per descent of a roller [N/m].
     terms : ndarray, shape (terms, contacts)
         State of linear load terms [N].
     term_rates : ndarray, shape (terms, 1 + contacts)
         Gain [N/W], and per contact the part of the way that a pass goes to rest.
-    nominal_gap : ndarray, shape (contacts, strips)
-        Gap before wear [m].
+    nominal_gap, from_apex : ndarray, shape (contacts, strips)
+        Gap before wear without tilt, and what a unit of tilt adds to it [m].
     rolling_speed : float
         V [m/s].
+    similar : bool
+        Follow a contact from pass to pass, rather than solve every pass in full.
     m : Medium
     w : Wear
-        Mean longitudinal and lateral creepage (contacts, 2); its variation on unworn bodies
-        (contacts, strips) and what worn depth of roller and cylinder adds to it (2,) [1/m];
-        friction (strips,); depth per work of the cylinder, then of each roller (1 + contacts,)
-        [m/(N/m)]; worn depths (strips,) and (contacts, strips) [m].
+        Variation of the creepage on unworn bodies, and what it falls by per spin [m] (contacts,
+        strips); what worn depth of roller and cylinder adds to it (2,) [1/m]; depth per work of
+        the cylinder, then of each roller (1 + contacts,) [m/(N/m)]; worn depths (strips,) and
+        (contacts, strips) [m].
     loads : Loads
         An anchor of zero load asks for a full solve.
     f : Follower
@@ -439,32 +473,28 @@ def run_passes(
     status, done, full_solves : int
         CONVERGED or what went wrong, the passes done, and those solved in full.
     """
-    contacts, n = nominal_gap.shape
-    fresh_gap, full_solves = np.empty(contacts), 0
-    for g in range(contacts):
-        fresh_gap[g] = nominal_gap[g].min()
+    full_solves, count = 0, passes.base_load.shape[0]
+    for g in range(nominal_gap.shape[0]):
         if loads.anchor[g].max() > 0.0:
             if not set_anchor(g, loads.anchor, m, f):
                 return SINGULAR, 0, full_solves
             _beyond_tangent(g, loads, m, f)
-    for p in range(base_load.shape[0]):
+    for p in range(count):
         g = order[(first + p) % order.shape[0]]
-        lowest = np.inf
-        for i in range(n):
-            f.gap[i] = nominal_gap[g, i] + w.cylinder_depth[i] + w.roller_depth[g, i]
-            lowest = min(lowest, f.gap[i])
-        load = base_load[p] - stiffness * (lowest - fresh_gap[g])
+        lowest, fresh = _meet(g, passes.tilt[p], nominal_gap, from_apex, f, w)
+        load = passes.base_load[p] - stiffness * (lowest - fresh)
         for t in range(terms.shape[0]):
             load += terms[t, g]
         if not load > 0.0:
             return LOST, p, full_solves
-        if not _follow(g, load, lowest, loads, m, f):
+        if not (similar and _follow(g, load, lowest, loads, m, f)):
             full_solves += 1
-            status = _solve_fully(g, load, loads, m, f)
+            status = _solve_fully(g, load, similar, loads, m, f)
             if status != CONVERGED:
                 return status, p, full_solves
-        power = rolling_speed * m.spacing * _wear_strips(g, loads.line_load, m, f, w)
+        power = _wear_strips(g, p, loads.line_load, passes, m, f, w)
+        power *= rolling_speed * m.spacing
         energy[g] += power
         for t in range(terms.shape[0]):
             terms[t, g] += term_rates[t, 1 + g] * (term_rates[t, 0] * power - terms[t, g])
-    return CONVERGED, base_load.shape[0], full_solves
+    return CONVERGED, count, full_solves

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from pydantic import Field
 
+from wearsim.mechanics.piecewise import PiecewiseLinear
 from wearsim.plugins import Load, LoadSpec, LoadTerm, Options
 from wearsim.quantities import (
     InputFile,
@@ -73,50 +74,28 @@ class RecordedLoad(Load):
             options.file.text, options.file.path, {"time": "s", "load": "N"}, rising="time"
         )
         self.stiffness = options.stiffness
-        self._time, self._load = columns["time"], columns["load"]
-        self._path = options.file.path
-        steps, ends = np.diff(self._time), (self._load[:-1], self._load[1:])
-        areas = 0.5 * steps * (ends[0] + ends[1])
-        squares = steps * (ends[0] ** 2 + ends[0] * ends[1] + ends[1] ** 2) / 3.0
-        self._area = np.concatenate([[0.0], np.cumsum(areas)])
-        self._square = np.concatenate([[0.0], np.cumsum(squares)])
+        self._log = PiecewiseLinear(columns["time"], columns["load"])
 
     @property
     def span(self) -> tuple[float, float]:
         """First and last time of the log [s]."""
-        return float(self._time[0]), float(self._time[-1])
+        return float(self._log.time[0]), float(self._log.time[-1])
 
     def force(self, time: FloatArray) -> FloatArray:
         """Return the load at each `time` [s], shape as `time` [N]."""
-        return np.interp(time, self._time, self._load)
-
-    def _integrals(self, time: float) -> tuple[float, float]:
-        """Return the integrals of the load and of its square from the log's start to `time`."""
-        k = int(np.clip(np.searchsorted(self._time, time) - 1, 0, len(self._time) - 2))
-        here = float(np.interp(time, self._time, self._load))
-        first, duration = float(self._load[k]), time - float(self._time[k])
-        area = 0.5 * duration * (first + here)
-        square = duration * (first * first + first * here + here * here) / 3.0
-        return float(self._area[k]) + area, float(self._square[k]) + square
+        return self._log.at(time)
 
     def mean(self, start: float, stop: float) -> float:
         """Return the exact mean of the load between two times [s] [N]."""
-        if stop <= start:
-            return float(self.force(np.array([start]))[0])
-        return (self._integrals(stop)[0] - self._integrals(start)[0]) / (stop - start)
+        return self._log.mean(start, stop)
 
     def extremes(self, start: float, stop: float) -> tuple[float, float]:
         """Return the exact least and greatest load between two times [s] [N]."""
-        inside = self._load[(self._time >= start) & (self._time <= stop)]
-        forces = np.concatenate([self.force(np.array([start, stop])), inside])
-        return float(forces.min()), float(forces.max())
+        return self._log.extremes(start, stop)
 
     def deviation(self, start: float, stop: float) -> float:
         """Return the exact standard deviation of the load between two times [s] [N]."""
-        if stop <= start:
-            return 0.0
-        square = (self._integrals(stop)[1] - self._integrals(start)[1]) / (stop - start)
-        return float(np.sqrt(max(0.0, square - self.mean(start, stop) ** 2)))
+        return self._log.deviation(start, stop)
 
 
 class ThermalTerm(LoadTerm):

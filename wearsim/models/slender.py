@@ -22,7 +22,14 @@ from wearsim.models.tangential import (
     friction_per_strip,
     local_slip,
 )
-from wearsim.plugins import Capabilities, ContactModel, ContactModelSpec, Options, PassLoop
+from wearsim.plugins import (
+    Capabilities,
+    ContactModel,
+    ContactModelSpec,
+    Options,
+    PassLoop,
+    SharedWear,
+)
 from wearsim.types import (
     ContactFields,
     ContactSolution,
@@ -104,7 +111,7 @@ class Slender(ContactModel):
             gap[None, :],
             longitudinal_curvature,
             [point],
-            compliance[None, None, :],
+            SharedWear.of_one(compliance),
             None if warm is None else [warm],
         )[0]
 
@@ -113,7 +120,7 @@ class Slender(ContactModel):
         gap: FloatArray,
         longitudinal_curvature: float,
         points: Sequence[OperatingPoint],
-        wear_compliance: FloatArray,
+        wear: SharedWear,
         warm: Sequence[ContactSolution] | None = None,
     ) -> list[ContactSolution]:
         """Solve several contacts that wear a profile they share, all at once."""
@@ -125,7 +132,7 @@ class Slender(ContactModel):
         loads = np.array([point.normal_force for point in points])
         arguments = (
             np.ascontiguousarray(gap),
-            np.ascontiguousarray(wear_compliance),
+            *wear.reduced,
             loads,
             self._grid.spacing,
             self._pair.contact_modulus,
@@ -199,12 +206,16 @@ class Slender(ContactModel):
         status, done, full_solves = slender_pass.run_passes(
             loop.order,
             loop.first_pass,
-            loop.base_load,
+            slender_pass.Passes(
+                loop.base_load, loop.creepage, loop.friction, loop.tilt, loop.spin
+            ),
             float(loop.stiffness),
             loop.terms,
             loop.term_rates,
             loop.nominal_gap,
+            loop.from_apex,
             loop.rolling_speed,
+            loop.similar,
             slender_pass.medium(
                 self._grid.spacing,
                 self._pair.contact_modulus,
@@ -213,10 +224,9 @@ class Slender(ContactModel):
                 self._table,
             ),
             slender_pass.Wear(
-                loop.creepage,
                 loop.slip_base,
+                loop.spin_arm,
                 loop.slip_rates,
-                loop.friction,
                 loop.wear,
                 loop.cylinder_depth,
                 loop.roller_depth,

@@ -21,6 +21,7 @@ from wearsim.plugins.random_inputs import (
     Process,
     Uniforms,
 )
+from wearsim.plugins.shared_wear import SharedWear
 from wearsim.plugins.specs import (
     ContactModelSpec,
     LoadSpec,
@@ -48,6 +49,7 @@ __all__ = [
     "PassLoop",
     "Process",
     "RandomInputSpec",
+    "SharedWear",
     "Spec",
     "Uniforms",
     "WearLaw",

@@ -9,7 +9,8 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from wearsim.errors import CapabilityError
+from wearsim.errors import CapabilityError, ContactError
+from wearsim.plugins.shared_wear import SharedWear
 from wearsim.types import (
     BatchSolution,
     ContactFields,
@@ -41,6 +42,8 @@ class Capabilities:
         The mean longitudinal creepage can be found from a bearing torque.
     local_friction : bool
         Friction may be given per strip.
+    friction_field : bool
+        Friction may differ from point to point within the contact, and be carried through it.
     pass_loop : bool
         `pass_loop` runs the per-pass loop in compiled code.
     fields : bool
@@ -52,6 +55,7 @@ class Capabilities:
     creepage_variation: bool = False
     bearing_torque: bool = False
     local_friction: bool = False
+    friction_field: bool = False
     pass_loop: bool = False
     fields: bool = False
 
@@ -64,9 +68,10 @@ class Capabilities:
 class PassLoop:
     """A run of roller passes in compiled code; arrays marked *state* are changed in place.
 
-    The physical rollers take turns, one pass each. A pass solves its contact on the present
-    profiles, then wears ``wear[0] * w`` off the cylinder and ``wear[1 + contact] * w`` off the
-    roller, w(y) being the dissipation P_l over V.
+    The physical rollers take turns, one pass each. Pass p of contact g meets the gap
+    ``nominal_gap[g] + tilt[p] * from_apex[g]`` and the worn depths; its creepage varies by
+    ``slip_base[g] - spin[p] * spin_arm[g]`` and what worn depth adds. It wears ``wear[0] * w`` off
+    the cylinder and ``wear[1 + g] * w`` off the roller, w(y) being the dissipation P_l over V.
 
     Parameters
     ----------
@@ -76,24 +81,26 @@ class PassLoop:
         Number of the first pass, counted from the start of the test.
     base_load : ndarray, shape (passes,)
         Load before feedback at each pass [N].
+    creepage : ndarray, shape (passes, 2)
+        Mean longitudinal, and lateral creepage.
+    friction, tilt, spin : ndarray, shape (passes,)
+        Friction coefficient, tilt that moves the contact [rad], and spin [1/m].
     stiffness : float
         Load lost per descent of a roller [N/m].
-    nominal_gap : ndarray, shape (contacts, strips)
-        Gap before wear [m].
+    nominal_gap, from_apex : ndarray, shape (contacts, strips)
+        Gap before wear, and distance from the roller's apex [m].
     longitudinal_curvature, rolling_speed : float
         Relative curvature along rolling [1/m], V [m/s].
-    creepage : ndarray, shape (contacts, 2)
-        Mean longitudinal, and lateral creepage.
-    slip_base : ndarray, shape (contacts, strips)
-        Variation of the longitudinal creepage on unworn bodies.
+    slip_base, spin_arm : ndarray, shape (contacts, strips)
+        Variation of the longitudinal creepage on unworn bodies; its fall per spin [m].
     slip_rates : ndarray, shape (2,)
         What worn depth of the roller adds to it, and of the cylinder takes off it [1/m].
-    friction : ndarray, shape (strips,)
-        Friction coefficient.
     wear : ndarray, shape (1 + contacts,)
         Depth per pass and w: the cylinder's, then each roller's [m/(N/m)].
     term_rates : ndarray, shape (terms, 1 + contacts)
         Gain of each load term [N/W], and the part of the way to rest that a pass goes.
+    similar : bool
+        Whether one pass of a contact is much like the one before, so that it can be followed.
     terms : ndarray, shape (terms, contacts)
         *State*: the load terms [N].
     cylinder_depth, roller_depth : ndarray, shape (strips,) and (contacts, strips)
@@ -110,16 +117,21 @@ class PassLoop:
     order: IntArray
     first_pass: int
     base_load: FloatArray
+    creepage: FloatArray
+    friction: FloatArray
+    tilt: FloatArray
+    spin: FloatArray
     stiffness: float
     nominal_gap: FloatArray
+    from_apex: FloatArray
     longitudinal_curvature: float
     rolling_speed: float
-    creepage: FloatArray
     slip_base: FloatArray
+    spin_arm: FloatArray
     slip_rates: FloatArray
-    friction: FloatArray
     wear: FloatArray
     term_rates: FloatArray
+    similar: bool
     terms: FloatArray
     cylinder_depth: FloatArray
     roller_depth: FloatArray
@@ -187,12 +199,10 @@ class ContactModel(ABC):
         gap: FloatArray,
         longitudinal_curvature: float,
         points: Sequence[OperatingPoint],
-        wear_compliance: FloatArray,
+        wear: SharedWear,
         warm: Sequence[ContactSolution] | None = None,
     ) -> list[ContactSolution]:
-        """Solve several contacts that wear a profile they share.
-
-        Contact k meets the gap ``gap[k] + sum_l wear_compliance[k, l] * q[l]``.
+        """Solve several contacts that wear bodies they share, by what they carry in the end.
 
         Parameters
         ----------
@@ -202,8 +212,8 @@ class ContactModel(ABC):
             Relative curvature along rolling [1/m].
         points : sequence of OperatingPoint
             One per contact.
-        wear_compliance : ndarray, shape (contacts, contacts, strips)
-            Gap that opens at the first contact per unit of line load of the second [m/(N/m)].
+        wear : SharedWear
+            Who wears which body, and how much per unit of line load.
         warm : sequence of ContactSolution, optional
             Solutions nearby to start from.
 
@@ -220,7 +230,7 @@ class ContactModel(ABC):
         """
         if len(points) == 1:
             first = warm[0] if warm is not None else None
-            own = wear_compliance[0, 0]
+            own = wear.total[0]
             return [self.solve(gap[0], longitudinal_curvature, points[0], own, first)]
         raise CapabilityError(
             f"{type(self).__name__} solves one contact at a time, and rollers that differ share the"
@@ -240,11 +250,12 @@ class ContactModel(ABC):
         Parameters
         ----------
         gap : ndarray, shape (stations, rollers, realisations, strips)
-            Gap of each contact [m].
+            Gap of each contact [m]; an axis along which all are the same may have stride 0.
         longitudinal_curvature : float
             Relative curvature along rolling [1/m].
         points : sequence of OperatingPoint
-            One per contact, in the order of `gap` with its last leading axis fastest.
+            One per contact, in the order of `gap` with its last leading axis fastest. For thousands
+            of contacts, `OperatingPoints` holds them as columns.
         wear_compliance : ndarray, shape as `gap`, optional
             As in `solve`.
         warm : sequence of ContactSolution, optional
@@ -253,23 +264,73 @@ class ContactModel(ABC):
         Returns
         -------
         BatchSolution
+
+        Raises
+        ------
+        ContactError
+            As `solve`, of the first contact that fails; it names the contact.
         """
         shape = gap.shape[:-1]
         if len(points) != int(np.prod(shape)):
             raise ValueError(f"{len(points)} operating points for a batch of shape {shape}")
         gaps = gap.reshape(-1, gap.shape[-1])
         compliances = None if wear_compliance is None else wear_compliance.reshape(gaps.shape)
-        solutions = tuple(
-            self.solve(
-                gaps[k],
-                longitudinal_curvature,
-                points[k],
-                None if compliances is None else compliances[k],
-                None if warm is None else warm[k],
-            )
-            for k in range(len(gaps))
+        solutions = []
+        for k in range(len(gaps)):
+            compliance = None if compliances is None else compliances[k]
+            start = None if warm is None else warm[k]
+            try:
+                found = self.solve(gaps[k], longitudinal_curvature, points[k], compliance, start)
+            except ContactError as error:
+                raise naming_contact(error, k, shape) from error
+            solutions.append(found)
+        return BatchSolution.of(shape, solutions)
+
+    def friction_points(
+        self, gap: FloatArray, longitudinal_curvature: float, point: OperatingPoint
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return where friction is asked for; only where `capabilities.friction_field`.
+
+        Parameters
+        ----------
+        gap, longitudinal_curvature, point
+            As in `solve`; the friction of `point` counts for nothing yet.
+
+        Returns
+        -------
+        x : ndarray, shape (points, strips)
+            Position along rolling, from the leading edge on [m]; 0 outside the contact.
+        y : ndarray, shape (strips,)
+            Axial position [m].
+        """
+        raise CapabilityError(
+            f"{type(self).__name__} takes no friction that differs from point to point; use"
+            " contact.model = 'hertz-fastsim'"
         )
-        return BatchSolution(shape=shape, solutions=solutions)
+
+    def friction_points_batch(
+        self, gap: FloatArray, longitudinal_curvature: float, points: Sequence[OperatingPoint]
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return `friction_points` of every contact of a batch, by default one after another.
+
+        Parameters
+        ----------
+        gap, longitudinal_curvature, points
+            As in `solve_batch`.
+
+        Returns
+        -------
+        x : ndarray, shape (contacts, points, strips)
+            As of `friction_points`.
+        y : ndarray, shape (strips,)
+            Axial position [m].
+        """
+        gaps = gap.reshape(-1, gap.shape[-1])
+        found = [
+            self.friction_points(gaps[k], longitudinal_curvature, points[k])
+            for k in range(len(gaps))
+        ]
+        return np.array([x for x, _ in found]), found[0][1]
 
     def suggest_grid(
         self,
@@ -322,6 +383,25 @@ class ContactModel(ABC):
             How many of the passes were solved in full, from no factorisation in use.
         """
         raise CapabilityError(f"{type(self).__name__} has no compiled per-pass loop")
+
+
+def naming_contact(error: ContactError, number: int, shape: tuple[int, ...]) -> ContactError:
+    """Return an error that says which contact of a batch it befell.
+
+    Parameters
+    ----------
+    error : ContactError
+        What went wrong.
+    number : int
+        The contact, in the order of the batch.
+    shape : tuple of int
+        The batch's leading axes, the last three of them station, roller and realisation.
+    """
+    place = [int(i) for i in np.unravel_index(number, shape)]
+    axes = ("station", "roller", "realisation")[-len(shape) :]
+    parts = [f"{axis} {i}" for axis, i, n in zip(axes, place, shape, strict=True) if n > 1]
+    text = f"{', '.join(parts)}: {error}" if parts else str(error)
+    return ContactError(text, error.state | {"contact": place})
 
 
 class WearLaw(ABC):

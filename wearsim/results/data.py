@@ -8,7 +8,37 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from wearsim.results.layout import REPLAY, Layout
+
 Arrays = dict[str, npt.NDArray[Any]]
+
+
+@dataclass(frozen=True, eq=False)
+class Content:
+    """What goes into a results file of any kind.
+
+    Parameters
+    ----------
+    layout : Layout
+        The kind of file.
+    about : dict of str to object
+        Everything but arrays and texts, ready for JSON.
+    scenario_text : str
+        TOML of the scenario.
+    files : dict of str to str
+        Content of every file the scenario names.
+    variables : dict of str to ndarray
+        Those of the layout.
+    checkpoint : dict of str to ndarray
+        The state to resume from; nothing where there is nothing to resume.
+    """
+
+    layout: Layout
+    about: dict[str, Any]
+    scenario_text: str
+    files: dict[str, str]
+    variables: Arrays
+    checkpoint: Arrays
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -52,6 +82,9 @@ class RunData:
         Time the run took so far [s].
     created : str
         When the run began, ISO 8601.
+    drawn : dict of str to dict
+        What was drawn in the place of random inputs, by the scenario's key: `values`, one for the
+        test or one per roller, and their SI `unit`.
     """
 
     scenario_text: str
@@ -72,6 +105,7 @@ class RunData:
     finished: bool
     wall_seconds: float
     created: str
+    drawn: dict[str, dict[str, Any]] = field(default_factory=dict)
     files: dict[str, str] = field(default_factory=dict)
     software: dict[str, str] = field(default_factory=dict)
     plugins: list[dict[str, str]] = field(default_factory=list)
@@ -87,6 +121,13 @@ class RunData:
     def about(self) -> dict[str, Any]:
         """Everything but arrays, the scenario's text and its files, by name."""
         return {name: getattr(self, name) for name in ABOUT}
+
+    @property
+    def content(self) -> Content:
+        """What goes into its file."""
+        return Content(
+            REPLAY, self.about, self.scenario_text, self.files, self.variables, self.checkpoint
+        )
 
 
 _STORED_APART = {"scenario_text", "files", "static", "history", "records", "checkpoint"}

@@ -1,7 +1,7 @@
-"""The only module that speaks HDF5: a run's file image, and the pieces of an open file.
+"""The only module that speaks HDF5: the image of a file, and the pieces of an open one.
 
 The image is made through h5py's low-level calls, which are three times as quick as its objects.
-It depends on the run alone (no time stamps), so that equal runs give equal files.
+It depends on the content alone (no time stamps), so that equal runs give equal files.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ import numpy as np
 import numpy.typing as npt
 from h5py import h5a, h5d, h5ds, h5f, h5g, h5p, h5s, h5t
 
-from wearsim.results.data import Arrays, RunData, as_plain
-from wearsim.results.layout import AXES, FORMAT, VARIABLES, VERSION, axis_lengths
+from wearsim.results.data import Arrays, Content, as_plain
+from wearsim.results.layout import Layout, axis_lengths
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 CHECKPOINT, INPUTS, ABOUT, SCENARIO, FILES = "checkpoint", "inputs", "about", "scenario", "files"
@@ -33,13 +33,13 @@ _ORDERED = h5p.CRT_ORDER_TRACKED | h5p.CRT_ORDER_INDEXED
 _number = itertools.count()
 
 
-def file_image(data: RunData) -> bytes:
-    """Return the content of a results file.
+def file_image(content: Content) -> bytes:
+    """Return the bytes of a results file.
 
     Parameters
     ----------
-    data : RunData
-        The run.
+    content : Content
+        What it shall hold.
 
     Returns
     -------
@@ -50,15 +50,15 @@ def file_image(data: RunData) -> bytes:
     ValueError
         If the variables are not those of the layout, or do not fit together.
     """
-    variables = data.variables
-    lengths = axis_lengths(variables)
+    layout, variables = content.layout, content.variables
+    lengths = axis_lengths(variables, layout.variables)
     file = _memory_file()
     try:
-        _put_labels(file, data)
-        _put_variables(file, variables, lengths)
-        _put_inputs(h5g.create(file, INPUTS.encode()), data)
+        _put_labels(file, content)
+        _put_variables(file, variables, layout, lengths)
+        _put_inputs(h5g.create(file, INPUTS.encode()), content)
         checkpoint = h5g.create(file, CHECKPOINT.encode())
-        for name, array in data.checkpoint.items():
+        for name, array in content.checkpoint.items():
             _put_array(checkpoint, name, array)
         h5f.flush(file)
         image: bytes = file.get_file_image()
@@ -77,11 +77,11 @@ def _memory_file() -> Any:
     return h5f.create(name.encode(), h5f.ACC_TRUNC, creation, access)
 
 
-def _put_labels(file: Any, data: RunData) -> None:
+def _put_labels(file: Any, content: Content) -> None:
     """Write what a person, or xarray, should see first; it is read back from the texts."""
-    _put_attribute(file, "format", FORMAT)
-    _put_attribute(file, "format_version", VERSION)
-    for name, value in data.about.items():
+    _put_attribute(file, "format", content.layout.format)
+    _put_attribute(file, "format_version", content.layout.version)
+    for name, value in content.about.items():
         if isinstance(value, str):
             _put_attribute(file, name, value[:_LABEL_LENGTH])
         elif isinstance(value, bool | np.bool_):
@@ -90,13 +90,15 @@ def _put_labels(file: Any, data: RunData) -> None:
             _put_attribute(file, name, value)
 
 
-def _put_variables(file: Any, variables: Arrays, lengths: Mapping[str, int]) -> None:
+def _put_variables(
+    file: Any, variables: Arrays, layout: Layout, lengths: Mapping[str, int]
+) -> None:
     scales = {}
-    for axis in AXES.values():
+    for axis in layout.axes.values():
         numbers = np.arange(axis.first, axis.first + lengths[axis.name])
         scales[axis.name] = _put_described(file, axis.name, numbers, "1", axis.long_name)
     datasets = {}
-    for name, variable in VARIABLES.items():
+    for name, variable in layout.variables.items():
         datasets[name] = _put_described(
             file, name, variables[name], variable.unit, variable.long_name
         )
@@ -104,15 +106,15 @@ def _put_variables(file: Any, variables: Arrays, lengths: Mapping[str, int]) -> 
     for name, scale in scales.items():
         h5ds.set_scale(scale, name.encode())
     for name, dataset in datasets.items():
-        for position, dim in enumerate(VARIABLES[name].dims):
+        for position, dim in enumerate(layout.variables[name].dims):
             h5ds.attach_scale(dataset, scales[dim], position)
 
 
-def _put_inputs(group: Any, data: RunData) -> None:
-    _put_text(group, SCENARIO, data.scenario_text)
-    _put_text(group, ABOUT, json.dumps(data.about, default=as_plain))
+def _put_inputs(group: Any, content: Content) -> None:
+    _put_text(group, SCENARIO, content.scenario_text)
+    _put_text(group, ABOUT, json.dumps(content.about, default=as_plain))
     files = h5g.create(group, FILES.encode())
-    for number, (path, text) in enumerate(data.files.items()):
+    for number, (path, text) in enumerate(content.files.items()):
         _put_attribute(_put_text(files, str(number), text), "path", path)
 
 

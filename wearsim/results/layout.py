@@ -1,4 +1,4 @@
-"""The layout of a results file: its format, its axes, and the one table of its variables."""
+"""The layout of a run's file: its format, its axes, and the one table of its variables."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy.typing as npt
 FORMAT = "wearsim-replay"
 VERSION = 1
 
-Kind: TypeAlias = Literal["static", "history", "record"]
+Kind: TypeAlias = Literal["static", "history", "record", "statistic"]
 
 
 @dataclass(frozen=True)
@@ -47,8 +47,8 @@ class Variable:
         Its SI unit; "1" for a plain number.
     long_name : str
         What it is.
-    kind : {"static", "history", "record"}
-        Given once, once per step, or once per record.
+    kind : {"static", "history", "record", "statistic"}
+        Given once, once per step, once per record, or taken over realisations.
     """
 
     name: str
@@ -56,6 +56,31 @@ class Variable:
     unit: str
     long_name: str
     kind: Kind
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What a kind of results file holds.
+
+    Parameters
+    ----------
+    format : str
+        Its name.
+    version : int
+        The version that is written, and the newest that can be read.
+    holds : str
+        What is in it and which command writes it, for messages.
+    axes : mapping of str to Axis
+        Every axis but y, whose coordinate is a variable of its own.
+    variables : mapping of str to Variable
+        The table of variables, by name.
+    """
+
+    format: str
+    version: int
+    holds: str
+    axes: Mapping[str, Axis]
+    variables: Mapping[str, Variable]
 
 
 AXES: Mapping[str, Axis] = {
@@ -128,14 +153,20 @@ VARIABLES: Mapping[str, Variable] = {
 }
 """The table of variables, by name."""
 
+REPLAY = Layout(FORMAT, VERSION, "a wear test, from `wearsim run`", AXES, VARIABLES)
 
-def axis_lengths(arrays: Mapping[str, npt.NDArray[Any]]) -> dict[str, int]:
+
+def axis_lengths(
+    arrays: Mapping[str, npt.NDArray[Any]], table: Mapping[str, Variable] = VARIABLES
+) -> dict[str, int]:
     """Return the length of every axis.
 
     Parameters
     ----------
     arrays : mapping of str to ndarray
         All variables of the table, by name.
+    table : mapping of str to Variable
+        The table; by default that of a run.
 
     Returns
     -------
@@ -146,13 +177,13 @@ def axis_lengths(arrays: Mapping[str, npt.NDArray[Any]]) -> dict[str, int]:
     ValueError
         If a variable is missing or unknown, or if one does not fit the axes of the others.
     """
-    if arrays.keys() != VARIABLES.keys():
-        missing = [name for name in VARIABLES if name not in arrays]
-        unknown = [name for name in arrays if name not in VARIABLES]
+    if arrays.keys() != table.keys():
+        missing = [name for name in table if name not in arrays]
+        unknown = [name for name in arrays if name not in table]
         raise ValueError(f"missing variables {missing}, unknown variables {unknown}")
     lengths: dict[str, int] = {}
     for name, array in arrays.items():
-        dims = VARIABLES[name].dims
+        dims = table[name].dims
         if array.ndim != len(dims):
             raise ValueError(f"{name} has {array.ndim} axes, expected {', '.join(dims)}")
         for dim, length in zip(dims, array.shape, strict=True):

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from wearsim.errors import ResultsFileError
+from wearsim.results import dissipation_data
 from wearsim.results.data import ABOUT, Arrays, RunData
-from wearsim.results.layout import FORMAT, VARIABLES, VERSION, axis_lengths
+from wearsim.results.dissipation_data import DissipationData
+from wearsim.results.dissipation_layout import DISSIPATION, with_inputs
+from wearsim.results.layout import REPLAY, Layout, axis_lengths
 
 if TYPE_CHECKING:
     import h5py
@@ -18,6 +22,9 @@ if TYPE_CHECKING:
 _SMALLEST = 96  # bytes: no HDF5 file is shorter
 # what h5py, json and numpy raise on content that is not as it was written
 _DAMAGE = (OSError, RuntimeError, ValueError, TypeError, KeyError, AttributeError, OverflowError)
+_LAYOUTS = {layout.format: layout for layout in (REPLAY, DISSIPATION)}
+
+Stored = TypeVar("Stored")
 
 
 def read_results(path: str | Path) -> RunData:
@@ -37,13 +44,53 @@ def read_results(path: str | Path) -> RunData:
     ResultsFileError
         If it is missing, foreign, truncated, damaged, or written by a newer wearsim.
     """
+    return _read(path, lambda file: _run_data(path, file))
+
+
+def read_dissipation(path: str | Path) -> DissipationData:
+    """Read the file of a study of the dissipation of a contact.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+
+    Returns
+    -------
+    DissipationData
+
+    Raises
+    ------
+    ResultsFileError
+        As of `read_results`.
+    """
+    return _read(path, lambda file: _dissipation_data(path, file))
+
+
+def is_dissipation(path: str | Path) -> bool:
+    """Tell whether a results file holds a study of the dissipation of a contact.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+
+    Raises
+    ------
+    ResultsFileError
+        If it is missing, foreign, truncated or damaged.
+    """
+    return _read(path, lambda file: _layout_of(path, file) is DISSIPATION)
+
+
+def _read(path: str | Path, take: Callable[[h5py.File], Stored]) -> Stored:
+    """Open a file and take from it; whatever goes wrong becomes a ResultsFileError."""
     from wearsim.results import hdf5  # noqa: PLC0415  (h5py takes 0.2 s to import)
 
     _check_signature(path, hdf5.SIGNATURE)
     try:
         with hdf5.opened(Path(path)) as file:
-            _check_format(path, file)
-            return _run_data(path, file)
+            return take(file)
     except _DAMAGE as error:
         if "truncated" in str(error):
             raise ResultsFileError(_truncated(path)) from error
@@ -77,38 +124,81 @@ def _first_line(error: Exception) -> str:
     return lines[0] if lines else type(error).__name__
 
 
-def _check_format(path: str | Path, file: h5py.File) -> None:
+def _layout_of(path: str | Path, file: h5py.File) -> Layout:
     name = file.attrs.get("format")
-    if not isinstance(name, str | bytes) or name not in {FORMAT, FORMAT.encode()}:
+    text = name.decode(errors="replace") if isinstance(name, bytes) else name
+    if not isinstance(text, str) or text not in _LAYOUTS:
         raise ResultsFileError(f"{path}: is HDF5, but not a results file of wearsim")
+    return _LAYOUTS[text]
+
+
+def _check_format(path: str | Path, file: h5py.File, wanted: Layout) -> None:
+    found = _layout_of(path, file)
+    if found is not wanted:
+        raise ResultsFileError(f"{path}: holds {found.holds}; what is needed is {wanted.holds}")
     version = int(file.attrs["format_version"])
-    if version > VERSION:
+    if version > wanted.version:
         raise ResultsFileError(
             f"{path}: was written by a newer wearsim (format {version}, this one reads up to"
-            f" {VERSION}); update wearsim to read it"
+            f" {wanted.version}); update wearsim to read it"
         )
 
 
 def _run_data(path: str | Path, file: h5py.File) -> RunData:
+    _check_format(path, file, REPLAY)
+    about, scenario_text, files = _texts(path, file, REPLAY, ["checkpoint"])
+    # nothing is drawn in files of version 0.1.0, which do not say so
+    _check_complete(path, [name for name in ABOUT if name not in about and name != "drawn"])
+    variables = _variables(file, REPLAY)
+    return RunData(
+        **{name: about[name] for name in ABOUT if name in about},
+        scenario_text=scenario_text,
+        files=files,
+        static=_of_kind("static", variables),
+        history=_of_kind("history", variables),
+        records=_of_kind("record", variables),
+        checkpoint=_checkpoint(file),
+    )
+
+
+def _dissipation_data(path: str | Path, file: h5py.File) -> DissipationData:
+    _check_format(path, file, DISSIPATION)
+    about, scenario_text, files = _texts(path, file, DISSIPATION)
+    _check_complete(path, [name for name in dissipation_data.ABOUT if name not in about])
+    layout = with_inputs(about["inputs"])
+    _check_complete(path, [name for name in layout.variables if name not in file])
+    return DissipationData(
+        **{name: about[name] for name in dissipation_data.ABOUT},
+        scenario_text=scenario_text,
+        files=files,
+        variables=_variables(file, layout),
+    )
+
+
+def _texts(
+    path: str | Path, file: h5py.File, layout: Layout, groups: Sequence[str] = ()
+) -> tuple[dict[str, Any], str, dict[str, str]]:
+    """Return what is stored apart from arrays, having checked that all else is there too."""
     from wearsim.results import hdf5  # noqa: PLC0415
 
     about_at, scenario_at = f"{hdf5.INPUTS}/{hdf5.ABOUT}", f"{hdf5.INPUTS}/{hdf5.SCENARIO}"
     files_at = f"{hdf5.INPUTS}/{hdf5.FILES}"
-    needed = (*VARIABLES, about_at, scenario_at, files_at, hdf5.CHECKPOINT)
-    _check_complete(path, [name for name in needed if name not in file])
+    wanted = (*layout.variables, about_at, scenario_at, files_at, *groups)
+    _check_complete(path, [name for name in wanted if name not in file])
     about: dict[str, Any] = json.loads(hdf5.get_text(file[about_at]))
-    _check_complete(path, [name for name in ABOUT if name not in about])
-    variables = {name: np.asarray(file[name][()]) for name in VARIABLES}
-    axis_lengths(variables)
-    return RunData(
-        **{name: about[name] for name in ABOUT},
-        scenario_text=hdf5.get_text(file[scenario_at]),
-        files=_files(file[files_at]),
-        static=_of_kind("static", variables),
-        history=_of_kind("history", variables),
-        records=_of_kind("record", variables),
-        checkpoint=hdf5.get_arrays(file[hdf5.CHECKPOINT]),
-    )
+    return about, hdf5.get_text(file[scenario_at]), _files(file[files_at])
+
+
+def _variables(file: h5py.File, layout: Layout) -> Arrays:
+    variables = {name: np.asarray(file[name][()]) for name in layout.variables}
+    axis_lengths(variables, layout.variables)
+    return variables
+
+
+def _checkpoint(file: h5py.File) -> Arrays:
+    from wearsim.results import hdf5  # noqa: PLC0415
+
+    return hdf5.get_arrays(file[hdf5.CHECKPOINT])
 
 
 def _check_complete(path: str | Path, missing: list[str]) -> None:
@@ -124,4 +214,4 @@ def _files(group: h5py.Group) -> dict[str, str]:
 
 
 def _of_kind(kind: str, variables: Arrays) -> Arrays:
-    return {name: array for name, array in variables.items() if VARIABLES[name].kind == kind}
+    return {name: array for name, array in variables.items() if REPLAY.variables[name].kind == kind}

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from wearsim.errors import ResultsFileError
 from wearsim.results.data import RunData
+from wearsim.results.dissipation_data import DissipationData
 
 STAGES = ("open", "write", "flush", "fsync", "close", "rename", "fsync folder")
 
@@ -34,14 +35,14 @@ def _stage(name: str) -> Iterator[None]:
     on_write_stage(f"after {name}")
 
 
-def write_results(path: str | Path, data: RunData) -> None:
+def write_results(path: str | Path, data: RunData | DissipationData) -> None:
     """Write a results file, in place of any that stands there.
 
     Parameters
     ----------
     path : str or Path
         The file.
-    data : RunData
+    data : RunData or DissipationData
         What it shall hold.
 
     Raises
@@ -53,7 +54,7 @@ def write_results(path: str | Path, data: RunData) -> None:
     """
     from wearsim.results import hdf5  # noqa: PLC0415  (h5py takes 0.2 s to import)
 
-    write_whole(path, hdf5.file_image(data))
+    write_whole(path, hdf5.file_image(data.content))
 
 
 def write_whole(path: str | Path, content: bytes) -> None:

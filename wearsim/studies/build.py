@@ -2,24 +2,35 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from wearsim.errors import CapabilityError, Problem, ScenarioError
+from wearsim.evolution.advance import explicit_step
 from wearsim.evolution.control import StepControl
+from wearsim.evolution.errors_of_steps import coarse_start, whole_volume
 from wearsim.evolution.explicit import ExplicitStepper
 from wearsim.evolution.implicit import ImplicitStepper
+from wearsim.evolution.inputs import ContactInputs
 from wearsim.evolution.per_pass import PerPassStepper
-from wearsim.evolution.scene import Kinematics, Scene
+from wearsim.evolution.scene import Kinematics, NoWear, Scene
+from wearsim.evolution.state import fresh_state
 from wearsim.evolution.stepper import Stepper
 from wearsim.plugins import ContactModel, Load
 from wearsim.scenario import Scenario, require_run
-from wearsim.studies.tracks import run_grid
-from wearsim.types import Creepage, FloatArray, Grid, Profile
+from wearsim.studies.draws import Draws, draw
+from wearsim.studies.per_pass_inputs import FEWEST_NODES, MOST_NODES, redrawing, with_nodes
+from wearsim.studies.tracks import Angles, run_grid
+from wearsim.types import FloatArray, Grid, Profile
 
 
-def merged_rollers(scenario: Scenario) -> tuple[list[int], FloatArray]:
+def merged_rollers(draws: Draws) -> tuple[list[int], FloatArray]:
     """Return the first of each kind of roller, and how many are alike."""
-    creepage = scenario.creepage
+    scenario = draws.scenario
+    creepage, numbers = scenario.creepage, range(scenario.operation.rollers)
+    if draws.tells_rollers_apart:
+        return list(numbers), np.ones(len(numbers))
     rows = list(
         zip(
             scenario.per_roller(scenario.roller.offset),
@@ -52,53 +63,49 @@ def start_height(scenario: Scenario, grid: Grid) -> FloatArray:
     return np.interp(grid.y, profile.y, profile.height)
 
 
-def nominal_gap(scenario: Scenario, grid: Grid, roller: int, profile: Profile | None) -> FloatArray:
-    """Return the gap of one roller before wear, shape (strips,) [m].
+def from_apex(scenario: Scenario, grid: Grid, roller: int) -> FloatArray:
+    """Return the axial distance from one roller's apex, shape (strips,) [m]."""
+    return np.asarray(grid.y - scenario.per_roller(scenario.roller.offset)[roller])
 
-    A tilted roller keeps its crown and turns about its apex: tilt adds a linear term, which moves
-    the contact by R_crown times tilt.
-    """
-    s = grid.y - scenario.per_roller(scenario.roller.offset)[roller]
+
+def flat_gap(scenario: Scenario, grid: Grid, roller: int, profile: Profile | None) -> FloatArray:
+    """Return the gap of one roller without tilt before wear, shape (strips,) [m]."""
+    s = from_apex(scenario, grid, roller)
     gap = s * s / (2.0 * scenario.roller.crown_radius)
-    if scenario.creepage.tilt_shifts_contact:
-        gap = gap + scenario.per_roller(scenario.creepage.tilt)[roller] * s
     if profile is not None:
         gap = gap - np.interp(grid.y, profile.y, profile.height)
     return gap
 
 
-def creepage_of(scenario: Scenario, roller: int) -> Creepage:
-    """Return the creepage of one roller: yaw gives the lateral part, tilt the spin."""
-    tilt = scenario.per_roller(scenario.creepage.tilt)[roller]
-    return Creepage(
-        longitudinal=scenario.creepage.longitudinal or 0.0,
-        lateral=scenario.per_roller(scenario.creepage.yaw)[roller],
-        spin=tilt / scenario.roller.radius,
-    )
-
-
-def rolling_radius(scenario: Scenario, grid: Grid, roller: int) -> FloatArray:
-    """Return the unworn roller's radius at every strip, shape (strips,) [m]."""
-    s = grid.y - scenario.per_roller(scenario.roller.offset)[roller]
-    return scenario.roller.radius - s * s / (2.0 * scenario.roller.crown_radius)
-
-
 def slip_profile(
     scenario: Scenario, grid: Grid, roller: int, profile: Profile | None
 ) -> FloatArray:
-    """Return the differential slip before wear, shape (strips,).
+    """Return the differential slip without tilt before wear, shape (strips,).
 
     s^2/(2 R_crown R_roller), s from the roller's apex, and the start profile's height over
-    R_cylinder. The tilt counts once: as the shift of the
-    contact away from the apex, or, where it shifts nothing, as the spin's -phi y.
+    R_cylinder.
     """
-    s = grid.y - scenario.per_roller(scenario.roller.offset)[roller]
+    s = from_apex(scenario, grid, roller)
     slip = s * s / (2.0 * scenario.roller.crown_radius * scenario.roller.radius)
-    if not scenario.creepage.tilt_shifts_contact:
-        slip = slip - creepage_of(scenario, roller).spin * s
     if profile is not None:
         slip = slip + np.interp(grid.y, profile.y, profile.height) / scenario.cylinder.radius
     return slip
+
+
+def mean_inputs(scenario: Scenario, rollers: list[int]) -> ContactInputs:
+    """Return the inputs of some rollers as the scenario gives them."""
+    creepage = scenario.creepage
+    alike = ContactInputs.alike(
+        len(rollers),
+        friction=scenario.friction.coefficient,
+        longitudinal=creepage.longitudinal or 0.0,
+        bearing_torque=creepage.bearing_torque or 0.0,
+    )
+    angles = {
+        name: np.array(scenario.per_roller(value))[rollers][:, None]
+        for name, value in (("yaw", creepage.yaw), ("tilt", creepage.tilt))
+    }
+    return alike.with_values(angles)
 
 
 def check_model(scenario: Scenario, model: ContactModel) -> None:
@@ -209,31 +216,113 @@ def build_scene(scenario: Scenario, grid: Grid | None = None) -> tuple[Scene, St
         If the contact model cannot do what is asked.
     """
     require_run(scenario)
-    if scenario.wear is None:
-        raise ValueError("require_run lets no scenario without wear pass")
+    draws = draw(scenario)
+    scenario = draws.scenario
     load, model = scenario.load.build(), scenario.contact.build()
     check_model(scenario, model)
-    first, multiplicity = merged_rollers(scenario)
-    name = chosen_stepper(scenario, model, len(first))
-    greatest = load_range(scenario, load, scenario.total_time)[1]
-    grid = grid if grid is not None else run_grid(scenario, greatest)
+    first, multiplicity = merged_rollers(draws)
+    name = chosen_stepper(scenario, model, 2 if draws.passes else len(first))
+    stepper = build_stepper(scenario, name)
+    grid = grid if grid is not None else strips_of_run(draws)
     model.prepare(grid, (scenario.cylinder.material, scenario.roller.material))
-    gaps = [nominal_gap(scenario, grid, r, scenario.cylinder.profile) for r in first]
-    creepage, free = scenario.creepage, scenario.creepage.drive == "free"
-    slips = [slip_profile(scenario, grid, r, scenario.cylinder.profile) for r in first]
-    radii = [rolling_radius(scenario, grid, r) for r in first]
-    scene = Scene(
+    scene = bare_scene(scenario, model, load, grid, first, multiplicity, scenario.cylinder.profile)
+    scene = with_draws(scene, draws, first)
+    if draws.passes and stepper.pass_by_pass:
+        scene = replace(scene, redraw=redrawing(scenario, draws.passes))
+    elif draws.passes:
+        scene = with_enough_nodes(scene, draws)
+    return scene, stepper, name
+
+
+def strips_of_run(draws: Draws) -> Grid:
+    """Return the strips that a run's draws and the end of its test call for."""
+    scenario = draws.scenario
+    greatest = load_range(scenario, scenario.load.build(), scenario.total_time)[1]
+    greatest += draws.range_of("normal_force", 0.0)[1]
+    return run_grid(scenario, greatest, Angles(*(_reach(draws, name) for name in ("yaw", "tilt"))))
+
+
+def _reach(draws: Draws, name: str) -> float:
+    """Return the greatest size of an angle that is drawn [rad]."""
+    return max(abs(angle) for angle in draws.range_of(name, 0.0))
+
+
+def with_draws(scene: Scene, draws: Draws, rollers: list[int]) -> Scene:
+    """Return the scene with what is drawn for its rollers, and with the paths of processes."""
+    values = {name: array[rollers][:, None] for name, array in draws.rollers.items()}
+    place = {number: k for k, number in enumerate(rollers)}
+    varying = tuple(
+        replace(item, rollers=tuple(place[r] for r in item.rollers if r in place))
+        for item in draws.varying
+    )
+    return replace(scene, inputs=scene.inputs.with_values(values), varying=varying)
+
+
+def with_enough_nodes(scene: Scene, draws: Draws) -> Scene:
+    """Return the scene with nodes for what is drawn at every pass.
+
+    Unless the scenario gives their number they are doubled until the wear of the fresh contacts
+    has settled to a part of the tolerance, or there are `MOST_NODES`.
+    """
+    scenario = draws.scenario
+    asked, tolerance = scenario.evolution.nodes, scenario.evolution.tolerance
+    count = asked or FEWEST_NODES
+    while True:
+        found = with_nodes(scene, scenario, draws.passes, count)
+        if asked or 2 * count > MOST_NODES:
+            return found
+        fresh = fresh_state(found)
+        one, other = (
+            whole_volume(scene, explicit_step(found, fresh, 1.0)),
+            whole_volume(scene, explicit_step(found.halved, coarse_start(found, fresh), 1.0)),
+        )
+        if (np.abs(one - other) <= 0.5 * tolerance * one).all():
+            return found
+        count *= 2
+
+
+def bare_scene(
+    scenario: Scenario,
+    model: ContactModel,
+    load: Load,
+    grid: Grid,
+    rollers: list[int],
+    multiplicity: FloatArray,
+    profile: Profile | None,
+) -> Scene:
+    """Return the scene of some rollers on strips, every input as the scenario gives it.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    model : ContactModel
+        Prepared for the grid.
+    load : Load
+    grid : Grid
+    rollers : list of int
+        Numbers of the rollers.
+    multiplicity : ndarray, shape (rollers,)
+        Physical rollers behind each.
+    profile : Profile, optional
+        The cylinder's profile at the start.
+    """
+    gaps = [flat_gap(scenario, grid, r, profile) for r in rollers]
+    slips = [slip_profile(scenario, grid, r, profile) for r in rollers]
+    creepage, count = scenario.creepage, len(rollers)
+    return Scene(
         grid=grid,
         model=model,
-        law=scenario.wear.build(),
+        law=scenario.wear.build() if scenario.wear is not None else NoWear(),
         load=load,
         terms={term.name: term.build() for term in scenario.load.terms},
         kinematics=kinematics(scenario, multiplicity),
-        nominal_gap=np.array(gaps)[None, :, None, :],
-        creepages=tuple(creepage_of(scenario, r) for r in first),
-        friction=scenario.friction.coefficient,
-        bearing_torque=creepage.bearing_torque if free else None,
-        rolling_radius=np.array(radii) if free else None,
+        flat_gap=np.array(gaps)[None, :, None, :],
+        from_apex=np.array([from_apex(scenario, grid, r) for r in rollers]),
+        inputs=mean_inputs(scenario, rollers),
+        roller=np.arange(count, dtype=np.int64),
+        weight=np.ones(count),
+        half=np.zeros(count, dtype=np.int64),
+        tilt_shifts=creepage.tilt_shifts_contact,
+        free=creepage.drive == "free",
         slip_profile=np.array(slips) if creepage.differential_slip else None,
     )
-    return scene, build_stepper(scenario, name), name

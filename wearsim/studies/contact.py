@@ -8,20 +8,11 @@ import numpy as np
 
 from wearsim.plugins import ContactModel
 from wearsim.scenario import Scenario
-from wearsim.studies.build import (
-    check_model,
-    creepage_of,
-    kinematics,
-    load_range,
-    nominal_gap,
-    rolling_radius,
-    slip_profile,
-)
+from wearsim.studies.build import bare_scene, check_model, load_range
 from wearsim.studies.tracks import MOST_STRIPS, contact_centres, fresh_patch
 from wearsim.types import (
     ContactFields,
     ContactSolution,
-    Creepage,
     FloatArray,
     Grid,
     OperatingPoint,
@@ -108,21 +99,10 @@ def study_contact(
     profile = profile if profile is not None else scenario.cylinder.profile
     grid = _grid(scenario, model, force, profile)
     model.prepare(grid, (scenario.cylinder.material, scenario.roller.material))
-    creepage = creepage_of(scenario, 0)
-    if scenario.creepage.differential_slip:
-        variation = slip_profile(scenario, grid, 0, profile)
-        creepage = Creepage(creepage.longitudinal, creepage.lateral, creepage.spin, variation)
-    free = scenario.creepage.drive == "free"
-    point = OperatingPoint(
-        normal_force=force,
-        rolling_speed=scenario.rolling_speed,
-        creepage=creepage,
-        friction=scenario.friction.coefficient,
-        bearing_torque=scenario.creepage.bearing_torque if free else None,
-        rolling_radius=rolling_radius(scenario, grid, 0) if free else None,
-    )
-    gap = nominal_gap(scenario, grid, 0, profile)
-    curvature = kinematics(scenario, np.ones(1)).longitudinal_curvature
+    scene = bare_scene(scenario, model, load, grid, [0], np.ones(1), profile)
+    unworn = np.zeros(grid.strips)
+    point = scene.point(0, 0, force, unworn, unworn)
+    gap, curvature = scene.nominal_gap[0, 0, 0], scene.kinematics.longitudinal_curvature
     solution = model.solve(gap, curvature, point)
     fields = model.fields(solution, gap, curvature, point) if with_fields else None
     return ContactStudy(solution, fields, gap, grid, point, scenario.contact.model, scenario.notes)

@@ -48,6 +48,18 @@ def _creepage(scenario: Scenario) -> str:
     return text + (", differential slip" if creepage.differential_slip else "")
 
 
+def _random(scenario: Scenario) -> Rows:
+    """Return a row per random input and, where there are any, one for how they are drawn."""
+    if not scenario.random:
+        return []
+    table = scenario.sampling
+    ties = [f"{first} with {second} {rank:g}" for first, second, rank in table.correlation]
+    words = [table.plan, f"realisation {table.realisation}"]
+    words += [f"rank correlation of {', '.join(ties)}"] if ties else []
+    rows = [(f"random {item.name}", item.describe()) for item in scenario.random]
+    return [*rows, ("sampling", ", ".join(words))]
+
+
 def _contact(scenario: Scenario, load: float) -> Rows:
     patch = fresh_patch(scenario, load)
     size = (
@@ -57,6 +69,7 @@ def _contact(scenario: Scenario, load: float) -> Rows:
     return [
         ("friction", f"{scenario.friction.coefficient:.4g}"),
         ("creepage", _creepage(scenario)),
+        *_random(scenario),
         ("contact model", f"{scenario.contact.model} ({scenario.contact.spec.summary})"),
         ("fresh patch (Hertz)", size),
     ]

@@ -48,16 +48,18 @@ def history_row(
         ),
         "dissipated_energy": state.energy,
         "power": scene.total_power(power),
-        "normal_force": present_loads(scene, state).mean(axis=0),
+        "normal_force": scene.per_roller(present_loads(scene, state)).mean(axis=0),
         "depth_error": state.depth_error,
         "volume_error": state.volume_error,
         "rejected": state.rejected,
         "solves": state.solves,
         "full_solves": state.full_solves,
     }
-    row["peak_pressure"] = contact_values(scene, state.contacts, "peak_pressure").max(axis=0)
+    peak = contact_values(scene, state.contacts, "peak_pressure")
+    row["peak_pressure"] = scene.of_roller(peak, np.maximum).max(axis=0)
     for name in ("approach", "longitudinal_creepage", "adhesion_fraction"):
-        row[name] = contact_values(scene, state.contacts, name).mean(axis=0)
+        values = contact_values(scene, state.contacts, name)
+        row[name] = scene.per_roller(values).mean(axis=0)
     return row
 
 
@@ -87,7 +89,7 @@ def record_row(scene: Scene, state: WearState, pass_by_pass: bool) -> Row:
         "roller_profile": state.roller_depth[0],
     }
     for name in ("line_load", "half_length", "dissipation"):
-        row[name] = contact_values(scene, state.contacts, name)
+        row[name] = scene.per_roller(contact_values(scene, state.contacts, name))
     return row
 
 

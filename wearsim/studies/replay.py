@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
-from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import numpy as np
@@ -16,21 +14,20 @@ from wearsim.errors import Interrupted, ResultsFileError, SolverError
 from wearsim.evolution.errors_of_steps import deepest, whole_volume
 from wearsim.evolution.loop import evolve
 from wearsim.evolution.scene import Scene
-from wearsim.evolution.state import WearState, fresh_state, widened, widened_state
+from wearsim.evolution.state import SIGMAS, WearState, fresh_state, widened, widened_state
 from wearsim.evolution.stepper import Advance, Stepper
-from wearsim.plugins import ContactModelSpec, LoadSpec, Spec, WearLawSpec, registry
 from wearsim.results import Result, RunData, check_output, read_results, write_results
 from wearsim.results.layout import VARIABLES
 from wearsim.scenario import Scenario, parse_scenario
-from wearsim.studies.build import build_scene, load_range, start_height
+from wearsim.studies.build import build_scene, start_height, strips_of_run
+from wearsim.studies.draws import draw
 from wearsim.studies.events import Checkpointed, Event, Finished, Started, Stepped, Warned
+from wearsim.studies.provenance import origins, plugins_in_use, software
 from wearsim.studies.recorder import Recorder
 from wearsim.studies.schedule import RecordSchedule
-from wearsim.studies.tracks import run_grid
 from wearsim.types import Grid
 
 Watcher = Callable[[Event], None]
-SOFTWARE = ("wearsim", "numpy", "scipy", "numba", "h5py")
 
 
 def run(
@@ -136,8 +133,7 @@ def _widened(scenario: Scenario, data: RunData, state: WearState) -> tuple[RunDa
     The strips that are there stay as they are, so that nothing is interpolated.
     """
     y, spacing = data.static["y"], float(data.checkpoint["spacing"])
-    greatest = load_range(scenario, scenario.load.build(), scenario.total_time)[1]
-    needed = run_grid(scenario, greatest)
+    needed = strips_of_run(draw(scenario))
     lacking = 0.5 * (needed.spacing * needed.strips - spacing * len(y))
     # a little more costs less than a contact that runs off its strips
     strips = int(np.ceil(lacking / spacing)) if lacking > 1e-6 * spacing else 0
@@ -176,7 +172,8 @@ class _Replay:
         self.tell: Watcher = on_event or (lambda event: None)
         self.stop_requested = stop_requested or (lambda: False)
         self.stop = float(scenario.total_passes)
-        self.software, self.plugins = dict(_software()), _plugins(scenario)
+        self.software, self.plugins = dict(software()), plugins_in_use(scenario)
+        self.drawn = draw(scenario).told(scenario.random)
         self.warnings: list[str] = []
         self.created = datetime.now(UTC).isoformat(timespec="seconds")
         self.wall_before, self.started = 0.0, time.monotonic()
@@ -193,8 +190,8 @@ class _Replay:
         self.recorder = self._recorder(state, data)
         self.warnings, self.created = list(data.warnings), data.created
         self.wall_before = data.wall_seconds
-        before = _origins(data.software, data.plugins)
-        now = _origins(self.software, self.plugins)
+        before = origins(data.software, data.plugins)
+        now = origins(self.software, self.plugins)
         for name in now:
             if before.get(name, now[name]) != now[name]:
                 self._warn(
@@ -242,13 +239,21 @@ class _Replay:
         state, tolerance = self.recorder.state, self.scenario.evolution.tolerance
         sizes = deepest(state), whole_volume(self.scene, state)
         errors = state.depth_error, state.volume_error
-        for name, size, error in zip(("depth", "worn volume"), sizes, errors, strict=True):
-            relative = float((error / np.where(size > 0.0, size, np.inf)).max())
-            if relative > tolerance:
-                self._warn(
-                    f"estimated error of {name}: {relative:.2%} is more than the tolerance of"
-                    f" {tolerance:.2%}; lower evolution.tolerance or evolution.step"
-                )
+        for kind, name in enumerate(("depth", "worn volume")):
+            parts = [errors[kind], state.quadrature[kind], SIGMAS * np.sqrt(state.scatter[kind])]
+            whole = np.where(sizes[kind] > 0.0, sizes[kind], np.inf)
+            relative, quadrature, scatter = (float((part / whole).max()) for part in parts)
+            if relative <= tolerance:
+                continue
+            remedy = "lower evolution.tolerance or evolution.step"
+            if max(quadrature, scatter) > 0.5 * relative:
+                remedy = "raise evolution.nodes"
+                if scatter > quadrature:
+                    remedy = f"{scatter:.2%} of it is what draws at so few passes leave to chance"
+            self._warn(
+                f"estimated error of {name}: {relative:.2%} is more than the tolerance of"
+                f" {tolerance:.2%}; {remedy}"
+            )
 
     def _step_through(self) -> None:
         every = self.scenario.outputs.checkpoint_every
@@ -328,6 +333,7 @@ class _Replay:
             seed=scenario.seed,
             software=self.software,
             plugins=self.plugins,
+            drawn=self.drawn,
             model=scenario.contact.model,
             stepper=self.stepper_name,
             tolerance=scenario.evolution.tolerance,
@@ -345,7 +351,7 @@ class _Replay:
             },
             static={
                 "y": scene.grid.y,
-                "nominal_gap": scene.nominal_gap,
+                "nominal_gap": scene.per_roller(scene.at_time(0.0, 0.0).nominal_gap),
                 "start_height": start_height(scenario, scene.grid),
                 "multiplicity": kinematics.multiplicity,
             },
@@ -356,46 +362,3 @@ class _Replay:
             wall_seconds=self._wall(),
             created=self.created,
         )
-
-
-@cache
-def _software() -> Mapping[str, str]:
-    found = {}
-    for name in SOFTWARE:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "unknown"
-    return found
-
-
-def _origins(software: dict[str, str], plugins: list[dict[str, str]]) -> dict[str, str]:
-    """Return the version of every package, and where every plugin in use comes from, by name."""
-    origins = dict(software)
-    for row in plugins:
-        known = row["distribution"] in software
-        origin = row["distribution"] if known else f"{row['distribution']} {row['version']}"
-        origins[f"the {row['kind']} '{row['name']}' of"] = origin
-    return origins
-
-
-def _plugins(scenario: Scenario) -> list[dict[str, str]]:
-    used: list[tuple[type[Spec], str]] = [
-        (ContactModelSpec, scenario.contact.model),
-        (LoadSpec, scenario.load.kind),
-    ]
-    used += [(LoadSpec, term.name) for term in scenario.load.terms]
-    if scenario.wear is not None:
-        used.append((WearLawSpec, scenario.wear.law))
-    rows = []
-    for kind, name in used:
-        item = registry().registered(kind, name)
-        rows.append(
-            {
-                "kind": kind.kind,
-                "name": name,
-                "distribution": item.distribution,
-                "version": item.version,
-            }
-        )
-    return rows

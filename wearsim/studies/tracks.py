@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from wearsim.errors import Problem, ScenarioError
@@ -12,6 +14,17 @@ from wearsim.types import Grid
 
 STRIPS_PER_HALF_WIDTH = 12  # of the fresh patch; a run's error in y is then about 1e-3
 MOST_STRIPS = 801
+
+
+@dataclass(frozen=True)
+class Angles:
+    """Greatest size that the angles of a roller take while it runs, besides those given [rad]."""
+
+    yaw: float = 0.0
+    tilt: float = 0.0
+
+
+NO_ANGLES = Angles()
 
 
 def contact_centres(scenario: Scenario) -> tuple[float, ...]:
@@ -31,7 +44,7 @@ def fresh_patch(scenario: Scenario, load: float) -> HertzContact:
     return hertz(along, 0.5 / scenario.roller.crown_radius, load, modulus)
 
 
-def foreseen_half_width(scenario: Scenario, load: float) -> float:
+def foreseen_half_width(scenario: Scenario, load: float, drawn: Angles) -> float:
     """Return half the width of the groove that full slip would leave at the end [m].
 
     Rigid bodies in full slip wear d = [(3/4) c N n / sqrt(2 R)]^(2/3) deep and 2 sqrt(2 R d) wide,
@@ -49,27 +62,34 @@ def foreseen_half_width(scenario: Scenario, load: float) -> float:
         start = float(np.ptp(scenario.cylinder.profile.height))
     half = fresh_patch(scenario, load).b
     for _ in range(20):  # the slip at the groove's sides depends on its width, weakly
-        per_load = wear * scenario.friction.coefficient * greatest_slip(scenario, half)
+        per_load = wear * scenario.friction.coefficient * greatest_slip(scenario, half, drawn)
         depth = (0.75 * per_load * load * scenario.total_passes / np.sqrt(crown)) ** (2.0 / 3.0)
         half = float(np.sqrt(crown * (depth + start)))
     return half
 
 
-def greatest_slip(scenario: Scenario, half_width: float) -> float:
+def greatest_slip(scenario: Scenario, half_width: float, drawn: Angles) -> float:
     """Return the greatest rigid slip within `half_width` [m] of a contact's middle."""
     creepage, roller = scenario.creepage, scenario.roller
     longitudinal = abs(creepage.longitudinal or 0.0)
-    tilt = max(abs(angle) for angle in scenario.per_roller(creepage.tilt))
+    tilt = max(drawn.tilt, *(abs(angle) for angle in scenario.per_roller(creepage.tilt)))
     longitudinal += tilt / roller.radius * half_width
     if creepage.drive == "free" or creepage.differential_slip:
         curvature = 1.0 / roller.radius + 1.0 / scenario.cylinder.radius
         longitudinal += half_width**2 / (2.0 * roller.crown_radius) * curvature
-    yaw = max(abs(angle) for angle in scenario.per_roller(creepage.yaw))
+    yaw = max(drawn.yaw, *(abs(angle) for angle in scenario.per_roller(creepage.yaw)))
     return float(np.hypot(longitudinal, yaw))
 
 
-def run_grid(scenario: Scenario, load: float) -> Grid:
+def run_grid(scenario: Scenario, load: float, drawn: Angles = NO_ANGLES) -> Grid:
     """Return the strips of a run whose greatest load is `load` [N].
+
+    Parameters
+    ----------
+    scenario : Scenario
+    load : float
+    drawn : Angles, optional
+        What random angles add.
 
     Raises
     ------
@@ -80,7 +100,9 @@ def run_grid(scenario: Scenario, load: float) -> Grid:
     choice = scenario.contact
     centre = choice.centre if choice.centre is not None else 0.5 * (min(centres) + max(centres))
     reach = max(abs(y - centre) for y in centres)
-    half = reach + 1.1 * foreseen_half_width(scenario, load) + 1.3 * patch.b
+    if scenario.creepage.tilt_shifts_contact:
+        reach += scenario.roller.crown_radius * drawn.tilt
+    half = reach + 1.1 * foreseen_half_width(scenario, load, drawn) + 1.3 * patch.b
     width = choice.width if choice.width is not None else 2.0 * half
     strips = choice.strips
     if strips is None:

@@ -1,0 +1,53 @@
+"""Who wears which body, and the same with as few bodies as there need be."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from wearsim.plugins import SharedWear
+
+
+def opened(own, members, shared, line_load):
+    """Return the gap that the reduced wear opens, written out pair by pair."""
+    gap = own * line_load
+    for k in range(len(members)):
+        for side in (0, 1):
+            body = members[k, side]
+            if body < 0:
+                continue
+            for other in range(len(members)):
+                for side2 in (0, 1):
+                    if members[other, side2] == body:
+                        gap[k] += shared[other, side2] * line_load[other]
+    return gap
+
+
+@settings(max_examples=80, deadline=None)
+@given(st.integers(1, 6), st.integers(1, 3), st.integers(1, 4), st.integers(0, 10**6))
+def test_that_the_reduced_wear_opens_the_same_gaps(contacts, stations, rollers, seed):
+    random = np.random.default_rng(seed)
+    bodies = np.stack(
+        [random.integers(0, stations, contacts), random.integers(0, rollers, contacts)], axis=1
+    )
+    compliance = random.random((contacts, 2, 5)) * random.integers(0, 2, (1, 2, 1))
+    wear, line_load = SharedWear(bodies, compliance), random.random((contacts, 5))
+    own, members, shared = wear.reduced
+    expected = wear.opening(line_load)
+    assert opened(own, members, shared, line_load) == pytest.approx(expected, rel=1e-12)
+    numbers = np.unique(members[members >= 0])
+    assert (numbers == np.arange(len(numbers))).all()
+
+
+def test_that_a_body_touched_once_is_no_shared_body():
+    three = SharedWear(np.array([[0, 0], [0, 1], [0, 2]]), np.ones((3, 2, 4)))
+    own, members, _ = three.reduced
+    assert (own == 1.0).all()
+    assert members.tolist() == [[0, -1], [0, -1], [0, -1]]
+
+
+def test_that_cylinder_and_roller_of_the_same_contacts_are_one_body():
+    own, members, shared = SharedWear(np.zeros((4, 2), dtype=int), np.ones((4, 2, 3))).reduced
+    assert not own.any()
+    assert (members[:, 0] == 0).all()
+    assert (shared[:, 0] == 2.0).all()

@@ -1,0 +1,34 @@
+"""Scenarios of short, fast-wearing tests with random inputs."""
+
+from pathlib import Path
+
+from wearsim.evolution.loop import evolve
+from wearsim.evolution.state import fresh_state
+from wearsim.scenario import load_scenario
+from wearsim.studies.build import build_scene
+
+RIG = Path(__file__).parents[2] / "scenarios" / "rig-450min.toml"
+LOAD = {"distribution": "maxent", "support": ["0 N", "inf"], "mean": "307 N", "std": "32 N"}
+FRICTION = {"distribution": "maxent", "support": [0, "inf"], "mean": 0.1, "std": 0.02}
+CREEPAGE = {"distribution": "maxent", "support": [0, 1], "mean": 1e-3, "std": 4e-4}
+SLACK = {"distribution": "disc", "radius": "2 mrad"}
+WANDERING = {"distribution": "ornstein-uhlenbeck", "correlation_time": "20 s"}
+FAST = "2e-9 1/Pa"  # two hundred times the rig's
+
+
+def scenario_of(passes=6000, k_over_h=FAST, **changes):
+    """Return the rig with a fast-wearing cylinder; a key's dots are written as `__`."""
+    overrides = {"operation.passes": passes, "wear.cylinder.k_over_h": k_over_h}
+    overrides |= {key.replace("__", "."): value for key, value in changes.items()}
+    return load_scenario(RIG, overrides)
+
+
+def end_of(scenario):
+    """Run a scenario and return its scene and its last state."""
+    scene, stepper, _ = build_scene(scenario)
+    state = fresh_state(scene)
+    for advance in evolve(
+        scene, state, stepper, float(scenario.total_passes), lambda _: float("inf"), 10**6
+    ):
+        state = advance.end
+    return scene, state

@@ -1,0 +1,59 @@
+"""A quantity that is linear between samples, with its exact integrals."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wearsim.types import FloatArray
+
+
+class PiecewiseLinear:
+    """A quantity over time, linear between its samples, the first and last of which bound it.
+
+    Parameters
+    ----------
+    time : ndarray, shape (samples,)
+        Times, rising [s].
+    value : ndarray, shape (samples,)
+        The quantity at those times.
+    """
+
+    def __init__(self, time: FloatArray, value: FloatArray) -> None:
+        self.time, self.value = time, value
+        steps, first, last = np.diff(time), value[:-1], value[1:]
+        areas = 0.5 * steps * (first + last)
+        squares = steps * (first**2 + first * last + last**2) / 3.0
+        self._area = np.concatenate([[0.0], np.cumsum(areas)])
+        self._square = np.concatenate([[0.0], np.cumsum(squares)])
+
+    def at(self, time: FloatArray) -> FloatArray:
+        """Return the value at each `time` [s], shape as `time`."""
+        return np.interp(time, self.time, self.value)
+
+    def _integrals(self, time: float) -> tuple[float, float]:
+        """Return the integrals of the value and of its square from the first sample to `time`."""
+        k = int(np.clip(np.searchsorted(self.time, time) - 1, 0, len(self.time) - 2))
+        here = float(np.interp(time, self.time, self.value))
+        first, duration = float(self.value[k]), time - float(self.time[k])
+        area = 0.5 * duration * (first + here)
+        square = duration * (first * first + first * here + here * here) / 3.0
+        return float(self._area[k]) + area, float(self._square[k]) + square
+
+    def mean(self, start: float, stop: float) -> float:
+        """Return the exact mean between two times [s]."""
+        if stop <= start:
+            return float(self.at(np.array([start]))[0])
+        return (self._integrals(stop)[0] - self._integrals(start)[0]) / (stop - start)
+
+    def extremes(self, start: float, stop: float) -> tuple[float, float]:
+        """Return the exact least and greatest value between two times [s]."""
+        inside = self.value[(self.time >= start) & (self.time <= stop)]
+        values = np.concatenate([self.at(np.array([start, stop])), inside])
+        return float(values.min()), float(values.max())
+
+    def deviation(self, start: float, stop: float) -> float:
+        """Return the exact standard deviation between two times [s]."""
+        if stop <= start:
+            return 0.0
+        square = (self._integrals(stop)[1] - self._integrals(start)[1]) / (stop - start)
+        return float(np.sqrt(max(0.0, square - self.mean(start, stop) ** 2)))

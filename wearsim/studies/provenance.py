@@ -1,0 +1,66 @@
+"""What a result was made with: the versions of the software and the plugins in use."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+
+from wearsim.plugins import (
+    ContactModelSpec,
+    LoadSpec,
+    RandomInputSpec,
+    Spec,
+    WearLawSpec,
+    registry,
+)
+from wearsim.scenario import Scenario
+
+SOFTWARE = ("wearsim", "numpy", "scipy", "numba", "h5py")
+
+
+@cache
+def software() -> Mapping[str, str]:
+    """Return the version of every package that a number may depend on, by name."""
+    found = {}
+    for name in SOFTWARE:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "unknown"
+    return found
+
+
+def plugins_in_use(scenario: Scenario) -> list[dict[str, str]]:
+    """Return kind, name, distribution and version of every plugin that a scenario asks for."""
+    used: list[tuple[type[Spec], str]] = [
+        (ContactModelSpec, scenario.contact.model),
+        (LoadSpec, scenario.load.kind),
+    ]
+    used += [(LoadSpec, term.name) for term in scenario.load.terms]
+    if scenario.wear is not None:
+        used.append((WearLawSpec, scenario.wear.law))
+    random = [name for item in scenario.random for name in (item.kind, item.marginal) if name]
+    used += [(RandomInputSpec, name) for name in dict.fromkeys(random)]
+    rows = []
+    for kind, name in used:
+        item = registry().registered(kind, name)
+        rows.append(
+            {
+                "kind": kind.kind,
+                "name": name,
+                "distribution": item.distribution,
+                "version": item.version,
+            }
+        )
+    return rows
+
+
+def origins(versions: Mapping[str, str], plugins: list[dict[str, str]]) -> dict[str, str]:
+    """Return the version of every package, and where every plugin in use comes from, by name."""
+    found = dict(versions)
+    for row in plugins:
+        known = row["distribution"] in versions
+        origin = row["distribution"] if known else f"{row['distribution']} {row['version']}"
+        found[f"the {row['kind']} '{row['name']}' of"] = origin
+    return found
