@@ -9,19 +9,23 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from wearsim.results import Result, open_results
+    from wearsim.results import DissipationResult, Result, open_dissipation, open_results
     from wearsim.scenario import Scenario, load_scenario
     from wearsim.studies.contact import ContactStudy, solve_contact, study_contact
+    from wearsim.studies.dissipation import dissipation
     from wearsim.studies.replay import resume, run
     from wearsim.types import ContactSolution, Profile
 
 __all__ = [
     "ContactSolution",
     "ContactStudy",
+    "DissipationResult",
     "Profile",
     "Result",
     "Scenario",
+    "dissipation",
     "load_scenario",
+    "open_dissipation",
     "open_results",
     "resume",
     "run",
@@ -32,10 +36,13 @@ __all__ = [
 _HOMES = {
     "ContactSolution": "wearsim.types",
     "ContactStudy": "wearsim.studies.contact",
+    "DissipationResult": "wearsim.results",
     "Profile": "wearsim.types",
     "Result": "wearsim.results",
     "Scenario": "wearsim.scenario",
+    "dissipation": "wearsim.studies.dissipation",
     "load_scenario": "wearsim.scenario",
+    "open_dissipation": "wearsim.results",
     "open_results": "wearsim.results",
     "resume": "wearsim.studies.replay",
     "run": "wearsim.studies.replay",

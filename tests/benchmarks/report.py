@@ -10,12 +10,13 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from tests.benchmarks import contacts, replays, starts
+from tests.benchmarks import contacts, replays, starts, studies
 from tests.benchmarks.table import Effort, Row, machine, markdown
 
 TABLES: dict[str, list[Callable[[Effort], list[Row]]]] = {
     "One contact": [contacts.hertz_rows, contacts.mean_rows, contacts.slender_rows],
     "Many contacts at once": [contacts.many_rows],
+    "Realisations of one contact": [studies.dissipation_rows],
     "Whole tests, in-process, once compiled": [replays.replay_rows, replays.file_rows],
     "At the shell": [starts.import_rows, starts.run_rows],
 }

@@ -8,8 +8,9 @@ from __future__ import annotations
 import pytest
 
 import wearsim
-from tests.benchmarks import contacts, replays, table
+from tests.benchmarks import contacts, replays, studies, table
 from tests.benchmarks.report import QUICK, TABLES
+from wearsim.studies.dissipation import dissipation
 
 
 def test_speed_of_hertz(benchmark):
@@ -34,8 +35,18 @@ def test_speed_of_a_replay(benchmark, name):
     assert benchmark(wearsim.run, replays.scenario(name, QUICK)).finished
 
 
+def test_speed_of_the_papers_monte_carlo(benchmark):
+    result = benchmark(dissipation, studies.paper(), 100)
+    assert result.summaries["power"].mean == pytest.approx(studies.MEAN_POWER, rel=0.2)
+
+
 def test_that_the_in_process_rows_of_the_report_hold_numbers():
-    functions = [*TABLES["One contact"], replays.replay_rows, replays.file_rows]
+    functions = [
+        *TABLES["One contact"],
+        studies.dissipation_rows,
+        replays.replay_rows,
+        replays.file_rows,
+    ]
     rows = [row for function in functions for row in function(QUICK)]
     assert all(row.seconds > 0.0 for row in rows)
     text = table.markdown("One contact", rows)

@@ -9,7 +9,9 @@ import typer
 
 from wearsim.cli.check import check
 from wearsim.cli.contact import contact
+from wearsim.cli.dissipation import dissipation
 from wearsim.cli.export import export
+from wearsim.cli.maxent import maxent
 from wearsim.cli.plot import plot
 from wearsim.cli.plugins import plugins
 from wearsim.cli.resume import resume
@@ -29,7 +31,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for verb in (check, contact, run, resume, show, plot, export, plugins, schema):
+for verb in (check, contact, dissipation, run, resume, show, plot, export, maxent, plugins, schema):
     app.command()(verb)
 
 

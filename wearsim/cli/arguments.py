@@ -59,8 +59,14 @@ def read_scenario(path: Path, settings: list[str] | None) -> Scenario:
     return load_scenario(path, overrides)
 
 
-def check_figure(path: Path) -> None:
+def check_figure(path: Path, option: str = "-o") -> None:
     """Raise unless a figure's name ends as a kind of figure does, in a folder that exists.
+
+    Parameters
+    ----------
+    path : Path
+    option : str
+        The option that named it.
 
     Raises
     ------
@@ -69,10 +75,10 @@ def check_figure(path: Path) -> None:
     """
     if path.suffix.lower() not in {".png", ".pdf", ".svg"}:
         raise typer.BadParameter(
-            f"'{path}' ends in no kind of figure, expected .png, .pdf or .svg", param_hint="-o"
+            f"'{path}' ends in no kind of figure, expected .png, .pdf or .svg", param_hint=option
         )
     if not path.parent.is_dir():
-        raise typer.BadParameter(f"there is no folder {path.parent}", param_hint="-o")
+        raise typer.BadParameter(f"there is no folder {path.parent}", param_hint=option)
 
 
 def read_text(path: Path) -> str:

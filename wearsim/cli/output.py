@@ -75,8 +75,8 @@ def note(text: str) -> None:
     typer.echo(text, err=True)
 
 
-def refuse_existing(path: Path, force: bool) -> None:
-    """Raise unless `path` may be written.
+def refuse_existing(path: Path, force: bool, option: str = "-o") -> None:
+    """Raise unless `path`, which an option named, may be written.
 
     Raises
     ------
@@ -84,4 +84,4 @@ def refuse_existing(path: Path, force: bool) -> None:
         If something stands there and `force` is not set.
     """
     if path.exists() and not force:
-        raise ResultsFileError(f"{path} exists; choose another name with -o, or --force")
+        raise ResultsFileError(f"{path} exists; choose another name with {option}, or --force")

@@ -1,4 +1,4 @@
-"""`wearsim plot`: the figure of a wear test."""
+"""`wearsim plot`: the figure of a results file."""
 
 from __future__ import annotations
 
@@ -25,10 +25,31 @@ Measured = Annotated[
 def plot(
     file: ResultsFile, figure: Figure = None, measured: Measured = None, force: Force = False
 ) -> None:
-    """Draw profiles, depth against passes, P_l(y) and load."""
+    """Draw a wear test: profiles, depth, P_l(y), load; or a study of one contact's dissipation."""
     path = figure if figure is not None else Path(f"{file.stem}.png")
     check_figure(path)
     refuse_existing(path, force)
+    from wearsim.results import is_dissipation
+
+    if is_dissipation(file):
+        _draw_study(file, path, measured)
+    else:
+        _draw_test(file, path, measured)
+    note(f"figure: {path}")
+
+
+def _draw_study(file: Path, path: Path, measured: list[Path] | None) -> None:
+    if measured:
+        raise typer.BadParameter(
+            "goes with a wear test, and this is a study of one contact", param_hint="--measured"
+        )
+    from wearsim.cli.dissipation import draw
+    from wearsim.results import open_dissipation
+
+    draw(open_dissipation(file), path)
+
+
+def _draw_test(file: Path, path: Path, measured: list[Path] | None) -> None:
     from wearsim.report.measured import read_measured
     from wearsim.results import open_results
 
@@ -38,4 +59,3 @@ def plot(
     from wearsim.report.saving import save_figure
 
     save_figure(replay_figure(result, profiles), path)
-    note(f"figure: {path}")

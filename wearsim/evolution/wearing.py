@@ -8,13 +8,11 @@ from typing import TypeAlias
 import numpy as np
 
 from wearsim.evolution.scene import Scene
+from wearsim.mechanics.wear_of_strips import learn_exponents, ratio_to_load
 from wearsim.plugins import SharedWear
 from wearsim.types import ContactSolution, FloatArray
 
 Contacts: TypeAlias = tuple[ContactSolution, ...]
-
-LEAST_EXPONENT, GREATEST_EXPONENT = 0.4, 1.0  # wear goes as q^(1/2) in adhesion, as q in sliding
-FELT = 1e-7  # relative change of a line load from which an exponent can be read
 
 
 class Wearing:
@@ -62,7 +60,7 @@ class Wearing:
         station, contact = np.divmod(np.arange(stations * contacts), contacts)
         bodies = np.stack([station, scene.roller[contact]], axis=1)
         # to (realisations, stations, contacts, sides, strips)
-        ratios = np.stack([_ratio(scene, part, self._contacts) for part in parts])
+        ratios = np.stack([_ratio(part, self._contacts) for part in parts])
         ratios = ratios.transpose(3, 1, 2, 0, 4).reshape(realisations, -1, 2, scene.grid.strips)
         return [SharedWear(bodies, ratio) for ratio in ratios]
 
@@ -93,18 +91,15 @@ class Wearing:
         return opening
 
 
-def _ratio(scene: Scene, wear: FloatArray, contacts: Contacts) -> FloatArray:
+def _column(contacts: Contacts, name: str) -> FloatArray:
+    """Return a field of all contacts, shape (contacts, strips)."""
+    return np.array([getattr(contact, name) for contact in contacts])
+
+
+def _ratio(wear: FloatArray, contacts: Contacts) -> FloatArray:
     """Return wear over line load, carried on into strips without load, last axis strips."""
-    ratio = np.zeros_like(wear)
-    if not wear.any():
-        return ratio
-    places = np.arange(wear.shape[-1], dtype=np.float64)
-    for index, contact in zip(scene.contacts, contacts, strict=True):
-        loaded = contact.line_load > 0.0
-        ratio[index] = np.interp(
-            places, places[loaded], wear[index][loaded] / contact.line_load[loaded]
-        )
-    return ratio
+    flat = np.ascontiguousarray(wear).reshape(len(contacts), -1)
+    return ratio_to_load(flat, _column(contacts, "line_load")).reshape(wear.shape)
 
 
 def exponents_between(
@@ -125,12 +120,11 @@ def exponents_between(
     ndarray, shape (stations, contacts, realisations, strips)
     """
     exponents = np.ones((*scene.shape, scene.grid.strips)) if known is None else known.copy()
-    for index, before, after in zip(scene.contacts, old, new, strict=True):
-        both = (before.dissipation > 0.0) & (after.dissipation > 0.0)
-        load = np.log(after.line_load[both] / before.line_load[both])
-        power = np.log(after.dissipation[both] / before.dissipation[both])
-        felt = np.abs(load) > FELT
-        strips = np.flatnonzero(both)[felt]
-        slopes = power[felt] / load[felt]
-        exponents[index][strips] = np.clip(slopes, LEAST_EXPONENT, GREATEST_EXPONENT)
+    learn_exponents(
+        _column(old, "line_load"),
+        _column(new, "line_load"),
+        _column(old, "dissipation"),
+        _column(new, "dissipation"),
+        exponents.reshape(len(new), -1),
+    )
     return exponents

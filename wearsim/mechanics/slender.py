@@ -364,3 +364,51 @@ def solve_slender(
         if change < STEP_TOLERANCE and not left and not entered:
             return CONVERGED, iteration
     return NO_CONVERGENCE, MAX_ITERATIONS
+
+
+@kernel
+def solve_each(
+    gap: FloatArray,
+    own: FloatArray,
+    loads: FloatArray,
+    spacing: float,
+    contact_modulus: float,
+    longitudinal_curvature: float,
+    table: FloatArray,
+    line_load: FloatArray,
+    approach: FloatArray,
+) -> tuple[int, int, IntArray]:
+    """Solve contacts that share nothing, one after another; parameters as in `solve_slender`.
+
+    Returns
+    -------
+    failed, status : int
+        The first contact that failed or -1, and what went wrong.
+    iterations : ndarray of int, shape (contacts,)
+    """
+    contacts, n = gap.shape
+    alone, nothing = np.full((1, 2), -1), np.zeros((1, 2, n))
+    iterations = np.zeros(contacts, np.int64)
+    for k in range(contacts):
+        start = line_load[k].max() > 0.0
+        for attempt in range(2):
+            status, iterations[k] = solve_slender(
+                gap[k : k + 1],
+                own[k : k + 1],
+                alone,
+                nothing,
+                loads[k : k + 1],
+                spacing,
+                contact_modulus,
+                longitudinal_curvature,
+                table,
+                line_load[k : k + 1],
+                approach[k : k + 1],
+            )
+            if status == CONVERGED or attempt == 1 or not start:
+                break
+            # a start from far away can mislead Newton; the foundation's guess is always near
+            line_load[k] = 0.0
+        if status != CONVERGED:
+            return k, status, iterations
+    return -1, CONVERGED, iterations

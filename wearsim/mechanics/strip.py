@@ -97,3 +97,83 @@ def strip_tractions(
             dissipation[i] = -rolling_speed * work
         else:
             force_x[i], force_y[i], adhesion_length[i], dissipation[i] = 0.0, 0.0, 0.0, 0.0
+
+
+SUMS = ("force_x", "force_y", "spin_moment", "power", "peak_pressure", "adhesion_fraction")
+
+
+@kernel
+def strip_contacts(
+    line_load: FloatArray,
+    y: FloatArray,
+    spacing: float,
+    longitudinal_curvature: float,
+    contact_modulus: float,
+    shear_modulus: float,
+    rolling_speed: float,
+    longitudinal: FloatArray,
+    lateral: FloatArray,
+    variation: FloatArray,
+    friction: FloatArray,
+    half_length: FloatArray,
+    dissipation: FloatArray,
+    sums: FloatArray,
+) -> None:
+    """Complete several contacts of slender strips: half-lengths, tractions and their sums.
+
+    Parameters
+    ----------
+    line_load : ndarray, shape (contacts, strips)
+        q [N/m].
+    y : ndarray, shape (strips,)
+        Axial position [m].
+    spacing, longitudinal_curvature : float
+        Strip width [m], relative curvature along rolling [1/m].
+    contact_modulus, shear_modulus, rolling_speed : float
+        E* and G [Pa], V [m/s].
+    longitudinal, lateral : ndarray, shape (contacts,)
+        Mean longitudinal, and lateral creepage.
+    variation, friction : ndarray, shape (contacts, strips)
+        How the longitudinal creepage varies, its mean weighted by the line load being taken off
+        here; friction coefficient.
+    half_length, dissipation : ndarray, shape (contacts, strips)
+        Filled: a [m], P_l [W/m].
+    sums : ndarray, shape (6, contacts)
+        Filled, in the order of `SUMS`: forces on body 1 [N], their moment about the load's centre
+        [N m], power [W], greatest pressure [Pa], and part of the area that adheres.
+    """
+    contacts, n = line_load.shape
+    scale = 4.0 / (np.pi * contact_modulus * longitudinal_curvature)
+    for k in range(contacts):
+        total, centre, mean = 0.0, 0.0, 0.0
+        for i in range(n):
+            q = line_load[k, i]
+            total += q
+            centre += q * y[i]
+            mean += q * variation[k, i]
+        centre /= total
+        mean = longitudinal[k] - mean / total
+        slip_y, widest, length, adhering = lateral[k], 0.0, 0.0, 0.0
+        sum_x, sum_y, moment, power = 0.0, 0.0, 0.0, 0.0
+        for i in range(n):
+            q = line_load[k, i]
+            if not q > 0.0:
+                half_length[k, i], dissipation[k, i] = 0.0, 0.0
+                continue
+            a, slip_x = np.sqrt(scale * q), mean + variation[k, i]
+            force_x, force_y, stick = strip_force(
+                a, q, friction[k, i], slip_x, slip_y, contact_modulus, shear_modulus
+            )
+            half_length[k, i] = a
+            dissipation[k, i] = -rolling_speed * (force_x * slip_x + force_y * slip_y)
+            widest = max(widest, a)
+            length += a
+            adhering += stick
+            sum_x += force_x
+            sum_y += force_y
+            moment -= (y[i] - centre) * force_x
+            power += dissipation[k, i]
+        sums[0, k], sums[1, k] = sum_x * spacing, sum_y * spacing
+        sums[2, k], sums[3, k] = moment * spacing, power * spacing
+        sums[4, k] = 0.5 * contact_modulus * longitudinal_curvature * widest
+        sums[5, k] = 0.5 * adhering / length

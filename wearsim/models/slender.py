@@ -14,6 +14,7 @@ from wearsim.mechanics import slender as kernels
 from wearsim.mechanics.elasticity import ElasticPair, combine
 from wearsim.mechanics.hertz import hertz
 from wearsim.mechanics.influence import HIGHEST, influence_table
+from wearsim.mechanics.strip import SUMS, strip_contacts
 from wearsim.models.strip_theory import StripTheory
 from wearsim.models.tangential import (
     Strips,
@@ -30,13 +31,17 @@ from wearsim.plugins import (
     PassLoop,
     SharedWear,
 )
+from wearsim.plugins.protocols import naming_contact
 from wearsim.types import (
+    BatchSolution,
     ContactFields,
     ContactSolution,
     FloatArray,
     Grid,
+    IntArray,
     Material,
     OperatingPoint,
+    OperatingPoints,
 )
 
 _REMEDY = {
@@ -145,10 +150,120 @@ class Slender(ContactModel):
             line_load[:] = 0.0
             status, iterations = kernels.solve_slender(*arguments, line_load, approach)
         self._check(status, gap, loads, line_load, approach)
+        columns = self._columns(points)
+        if columns is not None:
+            count = np.full(len(loads), iterations, dtype=np.int64)
+            shape = (len(loads),)
+            found = self._completed(
+                line_load, approach, count, longitudinal_curvature, columns, shape
+            )
+            return list(found.solutions)
         return [
             self._complete(line_load[k], approach[k], iterations, longitudinal_curvature, point)
             for k, point in enumerate(points)
         ]
+
+    def solve_batch(
+        self,
+        gap: FloatArray,
+        longitudinal_curvature: float,
+        points: Sequence[OperatingPoint],
+        wear_compliance: FloatArray | None = None,
+        warm: Sequence[ContactSolution] | None = None,
+    ) -> BatchSolution:
+        """Solve many independent contacts, in one call where strip theory takes them."""
+        columns = self._columns(points)
+        if columns is None:
+            return super().solve_batch(gap, longitudinal_curvature, points, wear_compliance, warm)
+        shape, strips = gap.shape[:-1], gap.shape[-1]
+        gaps = np.ascontiguousarray(gap).reshape(-1, strips)
+        compliance = np.zeros_like(gaps)
+        if wear_compliance is not None:
+            compliance = np.ascontiguousarray(wear_compliance).reshape(gaps.shape)
+        line_load, approach = np.zeros(gaps.shape), np.zeros(len(gaps))
+        if warm is not None:
+            line_load[:] = [solution.line_load for solution in warm]
+            approach[:] = [solution.approach for solution in warm]
+        failed, status, iterations = kernels.solve_each(
+            gaps,
+            compliance,
+            columns.normal_force,
+            self._grid.spacing,
+            self._pair.contact_modulus,
+            longitudinal_curvature,
+            self._table,
+            line_load,
+            approach,
+        )
+        for k in range(len(gaps) if failed < 0 else failed + 1):
+            part = slice(k, k + 1)
+            if k == failed or line_load[k, 0] > 0.0 or line_load[k, -1] > 0.0:
+                try:
+                    self._check(
+                        status if k == failed else kernels.CONVERGED,
+                        gaps[part],
+                        columns.normal_force[part],
+                        line_load[part],
+                        approach[part],
+                    )
+                except ContactError as error:
+                    raise naming_contact(error, k, shape) from error
+        return self._completed(
+            line_load, approach, iterations, longitudinal_curvature, columns, shape
+        )
+
+    def _columns(self, points: Sequence[OperatingPoint]) -> OperatingPoints | None:
+        """Return the points as columns where strip theory can take them all at once, or None."""
+        if not isinstance(self.theory, StripTheory):
+            return None
+        columns = OperatingPoints.of(points)
+        plain = columns is not None and columns.friction.ndim < 3 and not columns.friction_carried
+        return columns if plain else None
+
+    def _completed(
+        self,
+        line_load: FloatArray,
+        approach: FloatArray,
+        iterations: IntArray,
+        curvature: float,
+        points: OperatingPoints,
+        leading: tuple[int, ...],
+    ) -> BatchSolution:
+        """Return the solutions of normal contacts by strip theory, all in one call."""
+        y, shape = self._grid.y, line_load.shape
+        variation = points.variation
+        if variation is None:
+            variation = -points.spin[:, None] * y
+        friction = points.friction if points.friction.ndim > 1 else points.friction[:, None]
+        half_length, dissipation = np.empty(shape), np.empty(shape)
+        sums = np.empty((len(SUMS), len(approach)))
+        strip_contacts(
+            line_load,
+            y,
+            self._grid.spacing,
+            curvature,
+            self._pair.contact_modulus,
+            self._pair.shear_modulus,
+            points.rolling_speed,
+            points.longitudinal,
+            points.lateral,
+            np.ascontiguousarray(variation),
+            np.ascontiguousarray(np.broadcast_to(friction, shape)),
+            half_length,
+            dissipation,
+            sums,
+        )
+        columns = {
+            "half_length": half_length,
+            "line_load": line_load,
+            "dissipation": dissipation,
+            "approach": approach,
+            "longitudinal_creepage": points.longitudinal,
+            "iterations": iterations,
+            **dict(zip(SUMS, sums, strict=True)),
+        }
+        shaped = {name: a.reshape(leading + a.shape[1:]) for name, a in columns.items()}
+        return BatchSolution(leading, y, shaped)
 
     def _check(
         self,
@@ -206,9 +321,7 @@ class Slender(ContactModel):
         status, done, full_solves = slender_pass.run_passes(
             loop.order,
             loop.first_pass,
-            slender_pass.Passes(
-                loop.base_load, loop.creepage, loop.friction, loop.tilt, loop.spin
-            ),
+            slender_pass.Passes(loop.base_load, loop.creepage, loop.friction, loop.tilt, loop.spin),
             float(loop.stiffness),
             loop.terms,
             loop.term_rates,

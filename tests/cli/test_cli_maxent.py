@@ -1,0 +1,88 @@
+"""The verb maxent: a law in a table, in blocks, as JSON and as a figure."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+from cli_examples import Command
+
+LOAD = ("maxent", "--support", "0", "inf", "--mean", "307", "--std", "32")
+
+
+def test_that_a_law_is_told_with_its_multipliers_and_quantiles(command: Command) -> None:
+    result = command(*LOAD)
+    assert result.exit_code == 0
+    assert result.stderr == ""
+    cells = (re.split(" {2,}", line.strip()) for line in result.stdout.splitlines())
+    rows = {row[0]: row[1] for row in cells if len(row) == 2}
+    assert float(rows["l0"]) == pytest.approx(50.4047, rel=5e-6)
+    assert float(rows["l1"]) == pytest.approx(-0.2998047, rel=1e-6)
+    assert float(rows["l2"]) == pytest.approx(4.88281e-4, rel=5e-6)
+    assert rows["parent normal law"] == "mean 307, standard deviation 32"
+    assert float(rows["97.5 % quantile"]) == pytest.approx(307.0 + 1.959964 * 32.0, rel=1e-6)
+
+
+def test_that_the_density_is_drawn_in_blocks(command: Command) -> None:
+    lines = command("maxent", "--support", "0", "1", "--mean", "0.5", "--std", "0.35").stdout
+    drawn = [line[2:] for line in lines.splitlines() if set(line) & set("▁▂▃▄▅▆▇█")]
+    assert len(drawn) == 8
+    top, bottom = drawn[0].ljust(60), drawn[-1]
+    assert bottom == "█" * 60  # nowhere near zero
+    assert top == top[::-1]  # symmetric
+    assert top.strip(" ") == top  # and highest at both ends
+
+
+def test_that_json_is_all_there_is(command: Command) -> None:
+    result = command(*LOAD, "--json")
+    data = json.loads(result.stdout)
+    assert result.stderr == ""
+    assert data["support"] == [0.0, None]
+    assert data["multipliers"]["l1"] == pytest.approx(-0.2998047, rel=1e-6)
+    assert data["parent"] == pytest.approx({"mean": 307.0, "std": 32.0})
+    assert data["quantiles"]["0.5"] == pytest.approx(307.0)
+    assert data["warnings"] == []
+
+
+def test_that_negative_limits_and_means_are_taken(command: Command) -> None:
+    result = command("maxent", "--support", "-inf", "-1", "--mean", "-3.5", "--json")
+    data = json.loads(result.stdout)
+    assert (data["family"], data["std"]) == ("exponential", pytest.approx(2.5))
+
+
+def test_that_a_mean_logarithm_gives_a_gamma_law(command: Command) -> None:
+    arguments = ("maxent", "--support", "0", "inf", "--mean", "2", "--mean-log", "0.1")
+    assert json.loads(command(*arguments, "--json").stdout)["family"] == "gamma"
+    assert "l2 log x" in command(*arguments).stdout
+
+
+def test_that_a_spike_is_told_on_stderr(command: Command) -> None:
+    result = command("maxent", "--support", "0", "1", "--mean", "1e-3", "--std", "1.1e-3")
+    assert result.exit_code == 0
+    assert result.stderr.startswith("warning: the density is least at")
+
+
+def test_that_what_no_law_can_have_is_bad_input_in_one_line(command: Command) -> None:
+    result = command("maxent", "--support", "0", "inf", "--mean", "307", "--std", "320")
+    assert result.exit_code == 2
+    assert result.stdout == ""
+    (line,) = result.stderr.splitlines()
+    assert line.startswith("error: std 320 is more than mean - low = 307, the most that")
+
+
+def test_that_a_limit_that_is_no_number_is_bad_input(command: Command) -> None:
+    result = command("maxent", "--support", "0", "wide", "--mean", "307")
+    assert result.exit_code == 2
+    assert "'wide' is not a number" in result.stderr
+
+
+@pytest.mark.parametrize("known", [("--std", "9e-4"), ("--std", "1.1e-3"), ()])
+def test_that_a_figure_is_drawn_and_an_existing_one_left(
+    command: Command, tmp_path: Path, known: tuple[str, ...]
+) -> None:
+    figure = tmp_path / "law.png"
+    arguments = ("maxent", "--support", "0", "1", "--mean", "1e-3", *known, "-o", figure)
+    assert command(*arguments).exit_code == 0
+    assert figure.read_bytes().startswith(b"\x89PNG")
+    assert command(*arguments).exit_code == 2
+    assert command(*arguments, "--force").exit_code == 0

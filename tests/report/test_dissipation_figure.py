@@ -1,0 +1,78 @@
+"""The figure of a dissipation study: that it holds what was computed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from wearsim.report.dissipation import CLASSES, MOST_LINES, dissipation_figure
+from wearsim.report.saving import save_figure
+from wearsim.results import DissipationResult
+from wearsim.scenario import load_scenario
+from wearsim.studies.dissipation import dissipation
+
+PAPER = Path(__file__).parents[2] / "scenarios" / "paper-monte-carlo.toml"
+
+
+def study(count: int) -> DissipationResult:
+    return dissipation(load_scenario(PAPER, {"contact.mx": 8, "contact.my": 12}), count)
+
+
+@pytest.fixture(scope="module")
+def result() -> DissipationResult:
+    return study(300)
+
+
+def panel(figure: Figure, title: str):
+    (axes,) = [axes for axes in figure.axes if axes.get_title(loc="left").startswith(title)]
+    return axes
+
+
+@pytest.mark.parametrize(
+    ("title", "value", "error"),
+    [("Mean power", "mean", "mean_error"), ("Standard deviation", "std", "std_error")],
+)
+def test_that_estimates_are_drawn_with_their_error(result, title, value, error):
+    axes, found = panel(dissipation_figure(result), title), result.convergence()
+    assert axes.get_lines()[0].get_xdata().tolist() == found.count.tolist()
+    np.testing.assert_array_equal(axes.get_lines()[0].get_ydata(), getattr(found, value))
+    heights = axes.collections[0].get_paths()[0].vertices[:, 1]
+    assert getattr(found, value)[-1] + getattr(found, error)[-1] in heights
+    assert axes.get_ylabel().endswith("[W]")
+
+
+def test_that_the_density_has_unit_area_and_a_normal_law_beside_it(result):
+    axes = panel(dissipation_figure(result), "Density")
+    bars = axes.patches
+    assert len(bars) == CLASSES
+    assert sum(bar.get_width() * bar.get_height() for bar in bars) == pytest.approx(1.0)
+    power = result.summaries["power"]
+    x, y = axes.get_lines()[0].get_data()
+    assert y.max() == pytest.approx(1 / (power.std * np.sqrt(2 * np.pi)), rel=1e-3)
+    assert x[y.argmax()] == pytest.approx(power.mean, rel=0.01)
+
+
+def test_that_realisations_are_drawn_in_engineers_units(result):
+    axes = panel(dissipation_figure(result), f"Power per axial length, {MOST_LINES}")
+    assert len(axes.get_lines()) == MOST_LINES
+    x, y = axes.get_lines()[7].get_data()
+    np.testing.assert_allclose(x, result.y * 1e3)
+    np.testing.assert_allclose(y, result.dissipation[7] * 1e-3)
+
+
+def test_that_the_band_is_that_of_the_file(result):
+    axes = panel(dissipation_figure(result), "Its mean")
+    mean, alone = axes.get_lines()
+    np.testing.assert_allclose(mean.get_ydata(), result.values("dissipation_mean") * 1e-3)
+    np.testing.assert_allclose(alone.get_ydata(), result.values("mean_problem_dissipation") * 1e-3)
+    heights = axes.collections[0].get_paths()[0].vertices[:, 1]
+    assert heights.max() == pytest.approx(result.values("dissipation_high").max() * 1e-3)
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_that_few_realisations_have_a_figure_too(tmp_path, count):
+    save_figure(dissipation_figure(study(count)), tmp_path / "a.png")
+    assert (tmp_path / "a.png").stat().st_size > 10_000

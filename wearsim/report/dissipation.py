@@ -1,0 +1,138 @@
+"""The figure of realisations of one contact: how estimates settle, the power and P_l(y)."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullFormatter
+
+from wearsim.report.style import BLUE, GREEN, GREY, ORANGE, figure_style, name_axes
+from wearsim.report.units import PER_SI, count, shown
+from wearsim.types import FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from wearsim.results import DissipationResult
+
+MM, W_MM = PER_SI["mm"], PER_SI["W/mm"]
+MOST_LINES = 200
+CLASSES = 30
+_ROOM = 1.28  # height of the density's panel over its highest class, for the legend
+_SETTLING = 10  # realisations before which an estimate is too wild to set the scale
+PANELS: list[Any] = [["mean", "density", "realisations"], ["std", "density", "band"]]
+
+
+def dissipation_figure(result: DissipationResult) -> Figure:
+    """Return the figure of a study of one contact's dissipation.
+
+    Parameters
+    ----------
+    result : DissipationResult
+
+    Returns
+    -------
+    Figure
+        Five panels: mean and standard deviation against the number of realisations, density of the
+        power, its distribution across the track by realisation, and their mean and 95 % band.
+    """
+    with figure_style():
+        figure = Figure(figsize=(13.0, 6.8), layout="constrained")
+        panels = figure.subplot_mosaic(PANELS, width_ratios=[1.0, 1.15, 1.1])
+        found = result.convergence()
+        _draw_settling(panels["mean"], found.count, found.mean, found.mean_error)
+        name_axes(panels["mean"], "Mean power, with its standard error", "", "mean of $P_d$ [W]")
+        _draw_settling(panels["std"], found.count, found.std, found.std_error)
+        title = "Standard deviation, with its standard error"
+        name_axes(panels["std"], title, "realisations", "std of $P_d$ [W]")
+        _draw_density(panels["density"], result)
+        _draw_realisations(panels["realisations"], result)
+        _draw_band(panels["band"], result)
+        figure.suptitle(f"{result.title}\n{_caption(result)}", fontsize=10.5)
+    return figure
+
+
+def _caption(result: DissipationResult) -> str:
+    power, raw = result.summaries["power"], result.raw
+    text = f"{_number_of(result.count)} ({raw.plan}, {raw.model}"
+    text += f"{'' if result.finished else ', unfinished'}): mean {shown(power.mean, 'W')}"
+    if result.count == 1:
+        return text
+    ends = [power.quantile(0.025).value, power.quantile(0.975).value]
+    band = " to ".join(shown(value, "W", 3).removesuffix(" W") for value in ends)
+    return f"{text}, std {shown(power.std, 'W')}, 95 % within {band} W"
+
+
+def _number_of(realisations: int) -> str:
+    return f"{count(realisations)} realisation{'s' if realisations > 1 else ''}"
+
+
+def _draw_settling(axes: Axes, counts: IntArray, value: FloatArray, error: FloatArray) -> None:
+    """Draw an estimate against the number of realisations, and its standard error as a band."""
+    axes.fill_between(counts, value - error, value + error, color=BLUE, alpha=0.25, lw=0)
+    axes.plot(counts, value, color=BLUE)
+    axes.set_xscale("log")
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda number, _: count(number)))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    settled = (counts >= min(_SETTLING, int(counts[-1]))) & np.isfinite(error)
+    if settled.any() and error[settled].max() > 0.0:
+        low, high = (value - error)[settled].min(), (value + error)[settled].max()
+        axes.set_ylim(low - 0.05 * (high - low), high + 0.05 * (high - low))
+        axes.axhline(value[-1], color=GREY, lw=0.8, ls="--")
+    axes.set_xlim(max(1.0, 0.5 * min(_SETTLING, counts[-1])), max(2.0, 1.05 * float(counts[-1])))
+
+
+def _draw_density(axes: Axes, result: DissipationResult) -> None:
+    power, summary = result.power, result.summaries["power"]
+    if summary.std > 0.0:
+        axes.hist(power, CLASSES, density=True, color=BLUE, alpha=0.45, label="realisations")
+        across = np.linspace(*axes.get_xlim(), 400)
+        score = (across - summary.mean) / summary.std
+        normal = np.exp(-0.5 * score**2) / (summary.std * math.sqrt(math.tau))
+        axes.plot(across, normal, color=ORANGE, label="normal law of the same mean and std")
+    alone = result.mean_problem_power
+    ends = [summary.quantile(probability).value for probability in (0.025, 0.975)]
+    marks = [
+        (summary.mean, "black", "-", f"mean {shown(summary.mean, 'W')}"),
+        (alone, GREEN, "--", f"inputs at their mean {shown(alone, 'W')}"),
+        (ends[0], GREY, ":", "2.5 and 97.5 %"),
+        (ends[1], GREY, ":", None),
+    ]
+    for place, colour, style, label in marks:
+        axes.axvline(place, 0.0, 1.0 / _ROOM, color=colour, ls=style, lw=1.0, label=label)
+    name_axes(axes, "Density of the dissipated power", "$P_d$ [W]", "density [1/W]")
+    axes.set_ylim(top=_ROOM * axes.get_ylim()[1])
+    axes.legend(loc="upper right")
+
+
+def _draw_realisations(axes: Axes, result: DissipationResult) -> None:
+    rows = result.dissipation[:MOST_LINES]
+    y = result.y * MM
+    opacity = float(np.clip(15.0 / len(rows), 0.12, 1.0))
+    axes.plot(y, rows.T * W_MM, color=BLUE, lw=0.6, alpha=opacity)
+    name_axes(axes, f"Power per axial length, {_number_of(len(rows))}", "", r"$P_l$ [W/mm]")
+    axes.set_ylim(bottom=0.0)
+    axes.margins(x=0.0)
+
+
+def _draw_band(axes: Axes, result: DissipationResult) -> None:
+    y = result.y * MM
+    low, high, mean, alone = (
+        result.values(name) * W_MM
+        for name in (
+            "dissipation_low",
+            "dissipation_high",
+            "dissipation_mean",
+            "mean_problem_dissipation",
+        )
+    )
+    axes.fill_between(y, low, high, color=BLUE, alpha=0.25, lw=0, label="2.5 to 97.5 %")
+    axes.plot(y, mean, color="black", label="mean")
+    axes.plot(y, alone, color=GREEN, ls="--", label="inputs at their mean")
+    name_axes(axes, "Its mean and 95 % band", "y [mm]", r"$P_l$ [W/mm]")
+    axes.set_ylim(bottom=0.0)
+    axes.margins(x=0.0)
+    axes.set_ylim(top=1.3 * axes.get_ylim()[1])
+    axes.legend(loc="upper center", ncols=3)

@@ -1,0 +1,100 @@
+"""A friction field in realisations of a contact: its own numbers, at the model's own points."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from wearsim.errors import CapabilityError, Problem, ScenarioError
+from wearsim.plugins import ContactModel, ContactModelSpec, FrictionField, registry
+from wearsim.randomness.streams import Stream
+from wearsim.scenario import RandomInput, Scenario
+from wearsim.types import FloatArray, OperatingPoints
+
+
+class LocalFriction:
+    """The friction field of a scenario.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    model : ContactModel
+    item : RandomInput
+        The field.
+
+    Raises
+    ------
+    CapabilityError
+        If the model takes no friction field, or not with rollers that find their own creepage.
+    """
+
+    def __init__(self, scenario: Scenario, model: ContactModel, item: RandomInput) -> None:
+        if not isinstance(item.distribution, FrictionField):
+            raise TypeError(f"{item.name} is no field")
+        self._scenario, self._item, self._field = scenario, item, item.distribution
+        self._stream = Stream(scenario.seed, item.name, "field")
+        if not model.capabilities.friction_field:
+            raise CapabilityError(
+                f"{scenario.file}: contact model '{scenario.contact.model}' cannot take friction"
+                f" that differs within the contact, {item.name} with distribution ="
+                f" '{item.kind}'; choose {_able_models()}"
+            )
+        if scenario.creepage.drive != "creepage":
+            raise CapabilityError(
+                f"{scenario.file}: a friction field, {item.name}, needs prescribed creepage; set"
+                " creepage.drive = 'creepage', or give the friction a distribution"
+            )
+
+    def check(self, x: FloatArray, spacing: float) -> None:
+        """Refuse points that do not resolve the field.
+
+        Parameters
+        ----------
+        x : ndarray, shape (points, strips)
+            Where friction is taken in the longest contact [m].
+        spacing : float
+            Width of a strip [m].
+
+        Raises
+        ------
+        ScenarioError
+            If they are too far apart.
+        """
+        # the march begins at the leading edge, where there is no point yet
+        wrong = self._field.unresolved(float(2.0 * x.max() / len(x)), spacing)
+        if wrong is not None:
+            table, key = self._item.name.split(".", 1)
+            remedy = "more contact.mx and more strips (contact.my or contact.strips)"
+            problem = Problem(table, key, wrong, self._item.kind, remedy)
+            raise ScenarioError(self._scenario.file, [problem])
+
+    def put(
+        self, points: OperatingPoints, x: FloatArray, y: FloatArray, first: int
+    ) -> OperatingPoints:
+        """Return the points of some realisations on end, each with its own friction.
+
+        Parameters
+        ----------
+        points : OperatingPoints
+        x : ndarray, shape (contacts, points, strips)
+            Where friction is asked for, from the leading edge on [m].
+        y : ndarray, shape (strips,)
+            Axial position [m].
+        first : int
+            The first realisation.
+        """
+        friction = np.empty_like(x)
+        for row in range(len(x)):
+            own = partial(self._stream.uniforms, realisation=first + row)
+            friction[row] = self._field.values(x[row], y, own)
+        carried = self._field.frame != "contact"
+        return replace(points, friction=friction, friction_carried=carried)
+
+
+def _able_models() -> str:
+    """Return the models that take a friction field, as a user would choose them."""
+    specs = [registry().get(ContactModelSpec, name) for name in registry().names(ContactModelSpec)]
+    able = [f"'{spec.name}'" for spec in specs if spec.capabilities.friction_field]
+    return f"contact.model = {' or '.join(able)}" if able else "another distribution"

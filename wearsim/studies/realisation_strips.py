@@ -1,0 +1,102 @@
+"""The strips of a study of realisations: one set that holds the patch of every one of them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from wearsim.errors import Problem, ScenarioError
+from wearsim.plugins import ContactModel
+from wearsim.scenario import Scenario
+from wearsim.studies.tracks import MOST_STRIPS, contact_centres, fresh_patch
+from wearsim.types import FloatArray, Grid
+
+_MARGIN = 1e-9  # of a patch, so that rounding leaves it on its strips
+_ROUNDING = 1e-12
+
+
+def realisation_grid(
+    scenario: Scenario, model: ContactModel, load: float, loads: FloatArray, centres: FloatArray
+) -> Grid:
+    """Return strips for every realisation: as wide as the model would have them for the mean.
+
+    The patch with every input at its mean is cut just as the model suggests, and further strips
+    of the same width hold the others.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    model : ContactModel
+    load : float
+        Load with every input at its mean [N].
+    loads : ndarray, shape (realisations,)
+        Loads [N].
+    centres : ndarray, shape (realisations,)
+        Where each contact lies on an unworn cylinder [m].
+
+    Returns
+    -------
+    Grid
+
+    Raises
+    ------
+    ScenarioError
+        If the strips that were asked for cannot hold every contact, or too many are needed.
+    """
+    choice, profile = scenario.contact, scenario.cylinder.profile
+    mean_b = fresh_patch(scenario, load).b
+    half_widths = mean_b * np.cbrt(np.maximum(loads, 0.0) / load)
+    centre = choice.centre if choice.centre is not None else contact_centres(scenario)[0]
+    away = np.abs(centres - centre)
+    if profile is not None and choice.width is None:
+        start, stop = float(profile.y[0]), float(profile.y[-1])
+        strips = choice.strips or int(np.clip(np.ceil(24 * (stop - start) / mean_b), 161, 801))
+        return Grid.spanning(start, stop, strips)
+    suggested = _suggested(scenario, model, load, mean_b)
+    room = 0.5 * suggested.spacing * suggested.strips / mean_b  # of a patch, 1 for no margin
+    if choice.width is not None:
+        _check_width(scenario, choice.width, 2.0 * float((away + half_widths).max()))
+        half = 0.5 * choice.width
+        return Grid.spanning(centre - half, centre + half, choice.strips or 121)
+    reach = float((away + room * half_widths).max())
+    if choice.strips is not None:
+        reach *= 1.0 + _MARGIN
+        return Grid.spanning(centre - reach, centre + reach, choice.strips)
+    beyond = reach / suggested.spacing - 0.5 * suggested.strips
+    strips = suggested.strips + 2 * max(math.ceil(beyond - _ROUNDING * suggested.strips), 0)
+    if strips > MOST_STRIPS:
+        _refuse_many(scenario, strips, reach)
+    half = 0.5 * strips * suggested.spacing
+    return Grid.spanning(centre - half, centre + half, strips)
+
+
+def _suggested(scenario: Scenario, model: ContactModel, load: float, mean_b: float) -> Grid:
+    curvature = 1.0 / scenario.cylinder.radius + 1.0 / scenario.roller.radius
+    materials = scenario.cylinder.material, scenario.roller.material
+    grid = model.suggest_grid(1.0 / scenario.roller.crown_radius, curvature, load, materials)
+    return grid if grid is not None else Grid.spanning(-1.2 * mean_b, 1.2 * mean_b, 121)
+
+
+def _check_width(scenario: Scenario, width: float, needed: float) -> None:
+    if width < needed * (1.0 - _MARGIN):
+        problem = Problem(
+            "contact",
+            "width",
+            "the contacts of all realisations do not fit",
+            f"{width * 1e3:.4g} mm",
+            f"at least {needed * 1e3:.4g} mm",
+        )
+        raise ScenarioError(scenario.file, [problem])
+
+
+def _refuse_many(scenario: Scenario, strips: int, reach: float) -> None:
+    problem = Problem(
+        "contact",
+        "strips",
+        f"the contacts of all realisations lie within {2e3 * reach:.4g} mm, which takes"
+        f" {strips} strips of the width that suits one",
+        None,
+        f"a number of strips, such as {MOST_STRIPS}, or inputs that vary less",
+    )
+    raise ScenarioError(scenario.file, [problem])
