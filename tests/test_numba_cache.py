@@ -59,6 +59,13 @@ for stepper in ("implicit", "explicit", "per-pass"):
         run(name, evolution__stepper=stepper)
 run(contact__tangential="fastsim")
 run(contact__model="hertz-fastsim")
+run(creepage={{"drive": "free", "bearing_torque": "10 N mm"}})
+law = {{"distribution": "uniform", "low": 0.09, "high": 0.11}}
+wander = {{"distribution": "ornstein-uhlenbeck", "correlation_time": "10 s", "marginal": law}}
+run(friction__coefficient=wander, creepage__misalignment={{
+    "distribution": "disc", "radius": "1 mrad", "persistence": "per-pass"}})
+field = {{"distribution": "gaussian-field", "correlation_length": "300 um", "marginal": law}}
+wearsim.dissipation(scenario("mean-contact.toml", friction__coefficient=field), 2)
 march = {{"contact__closed_form": "never", "creepage__yaw": "0.5 mrad", "creepage__tilt": "1 mrad"}}
 for more in ({{}}, march, march | {{"contact__dissipation": "element-sum"}}):
     wearsim.study_contact(scenario("mean-contact.toml", **more))

@@ -52,9 +52,8 @@ class ContactInputs:
     def with_values(self, values: Mapping[str, FloatArray]) -> ContactInputs:
         """Return these inputs with some of them replaced; arrays broadcast to the shape."""
         shape = self.friction.shape
-        return replace(
-            self, **{name: np.broadcast_to(array, shape) for name, array in values.items()}
-        )
+        filled = {name: np.array(np.broadcast_to(array, shape)) for name, array in values.items()}
+        return replace(self, **filled)
 
 
 Redraw: TypeAlias = Callable[[ContactInputs, int], ContactInputs]

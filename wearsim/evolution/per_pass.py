@@ -93,8 +93,7 @@ def _slip_base(scene: Scene) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the variation of creepage on unworn bodies, its fall per spin, and per worn depth."""
     kinematics, nothing = scene.kinematics, np.zeros_like(scene.from_apex)
     if scene.slip_profile is None:
-        arm = np.broadcast_to(scene.grid.y, nothing.shape)
-        return nothing, np.ascontiguousarray(arm), np.zeros(2)
+        return nothing, np.repeat(scene.grid.y[None], len(nothing), axis=0), np.zeros(2)
     rates = np.array([1.0 / kinematics.roller_radius, 1.0 / kinematics.cylinder_radius])
     arm = nothing if scene.tilt_shifts else np.ascontiguousarray(scene.from_apex)
     return np.ascontiguousarray(scene.slip_profile), arm, rates

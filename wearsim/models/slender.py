@@ -136,7 +136,7 @@ class Slender(ContactModel):
             approach[:] = [solution.approach for solution in warm]
         loads = np.array([point.normal_force for point in points])
         arguments = (
-            np.ascontiguousarray(gap),
+            _own(gap),
             *wear.reduced,
             loads,
             self._grid.spacing,
@@ -176,10 +176,10 @@ class Slender(ContactModel):
         if columns is None:
             return super().solve_batch(gap, longitudinal_curvature, points, wear_compliance, warm)
         shape, strips = gap.shape[:-1], gap.shape[-1]
-        gaps = np.ascontiguousarray(gap).reshape(-1, strips)
+        gaps = _own(gap).reshape(-1, strips)
         compliance = np.zeros_like(gaps)
         if wear_compliance is not None:
-            compliance = np.ascontiguousarray(wear_compliance).reshape(gaps.shape)
+            compliance = _own(wear_compliance).reshape(gaps.shape)
         line_load, approach = np.zeros(gaps.shape), np.zeros(len(gaps))
         if warm is not None:
             line_load[:] = [solution.line_load for solution in warm]
@@ -187,7 +187,7 @@ class Slender(ContactModel):
         failed, status, iterations = kernels.solve_each(
             gaps,
             compliance,
-            columns.normal_force,
+            _own(columns.normal_force),
             self._grid.spacing,
             self._pair.contact_modulus,
             longitudinal_curvature,
@@ -245,10 +245,10 @@ class Slender(ContactModel):
             self._pair.contact_modulus,
             self._pair.shear_modulus,
             points.rolling_speed,
-            points.longitudinal,
-            points.lateral,
-            np.ascontiguousarray(variation),
-            np.ascontiguousarray(np.broadcast_to(friction, shape)),
+            _own(points.longitudinal),
+            _own(points.lateral),
+            _own(variation),
+            _own(np.broadcast_to(friction, shape)),
             half_length,
             dissipation,
             sums,
@@ -377,6 +377,11 @@ class Slender(ContactModel):
         return self.theory.fields(
             strips, self._pair, slip, friction, point.rolling_speed, points_along
         )
+
+
+def _own(array: FloatArray) -> FloatArray:
+    """Return a copy that can be written to, since a kernel is compiled for such arrays alone."""
+    return np.array(array, dtype=np.float64, order="C")
 
 
 def _build(options: SlenderOptions) -> Slender:
