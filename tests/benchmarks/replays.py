@@ -18,6 +18,19 @@ REPLAYS: dict[str, tuple[str, dict[str, object]]] = {
     "rig-logged-load": ("rig-logged-load.toml", {}),
     "rig-three-rollers": ("rig-three-rollers.toml", {}),
 }
+_LOAD = {"distribution": "maxent", "support": ["0 N", "inf"], "mean": "307 N", "std": "32 N"}
+_FRICTION = {"distribution": "maxent", "support": [0, "inf"], "mean": 0.1, "std": 0.02}
+_CREEPAGE = {"distribution": "maxent", "support": [0, 1], "mean": 1e-3, "std": 4e-4}
+_SLACK = {"distribution": "disc", "radius": "2 mrad"}
+SCATTER: dict[str, dict[str, object]] = {
+    "slack drawn at every pass": {"creepage.misalignment": _SLACK},
+    "load, friction, creepage and slack drawn at every pass": {
+        "load.normal_force": _LOAD,
+        "friction.coefficient": _FRICTION,
+        "creepage.longitudinal": _CREEPAGE,
+        "creepage.misalignment": _SLACK,
+    },
+}
 MUST = {"rig-450min": "0.5 s, aim 0.05 s; 0.5 % in depth and volume"}
 
 
@@ -63,6 +76,30 @@ def replay_rows(effort: Effort) -> list[Row]:
         asked = "2 min, aim 20 s" if name == "rig-450min" else ""
         in_full = f"{int(truths[0].full_solves[-1])} solved in full"
         rows.append(Row(f"{name}, pass by pass, {passes}", slow, asked, in_full))
+    return rows
+
+
+def scatter_rows(effort: Effort) -> list[Row]:
+    """Time expectations over inputs drawn at every pass, beside tests that draw every pass."""
+    rows = []
+    for name, inputs in SCATTER.items():
+        drawn = {key: {**law, "persistence": "per-pass"} for key, law in inputs.items()}
+        found = []
+        for stepper in ("implicit", "per-pass"):
+            changes = drawn | {
+                "evolution.stepper": stepper,
+                "operation.duration": f"{45 * effort.part:.12g} min",
+            }
+            asked = wearsim.load_scenario(SCENARIOS / "rig-450min.toml", changes)
+            kept: list[Result] = []
+            seconds = timed(lambda run=asked, kept=kept: kept.append(wearsim.run(run)))
+            found.append((kept[0], seconds))
+        (result, quick), (truth, slow) = found
+        what = f"a tenth of rig-450min, {name}"
+        steps = f"{int(result.steps)} steps, {int(result.solves[-1])} contact solves"
+        rows.append(Row(f"{what}, {steps}", quick, "", beside(result, truth)))
+        passes = f"{float(truth.passes[-1]):,.0f} passes".replace(",", " ")
+        rows.append(Row(f"{what}, {passes} drawn one by one", slow))
     return rows
 
 

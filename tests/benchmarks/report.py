@@ -16,8 +16,12 @@ from tests.benchmarks.table import Effort, Row, machine, markdown
 TABLES: dict[str, list[Callable[[Effort], list[Row]]]] = {
     "One contact": [contacts.hertz_rows, contacts.mean_rows, contacts.slender_rows],
     "Many contacts at once": [contacts.many_rows],
-    "Realisations of one contact": [studies.dissipation_rows],
-    "Whole tests, in-process, once compiled": [replays.replay_rows, replays.file_rows],
+    "Random inputs": [studies.draw_rows, studies.dissipation_rows, studies.cheapest_rows],
+    "Whole tests, in-process, once compiled": [
+        replays.replay_rows,
+        replays.scatter_rows,
+        replays.file_rows,
+    ],
     "At the shell": [starts.import_rows, starts.run_rows],
 }
 QUICK = Effort(repetitions=1, part=0.005)

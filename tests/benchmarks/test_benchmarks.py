@@ -43,9 +43,8 @@ def test_speed_of_the_papers_monte_carlo(benchmark):
 def test_that_the_in_process_rows_of_the_report_hold_numbers():
     functions = [
         *TABLES["One contact"],
-        studies.dissipation_rows,
-        replays.replay_rows,
-        replays.file_rows,
+        *TABLES["Random inputs"],
+        *TABLES["Whole tests, in-process, once compiled"],
     ]
     rows = [row for function in functions for row in function(QUICK)]
     assert all(row.seconds > 0.0 for row in rows)

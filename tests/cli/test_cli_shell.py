@@ -9,7 +9,10 @@ from cli_examples import Command
 import wearsim.cli.check
 from wearsim.errors import CapabilityError, PluginError, ResultsFileError, SolverError
 
-VERBS = ["check", "contact", "run", "resume", "show", "plot", "export", "plugins", "schema"]
+VERBS = [
+    *("check", "contact", "dissipation", "run", "resume", "show", "plot", "export"),
+    *("maxent", "reproduce", "plugins", "schema"),
+]
 
 
 def python(*args: str) -> subprocess.CompletedProcess[str]:

@@ -14,6 +14,7 @@ from wearsim.cli.export import export
 from wearsim.cli.maxent import maxent
 from wearsim.cli.plot import plot
 from wearsim.cli.plugins import plugins
+from wearsim.cli.reproduce import reproduce
 from wearsim.cli.resume import resume
 from wearsim.cli.run import run
 from wearsim.cli.schema import schema
@@ -31,7 +32,10 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for verb in (check, contact, dissipation, run, resume, show, plot, export, maxent, plugins, schema):
+for verb in (
+    check, contact, dissipation, run, resume, show, plot, export, maxent, reproduce,
+    plugins, schema,
+):  # fmt: skip
     app.command()(verb)
 
 

@@ -20,7 +20,7 @@ from wearsim.evolution.stepper import Stepper
 from wearsim.plugins import ContactModel, Load
 from wearsim.scenario import Scenario, require_run
 from wearsim.studies.draws import Draws, draw
-from wearsim.studies.per_pass_inputs import FEWEST_NODES, MOST_NODES, redrawing, with_nodes
+from wearsim.studies.per_pass_inputs import MOST_NODES, fewest_nodes, redrawing, with_nodes
 from wearsim.studies.tracks import Angles, run_grid
 from wearsim.types import FloatArray, Grid, Profile
 
@@ -266,7 +266,7 @@ def with_enough_nodes(scene: Scene, draws: Draws) -> Scene:
     """
     scenario = draws.scenario
     asked, tolerance = scenario.evolution.nodes, scenario.evolution.tolerance
-    count = asked or FEWEST_NODES
+    count = asked or fewest_nodes(draws.passes)
     while True:
         found = with_nodes(scene, scenario, draws.passes, count)
         if asked or 2 * count > MOST_NODES:

@@ -16,7 +16,7 @@ from wearsim.scenario import RandomInput, Scenario
 from wearsim.studies.draws import FIELD_OF, origin
 from wearsim.types import FloatArray
 
-FEWEST_NODES, MOST_NODES = 32, 64
+MOST_NODES = 128
 GUIDING_POINTS = 2**15
 LEAST_WEIGHT = 0.1  # of an equal weight; a negative one would wear metal on
 
@@ -67,6 +67,11 @@ def redrawing(scenario: Scenario, items: Sequence[RandomInput]) -> Redraw:
         return _placed(inputs, _values(items, copula.tie(uniforms)))
 
     return redraw
+
+
+def fewest_nodes(items: Sequence[RandomInput]) -> int:
+    """Return how many nodes a roller has at least: one number needs few, a plane many."""
+    return 8 if sum(item.dimension for item in items) == 1 else 64
 
 
 def with_nodes(scene: Scene, scenario: Scenario, items: Sequence[RandomInput], count: int) -> Scene:
@@ -139,7 +144,7 @@ def _calibrated(guides: FloatArray, means: FloatArray) -> FloatArray:
     nodes = guides.shape[1]
     equal = np.full(nodes, 1.0 / nodes)
     scale = np.abs(guides).max(axis=1)
-    felt = np.flatnonzero(scale > 0.0)[: nodes // 4]
+    felt = np.flatnonzero(scale > 0.0)[: max(nodes // 4, 2)]
     for count in range(len(felt), 1, -1):
         rows = guides[felt[:count]] / scale[felt[:count], None]
         missing = means[felt[:count]] / scale[felt[:count]] - rows @ equal
