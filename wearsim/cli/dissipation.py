@@ -60,7 +60,7 @@ def dissipation(
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
-    """Draw the random inputs of one contact many times, and solve each."""
+    """Draw a contact's random inputs many times, and solve each."""
     if figure is not None:
         check_figure(figure, "--figure")
         refuse_existing(figure, force, "--figure")

@@ -48,7 +48,7 @@ def maxent(
     json: Json = False,
     force: Force = False,
 ) -> None:
-    """Find the law of maximum entropy with a support, a mean and a standard deviation."""
+    """Find the law of maximum entropy from what is known."""
     if figure is not None:
         check_figure(figure)
         refuse_existing(figure, force)

@@ -25,7 +25,7 @@ Measured = Annotated[
 def plot(
     file: ResultsFile, figure: Figure = None, measured: Measured = None, force: Force = False
 ) -> None:
-    """Draw a wear test: profiles, depth, P_l(y), load; or a study of one contact's dissipation."""
+    """Draw what a results file holds: a test, or a study."""
     path = figure if figure is not None else Path(f"{file.stem}.png")
     check_figure(path)
     refuse_existing(path, force)

@@ -37,7 +37,7 @@ def reproduce(
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
-    """Compute the paper's numbers anew, and tell why they differ; -o draws its figures too."""
+    """Compute the paper's numbers anew; -o draws its figures too."""
     if figure is not None:
         check_figure(figure)
         refuse_existing(figure, force)

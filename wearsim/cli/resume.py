@@ -20,7 +20,7 @@ Until = Annotated[
 def resume(
     file: ResultsFile, until: Until = None, json: Json = False, quiet: Quiet = False
 ) -> None:
-    """Go on with a run from its file alone, or extend a finished one."""
+    """Go on with a run from its file alone, or extend it."""
     seconds = _seconds(until)
     from wearsim.cli.progress import watching
     from wearsim.cli.stop import stop_on_signals
