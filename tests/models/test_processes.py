@@ -36,7 +36,7 @@ def scores(values):
     return stats.norm.ppf(np.exp(-np.exp(-values)))
 
 
-@pytest.mark.parametrize("spacing", [{}, {"spacing": "20 s"}, {"spacing": "30 s"}])
+@pytest.mark.parametrize("spacing", [{}, {"spacing": "6 s"}, {"spacing": "15 s"}])
 def test_that_scores_forget_themselves_exponentially(spacing):
     made = process(correlation_time="1 min", **spacing)
     runs, points = 4000, 13
@@ -73,14 +73,14 @@ def test_that_the_first_value_is_the_draw_itself():
     )
 
 
-def test_that_its_time_grid_is_a_tenth_of_its_memory_unless_given():
-    assert process(correlation_time="5 min").spacing == 30.0
+def test_that_its_time_grid_is_a_twentieth_of_its_memory_unless_given():
+    assert process(correlation_time="5 min").spacing == 15.0
     assert process(correlation_time="5 min", spacing="1 min").spacing == 60.0
 
 
-def test_that_a_spacing_beyond_half_the_correlation_time_is_refused():
-    with pytest.raises(ValidationError, match=r'does not resolve.*"31 s".*60 s.*"30 s"'):
-        process(correlation_time="1 min", spacing="31 s")
+def test_that_a_spacing_beyond_a_quarter_of_the_correlation_time_is_refused():
+    with pytest.raises(ValidationError, match=r'does not resolve.*"16 s".*60 s.*"15 s"'):
+        process(correlation_time="1 min", spacing="16 s")
 
 
 def test_that_it_is_found_by_name_and_passes_on_warnings():

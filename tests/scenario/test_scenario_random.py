@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +13,9 @@ from scenario_examples import Parse
 
 from wearsim.errors import ScenarioError
 from wearsim.quantities import ANGLE, FORCE
-from wearsim.scenario import Scenario, parse_override, parse_scenario, realise
+from wearsim.scenario import Scenario, load_scenario, parse_override, parse_scenario, realise
+
+RIG = Path(__file__).parents[2] / "scenarios" / "rig-450min.toml"
 
 FORCE_LINE = 'normal_force = "300 N"'
 MU = "coefficient = 0.1"
@@ -505,3 +508,36 @@ def test_that_the_mistakes_of_all_random_inputs_come_together(parse: Parse) -> N
         ("friction", "coefficient"),
         ("wear.cylinder.k_over_h", "low"),
     ]
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "told"),
+    [
+        ("creepage.tilt", "90 deg", "1.571 rad"),
+        ("creepage.yaw", ["0 rad", "-0.2 rad", "0 rad"], "0.2 rad"),
+        ("creepage.misalignment", {"distribution": "disc", "radius": "90 deg"}, "1.571 rad"),
+        (
+            "creepage.tilt",
+            {"distribution": "uniform", "low": "0 rad", "high": "0.2 rad"},
+            "0.2 rad",
+        ),
+    ],
+)
+def test_that_an_angle_that_is_not_small_is_refused(key, value, told):
+    with pytest.raises(ScenarioError, match="too large an angle") as caught:
+        load_scenario(RIG, {"operation.rollers": 3, key: value})
+    assert told in str(caught.value)
+
+
+def test_that_an_angle_with_a_normal_law_is_taken():
+    law = {"distribution": "normal", "mean": "0 rad", "std": "1 mrad"}
+    assert load_scenario(RIG, {"creepage.tilt": law}).random
+
+
+@pytest.mark.parametrize("key", ["wear.cylinder.k_over_h", "roller.offset"])
+def test_that_what_no_contact_sees_cannot_change_in_time(key):
+    unit = "1/Pa" if "wear" in key else "m"
+    marginal = {"distribution": "uniform", "low": f"1e-11 {unit}", "high": f"2e-11 {unit}"}
+    process = {"distribution": "ornstein-uhlenbeck", "correlation_time": "1 min"}
+    with pytest.raises(ScenarioError, match="changes in time, as only"):
+        load_scenario(RIG, {key: {**process, "marginal": marginal}})

@@ -14,6 +14,7 @@ from tests.studies.random_examples import (
     scenario_of,
 )
 from wearsim.errors import CapabilityError, Interrupted, ScenarioError, StepError
+from wearsim.evolution import errors_of_steps
 from wearsim.evolution.errors_of_steps import whole_volume
 from wearsim.evolution.explicit import stability_limit
 from wearsim.evolution.state import fresh_state
@@ -190,3 +191,60 @@ def test_that_a_process_far_too_fast_is_refused():
     load = {**WANDERING, "correlation_time": "1 us", "marginal": LOAD}
     with pytest.raises(ScenarioError, match="a longer correlation_time"):
         build_scene(scenario_of(passes=100_000, load__normal_force=load))
+
+
+@pytest.mark.parametrize("key", ["load__normal_force", "friction__coefficient"])
+def test_that_a_wandering_input_is_part_of_the_estimated_error(key):
+    marginal = LOAD if "load" in key else FRICTION
+    _, state = end_of(scenario_of(contact__strips=61, **{key: {**WANDERING, "marginal": marginal}}))
+    assert 0.0 < state.spread[0, 0] < 0.01 * deepest(state)
+
+
+def test_that_a_record_means_the_same_whatever_the_stepper():
+    slack = {"creepage__misalignment": ALL_PER_PASS["creepage__misalignment"]}
+    inputs = {**slack, "passes": 3000, "contact__strips": 91}
+    expected = wearsim.run(scenario_of(**inputs))
+    drawn = wearsim.run(scenario_of(evolution__stepper="per-pass", **inputs))
+    power = drawn.dissipated_energy[-1] / drawn.time[-1]
+    assert drawn.power[-1] == pytest.approx(power, rel=0.05)
+    assert drawn.power[-1] == pytest.approx(expected.power[-1], rel=0.02)
+    # how wide the load lies over many passes; each pass by itself leaves the profile rough
+    widths = []
+    for result in (expected, drawn):
+        load = result.raw.records["line_load"][-1, 0, 0, 0]
+        widths.append(np.sqrt(np.dot(load, result.y**2) / load.sum()))
+    assert widths[1] == pytest.approx(widths[0], rel=0.03)
+
+
+def test_that_the_strips_hold_the_groove_of_the_roller_with_the_most_friction():
+    friction = {"distribution": "uniform", "low": 0.05, "high": 1.0, "persistence": "per-roller"}
+    scenario = scenario_of(friction__coefficient=friction, seed=3)
+    plain, _, _ = build_scene(scenario_of())
+    scene, state = end_of(scenario)
+    assert scene.inputs.friction.max() > 0.5
+    assert np.ptp(scene.grid.y) > 1.3 * np.ptp(plain.grid.y)
+    assert deepest(state) > 0.0
+
+
+def test_that_nodes_are_refused_where_there_is_nothing_to_expect():
+    for changes in ({}, {"evolution__stepper": "per-pass", **ALL_PER_PASS}):
+        with pytest.raises(ScenarioError, match="no expectation over passes"):
+            build_scene(scenario_of(evolution__nodes=16, **changes))
+
+
+def test_that_a_coarse_twin_that_fails_shortens_the_step(monkeypatch):
+    friction = {**FRICTION, "persistence": "per-pass"}
+    scene, stepper, _ = build_scene(scenario_of(passes=600, friction__coefficient=friction))
+    fresh, calls = fresh_state(scene), []
+    original = errors_of_steps.coarse_start
+
+    def failing(*arguments):
+        calls.append(1)
+        if len(calls) == 1:
+            raise StepError("the twin did not settle", {})
+        return original(*arguments)
+
+    monkeypatch.setattr(errors_of_steps, "coarse_start", failing)
+    end = stepper.advance(scene, fresh, 600.0).end
+    assert len(calls) == 2
+    assert end.rejected >= 1

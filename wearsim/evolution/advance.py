@@ -50,7 +50,7 @@ def checked_loads(loads: FloatArray, passes: float) -> FloatArray:
     if not (loads > 0.0).all():
         raise StepError(
             f"contact is lost at pass {passes:.0f}: the load has fallen to {loads.min():.4g} N;"
-            " the spring has run out of travel or the log falls to zero",
+            " the spring has run out of travel, or the log or a draw falls to zero",
             {"normal_force": loads, "passes": passes},
         )
     return loads
@@ -155,12 +155,13 @@ def _end_loads(
 
 def explicit_step(scene: Scene, state: WearState, passes: float) -> WearState:
     """Step over `passes` passes on the profiles of the step's start, under its mean load."""
-    scene = scene.at_time(scene.time(state.passes), scene.time(state.passes + passes))
-    foreseen = Wearing(scene, state.contacts, passes)
-    mean = _end_loads(scene, state, passes, foreseen, state.contacts)
-    contacts = contacts_at(scene, state, mean)
+    here = scene.at_time(scene.time(state.passes), scene.time(state.passes + passes))
+    foreseen = Wearing(here, state.contacts, passes)
+    mean = _end_loads(here, state, passes, foreseen, state.contacts)
+    solve = solve_present if scene.varying else contacts_at
+    contacts = solve(here, state, mean)
     solves = len(contacts) if contacts is state.contacts else 2 * len(contacts)
-    worn = _completed(scene, state, passes, Wearing(scene, contacts, passes), contacts, solves)
+    worn = _completed(here, state, passes, Wearing(here, contacts, passes), contacts, solves)
     return replace(worn, contacts=solve_present(scene, worn, present_loads(scene, worn)))
 
 
@@ -190,8 +191,7 @@ def contacts_at(scene: Scene, state: WearState, loads: FloatArray) -> Contacts:
     """
     line_load = contact_values(scene, state.contacts, "line_load")
     carried = line_load.sum(axis=-1) * scene.grid.spacing
-    same = scene.steady and not scene.varying
-    if same and np.abs(carried - loads).max() <= SAME_LOAD * loads.max():
+    if not scene.varying and np.abs(carried - loads).max() <= SAME_LOAD * loads.max():
         return state.contacts
     return solve_present(scene, state, loads)
 
@@ -202,7 +202,7 @@ def solve_present(scene: Scene, state: WearState, loads: FloatArray) -> Contacts
     points = operating_points(scene, loads, state.cylinder_depth, state.roller_depth)
     gap = scene.gap(state.cylinder_depth, state.roller_depth)
     batch = scene.model.solve_batch(
-        gap, scene.kinematics.longitudinal_curvature, points, None, list(state.contacts)
+        gap, scene.kinematics.longitudinal_curvature, points, None, list(state.contacts) or None
     )
     return tuple(batch.solutions)
 

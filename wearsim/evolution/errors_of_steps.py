@@ -84,33 +84,40 @@ def variation_error(scene: Scene, end: WearState, first: float, passes: float) -
     spread = np.zeros((2, scene.shape[2]))
     here = scene.at_time(start, stop)
     loads = contact_values(scene, end.contacts, "line_load").sum(axis=-1) * scene.grid.spacing
-    shift = min(scene.load.deviation(start, stop), 0.9 * float(loads.min()))
+    everyone = tuple(range(scene.rollers))
+    deviations = [("normal_force", everyone, scene.load.deviation(start, stop))]
+    deviations += [(v.name, v.rollers, v.path.deviation(start, stop)) for v in scene.varying]
     mean: Wearing | None = None
-    if shift > 1e-9 * float(loads.max()):
-        mean = _worn_at(here, end, loads, passes)
-        pair = [_worn_at(here, end, loads + sign * shift, passes) for sign in (-1.0, 1.0)]
-        spread += _bias(scene, end, mean, pair)
-    for item in scene.varying:
-        deviation = item.path.deviation(start, stop)
-        values = getattr(here.inputs, item.name)
+    for name, rollers, deviation in deviations:
+        values = loads if name == "normal_force" else getattr(here.inputs, name)
         if deviation <= 1e-9 * float(np.abs(values).max()):
             continue
-        mean = mean if mean is not None else _worn_at(here, end, loads, passes)
-        chosen = np.isin(scene.roller, item.rollers)[:, None]
-        pair = []
-        for sign in (-1.0, 1.0):
-            inputs = here.inputs.with_values({item.name: values + sign * deviation * chosen})
-            pair.append(_worn_at(replace(here, inputs=inputs), end, loads, passes))
-        spread += _bias(scene, end, mean, pair)
+        # a load and a friction coefficient are never below zero
+        most = 0.9 * float(values.min()) if name in {"normal_force", "friction"} else np.inf
+        mean = mean if mean is not None else _worn_at(here, end, loads, {}, passes)
+        shift = np.where(np.isin(scene.roller, rollers), min(deviation, most), 0.0)[:, None]
+        less, more = (
+            _worn_at(here, end, loads, {name: sign * shift}, passes) for sign in (-1.0, 1.0)
+        )
+        spread += _bias(scene, end, mean, (less, more))
     return COVER * spread
 
 
-def _worn_at(scene: Scene, end: WearState, loads: FloatArray, passes: float) -> Wearing:
-    """Return what `passes` passes on the profiles of `end` would wear off under `loads`."""
-    return Wearing(scene, solve_present(scene, end, loads), passes)
+def _worn_at(
+    scene: Scene, end: WearState, loads: FloatArray, shifts: dict[str, FloatArray], passes: float
+) -> Wearing:
+    """Return what passes on the profiles of `end` wear off with loads and inputs shifted."""
+    values = {
+        name: getattr(scene.inputs, name) + shift
+        for name, shift in shifts.items()
+        if name != "normal_force"
+    }
+    shifted = replace(scene, inputs=scene.inputs.with_values(values))
+    contacts = solve_present(shifted, end, loads + shifts.get("normal_force", 0.0))
+    return Wearing(shifted, contacts, passes)
 
 
-def _bias(scene: Scene, end: WearState, mean: Wearing, pair: list[Wearing]) -> FloatArray:
+def _bias(scene: Scene, end: WearState, mean: Wearing, pair: tuple[Wearing, Wearing]) -> FloatArray:
     """Return half the second difference of depth and volume, shape (2, realisations)."""
     less, more = pair
     changes = (
@@ -137,6 +144,7 @@ def coarse_start(scene: Scene, state: WearState) -> WearState:
         state,
         contacts=tuple(contact for (_, c, _), contact in contacts if c in chosen),
         shadow=None,
+        coarse=None,
     )
 
 

@@ -7,7 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from wearsim.errors import StepError
-from wearsim.evolution.advance import contacts_at, explicit_step, mean_loads, present_scene
+from wearsim.evolution.advance import (
+    contacts_at,
+    explicit_step,
+    mean_loads,
+    present_scene,
+    solve_present,
+)
 from wearsim.evolution.control import StepControl
 from wearsim.evolution.errors_of_steps import (
     COVER,
@@ -77,9 +83,11 @@ class ExplicitStepper(Stepper):
             proposed = min(chosen, 0.7 * step)
         end = with_pass_errors(scene, state, end, end, explicit_step, step)
         added = added + end.irreducible - state.irreducible
+        passes = stop if step == left else end.passes
         end = replace(
             end,
-            passes=stop if step == left else end.passes,
+            passes=passes,
+            coarse=None if end.coarse is None else replace(end.coarse, passes=passes),
             depth_error=state.depth_error + added[0],
             volume_error=state.volume_error + added[1],
             step=self.forced_step or (max(chosen, proposed) if step < proposed else chosen),
@@ -119,9 +127,12 @@ def _errors(scene: Scene, start: WearState, end: WearState, step: float) -> Floa
 
     Shape (2, realisations): depth [m] and volume worn off both bodies [m^3].
     """
-    gap = scene.gap(end.cylinder_depth, end.roller_depth)
-    loads = mean_loads(scene, start, step, gap, contact_values(scene, end.contacts, "power"))
-    again = Wearing(scene, contacts_at(scene, end, loads), step)
+    # the processes at their means over the step, as the step itself took them
+    here = scene.at_time(scene.time(start.passes), scene.time(start.passes + step))
+    gap = here.gap(end.cylinder_depth, end.roller_depth)
+    loads = mean_loads(here, start, step, gap, contact_values(here, end.contacts, "power"))
+    solve = solve_present if scene.varying else contacts_at
+    again = Wearing(here, solve(here, end, loads), step)
     other = replace(
         end,
         cylinder_depth=start.cylinder_depth + again.cylinder,

@@ -21,6 +21,7 @@ from wearsim.evolution.errors_of_steps import (
 from wearsim.evolution.scene import Scene
 from wearsim.evolution.state import WearState, contact_values
 from wearsim.evolution.stepper import Advance, Stepper, fitted
+from wearsim.types import FloatArray
 
 SMALLEST_STEP = 1e-3  # passes
 
@@ -60,38 +61,29 @@ class ImplicitStepper(Stepper):
                 half = implicit_step(scene, state, 0.5 * step)
                 end = implicit_step(scene, half, 0.5 * step)
                 whole = implicit_step(scene, twin, step)
+                end = with_pass_errors(scene, state, end, whole, implicit_step, step)
             except (StepError, ContactError) as failure:
                 if self.forced_step:
                     raise
                 cause, rejected, proposed = failure, rejected + 1, 0.2 * step
                 continue
-            new_spread = variation_error(scene, end, state.passes, step)
-            spread = state.spread + new_spread
-            moved = tuple(getattr(state, name) - getattr(twin, name) for name in DEPTHS)
-            apart = whole_volume(scene, end) - whole_volume(scene, whole)
-            before = whole_volume(scene, state) - whole_volume(scene, twin)
-            added = COVER * np.array([depth_between(end, whole, moved), np.abs(apart - before)])
-            over = excess(self.control, scene, state, end, added + new_spread, stop)
+            varied = variation_error(scene, end, state.passes, step)
+            added = _added(scene, (state, twin), (end, whole)) + varied
+            over = excess(self.control, scene, state, end, added, stop)
             if self.forced_step or over <= 1.0:
                 chosen = self.control.next_step(step, over)
                 # a step cut short by the stop says little about how long the next may be
                 chosen = max(chosen, proposed) if step < proposed else chosen
-                passes = stop if step == left else end.passes
-                end = with_pass_errors(scene, state, end, whole, implicit_step, step)
-                fixed = spread + end.irreducible
                 end = replace(
                     end,
-                    passes=passes,
-                    depth_error=COVER * depth_between(end, whole) + fixed[0],
-                    volume_error=COVER * np.abs(apart) + fixed[1],
-                    spread=spread,
+                    passes=stop if step == left else end.passes,
+                    spread=state.spread + varied,
                     step=self.forced_step or chosen,
                     steps=state.steps + 1,
                     rejected=rejected,
                     solves=end.solves + whole.solves - twin.solves,
-                    shadow=replace(whole, passes=passes, shadow=None),
                 )
-                return Advance(path=(state, half, end))
+                return Advance(path=(state, half, _with_errors(scene, end, whole)))
             rejected += 1
             proposed = min(self.control.next_step(step, over), 0.7 * step)
         if isinstance(cause, ContactError):
@@ -101,6 +93,36 @@ class ImplicitStepper(Stepper):
             f" {SMALLEST_STEP:g} passes); {cause or 'the error does not fall with the step'}",
             state.to_arrays(),
         )
+
+
+def _added(
+    scene: Scene, before: tuple[WearState, WearState], after: tuple[WearState, WearState]
+) -> FloatArray:
+    """Return what a step adds to the difference between a test and its twin, in depth and volume.
+
+    Shape (2, realisations): [m] and [m^3], with the factor for safety.
+    """
+    moved = tuple(getattr(before[0], name) - getattr(before[1], name) for name in DEPTHS)
+    volumes = [whole_volume(scene, one) - whole_volume(scene, two) for one, two in (before, after)]
+    return COVER * np.array([depth_between(*after, moved), np.abs(volumes[1] - volumes[0])])
+
+
+def _with_errors(scene: Scene, end: WearState, whole: WearState) -> WearState:
+    """Return `end` with the errors that its twin `whole` and all else tell, and with that twin."""
+    apart = np.abs(whole_volume(scene, end) - whole_volume(scene, whole))
+    other = end.spread + end.irreducible
+    twins = {
+        name: replace(twin, passes=end.passes, shadow=None, coarse=None)
+        for name, twin in (("shadow", whole), ("coarse", end.coarse))
+        if twin is not None
+    }
+    return replace(
+        end,
+        depth_error=COVER * depth_between(end, whole) + other[0],
+        volume_error=COVER * apart + other[1],
+        shadow=twins["shadow"],
+        coarse=twins.get("coarse"),
+    )
 
 
 def _first_step(scene: Scene, state: WearState) -> float:

@@ -108,10 +108,10 @@ class Scene:
         creepage varies with spin alone.
     varying : sequence of Varying
         Inputs that follow processes in time.
-    steady : bool
-        Whether the inputs are the same at all times, but for `varying`.
     redraw : callable, optional
         Draws the inputs of single passes, see `Redraw`.
+    expectation : Scene, optional
+        The same scene with contacts that stand for passes drawn one by one, to record by.
     """
 
     grid: Grid
@@ -130,8 +130,8 @@ class Scene:
     free: bool = False
     slip_profile: FloatArray | None = None
     varying: tuple[Varying, ...] = ()
-    steady: bool = True
     redraw: Redraw | None = None
+    expectation: Scene | None = None
 
     @cached_property
     def shape(self) -> tuple[int, int, int]:
@@ -201,7 +201,7 @@ class Scene:
             chosen = np.isin(self.roller, item.rollers)[:, None]
             values = np.where(chosen, item.path.mean(start, stop), getattr(inputs, item.name))
             inputs = inputs.with_values({item.name: values})
-        return replace(self, inputs=inputs, varying=(), steady=False)
+        return replace(self, inputs=inputs, varying=())
 
     def single_passes(self, rollers: IntArray, first: int, times: FloatArray) -> Scene:
         """Return a scene whose contacts are passes number `first` on.

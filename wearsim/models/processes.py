@@ -12,8 +12,8 @@ from wearsim.plugins import Distribution, Options, Process, RandomInputSpec, Uni
 from wearsim.quantities import PositiveDuration, QuantityError
 from wearsim.types import FloatArray
 
-_STEPS = 10  # per correlation time, unless a spacing is given
-_FEWEST = 2
+_STEPS = 20  # per correlation time, unless a spacing is given
+_FEWEST = 4
 
 
 class OrnsteinUhlenbeckOptions(Options):
@@ -23,7 +23,7 @@ class OrnsteinUhlenbeckOptions(Options):
         description="time over which it forgets itself to 1/e, e.g. '5 min'"
     )
     spacing: PositiveDuration | None = Field(
-        None, description="step of its time grid; a tenth of the correlation time by default"
+        None, description="step of its time grid; a twentieth of the correlation time by default"
     )
 
     @model_validator(mode="after")
@@ -33,7 +33,7 @@ class OrnsteinUhlenbeckOptions(Options):
             raise QuantityError(
                 "spacing does not resolve the process",
                 f'"{self.spacing:g} s" with a correlation time of {self.correlation_time:g} s',
-                f'half of that at most, "{greatest:g} s"',
+                f'a quarter of that at most, "{greatest:g} s"',
             )
         return self
 
@@ -44,7 +44,8 @@ class OrnsteinUhlenbeck(Process):
     Normal scores follow z_k+1 = r z_k + sqrt(1 - r^2) w_k with r = exp(-spacing/tau), which is
     exact at the points of the time grid (Gillespie 1996, DOI 10.1103/PhysRevE.54.2084), and are
     mapped to the marginal. The correlation holds for the scores; where the marginal is not
-    normal that of the values is a little less.
+    normal that of the values is a little less. Between the points of the grid the value is linear,
+    and its variance over all times (2 + r)/3 of the marginal's: 1.6 % less at a twentieth.
     """
 
     def __init__(self, options: OrnsteinUhlenbeckOptions, marginal: Distribution) -> None:

@@ -11,24 +11,26 @@ from pydantic import Field
 
 from wearsim.plugins import Distribution, FrictionField, JointDistribution, Options, Process
 from wearsim.quantities import Quantity, conversion
+from wearsim.randomness.plans import BELOW_ONE
 from wearsim.types import FloatArray
 
 Persistence: TypeAlias = Literal["per-test", "per-roller", "per-pass"]
 Role: TypeAlias = Literal["scalar", "joint", "field", "process"]
 
-LEAST = 2.0**-54  # the least uniform number that a stream yields
+LEAST = 1.0 - BELOW_ONE  # the least uniform number that a draw takes
 MISALIGNMENT = "creepage.misalignment"
 FRICTION = "friction.coefficient"
-OF_A_CONTACT = (
-    "load.normal_force",
-    FRICTION,
-    "creepage.longitudinal",
-    "creepage.bearing_torque",
-    "creepage.yaw",
-    "creepage.tilt",
-    MISALIGNMENT,
-)
-"""What one contact sees, so that it may change from pass to pass."""
+CONTACT_FIELDS = {
+    "load.normal_force": "normal_force",
+    FRICTION: "friction",
+    "creepage.longitudinal": "longitudinal",
+    "creepage.bearing_torque": "bearing_torque",
+    "creepage.yaw": "yaw",
+    "creepage.tilt": "tilt",
+}
+"""What one contact sees: its name where contacts are solved, by the scenario's key."""
+OF_A_CONTACT = (*CONTACT_FIELDS, MISALIGNMENT)
+"""What may change from pass to pass."""
 OF_A_ROLLER = (*OF_A_CONTACT, "roller.offset")
 """What may differ from roller to roller."""
 RANDOM_PLACES = "the values of [load], [friction], [creepage] and [wear], and roller.offset"
@@ -143,8 +145,15 @@ class RandomInput:
     @property
     def extremes(self) -> tuple[float, float]:
         """Least and greatest value that a draw can have; a continuous law keeps off its ends."""
-        least, most = self.scalar.quantile(np.array([LEAST, 1.0 - LEAST]))
+        least, most = self.scalar.quantile(np.array([LEAST, BELOW_ONE]))
         return float(least), float(most)
+
+    @property
+    def greatest(self) -> float:
+        """Greatest size that any of the values it sets can have."""
+        if isinstance(self.distribution, JointDistribution):
+            return max(self.distribution.reach)
+        return max(abs(end) for end in self.extremes)
 
     def values(self, uniform: FloatArray) -> FloatArray:
         """Return draws of the values that a scalar or joint input sets.

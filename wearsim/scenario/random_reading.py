@@ -10,6 +10,7 @@ from wearsim.plugins import Distribution, JointDistribution, RandomInputSpec, re
 from wearsim.quantities import Quantity, QuantityError, shown
 from wearsim.scenario.hosts import Joint
 from wearsim.scenario.random_inputs import (
+    CONTACT_FIELDS,
     FRICTION,
     MISALIGNMENT,
     OF_A_CONTACT,
@@ -89,9 +90,15 @@ def _suits(spec: RandomInputSpec, name: str, joint: Joint | None, report: Report
         what = f"sets several values together, as only {MISALIGNMENT} can"
     elif spec.role == "field" and name != FRICTION:
         what = f"differs within the contact, as only {FRICTION} can"
+    elif spec.role == "process" and name not in CONTACT_FIELDS:
+        what = f"changes in time, as only {', '.join(CONTACT_FIELDS)} can"
     if what is None:
         return True
-    roles = {"joint"} if joint else {"scalar", "process"}
+    roles = {"joint"} if joint else {"scalar"}
+    if name in CONTACT_FIELDS:
+        roles.add("process")
+    if name == FRICTION:
+        roles.add("field")
     report.add(name, "distribution", what, shown(spec.name), _one_of(roles))
     return False
 

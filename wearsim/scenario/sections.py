@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import Field
 
 from wearsim.quantities import (
@@ -97,6 +98,7 @@ class EvolutionTable(Table):
     nodes: int | None = Field(
         default=None,
         ge=4,
+        le=4096,
         multiple_of=4,
         description="Contacts that stand for the passes of a roller whose inputs are drawn at every"
         " pass; chosen if left out.",
@@ -128,6 +130,7 @@ class OutputsTable(Table):
 
 
 DEFAULT_RECORDS = 20
+LARGEST_ANGLE = 0.1  # rad; the kinematics of slip and shift are those of small angles
 CADENCES = ("records", "every_passes", "every")
 
 
@@ -154,7 +157,26 @@ def read_creepage(raw: Mapping[str, object], report: Report) -> CreepageTable | 
             report.add("creepage", needed, f'is needed with drive = "{drive}"', "none")
         if refused in raw:
             report.add("creepage", refused, f'has no meaning with drive = "{drive}"')
-    return report.validate(CreepageTable, raw, "creepage")
+    table = report.validate(CreepageTable, raw, "creepage")
+    if table is not None:
+        _check_angles(table, report)
+    return table
+
+
+def _check_angles(table: CreepageTable, report: Report) -> None:
+    """Note angles past which slip and shift are no longer in proportion to them."""
+    sizes = {"yaw": np.abs(np.atleast_1d(table.yaw)), "tilt": np.abs(np.atleast_1d(table.tilt))}
+    greatest = {f"creepage.{key}": float(values.max()) for key, values in sizes.items()}
+    for item in report.random:
+        if item.name.startswith("creepage.") and item.quantity == Quantity(ANGLE):
+            greatest[item.name] = item.greatest
+    for name, angle in greatest.items():
+        if angle > LARGEST_ANGLE:
+            key = name.removeprefix("creepage.")
+            expected = (
+                f"at most {LARGEST_ANGLE:g} rad (5.7 deg), as small angles are taken for granted"
+            )
+            report.add("creepage", key, "is too large an angle", f"{angle:.4g} rad", expected)
 
 
 def read_evolution(raw: Mapping[str, object], report: Report) -> EvolutionTable | None:

@@ -6,14 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from wearsim.errors import CapabilityError, Problem, ScenarioError
+from wearsim.errors import Problem, ScenarioError
 from wearsim.evolution.advance import explicit_step
-from wearsim.evolution.control import StepControl
 from wearsim.evolution.errors_of_steps import coarse_start, whole_volume
-from wearsim.evolution.explicit import ExplicitStepper
-from wearsim.evolution.implicit import ImplicitStepper
 from wearsim.evolution.inputs import ContactInputs
-from wearsim.evolution.per_pass import PerPassStepper
 from wearsim.evolution.scene import Kinematics, NoWear, Scene
 from wearsim.evolution.state import fresh_state
 from wearsim.evolution.stepper import Stepper
@@ -21,7 +17,8 @@ from wearsim.plugins import ContactModel, Load
 from wearsim.scenario import Scenario, require_run
 from wearsim.studies.draws import Draws, draw
 from wearsim.studies.per_pass_inputs import MOST_NODES, fewest_nodes, redrawing, with_nodes
-from wearsim.studies.tracks import Angles, run_grid
+from wearsim.studies.stepping import build_stepper, check_model, chosen_stepper
+from wearsim.studies.tracks import Drawn, run_grid
 from wearsim.types import FloatArray, Grid, Profile
 
 
@@ -108,67 +105,6 @@ def mean_inputs(scenario: Scenario, rollers: list[int]) -> ContactInputs:
     return alike.with_values(angles)
 
 
-def check_model(scenario: Scenario, model: ContactModel) -> None:
-    """Raise CapabilityError if the contact model cannot take what the scenario asks of it."""
-    needs = {
-        "bearing_torque": ("creepage.drive = 'free'", scenario.creepage.drive == "free"),
-        "creepage_variation": (
-            "creepage.differential_slip = true",
-            scenario.creepage.differential_slip,
-        ),
-    }
-    for capability, (asked, needed) in needs.items():
-        if needed and not getattr(model.capabilities, capability):
-            raise CapabilityError(
-                f"{scenario.file}: contact model '{scenario.contact.model}' cannot take {asked};"
-                " choose another contact.model"
-            )
-
-
-def chosen_stepper(scenario: Scenario, model: ContactModel, contacts: int) -> str:
-    """Return the stepper a scenario asks for, or for "auto" the one that fits the contact model.
-
-    Raises
-    ------
-    CapabilityError
-        If implicit steps are asked of a model that cannot take them.
-    """
-    able = model.capabilities.wear_compliance and (contacts == 1 or model.capabilities.coupled)
-    asked = scenario.evolution.stepper
-    if asked == "auto":
-        return "implicit" if able else "explicit"
-    if asked == "implicit" and not able:
-        raise CapabilityError(
-            f"{scenario.file}: contact model '{scenario.contact.model}' takes no wear compliance"
-            + (" of several rollers that differ" if model.capabilities.wear_compliance else "")
-            + "; set evolution.stepper = 'explicit' or 'per-pass', or choose another contact.model"
-        )
-    return asked
-
-
-def build_stepper(scenario: Scenario, name: str) -> Stepper:
-    """Return the stepper called `name` with the scenario's tolerance and step."""
-    evolution = scenario.evolution
-    idle = {
-        "step": name == "per-pass" and evolution.step is not None,
-        "allow_unstable": name != "explicit" and evolution.allow_unstable,
-    }
-    problems = [
-        Problem("evolution", key, f'has no meaning with stepper = "{name}"')
-        for key, told in idle.items()
-        if told
-    ]
-    if problems:
-        raise ScenarioError(scenario.file, problems)
-    control = StepControl(evolution.tolerance)
-    forced = float(evolution.step) if evolution.step is not None else None
-    if name == "implicit":
-        return ImplicitStepper(control, forced)
-    if name == "explicit":
-        return ExplicitStepper(control, forced, evolution.allow_unstable)
-    return PerPassStepper()
-
-
 def load_range(scenario: Scenario, load: Load, stop: float) -> tuple[float, float]:
     """Return the least and greatest load up to `stop` [s], before any feedback [N].
 
@@ -223,12 +159,16 @@ def build_scene(scenario: Scenario, grid: Grid | None = None) -> tuple[Scene, St
     first, multiplicity = merged_rollers(draws)
     name = chosen_stepper(scenario, model, 2 if draws.passes else len(first))
     stepper = build_stepper(scenario, name)
+    if scenario.evolution.nodes is not None and (stepper.pass_by_pass or not draws.passes):
+        what = "has no meaning where no expectation over passes is taken"
+        raise ScenarioError(scenario.file, [Problem("evolution", "nodes", what)])
     grid = grid if grid is not None else strips_of_run(draws)
     model.prepare(grid, (scenario.cylinder.material, scenario.roller.material))
     scene = bare_scene(scenario, model, load, grid, first, multiplicity, scenario.cylinder.profile)
     scene = with_draws(scene, draws, first)
     if draws.passes and stepper.pass_by_pass:
-        scene = replace(scene, redraw=redrawing(scenario, draws.passes))
+        nodes = with_nodes(scene, scenario, draws.passes, fewest_nodes(draws.passes))
+        scene = replace(scene, redraw=redrawing(scenario, draws.passes), expectation=nodes)
     elif draws.passes:
         scene = with_enough_nodes(scene, draws)
     return scene, stepper, name
@@ -239,7 +179,13 @@ def strips_of_run(draws: Draws) -> Grid:
     scenario = draws.scenario
     greatest = load_range(scenario, scenario.load.build(), scenario.total_time)[1]
     greatest += draws.range_of("normal_force", 0.0)[1]
-    return run_grid(scenario, greatest, Angles(*(_reach(draws, name) for name in ("yaw", "tilt"))))
+    drawn = Drawn(
+        yaw=_reach(draws, "yaw"),
+        tilt=_reach(draws, "tilt"),
+        friction=draws.lasting("friction", scenario.friction.coefficient),
+        longitudinal=draws.lasting("longitudinal", scenario.creepage.longitudinal or 0.0),
+    )
+    return run_grid(scenario, greatest, drawn)
 
 
 def _reach(draws: Draws, name: str) -> float:

@@ -8,7 +8,8 @@ import numpy as np
 
 from wearsim.plugins import ContactModel
 from wearsim.scenario import Scenario
-from wearsim.studies.build import bare_scene, check_model, load_range
+from wearsim.studies.build import bare_scene, load_range
+from wearsim.studies.stepping import check_model
 from wearsim.studies.tracks import MOST_STRIPS, contact_centres, fresh_patch
 from wearsim.types import (
     ContactFields,

@@ -14,17 +14,8 @@ from wearsim.plugins import JointDistribution, Process, Uniforms
 from wearsim.randomness.sampler import Sampler
 from wearsim.randomness.streams import Stream
 from wearsim.scenario import RandomInput, Scenario, realise
+from wearsim.scenario.random_inputs import CONTACT_FIELDS
 from wearsim.types import FloatArray
-
-FIELD_OF = {
-    "load.normal_force": "normal_force",
-    "friction.coefficient": "friction",
-    "creepage.longitudinal": "longitudinal",
-    "creepage.bearing_torque": "bearing_torque",
-    "creepage.yaw": "yaw",
-    "creepage.tilt": "tilt",
-}
-"""Field of `ContactInputs` by the scenario's key."""
 
 LISTED = {"roller.offset", "creepage.yaw", "creepage.tilt"}  # may stand as one value per roller
 LONGEST_PATH = 5_000_000  # samples of a process
@@ -79,6 +70,21 @@ class Draws:
             for key, value in self.values.items()
         }
 
+    def lasting(self, name: str, mean: float) -> float:
+        """Return the greatest size that an input of a contact has over the whole test.
+
+        Parameters
+        ----------
+        name : str
+            Field of `ContactInputs`.
+        mean : float
+            The value where nothing is drawn, which is also the mean of what every pass draws.
+        """
+        time = self.scenario.total_time
+        means = [item.path.mean(0.0, time) for item in self.varying if item.name == name]
+        values = [mean, *self.rollers.get(name, ()), *means]
+        return max(abs(float(value)) for value in values)
+
     def range_of(self, name: str, mean: float) -> tuple[float, float]:
         """Return about the least and greatest value that an input of a contact takes.
 
@@ -95,7 +101,7 @@ class Draws:
                 values += [float(item.path.value.min()), float(item.path.value.max())]
         for random in self.passes:
             for key, spread in zip(random.keys, _spreads(random), strict=True):
-                if FIELD_OF[key] == name:
+                if CONTACT_FIELDS[key] == name:
                     values += spread
         return min(values), max(values)
 
@@ -145,7 +151,7 @@ def draw(scenario: Scenario) -> Draws:
     }
     means = {item.name: item.mean[0] for item in lasting}
     rollers = {
-        FIELD_OF[key]: array - origin(key, means[key])
+        CONTACT_FIELDS[key]: array - origin(key, means[key])
         for key, array in values.items()
         if key not in listed
     }
@@ -231,7 +237,7 @@ def _varying(scenario: Scenario) -> tuple[Varying, ...]:
             path = process.path(points, _uniforms(stream, scenario.sampling.realisation, block))
             times = process.spacing * np.arange(points, dtype=np.float64)
             value = path - origin(item.name, item.mean[0])
-            found.append(Varying(FIELD_OF[item.name], group, PiecewiseLinear(times, value)))
+            found.append(Varying(CONTACT_FIELDS[item.name], group, PiecewiseLinear(times, value)))
     return tuple(found)
 
 

@@ -13,7 +13,8 @@ from wearsim.randomness.correlation import GaussianCopula
 from wearsim.randomness.sampler import Sampler
 from wearsim.randomness.streams import Stream
 from wearsim.scenario import RandomInput, Scenario
-from wearsim.studies.draws import FIELD_OF, origin
+from wearsim.scenario.random_inputs import CONTACT_FIELDS
+from wearsim.studies.draws import origin
 from wearsim.types import FloatArray
 
 MOST_NODES = 128
@@ -29,7 +30,7 @@ def _values(
     for item in items:
         drawn = item.values(uniforms[item.name])
         for column, (key, mean) in enumerate(zip(item.keys, item.mean, strict=True)):
-            values[FIELD_OF[key]] = drawn[:, column] - origin(key, mean)
+            values[CONTACT_FIELDS[key]] = drawn[:, column] - origin(key, mean)
     return values
 
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from wearsim.mechanics.elasticity import combine
 from wearsim.scenario import Scenario
-from wearsim.studies.build import build_scene, check_model, load_range
+from wearsim.studies.build import build_scene, load_range
 from wearsim.studies.contact import study_contact
+from wearsim.studies.stepping import check_model
 from wearsim.studies.tracks import fresh_patch
 
 Rows = list[tuple[str, str]]

@@ -8,7 +8,7 @@ import numpy as np
 
 from wearsim.errors import ContactError, SolverError
 from wearsim.scenario import Scenario
-from wearsim.studies.build import check_model, load_range
+from wearsim.studies.build import load_range
 from wearsim.studies.contact_draws import (
     FRICTION,
     LOAD,
@@ -21,6 +21,7 @@ from wearsim.studies.contact_draws import (
 )
 from wearsim.studies.local_friction import LocalFriction
 from wearsim.studies.realisation_strips import realisation_grid
+from wearsim.studies.stepping import check_model
 from wearsim.types import (
     BatchSolution,
     Creepage,

@@ -29,7 +29,7 @@ def history_row(
     scene: Scene, state: WearState, before: WearState | None, threshold: float, pass_by_pass: bool
 ) -> Row:
     """Return the observables of a state; `threshold` [m] bounds the groove's width."""
-    state = present_contacts(scene, state, pass_by_pass)
+    scene, state = present_contacts(scene, state, pass_by_pass)
     realisations = range(scene.shape[2])
     worn = state.cylinder_depth
     power = contact_values(scene, state.contacts, "power")
@@ -56,7 +56,7 @@ def history_row(
         "full_solves": state.full_solves,
     }
     peak = contact_values(scene, state.contacts, "peak_pressure")
-    row["peak_pressure"] = scene.of_roller(peak, np.maximum).max(axis=0)
+    row["peak_pressure"] = scene.per_roller(peak).max(axis=0)
     for name in ("approach", "longitudinal_creepage", "adhesion_fraction"):
         values = contact_values(scene, state.contacts, name)
         row[name] = scene.per_roller(values).mean(axis=0)
@@ -72,16 +72,22 @@ def at_record(scene: Scene, stepper: Stepper, start: WearState, passes: float) -
     return replace(stepper.side_step(scene, start, passes - start.passes), passes=passes)
 
 
-def present_contacts(scene: Scene, state: WearState, pass_by_pass: bool) -> WearState:
-    """Return `state` with its contacts at the loads of this moment."""
+def present_contacts(scene: Scene, state: WearState, pass_by_pass: bool) -> tuple[Scene, WearState]:
+    """Return `state` with its contacts at the loads of this moment, and the scene they are of.
+
+    Where every pass draws its inputs one contact says little: contacts that stand for many passes
+    take its place, so that a record holds the same whatever the stepper.
+    """
+    if scene.expectation is not None:
+        scene, state = scene.expectation, replace(state, contacts=())
     loads = present_loads(scene, state)
     solve = solve_present if pass_by_pass else contacts_at
-    return replace(state, contacts=solve(scene, state, loads))
+    return scene, replace(state, contacts=solve(scene, state, loads))
 
 
 def record_row(scene: Scene, state: WearState, pass_by_pass: bool) -> Row:
     """Return the profiles of a state and the contacts at the loads of this moment."""
-    state = present_contacts(scene, state, pass_by_pass)
+    scene, state = present_contacts(scene, state, pass_by_pass)
     row: Row = {
         "record_passes": state.passes,
         "record_time": scene.time(state.passes),

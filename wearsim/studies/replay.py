@@ -249,7 +249,8 @@ class _Replay:
             if max(quadrature, scatter) > 0.5 * relative:
                 remedy = "raise evolution.nodes"
                 if scatter > quadrature:
-                    remedy = f"{scatter:.2%} of it is what draws at so few passes leave to chance"
+                    part = scatter / relative
+                    remedy = f"{part:.0%} of it is what draws at so few passes leave to chance"
             self._warn(
                 f"estimated error of {name}: {relative:.2%} is more than the tolerance of"
                 f" {tolerance:.2%}; {remedy}"

@@ -17,14 +17,24 @@ MOST_STRIPS = 801
 
 
 @dataclass(frozen=True)
-class Angles:
-    """Greatest size that the angles of a roller take while it runs, besides those given [rad]."""
+class Drawn:
+    """What random inputs add to what a scenario gives.
+
+    Parameters
+    ----------
+    yaw, tilt : float
+        Greatest size that the angles of a roller take while it runs [rad].
+    friction, longitudinal : float, optional
+        Greatest friction coefficient and creepage that a roller has over the whole test.
+    """
 
     yaw: float = 0.0
     tilt: float = 0.0
+    friction: float = 0.0
+    longitudinal: float = 0.0
 
 
-NO_ANGLES = Angles()
+NOTHING_DRAWN = Drawn()
 
 
 def contact_centres(scenario: Scenario) -> tuple[float, ...]:
@@ -44,7 +54,7 @@ def fresh_patch(scenario: Scenario, load: float) -> HertzContact:
     return hertz(along, 0.5 / scenario.roller.crown_radius, load, modulus)
 
 
-def foreseen_half_width(scenario: Scenario, load: float, drawn: Angles) -> float:
+def foreseen_half_width(scenario: Scenario, load: float, drawn: Drawn) -> float:
     """Return half the width of the groove that full slip would leave at the end [m].
 
     Rigid bodies in full slip wear d = [(3/4) c N n / sqrt(2 R)]^(2/3) deep and 2 sqrt(2 R d) wide,
@@ -62,16 +72,17 @@ def foreseen_half_width(scenario: Scenario, load: float, drawn: Angles) -> float
         start = float(np.ptp(scenario.cylinder.profile.height))
     half = fresh_patch(scenario, load).b
     for _ in range(20):  # the slip at the groove's sides depends on its width, weakly
-        per_load = wear * scenario.friction.coefficient * greatest_slip(scenario, half, drawn)
+        friction = max(scenario.friction.coefficient, drawn.friction)
+        per_load = wear * friction * greatest_slip(scenario, half, drawn)
         depth = (0.75 * per_load * load * scenario.total_passes / np.sqrt(crown)) ** (2.0 / 3.0)
         half = float(np.sqrt(crown * (depth + start)))
     return half
 
 
-def greatest_slip(scenario: Scenario, half_width: float, drawn: Angles) -> float:
+def greatest_slip(scenario: Scenario, half_width: float, drawn: Drawn) -> float:
     """Return the greatest rigid slip within `half_width` [m] of a contact's middle."""
     creepage, roller = scenario.creepage, scenario.roller
-    longitudinal = abs(creepage.longitudinal or 0.0)
+    longitudinal = max(abs(creepage.longitudinal or 0.0), drawn.longitudinal)
     tilt = max(drawn.tilt, *(abs(angle) for angle in scenario.per_roller(creepage.tilt)))
     longitudinal += tilt / roller.radius * half_width
     if creepage.drive == "free" or creepage.differential_slip:
@@ -81,15 +92,15 @@ def greatest_slip(scenario: Scenario, half_width: float, drawn: Angles) -> float
     return float(np.hypot(longitudinal, yaw))
 
 
-def run_grid(scenario: Scenario, load: float, drawn: Angles = NO_ANGLES) -> Grid:
+def run_grid(scenario: Scenario, load: float, drawn: Drawn = NOTHING_DRAWN) -> Grid:
     """Return the strips of a run whose greatest load is `load` [N].
 
     Parameters
     ----------
     scenario : Scenario
     load : float
-    drawn : Angles, optional
-        What random angles add.
+    drawn : Drawn, optional
+        What random inputs add.
 
     Raises
     ------
