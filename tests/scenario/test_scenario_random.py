@@ -541,3 +541,15 @@ def test_that_what_no_contact_sees_cannot_change_in_time(key):
     process = {"distribution": "ornstein-uhlenbeck", "correlation_time": "1 min"}
     with pytest.raises(ScenarioError, match="changes in time, as only"):
         load_scenario(RIG, {key: {**process, "marginal": marginal}})
+
+
+def test_that_a_field_selects_a_contact_model_that_can_take_it():
+    law = {"distribution": "uniform", "low": 0.09, "high": 0.11}
+    field = {"friction.coefficient": {"distribution": "white", "marginal": law}}
+    rig = RIG.parent / "mean-contact.toml"
+    text = rig.read_text().split("[contact]")[0]
+    chosen = parse_scenario(text, "bare.toml", {}.__getitem__, field)
+    assert chosen.contact.model == "hertz-fastsim"
+    assert any("is a field, white" in note for note in chosen.notes)
+    asked = parse_scenario(text, "bare.toml", {}.__getitem__, {**field, "contact.model": "slender"})
+    assert asked.contact.model == "slender"

@@ -164,10 +164,29 @@ def _split(
     return ours, {key: value for key, value in raw.items() if key not in ours}
 
 
+def _default_model(report: Report) -> str:
+    """Return the model of a scenario that names none: the default, or one that can take a field."""
+    usual = str(ContactTable.model_fields["model"].default)
+    field = next((item for item in report.random if item.role == "field"), None)
+    if field is None:
+        return usual
+    known = [registry().get(ContactModelSpec, n) for n in registry().names(ContactModelSpec)]
+    able = [spec.name for spec in known if spec.capabilities.friction_field]
+    if not able:
+        return usual
+    report.notes.append(
+        f"contact.model is '{able[0]}': {field.name} is a field, {field.kind}, and '{usual}' takes"
+        " none"
+    )
+    return able[0]
+
+
 def read_contact(raw: Mapping[str, object], report: Report) -> ContactChoice | None:
     """Return the table [contact], or None after noting its mistakes."""
     ours, rest = _split(raw, ContactTable)
-    name = ours.get("model", "slender")
+    if "model" not in ours:
+        ours["model"] = _default_model(report)
+    name = ours["model"]
     table = report.validate(ContactTable, ours, "contact")
     spec = None
     if isinstance(name, str):

@@ -137,7 +137,7 @@ def parse_scenario(
         seed=top.seed,
         text=text,
         files=files,
-        notes=_notes(sections["roller"], sections["cylinder"], random),
+        notes=(*_notes(sections["roller"], sections["cylinder"], random), *report.notes),
         random=random,
         _tables=put_all(data, report.means),
         **sections,

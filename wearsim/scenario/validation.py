@@ -57,6 +57,7 @@ class Report:
         self.file = file
         self.names = names
         self.problems: list[Problem] = []
+        self.notes: list[str] = []
         self.random: list[RandomInput] = []
         self.tried: set[str] = set()
         self.means: dict[str, object] = {}
