@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -56,32 +57,19 @@ def checked_loads(loads: FloatArray, passes: float) -> FloatArray:
     return loads
 
 
-def operating_points(
-    scene: Scene, loads: FloatArray, cylinder_depth: FloatArray, roller_depth: FloatArray
-) -> list[OperatingPoint]:
-    """Return the operating point of every contact at given loads and worn depths."""
-    return [
-        scene.point(
-            c,
-            v,
-            float(loads[s, c, v]),
-            cylinder_depth[s, 0, v],
-            roller_depth[0, scene.roller[c], v],
-        )
-        for s, c, v in scene.contacts
-    ]
-
-
 def _solve_all(
     scene: Scene,
     gap: FloatArray,
-    points: list[OperatingPoint],
+    points: Sequence[OperatingPoint],
     compliance: list[SharedWear],
     warm: Contacts,
 ) -> Contacts:
     """Solve every realisation's coupled contacts; order as `WearState.contacts`."""
     stations, contacts, realisations = scene.shape
     curvature = scene.kinematics.longitudinal_curvature
+    if realisations == 1:
+        gaps = gap.reshape(len(warm), -1)
+        return tuple(scene.model.solve_coupled(gaps, curvature, points, compliance[0], warm))
     solved: dict[tuple[int, ...], ContactSolution] = {}
     flat = {index: number for number, index in enumerate(scene.contacts)}
     for v in range(realisations):
@@ -121,7 +109,7 @@ def implicit_step(scene: Scene, state: WearState, passes: float) -> WearState:
     loads = _end_loads(scene, state, passes, wearing, contacts)
     for iteration in range(1, MAX_FIXED_POINT + 1):
         ends = state.cylinder_depth + wearing.cylinder, state.roller_depth + wearing.roller
-        points = operating_points(scene, loads, *ends)
+        points = scene.points(loads, *ends)
         found = _solve_all(scene, gap + wearing.offset, points, wearing.compliance, contacts)
         new = Wearing(scene, found, passes)
         new_loads = _end_loads(scene, state, passes, new, found)
@@ -199,7 +187,7 @@ def contacts_at(scene: Scene, state: WearState, loads: FloatArray) -> Contacts:
 def solve_present(scene: Scene, state: WearState, loads: FloatArray) -> Contacts:
     """Solve every contact on the present profiles under `loads`, shape (S, C, N) [N]."""
     scene = present_scene(scene, state)
-    points = operating_points(scene, loads, state.cylinder_depth, state.roller_depth)
+    points = scene.points(loads, state.cylinder_depth, state.roller_depth)
     gap = scene.gap(state.cylinder_depth, state.roller_depth)
     batch = scene.model.solve_batch(
         gap, scene.kinematics.longitudinal_curvature, points, None, list(state.contacts) or None

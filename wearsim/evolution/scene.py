@@ -10,7 +10,15 @@ import numpy as np
 
 from wearsim.evolution.inputs import ContactInputs, Redraw, Varying
 from wearsim.plugins import BODIES, Body, ContactModel, Load, LoadTerm, WearLaw
-from wearsim.types import ContactSolution, Creepage, FloatArray, Grid, IntArray, OperatingPoint
+from wearsim.types import (
+    ContactSolution,
+    Creepage,
+    FloatArray,
+    Grid,
+    IntArray,
+    OperatingPoint,
+    OperatingPoints,
+)
 
 
 @dataclass(frozen=True)
@@ -244,27 +252,74 @@ class Scene:
         risen: FloatArray = gap.min(axis=-1) - self.nominal_gap.min(axis=-1)
         return risen
 
-    def creepage(
-        self, contact: int, realisation: int, cylinder_depth: FloatArray, roller_depth: FloatArray
-    ) -> Creepage:
-        """Return the creepage of one contact: yaw gives the lateral part, tilt the spin.
+    def _variation(
+        self,
+        roller: int | IntArray,
+        spin: float | FloatArray,
+        cylinder_depth: FloatArray,
+        roller_depth: FloatArray,
+    ) -> FloatArray | None:
+        """Return how creepage varies over the strips, last axis strips, or None for spin alone.
 
         The tilt counts once in differential slip: as the shift of the contact away from the apex,
         or, where it shifts nothing, as the spin's -phi y.
         """
-        inputs, place, kinematics = self.inputs, (contact, realisation), self.kinematics
-        spin, variation = float(self.spin[place]), None
-        if self.slip_profile is not None:
-            roller = self.roller[contact]
-            variation = (
-                self.slip_profile[roller]
-                + roller_depth / kinematics.roller_radius
-                - cylinder_depth / kinematics.cylinder_radius
-            )
-            if not self.tilt_shifts:
-                variation = variation - spin * self.from_apex[roller]
-        longitudinal, yaw = float(inputs.longitudinal[place]), float(inputs.yaw[place])
-        return Creepage(longitudinal, yaw, spin, variation)
+        if self.slip_profile is None:
+            return None
+        kinematics = self.kinematics
+        variation: FloatArray = (
+            self.slip_profile[roller]
+            + roller_depth / kinematics.roller_radius
+            - cylinder_depth / kinematics.cylinder_radius
+        )
+        return variation if self.tilt_shifts else variation - spin * self.from_apex[roller]
+
+    def points(
+        self, loads: FloatArray, cylinder_depth: FloatArray, roller_depth: FloatArray
+    ) -> Sequence[OperatingPoint]:
+        """Return the operating point of every contact.
+
+        Parameters
+        ----------
+        loads : ndarray, shape (stations, contacts, realisations)
+            Loads [N].
+        cylinder_depth, roller_depth : ndarray
+            Worn depths as in `WearState` [m].
+        """
+        if self.free:
+            return [
+                self.point(
+                    c,
+                    v,
+                    float(loads[s, c, v]),
+                    cylinder_depth[s, 0, v],
+                    roller_depth[0, self.roller[c], v],
+                )
+                for s, c, v in self.contacts
+            ]
+        inputs, shape = self.inputs, self.shape
+        variation = self._variation(
+            self.roller[None, :, None],
+            self.spin[None, :, :, None],
+            cylinder_depth,
+            roller_depth[:, self.roller],
+        )
+        if variation is not None:
+            strips = self.grid.strips
+            variation = np.broadcast_to(variation, (*shape, strips)).reshape(-1, strips)
+        columns = (inputs.longitudinal, inputs.yaw, self.spin, inputs.friction)
+        longitudinal, lateral, spin, friction = (
+            np.broadcast_to(column, shape).ravel() for column in columns
+        )
+        return OperatingPoints(
+            normal_force=loads.ravel(),
+            longitudinal=longitudinal,
+            lateral=lateral,
+            spin=spin,
+            friction=friction,
+            rolling_speed=self.kinematics.rolling_speed,
+            variation=variation,
+        )
 
     def point(
         self,
@@ -275,8 +330,8 @@ class Scene:
         roller_depth: FloatArray,
     ) -> OperatingPoint:
         """Return the operating point of one contact at its worn depths, shape (strips,) [m]."""
-        kinematics, place = self.kinematics, (contact, realisation)
-        radius = None
+        kinematics, inputs, place = self.kinematics, self.inputs, (contact, realisation)
+        spin, radius = float(self.spin[place]), None
         if self.free:
             s = self.from_apex[self.roller[contact]]
             radius = kinematics.roller_radius - s * s / (2.0 * kinematics.crown_radius)
@@ -284,9 +339,14 @@ class Scene:
         return OperatingPoint(
             normal_force=load,
             rolling_speed=kinematics.rolling_speed,
-            creepage=self.creepage(contact, realisation, cylinder_depth, roller_depth),
-            friction=float(self.inputs.friction[place]),
-            bearing_torque=float(self.inputs.bearing_torque[place]) if self.free else None,
+            creepage=Creepage(
+                float(inputs.longitudinal[place]),
+                float(inputs.yaw[place]),
+                spin,
+                self._variation(int(self.roller[contact]), spin, cylinder_depth, roller_depth),
+            ),
+            friction=float(inputs.friction[place]),
+            bearing_torque=float(inputs.bearing_torque[place]) if self.free else None,
             rolling_radius=radius,
         )
 
@@ -298,13 +358,18 @@ class Scene:
         cylinder, roller : ndarray, shape (stations, contacts, realisations, strips)
             Depth per pass of that contact [m].
         """
-        speed = self.kinematics.rolling_speed
-        shape = (*self.shape, self.grid.strips)
-        cylinder, roller = (
-            np.array([self.law.depth_per_pass(body, c, speed) for c in contacts]).reshape(shape)
-            for body in BODIES
-        )
+        cylinder, roller = (self._depth_per_pass(body, contacts) for body in BODIES)
         return cylinder, roller
+
+    def _depth_per_pass(self, body: Body, contacts: Sequence[ContactSolution]) -> FloatArray:
+        """Return the depth one pass of each contact wears off `body` [m]."""
+        speed = self.kinematics.rolling_speed
+        factor = self.law.depth_per_dissipation(body, speed)
+        if factor is not None:
+            depths = factor * np.array([contact.dissipation for contact in contacts])
+        else:
+            depths = np.array([self.law.depth_per_pass(body, c, speed) for c in contacts])
+        return depths.reshape(*self.shape, self.grid.strips)
 
     def shared_wear(
         self, cylinder: FloatArray, roller: FloatArray

@@ -134,7 +134,11 @@ class Slender(ContactModel):
         if warm is not None:
             line_load[:] = [solution.line_load for solution in warm]
             approach[:] = [solution.approach for solution in warm]
-        loads = np.array([point.normal_force for point in points])
+        columns = self._columns(points)
+        if columns is not None:
+            loads = _own(columns.normal_force)
+        else:
+            loads = np.array([point.normal_force for point in points])
         arguments = (
             _own(gap),
             *wear.reduced,
@@ -150,7 +154,6 @@ class Slender(ContactModel):
             line_load[:] = 0.0
             status, iterations = kernels.solve_slender(*arguments, line_load, approach)
         self._check(status, gap, loads, line_load, approach)
-        columns = self._columns(points)
         if columns is not None:
             count = np.full(len(loads), iterations, dtype=np.int64)
             shape = (len(loads),)

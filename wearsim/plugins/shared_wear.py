@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -71,21 +71,46 @@ class SharedWear:
             Number of each contact's shared bodies, counted over both columns, or -1.
         shared : ndarray, shape (contacts, 2, strips)
         """
-        own, shared = np.zeros_like(self.compliance[:, 0]), self.compliance.copy()
-        members = self.bodies.copy()
-        if _same_groups(members):
+        shared = self.compliance.copy()
+        merged, members = _membership(self.bodies.tobytes(), len(self.bodies))
+        if merged:
             shared[:, 0] += shared[:, 1]
-            members[:, 1] = NO_BODY
-        for side in (0, 1):
-            for body in np.unique(members[:, side]):
-                touching = members[:, side] == body
-                if body == NO_BODY or touching.sum() == 1 or not shared[touching, side].any():
-                    own[touching] += shared[touching, side] if body != NO_BODY else 0.0
-                    members[touching, side] = NO_BODY
-        kept = members != NO_BODY
-        members[:, 1] += (members[:, 0].max() + 1) * kept[:, 1]
-        members[kept] = np.unique(members[kept], return_inverse=True)[1]
-        return own, members, np.ascontiguousarray(np.where(kept[:, :, None], shared, 0.0))
+            shared[:, 1] = 0.0
+        idle = np.logical_not(shared.any(axis=(0, 2)))
+        members = np.where(idle, NO_BODY, members)
+        alone = (members == NO_BODY)[:, :, None]
+        own: FloatArray = np.where(alone, shared, 0.0).sum(axis=1)
+        shared[alone[:, :, 0]] = 0.0
+        return own, _counted(members) if idle[0] else members, shared
+
+
+@lru_cache(maxsize=64)
+def _membership(bodies: bytes, contacts: int) -> tuple[bool, IntArray]:
+    """Return whether both sides are one, and which shared bodies each contact has.
+
+    Parameters
+    ----------
+    bodies : bytes
+        The array `bodies` of a `SharedWear`.
+    contacts : int
+        Its length.
+    """
+    members = np.frombuffer(bodies, dtype=np.int64).reshape(contacts, 2).copy()
+    merged = _same_groups(members)
+    if merged:
+        members[:, 1] = NO_BODY
+    for side in (0, 1):
+        numbers, place, count = np.unique(members[:, side], return_inverse=True, return_counts=True)
+        members[(count == 1)[place] | (numbers[place] == NO_BODY), side] = NO_BODY
+    members[:, 1] += (members[:, 0].max() + 1) * (members[:, 1] != NO_BODY)
+    return merged, _counted(members)
+
+
+def _counted(members: IntArray) -> IntArray:
+    """Return the numbers of bodies counted from 0 without gaps."""
+    counted, kept = members.copy(), members != NO_BODY
+    counted[kept] = np.unique(members[kept], return_inverse=True)[1]
+    return counted
 
 
 def _same_groups(members: IntArray) -> bool:
