@@ -30,6 +30,7 @@ from wearsim.quantities import (
     Torque,
     WearFactor,
     conversion,
+    in_engineers_unit,
     quantity,
     shown,
 )
@@ -262,3 +263,21 @@ def test_that_importing_costs_no_pint() -> None:
     code = "import sys, wearsim.quantities, wearsim.tables; print('pint' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "told"),
+    [
+        (0.0125, "m", "12.5 mm"),
+        (6.9e5, "N/m", "690 N/mm"),
+        (-2e-4, "rad", "-0.2 mrad"),
+        (1.1e-11, "1/Pa", "1.1e-11 1/Pa"),
+        (0.1, "1", "0.1"),
+        (0.0, "m", "0"),
+        (math.inf, "N", "inf"),
+    ],
+)
+def test_that_an_si_value_is_told_in_the_unit_of_engineers(
+    value: float, unit: str, told: str
+) -> None:
+    assert in_engineers_unit(value, unit) == told

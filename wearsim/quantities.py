@@ -302,6 +302,48 @@ class Quantity:
         }
 
 
+def engineers_unit(unit: str) -> tuple[str, float]:
+    """Return the unit that engineers use for what an SI unit measures, and its size in SI.
+
+    Parameters
+    ----------
+    unit : str
+        In SI; "1" for a plain number.
+
+    Returns
+    -------
+    (str, float)
+        "mm" and 1e-3 for "m"; "1" and 1 for a plain number.
+    """
+    if unit == "1":
+        return unit, 1.0
+    engineers = _kind_of(unit).example.split(maxsplit=1)[1]
+    return engineers, float(conversion(engineers, unit))
+
+
+def in_engineers_unit(value: float, unit: str, digits: int = 6) -> str:
+    """Return an SI value in the unit that engineers use, with that unit.
+
+    Parameters
+    ----------
+    value : float
+        In SI.
+    unit : str
+        Its SI unit; "1" for a plain number.
+    digits : int
+        Significant digits.
+
+    Returns
+    -------
+    str
+        "12.5 mm" for 0.0125 and "m"; zero and infinity stand without a unit.
+    """
+    if unit == "1" or value in {0.0, float("inf"), -float("inf")}:
+        return f"{value:.{digits}g}"
+    engineers, size = engineers_unit(unit)
+    return f"{value / size:.{digits}g} {engineers}"
+
+
 def quantity(text: str, unit: str) -> float:
     """Return a quantity written with its unit as a number of `unit`.
 

@@ -7,20 +7,14 @@ from pathlib import Path
 
 from typer.testing import Result
 
+from tests.rig_text import BODIES, RUBBING
+
 Command = Callable[..., Result]
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
-SHORT = """\
-title = "a short [test]"
-
-[roller]
-radius = "20 mm"
-crown_radius = "500 mm"
-material = "steel"
-
-[cylinder]
-radius = "25 mm"
-material = "steel"
-
+SHORT = (
+    'title = "a short [test]"\n\n'
+    + BODIES
+    + """
 [operation]
 speed = "1000 rpm"
 duration = "2 min"
@@ -29,12 +23,9 @@ rollers = 3
 [load]
 normal_force = "300 N"
 
-[friction]
-coefficient = 0.1
-
-[creepage]
-longitudinal = 1e-3
-
+"""
+    + RUBBING
+    + """
 [wear]
 [wear.cylinder]
 k_over_h = "1.1e-11 1/Pa"
@@ -42,3 +33,4 @@ k_over_h = "1.1e-11 1/Pa"
 [wear.roller]
 k_over_h = "0 1/Pa"
 """
+)

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import json
+import re
 import signal
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from cli_examples import SCENARIOS, Command
 
 from wearsim.cli.counting import CountedLines
 from wearsim.cli.progress import Clock
 from wearsim.results import open_dissipation
+from wearsim.studies.study_size import MOST_BYTES
 
 PAPER = SCENARIOS / "paper-monte-carlo.toml"
 SMALL = ("--set", "contact.mx=8", "--set", "contact.my=12", "-n", 50)
@@ -132,12 +135,8 @@ def test_that_plot_draws_a_study(command: Command, studied: Path) -> None:
     assert "goes with a wear test" in refused.stderr
 
 
-@pytest.mark.parametrize("arguments", [("resume",), ("export", "-o", "out")])
-def test_that_a_study_is_no_wear_test(
-    command: Command, studied: Path, arguments: tuple[str, ...]
-) -> None:
-    verb, *options = arguments
-    result = command(verb, studied, *options)
+def test_that_a_study_is_no_wear_test(command: Command, studied: Path) -> None:
+    result = command("resume", studied)
     assert result.exit_code == 2
     assert result.stderr == (
         f"error: {studied}: holds realisations of one contact, from `wearsim dissipation`; what is"
@@ -156,7 +155,9 @@ def test_that_a_signal_ends_a_study_that_keeps_what_is_done(tmp_path: Path) -> N
         running.send_signal(signal.SIGINT)
         said = running.stderr.read()
     assert running.returncode == 130
-    assert "realisations; they are in a.h5" in said
+    assert "what is done is kept" in said
+    assert "checkpoint" not in said
+    assert "realisations; they are in a.h5; draw them with: wearsim plot a.h5" in said
     kept = open_dissipation(tmp_path / "a.h5")
     assert not kept.finished
     assert 0 < kept.count < 200_000
@@ -169,3 +170,149 @@ def test_that_counted_lines_are_a_second_apart() -> None:
     for done in (10, 20, 30, 40):
         counted(done, 1040)
     assert lines == ["20 of 1,040 realisations, 56 s left", "40 of 1,040 realisations, 55 s left"]
+
+
+def _own(name: str = "u.toml", **changes: str) -> Path:
+    """Write the paper's scenario, coarse and with changes, into the current folder."""
+    text = PAPER.read_text()
+    for old, new in changes.values():
+        assert old in text
+        text = text.replace(old, new)
+    path = Path(name)
+    path.write_text(text)
+    return path
+
+
+def test_that_force_replaces_no_input(command: Command) -> None:
+    scenario = _own()
+    before = scenario.read_bytes()
+    refused = command("dissipation", scenario, *SMALL, "-o", "u.toml", "--force")
+    assert refused.exit_code == 2
+    assert refused.stderr == (
+        "error: u.toml: the scenario is read from u.toml, and --force replaces no input; choose"
+        " another name with -o\n"
+    )
+    assert scenario.read_bytes() == before
+
+
+def test_that_force_replaces_no_file_that_the_scenario_reads(command: Command) -> None:
+    table = '{distribution = "table", file = "samples.csv"}'
+    text = PAPER.read_text()
+    start = text.index("[friction.coefficient]")
+    end = text.index("\n[", start)
+    Path("u.toml").write_text(f"{text[:start]}[friction]\ncoefficient = {table}\n{text[end:]}")
+    Path("samples.csv").write_text("value\n0.08\n0.1\n0.12\n")
+    for name in ("samples.csv", "./samples.csv", str(Path("samples.csv").resolve())):
+        refused = command("dissipation", "u.toml", *SMALL, "-o", name, "--force")
+        assert refused.exit_code == 2, refused.output
+        assert "the scenario is read from samples.csv" in refused.stderr
+    Path("link.png").symlink_to("samples.csv")
+    refused = command("dissipation", "u.toml", *SMALL, "--figure", "link.png", "--force")
+    assert refused.exit_code == 2
+    assert "choose another name with --figure" in refused.stderr
+    assert Path("samples.csv").read_text().startswith("value")
+
+
+def test_that_figure_and_results_have_a_file_each(command: Command) -> None:
+    result = command("dissipation", PAPER, *SMALL, "-o", "a.png", "--figure", "./a.png")
+    assert result.exit_code == 2
+    assert "is the results file too" in result.stderr
+    assert not Path("a.png").exists()
+
+
+def test_that_more_realisations_than_memory_holds_are_bad_input(command: Command) -> None:
+    result = command("dissipation", PAPER, "-n", 100_000_000_000)
+    assert result.exit_code == 2
+    told = re.search(r"(\S+) GB of memory, (\d+) bytes each, .* at most (\d+),", result.stderr)
+    assert told is not None
+    assert float(told[1]) == pytest.approx(1e11 * int(told[2]) / 1e9, rel=1e-3)
+    assert int(told[3]) == MOST_BYTES // int(told[2])
+
+
+def test_that_drawn_values_are_told_in_engineers_units(command: Command, studied: Path) -> None:
+    rows = command("show", studied).stdout
+    yaw = open_dissipation(studied).inputs["creepage.yaw"]
+    assert f"mean {yaw.mean() * 1e3:.4g} mrad, std {yaw.std(ddof=1) * 1e3:.4g} mrad" in rows
+
+
+def test_that_an_interval_holds_its_estimate_as_printed(command: Command) -> None:
+    result = command("dissipation", PAPER, *SMALL[:-1], 1000, "-q", "-o", "a.h5")
+    for line in result.stdout.splitlines():
+        told = re.search(
+            r"%\s+(\S+) to (\S+) W \(95 % confidence: (\S+) to (\S+) and (\S+) to (\S+)\)", line
+        )
+        if told:
+            low, high, *ends = (float(number) for number in told.groups())
+            assert ends[0] <= low <= ends[1]
+            assert ends[2] <= high <= ends[3]
+            break
+    else:
+        pytest.fail("no interval is told")
+
+
+def test_that_few_realisations_have_no_interval_and_one_no_confidence(command: Command) -> None:
+    few = command("dissipation", PAPER, *SMALL[:-1], 5, "-q", "-o", "a.h5").stdout
+    assert "(95 % confidence: too few realisations)" in few
+    assert "?" not in few
+    one = command("dissipation", PAPER, *SMALL[:-1], 1, "-q", "-o", "b.h5").stdout
+    assert "confidence" not in one
+    assert " to " not in one
+
+
+def test_that_a_field_is_told_by_what_it_is(command: Command) -> None:
+    field = (
+        'friction.coefficient={distribution="gaussian-field", correlation_length="500 um",'
+        ' marginal={distribution="uniform", low=0.08, high=0.12}}'
+    )
+    arguments = ("--set", field, "--set", "contact.mx=30", "--set", "contact.my=30", "-n", 3)
+    result = command("dissipation", PAPER, *arguments, "-q", "-o", "a.h5")
+    assert result.exit_code == 0, result.output
+    flat = " ".join(result.stdout.split())
+    assert (
+        "random friction.coefficient gaussian-field, correlation length 500 um, frame contact, of"
+        " uniform, mean 0.1, std 0.011547, on [0.08, 0.12], per-test"
+    ) in flat
+    assert " ".join(command("show", "a.h5").stdout.split()).count("correlation length 500 um") == 1
+    shown = json.loads(command("show", "a.h5", "--json").stdout)
+    assert shown["random"].keys() == {"friction.coefficient"}
+
+
+def test_that_rounding_is_not_told_as_a_result(command: Command) -> None:
+    _own(angles=("[creepage.misalignment]", "[creepage.none]"))
+    text = Path("u.toml").read_text()
+    start = text.index("[creepage.none]")
+    end = text.find("\n[", start)
+    Path("u.toml").write_text(text[:start] + (text[end:] if end > 0 else ""))
+    steady = ("--set", "load.normal_force=300 N", "--set", "friction.coefficient=0.1")
+    result = command("dissipation", "u.toml", *SMALL, *steady, "-q", "-o", "a.h5")
+    assert result.exit_code == 0, result.output
+    rows = {line[:18].strip(): line[18:].split() for line in result.stdout.splitlines()}
+    assert rows["normal force"] == ["300.0", "N", "-", "constant", "-", "-"]
+    assert rows["spin moment"] == ["0", "N", "mm", "-", "constant", "-", "-"]
+    assert rows["lateral force"] == ["0", "N", "-", "constant", "-", "-"]
+
+
+def test_that_export_writes_a_study(command: Command, studied: Path) -> None:
+    result = command("export", studied, "-o", "out")
+    assert result.exit_code == 0, result.output
+    assert result.stdout.splitlines() == [
+        f"out/{name}" for name in ("realisations.csv", "strips.csv", "scenario.toml")
+    ]
+    kept = open_dissipation(studied)
+    text = Path("out/realisations.csv").read_text()
+    head = text.splitlines()[0].split(",")
+    table = np.loadtxt(text.splitlines()[1:], delimiter=",")
+    for title, values in {
+        "load.normal_force [N]": kept.inputs["load.normal_force"],
+        "creepage.yaw [mrad]": kept.inputs["creepage.yaw"] * 1e3,
+        "power [W]": kept.power,
+        "spin_moment [N mm]": kept.values("spin_moment") * 1e3,
+        "peak_pressure [MPa]": kept.values("peak_pressure") * 1e-6,
+    }.items():
+        np.testing.assert_allclose(table[:, head.index(title)], values, rtol=1e-11)
+    strips = Path("out/strips.csv").read_text().splitlines()
+    assert strips[0].split(",")[:2] == ["y [mm]", "dissipation_mean [W/m]"]
+    found = np.loadtxt(strips[1:], delimiter=",")
+    np.testing.assert_allclose(found[:, 0], kept.y * 1e3, rtol=1e-11)
+    np.testing.assert_allclose(found[:, 1], kept.values("dissipation_mean"), rtol=1e-11)
+    assert not any(cell == "-0" for line in strips for cell in line.split(","))

@@ -182,3 +182,28 @@ def test_that_a_model_without_fields_still_gets_a_figure(
     assert result.exit_code == 0
     assert "gives no fields" in result.stderr
     assert (tmp_path / "c.svg").read_text().count("<svg") == 1
+
+
+def test_that_contact_says_that_random_inputs_stand_at_their_means(command: Command) -> None:
+    paper = SCENARIOS / "paper-monte-carlo.toml"
+    field = (
+        'friction.coefficient={distribution="white", marginal={distribution="uniform", low=0.08,'
+        " high=0.12}}"
+    )
+    lines = command("contact", paper, "--set", field).stderr.splitlines()
+    assert (
+        "random inputs stand at their means: creepage.longitudinal, creepage.misalignment,"
+        " load.normal_force"
+    ) in lines
+    assert "friction.coefficient, a field, stands at the mean of its marginal" in lines
+    assert "means" not in command("contact", SCENARIOS / "mean-contact.toml").stderr
+
+
+def test_that_a_figure_replaces_no_profile(command: Command) -> None:
+    profile = Path("worn.png")
+    profile.write_text("y [mm],height [um]\n-5,0\n0,-1\n5,0\n")
+    arguments = ("contact", SCENARIOS / "mean-contact.toml", "--profile", profile)
+    result = command(*arguments, "-o", profile, "--force")
+    assert result.exit_code == 2
+    assert "the profile is read from worn.png" in result.stderr
+    assert profile.read_text().startswith("y [mm]")

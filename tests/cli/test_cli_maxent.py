@@ -86,3 +86,34 @@ def test_that_a_figure_is_drawn_and_an_existing_one_left(
     assert figure.read_bytes().startswith(b"\x89PNG")
     assert command(*arguments).exit_code == 2
     assert command(*arguments, "--force").exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("known", "told"),
+    [
+        (("--mean", "1e-300", "--std", "1e-301"), "std 1e-301 is too small to be squared"),
+        (("--mean", "1e300", "--std", "1e299"), "mean 1e+300 is too large to be squared"),
+        (("--mean", "2", "--mean-log", "3"), "--mean-log 3 is not less than log(mean) = 0.693147"),
+        (("--mean-log", "3"), "--mean-log 3 needs the mean too"),
+        (("--mean", "nan"), "mean must be finite, got nan"),
+    ],
+)
+def test_that_an_error_names_the_options_and_values_as_typed(
+    command: Command, known: tuple[str, ...], told: str
+) -> None:
+    result = command("maxent", "--support", "0", "inf", *known)
+    assert result.exit_code == 2
+    assert result.stderr.startswith(f"error: {told}")
+
+
+@pytest.mark.parametrize("std", ["0.5", "0.35", "0.7"])
+def test_that_rounding_is_told_as_zero(command: Command, std: str) -> None:
+    arguments = ("maxent", "--support", "-1", "1", "--mean", "0", "--std", std)
+    data = json.loads(command(*arguments, "--json").stdout)
+    assert (data["mean"], data["quantiles"]["0.5"], data["multipliers"]["l1"]) == (0.0, 0.0, 0.0)
+    assert "e-1" not in command(*arguments).stdout
+
+
+def test_that_a_small_value_is_told_as_it_is(command: Command) -> None:
+    arguments = ("maxent", "--support", "0", "inf", "--mean", "1e-14", "--std", "1e-15", "--json")
+    assert json.loads(command(*arguments).stdout)["quantiles"]["0.5"] == pytest.approx(1e-14)

@@ -157,3 +157,38 @@ def test_that_resume_refuses_to_go_back(command: Command, finished: Path) -> Non
     result = command("resume", finished, "--until", "1 min")
     assert result.exit_code == 2
     assert "past 1 min" in result.stderr
+
+
+def test_that_force_replaces_not_the_scenario(command: Command, scenario: Path) -> None:
+    before = scenario.read_bytes()
+    result = command("run", scenario, "--force", "-o", scenario)
+    assert result.exit_code == 2
+    assert f"the scenario is read from {scenario}" in result.stderr
+    assert scenario.read_bytes() == before
+
+
+def test_that_run_and_show_tell_what_is_drawn_and_what_stays_random(
+    command: Command, scenario: Path
+) -> None:
+    changes = (
+        'wear.cylinder.k_over_h={distribution="constant", value="2e-11 1/Pa"}',
+        'creepage.yaw={distribution="uniform", low="1 mrad", high="2 mrad"}',
+        (
+            'load.normal_force={distribution="ornstein-uhlenbeck", correlation_time="5 min",'
+            ' marginal={distribution="uniform", low="280 N", high="320 N"}}'
+        ),
+    )
+    settings = [word for text in changes for word in ("--set", text)]
+    told = command("run", scenario, "-q", *settings)
+    assert told.exit_code == 0, told.output
+    found = open_results("short.h5")
+    yaw = found.drawn["creepage.yaw"]
+    assert found.drawn["wear.cylinder.k_over_h"] == (2e-11,)
+    for result in (told, command("show", "short.h5")):
+        flat = " ".join(result.stdout.split())
+        assert f"drawn creepage.yaw {yaw[0] * 1e3:.6g} mrad" in flat
+        assert "drawn wear.cylinder.k_over_h 2e-11 1/Pa" in flat
+        assert "random load.normal_force ornstein-uhlenbeck, correlation time 5 min, of" in flat
+    assert json.loads(command("show", "short.h5", "--json").stdout)["random"].keys() == {
+        "load.normal_force"
+    }

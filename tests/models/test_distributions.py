@@ -136,7 +136,21 @@ def test_that_warnings_of_a_law_are_passed_on() -> None:
 def test_that_samples_of_a_table_are_read_in_the_unit_of_the_host() -> None:
     made = build("table", {**NEWTON, "read": reader(SAMPLES)}, file="data.csv")
     assert made.support == (100.0, 800.0)
-    assert made.quantile(np.array([0.25, 0.5, 0.875])) == pytest.approx([200.0, 300.0, 600.0])
+    assert made.quantile(np.array([0.3, 0.5, 0.8])) == pytest.approx([200.0, 300.0, 600.0])
+
+
+def test_that_samples_of_a_table_count_alike() -> None:
+    samples = [0.05, 0.1, 0.1, 0.1, 0.3]
+    text = "value\n" + "\n".join(str(sample) for sample in samples)
+    made = build("table", {"read": reader(text)}, file="data.csv")
+    assert made.mean == pytest.approx(0.13, rel=1e-14)
+    # sample i stands at (i - 1/2)/n, and beyond the first and the last the quantiles are level
+    middles = (np.arange(5) + 0.5) / 5.0
+    assert made.quantile(middles) == pytest.approx(samples, rel=1e-14)
+    assert made.quantile(np.array([0.0, 0.05, 0.95, 1.0])).tolist() == [0.05, 0.05, 0.3, 0.3]
+    # the law is linear between them: its variance is theirs less a sixth of the squared gaps' mean
+    inner = np.square(np.diff(samples)).sum() / 6.0 / 5.0
+    assert made.std**2 == pytest.approx(np.var(samples) - inner, rel=1e-13)
 
 
 def test_that_a_table_of_quantiles_is_linear_between_them() -> None:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
+from tests.rig_text import BODIES, RUBBING
 from wearsim.plugins import LoadSpec, Options, hookimpl
 from wearsim.scenario import Scenario, parse_scenario
 
@@ -16,27 +17,17 @@ HOOKS = (
     "wearsim_loads",
     "wearsim_random_inputs",
 )
-RIG = """\
-[roller]
-radius = "20 mm"
-crown_radius = "500 mm"
-material = "steel"
-
-[cylinder]
-radius = "25 mm"
-material = "steel"
-
+RIG = (
+    BODIES
+    + """
 [operation]
 speed = "1000 rpm"
 duration = "2 min"
 rollers = 3
 
-[friction]
-coefficient = 0.1
-
-[creepage]
-longitudinal = 1e-3
 """
+    + RUBBING
+)
 TABLES = {
     "contact": 'model = "slender"',
     "load": 'kind = "constant"\nnormal_force = "300 N"',
@@ -72,7 +63,11 @@ def load_named(name: str) -> Callable[[], list[LoadSpec]]:
     return lambda: [LoadSpec(name, Options, "a load", factory=lambda options: None)]
 
 
-def rig(overrides: dict[str, object] | None = None, **tables: str) -> Scenario:
+def rig(
+    overrides: dict[str, object] | None = None,
+    read: Callable[[str], str] = {}.__getitem__,
+    **tables: str,
+) -> Scenario:
     """Return a short test of the rig, with some of its tables replaced."""
     text = RIG + "".join(f"\n[{name}]\n{body}\n" for name, body in (TABLES | tables).items())
-    return parse_scenario(text, "rig.toml", {}.__getitem__, overrides)
+    return parse_scenario(text, "rig.toml", read, overrides)

@@ -14,6 +14,7 @@ import pytest
 from plugin_examples import HOOKS, Point, rig
 
 import wearsim
+from wearsim.errors import ScenarioError
 from wearsim.plugins import LoadSpec, RandomInputSpec, WearLawSpec, hookspecs, registry
 
 
@@ -95,6 +96,18 @@ def test_that_the_example_of_a_load_runs(example, stepper):
     result = wearsim.run(scenario)
     assert result.normal_force[0] == pytest.approx(200.0, rel=1e-3)
     assert result.normal_force[-1] == pytest.approx(200.0 + 0.5 * 120.0, rel=5e-3)
+
+
+@pytest.mark.parametrize("place", [0, 30])
+def test_that_an_option_of_a_load_that_seldom_differs_is_seen_to_change_the_contact(example, place):
+    example("wearsim_loads")
+    starts = ["200"] * 30
+    starts.insert(place, "199" if place == 0 else "201")
+    read = {"starts.csv": "\n".join(["value", *starts])}.__getitem__
+    start = '{ distribution = "table", file = "starts.csv" }'
+    scenario = rig(load=f'kind = "ramp"\nstart = {start}\nslope = 0.5', read=read)
+    with pytest.raises(ScenarioError, match=r"\[load\] start: changes the load of the contact"):
+        wearsim.dissipation(scenario, 2)
 
 
 def test_that_the_load_of_the_example_has_exact_moments(example):

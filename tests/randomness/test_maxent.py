@@ -244,7 +244,7 @@ INFEASIBLE = [
     ((0.0, INF), 7.0, None, 2.0, "mean_log 2 is not less than log(mean) = 1.94591"),
     ((0.0, 9.0), 7.0, None, 1.0, "mean_log needs the support [0, inf), got [0, 9]"),
     ((0.0, INF), 7.0, 1.0, 1.0, "takes the place of the std"),
-    ((0.0, INF), None, None, 1.0, "mean_log needs the mean"),
+    ((0.0, INF), None, None, 1.0, "mean_log 1 needs the mean too"),
     ((0.0, INF), -7.0, None, 1.0, "mean -7 does not lie inside"),
     ((0.0, 1e9), 1.0, 1.1, None, "std 1.1 is more than mean - low = 1, which takes a probability"),
     ((-1e9, 0.0), -1.0, 1.1, None, "std 1.1 is more than high - mean = 1, which takes"),

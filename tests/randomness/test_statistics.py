@@ -10,7 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from wearsim.randomness.statistics import RowMoments, converge, order_ranks, summarise
+from wearsim.randomness.statistics import (
+    RowMoments,
+    converge,
+    is_constant,
+    order_ranks,
+    summarise,
+)
 
 
 def _coverage(count: int, probability: float, low: int, high: int) -> float:
@@ -132,3 +138,13 @@ def test_that_looking_at_the_moments_of_rows_changes_nothing():
     one = RowMoments(2)
     one.add(rows[:1])
     assert np.isnan(one.mean_and_std()[1]).all()
+
+
+def test_that_values_that_differ_by_rounding_alone_are_constant() -> None:
+    rounded = summarise(np.array([0.1, 0.1, np.nextafter(0.1, 1.0)]))
+    assert rounded.is_constant
+    assert math.isnan(rounded.skewness)
+    assert not summarise(np.array([0.1, 0.1 + 1e-8])).is_constant
+    assert not summarise(np.array([0.1])).is_constant
+    assert not is_constant(0.0, 1e-15)
+    assert is_constant(0.0, 1e-15, rounding=1e-14)

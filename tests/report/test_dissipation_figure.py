@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -76,3 +77,37 @@ def test_that_the_band_is_that_of_the_file(result):
 def test_that_few_realisations_have_a_figure_too(tmp_path, count):
     save_figure(dissipation_figure(study(count)), tmp_path / "a.png")
     assert (tmp_path / "a.png").stat().st_size > 10_000
+
+
+def steady(count: int) -> DissipationResult:
+    """Return a study whose realisations are all the same."""
+    mean = {"distribution": "constant", "value": "300 N"}
+    changes = {"load.normal_force": mean, "friction.coefficient": 0.1, "contact.mx": 8}
+    zero = {"distribution": "disc", "radius": "1e-12 mrad"}
+    changes |= {"creepage.longitudinal": 1e-3, "creepage.misalignment": zero, "contact.my": 12}
+    return dissipation(load_scenario(PAPER, changes), count)
+
+
+def test_that_no_power_below_zero_is_drawn(result):
+    wide = replace(
+        result.raw, variables={**result.raw.variables, "power": result.power - result.power.min()}
+    )
+    axes = panel(dissipation_figure(DissipationResult(wide)), "Density")
+    assert axes.get_lines()[0].get_xdata().min() >= 0.0
+    assert axes.get_xlim()[0] == 0.0
+
+
+def test_that_a_constant_power_has_no_density_and_one_curve():
+    found = steady(300)
+    assert found.summaries["power"].is_constant
+    figure = dissipation_figure(found)
+    density = panel(figure, "Density")
+    assert not density.patches
+    assert not density.get_lines()
+    assert f"{found.power[0]:.4g}" in density.texts[0].get_text()
+    curves = panel(figure, "Power per axial length, the same in all")
+    assert len(curves.get_lines()) == 1
+    low, high = panel(figure, "Mean power").get_ylim()
+    assert low < 0.0 < found.power[0] < high
+    assert high == pytest.approx(2 * found.power[0])
+    assert panel(figure, "Standard deviation").get_lines()[0].get_ydata().max() == 0.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wearsim.results import RunData
-from wearsim.results.data import Arrays
+from wearsim.results.content import Arrays
 from wearsim.results.layout import AXES, VARIABLES
 
 SCENARIO = 'title = "a rig"\n# µ = 0.1\n[load]\nfile = "load.csv"\n'

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import fields
 from pathlib import Path
 
@@ -184,3 +185,14 @@ def test_that_convergence_ends_at_the_summary():
     assert (np.diff(found.count) > 0).all()
     assert found.mean[-1] == pytest.approx(power.mean, rel=1e-13)
     assert found.std_error[-1] == power.std_error
+
+
+def test_that_a_study_is_told_in_a_line():
+    assert re.fullmatch(
+        r"<DissipationResult 'a contact': 40 of 50 realisations, power [\d.]+ W, std [\d.]+ W>",
+        repr(DissipationResult(some_study())),
+    )
+    one = DissipationResult(some_study(count=1, kept=1, asked=1, finished=True))
+    assert repr(one) == (
+        f"<DissipationResult 'a contact': 1 realisation, power {one.power[0]:.4g} W>"
+    )

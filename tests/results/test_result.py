@@ -99,3 +99,18 @@ def test_that_a_result_cannot_be_reassigned() -> None:
     assert (result.model, result.stepper, result.finished) == ("slender", "implicit", False)
     with pytest.raises(AttributeError):
         result.depth = result.width  # type: ignore[misc]
+
+
+def test_that_a_run_is_told_in_a_line() -> None:
+    result = Result(some_run())
+    depth = result.depth[-1] * 1e6
+    assert repr(result) == f"<Result 'a rig': 4000 of 1350000 roller passes, depth {depth:.4g} um>"
+    assert repr(Result(some_run(finished=True, total_passes=4000.0))) == (
+        f"<Result 'a rig': 4000 roller passes, depth {depth:.4g} um>"
+    )
+
+
+def test_that_drawn_values_are_had_by_their_key() -> None:
+    drawn = {"creepage.yaw": {"values": [1e-3, 2e-3], "unit": "rad"}}
+    assert Result(some_run(drawn=drawn)).drawn == {"creepage.yaw": (1e-3, 2e-3)}
+    assert Result(some_run()).drawn == {}

@@ -164,3 +164,21 @@ def test_that_an_output_that_cannot_be_written_is_told_before_the_run(
     monkeypatch.setattr(os, "access", lambda path, mode: False)
     with pytest.raises(ResultsFileError, match="is not writable"):
         check_output(tmp_path / "run.h5", force=False)
+
+
+@pytest.mark.parametrize("name", ["run.png", "run.PDF", "run.svg", "run.toml", "run.csv"])
+def test_that_a_name_of_another_kind_of_file_is_refused(tmp_path: Path, name: str) -> None:
+    with pytest.raises(ResultsFileError, match=r"no results file ends in .*, such as run\.h5"):
+        check_output(tmp_path / name, force=True)
+
+
+def test_that_an_input_is_never_replaced_by_whatever_name(tmp_path: Path) -> None:
+    log, link = tmp_path / "log.h5", tmp_path / "link.h5"
+    log.write_text("precious")
+    link.hardlink_to(log)
+    for name in (log, link, tmp_path / "." / "log.h5", tmp_path / ".." / tmp_path.name / "log.h5"):
+        with pytest.raises(ResultsFileError, match=f"the scenario is read from {log}"):
+            check_output(name, force=True, inputs=[tmp_path / "a.toml", log])
+    with pytest.raises(ResultsFileError, match="the scenario is read from"):
+        check_output(tmp_path / "b.h5", force=False, inputs=[tmp_path / "b.h5"])  # not there yet
+    check_output(tmp_path / "other.h5", force=True, inputs=[log])

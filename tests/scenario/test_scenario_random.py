@@ -76,7 +76,7 @@ def test_that_a_draw_is_in_si(rig: Scenario) -> None:
 def test_that_random_inputs_are_told_in_engineers_units(rig: Scenario) -> None:
     assert [item.describe() for item in rig.random] == [
         "square, yaw up to 2 mrad, tilt up to 2 mrad, per-roller",
-        "patches, length 50 um, of bell, mean 0.1, std 0.02, on [0.01, inf), per-pass",
+        "patches, length 50 um, frame contact, of bell, mean 0.1, std 0.02, on [0.01, inf), per-pass",
         f"flat, mean 300 N, std {200 / math.sqrt(12):.6g} N, on [200 N, 400 N], per-test",
         f"flat, mean 2e-11 1/Pa, std {2e-11 / math.sqrt(12):.6g} 1/Pa, on [1e-11 1/Pa, 3e-11 1/Pa], per-test",
     ]
@@ -349,7 +349,7 @@ rig.toml: [load.normal_force] persistance: unknown key (did you mean 'persistenc
     "a marginal below zero": (
         MU,
         'coefficient = {distribution = "patches", length = "1 um", marginal = {distribution = "bell", mean = 1, std = 2}}',
-        'rig.toml: [friction] coefficient: takes values down to -inf, and must be above 0, got patches, length 1 um, of bell, mean 1, std 2, on (-inf, inf), per-test, expected maxent with support [0, "inf"] or truncated-normal',
+        'rig.toml: [friction] coefficient: takes values down to -inf, and must be above 0, got patches, length 1 um, frame contact, of bell, mean 1, std 2, on (-inf, inf), per-test, expected maxent with support [0, "inf"] or truncated-normal',
     ),
     "a radius": (
         'radius = "25 mm"',
@@ -553,3 +553,39 @@ def test_that_a_field_selects_a_contact_model_that_can_take_it():
     assert any("is a field, white" in note for note in chosen.notes)
     asked = parse_scenario(text, "bare.toml", {}.__getitem__, {**field, "contact.model": "slender"})
     assert asked.contact.model == "slender"
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "told"),
+    [
+        (
+            "load.normal_force",
+            {"distributon": "normal", "mean": "300 N", "std": "30 N"},
+            "[load.normal_force] distributon: unknown key (did you mean 'distribution'?)",
+        ),
+        (
+            "creepage.longitudinal",
+            {"mean": 1e-3, "std": 1e-4},
+            "[creepage.longitudinal] distribution: is missing, expected the name of a random input",
+        ),
+        (
+            "friction.coefficient",
+            {"distribution": "constant", "value": -1},
+            "[friction] coefficient: must be above 0, got -1, expected a value above 0",
+        ),
+    ],
+)
+def test_that_a_table_in_the_place_of_a_value_is_told_what_it_lacks(key, value, told):
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario(RIG, {key: value})
+    assert str(caught.value).endswith(told)
+
+
+def test_that_a_number_in_steps_is_told_as_a_multiple():
+    with pytest.raises(ScenarioError, match="expected a multiple of 4 of at least 4"):
+        load_scenario(RIG, {"evolution.nodes": 6})
+
+
+def test_that_a_field_on_friction_is_among_what_is_expected():
+    with pytest.raises(ScenarioError, match=r'"gaussian-field".*"ornstein-uhlenbeck".*"white"'):
+        load_scenario(RIG, {"friction.coefficient": {"distribution": "disc", "radius": "1 mrad"}})

@@ -4,41 +4,32 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from tests.rig_text import BODIES, RUBBING
 from wearsim.scenario import Scenario, load_scenario, parse_scenario
 
 PAPER = Path(__file__).parents[2] / "scenarios" / "paper-monte-carlo.toml"
 COARSE: dict[str, object] = {"contact__mx": 16, "contact__my": 24}
 NO_ANGLES: dict[str, object] = {"creepage__yaw": "0 rad"}  # takes the misalignment's place
 
-CONTACT = """\
-title = "a contact"
-
-[roller]
-radius = "20 mm"
-crown_radius = "500 mm"
-material = "steel"
-
-[cylinder]
-radius = "25 mm"
-material = "steel"
-
+CONTACT = (
+    'title = "a contact"\n\n'
+    + BODIES
+    + """
 [operation]
 speed = "1000 rpm"
 
 [load]
 normal_force = {distribution = "maxent", support = ["0 N", "inf"], mean = "300 N", std = "30 N"}
 
-[friction]
-coefficient = 0.1
-
-[creepage]
-longitudinal = 1e-3
-
+"""
+    + RUBBING
+    + """
 [contact]
 model = "hertz-fastsim"
 mx = 16
 my = 24
 """
+)
 
 
 def paper(**overrides: object) -> Scenario:

@@ -5,24 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from tests.rig_text import BODIES, RUBBING
 from wearsim.errors import Interrupted
 from wearsim.results import Result, RunData
 from wearsim.results.data import differences
 from wearsim.scenario import Scenario, parse_scenario
 from wearsim.studies import replay
 
-RIG = """\
-title = "a rig"
-
-[roller]
-radius = "20 mm"
-crown_radius = "500 mm"
-material = "steel"
-
-[cylinder]
-radius = "25 mm"
-material = "steel"
-
+RIG = (
+    'title = "a rig"\n\n'
+    + BODIES
+    + """
 [operation]
 speed = "1000 rpm"
 passes = 6000
@@ -31,12 +24,9 @@ rollers = 3
 [load]
 normal_force = "300 N"
 
-[friction]
-coefficient = 0.1
-
-[creepage]
-longitudinal = 1e-3
-
+"""
+    + RUBBING
+    + """
 [contact]
 strips = 41
 width = "5 mm"
@@ -49,6 +39,7 @@ roller = { k_over_h = "0 1/Pa" }
 [outputs]
 records = 4
 """
+)
 
 # 50 passes a second: a log of 12 minutes lasts 36 000 passes
 LOG = "time [min],load [N]\n" + "".join(f"{k / 4},{300 + 60 * (-1) ** k + k}\n" for k in range(49))

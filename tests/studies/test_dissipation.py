@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +14,11 @@ from wearsim.errors import CapabilityError, ContactError, Interrupted, ScenarioE
 from wearsim.results import DissipationResult, open_dissipation
 from wearsim.scenario import realise
 from wearsim.studies import dissipation as study
-from wearsim.studies.contact import study_contact
+from wearsim.studies.contact import solve_contact, study_contact
+from wearsim.studies.contact_draws import draw_contacts
 from wearsim.studies.dissipation import dissipation
 from wearsim.studies.realisations import Realisations
+from wearsim.studies.study_size import bytes_of_each
 
 # mean and std [W]: converged, from another program
 PAPERS = {"no angles": (NO_ANGLES, 0.0739, 0.040), "all random": ({}, 0.1058, 0.047)}
@@ -115,7 +119,8 @@ def test_that_one_more_input_changes_no_others_draws(plan):
     key = "load.normal_force"
     assert one[key].tobytes() == two.inputs[key].tobytes()
     assert two.inputs["creepage.longitudinal"].std() > 0.0
-    assert any("upper bounds" in text for text in two.warnings) == (plan != "monte-carlo")
+    said = any("not exact for" in text for text in two.warnings)
+    assert said == (plan != "monte-carlo")
 
 
 CASES: dict[str, dict[str, object]] = {
@@ -253,7 +258,7 @@ def test_that_a_width_that_holds_not_all_is_refused():
 
 
 def test_that_inputs_that_range_too_far_are_refused():
-    with pytest.raises(ScenarioError, match="a number of strips, such as 801"):
+    with pytest.raises(ScenarioError, match=r"a number of strips, such as contact\.strips = 801"):
         dissipation(contact(roller__offset=normal("0 mm", "100 mm")), 20)
 
 
@@ -356,7 +361,22 @@ def test_that_a_field_that_the_grid_does_not_resolve_is_refused_before_the_study
     assert (
         "[friction] coefficient: the grid does not resolve a correlation length of 20 um" in message
     )
-    assert "more contact.mx and more strips" in message
+    assert re.search(r"expected contact\.mx = \d+ and contact\.my = \d+", message)
+
+
+@pytest.mark.parametrize("points", [5, 10])
+def test_that_a_field_is_refused_from_two_points_per_correlation_length_on(points):
+    coarse = {"load__normal_force": "300 N", "contact__mx": points, "contact__my": 201}
+    longest = solve_contact(contact(**coarse)).half_length.max()
+    limit = 2.0 * (2.0 * longest / points)
+
+    def start(length):
+        fine = field("gaussian-field", correlation_length=f"{length * 1e6} um")
+        return Realisations(contact(friction__coefficient=fine, **coarse), 1)
+
+    assert start(1.0001 * limit).friction_points == points
+    with pytest.raises(ScenarioError, match="um along rolling"):
+        start(0.9999 * limit)
 
 
 def test_that_white_friction_names_its_grid_and_warns(tmp_path):
@@ -403,3 +423,70 @@ def test_that_an_existing_file_stands_before_the_study_begins(tmp_path: Path):
     with pytest.raises(Exception, match="--force replaces it"):
         dissipation(contact(), 2, path)
     assert dissipation(contact(), 2, path, force=True).path == path
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        (
+            {"creepage__misalignment": {"distribution": "disc", "radius": "5 deg"}},
+            "[creepage] misalignment: moves contacts by up to",
+        ),
+        (
+            {"creepage__tilt": {"distribution": "uniform", "low": "-90 mrad", "high": "90 mrad"}},
+            "[creepage] tilt: moves contacts by up",
+        ),
+    ],
+)
+def test_that_a_tilt_that_shifts_contacts_too_far_is_named_with_its_shift(changes, told):
+    scenario = contact(contact__my=50, **changes)
+    with pytest.raises(ScenarioError) as caught:
+        dissipation(scenario, 50)
+    message = str(caught.value)
+    assert told in message
+    tilt = np.abs(draw_contacts(scenario, 50).values["creepage.tilt"]).max()
+    assert f"{0.5 * tilt * 1e3:.4g} mm, crown radius x tilt = 500 mm x {tilt * 1e3:.4g}" in message
+    assert "creepage.tilt_shifts_contact = false" in message
+    free = contact(contact__my=50, creepage__tilt_shifts_contact=False, **changes)
+    assert Realisations(free, 50).grid.strips < 100
+
+
+@pytest.mark.parametrize(("scenario", "count"), [("u.toml", 3), (contact(), 2.5), (contact(), "3")])
+def test_that_what_is_no_study_is_told_in_python_too(scenario, count):
+    with pytest.raises(TypeError, match=r"^(scenario|realisations) must be a .*, got "):
+        dissipation(scenario, count)
+
+
+def test_that_the_memory_of_a_realisation_is_not_underrated(monkeypatch):
+    monkeypatch.setattr(study, "MOST_KEPT", 1000)
+    scenario = paper(contact__mx=4, contact__my=6)
+
+    def peak(count: int) -> int:
+        tracemalloc.start()
+        dissipation(scenario, count)
+        found = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return found
+
+    peak(100)  # compiled, and every module imported
+    each = (peak(90_000) - peak(30_000)) / 60_000
+    assert 0.5 * bytes_of_each(scenario) < each < 1.05 * bytes_of_each(scenario)
+
+
+@pytest.mark.parametrize(("mx", "my"), [(16, 24), (16, 400), (400, 24)])
+def test_that_a_grid_too_coarse_for_a_field_is_told_the_least_that_is_not(mx, my):
+    def scenario(along: int, across: int):
+        fine = field("gaussian-field", correlation_length="20 um")
+        grid = {"contact__mx": along, "contact__my": across}
+        return contact(friction__coefficient=fine, **grid)
+
+    with pytest.raises(ScenarioError) as caught:
+        Realisations(scenario(mx, my), 3)
+    told = dict(re.findall(r"contact\.(mx|my) = (\d+)", str(caught.value)))
+    assert ("mx" in told, "my" in told) == (mx == 16, my == 24)
+    needed = {"mx": mx, "my": my} | {key: int(number) for key, number in told.items()}
+    assert Realisations(scenario(needed["mx"], needed["my"]), 3).friction_points == needed["mx"]
+    for key in told:
+        less = {**needed, key: needed[key] - 1}
+        with pytest.raises(ScenarioError, match="does not resolve"):
+            Realisations(scenario(less["mx"], less["my"]), 3)

@@ -40,11 +40,13 @@ def contact(
         check_figure(figure)
         refuse_existing(figure, force)
     loaded = load(scenario, settings)
+    if figure is not None:
+        _keep_inputs(figure, loaded, profile)
     from wearsim.studies.contact import study_contact
 
     has_fields = loaded.contact.spec.capabilities.fields
     study = study_contact(loaded, _profile(profile), figure is not None and has_fields)
-    notes = list(study.notes)
+    notes = [*study.notes, *_means(loaded)]
     if figure is not None and not has_fields:
         notes.append(f"model '{study.model}' gives no fields; the figure shows its strips alone")
     if json:
@@ -56,6 +58,26 @@ def contact(
     if not json:
         for text in [*notes, *([f"figure: {figure}"] if figure else [])]:
             note(text)
+
+
+def _keep_inputs(figure: Path, scenario: Scenario, profile: Path | None) -> None:
+    from wearsim.results import refuse_inputs
+
+    refuse_inputs(figure, scenario.paths)
+    if profile is not None:
+        refuse_inputs(figure, [profile], "the profile")
+
+
+def _means(scenario: Scenario) -> list[str]:
+    """Return a note that names the random inputs, which one contact takes at their means."""
+    fields = [item.name for item in scenario.random if item.role == "field"]
+    others = [item.name for item in scenario.random if item.role != "field"]
+    notes = []
+    if others:
+        notes.append(f"random inputs stand at their means: {', '.join(others)}")
+    if fields:
+        notes.append(f"{', '.join(fields)}, a field, stands at the mean of its marginal")
+    return notes
 
 
 def _profile(path: Path | None) -> Profile | None:

@@ -47,6 +47,11 @@ Seed = Annotated[
     ),
 ]
 
+_STOPPING = (
+    "stopping after these realisations, and what is done is kept; once more to stop at once and"
+    " lose it"
+)
+
 
 def dissipation(
     scenario: ScenarioFile,
@@ -66,11 +71,13 @@ def dissipation(
         refuse_existing(figure, force, "--figure")
     loaded = _read(scenario, settings, plan, seed)
     path = output if output is not None else Path(f"{scenario.stem}-dissipation.h5")
+    if figure is not None:
+        _check_apart(figure, path, loaded)
     from wearsim.cli.counting import counting
     from wearsim.cli.stop import stop_on_signals
     from wearsim.studies.dissipation import dissipation as study
 
-    with stop_on_signals() as stop, counting(quiet, "realisations") as counted:
+    with stop_on_signals(_STOPPING) as stop, counting(quiet, "realisations") as counted:
         result = study(
             loaded,
             realisations,
@@ -91,6 +98,18 @@ def _read(path: Path, settings: list[str] | None, plan: str | None, seed: int | 
     more = [f"sampling.plan={plan}"] if plan is not None else []
     more += [f"seed={seed}"] if seed is not None else []
     return read_scenario(path, [*(settings or []), *more])
+
+
+def _check_apart(figure: Path, output: Path, scenario: Scenario) -> None:
+    """Raise if the figure would take the place of the results file, or of an input."""
+    from wearsim.results import refuse_inputs, same_file
+
+    refuse_inputs(figure, scenario.paths, option="--figure")
+    if same_file(figure, output):
+        raise typer.BadParameter(
+            f"{figure} is the results file too, as -o says; give them different names",
+            param_hint="--figure",
+        )
 
 
 def _report(result: DissipationResult, json: bool, figure: Path | None) -> None:

@@ -19,7 +19,8 @@ Folder = Annotated[
 
 def export(file: ResultsFile, output: Folder) -> None:
     """Write a results file as CSV, units in the headers."""
-    from wearsim.results import export_csv, open_results
+    from wearsim.results import export_csv, is_dissipation, open_dissipation, open_results
 
-    for path in export_csv(open_results(file), output):
+    result = open_dissipation(file) if is_dissipation(file) else open_results(file)
+    for path in export_csv(result, output):
         typer.echo(str(path))

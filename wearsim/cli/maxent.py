@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -52,9 +53,7 @@ def maxent(
     if figure is not None:
         check_figure(figure)
         refuse_existing(figure, force)
-    from wearsim.randomness.maxent import maximum_entropy
-
-    law = maximum_entropy((_limit(support[0]), _limit(support[1])), mean, std, mean_log)
+    law = _law((_limit(support[0]), _limit(support[1])), mean, std, mean_log)
     if figure is not None:
         from wearsim.report.maxent import maxent_figure
         from wearsim.report.saving import save_figure
@@ -81,9 +80,28 @@ def _limit(text: str) -> float:
         ) from error
 
 
+def _law(
+    support: tuple[float, float], mean: float | None, std: float | None, mean_log: float | None
+) -> Law:
+    """Return the law, or raise with the options as they are typed."""
+    from wearsim.randomness.maxent import Infeasible, maximum_entropy
+
+    try:
+        return maximum_entropy(support, mean, std, mean_log)
+    except Infeasible as error:
+        raise Infeasible(_as_typed(str(error))) from error
+
+
+def _as_typed(text: str) -> str:
+    """Return a message in which knowledge is named as the options are."""
+    return re.sub(r"\bmean_log\b", "--mean-log", text)
+
+
 def _rows(law: Law) -> list[tuple[str, str]]:
-    l0, l1, l2 = (f"{value:.7g}" for value in law.multipliers)
-    parent = law.parent
+    from wearsim.report import law_numbers
+
+    l0, l1, l2 = (f"{value:.7g}" for value in law_numbers.multipliers(law))
+    parent = law_numbers.parent(law)
     return [
         ("family", law.family),
         ("support", " to ".join(f"{end:g}" for end in law.support)),
@@ -92,7 +110,7 @@ def _rows(law: Law) -> list[tuple[str, str]]:
         ("l1", l1),
         ("l2", l2),
         ("parent normal law", _parent(parent) if parent else "none"),
-        ("mean", f"{law.mean:.7g}"),
+        ("mean", f"{law_numbers.value(law, law.mean):.7g}"),
         ("standard deviation", f"{law.std:.7g}"),
         *(
             (f"{100.0 * probability:g} % quantile", f"{value:.7g}")
@@ -108,8 +126,10 @@ def _parent(parent: tuple[float, float]) -> str:
 def _quantiles(law: Law) -> dict[float, float]:
     import numpy as np
 
+    from wearsim.report.law_numbers import value
+
     values = law.quantile(np.array(PROBABILITIES)).tolist()
-    return dict(zip(PROBABILITIES, values, strict=True))
+    return {part: value(law, found) for part, found in zip(PROBABILITIES, values, strict=True)}
 
 
 def _plot(law: Law) -> list[str]:
@@ -130,14 +150,17 @@ def _plot(law: Law) -> list[str]:
 
 def _data(law: Law, figure: Path | None) -> dict[str, Any]:
     """Return the law in the unit of what was given."""
-    parent = law.parent
+    from wearsim.report import law_numbers
+
+    parent = law_numbers.parent(law)
+    multipliers = law_numbers.multipliers(law)
     return {
         "family": law.family,
         "support": law.support,
-        "multipliers": dict(zip(("l0", "l1", "l2"), law.multipliers, strict=True)),
+        "multipliers": dict(zip(("l0", "l1", "l2"), multipliers, strict=True)),
         "l2_multiplies": law.third,
         "parent": parent and {"mean": parent[0], "std": parent[1]},
-        "mean": law.mean,
+        "mean": law_numbers.value(law, law.mean),
         "std": law.std,
         "quantiles": _quantiles(law),
         "warnings": list(law.warnings),

@@ -29,8 +29,10 @@ def plot(
     path = figure if figure is not None else Path(f"{file.stem}.png")
     check_figure(path)
     refuse_existing(path, force)
-    from wearsim.results import is_dissipation
+    from wearsim.results import is_dissipation, refuse_inputs
 
+    refuse_inputs(path, [file], "the figure")
+    refuse_inputs(path, measured or [], "a measured profile")
     if is_dissipation(file):
         _draw_study(file, path, measured)
     else:

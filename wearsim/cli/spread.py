@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 from wearsim.cli.output import write_list, write_table
+from wearsim.cli.summary import still_random
+from wearsim.randomness.statistics import is_constant
 from wearsim.report.units import NOTHING, count, lapse, shown
 
 if TYPE_CHECKING:
@@ -29,6 +32,9 @@ WORDS = {
     "peak_pressure": "peak pressure",
 }
 _SI = {"W": "W", "N": "N", "N mm": "N_m", "MPa": "Pa"}
+_ROUNDING = 1e-12  # of forces, in parts of the load
+CONSTANT = "constant"
+_TOO_FEW = "too few realisations"
 
 
 def write_spread(result: DissipationResult, more: Rows) -> None:
@@ -50,9 +56,10 @@ def write_spread(result: DissipationResult, more: Rows) -> None:
     rows += [("inputs at their mean", f"{shown(result.mean_problem_power, 'W')} dissipated")]
     write_table(result.title, [*rows, *_power(result.summaries["power"])])
     heads = ("", "mean", "standard error", "std", "standard error", "skewness")
-    write_list(heads, [_line(name, result.summaries[name]) for name in UNITS])
+    write_list(heads, [_line(name, result) for name in UNITS])
     effort = f"{lapse(raw.solve_seconds)} for the contacts, {lapse(raw.wall_seconds)} in all"
-    write_table("", [*_inputs(result), ("wall time", effort), *more])
+    random = [(f"random {name}", text) for name, text in still_random(result).items()]
+    write_table("", [*_inputs(result), *random, ("wall time", effort), *more])
 
 
 def standing(result: DissipationResult) -> str:
@@ -67,11 +74,14 @@ def standing(result: DissipationResult) -> str:
 
 def _power(power: Summary) -> Rows:
     """Return the ranges of the power, each end with its confidence interval."""
+    if power.count == 1 or power.is_constant:
+        same = "" if power.count == 1 else ", the same in all realisations"
+        return [("power", shown(power.mean, "W") + same)]
     rows = []
     for low, high in ((0.025, 0.975), (0.05, 0.95)):
         ends = [power.quantile(low), power.quantile(high)]
         values = " to ".join(shown(end.value, "W").removesuffix(" W") for end in ends)
-        sure = " and ".join(_interval(end.low, end.high) for end in ends)
+        sure = _confidence([_interval(end.low, end.high) for end in ends])
         name = f"power, {100 * low:g} to {100 * high:g} %"
         rows.append((name, f"{values} W (95 % confidence: {sure})"))
     least, greatest = shown(power.least, "W").removesuffix(" W"), shown(power.greatest, "W")
@@ -79,17 +89,34 @@ def _power(power: Summary) -> Rows:
 
 
 def _interval(low: float, high: float) -> str:
-    ends = (shown(value, "W", 3).removesuffix(" W") for value in (low, high))
-    return " to ".join("?" if end == NOTHING else end for end in ends)
+    # with the digits of the estimate, or it could seem to lie outside
+    ends = [shown(value, "W").removesuffix(" W") for value in (low, high)]
+    return _TOO_FEW if NOTHING in ends else " to ".join(ends)
 
 
-def _line(name: str, summary: Summary) -> tuple[str, ...]:
-    unit = UNITS[name]
+def _confidence(intervals: list[str]) -> str:
+    return intervals[0] if len(set(intervals)) == 1 else " and ".join(intervals)
+
+
+def _rounding(name: str, result: DissipationResult) -> float:
+    """Return what rounding leaves of a force or a moment that is zero, in SI."""
+    load = float(abs(result.values("normal_force")).max())
+    length = result.raw.strip_width * len(result.y)
+    scale = {"force_x": load, "force_y": load, "spin_moment": load * length}
+    return _ROUNDING * scale.get(name, 0.0)
+
+
+def _line(name: str, result: DissipationResult) -> tuple[str, ...]:
+    unit, summary = UNITS[name], result.summaries[name]
+    rounding = _rounding(name, result)
+    mean = 0.0 if abs(summary.mean) <= rounding else summary.mean
+    if is_constant(mean, summary.std, rounding):
+        return (WORDS[name], shown(mean, unit), NOTHING, CONSTANT, NOTHING, NOTHING)
     errors = (shown(value, unit, 2) for value in (summary.mean_error, summary.std_error))
     mean_error, std_error = errors
     return (
         WORDS[name],
-        shown(summary.mean, unit),
+        shown(mean, unit),
         mean_error,
         shown(summary.std, unit),
         std_error,
@@ -98,14 +125,19 @@ def _line(name: str, summary: Summary) -> tuple[str, ...]:
 
 
 def _inputs(result: DissipationResult) -> Rows:
-    """Return mean and standard deviation of what was drawn, in SI as the inputs differ."""
+    """Return mean and standard deviation of what was drawn."""
+    from wearsim.quantities import in_engineers_unit
+
     rows = []
     for item in result.raw.inputs:
-        values = result.inputs[item["key"]]
-        unit = "" if item["unit"] == "1" else f" {item['unit']}"
-        text = f"mean {values.mean():.4g}{unit}"
-        if len(values) > 1:
-            text += f", std {values.std(ddof=1):.4g}{unit}"
+        values, unit = result.inputs[item["key"]], item["unit"]
+        mean = float(values.mean())
+        std = float(values.std(ddof=1)) if len(values) > 1 else math.nan
+        text = f"mean {in_engineers_unit(mean, unit, 4)}"
+        if is_constant(mean, std):
+            text = f"{CONSTANT} {in_engineers_unit(mean, unit, 4)}"
+        elif len(values) > 1:
+            text += f", std {in_engineers_unit(std, unit, 4)}"
         rows.append((f"drawn {item['key']}", text))
     return rows
 
@@ -132,6 +164,7 @@ def as_json(result: DissipationResult) -> dict[str, Any]:
             }
             for item in raw.inputs
         },
+        "random": still_random(result),
         "friction_grid": raw.friction_grid or None,
         "strips": {
             "y_m": result.y,

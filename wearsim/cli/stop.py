@@ -25,11 +25,18 @@ class Stop:
 
 
 @contextmanager
-def stop_on_signals() -> Iterator[Stop]:
+def stop_on_signals(
+    saying: str = "stopping at a checkpoint; once more to stop at once",
+) -> Iterator[Stop]:
     """Catch SIGINT and SIGTERM for as long as the context lasts.
 
     The first signal sets the flag and gives the signals back to the operating system, so that a
     second one ends the process even while compiled code runs; its results file still opens.
+
+    Parameters
+    ----------
+    saying : str
+        What the user is told at the first.
     """
     stop = Stop()
     before = {number: signal.getsignal(number) for number in _SIGNALS}
@@ -38,7 +45,7 @@ def stop_on_signals() -> Iterator[Stop]:
         stop.asked = True
         for caught in _SIGNALS:
             signal.signal(caught, signal.SIG_DFL)
-        note("stopping at a checkpoint; once more to stop at once")
+        note(saying)
 
     for number in _SIGNALS:
         signal.signal(number, ask)

@@ -9,7 +9,7 @@ import numpy as np
 from wearsim.report.units import count, lapse, shown
 
 if TYPE_CHECKING:
-    from wearsim.results import Result
+    from wearsim.results import DissipationResult, Result
 
 Rows = list[tuple[str, str]]
 
@@ -55,12 +55,35 @@ def _with_part(error: Any, depth: Any) -> str:
 
 
 def draws(result: Result) -> Rows:
-    """Return what was drawn in the place of random inputs, in SI."""
+    """Return what was drawn in the place of random inputs, and what stayed random."""
+    from wearsim.quantities import engineers_unit
+
     rows = []
     for key, drawn in result.raw.drawn.items():
-        unit = "" if drawn["unit"] == "1" else f" {drawn['unit']}"
-        rows.append((f"drawn {key}", " / ".join(f"{v:.6g}" for v in drawn["values"]) + unit))
-    return rows
+        unit, size = engineers_unit(drawn["unit"])
+        text = " / ".join(f"{value / size:.6g}" for value in drawn["values"])
+        rows.append((f"drawn {key}", text if unit == "1" else f"{text} {unit}"))
+    return rows + [(f"random {name}", text) for name, text in still_random(result).items()]
+
+
+def still_random(result: Result | DissipationResult) -> dict[str, str]:
+    """Return the random inputs that no one drawn value tells, by key and in words.
+
+    They are fields, processes and what is drawn at every pass. The stored scenario tells them;
+    where a plugin of theirs is missing, it cannot be read, and that is told instead.
+    """
+    from wearsim.errors import PluginError, ScenarioError
+    from wearsim.results import Result
+
+    try:
+        random = result.scenario.random
+    except (PluginError, ScenarioError) as error:
+        return {"inputs": f"not told, since the scenario cannot be read here: {error}"}
+    if isinstance(result, Result):
+        told = [item for item in random if not set(item.keys) <= set(result.raw.drawn)]
+    else:
+        told = [item for item in random if item.role in {"field", "process"}]
+    return {item.name: item.describe() for item in told}
 
 
 def effort(result: Result) -> Rows:
@@ -104,6 +127,7 @@ def as_json(result: Result) -> dict[str, Any]:
         "full_solves": _int(result.full_solves),
         "wall_seconds": result.raw.wall_seconds,
         "drawn": result.raw.drawn,
+        "random": still_random(result),
         "output": str(result.path) if result.path else None,
         "notes": list(result.notes),
         "warnings": list(result.warnings),

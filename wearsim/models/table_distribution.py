@@ -43,7 +43,7 @@ def _quantiles(file: InputFile, unit: str) -> tuple[FloatArray, FloatArray]:
     """Return the probabilities and values in a file; raises ScenarioError."""
     if not _has_probabilities(file.text):
         samples = np.sort(read_columns(file.text, file.path, {"value": unit})["value"])
-        return np.linspace(0.0, 1.0, len(samples)), samples
+        return _plotted(samples)
     columns = {"probability": "1", "value": unit}
     read = read_columns(file.text, file.path, columns, rising="probability")
     probability, value = read["probability"], read["value"]
@@ -58,6 +58,17 @@ def _quantiles(file: InputFile, unit: str) -> tuple[FloatArray, FloatArray]:
     if problems:
         raise ScenarioError(file.path, problems)
     return probability, value
+
+
+def _plotted(samples: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return probabilities and values of rising samples, whose mean is then that of the law.
+
+    Sample i of n stands at (i - 1/2)/n, with level ends beyond the first and the last. From 0 to 1
+    in equal steps the two extremes would have half the weight of the others.
+    """
+    places = (np.arange(len(samples)) + 0.5) / len(samples)
+    ends = samples[:1], samples[-1:]
+    return np.concatenate([[0.0], places, [1.0]]), np.concatenate([ends[0], samples, ends[1]])
 
 
 def _has_probabilities(text: str) -> bool:

@@ -21,6 +21,8 @@ from wearsim.randomness.truncated_normal import QuadraticExponent, TruncatedNorm
 
 _ROUNDING = 1e-12
 _RAREST = 1e-12  # probability of a far end
+_SMALLEST, _LARGEST = 1e-150, 1e150  # sizes whose squares, and their inverses, are numbers
+_OTHER_UNIT = "choose a unit in which it lies between 1e-150 and 1e150"
 
 
 class Infeasible(WearsimError, ValueError):  # noqa: N818  (it is what the knowledge is)
@@ -78,8 +80,10 @@ def _check(
         raise Infeasible(f"the support must rise, got {low:g} to {high:g}")
     if math.isfinite(low) and math.isfinite(high) and math.isinf(high - low):
         raise Infeasible(f"the support {_interval(low, high)} is too wide for numbers")
-    if any(value is not None and not math.isfinite(value) for value in (mean, std, mean_log)):
-        raise Infeasible("mean, std and mean_log must be finite")
+    for name, value in (("mean", mean), ("std", std), ("mean_log", mean_log)):
+        if value is not None and not math.isfinite(value):
+            raise Infeasible(f"{name} must be finite, got {value:g}")
+    _check_sizes(low, high, mean, std)
     if mean_log is not None:
         _check_logarithm(low, high, mean, std, mean_log)
         return
@@ -101,6 +105,20 @@ def _check(
             )
     else:
         _check_spread(low, high, mean, std)
+
+
+def _check_sizes(low: float, high: float, mean: float | None, std: float | None) -> None:
+    """Raise where a square or its inverse would be no number."""
+    sizes = {"std": std, "the width of the support": high - low}
+    if mean is not None:
+        sizes |= {"the distance of the mean from the support's end": min(mean - low, high - mean)}
+    for name, size in sizes.items():
+        if size is not None and 0.0 < size < _SMALLEST:
+            raise Infeasible(f"{name} {size:g} is too small to be squared; {_OTHER_UNIT}")
+    places = {"low": low, "high": high, "mean": mean, "std": std}
+    for name, place in places.items():
+        if place is not None and _LARGEST < abs(place) < math.inf:
+            raise Infeasible(f"{name} {place:g} is too large to be squared; {_OTHER_UNIT}")
 
 
 def _check_spread(low: float, high: float, mean: float, std: float) -> None:
@@ -137,8 +155,12 @@ def _check_spread(low: float, high: float, mean: float, std: float) -> None:
 def _check_logarithm(
     low: float, high: float, mean: float | None, std: float | None, mean_log: float
 ) -> None:
-    if mean is None or std is not None:
-        raise Infeasible("mean_log needs the mean, and takes the place of the std")
+    if mean is None:
+        raise Infeasible(f"mean_log {mean_log:g} needs the mean too")
+    if std is not None:
+        raise Infeasible(
+            f"mean_log {mean_log:g} takes the place of the std, got std {std:g}; leave one out"
+        )
     if (low, high) != (0.0, math.inf):
         raise Infeasible(f"mean_log needs the support [0, inf), got {_interval(low, high)}")
     if not mean > 0.0:

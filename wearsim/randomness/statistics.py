@@ -10,6 +10,7 @@ import numpy as np
 from wearsim.types import FloatArray, IntArray
 
 CONFIDENCE = 0.95
+_SAME = 1e-9  # spread of values that are all the same, in parts of their size
 _BLOCK = 256  # rows that are summed at once, whatever the batches they come in
 _FAR = 10.0  # standard deviations of a rank beyond which no probability is left
 
@@ -36,7 +37,7 @@ class Quantile:
 
 @dataclass(frozen=True)
 class Summary:
-    """What realisations of one number tell; nan where there are too few for it.
+    """What realisations of one number tell; nan where there are too few, or no spread, for it.
 
     Parameters
     ----------
@@ -63,6 +64,11 @@ class Summary:
     least: float
     greatest: float
     quantiles: tuple[Quantile, ...]
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether the realisations differ by rounding alone; not so where there is but one."""
+        return is_constant(self.mean, self.std)
 
     def quantile(self, probability: float) -> Quantile:
         """Return the quantile of this probability."""
@@ -112,13 +118,14 @@ def summarise(values: FloatArray, probabilities: tuple[float, ...] = ()) -> Summ
     deviation = values - float(values.mean())
     second, third = float((deviation**2).mean()), float((deviation**3).mean())
     skewness = math.nan
-    if count > 2 and second > 0.0:
+    mean, std = float(at_end.mean[0]), float(at_end.std[0])
+    if count > 2 and second > 0.0 and not is_constant(mean, std):
         skewness = third / second**1.5 * math.sqrt(count * (count - 1.0)) / (count - 2.0)
     ordered = np.sort(values)
     return Summary(
         count=count,
-        mean=float(at_end.mean[0]),
-        std=float(at_end.std[0]),
+        mean=mean,
+        std=std,
         mean_error=float(at_end.mean_error[0]),
         std_error=float(at_end.std_error[0]),
         skewness=skewness,
@@ -126,6 +133,23 @@ def summarise(values: FloatArray, probabilities: tuple[float, ...] = ()) -> Summ
         greatest=float(ordered[-1]),
         quantiles=tuple(_quantile(ordered, probability) for probability in probabilities),
     )
+
+
+def is_constant(mean: float, std: float, rounding: float = 0.0) -> bool:
+    """Tell whether values differ by no more than rounding.
+
+    Parameters
+    ----------
+    mean, std : float
+        Of the values; a std of nan, as of a single value, tells nothing.
+    rounding : float
+        What rounding leaves of a value that is zero.
+
+    Returns
+    -------
+    bool
+    """
+    return std <= max(_SAME * abs(mean), rounding)
 
 
 def converge(values: FloatArray, counts: IntArray) -> Convergence:

@@ -21,6 +21,7 @@ MM, W_MM = PER_SI["mm"], PER_SI["W/mm"]
 MOST_LINES = 200
 CLASSES = 30
 _ROOM = 1.28  # height of the density's panel over its highest class, for the legend
+_SAME = 1e-9  # of the greatest, by which curves differ that are drawn as one
 _SETTLING = 10  # realisations before which an estimate is too wild to set the scale
 PANELS: list[Any] = [["mean", "density", "realisations"], ["std", "density", "band"]]
 
@@ -41,10 +42,11 @@ def dissipation_figure(result: DissipationResult) -> Figure:
     with figure_style():
         figure = Figure(figsize=(13.0, 6.8), layout="constrained")
         panels = figure.subplot_mosaic(PANELS, width_ratios=[1.0, 1.15, 1.1])
-        found = result.convergence()
-        _draw_settling(panels["mean"], found.count, found.mean, found.mean_error)
+        found, constant = result.convergence(), result.summaries["power"].is_constant
+        _draw_settling(panels["mean"], found.count, found.mean, found.mean_error, constant)
         name_axes(panels["mean"], "Mean power, with its standard error", "", "mean of $P_d$ [W]")
-        _draw_settling(panels["std"], found.count, found.std, found.std_error)
+        std = np.zeros_like(found.std) if constant else found.std  # or rounding would be drawn
+        _draw_settling(panels["std"], found.count, std, found.std_error, constant)
         title = "Standard deviation, with its standard error"
         name_axes(panels["std"], title, "realisations", "std of $P_d$ [W]")
         _draw_density(panels["density"], result)
@@ -60,6 +62,8 @@ def _caption(result: DissipationResult) -> str:
     text += f"{'' if result.finished else ', unfinished'}): mean {shown(power.mean, 'W')}"
     if result.count == 1:
         return text
+    if power.is_constant:
+        return f"{text}, the same in all"
     ends = [power.quantile(0.025).value, power.quantile(0.975).value]
     band = " to ".join(shown(value, "W", 3).removesuffix(" W") for value in ends)
     return f"{text}, std {shown(power.std, 'W')}, 95 % within {band} W"
@@ -69,10 +73,17 @@ def _number_of(realisations: int) -> str:
     return f"{count(realisations)} realisation{'s' if realisations > 1 else ''}"
 
 
-def _draw_settling(axes: Axes, counts: IntArray, value: FloatArray, error: FloatArray) -> None:
+def _draw_settling(
+    axes: Axes, counts: IntArray, value: FloatArray, error: FloatArray, constant: bool
+) -> None:
     """Draw an estimate against the number of realisations, and its standard error as a band."""
+    if constant:
+        error = np.zeros_like(error)
+        top = 2.0 * float(value[-1]) or 1.0
+        axes.set_ylim(-0.05 * top, top)  # so that a line at zero is seen
     axes.fill_between(counts, value - error, value + error, color=BLUE, alpha=0.25, lw=0)
-    axes.plot(counts, value, color=BLUE)
+    marker = "o" if len(counts) == 1 else ""
+    axes.plot(counts, value, color=BLUE, marker=marker)
     axes.set_xscale("log")
     axes.xaxis.set_major_formatter(FuncFormatter(lambda number, _: count(number)))
     axes.xaxis.set_minor_formatter(NullFormatter())
@@ -86,12 +97,16 @@ def _draw_settling(axes: Axes, counts: IntArray, value: FloatArray, error: Float
 
 def _draw_density(axes: Axes, result: DissipationResult) -> None:
     power, summary = result.power, result.summaries["power"]
-    if summary.std > 0.0:
-        axes.hist(power, CLASSES, density=True, color=BLUE, alpha=0.45, label="realisations")
-        across = np.linspace(*axes.get_xlim(), 400)
-        score = (across - summary.mean) / summary.std
-        normal = np.exp(-0.5 * score**2) / (summary.std * math.sqrt(math.tau))
-        axes.plot(across, normal, color=ORANGE, label="normal law of the same mean and std")
+    if result.count == 1 or summary.is_constant:
+        _tell_one_value(axes, result)
+        return
+    axes.hist(power, CLASSES, density=True, color=BLUE, alpha=0.45, label="realisations")
+    low, high = axes.get_xlim()
+    across = np.linspace(max(low, 0.0), high, 400)  # no power is below zero
+    score = (across - summary.mean) / summary.std
+    normal = np.exp(-0.5 * score**2) / (summary.std * math.sqrt(math.tau))
+    axes.plot(across, normal, color=ORANGE, label="normal law of the same mean and std")
+    axes.set_xlim(max(low, 0.0), high)
     alone = result.mean_problem_power
     ends = [summary.quantile(probability).value for probability in (0.025, 0.975)]
     marks = [
@@ -107,12 +122,25 @@ def _draw_density(axes: Axes, result: DissipationResult) -> None:
     axes.legend(loc="upper right")
 
 
+def _tell_one_value(axes: Axes, result: DissipationResult) -> None:
+    """Say what the power is where it has no density."""
+    power = shown(result.summaries["power"].mean, "W")
+    lines = [f"{power} in {_number_of(result.count)}: no density to draw"]
+    lines.append(f"inputs at their mean: {shown(result.mean_problem_power, 'W')}")
+    axes.text(0.5, 0.5, "\n".join(lines), ha="center", va="center", transform=axes.transAxes)
+    axes.set_title("Density of the dissipated power", loc="left")
+    axes.set_axis_off()
+
+
 def _draw_realisations(axes: Axes, result: DissipationResult) -> None:
-    rows = result.dissipation[:MOST_LINES]
-    y = result.y * MM
+    kept, y = result.dissipation, result.y * MM
+    rows = kept[:MOST_LINES]
+    title = _number_of(len(rows))
+    if len(kept) > 1 and float(np.ptp(kept, axis=0).max()) <= _SAME * float(kept.max()):
+        rows, title = rows[:1], "the same in all"
     opacity = float(np.clip(15.0 / len(rows), 0.12, 1.0))
     axes.plot(y, rows.T * W_MM, color=BLUE, lw=0.6, alpha=opacity)
-    name_axes(axes, f"Power per axial length, {_number_of(len(rows))}", "", r"$P_l$ [W/mm]")
+    name_axes(axes, f"Power per axial length, {title}", "", r"$P_l$ [W/mm]")
     axes.set_ylim(bottom=0.0)
     axes.margins(x=0.0)
 

@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from wearsim.randomness.laws import Law
+from wearsim.report.law_numbers import multipliers, parent, value
 from wearsim.report.style import BLUE, GREY, ORANGE, figure_style, name_axes
 from wearsim.types import FloatArray
 
@@ -34,11 +35,11 @@ def maxent_figure(law: Law) -> Figure:
         _draw_bulk(axes, law, x, density)
         axes.plot(x, density, color=BLUE, label=law.family)
         _draw_parent(axes, law, x, density)
-        axes.axvline(law.mean, color=ORANGE, lw=1.0, label=f"mean {law.mean:.4g}")
+        axes.axvline(law.mean, color=ORANGE, lw=1.0, label=f"mean {value(law, law.mean):.4g}")
         axes.set_xlim(low, high)
         axes.set_ylim(0.0, 1.08 * float(density.max()))
         axes.legend(loc="best")
-        l0, l1, l2 = (f"{value:.5g}" for value in law.multipliers)
+        l0, l1, l2 = (f"{number:.5g}" for number in multipliers(law))
         title = f"Maximum entropy: {law.family}\n$\\lambda_0$ = {l0}, $\\lambda_1$ = {l1}"
         name_axes(axes, f"{title}, $\\lambda_2$ = {l2}", "value", "density")
     return figure
@@ -54,10 +55,11 @@ def _draw_bulk(axes: Axes, law: Law, x: FloatArray, density: FloatArray) -> None
 
 def _draw_parent(axes: Axes, law: Law, x: FloatArray, density: FloatArray) -> None:
     """Draw the parent normal law where it can be told from the law that is cut from it."""
-    if law.parent is None:
+    found = parent(law)
+    if found is None:
         return
-    mean, std = law.parent
-    parent = np.exp(-0.5 * ((x - mean) / std) ** 2) / (std * np.sqrt(2.0 * np.pi))
-    if np.abs(parent - density).max() > 1e-3 * density.max():
+    mean, std = found
+    normal = np.exp(-0.5 * ((x - mean) / std) ** 2) / (std * np.sqrt(2.0 * np.pi))
+    if np.abs(normal - density).max() > 1e-3 * density.max():
         label = f"parent: {mean:.4g}, std {std:.4g}"
-        axes.plot(x, parent, "--", color=GREY, lw=1.0, label=label)
+        axes.plot(x, normal, "--", color=GREY, lw=1.0, label=label)

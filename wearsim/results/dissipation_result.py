@@ -6,18 +6,16 @@ import math
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from wearsim.randomness.statistics import Convergence, Summary, converge, summarise
-from wearsim.results.data import Arrays
+from wearsim.results.content import Arrays
 from wearsim.results.dissipation_data import DissipationData
 from wearsim.results.reader import read_dissipation
+from wearsim.results.study_result import StudyResult
 from wearsim.types import FloatArray
-
-if TYPE_CHECKING:
-    from wearsim.scenario import Scenario
 
 BAND = (0.025, 0.975)
 """Probabilities between which 95 % lie."""
@@ -28,19 +26,18 @@ SUMMARISED = ("power", "force_x", "force_y", "spin_moment", "normal_force", "pea
 
 
 @dataclass(frozen=True, eq=False)
-class DissipationResult:
-    """Realisations of one contact, as many as are done.
+class DissipationResult(StudyResult[DissipationData]):
+    """Realisations of one contact, as many as are done."""
 
-    Parameters
-    ----------
-    raw : DissipationData
-        All there is.
-    path : Path, optional
-        The results file, where there is one.
-    """
+    def __repr__(self) -> str:
+        done = f"{self.count}" if self.finished else f"{self.count} of {self.raw.asked}"
+        noun = "realisation" if done == "1" else "realisations"
+        return f"<DissipationResult '{self.title}': {done} {noun}, {self._power()}>"
 
-    raw: DissipationData
-    path: Path | None = None
+    def _power(self) -> str:
+        power = self.summaries["power"]
+        std = f", std {power.std:.4g} W" if power.count > 1 else ""
+        return f"power {power.mean:.4g} W{std}"
 
     def values(self, name: str) -> FloatArray:
         """Return any variable of the results file, or drawn values by their dotted key.
@@ -56,38 +53,10 @@ class DissipationResult:
         """
         return self.raw.variables[name]
 
-    @cached_property
-    def scenario(self) -> Scenario:
-        """The scenario, read from the text and files that are stored with the study."""
-        from wearsim.scenario import parse_scenario  # noqa: PLC0415  (a results file needs none)
-
-        raw = self.raw
-        return parse_scenario(raw.scenario_text, raw.scenario_file, raw.files.__getitem__)
-
-    @property
-    def title(self) -> str:
-        """What the scenario is, in a line."""
-        return self.raw.title
-
-    @property
-    def finished(self) -> bool:
-        """Whether all realisations are done."""
-        return self.raw.finished
-
     @property
     def count(self) -> int:
         """Realisations that are done."""
         return len(self.power)
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What a user should know of the scenario."""
-        return tuple(self.raw.notes)
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What a user should know of the study."""
-        return tuple(self.raw.warnings)
 
     @property
     def inputs(self) -> dict[str, FloatArray]:
@@ -161,20 +130,5 @@ def _finite(value: Any) -> Any:
 
 
 def open_dissipation(path: str | Path) -> DissipationResult:
-    """Open the file of a dissipation study.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file.
-
-    Returns
-    -------
-    DissipationResult
-
-    Raises
-    ------
-    ResultsFileError
-        If it is missing, foreign, truncated, damaged, or written by a newer wearsim.
-    """
+    """Open the file of a dissipation study; see `open_results`."""
     return DissipationResult(read_dissipation(path), Path(path))

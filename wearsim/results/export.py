@@ -1,4 +1,4 @@
-"""A run as CSV in engineers' units, the units in the headers."""
+"""A run or a study as CSV in engineers' units, the units in the headers."""
 
 from __future__ import annotations
 
@@ -11,7 +11,11 @@ from typing import TypeAlias
 import numpy as np
 
 from wearsim.errors import ResultsFileError
+from wearsim.quantities import engineers_unit
 from wearsim.results.data import RunData
+from wearsim.results.dissipation_data import DissipationData
+from wearsim.results.dissipation_layout import with_inputs
+from wearsim.results.dissipation_result import DissipationResult
 from wearsim.results.layout import AXES, VARIABLES
 from wearsim.results.result import Result
 from wearsim.results.writer import write_whole
@@ -28,13 +32,13 @@ _DEPTHS = {"cylinder_profile": "depth", "roller_profile": "depth"}
 _OTHER_INPUTS = "inputs"  # where input files go that cannot stand where the scenario names them
 
 
-def export_csv(result: Result, folder: str | Path) -> list[Path]:
-    """Write a run as CSV: its history, its records, and the scenario with the files it names.
+def export_csv(result: Result | DissipationResult, folder: str | Path) -> list[Path]:
+    """Write a run or a study as CSV, and the scenario with the files it names.
 
     Parameters
     ----------
-    result : Result
-        The run.
+    result : Result or DissipationResult
+        Of a run, its history and its records; of a study, its realisations and its strips.
     folder : str or Path
         Where to; it is made where it does not exist.
 
@@ -49,7 +53,9 @@ def export_csv(result: Result, folder: str | Path) -> list[Path]:
         If a file exists already (then none is written), or cannot be written.
     """
     folder = Path(folder)
-    texts = {folder / name: text for name, text in _texts(result).items()}
+    tables = _of_run(result.raw) if isinstance(result, Result) else _of_study(result.raw)
+    contents = _with_scenario(tables, result.raw)
+    texts = {folder / name: text for name, text in contents.items()}
     existing = [str(path) for path in texts if path.exists()]
     if existing:
         raise ResultsFileError(
@@ -64,9 +70,8 @@ def export_csv(result: Result, folder: str | Path) -> list[Path]:
     return list(texts)
 
 
-def _texts(result: Result) -> dict[str, str]:
-    """Return the content of every file to write, by its path in the folder."""
-    raw = result.raw
+def _of_run(raw: RunData) -> dict[str, str]:
+    """Return the tables of a run, by the name of the file each goes into."""
     texts = {
         "history.csv": _csv(_history(raw)),
         "cylinder_profiles.csv": _csv(_records(raw, "cylinder_profile")),
@@ -75,7 +80,24 @@ def _texts(result: Result) -> dict[str, str]:
         texts["roller_profiles.csv"] = _csv(_records(raw, "roller_profile"))
     texts["line_load.csv"] = _csv(_records(raw, "line_load"))
     texts["dissipation.csv"] = _csv(_records(raw, "dissipation"))
-    texts["scenario.toml"] = raw.scenario_text
+    return texts
+
+
+def _of_study(raw: DissipationData) -> dict[str, str]:
+    """Return the tables of a study, by the name of the file each goes into."""
+    return {
+        "realisations.csv": _csv(_realisations(raw)),
+        "strips.csv": _csv(
+            _study_column(raw, name)
+            for name, variable in with_inputs(raw.inputs).variables.items()
+            if variable.dims == ("y",)
+        ),
+    }
+
+
+def _with_scenario(tables: dict[str, str], raw: RunData | DissipationData) -> dict[str, str]:
+    """Return the content of every file to write, by its path in the folder."""
+    texts = {**tables, "scenario.toml": raw.scenario_text}
     for path, text in raw.files.items():
         texts[_place(path, texts)] = text
     return texts
@@ -99,6 +121,23 @@ def _history(raw: RunData) -> Iterator[Column]:
     for name, variable in VARIABLES.items():
         if variable.kind == "history":
             yield from _columns(name, raw.history[name], variable.dims, name)
+
+
+def _realisations(raw: DissipationData) -> Iterator[Column]:
+    """Yield the number of each realisation, what was drawn for it and what came of it."""
+    drawn = [item["key"] for item in raw.inputs]
+    layout = with_inputs(raw.inputs).variables
+    found = [name for name, item in layout.items() if item.dims == ("realisation",)]
+    yield "realisation", np.arange(len(raw.variables["power"]), dtype=np.float64)
+    for name in [*drawn, *(name for name in found if name not in drawn)]:
+        yield _study_column(raw, name)
+
+
+def _study_column(raw: DissipationData, name: str) -> Column:
+    unit = with_inputs(raw.inputs).variables[name].unit
+    engineers, size = _UNITS[unit] if unit == "Pa" else engineers_unit(unit)
+    title = name if engineers == "1" else f"{name} [{engineers}]"
+    return title, raw.variables[name] / size
 
 
 def _records(raw: RunData, name: str) -> Iterator[Column]:
@@ -135,5 +174,8 @@ def _csv(columns: Iterable[Column]) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(titles)
-    writer.writerows([f"{value:.12g}" for value in row] for row in np.column_stack(values).tolist())
+    # plus zero, so that no -0 is written
+    writer.writerows(
+        [f"{value + 0.0:.12g}" for value in row] for row in np.column_stack(values).tolist()
+    )
     return text.getvalue()

@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 from h5py import h5a, h5d, h5ds, h5f, h5g, h5p, h5s, h5t
 
-from wearsim.results.data import Arrays, Content, as_plain
+from wearsim.results.content import Arrays, Content, as_plain
 from wearsim.results.layout import Layout, axis_lengths
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from wearsim.errors import ResultsFileError
-from wearsim.results import dissipation_data
-from wearsim.results.data import ABOUT, Arrays, RunData
+from wearsim.results.content import Arrays, StudyData
+from wearsim.results.data import RunData
 from wearsim.results.dissipation_data import DissipationData
 from wearsim.results.dissipation_layout import DISSIPATION, with_inputs
 from wearsim.results.layout import REPLAY, Layout, axis_lengths
@@ -48,38 +48,12 @@ def read_results(path: str | Path) -> RunData:
 
 
 def read_dissipation(path: str | Path) -> DissipationData:
-    """Read the file of a study of the dissipation of a contact.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file.
-
-    Returns
-    -------
-    DissipationData
-
-    Raises
-    ------
-    ResultsFileError
-        As of `read_results`.
-    """
+    """Read the file of a study of the dissipation of a contact; see `read_results`."""
     return _read(path, lambda file: _dissipation_data(path, file))
 
 
 def is_dissipation(path: str | Path) -> bool:
-    """Tell whether a results file holds a study of the dissipation of a contact.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file.
-
-    Raises
-    ------
-    ResultsFileError
-        If it is missing, foreign, truncated or damaged.
-    """
+    """Tell whether a results file holds a study of a contact; raises as `read_results`."""
     return _read(path, lambda file: _layout_of(path, file) is DISSIPATION)
 
 
@@ -145,15 +119,11 @@ def _check_format(path: str | Path, file: h5py.File, wanted: Layout) -> None:
 
 
 def _run_data(path: str | Path, file: h5py.File) -> RunData:
-    _check_format(path, file, REPLAY)
-    about, scenario_text, files = _texts(path, file, REPLAY, ["checkpoint"])
     # nothing is drawn in files of version 0.1.0, which do not say so
-    _check_complete(path, [name for name in ABOUT if name not in about and name != "drawn"])
+    told = _told(path, file, REPLAY, RunData, groups=["checkpoint"], optional=["drawn"])
     variables = _variables(file, REPLAY)
     return RunData(
-        **{name: about[name] for name in ABOUT if name in about},
-        scenario_text=scenario_text,
-        files=files,
+        **told,
         static=_of_kind("static", variables),
         history=_of_kind("history", variables),
         records=_of_kind("record", variables),
@@ -162,31 +132,33 @@ def _run_data(path: str | Path, file: h5py.File) -> RunData:
 
 
 def _dissipation_data(path: str | Path, file: h5py.File) -> DissipationData:
-    _check_format(path, file, DISSIPATION)
-    about, scenario_text, files = _texts(path, file, DISSIPATION)
-    _check_complete(path, [name for name in dissipation_data.ABOUT if name not in about])
-    layout = with_inputs(about["inputs"])
+    told = _told(path, file, DISSIPATION, DissipationData)
+    layout = with_inputs(told["inputs"])
     _check_complete(path, [name for name in layout.variables if name not in file])
-    return DissipationData(
-        **{name: about[name] for name in dissipation_data.ABOUT},
-        scenario_text=scenario_text,
-        files=files,
-        variables=_variables(file, layout),
-    )
+    return DissipationData(**told, variables=_variables(file, layout))
 
 
-def _texts(
-    path: str | Path, file: h5py.File, layout: Layout, groups: Sequence[str] = ()
-) -> tuple[dict[str, Any], str, dict[str, str]]:
-    """Return what is stored apart from arrays, having checked that all else is there too."""
+def _told(
+    path: str | Path,
+    file: h5py.File,
+    layout: Layout,
+    kind: type[StudyData],
+    groups: Sequence[str] = (),
+    optional: Sequence[str] = (),
+) -> dict[str, Any]:
+    """Return all fields of `kind` but arrays, having checked that these are there too."""
     from wearsim.results import hdf5  # noqa: PLC0415
 
+    _check_format(path, file, layout)
     about_at, scenario_at = f"{hdf5.INPUTS}/{hdf5.ABOUT}", f"{hdf5.INPUTS}/{hdf5.SCENARIO}"
     files_at = f"{hdf5.INPUTS}/{hdf5.FILES}"
     wanted = (*layout.variables, about_at, scenario_at, files_at, *groups)
     _check_complete(path, [name for name in wanted if name not in file])
     about: dict[str, Any] = json.loads(hdf5.get_text(file[about_at]))
-    return about, hdf5.get_text(file[scenario_at]), _files(file[files_at])
+    names = kind.told()
+    _check_complete(path, [name for name in names if name not in {*about, *optional}])
+    texts = {"scenario_text": hdf5.get_text(file[scenario_at]), "files": _files(file[files_at])}
+    return {name: about[name] for name in names if name in about} | texts
 
 
 def _variables(file: h5py.File, layout: Layout) -> Arrays:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -13,10 +12,8 @@ import numpy.typing as npt
 from wearsim.results.data import RunData
 from wearsim.results.layout import VARIABLES
 from wearsim.results.reader import read_results
+from wearsim.results.study_result import StudyResult
 from wearsim.types import FloatArray, IntArray
-
-if TYPE_CHECKING:
-    from wearsim.scenario import Scenario
 
 Number: TypeAlias = float | list[float]
 
@@ -24,19 +21,14 @@ _DROPPED = {"station", "roller", "realisation"}
 
 
 @dataclass(frozen=True, eq=False)
-class Result:
-    """A run, finished or not. Axes station, roller and realisation are dropped at length one.
+class Result(StudyResult[RunData]):
+    """A run, finished or not. Axes station, roller and realisation are dropped at length one."""
 
-    Parameters
-    ----------
-    raw : RunData
-        All there is, every axis kept.
-    path : Path, optional
-        The results file, where there is one.
-    """
-
-    raw: RunData
-    path: Path | None = None
+    def __repr__(self) -> str:
+        passes, total = float(self.passes[-1]), self.raw.total_passes
+        done = f"{passes:.12g}" if self.finished else f"{passes:.12g} of {total:.12g}"
+        depth = float(np.max(self.depth[-1]))
+        return f"<Result '{self.title}': {done} roller passes, depth {depth * 1e6:.4g} um>"
 
     def values(self, name: str) -> npt.NDArray[Any]:
         """Return any variable of the results file, axes of length one dropped as above.
@@ -54,13 +46,13 @@ class Result:
         dims = zip(VARIABLES[name].dims, array.shape, strict=True)
         return array.reshape([n for dim, n in dims if n != 1 or dim not in _DROPPED])
 
-    @cached_property
-    def scenario(self) -> Scenario:
-        """The scenario, read from the text and files that are stored with the run."""
-        from wearsim.scenario import parse_scenario  # noqa: PLC0415  (a results file needs none)
+    @property
+    def drawn(self) -> dict[str, tuple[float, ...]]:
+        """What was drawn for the random inputs by the scenario's key, one or one per roller [SI].
 
-        raw = self.raw
-        return parse_scenario(raw.scenario_text, raw.scenario_file, raw.files.__getitem__)
+        What stays random in the run, a process or what is drawn at every pass, is not among it.
+        """
+        return {key: tuple(item["values"]) for key, item in self.raw.drawn.items()}
 
     @property
     def start_height(self) -> FloatArray:
@@ -68,34 +60,9 @@ class Result:
         return self.raw.static["start_height"]
 
     @property
-    def title(self) -> str:
-        """What the scenario is, in a line."""
-        return self.raw.title
-
-    @property
-    def model(self) -> str:
-        """Name of the contact model in use."""
-        return self.raw.model
-
-    @property
     def stepper(self) -> str:
         """Name of the stepper in use."""
         return self.raw.stepper
-
-    @property
-    def finished(self) -> bool:
-        """Whether all passes are done."""
-        return self.raw.finished
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What a user should know of the scenario."""
-        return tuple(self.raw.notes)
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What a user should know of the run."""
-        return tuple(self.raw.warnings)
 
     @property
     def passes(self) -> FloatArray:

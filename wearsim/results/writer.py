@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from wearsim.errors import ResultsFileError
 from wearsim.results.data import RunData
 from wearsim.results.dissipation_data import DissipationData
+from wearsim.results.inputs import refuse_inputs
+
+OTHER_KINDS = (".png", ".pdf", ".svg", ".toml", ".csv")
+"""How names end that mean a figure, a scenario or a table."""
 
 STAGES = ("open", "write", "flush", "fsync", "close", "rename", "fsync folder")
 
@@ -114,7 +118,7 @@ def _sync_folder(folder: Path) -> None:
         os.close(handle)
 
 
-def check_output(path: str | Path, force: bool) -> None:
+def check_output(path: str | Path, force: bool, inputs: Iterable[Path] = ()) -> None:
     """Check that a results file may be written, before hours are spent on it.
 
     Parameters
@@ -123,14 +127,24 @@ def check_output(path: str | Path, force: bool) -> None:
         The file.
     force : bool
         Whether an existing file may be replaced.
+    inputs : iterable of Path
+        Files that the scenario is read from, which are never replaced.
 
     Raises
     ------
     ResultsFileError
-        If it exists and `force` is not set, or if its folder is missing or not writable.
+        If it exists and `force` is not set, if it is an input, if its name is that of a figure, a
+        scenario or a table, or if its folder is missing or not writable.
     """
+    refuse_inputs(path, inputs)
     target = Path(path).resolve()
     folder = target.parent
+    suffix = Path(path).suffix
+    if suffix.lower() in OTHER_KINDS:
+        name = Path(path).with_suffix(".h5").name
+        raise ResultsFileError(
+            f"{path}: no results file ends in {suffix}; choose another name with -o, such as {name}"
+        )
     if target.is_dir():
         raise ResultsFileError(f"{path}: is a folder; name a file in it with -o")
     if not folder.is_dir():

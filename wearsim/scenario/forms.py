@@ -5,7 +5,7 @@ from __future__ import annotations
 import types
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_origin
 
-from annotated_types import Ge, Gt, Le, Lt
+from annotated_types import Ge, Gt, Le, Lt, MultipleOf
 from pydantic import BaseModel, PlainValidator
 
 from wearsim.quantities import HostQuantity, Quantity, shown
@@ -72,6 +72,8 @@ def form(field: FieldInfo, host: Quantity | None = None) -> str | None:
             return item.expected
     forms = [_form(part, host) for part in _marked(field)]
     known = list(dict.fromkeys(text for text in forms if text))
+    steps = [item.multiple_of for item in field.metadata if isinstance(item, MultipleOf)]
+    known = [f"a multiple of {step}" for step in steps] or known
     return " or ".join(known) + _limits(field.metadata) if known else None
 
 

@@ -159,7 +159,10 @@ def _fits(report: Report, item: RandomInput, host: Host, table: str, key: str) -
     if reach:
         what = f"takes values {reach}, and must be {host.allowed}"
         remedy = f"maxent with support {host.support} or truncated-normal"
-        report.add(table, key, what, item.describe(), remedy)
+        if low == high:
+            what, remedy = f"must be {host.allowed}", f"a value {host.allowed}"
+        got = amount(low, host.quantity) if low == high else item.describe()
+        report.add(table, key, what, got, remedy)
         return False
     if item.mean[0] - item.mean[0] != 0.0:  # infinite or not a number
         report.add(table, key, "has no finite mean", item.describe())

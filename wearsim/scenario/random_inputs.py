@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from wearsim.plugins import Distribution, FrictionField, JointDistribution, Options, Process
-from wearsim.quantities import Quantity, conversion
+from wearsim.quantities import Quantity, in_engineers_unit
 from wearsim.randomness.plans import BELOW_ONE
 from wearsim.types import FloatArray
 
@@ -59,10 +59,7 @@ def can_be_random(name: str) -> bool:
 
 def amount(value: float, quantity: Quantity | None) -> str:
     """Return an SI value in the engineers' unit of its quantity."""
-    if quantity is None or value in {0.0, float("inf"), -float("inf")}:
-        return f"{value:.6g}"
-    unit = quantity.kind.example.split(maxsplit=1)[1]
-    return f"{value / float(conversion(unit, quantity.kind.unit)):.6g} {unit}"
+    return in_engineers_unit(value, quantity.kind.unit if quantity else "1")
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,6 +185,8 @@ class RandomInput:
             return ", ".join([*words, self.persistence])
         if self.marginal:
             words += [f"{key.replace('_', ' ')} {text}" for key, text in self.options.items()]
+            if isinstance(self.distribution, FrictionField) and "frame" not in self.options:
+                words.append(f"frame {self.distribution.frame}")
             words.append(f"of {self.marginal}")
         law = self.scalar
         words += [

@@ -6,7 +6,7 @@ import hashlib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import PurePath
+from pathlib import Path, PurePath
 from typing import Any, TypeAlias
 
 from wearsim.errors import Problem, ScenarioError
@@ -78,6 +78,12 @@ class Scenario:
     def name(self) -> str:
         """The file's name without folder and suffix."""
         return PurePath(self.file).stem
+
+    @property
+    def paths(self) -> tuple[Path, ...]:
+        """Where it came from, and the files it names, which are sought beside it."""
+        own = Path(self.file)
+        return (own, *(own.parent / name for name in self.files))
 
     @property
     def sha256(self) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import json
 from typing import TYPE_CHECKING, TypeVar
 
@@ -11,11 +12,14 @@ from wearsim.errors import Problem, ScenarioError
 from wearsim.plugins import Options
 from wearsim.quantities import QuantityError, shown
 from wearsim.scenario.forms import choices, field_at, form, model_at
+from wearsim.scenario.hosts import host_of, joint_of
 from wearsim.scenario.lifting import lift
+from wearsim.scenario.random_inputs import can_be_random
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    from pydantic.fields import FieldInfo
     from pydantic_core import ErrorDetails
 
     from wearsim.quantities import Quantity
@@ -152,7 +156,9 @@ class Report:
         field = field_at(model, details["loc"])
         kind, value = details["type"], details["input"]
         expected = form(field, host) if field else None
-        if kind == "value_error":
+        if kind != "missing" and isinstance(value, dict) and self._meant_random(field, place, key):
+            self._add_no_distribution(f"{place}.{key}", value)
+        elif kind == "value_error":
             self._add_value_error(place, key, details["ctx"]["error"], value)
         elif kind == "extra_forbidden":
             known = model_at(model, details["loc"][:-1])
@@ -169,6 +175,21 @@ class Report:
             what = _WHAT.get(kind, "is out of range" if kind in _BOUNDS else "cannot be used")
             said = details["msg"].removeprefix("Input should be ")
             self.add(place, key, what, shown(value), expected or said[:1].lower() + said[1:])
+
+    def _meant_random(self, field: FieldInfo | None, place: str, key: str) -> bool:
+        """Tell whether a table in a field's place can only have been meant as a random input."""
+        if field is None or not can_be_random(f"{place}.{key}"):
+            return False
+        within = any(f"{place}.".startswith(f"{name}.") for name in self.tried)
+        return not within and (host_of(field) or joint_of(field)) is not None
+
+    def _add_no_distribution(self, name: str, value: Mapping[str, object]) -> None:
+        """Note a table in the place of a value that does not say which random input it is."""
+        near = difflib.get_close_matches("distribution", value, n=1)
+        if near:
+            self.add(name, near[0], "unknown key (did you mean 'distribution'?)")
+        else:
+            self.add(name, "distribution", "is missing", None, "the name of a random input")
 
     def _add_value_error(self, table: str, key: str, error: Exception, value: object) -> None:
         if isinstance(error, QuantityError):

@@ -52,9 +52,8 @@ def kinematics(scenario: Scenario, multiplicity: FloatArray) -> Kinematics:
     )
 
 
-def start_height(scenario: Scenario, grid: Grid) -> FloatArray:
-    """Return the cylinder's height above nominal before the run, shape (strips,) [m]."""
-    profile = scenario.cylinder.profile
+def start_height(profile: Profile | None, grid: Grid) -> FloatArray:
+    """Return a cylinder's height above nominal before wear, shape (strips,) [m]."""
     if profile is None:
         return np.zeros_like(grid.y)
     return np.interp(grid.y, profile.y, profile.height)
@@ -65,28 +64,33 @@ def from_apex(scenario: Scenario, grid: Grid, roller: int) -> FloatArray:
     return np.asarray(grid.y - scenario.per_roller(scenario.roller.offset)[roller])
 
 
-def flat_gap(scenario: Scenario, grid: Grid, roller: int, profile: Profile | None) -> FloatArray:
-    """Return the gap of one roller without tilt before wear, shape (strips,) [m]."""
-    s = from_apex(scenario, grid, roller)
-    gap = s * s / (2.0 * scenario.roller.crown_radius)
-    if profile is not None:
-        gap = gap - np.interp(grid.y, profile.y, profile.height)
-    return gap
+def flat_gap(scenario: Scenario, s: FloatArray, height: FloatArray) -> FloatArray:
+    """Return the gap without tilt before wear [m].
+
+    Parameters
+    ----------
+    scenario : Scenario
+    s : ndarray, shape (..., strips)
+        Distance from the roller's apex [m].
+    height : ndarray, shape (strips,)
+        As `start_height` returns it [m].
+    """
+    return s * s / (2.0 * scenario.roller.crown_radius) - height
 
 
-def slip_profile(
-    scenario: Scenario, grid: Grid, roller: int, profile: Profile | None
-) -> FloatArray:
-    """Return the differential slip without tilt before wear, shape (strips,).
+def slip_profile(scenario: Scenario, s: FloatArray, height: FloatArray) -> FloatArray:
+    """Return the differential slip without tilt before wear.
 
     s^2/(2 R_crown R_roller), s from the roller's apex, and the start profile's height over
     R_cylinder.
+
+    Parameters
+    ----------
+    scenario, s, height
+        As for `flat_gap`.
     """
-    s = from_apex(scenario, grid, roller)
     slip = s * s / (2.0 * scenario.roller.crown_radius * scenario.roller.radius)
-    if profile is not None:
-        slip = slip + np.interp(grid.y, profile.y, profile.height) / scenario.cylinder.radius
-    return slip
+    return slip + height / scenario.cylinder.radius
 
 
 def mean_inputs(scenario: Scenario, rollers: list[int]) -> ContactInputs:
@@ -252,8 +256,8 @@ def bare_scene(
     profile : Profile, optional
         The cylinder's profile at the start.
     """
-    gaps = [flat_gap(scenario, grid, r, profile) for r in rollers]
-    slips = [slip_profile(scenario, grid, r, profile) for r in rollers]
+    s = np.array([from_apex(scenario, grid, r) for r in rollers])
+    height = start_height(profile, grid)
     creepage, count = scenario.creepage, len(rollers)
     return Scene(
         grid=grid,
@@ -262,13 +266,13 @@ def bare_scene(
         load=load,
         terms={term.name: term.build() for term in scenario.load.terms},
         kinematics=kinematics(scenario, multiplicity),
-        flat_gap=np.array(gaps)[None, :, None, :],
-        from_apex=np.array([from_apex(scenario, grid, r) for r in rollers]),
+        flat_gap=flat_gap(scenario, s, height)[None, :, None, :],
+        from_apex=s,
         inputs=mean_inputs(scenario, rollers),
         roller=np.arange(count, dtype=np.int64),
         weight=np.ones(count),
         half=np.zeros(count, dtype=np.int64),
         tilt_shifts=creepage.tilt_shifts_contact,
         free=creepage.drive == "free",
-        slip_profile=np.array(slips) if creepage.differential_slip else None,
+        slip_profile=slip_profile(scenario, s, height) if creepage.differential_slip else None,
     )

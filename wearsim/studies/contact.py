@@ -10,7 +10,7 @@ from wearsim.plugins import ContactModel
 from wearsim.scenario import Scenario
 from wearsim.studies.build import bare_scene, load_range
 from wearsim.studies.stepping import check_model
-from wearsim.studies.tracks import MOST_STRIPS, contact_centres, fresh_patch
+from wearsim.studies.tracks import contact_centres, fresh_patch, profile_grid
 from wearsim.types import (
     ContactFields,
     ContactSolution,
@@ -56,9 +56,7 @@ def _grid(scenario: Scenario, model: ContactModel, load: float, profile: Profile
         centre = choice.centre
     patch = fresh_patch(scenario, load)
     if choice.width is None and profile is not None:
-        start, stop = float(profile.y[0]), float(profile.y[-1])
-        strips = choice.strips or int(np.clip(np.ceil(24 * (stop - start) / patch.b), 161, 801))
-        return Grid.spanning(start, stop, min(strips, MOST_STRIPS))
+        return profile_grid(profile, patch.b, choice.strips)
     if choice.width is None and choice.strips is None:
         curvature = 1.0 / scenario.cylinder.radius + 1.0 / scenario.roller.radius
         materials = scenario.cylinder.material, scenario.roller.material

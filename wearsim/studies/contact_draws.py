@@ -10,15 +10,18 @@ import numpy as np
 from wearsim.errors import Problem, ScenarioError
 from wearsim.randomness.sampler import Sampler
 from wearsim.scenario import RandomInput, Scenario, realise
+from wearsim.scenario.random_inputs import CONTACT_FIELDS
 from wearsim.types import FloatArray
 
 LOAD, FRICTION, LONGITUDINAL = "load.normal_force", "friction.coefficient", "creepage.longitudinal"
 TORQUE, YAW, TILT = "creepage.bearing_torque", "creepage.yaw", "creepage.tilt"
 OFFSET = "roller.offset"
-KEYS = (LOAD, FRICTION, LONGITUDINAL, TORQUE, YAW, TILT, OFFSET)
+KEYS = (*CONTACT_FIELDS, OFFSET)
 """The values that one contact depends on and that may be random, by the scenario's keys."""
 
 BLOCK = 4096  # realisations that are drawn at once
+# between the extremes of a random option of the load, where it is asked whether the load feels it
+_BETWEEN = np.array([0.01, 0.1, 0.25, 0.5, 0.75, 0.9, 0.99])
 
 
 @dataclass(frozen=True)
@@ -84,11 +87,10 @@ def _acts(scenario: Scenario, item: RandomInput) -> bool:
         return True
     if not item.name.startswith("load."):
         return False
-    quarters = item.scalar.quantile(np.array([0.25, 0.75]))
+    tried = {*item.extremes, *item.scalar.quantile(_BETWEEN).tolist()}
     start = np.zeros(1)
     forces = {
-        float(realise(scenario, {item.name: float(value)}).load.build().force(start)[0])
-        for value in quarters
+        float(realise(scenario, {item.name: value}).load.build().force(start)[0]) for value in tried
     }
     if len(forces) == 1:
         return False

@@ -12,11 +12,12 @@ import numpy as np
 from wearsim.errors import Interrupted, Problem, ScenarioError, SolverError
 from wearsim.randomness.statistics import RowMoments
 from wearsim.results import DissipationData, DissipationResult, check_output, write_results
-from wearsim.results.data import Arrays
+from wearsim.results.content import Arrays
 from wearsim.results.dissipation_result import BAND, as_numbers, summaries
 from wearsim.scenario import Scenario
 from wearsim.studies.provenance import plugins_in_use, software
 from wearsim.studies.realisations import Realisations
+from wearsim.studies.study_size import checked_count
 from wearsim.types import BatchSolution
 
 BATCH = 1024  # realisations that are solved between two looks at the user
@@ -70,16 +71,17 @@ def dissipation(
     ------
     ScenarioError, CapabilityError, ResultsFileError
         If the study cannot start.
+    TypeError, ValueError
+        If the scenario is none, or `realisations` is not a whole number above zero.
     SolverError
         If a realisation has no solution, naming it; those before it are in the file.
     Interrupted
         If it was stopped; the file holds what was done, labelled as unfinished.
     """
-    if realisations < 1:
-        raise ValueError(f"realisations must be 1 or more, got {realisations}")
+    realisations = checked_count(scenario, realisations)
     path = Path(output) if output is not None else None
     if path is not None:
-        check_output(path, force)
+        check_output(path, force, scenario.paths)
     study = _Study(scenario, realisations, path)
     tell = on_progress or (lambda done, total: None)
     try:
@@ -132,7 +134,9 @@ class _Study:
     def interrupted(self) -> Interrupted:
         """Write what is done and return how the study ends."""
         self.close()
-        kept = f"they are in {self.path}" if self.path else "nothing was written"
+        kept = "nothing was written"
+        if self.path:
+            kept = f"they are in {self.path}; draw them with: wearsim plot {self.path}"
         return Interrupted(
             f"stopped after {self.done} of {self.contacts.count} realisations; {kept}"
         )
@@ -202,8 +206,8 @@ class _Study:
             warnings.append("only the first roller's contact is looked at")
         if self.scenario.sampling.plan != "monte-carlo":
             warnings.append(
-                f"standard errors and intervals are those of plain Monte Carlo: with"
-                f" {self.scenario.sampling.plan} they are upper bounds"
+                "standard errors and intervals are those of plain Monte Carlo, which are not exact"
+                f" for {self.scenario.sampling.plan}"
             )
         if kept < self.done:
             warnings.append(

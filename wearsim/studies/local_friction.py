@@ -11,6 +11,7 @@ from wearsim.errors import CapabilityError, Problem, ScenarioError
 from wearsim.plugins import ContactModel, ContactModelSpec, FrictionField, registry
 from wearsim.randomness.streams import Stream
 from wearsim.scenario import RandomInput, Scenario
+from wearsim.studies.finer_grid import finer_grid
 from wearsim.types import FloatArray, OperatingPoints
 
 
@@ -62,12 +63,14 @@ class LocalFriction:
         ScenarioError
             If they are too far apart.
         """
-        # the march begins at the leading edge, where there is no point yet
-        wrong = self._field.unresolved(float(2.0 * x.max() / len(x)), spacing)
+        # the march begins at the leading edge, where there is no point yet, and ends in one at the
+        # trailing edge
+        along = float(2.0 * np.abs(x).max() / len(x))
+        wrong = self._field.unresolved(along, spacing)
         if wrong is not None:
             table, key = self._item.name.split(".", 1)
-            remedy = "more contact.mx and more strips (contact.my or contact.strips)"
-            problem = Problem(table, key, wrong, self._item.kind, remedy)
+            remedy = finer_grid(self._scenario, self._field, len(x), along, spacing)
+            problem = Problem(table, key, wrong, self._item.describe(), remedy)
             raise ScenarioError(self._scenario.file, [problem])
 
     def put(

@@ -8,8 +8,9 @@ import numpy as np
 
 from wearsim.errors import Problem, ScenarioError
 from wearsim.plugins import ContactModel
-from wearsim.scenario import Scenario
-from wearsim.studies.tracks import MOST_STRIPS, contact_centres, fresh_patch
+from wearsim.scenario import RandomInput, Scenario
+from wearsim.studies.contact_draws import OFFSET, TILT
+from wearsim.studies.tracks import MOST_STRIPS, contact_centres, fresh_patch, profile_grid
 from wearsim.types import FloatArray, Grid
 
 _MARGIN = 1e-9  # of a patch, so that rounding leaves it on its strips
@@ -50,9 +51,7 @@ def realisation_grid(
     centre = choice.centre if choice.centre is not None else contact_centres(scenario)[0]
     away = np.abs(centres - centre)
     if profile is not None and choice.width is None:
-        start, stop = float(profile.y[0]), float(profile.y[-1])
-        strips = choice.strips or int(np.clip(np.ceil(24 * (stop - start) / mean_b), 161, 801))
-        return Grid.spanning(start, stop, strips)
+        return profile_grid(profile, mean_b, choice.strips)
     suggested = _suggested(scenario, model, load, mean_b)
     room = 0.5 * suggested.spacing * suggested.strips / mean_b  # of a patch, 1 for no margin
     if choice.width is not None:
@@ -66,7 +65,7 @@ def realisation_grid(
     beyond = reach / suggested.spacing - 0.5 * suggested.strips
     strips = suggested.strips + 2 * max(math.ceil(beyond - _ROUNDING * suggested.strips), 0)
     if strips > MOST_STRIPS:
-        _refuse_many(scenario, strips, reach)
+        _refuse_many(scenario, strips, reach, float(away.max()))
     half = 0.5 * strips * suggested.spacing
     return Grid.spanning(centre - half, centre + half, strips)
 
@@ -90,13 +89,38 @@ def _check_width(scenario: Scenario, width: float, needed: float) -> None:
         raise ScenarioError(scenario.file, [problem])
 
 
-def _refuse_many(scenario: Scenario, strips: int, reach: float) -> None:
-    problem = Problem(
-        "contact",
-        "strips",
-        f"the contacts of all realisations lie within {2e3 * reach:.4g} mm, which takes"
-        f" {strips} strips of the width that suits one",
-        None,
-        f"a number of strips, such as {MOST_STRIPS}, or inputs that vary less",
+def _refuse_many(scenario: Scenario, strips: int, reach: float, away: float) -> None:
+    """Refuse more strips than there may be, naming what sets the contacts so far apart."""
+    takes = (
+        f"the contacts of all realisations lie within {2e3 * reach:.4g} mm, which takes {strips}"
+        f" strips of the width that suits one, and there may be {MOST_STRIPS}"
     )
-    raise ScenarioError(scenario.file, [problem])
+    coarser = f"a number of strips, such as contact.strips = {MOST_STRIPS}"
+    shifting = _shifting(scenario)
+    if not shifting:
+        expected = f"{coarser}, or inputs that vary less"
+        raise ScenarioError(scenario.file, [Problem("contact", "strips", takes, None, expected)])
+    alone = len(shifting) == 1 and scenario.contact.centre is None
+    crown = scenario.roller.crown_radius if alone else None
+    problems = [_shifts_far(item, takes, coarser, away, crown) for item in shifting]
+    raise ScenarioError(scenario.file, problems)
+
+
+def _shifting(scenario: Scenario) -> list[RandomInput]:
+    """Return the random inputs that move the contact along the track."""
+    keys = {OFFSET, TILT} if scenario.creepage.tilt_shifts_contact else {OFFSET}
+    return [item for item in scenario.random if keys & set(item.keys)]
+
+
+def _shifts_far(
+    item: RandomInput, takes: str, coarser: str, away: float, crown: float | None
+) -> Problem:
+    """Return what is told of one input; `crown` is given where it alone moves the contact."""
+    table, key = item.name.split(".", 1)
+    shift = f"moves contacts by up to {away * 1e3:.4g} mm"
+    less = f"a smaller {'radius' if 'radius' in item.options else 'spread'}"
+    if TILT in item.keys and crown is not None:
+        shift += f", crown radius x tilt = {crown * 1e3:.4g} mm x {away / crown * 1e3:.4g} mrad"
+    if TILT in item.keys:
+        less += ", creepage.tilt_shifts_contact = false"
+    return Problem(table, key, f"{shift}: {takes}", item.describe(), f"{less}, or {coarser}")

@@ -8,7 +8,7 @@ import numpy as np
 
 from wearsim.errors import ContactError, SolverError
 from wearsim.scenario import Scenario
-from wearsim.studies.build import load_range
+from wearsim.studies.build import flat_gap, load_range, slip_profile, start_height
 from wearsim.studies.contact_draws import (
     FRICTION,
     LOAD,
@@ -22,6 +22,7 @@ from wearsim.studies.contact_draws import (
 from wearsim.studies.local_friction import LocalFriction
 from wearsim.studies.realisation_strips import realisation_grid
 from wearsim.studies.stepping import check_model
+from wearsim.studies.tracks import touched_at
 from wearsim.types import (
     BatchSolution,
     Creepage,
@@ -64,11 +65,15 @@ class Realisations:
         self._field = LocalFriction(scenario, self.model, item) if item is not None else None
         everything = self._columns(slice(0, count))
         self.grid = realisation_grid(
-            scenario, self.model, self._load, everything[LOAD], self._centres(everything)
+            scenario,
+            self.model,
+            self._load,
+            everything[LOAD],
+            touched_at(scenario, everything[OFFSET], everything[TILT]),
         )
         self.model.prepare(self.grid, (scenario.cylinder.material, scenario.roller.material))
         self._curvature = 1.0 / scenario.cylinder.radius + 1.0 / scenario.roller.radius
-        self._profile = self._on_strips()
+        self._height = start_height(scenario.cylinder.profile, self.grid)
         self.friction_points = 0
         if self._field is not None:
             self.friction_points = self._checked_points(self._field, everything)
@@ -128,16 +133,6 @@ class Realisations:
             columns[LOAD] = self._load + (drawn[LOAD][part] - mean)
         return columns
 
-    def _centres(self, columns: Columns) -> FloatArray:
-        """Return where the contacts lie on an unworn cylinder [m]."""
-        if not self.scenario.creepage.tilt_shifts_contact:
-            return columns[OFFSET]
-        return columns[OFFSET] - self.scenario.roller.crown_radius * columns[TILT]
-
-    def _on_strips(self) -> FloatArray | None:
-        profile = self.scenario.cylinder.profile
-        return None if profile is None else np.interp(self.grid.y, profile.y, profile.height)
-
     def _from_apex(self, columns: Columns) -> FloatArray:
         """Return the distance from the roller's apex, (contacts, strips), or (1, strips) [m]."""
         offset = columns[OFFSET] if OFFSET in self.draws.values else columns[OFFSET][:1]
@@ -146,9 +141,7 @@ class Realisations:
     def _gap(self, columns: Columns) -> FloatArray:
         """Return the gaps, (1, 1, contacts, strips) [m]; of stride 0 where all are the same."""
         s, tilt = self._from_apex(columns), columns[TILT]
-        gap = s * s / (2.0 * self.scenario.roller.crown_radius)
-        if self._profile is not None:
-            gap = gap - self._profile
+        gap = flat_gap(self.scenario, s, self._height)
         if self.scenario.creepage.tilt_shifts_contact and tilt.any():
             gap = gap + tilt[:, None] * s
         return np.broadcast_to(gap, (len(tilt), self.grid.strips))[None, None]
@@ -162,12 +155,10 @@ class Realisations:
         scenario, creepage = self.scenario, self.scenario.creepage
         if not creepage.differential_slip:
             return None
-        roller, s = scenario.roller, self._from_apex(columns)
-        slip = s * s / (2.0 * roller.crown_radius * roller.radius)
-        if self._profile is not None:
-            slip = slip + self._profile / scenario.cylinder.radius
+        s = self._from_apex(columns)
+        slip = slip_profile(scenario, s, self._height)
         if not creepage.tilt_shifts_contact:
-            slip = slip - columns[TILT][:, None] / roller.radius * s
+            slip = slip - columns[TILT][:, None] / scenario.roller.radius * s
         return np.array(np.broadcast_to(slip, (len(columns[TILT]), self.grid.strips)))
 
     def _points(self, columns: Columns) -> OperatingPoints | list[OperatingPoint]:

@@ -67,7 +67,7 @@ def run(
     """
     path = Path(output) if output is not None else None
     if path is not None:
-        check_output(path, force)
+        check_output(path, force, scenario.paths)
     scene, stepper, name = build_scene(scenario)
     replay = _Replay(scenario, scene, stepper, name, path, on_event, stop_requested)
     replay.begin(fresh_state(scene), float(scenario.total_passes))
@@ -353,7 +353,7 @@ class _Replay:
             static={
                 "y": scene.grid.y,
                 "nominal_gap": scene.per_roller(scene.at_time(0.0, 0.0).nominal_gap),
-                "start_height": start_height(scenario, scene.grid),
+                "start_height": start_height(scenario.cylinder.profile, scene.grid),
                 "multiplicity": kinematics.multiplicity,
             },
             history=self.recorder.history,

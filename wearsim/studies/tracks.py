@@ -10,10 +10,12 @@ from wearsim.errors import Problem, ScenarioError
 from wearsim.mechanics.elasticity import combine
 from wearsim.mechanics.hertz import HertzContact, hertz
 from wearsim.scenario import Scenario
-from wearsim.types import Grid
+from wearsim.types import FloatArray, Grid, Profile
 
 STRIPS_PER_HALF_WIDTH = 12  # of the fresh patch; a run's error in y is then about 1e-3
 MOST_STRIPS = 801
+PROFILE_STRIPS_PER_HALF_WIDTH = 24  # where one contact is solved on a profile's whole width
+FEWEST_PROFILE_STRIPS = 161
 
 
 @dataclass(frozen=True)
@@ -39,12 +41,33 @@ NOTHING_DRAWN = Drawn()
 
 def contact_centres(scenario: Scenario) -> tuple[float, ...]:
     """Return where each roller first touches the cylinder [m]."""
-    offsets = scenario.per_roller(scenario.roller.offset)
+    offsets = np.array(scenario.per_roller(scenario.roller.offset))
+    tilts = np.array(scenario.per_roller(scenario.creepage.tilt))
+    return tuple(touched_at(scenario, offsets, tilts).tolist())
+
+
+def touched_at(scenario: Scenario, offset: FloatArray, tilt: FloatArray) -> FloatArray:
+    """Return where rollers of these offsets [m] and tilts [rad] touch an unworn cylinder [m]."""
     if not scenario.creepage.tilt_shifts_contact:
-        return offsets
-    tilts = scenario.per_roller(scenario.creepage.tilt)
-    crown = scenario.roller.crown_radius
-    return tuple(y - crown * tilt for y, tilt in zip(offsets, tilts, strict=True))
+        return offset
+    return np.asarray(offset - scenario.roller.crown_radius * tilt)
+
+
+def profile_grid(profile: Profile, half_width: float, strips: int | None) -> Grid:
+    """Return strips over a profile's whole width.
+
+    Parameters
+    ----------
+    profile : Profile
+    half_width : float
+        That of the fresh patch [m].
+    strips : int, optional
+        How many; by default as many as resolve the patch, at most `MOST_STRIPS`.
+    """
+    start, stop = float(profile.y[0]), float(profile.y[-1])
+    resolving = np.ceil(PROFILE_STRIPS_PER_HALF_WIDTH * (stop - start) / half_width)
+    chosen = strips or int(np.clip(resolving, FEWEST_PROFILE_STRIPS, MOST_STRIPS))
+    return Grid.spanning(start, stop, chosen)
 
 
 def fresh_patch(scenario: Scenario, load: float) -> HertzContact:
