@@ -172,29 +172,47 @@ def march_into(
     sums : Sums
         Overwritten.
     """
-    force_x, force_y, moment = sums.force_x, sums.force_y, sums.moment
-    adhesion, traction_x, traction_y = sums.adhesion, sums.traction_x, sums.traction_y
     clear(sums)
     cell = 2.0 / points
     for k in range(1, points + 1):
         place = place_of(k, points)
-        middle = place + 0.5 * cell
         shape = bound_shape(place, elliptic)
         for j in range(len(half_length)):
             a = half_length[j]
-            dx = cell * a
-            tx = traction_x[j] - gradient_x[j] * dx
-            ty = traction_y[j] - (gradient_y + gradient_spin * middle * a) * dx
-            sticks, scale = hold(tx, ty, shape * bound_peak[j])
-            tx *= scale
-            ty *= scale
-            traction_x[j] = tx
-            traction_y[j] = ty
-            force_x[j] += tx
-            force_y[j] += ty
-            moment[j] += place * ty
-            adhesion[j] += 1.0 if sticks else 0.0
+            across = gradient_y + gradient_spin * (place + 0.5 * cell) * a
+            _step(j, place, cell * a, gradient_x[j], across, shape * bound_peak[j], sums)
     _times_step(sums, half_length, cell)
+
+
+@kernel
+def _step(
+    j: int, place: float, dx: float, along: float, across: float, bound: float, sums: Sums
+) -> tuple[float, float, float]:
+    """Take strip `j` a step on; return the trial tractions and the factor that held them.
+
+    Parameters
+    ----------
+    j : int
+        Number of the strip.
+    place, dx : float
+        x/a where the step ends, and its length [m].
+    along, across : float
+        Rise of the tractions over the step [Pa/m].
+    bound : float
+        Traction bound where the step ends [Pa].
+    sums : Sums
+        Brought up to date, but for the work.
+    """
+    tx = sums.traction_x[j] - along * dx
+    ty = sums.traction_y[j] - across * dx
+    sticks, scale = hold(tx, ty, bound)
+    sums.traction_x[j] = scale * tx
+    sums.traction_y[j] = scale * ty
+    sums.force_x[j] += scale * tx
+    sums.force_y[j] += scale * ty
+    sums.moment[j] += place * (scale * ty)
+    sums.adhesion[j] += 1.0 if sticks else 0.0
+    return tx, ty, scale
 
 
 @kernel
@@ -269,29 +287,17 @@ def march_local(
     sums : Sums
         Overwritten; `work` is the textbook's element sum over the rolling velocity.
     """
-    force_x, force_y, moment, work = sums.force_x, sums.force_y, sums.moment, sums.work
-    adhesion, traction_x, traction_y = sums.adhesion, sums.traction_x, sums.traction_y
     clear(sums)
     points = len(friction)
     cell = 2.0 / points
     for k in range(1, points + 1):
         place = place_of(k, points)
-        middle = place + 0.5 * cell
         shape = bound_shape(place, elliptic)
         for j in range(len(half_length)):
             a = half_length[j]
-            dx = cell * a
-            tx = traction_x[j] - gradient_x[j] * dx
-            ty = traction_y[j] - (gradient_y + gradient_spin * middle * a) * dx
+            across = gradient_y + gradient_spin * (place + 0.5 * cell) * a
             bound = shape * (friction[k - 1, first + j] * bound_peak[j])
-            sticks, scale = hold(tx, ty, bound)
-            work[j] += scale * (1.0 - scale) * (longitudinal * tx * tx + lateral * ty * ty)
-            tx *= scale
-            ty *= scale
-            traction_x[j] = tx
-            traction_y[j] = ty
-            force_x[j] += tx
-            force_y[j] += ty
-            moment[j] += place * ty
-            adhesion[j] += 1.0 if sticks else 0.0
+            tx, ty, scale = _step(j, place, cell * a, gradient_x[j], across, bound, sums)
+            cut = scale * (1.0 - scale)
+            sums.work[j] += cut * (longitudinal * tx * tx + lateral * ty * ty)
     _times_step(sums, half_length, cell)

@@ -222,68 +222,36 @@ def _solve_tractions(
 ) -> None:
     """Sum the tractions of contact `k` along its strips into `total`."""
     a, b = patches.a[k], patches.b[k]
-    c11, c22, c23 = coefficients
-    longitudinal = 8.0 * a / (3.0 * c11 * theory.shear_modulus)
-    lateral = 8.0 * a / (3.0 * c22 * theory.shear_modulus)
-    turning = math.pi * a * math.sqrt(a / b) / (4.0 * c23 * theory.shear_modulus)
+    longitudinal, lateral, turning = _flexibilities(a, b, coefficients, theory.shear_modulus)
     parabola = 2.0 * asked.normal_force[k] / (math.pi * a * b)
-    strips = len(work.peak)
-    for j in range(strips):
-        t = work.middle[j] / b
-        section = max((1.0 - t) * (1.0 + t), 0.0) if work.coverage[j] > 0.0 else 0.0
-        if theory.elliptic:
-            work.peak[j] = patches.peak_pressure[k] * math.sqrt(section)
-        else:
-            work.peak[j] = parabola * section
+    _put_bounds(b, patches.peak_pressure[k], parabola, theory.elliptic, work)
+    for j in range(first, stop):
         mean = work.longitudinal[j] - work.spin_part[j]
         work.gradient_x[j] = mean / longitudinal + work.spin_part[j] / turning
     gradient_y, gradient_spin = asked.lateral[k] / lateral, asked.spin[k] / turning
-    closed = theory.closed_form == ALWAYS
-    closed = closed or (theory.closed_form == EXACT and asked.spin[k] == 0.0)
-    closed = closed and not theory.element_sum
-    half_length = found.half_length[k][first:stop]
+    slopes = gradient_y, gradient_spin, longitudinal, lateral
+    half_length, part = found.half_length[k][first:stop], part_of(sums, first, stop)
     gradient_x, peak = work.gradient_x[first:stop], work.peak[first:stop]
-    bound, part = work.bound[first:stop], part_of(sums, first, stop)
-    friction = asked.friction[k]
+    bound, friction = work.bound[first:stop], asked.friction[k]
     lanes, columns = friction.shape
     clear(total)
     if lanes > 1 and not asked.carried:
-        march_local(
-            half_length,
-            peak,
-            friction,
-            first,
-            theory.elliptic,
-            gradient_x,
-            gradient_y,
-            gradient_spin,
-            longitudinal,
-            lateral,
-            part,
-        )
+        march_local(half_length, peak, friction, first, theory.elliptic, gradient_x, *slopes, part)
         _add(part, 1.0, first, total)
         return
+    closed = theory.closed_form == ALWAYS
+    closed = closed or (theory.closed_form == EXACT and asked.spin[k] == 0.0)
     for lane in range(lanes):  # the particles of a pattern that rolls through, or one for all
         for j in range(stop - first):
             bound[j] = friction[lane, first + j if columns > 1 else 0] * peak[j]
-        if closed:
+        if theory.element_sum:
+            march_local(
+                half_length, bound, alike, first, theory.elliptic, gradient_x, *slopes, part
+            )
+        elif closed:
             closed_form_into(half_length, bound, theory.elliptic, gradient_x, gradient_y, part)
             if asked.spin[k] != 0.0:
                 part.moment[:] = 0.0  # phi x is left out, of the work as of the traction
-        elif theory.element_sum:
-            march_local(
-                half_length,
-                bound,
-                alike,
-                first,
-                theory.elliptic,
-                gradient_x,
-                gradient_y,
-                gradient_spin,
-                longitudinal,
-                lateral,
-                part,
-            )
         else:
             march_into(
                 half_length,
@@ -296,6 +264,29 @@ def _solve_tractions(
                 part,
             )
         _add(part, 1.0 / lanes, first, total)
+
+
+@kernel
+def _flexibilities(
+    a: float, b: float, coefficients: tuple[float, float, float], shear_modulus: float
+) -> tuple[float, float, float]:
+    """Return L1, L2 and L3 [m/Pa], as `kalker.flexibilities` does."""
+    c11, c22, c23 = coefficients
+    longitudinal = 8.0 * a / (3.0 * c11 * shear_modulus)
+    lateral = 8.0 * a / (3.0 * c22 * shear_modulus)
+    turning = math.pi * a * math.sqrt(a / b) / (4.0 * c23 * shear_modulus)
+    return longitudinal, lateral, turning
+
+
+@kernel
+def _put_bounds(
+    b: float, peak_pressure: float, parabola: float, elliptic: bool, work: Work
+) -> None:
+    """Put the traction bound's pressure at x = 0 of every strip, elliptic or parabolic."""
+    for j in range(len(work.peak)):
+        t = work.middle[j] / b
+        section = max((1.0 - t) * (1.0 + t), 0.0) if work.coverage[j] > 0.0 else 0.0
+        work.peak[j] = peak_pressure * math.sqrt(section) if elliptic else parabola * section
 
 
 @kernel

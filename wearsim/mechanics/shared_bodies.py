@@ -20,6 +20,16 @@ SIDES = 2  # a contact touches a cylinder and a roller
 
 
 @kernel
+def count_bodies(members: IntArray) -> int:
+    """Return how many bodies contacts share, from their numbers, shape (contacts, 2)."""
+    count = 0
+    for k in range(members.shape[0]):
+        for side in range(SIDES):
+            count = max(count, members[k, side] + 1)
+    return count
+
+
+@kernel
 def add_depths(
     members: IntArray, shared: FloatArray, line_load: FloatArray, surface: FloatArray
 ) -> None:
@@ -35,7 +45,7 @@ def add_depths(
         [N/m]; [m], added to.
     """
     contacts, n = line_load.shape
-    depth = np.zeros((members.max() + 1, n))
+    depth = np.zeros((count_bodies(members), n))
     for k in range(contacts):
         for side in range(SIDES):
             b = members[k, side]
@@ -56,7 +66,9 @@ def _number_unknowns(
 ) -> int:
     """Give the strips of bodies that wear under a contact their numbers, the others -1."""
     contacts, n = index.shape
-    number[:] = -1
+    for b in range(number.shape[0]):
+        for i in range(n):
+            number[b, i] = -1
     for k in range(contacts):
         for side in range(SIDES):
             b = members[k, side]
@@ -106,7 +118,7 @@ def solve_depths(
         False if the system is singular.
     """
     contacts, n = index.shape
-    number = np.empty((members.max() + 1, n), np.int64)
+    number = np.empty((count_bodies(members), n), np.int64)
     count = _number_unknowns(members, shared, index, number)
     matrix = np.zeros((count, count + 1))
     for i in range(count):

@@ -17,7 +17,7 @@ import numpy as np
 from wearsim.mechanics.influence import HIGHEST, read_influence
 from wearsim.mechanics.jit import kernel
 from wearsim.mechanics.linear import solve_in_place
-from wearsim.mechanics.shared_bodies import add_depths, solve_depths
+from wearsim.mechanics.shared_bodies import add_depths, count_bodies, solve_depths
 from wearsim.types import FloatArray, IntArray
 
 CONVERGED = 0
@@ -142,6 +142,7 @@ def _assemble(
     log_scale: float,
     line_load: FloatArray,
     index: IntArray,
+    size: int,
     coupled: bool,
     work: FloatArray,
     surface: FloatArray,
@@ -153,7 +154,7 @@ def _assemble(
     contact. Columns after those of the strips hold the residual, a unit approach and, where
     contacts share a body, a unit rise of every strip's gap.
     """
-    n, size = line_load.shape[1], index[k].max() + 1
+    n = line_load.shape[1]
     for i in range(n):
         surface[k, i] += own[k, i] * line_load[k, i]
         row = index[k, i]
@@ -320,7 +321,7 @@ def solve_slender(
     unit = 1.0 / (np.pi * contact_modulus)
     log_scale = 0.5 * np.log(4.0 / (np.pi * contact_modulus * longitudinal_curvature))
     log_scale -= np.log(spacing)
-    coupled = members.max() >= 0
+    coupled = count_bodies(members) > 0
     per_strip = 2 if coupled else 1
     kept = contacts if coupled else 0
     index = np.empty((contacts, n), np.int64)
@@ -329,9 +330,10 @@ def solve_slender(
     work, matrix = np.empty((2, n)), np.empty((n, 2 + per_strip * n))
     for k in range(contacts):
         if not line_load[k].max() > 0.0:
-            total = own + shared[:, 0] + shared[:, 1]
+            for i in range(n):
+                surface[k, i] = own[k, i] + shared[k, 0, i] + shared[k, 1, i]
             approach[k] = foundation_guess(
-                k, gap, total, contact_modulus, loads[k], spacing, line_load
+                k, gap, surface, contact_modulus, loads[k], spacing, line_load
             )
     for iteration in range(1, MAX_ITERATIONS + 1):
         cautious = iteration > 12
@@ -343,13 +345,26 @@ def solve_slender(
             width = 2 + per_strip * size
             matrix[:size, :width] = 0.0
             widest = _assemble(
-                k, own, table, unit, log_scale, line_load, index, coupled, work, surface, matrix
+                k,
+                own,
+                table,
+                unit,
+                log_scale,
+                line_load,
+                index,
+                size,
+                coupled,
+                work,
+                surface,
+                matrix,
             )
             if widest > HIGHEST:
                 return TOO_FINE, iteration
             if not solve_in_place(matrix, size, width):
                 return SINGULAR, iteration
-            missing = loads[k] / spacing - line_load[k].sum()
+            missing = loads[k] / spacing
+            for i in range(n):
+                missing -= line_load[k, i]
             if not _answer(k, size, coupled, missing, matrix, step, approach, response, lift):
                 return SINGULAR, iteration
         if coupled and not solve_depths(members, shared, index, response, step, lift, approach):
@@ -364,51 +379,3 @@ def solve_slender(
         if change < STEP_TOLERANCE and not left and not entered:
             return CONVERGED, iteration
     return NO_CONVERGENCE, MAX_ITERATIONS
-
-
-@kernel
-def solve_each(
-    gap: FloatArray,
-    own: FloatArray,
-    loads: FloatArray,
-    spacing: float,
-    contact_modulus: float,
-    longitudinal_curvature: float,
-    table: FloatArray,
-    line_load: FloatArray,
-    approach: FloatArray,
-) -> tuple[int, int, IntArray]:
-    """Solve contacts that share nothing, one after another; parameters as in `solve_slender`.
-
-    Returns
-    -------
-    failed, status : int
-        The first contact that failed or -1, and what went wrong.
-    iterations : ndarray of int, shape (contacts,)
-    """
-    contacts, n = gap.shape
-    alone, nothing = np.full((1, 2), -1), np.zeros((1, 2, n))
-    iterations = np.zeros(contacts, np.int64)
-    for k in range(contacts):
-        start = line_load[k].max() > 0.0
-        for attempt in range(2):
-            status, iterations[k] = solve_slender(
-                gap[k : k + 1],
-                own[k : k + 1],
-                alone,
-                nothing,
-                loads[k : k + 1],
-                spacing,
-                contact_modulus,
-                longitudinal_curvature,
-                table,
-                line_load[k : k + 1],
-                approach[k : k + 1],
-            )
-            if status == CONVERGED or attempt == 1 or not start:
-                break
-            # a start from far away can mislead Newton; the foundation's guess is always near
-            line_load[k] = 0.0
-        if status != CONVERGED:
-            return k, status, iterations
-    return -1, CONVERGED, iterations

@@ -32,6 +32,7 @@ from wearsim.plugins import (
     SharedWear,
 )
 from wearsim.plugins.protocols import naming_contact
+from wearsim.plugins.shared_wear import NO_BODY
 from wearsim.types import (
     BatchSolution,
     ContactFields,
@@ -139,21 +140,9 @@ class Slender(ContactModel):
             loads = _own(columns.normal_force)
         else:
             loads = np.array([point.normal_force for point in points])
-        arguments = (
-            _own(gap),
-            *wear.reduced,
-            loads,
-            self._grid.spacing,
-            self._pair.contact_modulus,
-            longitudinal_curvature,
-            self._table,
+        iterations = self._solve_normal(
+            _own(gap), wear.reduced, loads, longitudinal_curvature, line_load, approach
         )
-        status, iterations = kernels.solve_slender(*arguments, line_load, approach)
-        if status != kernels.CONVERGED and warm is not None:
-            # a start from far away can mislead Newton; the foundation's guess is always near
-            line_load[:] = 0.0
-            status, iterations = kernels.solve_slender(*arguments, line_load, approach)
-        self._check(status, gap, loads, line_load, approach)
         if columns is not None:
             count = np.full(len(loads), iterations, dtype=np.int64)
             shape = (len(loads),)
@@ -165,6 +154,34 @@ class Slender(ContactModel):
             self._complete(line_load[k], approach[k], iterations, longitudinal_curvature, point)
             for k, point in enumerate(points)
         ]
+
+    def _solve_normal(
+        self,
+        gap: FloatArray,
+        wear: tuple[FloatArray, IntArray, FloatArray],
+        loads: FloatArray,
+        longitudinal_curvature: float,
+        line_load: FloatArray,
+        approach: FloatArray,
+    ) -> int:
+        """Solve normal contacts in place from what they start with; return the iterations."""
+        arguments = (
+            gap,
+            *wear,
+            loads,
+            self._grid.spacing,
+            self._pair.contact_modulus,
+            longitudinal_curvature,
+            self._table,
+        )
+        started = bool(line_load.any())
+        status, iterations = kernels.solve_slender(*arguments, line_load, approach)
+        if status != kernels.CONVERGED and started:
+            # a start from far away can mislead Newton; the foundation's guess is always near
+            line_load[:] = 0.0
+            status, iterations = kernels.solve_slender(*arguments, line_load, approach)
+        self._check(status, gap, loads, line_load, approach)
+        return int(iterations)
 
     def solve_batch(
         self,
@@ -187,30 +204,21 @@ class Slender(ContactModel):
         if warm is not None:
             line_load[:] = [solution.line_load for solution in warm]
             approach[:] = [solution.approach for solution in warm]
-        failed, status, iterations = kernels.solve_each(
-            gaps,
-            compliance,
-            _own(columns.normal_force),
-            self._grid.spacing,
-            self._pair.contact_modulus,
-            longitudinal_curvature,
-            self._table,
-            line_load,
-            approach,
-        )
-        for k in range(len(gaps) if failed < 0 else failed + 1):
-            part = slice(k, k + 1)
-            if k == failed or line_load[k, 0] > 0.0 or line_load[k, -1] > 0.0:
-                try:
-                    self._check(
-                        status if k == failed else kernels.CONVERGED,
-                        gaps[part],
-                        columns.normal_force[part],
-                        line_load[part],
-                        approach[part],
-                    )
-                except ContactError as error:
-                    raise naming_contact(error, k, shape) from error
+        iterations, loads = np.zeros(len(gaps), dtype=np.int64), _own(columns.normal_force)
+        alone, nothing = np.full((1, 2), NO_BODY), np.zeros((1, 2, strips))
+        for k in range(len(gaps)):
+            one = slice(k, k + 1)
+            try:
+                iterations[k] = self._solve_normal(
+                    gaps[one],
+                    (compliance[one], alone, nothing),
+                    loads[one],
+                    longitudinal_curvature,
+                    line_load[one],
+                    approach[one],
+                )
+            except ContactError as error:
+                raise naming_contact(error, k, shape) from error
         return self._completed(
             line_load, approach, iterations, longitudinal_curvature, columns, shape
         )

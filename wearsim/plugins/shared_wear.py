@@ -71,6 +71,8 @@ class SharedWear:
             Number of each contact's shared bodies, counted over both columns, or -1.
         shared : ndarray, shape (contacts, 2, strips)
         """
+        if len(self.bodies) == 1:
+            return self.total, np.full((1, 2), NO_BODY), np.zeros_like(self.compliance)
         shared = self.compliance.copy()
         merged, members = _membership(self.bodies.tobytes(), len(self.bodies))
         if merged:
