@@ -337,7 +337,9 @@ def solve_slender(
             )
     for iteration in range(1, MAX_ITERATIONS + 1):
         cautious = iteration > 12
-        surface[:] = gap
+        for k in range(contacts):
+            for i in range(n):  # an assignment of arrays takes seconds to compile
+                surface[k, i] = gap[k, i]
         if coupled:
             add_depths(members, shared, line_load, surface)
         for k in range(contacts):

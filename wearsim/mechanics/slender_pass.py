@@ -356,12 +356,16 @@ def _solve_fully(g: int, load: float, anchored: bool, loads: Loads, m: Medium, f
     )
     if status != CONVERGED:
         return status
-    loads.line_load[g], loads.approach[g] = line_load[0], approach[0]
+    loads.approach[g] = approach[0]
+    for i in range(n):
+        loads.line_load[g, i] = line_load[0, i]
     if not anchored:
         _number_strips(g, loads.line_load, f)
         return CONVERGED
-    loads.anchor[g], loads.anchor_gap[g] = line_load[0], f.gap
-    loads.anchor_approach[g], f.beyond[g] = approach[0], 0.0
+    for i in range(n):
+        loads.anchor[g, i], loads.anchor_gap[g, i] = line_load[0, i], f.gap[i]
+        f.beyond[g, i] = 0.0
+    loads.anchor_approach[g] = approach[0]
     return CONVERGED if set_anchor(g, loads.anchor, m, f) else SINGULAR
 
 
