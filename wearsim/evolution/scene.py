@@ -395,11 +395,11 @@ class Scene:
         if not self.has_nodes:
             return values
         weighted = values * self.weight.reshape(1, -1, *(1,) * (values.ndim - 2))
-        return self.of_roller(weighted, np.add)
+        return self.sum_of_roller(weighted)
 
-    def of_roller(self, values: FloatArray, gather: np.ufunc) -> FloatArray:
-        """Return `gather` of each roller's contacts, such as np.add, (S, C, ...) to (S, R, ...)."""
-        found = [gather.reduce(values[:, self.roller == r], axis=1) for r in range(self.rollers)]
+    def sum_of_roller(self, values: FloatArray) -> FloatArray:
+        """Return the sum over each roller's contacts, (S, C, ...) to (S, R, ...)."""
+        found = [values[:, self.roller == r].sum(axis=1) for r in range(self.rollers)]
         return np.stack(found, axis=1)
 
     def total_power(self, power: FloatArray) -> FloatArray:

@@ -72,7 +72,7 @@ class Wearing:
         kept = 1.0 - self.exponents
         on_cylinder, on_roller = self._parts
         on_cylinder = (kept * on_cylinder).sum(axis=1, keepdims=True)
-        on_roller = self._scene.of_roller((kept * on_roller).sum(axis=0, keepdims=True), np.add)
+        on_roller = self._scene.sum_of_roller((kept * on_roller).sum(axis=0, keepdims=True))
         opening: FloatArray = on_cylinder + on_roller[:, self._scene.roller]
         return opening
 

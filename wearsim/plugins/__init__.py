@@ -13,7 +13,6 @@ from wearsim.plugins.protocols import (
     WearLaw,
 )
 from wearsim.plugins.random_inputs import (
-    FRAMES,
     Distribution,
     Frame,
     FrictionField,
@@ -33,7 +32,6 @@ from wearsim.plugins.specs import (
 
 __all__ = [
     "BODIES",
-    "FRAMES",
     "Body",
     "Capabilities",
     "ContactModel",

@@ -12,7 +12,6 @@ import numpy as np
 from wearsim.types import FloatArray
 
 Frame: TypeAlias = Literal["contact", "cylinder", "roller"]
-FRAMES: tuple[Frame, ...] = ("contact", "cylinder", "roller")
 
 Uniforms: TypeAlias = Callable[[int, int], FloatArray]
 """Uniform numbers of one stream, by first index and count; each index has one value for ever."""

@@ -44,8 +44,7 @@ def monte_carlo(seed: int, name: str, dimension: int, first: int, count: int) ->
     ndarray, shape (count, dimension)
         Strictly between 0 and 1.
     """
-    stream = Stream(seed, name, "test")
-    return np.stack([stream.uniforms(first, count, block=k) for k in range(dimension)], axis=1)
+    return Stream(seed, name, "test").rows(first, count, dimension)
 
 
 def latin_hypercube(

@@ -66,3 +66,11 @@ class Stream:
         """Return uniform numbers between 0 and 1, both excluded; parameters as of `words`."""
         words = self.words(first, count, realisation, block)
         return np.asarray(((words >> np.uint64(12)) + 0.5) * _STEP)
+
+    def rows(self, first: int, count: int, dimension: int, realisation: int = 0) -> FloatArray:
+        """Return uniform numbers for draws that take several each, (count, dimension).
+
+        Component k of every draw has the block k; other parameters as of `words`.
+        """
+        columns = [self.uniforms(first, count, realisation, k) for k in range(dimension)]
+        return np.stack(columns, axis=1)

@@ -30,8 +30,6 @@ class Draws:
     ----------
     scenario : Scenario
         With what is drawn for a test as a whole in place; the rest at its mean.
-    values : mapping of str to ndarray, shape () or (rollers,)
-        Everything that is drawn for the test or for its rollers, by the scenario's key.
     rollers : mapping of str to ndarray, shape (rollers,)
         What is drawn for each roller and has no place in the scenario, by field of `ContactInputs`.
     varying : tuple of Varying
@@ -41,7 +39,6 @@ class Draws:
     """
 
     scenario: Scenario
-    values: Mapping[str, FloatArray] = field(default_factory=dict)
     rollers: Mapping[str, FloatArray] = field(default_factory=dict)
     varying: tuple[Varying, ...] = ()
     passes: tuple[RandomInput, ...] = ()
@@ -51,24 +48,6 @@ class Draws:
         """Whether rollers that the scenario calls alike have inputs of their own."""
         count = self.scenario.operation.rollers
         return bool(self.rollers) or any(len(v.rollers) < count for v in self.varying)
-
-    def told(self, inputs: Sequence[RandomInput]) -> dict[str, dict[str, object]]:
-        """Return what is drawn as plain values with their SI units, for a results file.
-
-        Parameters
-        ----------
-        inputs : sequence of RandomInput
-            The scenario's.
-        """
-        units = {
-            key: item.quantity.kind.unit if item.quantity else "1"
-            for item in inputs
-            for key in item.keys
-        }
-        return {
-            key: {"values": np.atleast_1d(value).tolist(), "unit": units[key]}
-            for key, value in self.values.items()
-        }
 
     def lasting(self, name: str, mean: float) -> float:
         """Return the greatest size that an input of a contact has over the whole test.
@@ -141,8 +120,7 @@ def draw(scenario: Scenario) -> Draws:
     if not scenario.random:
         return Draws(scenario)
     _refuse(scenario)
-    whole = [item for item in scenario.random if item.role in {"scalar", "joint"}]
-    lasting = [item for item in whole if item.persistence != "per-pass"]
+    lasting = _lasting(scenario)
     values = _lasting_values(scenario, lasting)
     listed = {
         key: tuple(float(number) for number in array) if array.ndim else float(array)
@@ -157,11 +135,45 @@ def draw(scenario: Scenario) -> Draws:
     }
     return Draws(
         scenario=realise(scenario, listed) if listed else scenario,
-        values=values,
         rollers=rollers,
         varying=_varying(scenario),
-        passes=tuple(item for item in whole if item.persistence == "per-pass"),
+        passes=tuple(item for item in scenario.random if item.persistence == "per-pass"),
     )
+
+
+def drawn_values(scenario: Scenario) -> dict[str, dict[str, object]]:
+    """Return what is drawn for the test and its rollers, as plain values for a results file.
+
+    Parameters
+    ----------
+    scenario : Scenario
+
+    Returns
+    -------
+    dict of str to dict
+        By the scenario's key: `values`, one for the test or one per roller, and their SI `unit`.
+    """
+    lasting = _lasting(scenario)
+    if not lasting:
+        return {}
+    units = {
+        key: item.quantity.kind.unit if item.quantity else "1"
+        for item in lasting
+        for key in item.keys
+    }
+    return {
+        key: {"values": np.atleast_1d(value).tolist(), "unit": units[key]}
+        for key, value in _lasting_values(scenario, lasting).items()
+    }
+
+
+def _lasting(scenario: Scenario) -> list[RandomInput]:
+    """Return the inputs that are drawn once for the test or once for each roller."""
+    return [
+        item
+        for item in scenario.random
+        if item.role in {"scalar", "joint"} and item.persistence != "per-pass"
+    ]
 
 
 def _refuse(scenario: Scenario) -> None:

@@ -56,13 +56,7 @@ def redrawing(scenario: Scenario, items: Sequence[RandomInput]) -> Redraw:
     def redraw(inputs: ContactInputs, first: int) -> ContactInputs:
         count = len(inputs.friction)
         uniforms = {
-            item.name: np.stack(
-                [
-                    stream.uniforms(first, count, realisation, component)
-                    for component in range(item.dimension)
-                ],
-                axis=1,
-            )
+            item.name: stream.rows(first, count, item.dimension, realisation)
             for item, stream in streams.items()
         }
         return _placed(inputs, _values(items, copula.tie(uniforms)))

@@ -20,7 +20,7 @@ from wearsim.results import Result, RunData, check_output, read_results, write_r
 from wearsim.results.layout import VARIABLES
 from wearsim.scenario import Scenario, parse_scenario
 from wearsim.studies.build import build_scene, start_height, strips_of_run
-from wearsim.studies.draws import draw
+from wearsim.studies.draws import draw, drawn_values
 from wearsim.studies.events import Checkpointed, Event, Finished, Started, Stepped, Warned
 from wearsim.studies.provenance import origins, plugins_in_use, software
 from wearsim.studies.recorder import Recorder
@@ -173,7 +173,7 @@ class _Replay:
         self.stop_requested = stop_requested or (lambda: False)
         self.stop = float(scenario.total_passes)
         self.software, self.plugins = dict(software()), plugins_in_use(scenario)
-        self.drawn = draw(scenario).told(scenario.random)
+        self.drawn = drawn_values(scenario)
         self.warnings: list[str] = []
         self.created = datetime.now(UTC).isoformat(timespec="seconds")
         self.wall_before, self.started = 0.0, time.monotonic()
