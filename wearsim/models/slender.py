@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
-from pydantic import Field
 
 from wearsim.errors import ContactError
 from wearsim.mechanics import slender as kernels
@@ -23,11 +21,11 @@ from wearsim.models.tangential import (
     friction_per_strip,
     local_slip,
 )
+from wearsim.models.tangential_options import TangentialOptions, tangential_theory
 from wearsim.plugins import (
     Capabilities,
     ContactModel,
     ContactModelSpec,
-    Options,
     PassLoop,
     SharedWear,
 )
@@ -55,16 +53,8 @@ _REMEDY = {
 }
 
 
-class SlenderOptions(Options):
+class SlenderOptions(TangentialOptions):
     """Options of the contact model `slender`."""
-
-    tangential: Literal["strip", "fastsim"] = Field(
-        "strip", description="tangential theory: closed-form strips, or a FASTSIM march"
-    )
-    mx: int = Field(50, ge=1, description="points along rolling of a FASTSIM march")
-    bound: Literal["parabolic", "elliptic"] = Field(
-        "elliptic", description="traction bound of a FASTSIM march"
-    )
 
 
 class Slender(ContactModel):
@@ -396,11 +386,7 @@ def _own(array: FloatArray) -> FloatArray:
 
 
 def _build(options: SlenderOptions) -> Slender:
-    if options.tangential == "strip":
-        return Slender(StripTheory())
-    from wearsim.models.fastsim_theory import FastsimTheory  # noqa: PLC0415
-
-    return Slender(FastsimTheory(mx=options.mx, bound=options.bound))
+    return Slender(tangential_theory(options))
 
 
 SPEC = ContactModelSpec(
