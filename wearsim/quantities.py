@@ -31,7 +31,7 @@ minute = min; minutes = min; hour = h; hours = h; day = d; days = d
 rad = [angle]; mrad = 1/1000 * rad; urad = 1/1000 * mrad
 turn = 6.283185307179586476925286766559 * rad; turns = turn; rev = turn; deg = 1/360 * turn
 rpm = turn / min
-kg = [mass]; g = 1/1000 * kg; mg = 1/1000 * g
+kg = [mass]; g = 1/1000 * kg; mg = 1/1000 * g; ug = 1/1000 * mg
 N = kg * m / s**2; mN = 1/1000 * N; kN = 1000 * N; MN = 1000 * kN
 Pa = N / m**2; kPa = 1000 * Pa; MPa = 1000 * kPa; GPa = 1000 * MPa
 J = N * m; mJ = 1/1000 * J; kJ = 1000 * J; MJ = 1000 * kJ; Nm = N * m; Nmm = N * mm; kNm = kN * m
@@ -109,10 +109,12 @@ ANGLE = Kind("an angle", "rad", "1 mrad")
 TORQUE = Kind("a torque", "N m", "0.5 N mm")
 SPEED = Kind("a speed", "m/s", "2.6 m/s")
 PER_POWER = Kind("a force per power", "N/W", "20 N/W")
+DENSITY = Kind("a density", "kg/m^3", "7850 kg/m^3")
+MASS_PER_ENERGY = Kind("a mass per energy", "kg/J", "5.3 ug/J")
 
 _KINDS = (
     *(LENGTH, FORCE, STIFFNESS, PRESSURE, WEAR_FACTOR, ROTATION_SPEED, DURATION, ANGLE, TORQUE),
-    *(SPEED, PER_POWER),
+    *(SPEED, PER_POWER, DENSITY, MASS_PER_ENERGY),
     Kind("an area", "m^2", "10 mm^2"),
     Kind("a volume", "m^3", "10 mm^3"),
     Kind("a power", "W", "0.07 W"),
@@ -390,6 +392,9 @@ NonNegativeTorque: TypeAlias = Annotated[float, Quantity(TORQUE, "not negative")
 Speed: TypeAlias = Annotated[float, Quantity(SPEED)]
 PositiveSpeed: TypeAlias = Annotated[float, Quantity(SPEED, "positive")]
 PerPower: TypeAlias = Annotated[float, Quantity(PER_POWER)]
+PositiveDensity: TypeAlias = Annotated[float, Quantity(DENSITY, "positive")]
+PositiveMassPerEnergy: TypeAlias = Annotated[float, Quantity(MASS_PER_ENERGY, "positive")]
+NonNegativeMassPerEnergy: TypeAlias = Annotated[float, Quantity(MASS_PER_ENERGY, "not negative")]
 
 
 @dataclass(frozen=True)

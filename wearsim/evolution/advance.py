@@ -119,7 +119,7 @@ def implicit_step(scene: Scene, state: WearState, passes: float) -> WearState:
             change = max(change, _differs(new.cylinder, wearing.cylinder))
         if change < FIXED_POINT_TOLERANCE:
             return _completed(scene, state, passes, new, found, iteration * len(found))
-        new.exponents = exponents_between(scene, contacts, found, wearing.exponents)
+        new.exponents = exponents_between(wearing, new)
         contacts, wearing, loads = found, new, new_loads
     raise StepError(
         f"an implicit step of {passes:.4g} passes from pass {state.passes:.0f} did not settle"

@@ -14,6 +14,9 @@ from wearsim.types import ContactSolution, FloatArray
 
 Contacts: TypeAlias = tuple[ContactSolution, ...]
 
+SLIDING = 1.0  # exponent of dissipation in full sliding, the greatest there is
+STEEPEST = 50.0  # where catastrophic wear begins, T gamma's law goes as the power 44
+
 
 class Wearing:
     """What a step of `passes` passes with given contacts wears off the bodies.
@@ -43,11 +46,17 @@ class Wearing:
         rates = scene.shared_wear(cylinder, roller)
         self.cylinder, self.roller = rates[0] * passes, rates[1] * passes
         self.exponents: FloatArray | None = None
-        self._scene, self._contacts = scene, contacts
+        self.scene, self.contacts = scene, contacts
         # each contact's own part in the wear of the bodies
         share = passes * scene.cylinder_share[None, :, None, None]
         own = passes * scene.kinematics.roller_share / scene.shape[0]
         self._parts = cylinder * share, roller * own * scene.weight[None, :, None, None]
+
+    @property
+    def per_contact(self) -> FloatArray:
+        """Depth that each contact wears off both bodies, shape (contacts, strips) [m]."""
+        worn: FloatArray = (self._parts[0] + self._parts[1]).reshape(len(self.contacts), -1)
+        return worn
 
     @cached_property
     def compliance(self) -> list[SharedWear]:
@@ -55,12 +64,12 @@ class Wearing:
         parts = self._parts
         if self.exponents is not None:
             parts = self.exponents * parts[0], self.exponents * parts[1]
-        scene = self._scene
+        scene = self.scene
         stations, contacts, realisations = scene.shape
         station, contact = np.divmod(np.arange(stations * contacts), contacts)
         bodies = np.stack([station, scene.roller[contact]], axis=1)
         # to (realisations, stations, contacts, sides, strips)
-        ratios = np.stack([_ratio(part, self._contacts) for part in parts])
+        ratios = np.stack([_ratio(part, self.contacts) for part in parts])
         ratios = ratios.transpose(3, 1, 2, 0, 4).reshape(realisations, -1, 2, scene.grid.strips)
         return [SharedWear(bodies, ratio) for ratio in ratios]
 
@@ -72,14 +81,14 @@ class Wearing:
         kept = 1.0 - self.exponents
         on_cylinder, on_roller = self._parts
         on_cylinder = (kept * on_cylinder).sum(axis=1, keepdims=True)
-        on_roller = self._scene.sum_of_roller((kept * on_roller).sum(axis=0, keepdims=True))
-        opening: FloatArray = on_cylinder + on_roller[:, self._scene.roller]
+        on_roller = self.scene.sum_of_roller((kept * on_roller).sum(axis=0, keepdims=True))
+        opening: FloatArray = on_cylinder + on_roller[:, self.scene.roller]
         return opening
 
     @property
     def opening(self) -> FloatArray:
         """Gap that the step opens at every contact, (stations, contacts, realisations, strips)."""
-        return self.cylinder + self.roller[:, self._scene.roller]
+        return self.cylinder + self.roller[:, self.scene.roller]
 
     def foreseen(self, line_load: FloatArray) -> FloatArray:
         """Return the opening that compliance and offset make of a line load, shape as `opening`."""
@@ -102,29 +111,28 @@ def _ratio(wear: FloatArray, contacts: Contacts) -> FloatArray:
     return ratio_to_load(flat, _column(contacts, "line_load")).reshape(wear.shape)
 
 
-def exponents_between(
-    scene: Scene, old: Contacts, new: Contacts, known: FloatArray | None
-) -> FloatArray:
-    """Return the exponents with which dissipation followed the line load from `old` to `new`.
+def exponents_between(old: Wearing, new: Wearing) -> FloatArray:
+    """Return the exponents with which wear followed the line load from `old` to `new`.
 
     Parameters
     ----------
-    scene : Scene
-    old, new : tuple of ContactSolution
-        Two solutions of the same contacts.
-    known : ndarray, shape (stations, contacts, realisations, strips), optional
-        What to take where a strip tells nothing; 1 where left out.
+    old, new : Wearing
+        The wear of two solutions of the same contacts.
 
     Returns
     -------
     ndarray, shape (stations, contacts, realisations, strips)
+        Where a strip tells nothing that of `old`, or 1.
     """
+    scene, known = old.scene, old.exponents
     exponents = np.ones((*scene.shape, scene.grid.strips)) if known is None else known.copy()
+    linear = scene.law.depth_per_dissipation("cylinder", scene.kinematics.rolling_speed)
     learn_exponents(
-        _column(old, "line_load"),
-        _column(new, "line_load"),
-        _column(old, "dissipation"),
-        _column(new, "dissipation"),
-        exponents.reshape(len(new), -1),
+        _column(old.contacts, "line_load"),
+        _column(new.contacts, "line_load"),
+        old.per_contact,
+        new.per_contact,
+        SLIDING if linear is not None else STEEPEST,
+        exponents.reshape(len(new.contacts), -1),
     )
     return exponents

@@ -7,7 +7,7 @@ import numpy as np
 from wearsim.mechanics.jit import kernel
 from wearsim.types import FloatArray
 
-LEAST_EXPONENT, GREATEST_EXPONENT = 0.4, 1.0  # wear goes as q^(1/2) in adhesion, as q in sliding
+LEAST_EXPONENT = 0.4  # wear goes as q^(1/2) in adhesion, and where its rate is at rest
 FELT = 1e-7  # relative change of a line load from which an exponent can be read
 
 
@@ -48,8 +48,9 @@ def ratio_to_load(wear: FloatArray, line_load: FloatArray) -> FloatArray:
 def learn_exponents(
     load: FloatArray,
     new_load: FloatArray,
-    dissipation: FloatArray,
-    new_dissipation: FloatArray,
+    wear: FloatArray,
+    new_wear: FloatArray,
+    greatest: float,
     exponents: FloatArray,
 ) -> None:
     """Read from two solutions of the same contacts with which exponent wear follows the line load.
@@ -58,16 +59,18 @@ def learn_exponents(
     ----------
     load, new_load : ndarray, shape (contacts, strips)
         Line loads of the two [N/m].
-    dissipation, new_dissipation : ndarray, shape (contacts, strips)
-        P_l of the two [W/m].
+    wear, new_wear : ndarray, shape (contacts, strips)
+        Wear of the two, in one unit.
+    greatest : float
+        The greatest exponent that is believed.
     exponents : ndarray, shape (contacts, strips)
         Changed where the load did.
     """
     for k in range(load.shape[0]):
         for i in range(load.shape[1]):
-            if not (dissipation[k, i] > 0.0 and new_dissipation[k, i] > 0.0):
+            if not (wear[k, i] > 0.0 and new_wear[k, i] > 0.0):
                 continue
             rise = np.log(new_load[k, i] / load[k, i])
             if abs(rise) > FELT:
-                slope = np.log(new_dissipation[k, i] / dissipation[k, i]) / rise
-                exponents[k, i] = min(max(slope, LEAST_EXPONENT), GREATEST_EXPONENT)
+                slope = np.log(new_wear[k, i] / wear[k, i]) / rise
+                exponents[k, i] = min(max(slope, LEAST_EXPONENT), greatest)

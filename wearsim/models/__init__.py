@@ -12,6 +12,7 @@ from wearsim.models import (
     loads,
     processes,
     slender,
+    t_gamma,
 )
 from wearsim.plugins import ContactModelSpec, LoadSpec, RandomInputSpec, WearLawSpec, hookimpl
 
@@ -25,7 +26,7 @@ def wearsim_contact_models() -> Iterable[ContactModelSpec]:
 @hookimpl
 def wearsim_wear_laws() -> Iterable[WearLawSpec]:
     """Yield the built-in wear laws."""
-    return (archard.SPEC,)
+    return (archard.SPEC, t_gamma.SPEC)
 
 
 @hookimpl

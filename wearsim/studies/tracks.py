@@ -9,8 +9,9 @@ import numpy as np
 from wearsim.errors import Problem, ScenarioError
 from wearsim.mechanics.elasticity import combine
 from wearsim.mechanics.hertz import HertzContact, hertz
+from wearsim.plugins import WearLaw
 from wearsim.scenario import Scenario
-from wearsim.types import FloatArray, Grid, Profile
+from wearsim.types import ContactSolution, FloatArray, Grid, Profile
 
 STRIPS_PER_HALF_WIDTH = 12  # of the fresh patch; a run's error in y is then about 1e-3
 MOST_STRIPS = 801
@@ -81,25 +82,65 @@ def foreseen_half_width(scenario: Scenario, load: float, drawn: Drawn) -> float:
     """Return half the width of the groove that full slip would leave at the end [m].
 
     Rigid bodies in full slip wear d = [(3/4) c N n / sqrt(2 R)]^(2/3) deep and 2 sqrt(2 R d) wide,
-    c being depth per pass and load; wear of the roller counts like that of the cylinder.
+    c being depth per pass and load; wear of the roller counts like that of the cylinder. Of a law
+    that is not linear c is the greater of those in the fresh contact and in the final groove.
     """
     if scenario.wear is None:
         return 0.0
-    law, speed = scenario.wear.build(), scenario.rolling_speed
-    factors = [law.depth_per_dissipation(body, speed) for body in ("cylinder", "roller")]
-    share = scenario.cylinder.radius / scenario.roller.radius / scenario.operation.rollers
-    wear = ((factors[0] or 0.0) + share * (factors[1] or 0.0)) * speed
+    law, patch = scenario.wear.build(), fresh_patch(scenario, load)
+    friction = max(scenario.friction.coefficient, drawn.friction)
     crown = 2.0 * scenario.roller.crown_radius
     start = 0.0
     if scenario.cylinder.profile is not None:
         start = float(np.ptp(scenario.cylinder.profile.height))
-    half = fresh_patch(scenario, load).b
+    half = patch.b
     for _ in range(20):  # the slip at the groove's sides depends on its width, weakly
-        friction = max(scenario.friction.coefficient, drawn.friction)
-        per_load = wear * friction * greatest_slip(scenario, half, drawn)
+        slip = greatest_slip(scenario, half, drawn)
+        line_loads = 0.75 * load / np.array([patch.b, max(half, patch.b)])
+        per_load = wear_per_load(scenario, law, line_loads, friction * slip)
         depth = (0.75 * per_load * load * scenario.total_passes / np.sqrt(crown)) ** (2.0 / 3.0)
         half = float(np.sqrt(crown * (depth + start)))
     return half
+
+
+def wear_per_load(
+    scenario: Scenario, law: WearLaw, line_load: FloatArray, friction_slip: float
+) -> float:
+    """Return depth per pass and line load of strips in full slip, on both bodies [m/(N/m)].
+
+    Parameters
+    ----------
+    scenario : Scenario
+    law : WearLaw
+    line_load : ndarray, shape (strips,)
+        Line loads to look at; the greatest answer counts [N/m].
+    friction_slip : float
+        Friction coefficient times slip.
+    """
+    modulus = combine(scenario.cylinder.material, scenario.roller.material).contact_modulus
+    curvature = 1.0 / scenario.cylinder.radius + 1.0 / scenario.roller.radius
+    half_length = np.sqrt(4.0 * line_load / (np.pi * modulus * curvature))
+    speed = scenario.rolling_speed
+    dissipation = friction_slip * line_load * speed
+    sliding = ContactSolution(
+        y=np.zeros_like(line_load),
+        half_length=half_length,
+        line_load=line_load,
+        dissipation=dissipation,
+        force_x=0.0,
+        force_y=0.0,
+        spin_moment=0.0,
+        approach=0.0,
+        peak_pressure=float((2.0 * line_load / (np.pi * half_length)).max()),
+        adhesion_fraction=0.0,
+        power=float(dissipation.sum()),
+        longitudinal_creepage=0.0,
+        iterations=0,
+    )
+    share = scenario.cylinder.radius / scenario.roller.radius / scenario.operation.rollers
+    depth = law.depth_per_pass("cylinder", sliding, speed)
+    depth = depth + share * law.depth_per_pass("roller", sliding, speed)
+    return float((depth / line_load).max())
 
 
 def greatest_slip(scenario: Scenario, half_width: float, drawn: Drawn) -> float:

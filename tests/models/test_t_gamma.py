@@ -1,0 +1,103 @@
+"""The wear law by T gamma over A: its regimes, and tests that run through them."""
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from tests.evolution import built, stepped, worn
+from wearsim.evolution.per_pass import PerPassStepper
+from wearsim.models.t_gamma import Regimes, TGamma, TGammaOptions
+from wearsim.types import ContactSolution
+
+SPEED = 2.0
+MILD = 5.3e-9 / 7850.0  # m^3/J
+
+
+def contact(index, half_length=1e-4):
+    """Return a contact whose strips dissipate `index` [Pa] per area and rolled distance."""
+    index = np.asarray(index, dtype=float)
+    strips = np.full_like(index, half_length)
+    numbers = dict.fromkeys(
+        ("force_x", "force_y", "spin_moment", "approach", "peak_pressure", "adhesion_fraction"), 0.0
+    )
+    return ContactSolution(
+        y=np.arange(len(index), dtype=float),
+        half_length=strips,
+        line_load=strips,
+        dissipation=index * 2.0 * strips * SPEED,
+        power=0.0,
+        longitudinal_creepage=0.0,
+        iterations=0,
+        **numbers,
+    )
+
+
+def depths(index, **options):
+    law = TGamma(TGammaOptions(**options))
+    return law.depth_per_pass("cylinder", contact(index), SPEED)
+
+
+def test_that_the_published_rates_come_back():
+    # ug per m rolled and mm^2 of contact, at T gamma over A in N/mm^2
+    index = np.array([0.0, 5.0, 10.3, 20.0, 77.0, 87.2])
+    rate = np.array([0.0, 5.3 * 5.0, 5.3 * 10.3, 55.0, 55.0, 55.0 + 61.9 * 10.0])
+    per_area = depths(index * 1e6) * 7850.0 / 2e-4  # kg/m^3, which is 1e-3 ug/(m mm^2)
+    np.testing.assert_allclose(per_area * 1e3, rate, rtol=1e-12)
+
+
+def test_that_the_regimes_meet():
+    regimes = Regimes()
+    for threshold in (regimes.severe / regimes.mild, regimes.catastrophic_from):
+        below, above = regimes.rate(threshold * np.array([1.0 - 1e-9, 1.0 + 1e-9]))
+        assert above == pytest.approx(below, rel=1e-6)
+    assert regimes.severe / regimes.mild == pytest.approx(10.4e6, rel=5e-3)  # as published
+
+
+def test_that_nothing_wears_outside_the_contact_or_with_factor_zero():
+    law = TGamma(TGammaOptions(roller={"factor": 0.0}))
+    outside = contact([1e6, 1e6], half_length=0.0)
+    assert law.depth_per_pass("cylinder", outside, SPEED).tolist() == [0.0, 0.0]
+    assert law.depth_per_pass("roller", contact([1e6, 9e7]), SPEED).tolist() == [0.0, 0.0]
+
+
+def test_that_rates_are_read_with_their_units():
+    read = Regimes(mild="5.3 ug/J", severe="55 ug/(m mm^2)", catastrophic_from="77.2 N/mm^2")
+    assert read.model_dump() == pytest.approx(Regimes().model_dump())
+    with pytest.raises(ValidationError, match="wrong dimension"):
+        Regimes(mild="5.3 ug")
+
+
+def test_that_a_mildly_worn_test_is_archards():
+    law = {"wear": {"law": "t-gamma", "roller": {"factor": 0.5}}}
+    scene, state = worn(operation__duration="30 min", **law)
+    energy = {"k_over_h": f"{MILD!r} 1/Pa"}, {"k_over_h": f"{0.5 * MILD!r} 1/Pa"}
+    linear = {"law": "archard-dissipation", "cylinder": energy[0], "roller": energy[1]}
+    _, archard = worn(operation__duration="30 min", wear=linear)
+    np.testing.assert_allclose(state.cylinder_depth, archard.cylinder_depth, rtol=1e-6, atol=1e-15)
+    assert (scene.shared_wear(*scene.wear_per_pass(state.contacts))[1] > 0.0).any()
+
+
+@pytest.mark.parametrize(
+    ("creepage", "regime", "passes"),
+    [(0.06, "severe", 600), (0.2, "severe", 600), (0.4, "catastrophic", 6000)],
+)
+def test_that_implicit_steps_agree_with_every_pass_by_itself(creepage, regime, passes):
+    """Strips in the middle wear severely, and mildly at the patch's ends."""
+    changes = {
+        "wear": {"law": "t-gamma", "roller": {"factor": 0.0}},
+        "creepage__longitudinal": creepage,
+        "friction__coefficient": 0.5,
+        "operation__passes": passes,
+    }
+    scene, stepper, stop = built(**changes)
+    start = stepped(scene, stepper, 1.0)[0]
+    index = start.contacts[0].dissipation.max() / (2.0 * start.contacts[0].half_length.max())
+    assert (index / scene.kinematics.rolling_speed > 77.2e6) == (regime == "catastrophic")
+    implicit, _ = stepped(scene, stepper, stop)
+    truth, _ = stepped(scene, PerPassStepper(), stop)
+    greatest = truth.cylinder_depth.max()
+    apart = np.abs(implicit.cylinder_depth - truth.cylinder_depth).max()
+    assert apart < 5e-3 * greatest
+    assert abs(implicit.cylinder_depth.max() - greatest) < implicit.depth_error[0]
+    assert implicit.depth_error[0] < 2e-3 * greatest
+    assert implicit.solves < 0.7 * truth.solves
