@@ -1,0 +1,191 @@
+"""Every contact model beside the exact theory and beside the others, as Markdown tables.
+
+``python -m tests.benchmarks.models -o docs/models.md``. A contact model that is installed from
+elsewhere stands in the tables of worn profiles and whole tests with its default options.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from tests.benchmarks.replays import SCENARIOS
+from tests.benchmarks.table import best_short, lapse, machine, part, timed
+from tests.reference import WORN, rows
+from tests.reference.accuracy import (
+    PowerErrors,
+    WornErrors,
+    built,
+    drawn_errors,
+    hard_errors,
+    solved,
+    worn_errors,
+)
+from wearsim import load_scenario, run
+from wearsim.errors import WearsimError
+from wearsim.plugins import ContactModelSpec, registry
+
+#: what is drawn or prescribed, by contact model and options
+TANGENTIAL: dict[str, tuple[str, dict[str, Any]]] = {
+    "strip, on exact Hertz": ("hertz", {}),
+    "fastrip, on exact Hertz": ("hertz", {"tangential": "fastrip"}),
+    "fastsim, elliptic bound": ("hertz", {"tangential": "fastsim"}),
+    "fastsim, elliptic, one flexibility": (
+        "hertz",
+        {"tangential": "fastsim", "flexibility": "one"},
+    ),
+    "fastsim, parabolic bound (`hertz-fastsim`)": ("hertz-fastsim", {}),
+    "fastsim, parabolic, one flexibility": ("hertz-fastsim", {"flexibility": "one"}),
+    "strip, on `slender` (the default)": ("slender", {}),
+}
+VARIANTS = ("kik-piotrowski", "ayasse-chollet", "analyn")
+LONG = 3.0  # b/a from which the theories of strips apply
+FAILED = "no: "
+
+
+def normal_models() -> dict[str, tuple[str, dict[str, Any]]]:
+    """Return every registered contact model, with its variants, each with default options."""
+    found: dict[str, tuple[str, dict[str, Any]]] = {}
+    for name in registry().names(ContactModelSpec):
+        if name == "semi-hertzian":
+            found |= {f"{name}, {variant}": (name, {"variant": variant}) for variant in VARIANTS}
+        else:
+            found[name] = (name, {})
+    return found
+
+
+def drawn_table(repetitions: int) -> str:
+    """Return the errors of the tangential theories on random cases and hard ones."""
+    lines = []
+    for label, (name, options) in TANGENTIAL.items():
+        model = built(name, **options)
+        row = rows("rig_random", kind="partial")[0]
+        seconds = best_short(lambda model=model, row=row: solved(model, row), repetitions)
+        cells = [label]
+        for kind in ("paper", "partial"):
+            found = drawn_errors(model, kind)
+            cells += [_spread(found), percent(found.strips)]
+        cells += [_spread(hard_errors(model, LONG)), lapse(seconds)]
+        lines.append(cells)
+    head = (
+        "tangential theory",
+        *("paper's inputs: power, rms / worst", "P_l(y), L2"),
+        *("partial slip with spin: power, rms / worst", "P_l(y), L2"),
+        *(f"hard cases, b/a >= {LONG:g}: power, rms / worst", "one contact, prepared and solved"),
+    )
+    return table(head, lines)
+
+
+def _spread(errors: PowerErrors) -> str:
+    return f"{percent(errors.rms)} / {percent(errors.worst)}"
+
+
+def percent(error: float) -> str:
+    """Return an error without its sign."""
+    return f"{100.0 * abs(error):.2g} %"
+
+
+def worn_table() -> str:
+    """Return the errors of the normal models on worn profiles."""
+    lines = []
+    for profile in WORN:
+        for label, (name, options) in normal_models().items():
+            try:
+                cells = _worn_cells(worn_errors(built(name, **options), profile))
+            except WearsimError as error:
+                cells = [FAILED + str(error).split(";", maxsplit=1)[0], *[""] * 6]
+            lines.append([profile.replace("_", " "), label, *cells])
+    head = (
+        *("profile", "contact model", "line load, L1", "half-length, L1", "approach"),
+        *("peak pressure", "P_l(y), L2: full sliding", "partial slip", "with spin"),
+    )
+    return table(head, lines)
+
+
+def _worn_cells(errors: WornErrors) -> list[str]:
+    return [
+        percent(errors.line_load),
+        percent(errors.half_length),
+        part(errors.approach),
+        part(errors.peak_pressure),
+        *(percent(value) for value in errors.dissipation.values()),
+    ]
+
+
+def whole_table(share: float) -> str:
+    """Return the end of rig-450min with every model, and what it took; `share` shortens it."""
+    lines = []
+    for label, (name, options) in normal_models().items():
+        lines.append([label, *_whole_cells(name, options, share)])
+    head = (
+        *("contact model", "depth", "width", "worn volume", "estimated error of depth"),
+        *("stepper", "steps", "contact solves", "time"),
+    )
+    return table(head, lines)
+
+
+def _whole_cells(name: str, options: dict[str, Any], share: float) -> list[str]:
+    overrides: dict[str, object] = {"operation.duration": f"{450 * share:.12g} min"}
+    overrides |= {"contact.model": name} | {f"contact.{key}": v for key, v in options.items()}
+    scenario = load_scenario(SCENARIOS / "rig-450min.toml", overrides=overrides)
+    try:
+        result = run(scenario)
+    except WearsimError as error:
+        return [FAILED + str(error), *[""] * 7]
+    seconds = timed(lambda: run(scenario))
+    return [
+        f"{result.depth[-1] * 1e6:.2f} um",
+        f"{result.width[-1] * 1e3:.2f} mm",
+        f"{result.worn_volume[-1] * 1e9:.3f} mm^3",
+        percent(float(result.depth_error[-1] / result.depth[-1])),
+        result.stepper,
+        str(result.steps),
+        str(result.solves[-1]),
+        lapse(seconds),
+    ]
+
+
+def table(head: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
+    """Return a Markdown table."""
+    rule = ["---"] * len(head)
+    return "".join(f"| {' | '.join(line)} |\n" for line in (head, rule, *lines))
+
+
+def report(tell: Callable[[str], object], share: float = 1.0, repetitions: int = 5) -> str:
+    """Measure everything and return the page; `tell` gets each table as soon as it is done."""
+    text = ""
+    parts: tuple[tuple[str, Callable[[], str]], ...] = (
+        ("Tangential theories on elliptic contacts", lambda: drawn_table(repetitions)),
+        ("Normal models on worn profiles, closed-form strips for the tractions", worn_table),
+        ("rig-450min to its end with every model", lambda: whole_table(share)),
+    )
+    for title, measure in parts:
+        section = f"## {title}\n\n{measure()}\n"
+        tell(section)
+        text += section
+    return text
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Print the page, and write it where asked."""
+    parser = argparse.ArgumentParser(prog="tests.benchmarks.models", description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="shorten the whole tests")
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE.md", help="write it here too")
+    asked = parser.parse_args(arguments)
+
+    def tell(text: str) -> None:
+        sys.stdout.write(text + "\n")
+        sys.stdout.flush()
+
+    tell(f"Measured on {machine()}.\n")
+    text = report(tell, *((0.002, 1) if asked.quick else ()))
+    if asked.output is not None:
+        asked.output.parent.mkdir(parents=True, exist_ok=True)
+        asked.output.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
