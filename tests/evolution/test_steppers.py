@@ -128,8 +128,14 @@ def test_that_three_offset_rollers_converge_as_the_step_shrinks():
     assert depth_errors[-1] < 5e-3 * cylinder_depth_of(truth)[0]
 
 
-def test_that_the_compiled_loop_is_the_python_loop():
+# half-lengths that follow from each other are those of the anchor while a contact is followed
+FOLLOWED = [("local", 2e-8), ("coupled", 2e-5)]
+
+
+@pytest.mark.parametrize(("half_length", "tolerance"), FOLLOWED)
+def test_that_the_compiled_loop_is_the_python_loop(half_length, tolerance):
     scene, _, _ = built(
+        contact__half_length=half_length,
         roller__offset=["0 mm", "0 mm", "1 mm"],
         load__kind="spring",
         load__stiffness="690 N/mm",
@@ -144,22 +150,24 @@ def test_that_the_compiled_loop_is_the_python_loop():
     slow, fast = _run_in_python(scene, state, 300), _run_compiled(scene, state, 300)
     for name in ("cylinder_depth", "roller_depth", "terms", "energy"):
         one, other = getattr(slow, name), getattr(fast, name)
-        assert np.abs(one - other).max() < 2e-8 * np.abs(one).max(), name
+        assert np.abs(one - other).max() < tolerance * np.abs(one).max(), name
     assert fast.terms.max() > 0.1
     assert fast.full_solves < 30
 
 
-def test_that_a_pass_followed_by_the_chord_method_keeps_its_residual_below_1e_8():
-    scene, _, _ = built(operation__passes=200_000, contact__strips=91)
+@pytest.mark.parametrize(("half_length", "tolerance"), FOLLOWED)
+def test_that_a_pass_followed_by_the_chord_method_leaves_next_to_nothing(half_length, tolerance):
+    scene, _, _ = built(
+        contact__half_length=half_length, operation__passes=200_000, contact__strips=91
+    )
     state, _ = stepped(scene, PerPassStepper(), 5_000)
     last = _run_compiled(scene, state, 1)
     assert last.full_solves == state.full_solves
     q = last.loop_strips[0, 0, 0, 0]
     gap = scene.gap(state.cylinder_depth, state.roller_depth)[0, 0, 0]
     exact = scene.model.solve(gap, 90.0, scene.point(0, 0, 300.0, gap * 0.0, gap * 0.0))
-    # what the line load misses, pressed through the stiffness of one strip, in parts of approach
-    assert np.abs(q - exact.line_load).max() < 1e-7 * exact.line_load.max()
-    assert last.loop_contacts[0, 0, 0, 0] == pytest.approx(exact.approach, rel=1e-8)
+    assert np.abs(q - exact.line_load).max() < 5.0 * tolerance * exact.line_load.max()
+    assert last.loop_contacts[0, 0, 0, 0] == pytest.approx(exact.approach, rel=tolerance)
     assert q.sum() * scene.grid.spacing == pytest.approx(300.0, rel=1e-10)
 
 
@@ -253,7 +261,7 @@ def test_that_a_free_roller_finds_its_creepage_at_every_step():
 def test_that_a_load_that_falls_to_nothing_is_an_error_that_names_the_cause(tmp_path):
     log = tmp_path / "log.csv"
     log.write_text("time [min], load [N]\n0, 300\n2, 300\n2.1, -10\n450, -10\n")
-    for name in ("implicit", "explicit", "per-pass"):
+    for name in ("implicit", "stabilised", "explicit", "per-pass"):
         scene, stepper, stop = built(
             # a term might still hold it up, so that this log is not refused beforehand
             load={"kind": "recorded", "file": str(log), "thermal": THERMAL},

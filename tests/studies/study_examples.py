@@ -46,6 +46,7 @@ LOG = "time [min],load [N]\n" + "".join(f"{k / 4},{300 + 60 * (-1) ** k + k}\n" 
 
 STEPPERS: dict[str, dict[str, object]] = {
     "implicit": {"evolution.tolerance": 0.005},
+    "stabilised": {"evolution.stepper": "stabilised", "evolution.tolerance": 1e-4},
     "explicit": {"evolution.stepper": "explicit", "evolution.tolerance": 0.02},
     "compiled passes": {"evolution.stepper": "per-pass"},
     "passes in Python": {

@@ -146,7 +146,7 @@ def _lost(stepper: str) -> Scenario:
     return parse_scenario(text, "rig.toml", {"load.csv": FALLING}.__getitem__)
 
 
-@pytest.mark.parametrize("stepper", ["implicit", "explicit", "compiled passes"])
+@pytest.mark.parametrize("stepper", ["implicit", "stabilised", "explicit", "compiled passes"])
 def test_that_a_run_that_loses_its_load_keeps_its_last_good_state(stepper: str, path: Path) -> None:
     scenario = _lost(stepper)
     with pytest.raises(SolverError, match="contact is lost at pass") as caught:

@@ -42,7 +42,7 @@ def _runs(**overrides: object) -> dict[str, Result]:
 
 
 @pytest.mark.parametrize("load", LOADS)
-@pytest.mark.parametrize("stepper", ["implicit", "explicit"])
+@pytest.mark.parametrize("stepper", ["implicit", "stabilised", "explicit"])
 def test_that_records_never_move_a_step(stepper: str, load: str) -> None:
     runs = _runs(**{**ROLLERS["wearing"], **LOADS[load], **STEPPERS[stepper]})
     first = runs["five"]
@@ -78,7 +78,8 @@ def test_that_records_never_move_a_pass(stepper: str) -> None:
         for name, array in first.raw.records.items():
             exact = name.endswith("profile") or name.startswith("record")
             found, last = other.raw.records[name][-1], array[-1]
-            tolerance = 0.0 if exact else 1e-12 * np.abs(last).max()
+            # a contact solved anew from another start is the same to the end of Newton's steps
+            tolerance = 0.0 if exact else 2e-8 * np.abs(last).max()
             np.testing.assert_allclose(found, last, rtol=0.0, atol=tolerance, err_msg=name)
 
 

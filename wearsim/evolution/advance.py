@@ -21,19 +21,23 @@ SAME_LOAD = 1e-9  # relative change of a load that asks for no new solution
 
 
 def mean_loads(
-    scene: Scene, state: WearState, passes: float, end_gap: FloatArray, power: FloatArray
+    scene: Scene,
+    state: WearState,
+    passes: float,
+    gaps: Sequence[FloatArray],
+    power: FloatArray,
 ) -> FloatArray:
     """Return the mean load of each contact over a step, shape (S, C, N) [N].
 
-    The load itself is integrated exactly; the feedback takes the mean of the descents at the
-    step's ends, and each term its exact mean at constant `power`.
+    The load itself is integrated exactly; the feedback takes the mean of the descents at `gaps`,
+    as a rule those at the step's ends, and each term its exact mean at constant `power`.
     """
     start, stop = scene.time(state.passes), scene.time(state.passes + passes)
     scene = scene.at_time(start, stop)
     loads = _loads(scene, scene.load.mean(start, stop))
     if scene.load.stiffness != 0.0:
-        before = scene.descent(scene.gap(state.cylinder_depth, state.roller_depth))
-        loads -= scene.load.stiffness * 0.5 * (before + scene.descent(end_gap))
+        descents = [scene.descent(gap) for gap in gaps]
+        loads -= scene.load.stiffness * np.mean(descents, axis=0)
     for number, term in enumerate(scene.terms.values()):
         # a station's power counts like any other's
         mean = scene.per_roller(power).mean(axis=0)
@@ -118,7 +122,9 @@ def implicit_step(scene: Scene, state: WearState, passes: float) -> WearState:
         if scene.slip_profile is not None:
             change = max(change, _differs(new.cylinder, wearing.cylinder))
         if change < FIXED_POINT_TOLERANCE:
-            return _completed(scene, state, passes, new, found, iteration * len(found))
+            power = contact_values(scene, found, "power")
+            begun = replace(state, contacts=found, solves=state.solves + iteration * len(found))
+            return worn_state(scene, begun, passes, (new.cylinder, new.roller), power)
         new.exponents = exponents_between(wearing, new)
         contacts, wearing, loads = found, new, new_loads
     raise StepError(
@@ -135,10 +141,11 @@ def _end_loads(
     wearing: Wearing,
     contacts: Contacts,
 ) -> FloatArray:
-    end_gap = scene.gap(
-        state.cylinder_depth + wearing.cylinder, state.roller_depth + wearing.roller
+    gaps = (
+        scene.gap(state.cylinder_depth, state.roller_depth),
+        scene.gap(state.cylinder_depth + wearing.cylinder, state.roller_depth + wearing.roller),
     )
-    return mean_loads(scene, state, passes, end_gap, contact_values(scene, contacts, "power"))
+    return mean_loads(scene, state, passes, gaps, contact_values(scene, contacts, "power"))
 
 
 def explicit_step(scene: Scene, state: WearState, passes: float) -> WearState:
@@ -149,7 +156,9 @@ def explicit_step(scene: Scene, state: WearState, passes: float) -> WearState:
     solve = solve_present if scene.varying else contacts_at
     contacts = solve(here, state, mean)
     solves = len(contacts) if contacts is state.contacts else 2 * len(contacts)
-    worn = _completed(here, state, passes, Wearing(here, contacts, passes), contacts, solves)
+    wearing, power = Wearing(here, contacts, passes), contact_values(here, contacts, "power")
+    begun = replace(state, contacts=contacts, solves=state.solves + solves)
+    worn = worn_state(here, begun, passes, (wearing.cylinder, wearing.roller), power)
     return replace(worn, contacts=solve_present(scene, worn, present_loads(scene, worn)))
 
 
@@ -195,16 +204,27 @@ def solve_present(scene: Scene, state: WearState, loads: FloatArray) -> Contacts
     return tuple(batch.solutions)
 
 
-def _completed(
+def worn_state(
     scene: Scene,
     state: WearState,
     passes: float,
-    wearing: Wearing,
-    contacts: Contacts,
-    solves: int,
+    worn: tuple[FloatArray, FloatArray],
+    power: FloatArray,
 ) -> WearState:
-    """Return the state after the step; energy is counted with the same dissipation as the wear."""
-    power = contact_values(scene, contacts, "power")
+    """Return the state that a step leads to.
+
+    Parameters
+    ----------
+    scene : Scene
+    state : WearState
+        Where the step began; its contacts stand in the state returned too.
+    passes : float
+        Length of the step.
+    worn : tuple of ndarray
+        Depth the step has worn off cylinder and rollers, shapes as in `WearState` [m].
+    power : ndarray, shape (stations, contacts, realisations)
+        Mean dissipated power of the step [W], of the same dissipation as the wear.
+    """
     duration = scene.time(state.passes + passes) - scene.time(state.passes)
     terms = np.array(
         [
@@ -215,12 +235,10 @@ def _completed(
     return replace(
         state,
         passes=state.passes + passes,
-        cylinder_depth=state.cylinder_depth + wearing.cylinder,
-        roller_depth=state.roller_depth + wearing.roller,
+        cylinder_depth=state.cylinder_depth + worn[0],
+        roller_depth=state.roller_depth + worn[1],
         terms=terms,
-        contacts=contacts,
         energy=state.energy + scene.total_power(power) * (passes / scene.kinematics.pass_rate),
-        solves=state.solves + solves,
     )
 
 

@@ -51,10 +51,12 @@ class StepControl:
         budget = self.tolerance * reached / math.pow(part, exponent)
         return self.share * max(budget - spent, FLOOR * budget)
 
-    def next_step(self, step: float, excess: float) -> float:
+    def next_step(self, step: float, excess: float, order: int = 1) -> float:
         """Return the next step where this one's error was `excess` times its allowance.
 
-        The local error of a first-order scheme grows as the square of the step.
+        The error that a step adds grows as the step to the power order + 1.
         """
-        factor = self.grow if excess == 0.0 else self.safety / math.sqrt(excess)
+        factor = self.grow
+        if excess > 0.0:
+            factor = self.safety / math.pow(excess, 1.0 / (order + 1))
         return step * min(self.grow, max(self.shrink, factor))

@@ -206,8 +206,12 @@ def excess(
     end: WearState,
     added: FloatArray,
     stop: float,
+    reached: FloatArray | None = None,
 ) -> float:
     """Return what a step adds to the errors over what it may add.
+
+    Wear forgets, and its errors make room again: where `reached` tells them, all of them together
+    may also be what a first step might have added.
 
     Parameters
     ----------
@@ -219,15 +223,19 @@ def excess(
         Error of depth [m] and volume [m^3] that the step adds.
     stop : float
         Passes at the end of the test.
+    reached : ndarray, shape (2, realisations), optional
+        Error of depth [m] and volume [m^3] after the step, at most `added` and what was before.
     """
     part, worst = end.passes / stop, 0.0
     sizes = deepest(end), whole_volume(scene, end)
     # what no shorter step would take away must not shorten it
     reducible = np.array([start.depth_error, start.volume_error]) - start.irreducible
-    spent = reducible[0], reducible[1]
+    after = reducible + added if reached is None else reached
     for kind, exponent in enumerate((DEPTH_EXPONENT, VOLUME_EXPONENT)):
-        for size, before, error in zip(sizes[kind], spent[kind], added[kind], strict=True):
+        columns = sizes[kind], reducible[kind], added[kind], after[kind]
+        for size, before, error, total in zip(*columns, strict=True):
             if size > 0.0:
                 allowed = control.allowance(float(size), exponent, float(before), part)
-                worst = max(worst, float(error) / allowed)
+                anew = control.allowance(float(size), exponent, 0.0, part)
+                worst = max(worst, min(float(error) / allowed, float(total) / anew))
     return worst

@@ -11,7 +11,6 @@ from wearsim.evolution.advance import (
     contacts_at,
     explicit_step,
     mean_loads,
-    present_scene,
     solve_present,
 )
 from wearsim.evolution.control import StepControl
@@ -25,6 +24,7 @@ from wearsim.evolution.errors_of_steps import (
 )
 from wearsim.evolution.observables import oscillation
 from wearsim.evolution.scene import Scene
+from wearsim.evolution.stability import stability_limit
 from wearsim.evolution.state import WearState, contact_values
 from wearsim.evolution.stepper import Advance, Stepper, fitted
 from wearsim.evolution.wearing import Wearing
@@ -32,7 +32,6 @@ from wearsim.types import FloatArray
 
 SAFETY = 0.5  # of the limit of stability
 OSCILLATING = 0.1  # alternate strips differ by this part of the peak line load
-POWER_ITERATIONS = 12
 
 
 class ExplicitStepper(Stepper):
@@ -103,7 +102,7 @@ class ExplicitStepper(Stepper):
             raise StepError(
                 f"a step of {self.forced_step:g} passes exceeds the limit of stability, which is"
                 f" {limit:.4g} passes at pass {state.passes:.0f}; lower evolution.step, set"
-                " evolution.stepper = 'implicit', or set evolution.allow_unstable = true to see"
+                " evolution.stepper = 'stabilised', or set evolution.allow_unstable = true to see"
                 " what happens",
                 state.to_arrays(),
             )
@@ -129,8 +128,8 @@ def _errors(scene: Scene, start: WearState, end: WearState, step: float) -> Floa
     """
     # the processes at their means over the step, as the step itself took them
     here = scene.at_time(scene.time(start.passes), scene.time(start.passes + step))
-    gap = here.gap(end.cylinder_depth, end.roller_depth)
-    loads = mean_loads(here, start, step, gap, contact_values(here, end.contacts, "power"))
+    gaps = [here.gap(state.cylinder_depth, state.roller_depth) for state in (start, end)]
+    loads = mean_loads(here, start, step, gaps, contact_values(here, end.contacts, "power"))
     solve = solve_present if scene.varying else contacts_at
     again = Wearing(here, solve(here, end, loads), step)
     other = replace(
@@ -141,52 +140,3 @@ def _errors(scene: Scene, start: WearState, end: WearState, step: float) -> Floa
     volumes = np.abs(whole_volume(scene, end) - whole_volume(scene, other))
     apart = np.array([depth_between(end, other), volumes])
     return COVER * 0.5 * apart + variation_error(scene, end, start.passes, step)
-
-
-def stability_limit(scene: Scene, state: WearState) -> float:
-    """Return the longest explicit step that is stable [passes].
-
-    Power iteration on the change of wear per pass that a change of the gap causes, from the
-    alternating shape that is nearly the stiffest; the sensitivity of the load comes from the model.
-
-    Returns
-    -------
-    float
-        2 over the greatest rate of decay, infinite where nothing wears.
-    """
-    return min(_limit_of(scene, state, v) for v in range(scene.shape[2]))
-
-
-def _limit_of(scene: Scene, state: WearState, v: int) -> float:
-    """Return the limit of realisation `v`: all rollers together on the cylinder they share.
-
-    A roller's own wear is counted as if every roller had the same share of the shape; that can
-    only lower the limit.
-    """
-    scene = present_scene(scene, state)
-    gap = scene.gap(state.cylinder_depth, state.roller_depth)
-    curvature = scene.kinematics.longitudinal_curvature
-    cylinder, roller = scene.wear_per_pass(state.contacts)
-    parts = []
-    for (s, c, realisation), contact in zip(scene.contacts, state.contacts, strict=True):
-        loaded = contact.line_load > 0.0
-        wear = cylinder[s, c, v] * scene.cylinder_share[c]
-        wear = wear + roller[s, c, v] * scene.weight[c] * scene.kinematics.roller_share
-        ratio = np.where(loaded, wear / np.where(loaded, contact.line_load, 1.0), 0.0)
-        if realisation == v and ratio.any():
-            load = float(contact.line_load.sum() * scene.grid.spacing)
-            depths = state.cylinder_depth[s, 0, v], state.roller_depth[0, scene.roller[c], v]
-            parts.append((contact, gap[s, c, v], scene.point(c, v, load, *depths), ratio))
-    if not parts:
-        return np.inf
-    anywhere = np.any([contact.line_load > 0.0 for contact, *_ in parts], axis=0)
-    shape, rate = np.where(anywhere, (-1.0) ** np.arange(len(anywhere)), 0.0), 0.0
-    for _ in range(POWER_ITERATIONS):
-        shape /= np.abs(shape).max()
-        new = np.zeros_like(shape)
-        for contact, gap_here, point, ratio in parts:
-            fall = scene.model.load_sensitivity(contact, gap_here, curvature, point, shape)
-            new += ratio * fall
-        rate = float(np.dot(shape, new) / np.dot(shape, shape))
-        shape = new
-    return 2.0 / rate if rate > 0.0 else np.inf

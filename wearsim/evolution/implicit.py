@@ -1,134 +1,23 @@
-"""The implicit stepper: backward Euler by contact with wear compliance, error by a coarser twin."""
+"""The implicit stepper: backward Euler by contact with wear compliance."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-
-import numpy as np
-
-from wearsim.errors import ContactError, StepError
 from wearsim.evolution.advance import implicit_step
-from wearsim.evolution.control import StepControl
-from wearsim.evolution.errors_of_steps import (
-    COVER,
-    DEPTHS,
-    depth_between,
-    excess,
-    variation_error,
-    whole_volume,
-    with_pass_errors,
-)
+from wearsim.evolution.errors_of_steps import Step
 from wearsim.evolution.scene import Scene
-from wearsim.evolution.state import WearState, contact_values
-from wearsim.evolution.stepper import Advance, Stepper, fitted
-from wearsim.types import FloatArray
-
-SMALLEST_STEP = 1e-3  # passes
+from wearsim.evolution.state import WearState
+from wearsim.evolution.twin import TwinStepper
 
 
-class ImplicitStepper(Stepper):
-    """Takes every step in halves, and whole in a twin of the test that is stepped beside it.
+class ImplicitStepper(TwinStepper):
+    """Solves the contacts on the profiles at the end of each step, for models that can.
 
-    The two differ by about the error of the test, with all that wear has forgotten of earlier
-    errors; `COVER` times that is the estimate. What a step adds to the difference controls its
-    size.
-
-    Parameters
-    ----------
-    control : StepControl
-        Step-size control.
-    forced_step : float, optional
-        Passes per step, in place of the control's choice.
+    Stable whatever the step, and of first order: the twin has about twice the error of the test, so
+    that the two lie apart by that of the test.
     """
 
-    def __init__(self, control: StepControl, forced_step: float | None = None) -> None:
-        self.control = control
-        self.forced_step = forced_step
+    order = 1
 
-    def side_step(self, scene: Scene, state: WearState, passes: float) -> WearState:
-        """Return the state `passes` passes later, in one step."""
-        return implicit_step(scene, state, passes)
-
-    def advance(self, scene: Scene, state: WearState, stop: float) -> Advance:
-        """Take one step, shortened until what it adds to the error is allowed."""
-        twin = state.shadow or state
-        proposed = self.forced_step or state.step or _first_step(scene, state)
-        rejected, cause = state.rejected, None
-        while proposed >= SMALLEST_STEP:
-            left = stop - state.passes
-            step = min(proposed, left) if self.forced_step else fitted(proposed, left)
-            try:
-                half = implicit_step(scene, state, 0.5 * step)
-                end = implicit_step(scene, half, 0.5 * step)
-                whole = implicit_step(scene, twin, step)
-                end = with_pass_errors(scene, state, end, whole, implicit_step, step)
-            except (StepError, ContactError) as failure:
-                if self.forced_step:
-                    raise
-                cause, rejected, proposed = failure, rejected + 1, 0.2 * step
-                continue
-            varied = variation_error(scene, end, state.passes, step)
-            added = _added(scene, (state, twin), (end, whole)) + varied
-            over = excess(self.control, scene, state, end, added, stop)
-            if self.forced_step or over <= 1.0:
-                chosen = self.control.next_step(step, over)
-                # a step cut short by the stop says little about how long the next may be
-                chosen = max(chosen, proposed) if step < proposed else chosen
-                end = replace(
-                    end,
-                    passes=stop if step == left else end.passes,
-                    spread=state.spread + varied,
-                    step=self.forced_step or chosen,
-                    steps=state.steps + 1,
-                    rejected=rejected,
-                    solves=end.solves + whole.solves - twin.solves,
-                )
-                return Advance(path=(state, half, _with_errors(scene, end, whole)))
-            rejected += 1
-            proposed = min(self.control.next_step(step, over), 0.7 * step)
-        if isinstance(cause, ContactError):
-            raise cause
-        raise StepError(
-            f"no step is short enough at pass {state.passes:.0f} (tried down to"
-            f" {SMALLEST_STEP:g} passes); {cause or 'the error does not fall with the step'}",
-            state.to_arrays(),
-        )
-
-
-def _added(
-    scene: Scene, before: tuple[WearState, WearState], after: tuple[WearState, WearState]
-) -> FloatArray:
-    """Return what a step adds to the difference between a test and its twin, in depth and volume.
-
-    Shape (2, realisations): [m] and [m^3], with the factor for safety.
-    """
-    moved = tuple(getattr(before[0], name) - getattr(before[1], name) for name in DEPTHS)
-    volumes = [whole_volume(scene, one) - whole_volume(scene, two) for one, two in (before, after)]
-    return COVER * np.array([depth_between(*after, moved), np.abs(volumes[1] - volumes[0])])
-
-
-def _with_errors(scene: Scene, end: WearState, whole: WearState) -> WearState:
-    """Return `end` with the errors that its twin `whole` and all else tell, and with that twin."""
-    apart = np.abs(whole_volume(scene, end) - whole_volume(scene, whole))
-    other = end.spread + end.irreducible
-    twins = {
-        name: replace(twin, passes=end.passes, shadow=None, coarse=None)
-        for name, twin in (("shadow", whole), ("coarse", end.coarse))
-        if twin is not None
-    }
-    return replace(
-        end,
-        depth_error=COVER * depth_between(end, whole) + other[0],
-        volume_error=COVER * apart + other[1],
-        shadow=twins["shadow"],
-        coarse=twins.get("coarse"),
-    )
-
-
-def _first_step(scene: Scene, state: WearState) -> float:
-    """Return the passes that wear a tenth of the elastic approach off the fresh contact."""
-    cylinder, roller = scene.shared_wear(*scene.wear_per_pass(state.contacts))
-    rate = float((cylinder + roller).max())
-    gap = scene.gap(state.cylinder_depth, state.roller_depth)
-    approach = contact_values(scene, state.contacts, "approach") - gap.min(axis=-1)
-    return 0.1 * float(approach.min()) / rate if rate > 0.0 else np.inf
+    def scheme(self, scene: Scene, state: WearState) -> Step:
+        """Return the implicit step."""
+        return implicit_step

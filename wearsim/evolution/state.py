@@ -59,6 +59,8 @@ class WearState:
         The same test stepped twice as coarsely; what sets the two apart is the error estimate.
     coarse : WearState, optional
         The shadow with half the contacts that stand for inputs drawn at every pass.
+    decay : ndarray, shape (realisations,), optional
+        Greatest rate at which wear flattens a profile, where last measured [1/pass].
     """
 
     passes: float
@@ -81,6 +83,7 @@ class WearState:
     loop_contacts: FloatArray | None = None
     shadow: WearState | None = None
     coarse: WearState | None = None
+    decay: FloatArray | None = None
 
     @property
     def irreducible(self) -> FloatArray:

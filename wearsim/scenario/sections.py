@@ -85,8 +85,10 @@ class CreepageTable(Table):
 class EvolutionTable(Table):
     """How the wear is stepped through the passes."""
 
-    stepper: Literal["auto", "implicit", "explicit", "per-pass"] = Field(
-        default="auto", description="How a step is taken; auto fits the contact model."
+    stepper: Literal["auto", "implicit", "stabilised", "explicit", "per-pass"] = Field(
+        default="auto",
+        description="How a step is taken; auto is implicit where the contact model takes wear"
+        " compliance, else stabilised.",
     )
     tolerance: float = Field(
         default=1e-3, gt=0.0, le=0.1, description="Relative error of the final depth and volume."

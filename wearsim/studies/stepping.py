@@ -7,6 +7,7 @@ from wearsim.evolution.control import StepControl
 from wearsim.evolution.explicit import ExplicitStepper
 from wearsim.evolution.implicit import ImplicitStepper
 from wearsim.evolution.per_pass import PerPassStepper
+from wearsim.evolution.stabilised import StabilisedStepper
 from wearsim.evolution.stepper import Stepper
 from wearsim.plugins import ContactModel
 from wearsim.scenario import Scenario
@@ -40,7 +41,7 @@ def chosen_stepper(scenario: Scenario, model: ContactModel, contacts: int) -> st
     able = model.capabilities.wear_compliance and (contacts == 1 or model.capabilities.coupled)
     asked = scenario.evolution.stepper
     if asked == "auto":
-        return "implicit" if able else "explicit"
+        return "implicit" if able else "stabilised"
     if asked == "implicit" and not able:
         raise CapabilityError(
             f"{scenario.file}: contact model '{scenario.contact.model}' takes no wear compliance"
@@ -49,7 +50,8 @@ def chosen_stepper(scenario: Scenario, model: ContactModel, contacts: int) -> st
                 if model.capabilities.wear_compliance
                 else ""
             )
-            + "; set evolution.stepper = 'explicit' or 'per-pass', or choose another contact.model"
+            + "; set evolution.stepper = 'stabilised' or 'per-pass', or choose another"
+            " contact.model"
         )
     return asked
 
@@ -72,6 +74,8 @@ def build_stepper(scenario: Scenario, name: str) -> Stepper:
     forced = float(evolution.step) if evolution.step is not None else None
     if name == "implicit":
         return ImplicitStepper(control, forced)
+    if name == "stabilised":
+        return StabilisedStepper(control, forced)
     if name == "explicit":
         return ExplicitStepper(control, forced, evolution.allow_unstable)
     return PerPassStepper()

@@ -1,0 +1,48 @@
+"""Contact models that claim nothing beyond `solve`, for the steppers that ask for nothing more."""
+
+from __future__ import annotations
+
+import importlib.util
+from dataclasses import replace
+from pathlib import Path
+
+from tests.evolution import built
+from wearsim.plugins import Capabilities, ContactModel
+
+TINY = Path(__file__).parents[1] / "plugins" / "data" / "tiny" / "wearsim_tiny.py"
+
+
+class BlackBox(ContactModel):
+    """Another model that hides what it can do, and counts what it solves."""
+
+    def __init__(self, inner):
+        self.inner, self.solved = inner, 0
+        self.capabilities = Capabilities(creepage_variation=inner.capabilities.creepage_variation)
+
+    def prepare(self, grid, materials):
+        self.inner.prepare(grid, materials)
+
+    def solve(self, gap, longitudinal_curvature, point, wear_compliance=None, warm=None):
+        assert wear_compliance is None
+        self.solved += 1
+        return self.inner.solve(gap, longitudinal_curvature, point, None, warm)
+
+
+def winkler(grid):
+    """Return the third party's elastic foundation, prepared for a grid."""
+    spec = importlib.util.spec_from_file_location("wearsim_tiny", TINY)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    model = module.Winkler(module.WinklerOptions().foundation_modulus)
+    model.prepare(grid, None)
+    return model
+
+
+def boxed(foundation=False, box=BlackBox, **changes):
+    """Return scene, stepper and passes of the rig with a model that claims nothing.
+
+    It is the built-in one of slender contacts, or an elastic foundation.
+    """
+    scene, stepper, stop = built(evolution__stepper="stabilised", **changes)
+    model = winkler(scene.grid) if foundation else scene.model
+    return replace(scene, model=box(model)), stepper, stop
