@@ -33,8 +33,8 @@ print(json.dumps({{
 STRIP = """
 import json
 import wearsim
-from wearsim.mechanics.strip import strip_force as kernel
-kernel(1e-4, 1e5, 0.1, 1e-3, 0.0, 1.15e11, 8e10)
+from wearsim.mechanics.carter import strip_force as kernel
+kernel(1e-4, 1e5, 0.1, 1e13, 1e-3, 0.0, 0.0, 1.15e11, 8e10)
 stats = kernel.stats
 print(json.dumps({"hits": sum(stats.cache_hits.values()), "path": stats.cache_path,
     "file": wearsim.__file__}))
@@ -58,7 +58,15 @@ for stepper in ("implicit", "explicit", "per-pass"):
     for name in ("rig-450min.toml", "rig-three-rollers.toml"):
         run(name, evolution__stepper=stepper)
 run(contact__tangential="fastsim")
-run(contact__model="hertz-fastsim")
+for model in ("hertz-fastsim", "hertz"):
+    run(contact__model=model)
+for variant in ("kik-piotrowski", "ayasse-chollet", "analyn"):
+    run(contact__model="semi-hertzian", contact__variant=variant)
+spin = {{"creepage__yaw": "0.5 mrad", "creepage__tilt": "1 mrad"}}
+wearsim.study_contact(
+    scenario("mean-contact.toml", contact={{"model": "hertz", "tangential": "fastrip"}}, **spin),
+    with_fields=True,
+)
 run(creepage={{"drive": "free", "bearing_torque": "10 N mm"}})
 law = {{"distribution": "uniform", "low": 0.09, "high": 0.11}}
 wander = {{"distribution": "ornstein-uhlenbeck", "correlation_time": "10 s", "marginal": law}}
@@ -66,7 +74,7 @@ run(friction__coefficient=wander, creepage__misalignment={{
     "distribution": "disc", "radius": "1 mrad", "persistence": "per-pass"}})
 field = {{"distribution": "gaussian-field", "correlation_length": "300 um", "marginal": law}}
 wearsim.dissipation(scenario("mean-contact.toml", friction__coefficient=field), 2)
-march = {{"contact__closed_form": "never", "creepage__yaw": "0.5 mrad", "creepage__tilt": "1 mrad"}}
+march = spin | {{"contact__closed_form": "never"}}
 for more in ({{}}, march, march | {{"contact__dissipation": "element-sum"}}):
     wearsim.study_contact(scenario("mean-contact.toml", **more))
 model, grid = HertzFastsim(), Grid.spanning(-3e-3, 3e-3, 61)

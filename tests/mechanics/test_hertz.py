@@ -70,6 +70,18 @@ def test_that_the_elliptic_integrals_reach_the_circle():
     assert d_integral == pytest.approx(0.25 * math.pi, rel=1e-14)
 
 
+@pytest.mark.parametrize("exponent", range(-16, -2))
+def test_that_the_elliptic_integrals_are_smooth_beside_the_circle(exponent):
+    complement = 1.0 - 10.0**exponent
+    square = (1.0 - complement) * (1.0 + complement)
+    first, d_integral = elliptic_integrals(complement)
+    # K = pi/2 (1 + m/4 + ...), D = pi/4 (1 + 3m/8 + ...), m = e^2
+    assert first == pytest.approx(0.5 * math.pi * (1.0 + square / 4.0), rel=square**2 + 1e-15)
+    assert d_integral == pytest.approx(
+        0.25 * math.pi * (1.0 + 3.0 * square / 8.0), rel=square**2 + 1e-14
+    )
+
+
 @settings(deadline=None)  # the first call compiles
 @given(st.floats(-4.0, 4.0))
 def test_that_the_aspect_ratio_solves_its_equation_over_eight_decades(exponent):

@@ -125,10 +125,10 @@ def test_that_a_contact_that_fails_says_why_and_harms_no_other(gap, load, status
     assert np.array_equal(halves[0], halves[2])
 
 
-def theory(closed_form=NEVER, kalker=TABLE, element_sum=False, points=24):
+def theory(closed_form=NEVER, kalker=TABLE, element_sum=False, points=24, single=False):
     tables = spline(0), spline(1), spline(2)
     return Theory(
-        SHEAR, NU, False, closed_form, element_sum, points, kalker, np.zeros(3), tables
+        SHEAR, NU, False, closed_form, element_sum, points, single, kalker, np.zeros(3), tables
     )  # fmt: skip
 
 

@@ -13,7 +13,9 @@ from wearsim.mechanics.kalker import (
     flexibilities,
     line_limit_coefficients,
     long_limit,
+    one_flexibility,
     short_limit,
+    spline,
 )
 
 NAMES = ("c11", "c22", "c23", "c33")
@@ -73,12 +75,42 @@ def test_that_coefficients_are_continuous_in_both_arguments(exponent, nu):
     assert values(ratio, nu + 1e-7) == pytest.approx(here, rel=1e-5)
 
 
-@pytest.mark.parametrize("edge", [0.1, 10.0, 20.0])
-@pytest.mark.parametrize("nu", [0.0, 0.25, 0.5])
-def test_that_table_and_limits_meet_without_a_kink(edge, nu):
+KNOTS = sorted({round(math.exp(place), 12) for which in range(4) for place in spline(which).knots})
+
+
+@pytest.mark.parametrize("nu", [0.0, 0.1, 0.25, 0.3, 0.42, 0.5])
+def test_that_no_knot_and_neither_end_of_the_table_makes_a_jump_or_a_kink(nu):
+    assert len(KNOTS) == 20
+    assert (KNOTS[0], KNOTS[-1]) == (0.1, 20.0)
     step = 1e-4
-    below, here, above = (np.log(values(edge * math.exp(k * step), nu)) for k in (-1, 0, 1))
-    assert above - here == pytest.approx(here - below, abs=5e-7)
+    for knot in KNOTS:
+        below, here, above = (np.log(values(knot * math.exp(k * step), nu)) for k in (-1, 0, 1))
+        near = np.log(values(knot * (1.0 + 1e-12), nu)), np.log(values(knot * (1.0 - 1e-12), nu))
+        assert near[0] == pytest.approx(near[1], abs=1e-10)
+        # twice the curvature's share: a kink would add its change of slope times the step
+        assert above - here == pytest.approx(here - below, abs=5e-7)
+
+
+@pytest.mark.parametrize("ratio", [0.05, 0.3, 1.0, 4.0, 15.0])
+def test_that_the_tables_columns_of_poissons_ratio_make_no_jump_or_kink(ratio):
+    step = 1e-4
+    below, here, above = (values(ratio, 0.25 + k * step) for k in (-1, 0, 1))
+    assert above - here == pytest.approx(here - below, rel=5e-3, abs=1e-6)
+    assert values(ratio, 0.25 + 1e-12) == pytest.approx(values(ratio, 0.25 - 1e-12), rel=1e-10)
+
+
+@pytest.mark.parametrize(("edge", "limit"), [(0.1, short_limit), (10.0, long_limit)])
+def test_that_between_its_columns_it_follows_poissons_ratio_as_the_limits_do(edge, limit):
+    # what the table has beyond its limit varies slowly, and lies between that of its columns
+    def beyond(nu):
+        return values(edge, nu) / np.array(limit(min(edge, 1.0 / edge), nu))
+
+    columns = np.array([beyond(nu) for nu in (0.0, 0.25, 0.5)])
+    allowed = np.array([1e-3, 1e-3, 4e-3, 1.5e-2])
+    for nu in np.linspace(0.0, 0.5, 21):
+        found = beyond(nu)
+        assert np.all(found <= columns.max(axis=0) * (1.0 + allowed))
+        assert np.all(found >= columns.min(axis=0) * (1.0 - allowed))
 
 
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.5])
@@ -113,3 +145,14 @@ def test_that_flexibilities_follow_from_coefficients():
     assert found.longitudinal == pytest.approx(1.6889956260024387e-15, rel=1e-12)
     assert found.lateral == pytest.approx(2.4128508942891984e-15, rel=1e-12)
     assert found.spin == pytest.approx(1.1056223217325914e-15, rel=2e-4)
+
+
+def test_that_one_flexibility_stands_for_three():
+    three = (2.0, 3.0, 5.0)
+    for k in range(3):
+        alone = [0.0, 0.0, 0.0]
+        alone[k] = -7e-4
+        assert one_flexibility(*three, *alone) == pytest.approx(three[k], rel=1e-15)
+    assert one_flexibility(*three, 0.0, 0.0, 0.0) == three[0]
+    found = one_flexibility(*three, 3e-300, -4e-300, 12e-300)
+    assert found == pytest.approx((3.0 * 2.0 + 4.0 * 3.0 + 12.0 * 5.0) / 13.0, rel=1e-14)

@@ -3,16 +3,17 @@
 import numpy as np
 import pytest
 
-from wearsim.mechanics.linear import solve_in_place
+from wearsim.mechanics.linear import solve_in_place, solve_many_in_place
 
 
 @pytest.mark.parametrize("size", [1, 2, 3, 4, 5, 7, 8, 16, 61])
-@pytest.mark.parametrize("sides", [1, 3])
-def test_that_systems_of_every_size_are_solved_like_lapack_does(size, sides):
+@pytest.mark.parametrize("sides", [1, 3, 12])
+@pytest.mark.parametrize("solver", [solve_in_place, solve_many_in_place])
+def test_that_systems_of_every_size_are_solved_like_lapack_does(solver, size, sides):
     random = np.random.default_rng(size)
     matrix, right = random.normal(size=(size, size)), random.normal(size=(size, sides))
     system = np.hstack([matrix, right])
-    assert solve_in_place(system, size, size + sides)
+    assert solver(system, size, size + sides)
     np.testing.assert_allclose(system[:, size:], np.linalg.solve(matrix, right), rtol=1e-9)
 
 

@@ -9,11 +9,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from tests.reference import STEEL, rows, worn_profile
+from tests.reference import STEEL, rows, table, worn_profile
 from wearsim.errors import CapabilityError, ContactError
 from wearsim.mechanics.elasticity import combine
+from wearsim.mechanics.fastsim_closed_form import closed_form_parabolic
 from wearsim.mechanics.hertz import hertz
-from wearsim.models.fastsim_theory import FastsimTheory, equivalent_ellipse
+from wearsim.mechanics.kalker import creepage_coefficients, flexibilities
+from wearsim.models.equivalent_ellipse import equivalent_ellipse
+from wearsim.models.fastsim_theory import FastsimTheory
 from wearsim.models.hertz_fastsim import SPEC, HertzFastsim, HertzFastsimOptions
 from wearsim.models.tangential import Strips, complete
 from wearsim.types import Creepage, Grid, OperatingPoint, OperatingPoints
@@ -159,6 +162,64 @@ def test_that_hard_cases_stay_as_far_off_as_kalker_is(bound, rms):
     assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(rms, rel=0.03)
 
 
+@pytest.mark.parametrize("flexibility", ["three", "one"])
+@pytest.mark.parametrize(("bound", "order"), [("parabolic", 2.0), ("elliptic", 1.5)])
+def test_that_steps_converge_on_the_quadrature_of_the_reference(bound, order, flexibility):
+    # the root at the elliptic bound's edges costs half an order
+    whole = table("mean_problem")
+    c11 = 8.0 * whole["a_m"] / (3.0 * 1.6889956260024387e-15 * PAIR.shear_modulus)
+    given = {"c11": c11, "c22": 2.5, "c23": 0.5}
+    for case in whole["rows"][:2]:
+        errors = []
+        for mx in (25, 50, 100, 200):
+            model = HertzFastsim(
+                HertzFastsimOptions(
+                    mx=mx, my=1200, bound=bound, flexibility=flexibility, closed_form="never",
+                    kalker_coefficients=given,
+                )
+            )  # fmt: skip
+            grid = model.suggest_grid(1.0, 45.0, 300.0, MATERIALS)
+            model.prepare(grid, MATERIALS)
+            point = OperatingPoint(300.0, 1.0, Creepage(case["xi"]), 0.1)
+            power = model.solve(0.5 * grid.y**2, 45.0, point).power
+            errors.append(power / case[f"fastsim_{bound[:3]}_exact_P_over_V_N"] - 1.0)
+        orders = np.log2(np.divide(errors[:-1], errors[1:]))
+        assert orders == pytest.approx(order, abs=0.15)
+
+
+def test_that_one_flexibility_is_the_weighted_mean_of_three_along_the_creepage():
+    xi, eta = 3e-4, -4e-4
+    *_, solution = contact(creepage=(xi, eta, 0.0), flexibility="one", my=400)
+    assert solution.force_y / solution.force_x == pytest.approx(eta / xi, rel=1e-12)
+    patch = hertz(45.0, 1.0, 300.0, PAIR.contact_modulus)
+    three = flexibilities(
+        creepage_coefficients(patch.a / patch.b, 0.3), patch.a, patch.b, PAIR.shear_modulus
+    )
+    mean = (3.0 * three.longitudinal + 4.0 * three.lateral) / 5.0
+    half = patch.half_length(solution.y)
+    expected = closed_form_parabolic(patch.a, patch.b, 300.0, 0.1, 5e-4, mean, half)
+    assert solution.dissipation == pytest.approx(SPEED * 5e-4 * expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("creepage", [(5e-4, 0.0, 0.0), (0.0, 5e-4, 0.0), (0.0, 0.0, 0.7)])
+def test_that_one_flexibility_is_kalkers_own_where_one_creepage_acts(creepage):
+    one, three = (
+        contact(creepage=creepage, flexibility=name, closed_form="never")[-1]
+        for name in ("one", "three")
+    )
+    assert one.dissipation == pytest.approx(three.dissipation, rel=1e-12)
+
+
+def test_that_one_flexibility_leaves_full_sliding_to_the_creepage():
+    # with three the traction keeps to what would adhere
+    creepage = (0.012, 0.016, 0.0)
+    *_, one = contact(creepage=creepage, flexibility="one")
+    *_, three = contact(creepage=creepage)
+    assert one.force_y / one.force_x == pytest.approx(4.0 / 3.0, rel=1e-12)
+    assert one.power > 1.01 * three.power
+    assert one.power == pytest.approx(SPEED * 30.0 * 0.02, rel=1e-3)
+
+
 def groove(depth, offset=0.0):
     return lambda y: y**2 + 0.95 * np.maximum(depth - (y - offset) ** 2, 0.0)
 
@@ -208,7 +269,7 @@ def test_that_a_lost_contact_is_an_error():
 
 def test_that_a_wear_compliance_is_refused():
     model, gap, point, _ = contact()
-    with pytest.raises(CapabilityError, match="stepper = 'explicit'"):
+    with pytest.raises(CapabilityError, match="stepper = 'stabilised'"):
         model.solve(gap, RIG[0], point, np.zeros_like(gap))
 
 
@@ -339,6 +400,8 @@ OPTIONS = [
     {"kalker": "line-limit"},
     {"kalker_coefficients": {"c11": 4.0, "c22": 3.0, "c23": 0.5}},
     {"patch": {"a": "0.2 mm", "b": "2 mm"}},
+    {"flexibility": "one", "closed_form": "never"},
+    {"flexibility": "one", "dissipation": "element-sum", "bound": "elliptic"},
 ]
 
 
@@ -352,7 +415,8 @@ def test_that_a_batch_is_solved_as_each_contact_alone(options, spin):
         assert_same(found.solutions[k], model.solve(gap[0, 0, k], RIG[0], points[k]))
 
 
-def test_that_a_batch_takes_any_gaps_friction_per_strip_and_varied_creepage():
+@pytest.mark.parametrize("flexibility", ["three", "one"])
+def test_that_a_batch_takes_any_gaps_friction_per_strip_and_varied_creepage(flexibility):
     random = np.random.default_rng(1)
     shapes = [groove(depth, offset) for depth, offset in random.random((CONTACTS, 2)) * 3e-6]
     points = replace(
@@ -360,7 +424,7 @@ def test_that_a_batch_takes_any_gaps_friction_per_strip_and_varied_creepage():
         friction=random.uniform(0.05, 0.15, (CONTACTS, 81)),
         variation=random.normal(size=(CONTACTS, 81)) * 1e-4,
     )
-    model, gap, found = batch(points, lambda y, k: shapes[k](y), 9e-3, 81)
+    model, gap, found = batch(points, lambda y, k: shapes[k](y), 9e-3, 81, flexibility=flexibility)
     for k in range(0, CONTACTS, 4):
         assert_same(found.solutions[k], model.solve(gap[0, 0, k], RIG[0], points[k]))
 
@@ -419,7 +483,7 @@ def test_that_a_batch_needs_a_curvature_along_rolling_and_friction_of_a_shape_it
         batch(replace(points, friction=np.full((CONTACTS, 7, 50), 0.1)))
     with pytest.raises(ValueError, match="60 operating points for a batch of 59 contacts"):
         model.solve_batch(gap[:, :, 1:], RIG[0], points)
-    with pytest.raises(CapabilityError, match="stepper = 'explicit'"):
+    with pytest.raises(CapabilityError, match="stepper = 'stabilised'"):
         model.solve_batch(gap, RIG[0], points, np.zeros_like(gap))
 
 

@@ -72,11 +72,11 @@ def test_that_forces_and_slip_have_the_signs_of_the_exact_theory():
                 "spin": row["phi_per_m"],
             },
         )
-        assert solution.force_x == pytest.approx(row["Fx_N"], rel=5e-2)
-        assert solution.force_y == pytest.approx(row["Fy_N"], rel=5e-2)
-        # strips know no traction along x that phi x makes, and so only part of the moment
-        assert solution.spin_moment * row["Mz_Nm"] > 0.0
-        assert solution.power / SPEED == pytest.approx(row["P_over_V_N"], rel=1e-2)
+        assert solution.force_x == pytest.approx(row["Fx_N"], rel=5e-3)
+        assert solution.force_y == pytest.approx(row["Fy_N"], rel=5e-3)
+        # the moment is small between two large parts
+        assert solution.spin_moment == pytest.approx(row["Mz_Nm"], rel=0.1)
+        assert solution.power / SPEED == pytest.approx(row["P_over_V_N"], rel=3e-3)
 
 
 @pytest.mark.parametrize("name", WORN)
@@ -103,11 +103,23 @@ def test_that_worn_profiles_dissipate_like_the_exact_theory(name, case):
         curvature=45.0,
         creepage={"longitudinal": xi, "lateral": eta, "spin": phi},
     )
-    assert solution.power / SPEED == pytest.approx(exact[f"P_over_V_{case}"], rel=0.015)
+    assert solution.power / SPEED == pytest.approx(exact[f"P_over_V_{case}"], rel=6e-3)
+    rows_exact = exact[f"P_l_over_V_{case}"]
+    ours = np.interp(exact["y"], solution.y, solution.dissipation) / SPEED
+    # the parabola has a kink, at which its line load alone is off by as much
+    limit = 0.035 if name == "parabola" else 0.016
+    assert np.linalg.norm(ours - rows_exact) < limit * np.linalg.norm(rows_exact)
 
 
 @pytest.mark.parametrize(
-    "creepage", [{"longitudinal": 2e-4}, {"longitudinal": 2e-4, "lateral": 2e-4}]
+    "creepage",
+    [
+        {"longitudinal": 2e-4},
+        {"longitudinal": 2e-4, "lateral": 2e-4},
+        {"longitudinal": 1e-4, "lateral": -4e-4, "spin": 0.7},
+        {"longitudinal": 1e-3, "lateral": 1e-3},
+        {"longitudinal": 0.0, "spin": 20.0},
+    ],
 )
 def test_that_the_fields_add_up_to_the_strips(creepage):
     model, gap, point, solution = contact(creepage=creepage)
@@ -118,11 +130,12 @@ def test_that_the_fields_add_up_to_the_strips(creepage):
         return np.trapezoid(values, fields.x, axis=0).sum() * spacing
 
     assert total(fields.pressure) == pytest.approx(300.0, rel=1e-4)
-    assert total(fields.traction_x) == pytest.approx(solution.force_x, rel=1e-3)
-    assert total(fields.traction_y) == pytest.approx(solution.force_y, rel=1e-3, abs=1e-9)
-    # with lateral creep, traction and slip are not quite parallel in this theory
-    exact = "lateral" not in creepage
-    assert total(fields.power_density) == pytest.approx(solution.power, rel=2e-3 if exact else 2e-2)
+    # where directions vary along a strip, tractions are cut to their bound
+    exact = 1e-4 if len(creepage) == 1 else 2e-3
+    size = 0.1 * 300.0  # the friction force
+    assert total(fields.traction_x) == pytest.approx(solution.force_x, rel=0.0, abs=exact * size)
+    assert total(fields.traction_y) == pytest.approx(solution.force_y, rel=0.0, abs=exact * size)
+    assert total(fields.power_density) == pytest.approx(solution.power, rel=exact)
     assert total(fields.adhesion.astype(float)) / total(np.ones_like(fields.x)) == pytest.approx(
         solution.adhesion_fraction, abs=2e-3
     )
@@ -130,13 +143,13 @@ def test_that_the_fields_add_up_to_the_strips(creepage):
     traction = np.hypot(fields.traction_x, fields.traction_y)
     assert (traction <= bound * (1.0 + 1e-9) + 1.0).all()
     slip = np.hypot(fields.slip_x, fields.slip_y)
-    assert slip[fields.adhesion].max() == 0.0
+    assert not slip[fields.adhesion].any()
 
 
 def test_that_spin_and_its_slip_profile_are_the_same_thing():
     grid = Grid.spanning(-1.9e-3, 1.9e-3, 101)
     spin = {"longitudinal": 3e-4, "spin": 0.5}
-    profile = {"longitudinal": 3e-4, "spin": 0.0, "variation": -0.5 * grid.y + 7.0}
+    profile = {"longitudinal": 3e-4, "spin": 0.5, "variation": -0.5 * grid.y + 7.0}
     *_, first = contact(grid=grid, creepage=spin)
     *_, second = contact(grid=grid, creepage=profile)
     np.testing.assert_allclose(second.dissipation, first.dissipation, rtol=1e-7)
@@ -198,15 +211,3 @@ def test_that_wear_compliance_makes_the_contact_softer_and_conserves_the_load():
 def test_that_only_strip_theory_claims_the_compiled_loop():
     assert Slender(StripTheory()).capabilities.pass_loop
     assert not SPEC.factory(SlenderOptions(tangential="fastsim")).capabilities.pass_loop
-
-
-def test_that_the_load_sensitivity_is_the_derivative_of_the_load():
-    model, gap, point, solution = contact(grid=Grid.spanning(-3e-3, 3e-3, 81))
-    change = np.exp(-((solution.y / 3e-4) ** 2))
-    fall = model.load_sensitivity(solution, gap, RIG, point, change)
-    step = 1e-11
-    plus = model.solve(gap + step * change, RIG, point, None, solution).line_load
-    minus = model.solve(gap - step * change, RIG, point, None, solution).line_load
-    expected = (minus - plus) / (2.0 * step)
-    np.testing.assert_allclose(fall, expected, atol=2e-3 * np.abs(expected).max())
-    assert abs(fall.sum()) < 1e-6 * np.abs(fall).sum()

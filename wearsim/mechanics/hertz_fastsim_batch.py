@@ -19,7 +19,7 @@ from wearsim.mechanics.fastsim_closed_form import closed_form_into
 from wearsim.mechanics.hertz import CONVERGED
 from wearsim.mechanics.hertz_patches import Bodies, Patches, cut_into_strips, find_patches
 from wearsim.mechanics.jit import kernel
-from wearsim.mechanics.kalker import Spline, coefficient, short_limit
+from wearsim.mechanics.kalker import Spline, coefficient, one_flexibility, short_limit
 from wearsim.types import FloatArray, IntArray
 
 NEVER, EXACT, ALWAYS = range(3)  # where the closed form takes the march's place
@@ -30,8 +30,9 @@ NO_LIMIT, NOT_FINITE = 30, 31  # statuses beside those of `hertz_patches`
 class Theory(NamedTuple):
     """How tractions are found; `models.fastsim_theory.FastsimTheory` has the words.
 
-    G [Pa], nu, the bound, the closed form, the dissipation, the steps along a strip, where the
-    creepage coefficients come from, (3,) given ones and the tables of C11, C22 and C23.
+    G [Pa], nu, the bound, the closed form, the dissipation, the steps along a strip, whether one
+    flexibility stands for three, where the creepage coefficients come from, (3,) given ones and the
+    tables of C11, C22 and C23.
     """
 
     shear_modulus: float
@@ -40,6 +41,7 @@ class Theory(NamedTuple):
     closed_form: int
     element_sum: bool
     points: int
+    single: bool
     kalker: int
     given: FloatArray
     tables: tuple[Spline, Spline, Spline]
@@ -223,6 +225,13 @@ def _solve_tractions(
     """Sum the tractions of contact `k` along its strips into `total`."""
     a, b = patches.a[k], patches.b[k]
     longitudinal, lateral, turning = _flexibilities(a, b, coefficients, theory.shear_modulus)
+    if theory.single:
+        along = _mean_of_magnitudes(found.line_load[k], work)
+        spinning = asked.spin[k] * math.sqrt(a * b)
+        longitudinal = one_flexibility(
+            longitudinal, lateral, turning, along, asked.lateral[k], spinning
+        )
+        lateral, turning = longitudinal, longitudinal
     parabola = 2.0 * asked.normal_force[k] / (math.pi * a * b)
     _put_bounds(b, patches.peak_pressure[k], parabola, theory.elliptic, work)
     for j in range(first, stop):
@@ -276,6 +285,16 @@ def _flexibilities(
     lateral = 8.0 * a / (3.0 * c22 * shear_modulus)
     turning = math.pi * a * math.sqrt(a / b) / (4.0 * c23 * shear_modulus)
     return longitudinal, lateral, turning
+
+
+@kernel
+def _mean_of_magnitudes(line_load: FloatArray, work: Work) -> float:
+    """Return the mean size of the longitudinal creepage without spin, weighted by the load."""
+    product, load = 0.0, 0.0
+    for j in range(len(line_load)):
+        product += abs(work.longitudinal[j] - work.spin_part[j]) * line_load[j]
+        load += line_load[j]
+    return product / load
 
 
 @kernel

@@ -7,16 +7,24 @@ contact, J. Appl. Mech. 39 (1972), DOI 10.1115/1.3422842), with
     F_k = f((k + 1/2) dy/a) - f((k - 1/2) dy/a),
     f(t) = mean of asinh(t/|s|) over s in (-1, 1), weighted by (2/pi) sqrt(1 - s^2).
 
-F_k depends on ln(a/dy) alone, smoothly; so it is tabulated once and read by cubic interpolation.
+At the same place that strip curves the surface along rolling by ``C_k q / (pi E* a^2)``, with
+
+    C_k = h((k + 1/2) dy/a) - h((k - 1/2) dy/a),   h(t) = (4/pi) k' K,   k' = t / sqrt(1 + t^2),
+
+K being the complete elliptic integral of complementary modulus k'; it is the second derivative of f
+with respect to the place along rolling, and C_0 = 4 for a strip without end. F_k and C_k depend on
+ln(a/dy) alone, smoothly; so they are tabulated once and read by cubic interpolation.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from math import comb
 
 import numpy as np
 
+from wearsim.mechanics.hertz import elliptic_integrals
 from wearsim.mechanics.jit import kernel
 from wearsim.types import FloatArray
 
@@ -79,6 +87,35 @@ def mean_asinh(t: FloatArray) -> tuple[FloatArray, FloatArray]:
     return value, slope
 
 
+@kernel
+def _fill_curvature(t: FloatArray, value: FloatArray, slope: FloatArray) -> None:
+    """Fill h(t) and t h'(t) at every distance."""
+    for i in range(t.shape[0]):
+        square = 1.0 + t[i] * t[i]
+        complement = t[i] / np.sqrt(square)
+        first, d_integral = elliptic_integrals(complement)
+        value[i] = 4.0 / np.pi * complement * first
+        slope[i] = 4.0 / np.pi * complement * d_integral / square
+
+
+def middle_curvature(t: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return h(t) and its logarithmic derivative t h'(t).
+
+    Parameters
+    ----------
+    t : ndarray, shape (points,)
+        Positive distances in half-lengths.
+
+    Returns
+    -------
+    value, slope : ndarray, shape (points,)
+        h(t) and t h'(t), to 1e-15.
+    """
+    value, slope = np.empty_like(t), np.empty_like(t)
+    _fill_curvature(t, value, slope)
+    return value, slope
+
+
 @cache
 def influence_table(strips: int) -> FloatArray:
     """Tabulate F_k and its derivative by ln(a/dy).
@@ -93,10 +130,34 @@ def influence_table(strips: int) -> FloatArray:
     ndarray, shape (nodes, 2, strips)
         F_k and STEP * dF_k/dln(a/dy) at ln(a/dy) = LOWEST, LOWEST + STEP, ..., HIGHEST.
     """
+    return _tabulated(mean_asinh, strips)
+
+
+@cache
+def curvature_table(strips: int) -> FloatArray:
+    """Tabulate C_k and its derivative by ln(a/dy).
+
+    Parameters and returns are those of `influence_table`, with C_k in the place of F_k.
+    """
+    return _tabulated(middle_curvature, strips)
+
+
+@cache
+def no_table(strips: int) -> FloatArray:
+    """Return a table without nodes, for strips that are taken by themselves."""
+    table = np.empty((0, 2, strips))
+    table.setflags(write=False)
+    return table
+
+
+def _tabulated(
+    function: Callable[[FloatArray], tuple[FloatArray, FloatArray]], strips: int
+) -> FloatArray:
+    """Return a table of the differences of an odd function across strips k places away."""
     tau = LOWEST + STEP * np.arange(round((HIGHEST - LOWEST) / STEP) + 1)
     edges = np.arange(strips) + 0.5
     t = edges[None, :] * np.exp(-tau)[:, None]
-    value, slope = mean_asinh(t.ravel())
+    value, slope = function(t.ravel())
     value, slope = value.reshape(t.shape), slope.reshape(t.shape)
     table = np.empty((len(tau), 2, strips))
     table[:, 0, 0], table[:, 1, 0] = 2.0 * value[:, 0], -2.0 * STEP * slope[:, 0]
@@ -107,21 +168,37 @@ def influence_table(strips: int) -> FloatArray:
 
 
 @kernel
+def read_values(table: FloatArray, tau: float, count: int, value: FloatArray) -> None:
+    """Interpolate F_k or C_k for one strip; parameters are those of `read_influence`."""
+    position = max((tau - LOWEST) / STEP, 0.0)
+    node = min(int(position), table.shape[0] - 2)
+    s = position - node
+    v0 = (1.0 + 2.0 * s) * (1.0 - s) ** 2
+    v1 = s * (1.0 - s) ** 2
+    w0 = s * s * (3.0 - 2.0 * s)
+    w1 = s * s * (s - 1.0)
+    low, low_slope = table[node, 0], table[node, 1]
+    high, high_slope = table[node + 1, 0], table[node + 1, 1]
+    for k in range(count):
+        value[k] = v0 * low[k] + v1 * low_slope[k] + w0 * high[k] + w1 * high_slope[k]
+
+
+@kernel
 def read_influence(
     table: FloatArray, tau: float, count: int, value: FloatArray, tangent: FloatArray
 ) -> None:
-    """Interpolate F_k for one strip, and what Newton's method needs of it.
+    """Interpolate F_k or C_k for one strip, and what Newton's method needs of it.
 
     Parameters
     ----------
     table : ndarray, shape (nodes, 2, strips)
-        From `influence_table`.
+        From `influence_table` or `curvature_table`.
     tau : float
         ln(a/dy) of the loaded strip, up to HIGHEST; below LOWEST it is taken as LOWEST.
     count : int
         How many distances k to fill.
     value : ndarray, shape (>= count,)
-        Receives F_k.
+        Receives F_k (or C_k).
     tangent : ndarray, shape (>= count,)
         Receives d(q F_k)/dq = F_k + (dF_k/dtau)/2, since a grows as the root of q.
     """

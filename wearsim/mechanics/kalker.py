@@ -339,3 +339,34 @@ def flexibilities(
         lateral=8.0 * a / (3.0 * coefficients.c22 * shear_modulus),
         spin=math.pi * a * math.sqrt(a / semi_axis_y) / (4.0 * coefficients.c23 * shear_modulus),
     )
+
+
+@kernel
+def one_flexibility(
+    longitudinal: float,
+    lateral: float,
+    turning: float,
+    creepage_x: float,
+    creepage_y: float,
+    creepage_spin: float,
+) -> float:
+    """Return the one flexibility that stands for FASTSIM's three: their mean, weighted by creepage.
+
+    Parameters
+    ----------
+    longitudinal, lateral, turning : float
+        L1, L2 and L3 [m/Pa].
+    creepage_x, creepage_y, creepage_spin : float
+        Longitudinal and lateral creepage, and spin times sqrt(ab); L1 where there is none.
+
+    Notes
+    -----
+    Kalker (1982), DOI 10.1080/00423118208968684.
+    """
+    x, y, spin = abs(creepage_x), abs(creepage_y), abs(creepage_spin)
+    largest = max(x, y, spin)
+    if not largest > 0.0:
+        return longitudinal
+    x, y, spin = x / largest, y / largest, spin / largest
+    weighted = x * longitudinal + y * lateral + spin * turning
+    return weighted / math.sqrt(x * x + y * y + spin * spin)

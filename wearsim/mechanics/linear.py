@@ -50,6 +50,23 @@ def _eliminate_four(matrix: FloatArray, size: int, width: int, start: int) -> No
 
 
 @kernel
+def _eliminate(matrix: FloatArray, size: int, width: int) -> bool:
+    """Bring a system to its upper triangle, right-hand sides included."""
+    for start in range(0, size, PANEL):
+        stop = min(start + PANEL, size)
+        if not _factor_panel(matrix, size, width, start, stop):
+            return False
+        if stop - start == PANEL:
+            _eliminate_four(matrix, size, width, start)
+        else:
+            for k in range(start, stop):
+                for i in range(k + 1, stop):
+                    for j in range(stop, width):
+                        matrix[i, j] -= matrix[i, k] * matrix[k, j]
+    return True
+
+
+@kernel
 def solve_in_place(matrix: FloatArray, size: int, width: int) -> bool:
     """Solve a linear system by elimination with partial pivoting, right-hand sides appended.
 
@@ -68,20 +85,21 @@ def solve_in_place(matrix: FloatArray, size: int, width: int) -> bool:
     bool
         False if a pivot vanished or is not a number.
     """
-    for start in range(0, size, PANEL):
-        stop = min(start + PANEL, size)
-        if not _factor_panel(matrix, size, width, start, stop):
-            return False
-        if stop - start == PANEL:
-            _eliminate_four(matrix, size, width, start)
-        else:
-            for k in range(start, stop):
-                for i in range(k + 1, stop):
-                    for j in range(stop, width):
-                        matrix[i, j] -= matrix[i, k] * matrix[k, j]
+    if not _eliminate(matrix, size, width):
+        return False
+    for column in range(size, width):
+        _substitute_back(matrix, size, column)
+    return True
+
+
+@kernel
+def solve_many_in_place(matrix: FloatArray, size: int, width: int) -> bool:
+    """Solve a linear system as `solve_in_place` does, quickly where right-hand sides are many."""
+    if not _eliminate(matrix, size, width):
+        return False
     if width - size < MANY:
-        for c in range(size, width):
-            _substitute_back(matrix, size, c)
+        for column in range(size, width):
+            _substitute_back(matrix, size, column)
     else:
         _substitute_rows_back(matrix, size, width)
     return True

@@ -1,23 +1,33 @@
-"""Normal contact of slender patches: unknown line loads on strips, one or several coupled contacts.
+"""Normal contact of slender patches: unknown line loads on strips.
 
 Strip i of contact k meets the gap z_i and is pressed down by every strip j (see `influence`):
 
-    sum_j W_ij(a_j) q_j + c_i q_i + D_i + z_i = delta_k   where q_i > 0,
-    a_j = sqrt(4 q_j / (pi E* kappa)),   sum_i q_i dy = N_k,
+    sum_j W_ij(a_j) q_j + c_i q_i + z_i = delta_k   where q_i > 0,
+    a_j = sqrt(4 s_j q_j / (pi E* kappa)),   sum_i q_i dy = N_k,
 
-kappa being the relative curvature along rolling, c the contact's own wear compliance and D what all
-contacts wear off the bodies that they share (see `shared_bodies`). Newton's method with the exact
-derivative of W, an active set of strips in contact, and delta as one more unknown.
+kappa being the relative curvature along rolling, s what strips make of each other's half-lengths
+(see `half_length`) and c the contact's own wear compliance; contacts that wear bodies they share
+are in `slender_coupled`. Newton's method with an active set of strips in contact, and delta as one
+more unknown. The derivative of W is exact but for that of s, which knows only strips
+nearby: the last steps shrink fifty times or so, where with s = 1 they are squared.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from wearsim.mechanics.half_length import (
+    Lengths,
+    add_lengthening,
+    fill_half_lengths,
+    find_factors,
+    lengthen,
+    log_length,
+    new_lengths,
+)
 from wearsim.mechanics.influence import HIGHEST, read_influence
 from wearsim.mechanics.jit import kernel
 from wearsim.mechanics.linear import solve_in_place
-from wearsim.mechanics.shared_bodies import add_depths, count_bodies, solve_depths
 from wearsim.types import FloatArray, IntArray
 
 CONVERGED = 0
@@ -25,8 +35,9 @@ SINGULAR = 1
 TOO_FINE = 2
 NO_CONVERGENCE = 3
 NOT_FINITE = 4
+GOING_ON = -1
 
-STEP_TOLERANCE = 1e-7  # of the greatest line load; Newton squares it before it is felt
+STEP_TOLERANCE = 1e-7  # of the greatest line load; the error left is a small part of it
 GAP_TOLERANCE = 1e-8  # of the approach
 MAX_ITERATIONS = 100
 
@@ -102,7 +113,7 @@ def _press(
     index: IntArray,
     table: FloatArray,
     unit: float,
-    log_scale: float,
+    lengths: Lengths,
     work: FloatArray,
     surface: FloatArray,
     matrix: FloatArray,
@@ -119,7 +130,7 @@ def _press(
         if column < 0:
             continue
         q = line_load[k, j]
-        tau = log_scale + 0.5 * np.log(q)
+        tau = log_length(k, j, line_load, lengths)
         widest = max(widest, tau)
         if widest > HIGHEST:
             return widest
@@ -130,82 +141,80 @@ def _press(
             row = index[k, i]
             if row >= 0:
                 matrix[row, column] += unit * tangent[abs(i - j)]
+        if lengths.table.shape[0] > 0:
+            lengthen(k, j, unit * q, value, tangent, lengths)
+    if lengths.table.shape[0] > 0:
+        add_lengthening(k, line_load, index, lengths, matrix)
     return widest
 
 
 @kernel
-def _assemble(
+def newton_system(
     k: int,
     own: FloatArray,
     table: FloatArray,
     unit: float,
-    log_scale: float,
+    lengths: Lengths,
     line_load: FloatArray,
     index: IntArray,
-    size: int,
-    coupled: bool,
     work: FloatArray,
     surface: FloatArray,
     matrix: FloatArray,
-) -> float:
-    """Add contact `k`'s Newton system to `matrix`; return the greatest ln(a/dy).
+) -> tuple[int, float]:
+    """Fill `matrix` with contact `k`'s Newton system; return its size and the greatest ln(a/dy).
 
-    `surface` holds gap and shared wear, and receives displacement and own wear; it equals delta in
-    contact. Columns after those of the strips hold the residual, a unit approach and, where
-    contacts share a body, a unit rise of every strip's gap.
+    `surface` holds the gap and receives displacement and own wear; it equals delta in contact.
+    Two columns after those of the strips hold the residual and a unit approach. Past HIGHEST the
+    system is not complete.
     """
-    n = line_load.shape[1]
+    n, size = line_load.shape[1], _number_strips(k, line_load, index)
+    for row in range(size):
+        for column in range(size):
+            matrix[row, column] = 0.0
     for i in range(n):
         surface[k, i] += own[k, i] * line_load[k, i]
         row = index[k, i]
         if row >= 0:
             matrix[row, row] = own[k, i]
-            if coupled:
-                matrix[row, size + 2 + row] = 1.0
-    widest = _press(k, line_load, index, table, unit, log_scale, work, surface, matrix)
+    widest = find_factors(k, line_load, lengths)
+    if widest > HIGHEST:
+        return size, widest
+    widest = _press(k, line_load, index, table, unit, lengths, work, surface, matrix)
     for i in range(n):
         row = index[k, i]
         if row >= 0:
             matrix[row, size] = -surface[k, i]
             matrix[row, size + 1] = 1.0
-    return widest
+    return size, widest
 
 
 @kernel
-def _answer(
+def take_step(
     k: int,
     size: int,
-    coupled: bool,
-    missing: float,
+    load: float,
+    line_load: FloatArray,
     matrix: FloatArray,
     step: FloatArray,
     approach: FloatArray,
-    response: FloatArray,
-    lift: FloatArray,
-) -> bool:
-    """Take contact `k`'s step and approach, and how both follow its gap, from its solved system.
+) -> float:
+    """Take contact `k`'s step and approach from its solved system; return the rise per approach.
 
-    The approach is chosen so that the loads of the strips grow by `missing` in all [N/m].
+    The approach is chosen so that the strips carry `load` in all [N/m]. Where the rise is zero
+    there is none, and nothing is taken.
     """
-    risen = 0.0
+    missing, risen = load, 0.0
+    for i in range(line_load.shape[1]):
+        missing -= line_load[k, i]
     for row in range(size):
         missing -= matrix[row, size]
         risen += matrix[row, size + 1]
-    if not abs(risen) > 0.0:
-        return False
-    approach[k] = missing / risen
-    for row in range(size):
-        step[k, row] = matrix[row, size] + matrix[row, size + 1] * approach[k]
-    if coupled:
-        for column in range(size):
-            total = 0.0
-            for row in range(size):
-                total += matrix[row, size + 2 + column]
-            lift[k, column] = total / risen
-            for row in range(size):
-                fall = matrix[row, size + 2 + column] - matrix[row, size + 1] * lift[k, column]
-                response[k, column, row] = fall
-    return True
+    if abs(risen) > 0.0:
+        approach[k] = missing / risen
+        for row in range(size):
+            step[k, row] = matrix[row, size] + matrix[row, size + 1] * approach[k]
+        return risen
+    return 0.0
 
 
 @kernel
@@ -276,41 +285,93 @@ def _admit(
 
 
 @kernel
+def start_contact(
+    k: int,
+    gap: FloatArray,
+    compliance: FloatArray,
+    contact_modulus: float,
+    load: float,
+    spacing: float,
+    line_load: FloatArray,
+    approach: FloatArray,
+) -> None:
+    """Give contact `k` a start if it has none; parameters as of `foundation_guess`."""
+    for i in range(gap.shape[1]):
+        if line_load[k, i] > 0.0:
+            return
+    approach[k] = foundation_guess(k, gap, compliance, contact_modulus, load, spacing, line_load)
+
+
+@kernel
+def settle(
+    iteration: int,
+    unit: float,
+    surface: FloatArray,
+    index: IntArray,
+    step: FloatArray,
+    approach: FloatArray,
+    line_load: FloatArray,
+) -> int:
+    """Take Newton's step, let strips leave and enter, and return CONVERGED, GOING_ON or NOT_FINITE.
+
+    After some iterations it goes cautiously; a strip that comes and goes at the edge is let be
+    where it hardly matters.
+    """
+    cautious = iteration > 12
+    change, left = _update(line_load, index, step, cautious)
+    if not change < np.inf:
+        return NOT_FINITE
+    ready = not cautious or (change < 1e-3 and not left)
+    tolerance = GAP_TOLERANCE * 10.0 ** max(0, iteration // 20 - 1)
+    entered = ready and _admit(surface, line_load, index, approach, unit, tolerance, cautious)
+    if change < STEP_TOLERANCE and not left and not entered:
+        return CONVERGED
+    return GOING_ON
+
+
+@kernel
+def log_scale_of(contact_modulus: float, longitudinal_curvature: float, spacing: float) -> float:
+    """Return ln(a/dy) of a strip by itself under 1 N/m."""
+    scale = 4.0 / (np.pi * contact_modulus * longitudinal_curvature)
+    value: float = 0.5 * np.log(scale) - np.log(spacing)
+    return value
+
+
+@kernel
 def solve_slender(
     gap: FloatArray,
     own: FloatArray,
-    members: IntArray,
-    shared: FloatArray,
     loads: FloatArray,
     spacing: float,
     contact_modulus: float,
     longitudinal_curvature: float,
     table: FloatArray,
+    bend: FloatArray,
     line_load: FloatArray,
     approach: FloatArray,
+    half_length: FloatArray,
 ) -> tuple[int, int]:
-    """Solve one or several coupled slender contacts, starting from the line loads given.
+    """Solve one or several slender contacts that share nothing, from the line loads given.
 
     Parameters
     ----------
     gap : ndarray, shape (contacts, strips)
         Gap [m].
     own : ndarray, shape (contacts, strips)
-        Gap that a contact opens for itself alone per unit of line load [m/(N/m)].
-    members : ndarray of int, shape (contacts, 2)
-        Bodies that each contact shares with others, numbered from 0; -1 for none.
-    shared : ndarray, shape (contacts, 2, strips)
-        Depth that a contact wears off those bodies per unit of line load [m/(N/m)].
+        Gap that a contact opens for itself per unit of line load [m/(N/m)].
     loads : ndarray, shape (contacts,)
         Loads N [N].
     spacing, contact_modulus, longitudinal_curvature : float
         Strip width [m], E* [Pa], kappa [1/m].
-    table : ndarray
-        From `influence_table`.
+    table, bend : ndarray
+        From `influence_table`, and from `curvature_table` or, for half-lengths that follow from a
+        strip's own line load alone, `no_table`.
     line_load : ndarray, shape (contacts, strips)
         Starting line loads, all zero in a contact for a start from nothing; holds q [N/m] after.
     approach : ndarray, shape (contacts,)
         Starting approaches; holds delta [m] after.
+    half_length : ndarray, shape (contacts, strips)
+        Holds a [m] after.
 
     Returns
     -------
@@ -319,65 +380,29 @@ def solve_slender(
     """
     contacts, n = gap.shape
     unit = 1.0 / (np.pi * contact_modulus)
-    log_scale = 0.5 * np.log(4.0 / (np.pi * contact_modulus * longitudinal_curvature))
-    log_scale -= np.log(spacing)
-    coupled = count_bodies(members) > 0
-    per_strip = 2 if coupled else 1
-    kept = contacts if coupled else 0
     index = np.empty((contacts, n), np.int64)
     surface, step = np.empty((contacts, n)), np.empty((contacts, n))
-    response, lift = np.empty((kept, n, n)), np.empty((kept, n))
-    work, matrix = np.empty((2, n)), np.empty((n, 2 + per_strip * n))
+    work, matrix = np.empty((2, n)), np.empty((n, n + 2))
+    log_scale = log_scale_of(contact_modulus, longitudinal_curvature, spacing)
+    lengths = new_lengths(contacts, bend, log_scale)
     for k in range(contacts):
-        if not line_load[k].max() > 0.0:
-            for i in range(n):
-                surface[k, i] = own[k, i] + shared[k, 0, i] + shared[k, 1, i]
-            approach[k] = foundation_guess(
-                k, gap, surface, contact_modulus, loads[k], spacing, line_load
-            )
+        start_contact(k, gap, own, contact_modulus, loads[k], spacing, line_load, approach)
     for iteration in range(1, MAX_ITERATIONS + 1):
-        cautious = iteration > 12
         for k in range(contacts):
             for i in range(n):  # an assignment of arrays takes seconds to compile
                 surface[k, i] = gap[k, i]
-        if coupled:
-            add_depths(members, shared, line_load, surface)
-        for k in range(contacts):
-            size = _number_strips(k, line_load, index)
-            width = 2 + per_strip * size
-            matrix[:size, :width] = 0.0
-            widest = _assemble(
-                k,
-                own,
-                table,
-                unit,
-                log_scale,
-                line_load,
-                index,
-                size,
-                coupled,
-                work,
-                surface,
-                matrix,
+            size, widest = newton_system(
+                k, own, table, unit, lengths, line_load, index, work, surface, matrix
             )
             if widest > HIGHEST:
                 return TOO_FINE, iteration
-            if not solve_in_place(matrix, size, width):
+            if not solve_in_place(matrix, size, size + 2):
                 return SINGULAR, iteration
-            missing = loads[k] / spacing
-            for i in range(n):
-                missing -= line_load[k, i]
-            if not _answer(k, size, coupled, missing, matrix, step, approach, response, lift):
+            if take_step(k, size, loads[k] / spacing, line_load, matrix, step, approach) == 0.0:
                 return SINGULAR, iteration
-        if coupled and not solve_depths(members, shared, index, response, step, lift, approach):
-            return SINGULAR, iteration
-        change, left = _update(line_load, index, step, cautious)
-        if not change < np.inf:
-            return NOT_FINITE, iteration
-        settled = not cautious or (change < 1e-3 and not left)
-        # a strip that comes and goes at the edge is let be where it hardly matters
-        tolerance = GAP_TOLERANCE * 10.0 ** max(0, iteration // 20 - 1)
-        entered = settled and _admit(surface, line_load, index, approach, unit, tolerance, cautious)
-        if change < STEP_TOLERANCE and not left and not entered:
-            return CONVERGED, iteration
+        status = settle(iteration, unit, surface, index, step, approach, line_load)
+        if status == CONVERGED:
+            fill_half_lengths(spacing, line_load, lengths, half_length)
+        if status != GOING_ON:
+            return status, iteration
     return NO_CONVERGENCE, MAX_ITERATIONS

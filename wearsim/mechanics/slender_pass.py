@@ -9,6 +9,10 @@ so that with q = q_A + x the equations read J x = delta - z + ... - N(x), in whi
 left of phi beyond its tangent. N is short-ranged (F_k depends on q as k^-3), so that a pass costs
 one product with the inverse and a band. The anchor is moved before any strip's load has changed by
 `STRAY`, when strips join or leave, and when the residual of the gap exceeds `RESIDUAL`.
+
+What strips make of each other's half-lengths (see `half_length`) is that of the anchor, and J holds
+its slope: the loads stray so little from the anchor that a pass is off by 1e-5 of the greatest
+load.
 """
 
 from __future__ import annotations
@@ -17,11 +21,20 @@ from typing import NamedTuple
 
 import numpy as np
 
+from wearsim.mechanics.half_length import (
+    Lengths,
+    add_lengthening,
+    find_factors,
+    lengthen,
+    log_length,
+    new_lengths,
+)
 from wearsim.mechanics.influence import read_influence
 from wearsim.mechanics.jit import kernel
-from wearsim.mechanics.linear import solve_in_place
+from wearsim.mechanics.linear import solve_many_in_place
 from wearsim.mechanics.slender import CONVERGED, GAP_TOLERANCE, SINGULAR, solve_slender
-from wearsim.mechanics.strip import strip_force
+from wearsim.mechanics.strip import StripTractions, new_tractions, solve_strips
+from wearsim.mechanics.strip_coupling import StripElasticity, strip_elasticity
 from wearsim.types import FloatArray, IntArray
 
 RESIDUAL = 1e-8  # of the elastic approach
@@ -34,19 +47,19 @@ LOST = 10  # status: the load is not positive
 
 
 class Medium(NamedTuple):
-    """What the strips have in common: width [m], 1/(pi E*) [1/Pa], E* and G [Pa] and the rest.
+    """What the strips have in common: width [m], 1/(pi E*) [1/Pa], E* [Pa] and the rest.
 
-    `half_length_scale` times a line load is a^2; `log_scale` is ln(a/dy) at 1 N/m.
+    `log_scale` is ln(a/dy) at 1 N/m of a strip by itself.
     """
 
     spacing: float
     unit: float
     contact_modulus: float
-    shear_modulus: float
     longitudinal_curvature: float
-    half_length_scale: float
     log_scale: float
     table: FloatArray
+    bend: FloatArray
+    elasticity: StripElasticity
 
 
 class Loads(NamedTuple):
@@ -65,7 +78,9 @@ class Follower(NamedTuple):
     Loaded strips and their number; the inverse of the Jacobian, transposed; the loads that a unit
     approach adds; phi, its tangent and half its second derivative near each loaded strip; the
     unloaded strips beside loaded ones, -1 after the last, and their rows of J; the displacement at
-    the anchor; N; and of the contact in hand its gap and the change of its loads.
+    the anchor; N; what half-lengths follow from, s at the anchor; and of the contact in hand its
+    gap, the change of its loads, its half-lengths, friction and longitudinal slip (3, strips), and
+    its tractions.
     """
 
     active: IntArray
@@ -77,10 +92,13 @@ class Follower(NamedTuple):
     guard_row: FloatArray
     surface: FloatArray
     beyond: FloatArray
+    lengths: Lengths
     gap: FloatArray
     change: FloatArray
     work: FloatArray
     matrix: FloatArray
+    seen: FloatArray
+    tractions: StripTractions
 
 
 class Passes(NamedTuple):
@@ -110,8 +128,9 @@ def medium(
     shear_modulus: float,
     longitudinal_curvature: float,
     table: FloatArray,
+    bend: FloatArray,
 ) -> Medium:
-    """Return the `Medium` of strips of width `spacing`."""
+    """Return the `Medium` of strips of width `spacing`, with tables as in `solve_slender`."""
     unit = 1.0 / (np.pi * contact_modulus)
     scale = 4.0 * unit / longitudinal_curvature
     log_scale = 0.5 * np.log(scale) - np.log(spacing)
@@ -119,15 +138,15 @@ def medium(
         spacing,
         unit,
         contact_modulus,
-        shear_modulus,
         longitudinal_curvature,
-        scale,
         log_scale,
         table,
+        bend,
+        strip_elasticity(contact_modulus, shear_modulus),
     )
 
 
-def empty_follower(contacts: int, n: int) -> Follower:
+def empty_follower(m: Medium, contacts: int, n: int) -> Follower:
     """Return a `Follower` for contacts that have no anchor yet."""
     return Follower(
         np.zeros((contacts, n), np.int64),
@@ -139,10 +158,13 @@ def empty_follower(contacts: int, n: int) -> Follower:
         np.empty((contacts, n, n)),
         np.empty((contacts, n)),
         np.zeros((contacts, n)),
+        new_lengths(contacts, m.bend, float(m.log_scale)),
         np.empty(n),
         np.empty(n),
         np.empty((6, max(n, BAND))),
         np.empty((n, 2 * n)),
+        np.zeros((3, n)),
+        new_tractions(n),
     )
 
 
@@ -167,6 +189,15 @@ def _number_strips(g: int, line_load: FloatArray, f: Follower) -> int:
 
 
 @kernel
+def _add_lengthening(g: int, line_load: FloatArray, f: Follower) -> None:
+    """Add to the Jacobian of contact `g` how s follows the loads."""
+    row = np.full(line_load.shape, -1)
+    for r in range(f.loaded[g]):
+        row[g, f.active[g, r]] = r
+    add_lengthening(g, line_load, row, f.lengths, f.matrix)
+
+
+@kernel
 def set_anchor(g: int, line_load: FloatArray, m: Medium, f: Follower) -> bool:
     """Invert the Jacobian of contact `g` at a line load and keep what the chord method needs.
 
@@ -185,6 +216,7 @@ def set_anchor(g: int, line_load: FloatArray, m: Medium, f: Follower) -> bool:
     bool
         False if the Jacobian is singular.
     """
+    find_factors(g, line_load, f.lengths)
     n = line_load.shape[1]
     reach, small = min(BAND, n), 1e-3
     guards, count = _number_strips(g, line_load, f), f.loaded[g]
@@ -194,7 +226,7 @@ def set_anchor(g: int, line_load: FloatArray, m: Medium, f: Follower) -> bool:
     for c in range(count):
         j = f.active[g, c]
         q = line_load[g, j]
-        tau = m.log_scale + 0.5 * np.log(q)
+        tau = log_length(g, j, line_load, f.lengths)
         read_influence(m.table, tau, n, work[0], work[1])
         read_influence(m.table, tau + small, reach, work[2], work[3])
         read_influence(m.table, tau - small, reach, work[4], work[5])
@@ -208,8 +240,13 @@ def set_anchor(g: int, line_load: FloatArray, m: Medium, f: Follower) -> bool:
         for r in range(guards):
             f.guard_row[g, r, c] = m.unit * work[1, abs(f.guard[g, r] - j)]
         for i in range(n):
-            f.surface[g, i] += m.unit * q * work[0, abs(i - j)]
-    if not solve_in_place(matrix, count, 2 * count):
+            k = abs(i - j)
+            f.surface[g, i] += m.unit * q * work[0, k]
+        if m.bend.shape[0] > 0:
+            lengthen(g, j, m.unit * q, work[0], work[1], f.lengths)
+    if m.bend.shape[0] > 0:
+        _add_lengthening(g, line_load, f)
+    if not solve_many_in_place(matrix, count, 2 * count):
         return False
     for r in range(count):
         total = 0.0
@@ -235,7 +272,8 @@ def _beyond_tangent(g: int, loads: Loads, m: Medium, f: Follower) -> None:
             for k in range(reach):
                 work[0, k] = f.near[g, c, 2, k] * x * x
         else:
-            read_influence(m.table, m.log_scale + 0.5 * np.log(q), reach, work[2], work[3])
+            tau = log_length(g, j, loads.line_load, f.lengths)
+            read_influence(m.table, tau, reach, work[2], work[3])
             for k in range(reach):
                 phi = m.unit * q * work[2, k]
                 work[0, k] = phi - f.near[g, c, 0, k] - f.near[g, c, 1, k] * x
@@ -336,7 +374,7 @@ def _solve_fully(g: int, load: float, anchored: bool, loads: Loads, m: Medium, f
     """Solve contact `g` by Newton's method, and set its anchor there; return the status."""
     n = f.gap.shape[0]
     gap, line_load, no_wear = np.empty((1, n)), np.empty((1, n)), np.zeros((1, n))
-    no_body, no_depth = np.full((1, 2), -1), np.zeros((1, 2, n))
+    half_length = np.empty((1, n))
     approach, force = np.empty(1), np.empty(1)
     approach[0], force[0] = loads.approach[g], load
     for i in range(n):
@@ -344,15 +382,15 @@ def _solve_fully(g: int, load: float, anchored: bool, loads: Loads, m: Medium, f
     status, _ = solve_slender(
         gap,
         no_wear,
-        no_body,
-        no_depth,
         force,
         m.spacing,
         m.contact_modulus,
         m.longitudinal_curvature,
         m.table,
+        m.bend,
         line_load,
         approach,
+        half_length,
     )
     if status != CONVERGED:
         return status
@@ -361,6 +399,7 @@ def _solve_fully(g: int, load: float, anchored: bool, loads: Loads, m: Medium, f
         loads.line_load[g, i] = line_load[0, i]
     if not anchored:
         _number_strips(g, loads.line_load, f)
+        find_factors(g, loads.line_load, f.lengths)
         return CONVERGED
     for i in range(n):
         loads.anchor[g, i], loads.anchor_gap[g, i] = line_load[0, i], f.gap[i]
@@ -389,16 +428,26 @@ def _wear_strips(
         mean += line_load[g, i] * _local_slip(g, i, spin, w)
         total += line_load[g, i]
     mean /= total
-    slip_y, friction = passes.creepage[p, 1], passes.friction[p]
+    half_length, friction, slip_x = f.seen[0], f.seen[1], f.seen[2]
     for r in range(f.loaded[g]):
         i = f.active[g, r]
-        q = line_load[g, i]
-        slip_x = passes.creepage[p, 0] - mean + _local_slip(g, i, spin, w)
-        a = np.sqrt(m.half_length_scale * q)
-        force_x, force_y, _ = strip_force(
-            a, q, friction, slip_x, slip_y, m.contact_modulus, m.shear_modulus
-        )
-        work = -(force_x * slip_x + force_y * slip_y)
+        half_length[i] = m.spacing * np.exp(log_length(g, i, line_load, f.lengths))
+        friction[i] = passes.friction[p]
+        slip_x[i] = passes.creepage[p, 0] - mean + _local_slip(g, i, spin, w)
+    solve_strips(
+        half_length,
+        line_load[g],
+        friction,
+        slip_x,
+        passes.creepage[p, 1],
+        spin,
+        m.spacing,
+        m.elasticity,
+        f.tractions,
+    )
+    for r in range(f.loaded[g]):
+        i = f.active[g, r]
+        work = f.tractions.work[i]
         w.cylinder_depth[i] += w.depth_per_work[0] * work
         w.roller_depth[g, i] += w.depth_per_work[1 + g] * work
         dissipated += work

@@ -9,8 +9,10 @@ from wearsim.models import (
     distributions,
     friction_fields,
     hertz_fastsim,
+    hertz_model,
     loads,
     processes,
+    semi_hertzian,
     slender,
     t_gamma,
 )
@@ -20,7 +22,7 @@ from wearsim.plugins import ContactModelSpec, LoadSpec, RandomInputSpec, WearLaw
 @hookimpl
 def wearsim_contact_models() -> Iterable[ContactModelSpec]:
     """Yield the built-in contact models."""
-    return (hertz_fastsim.SPEC, slender.SPEC)
+    return (hertz_fastsim.SPEC, hertz_model.SPEC, semi_hertzian.SPEC, slender.SPEC)
 
 
 @hookimpl

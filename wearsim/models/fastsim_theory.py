@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import ClassVar, Literal, TypeAlias
 
 import numpy as np
 
@@ -14,7 +12,6 @@ from wearsim.mechanics.elasticity import ElasticPair
 from wearsim.mechanics.fastsim import march
 from wearsim.mechanics.fastsim_closed_form import closed_form
 from wearsim.mechanics.fastsim_fields import element_sum, march_fields, march_local_fields
-from wearsim.mechanics.hertz import HertzContact
 from wearsim.mechanics.kalker import (
     CreepageCoefficients,
     Flexibilities,
@@ -23,6 +20,13 @@ from wearsim.mechanics.kalker import (
     line_limit_coefficients,
     spline,
 )
+from wearsim.models.equivalent_ellipse import (
+    covered_share,
+    equivalent_ellipse,
+    peak_pressure,
+    single_flexibility,
+    touching,
+)
 from wearsim.models.tangential import LocalSlip, Strips, TangentialTheory, Tractions
 from wearsim.types import ContactFields, FloatArray
 
@@ -30,48 +34,13 @@ Bound: TypeAlias = Literal["parabolic", "elliptic"]
 Dissipation: TypeAlias = Literal["rigid-slip", "element-sum"]
 Kalker: TypeAlias = Literal["table", "line-limit"]
 ClosedForm: TypeAlias = Literal["exact", "always", "never"]
+Flexibility: TypeAlias = Literal["three", "one"]
 
 _CLOSED_FORM = {"never": batches.NEVER, "exact": batches.EXACT, "always": batches.ALWAYS}
 
 
-@dataclass(frozen=True)
-class EllipseStrips(Strips):
-    """Strips cut from a Hertzian ellipse, which FASTSIM can then treat as Kalker did.
-
-    `half_length` holds a(y) at the middle of the covered part of each strip, and `line_load` the
-    mean of q(y) over the whole strip.
-
-    Parameters
-    ----------
-    ellipse : HertzContact
-        The patch.
-    from_centre : ndarray, shape (strips,)
-        Distance of the middle of each strip's covered part from the patch's centre [m].
-    coverage : ndarray, shape (strips,)
-        Part of each strip that the patch covers, 0 to 1; sums over a strip are weighted with it.
-    """
-
-    ellipse: HertzContact
-    from_centre: FloatArray
-    coverage: FloatArray
-
-
-def equivalent_ellipse(strips: Strips) -> tuple[float, float]:
-    """Return the semi-axes a and b [m] of the ellipse whose flexibilities the strips get.
-
-    Its half-length a is the greatest of the strips', and its area is theirs: b = area/(pi a). So
-    b changes smoothly as strips come into contact, and a gap between two patches counts for
-    nothing. An ellipse gives itself.
-    """
-    if isinstance(strips, EllipseStrips):
-        return strips.ellipse.a, strips.ellipse.b
-    a = float(strips.half_length.max())
-    area = 2.0 * float(strips.half_length.sum()) * strips.spacing
-    return a, area / (math.pi * a)
-
-
 class FastsimTheory(TangentialTheory):
-    """Kalker's simplified theory with its three flexibilities.
+    """Kalker's simplified theory with its three flexibilities, or with one.
 
     Parameters
     ----------
@@ -94,11 +63,17 @@ class FastsimTheory(TangentialTheory):
         then left out of the slip; or nowhere. Over the paper's inputs leaving it out moves the mean
         and the standard deviation of the power by less than 1e-4 of them, and one power by 0.2 %
         rms, 2.5 % at most.
+    flexibility : {"three", "one"}
+        Kalker's three flexibilities, or their mean weighted with the magnitudes of the creepages,
+        ``L = (|xi| L1 + |eta| L2 + |phi| c L3)/sqrt(xi^2 + eta^2 + phi^2 c^2)``, c = sqrt(ab). One
+        leaves the direction of slip to the creepage where a contact slides throughout.
 
     Notes
     -----
     Kalker (1982), DOI 10.1080/00423118208968684.
     """
+
+    knows_ellipses: ClassVar[bool] = True
 
     def __init__(
         self,
@@ -108,6 +83,7 @@ class FastsimTheory(TangentialTheory):
         kalker: Kalker = "table",
         coefficients: CreepageCoefficients | None = None,
         closed_form: ClosedForm = "exact",
+        flexibility: Flexibility = "three",
     ) -> None:
         self.elliptic = bound == "elliptic"
         self.mx = mx
@@ -115,6 +91,7 @@ class FastsimTheory(TangentialTheory):
         self.kalker = kalker
         self.coefficients = coefficients
         self.closed_form = closed_form
+        self.single = flexibility == "one"
 
     def flexibilities(self, strips: Strips, pair: ElasticPair) -> Flexibilities:
         """Return L1, L2 and L3 of the strips' equivalent ellipse.
@@ -137,6 +114,16 @@ class FastsimTheory(TangentialTheory):
                 ) from error
         return flexibilities(found, a, b, pair.shear_modulus)
 
+    def _flexibilities_under(
+        self, strips: Strips, pair: ElasticPair, slip: LocalSlip
+    ) -> Flexibilities:
+        """Return the flexibilities that the march takes under a creepage."""
+        three = self.flexibilities(strips, pair)
+        if not self.single:
+            return three
+        one = single_flexibility(strips, three, slip)
+        return Flexibilities(one, one, one)
+
     def tractions(
         self,
         strips: Strips,
@@ -146,8 +133,8 @@ class FastsimTheory(TangentialTheory):
         rolling_speed: float,
     ) -> Tractions:
         """Return the tractions for a local slip; strips outside the contact cost nothing."""
-        part = _touching(strips)
-        flexibility = self.flexibilities(strips, pair)
+        part = touching(strips)
+        flexibility = self._flexibilities_under(strips, pair, slip)
         problem = self._problem(strips, flexibility, slip, friction, part)
         out = np.zeros((5, len(strips.y)))
         always = self.closed_form == "always"
@@ -167,8 +154,7 @@ class FastsimTheory(TangentialTheory):
         else:
             work = slip.longitudinal * force_x + slip.lateral * force_y + slip.spin * moment
             dissipation[:] = -rolling_speed * work
-        if isinstance(strips, EllipseStrips):
-            out[[0, 1, 2, 4]] *= strips.coverage
+        out[[0, 1, 2, 4]] *= covered_share(strips)
         return Tractions(force_x, force_y, moment, dissipation, adhesion)
 
     def fields(
@@ -187,7 +173,7 @@ class FastsimTheory(TangentialTheory):
         L2 across it, so that it is zero where the surfaces adhere. Where `friction` has the shape
         (points, strips) its points are those of the march, and `points_along` counts for nothing.
         """
-        flexibility = self.flexibilities(strips, pair)
+        flexibility = self._flexibilities_under(strips, pair, slip)
         everywhere = slice(0, len(strips.y))
         problem = self._problem(strips, flexibility, slip, friction, everywhere)
         half_length, _, elliptic, gradient_x, gradient_y, gradient_spin = problem
@@ -195,7 +181,7 @@ class FastsimTheory(TangentialTheory):
         local = np.require(
             np.broadcast_to(friction, (steps, len(strips.y))), np.float64, ["C", "W"]
         )
-        peak = self._peak(strips, self.elliptic)
+        peak = peak_pressure(strips, elliptic=self.elliptic)
         marched = march_local_fields(
             half_length, peak, local, elliptic, gradient_x, gradient_y, gradient_spin
         )[:, ::-1]
@@ -213,7 +199,7 @@ class FastsimTheory(TangentialTheory):
         return ContactFields(
             x=place * a,
             y=strips.y,
-            pressure=self._peak(strips, elliptic=True) * np.sqrt(shape),
+            pressure=peak_pressure(strips, elliptic=True) * np.sqrt(shape),
             traction_x=traction_x,
             traction_y=traction_y,
             slip_x=slip_x,
@@ -233,6 +219,7 @@ class FastsimTheory(TangentialTheory):
             closed_form=_CLOSED_FORM[self.closed_form],
             element_sum=self.element_sum,
             points=self.mx,
+            single=self.single,
             kalker=chosen if given is None else batches.GIVEN,
             given=np.zeros(3) if given is None else np.array([given.c11, given.c22, given.c23]),
             tables=(spline(0), spline(1), spline(2)),
@@ -249,31 +236,12 @@ class FastsimTheory(TangentialTheory):
         """Return what the kernels take, for the strips of `part`."""
         mean = slip.longitudinal - slip.spin_part
         gradient_x = mean / flexibility.longitudinal + slip.spin_part / flexibility.spin
+        bound = friction * peak_pressure(strips, elliptic=self.elliptic)
         return (
             np.ascontiguousarray(strips.half_length[part]),
-            np.ascontiguousarray((friction * self._peak(strips, self.elliptic))[..., part]),
+            np.ascontiguousarray(bound[..., part]),
             self.elliptic,
             np.ascontiguousarray(gradient_x[part]),
             float(slip.lateral / flexibility.lateral),
             float(slip.spin / flexibility.spin),
         )
-
-    @staticmethod
-    def _peak(strips: Strips, elliptic: bool) -> FloatArray:
-        """Return the elliptic or parabolic pressure at x = 0, shape (strips,) [Pa]."""
-        if isinstance(strips, EllipseStrips):
-            patch = strips.ellipse
-            t = strips.from_centre / patch.b
-            section = np.where(strips.coverage > 0.0, np.maximum((1.0 - t) * (1.0 + t), 0.0), 0.0)
-            if elliptic:
-                return patch.peak_pressure * np.sqrt(section)
-            return 2.0 * patch.normal_force / (math.pi * patch.a * patch.b) * section
-        inside = strips.half_length > 0.0
-        mean = strips.line_load / np.where(inside, strips.half_length, 1.0)
-        return np.where(inside, (2.0 / math.pi if elliptic else 0.75) * mean, 0.0)
-
-
-def _touching(strips: Strips) -> slice:
-    """Return the strips from the first to the last in contact."""
-    inside = np.flatnonzero(strips.half_length > 0.0)
-    return slice(int(inside[0]), int(inside[-1]) + 1)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -84,7 +86,15 @@ class Tractions:
 
 
 class TangentialTheory(ABC):
-    """Solves the tangential problem on given strips."""
+    """Solves the tangential problem on given strips.
+
+    Attributes
+    ----------
+    knows_ellipses : bool
+        Whether it takes strips that an ellipse covers in part as what they are.
+    """
+
+    knows_ellipses: ClassVar[bool] = False
 
     @abstractmethod
     def tractions(
@@ -139,6 +149,8 @@ def friction_per_strip(strips: Strips, point: OperatingPoint) -> FloatArray:
         )
     friction = np.empty_like(strips.y)
     friction[:] = point.friction
+    if not np.isfinite(friction).all():  # a closed form would take it for none
+        raise power_not_finite(point, line_load=strips.line_load)
     return friction
 
 
@@ -174,6 +186,14 @@ def _balanced_creepage(
     return float(brentq(excess, -reach, reach, xtol=1e-16, rtol=1e-14))
 
 
+def power_not_finite(point: OperatingPoint, **state: FloatArray) -> ContactError:
+    """Return the error of a contact whose tractions make no sense, with the state it was in."""
+    return ContactError(
+        "the dissipated power is not finite; check creepage, friction and rolling speed",
+        {"point": point, **state},
+    )
+
+
 def complete(
     theory: TangentialTheory, strips: Strips, pair: ElasticPair, point: OperatingPoint
 ) -> ContactSolution:
@@ -184,6 +204,9 @@ def complete(
     slip = local_slip(strips, point, longitudinal)
     friction = friction_per_strip(strips, point)
     found = theory.tractions(strips, pair, slip, friction, point.rolling_speed)
+    power = float(found.dissipation.sum()) * strips.spacing
+    if not math.isfinite(power):
+        raise power_not_finite(point, line_load=strips.line_load)
     arm = strips.y - load_weighted_mean(strips, strips.y)
     length = 2.0 * strips.half_length.sum()
     return ContactSolution(
@@ -197,7 +220,7 @@ def complete(
         approach=strips.approach,
         peak_pressure=strips.peak_pressure,
         adhesion_fraction=float(found.adhesion_length.sum() / length),
-        power=float(found.dissipation.sum()) * strips.spacing,
+        power=power,
         longitudinal_creepage=longitudinal,
         iterations=strips.iterations,
     )

@@ -1,0 +1,163 @@
+"""The contact model `hertz`: Hertz's patch on any grid, with each tangential theory."""
+
+import numpy as np
+import pytest
+
+from tests.reference import STEEL, rows
+from wearsim.errors import CapabilityError, ContactError
+from wearsim.mechanics.elasticity import combine
+from wearsim.mechanics.hertz import hertz
+from wearsim.models.hertz_fastsim import HertzFastsim, HertzFastsimOptions
+from wearsim.models.hertz_model import SPEC, HertzModel
+from wearsim.models.strip_theory import StripTheory
+from wearsim.types import Creepage, Grid, OperatingPoint
+
+MATERIALS = (STEEL, STEEL)
+PAIR = combine(*MATERIALS)
+RIG = (90.0, 2.0)  # relative curvatures along and across
+THEORIES = ("strip", "fastrip", "fastsim")
+
+
+def contact(grid=None, creepage=(1e-3, 0.0, 0.0), load=300.0, mu=0.1, shape=None, **options):
+    """Solve the rig's contact; `options` in the words of a scenario."""
+    model = SPEC.factory(SPEC.options(**options))
+    if grid is None:
+        grid = model.suggest_grid(RIG[1], RIG[0], load, MATERIALS)
+    model.prepare(grid, MATERIALS)
+    gap = grid.y**2 if shape is None else shape(grid.y)
+    point = OperatingPoint(load, 2.618, Creepage(*creepage), mu)
+    return model, gap, point, model.solve(gap, RIG[0], point)
+
+
+def test_that_the_patch_is_that_of_hertz():
+    *_, solution = contact()
+    patch = hertz(45.0, 1.0, 300.0, PAIR.contact_modulus)
+    assert solution.peak_pressure == pytest.approx(patch.peak_pressure, rel=1e-9)
+    assert solution.approach == pytest.approx(patch.approach, rel=1e-9)
+    assert solution.half_length == pytest.approx(patch.half_length(solution.y), rel=1e-9)
+    assert solution.line_load.sum() * (solution.y[1] - solution.y[0]) == pytest.approx(300.0)
+
+
+@pytest.mark.parametrize("creepage", [(5e-4, 2e-4, 0.0), (5e-4, 2e-4, 0.3)])
+@pytest.mark.parametrize("bound", ["parabolic", "elliptic"])
+def test_that_with_fastsim_it_is_the_papers_model(bound, creepage):
+    *_, found = contact(creepage=creepage, tangential="fastsim", bound=bound)
+    model = HertzFastsim(HertzFastsimOptions(bound=bound))
+    grid = model.suggest_grid(RIG[1], RIG[0], 300.0, MATERIALS)
+    model.prepare(grid, MATERIALS)
+    point = OperatingPoint(300.0, 2.618, Creepage(*creepage), 0.1)
+    expected = model.solve(grid.y**2, RIG[0], point)
+    assert np.array_equal(found.dissipation, expected.dissipation)
+
+
+@pytest.mark.parametrize("tangential", THEORIES)
+def test_that_strips_partly_covered_keep_forces_and_power_smooth(tangential):
+    chosen = {"tangential": tangential, "creepage": (6e-4, 3e-4, 0.05)}
+    exact = contact(my=1000, **chosen)[-1]
+    for half in np.linspace(3.0e-3, 3.2e-3, 9):
+        found = contact(Grid.spanning(-half, half, 81), **chosen)[-1]
+        assert found.power == pytest.approx(exact.power, rel=2e-3)
+        assert found.force_x == pytest.approx(exact.force_x, rel=2e-3)
+
+
+@pytest.mark.parametrize("tangential", THEORIES)
+def test_that_all_slide_with_the_whole_of_friction_whatever_is_covered(tangential):
+    grid = Grid.spanning(-2.05e-3, 2.05e-3, 23)
+    *_, solution = contact(grid, (0.05, 0.0, 0.0), tangential=tangential)
+    assert solution.force_x == pytest.approx(-30.0, rel=2e-2)
+    touching = solution.line_load > 0.0
+    assert np.any(solution.line_load[touching] < 0.5 * solution.line_load.max())
+    sliding = solution.dissipation[touching] / (2.618 * 0.05 * 0.1)
+    tolerance = 0.1 if tangential == "fastsim" else 0.02
+    assert sliding == pytest.approx(solution.line_load[touching], rel=tolerance)
+
+
+@pytest.mark.parametrize("tangential", THEORIES)
+def test_that_power_is_the_work_of_the_rigid_slip(tangential):
+    _, _, point, found = contact(
+        Grid.spanning(-2.7e-3, 2.7e-3, 77), (4e-4, 5e-4, 0.2), tangential=tangential
+    )
+    work = 4e-4 * found.force_x + 5e-4 * found.force_y + 0.2 * found.spin_moment
+    assert found.power == pytest.approx(-point.rolling_speed * work, rel=1e-12)
+
+
+def test_that_strips_are_the_default_and_near_the_exact_theory():
+    model, *_ = contact()
+    assert isinstance(model.theory, StripTheory)
+    errors = []
+    for case in rows("rig_random", kind="paper"):
+        creepage = case["xi"], case["eta"], case["phi_per_m"]
+        *_, found = contact(None, creepage, case["N_N"], case["mu"])
+        errors.append(found.power / 2.618 / case["P_over_V_N"] - 1.0)
+    assert np.sqrt(np.mean(np.square(errors))) < 5e-3
+
+
+@pytest.mark.parametrize("tangential", THEORIES)
+def test_that_a_worn_profile_is_fitted_anew(tangential):
+    def groove(y):
+        return y**2 + 0.95 * np.maximum(17e-6 - (y - 2e-4) ** 2, 0.0)
+
+    grid = Grid.spanning(-9e-3, 9e-3, 181)
+    *_, fresh = contact(grid, tangential=tangential)
+    *_, worn = contact(grid, shape=groove, tangential=tangential)
+    assert worn.line_load.sum() * grid.spacing == pytest.approx(300.0, rel=1e-12)
+    wide = [np.count_nonzero(found.line_load) for found in (fresh, worn)]
+    assert wide[1] > 1.2 * wide[0]
+
+
+@pytest.mark.parametrize("tangential", THEORIES)
+def test_that_friction_torque_and_creepage_may_be_local(tangential):
+    model, gap, _, whole = contact(tangential=tangential)
+    friction = np.where(np.arange(50) < 25, 0.1, 0.05)
+    half = model.solve(gap, RIG[0], OperatingPoint(300.0, 2.618, Creepage(1e-3), friction))
+    assert half.dissipation[:20] == pytest.approx(whole.dissipation[:20], rel=2e-2)
+    assert np.all(half.dissipation[25:] < whole.dissipation[25:])
+    torque = OperatingPoint(
+        300.0, 2.618, Creepage(0.0), 0.1, bearing_torque=0.1, rolling_radius=np.full(50, 20e-3)
+    )
+    assert -model.solve(gap, RIG[0], torque).force_x * 20e-3 == pytest.approx(0.1, rel=1e-9)
+    varied = Creepage(1e-4, variation=300.0 * whole.y**2)
+    assert np.isfinite(model.solve(gap, RIG[0], OperatingPoint(300.0, 1.0, varied, 0.1)).power)
+
+
+@pytest.mark.parametrize("tangential", THEORIES)
+def test_that_fields_hold_the_load_and_the_traction(tangential):
+    grid = Grid.spanning(-2.2e-3, 2.2e-3, 60)
+    model, gap, point, solution = contact(grid, (6e-4, 0.0, 0.0), tangential=tangential)
+    fields = model.fields(solution, gap, RIG[0], point, points_along=401)
+    half = hertz(45.0, 1.0, 300.0, PAIR.contact_modulus).b
+    edges = np.append(-2.2e-3, solution.y + 0.5 * grid.spacing)
+    width = np.diff(np.clip(edges, -half, half))
+    if tangential == "strip":  # which takes strips whole
+        width[width > 0.0] = grid.spacing
+    load = np.dot(np.trapezoid(fields.pressure, fields.x, axis=0), width)
+    assert load == pytest.approx(300.0, rel=5e-3)
+    force = np.dot(np.trapezoid(fields.traction_x, fields.x, axis=0), width)
+    assert force == pytest.approx(solution.force_x, rel=1e-2)
+
+
+def test_that_a_batch_is_solved_as_each_contact_alone():
+    model, gap, point, alone = contact(creepage=(4e-4, 3e-4, 0.1), tangential="fastrip")
+    found = model.solve_batch(np.array([gap, gap]), RIG[0], [point, point])
+    assert found.stack("dissipation")[1] == pytest.approx(alone.dissipation, rel=1e-14)
+
+
+def test_that_what_it_cannot_do_is_told():
+    model, gap, point, _ = contact()
+    with pytest.raises(CapabilityError, match="hertz takes no wear compliance"):
+        model.solve(gap, RIG[0], point, np.zeros_like(gap))
+    field = OperatingPoint(300.0, 2.618, Creepage(1e-3), np.full((50, 50), 0.1))
+    with pytest.raises(CapabilityError, match="not one per point"):
+        model.solve(gap, RIG[0], field)
+    with pytest.raises(ContactError, match="contact is lost"):
+        contact(Grid.spanning(-3e-3, 3e-3, 61), load=0.0)
+    for tangential in THEORIES:
+        for bad in ({"mu": np.nan}, {"creepage": (np.nan, 0.0, 0.0)}):
+            with pytest.raises(ContactError, match="power is not finite"):
+                contact(tangential=tangential, **bad)
+
+
+def test_that_the_spec_builds_the_model_it_names():
+    assert SPEC.name == "hertz"
+    assert isinstance(SPEC.factory(SPEC.options()), HertzModel)
+    assert SPEC.capabilities == HertzModel.capabilities

@@ -1,0 +1,176 @@
+"""The contact model `semi-hertzian`: against the exact theory, and through a whole wear test."""
+
+import numpy as np
+import pytest
+
+from tests.reference import CREEPAGES, STEEL, WORN, worn_profile
+from tests.studies.study_examples import short
+from wearsim.errors import ContactError
+from wearsim.models.semi_hertzian import SPEC, SemiHertzianOptions
+from wearsim.studies import replay
+from wearsim.types import Creepage, Grid, OperatingPoint
+
+MATERIALS = (STEEL, STEEL)
+RIG = 90.0
+VARIANTS = ("kik-piotrowski", "ayasse-chollet", "analyn")
+# on the profiles of `WORN`, in their order: L1 of the line load, from above [%]
+LINE_LOAD = {
+    "kik-piotrowski": (18.0, 12.0, 14.5, 11.5, 12.0),
+    "ayasse-chollet": (0.1, 7.5, 5.0, 5.0, 10.5),
+    "analyn": (0.1, 6.5, 4.0, 3.5, 10.5),
+}
+
+
+def contact(variant="analyn", grid=None, gap=None, creepage=None, curvature=RIG, **options):
+    model = SPEC.factory(SemiHertzianOptions(variant=variant, **options))
+    if grid is None:
+        grid = model.suggest_grid(2.0, curvature, 300.0, MATERIALS)
+    model.prepare(grid, MATERIALS)
+    gap = grid.y**2 if gap is None else gap(grid.y)
+    creepage = dict(creepage or {"longitudinal": 1e-3})
+    torque = creepage.pop("bearing_torque", None)
+    radius = np.full(grid.strips, 0.02) if torque is not None else None
+    point = OperatingPoint(300.0, 2.6, Creepage(**creepage), 0.1, torque, radius)
+    return model, gap, point, model.solve(gap, curvature, point)
+
+
+def carried_on(exact, y):
+    """Return a worn profile, carried on beyond its data by the parabola through their ends."""
+    gap = np.interp(y, exact["y"], exact["w"])
+    for beyond, end in (
+        (y < exact["y"][0], slice(0, 12)),
+        (y > exact["y"][-1], slice(-12, None)),
+    ):
+        parabola = np.polynomial.Polynomial.fit(exact["y"][end], exact["w"][end], 2)
+        gap[beyond] = parabola(y[beyond])
+    return gap
+
+
+def on_worn(variant, name, creepage):
+    exact = worn_profile(name)
+    grid = Grid.spanning(-4e-3, 4e-3, 321)
+    *_, solution = contact(variant, grid, lambda y: carried_on(exact, y), creepage, curvature=45.0)
+    return exact, solution
+
+
+def difference(exact, solution, name, attribute, power=1):
+    found = np.interp(exact["y"], solution.y, getattr(solution, attribute))
+    missed = np.abs(found - exact[name]) ** power
+    return (missed.sum() / (exact[name] ** power).sum()) ** (1.0 / power)
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+@pytest.mark.parametrize("name", WORN)
+def test_that_worn_profiles_carry_nearly_the_line_load_of_the_exact_theory(variant, name):
+    exact, solution = on_worn(variant, name, {"longitudinal": 1e-3})
+    allowed = LINE_LOAD[variant][WORN.index(name)] / 100.0
+    assert 0.9 * allowed - 0.01 < difference(exact, solution, "q", "line_load") < allowed
+    bottom = exact["w"].min()
+    found = (solution.approach - bottom) / (exact["approach"] - bottom)
+    assert found == pytest.approx(1.0, abs=0.17 if name == "parabola" else 0.07)
+    if variant != "kik-piotrowski":
+        assert difference(exact, solution, "a", "half_length") < 0.07
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+@pytest.mark.parametrize("case", list(CREEPAGES))
+def test_that_worn_profiles_dissipate_nearly_like_the_exact_theory(variant, case):
+    longitudinal, lateral, spin = CREEPAGES[case]
+    kik = variant == "kik-piotrowski"
+    for name in WORN:
+        creepage = {"longitudinal": longitudinal, "lateral": lateral, "spin": spin}
+        exact, solution = on_worn(variant, name, creepage)
+        power = solution.power / 2.6
+        assert power == pytest.approx(exact[f"P_over_V_{case}"], rel=0.14 if kik else 0.025)
+        scaled = {**exact, "rows": 2.6 * exact[f"P_l_over_V_{case}"]}
+        assert difference(scaled, solution, "rows", "dissipation", 2) < (0.32 if kik else 0.21)
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+@pytest.mark.parametrize("tangential", ["strip", "fastrip", "fastsim"])
+def test_that_power_is_the_work_of_the_rigid_slip(variant, tangential):
+    creepage = {"longitudinal": -3e-4, "lateral": 2e-4, "spin": 0.4}
+    *_, solution = contact(variant, creepage=creepage, tangential=tangential)
+    work = -2.6 * (
+        creepage["longitudinal"] * solution.force_x
+        + creepage["lateral"] * solution.force_y
+        + creepage["spin"] * solution.spin_moment
+    )
+    assert solution.power == pytest.approx(work, rel=1e-12)
+    assert solution.power > 0.0
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_that_the_fields_add_up_to_the_strips(variant):
+    model, gap, point, solution = contact(variant, creepage={"longitudinal": 2e-4})
+    fields = model.fields(solution, gap, RIG, point, points_along=2001)
+    spacing = np.diff(solution.y)[0]
+
+    def total(values):
+        return np.trapezoid(values, fields.x, axis=0).sum() * spacing
+
+    assert total(fields.pressure) == pytest.approx(300.0, rel=1e-4)
+    assert fields.pressure.max() == pytest.approx(solution.peak_pressure, rel=1e-6)
+    assert total(fields.traction_x) == pytest.approx(solution.force_x, rel=1e-3)
+    assert total(fields.power_density) == pytest.approx(solution.power, rel=2e-3)
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_that_a_free_roller_carries_its_bearing_torque(variant):
+    *_, solution = contact(variant, creepage={"longitudinal": 0.0, "bearing_torque": 0.3})
+    assert -0.02 * solution.force_x == pytest.approx(0.3, rel=1e-9)
+
+
+def test_that_the_variants_promise_what_they_keep():
+    model, gap, point, hard = contact()
+    assert SPEC.capabilities == model.capabilities
+    assert model.capabilities.wear_compliance
+    assert not model.capabilities.coupled
+    soft = model.solve(gap, RIG, point, np.full(len(gap), 2e-12))
+    assert soft.peak_pressure < hard.peak_pressure
+    assert soft.line_load.sum() == pytest.approx(hard.line_load.sum(), rel=1e-12)
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_that_a_solution_does_not_depend_on_where_it_starts(variant):
+    model, gap, point, solution = contact(variant)
+    _, _, _, other = contact(variant, gap=lambda y: 0.7 * y**2)
+    again = model.solve(gap, RIG, point, None, other)
+    np.testing.assert_array_equal(again.line_load, solution.line_load)
+
+
+def test_that_a_contact_at_the_edge_of_its_strips_is_an_error():
+    with pytest.raises(
+        ContactError, match=r"raise contact\.width or move contact\.centre"
+    ) as caught:
+        contact(grid=Grid.spanning(-1e-3, 1e-3, 51))
+    assert set(caught.value.state) >= {"gap", "line_load", "approach"}
+
+
+def test_that_strips_too_narrow_are_an_error():
+    with pytest.raises(ContactError, match=r"lower contact\.strips"):
+        contact(grid=Grid.spanning(-1.8e-5, 1.8e-5, 51))
+
+
+def test_that_what_is_not_finite_is_an_error():
+    with pytest.raises(ContactError, match="not finite"):
+        contact(gap=lambda y: np.where(y > 0.0, np.nan, y**2))
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_that_a_wear_test_runs_implicitly_to_the_depth_of_line_contact(variant):
+    depth = {}
+    for model in ("semi-hertzian", "slender"):
+        own = {"contact__variant": variant} if model == "semi-hertzian" else {}
+        scenario = short(
+            contact__model=model,
+            contact__width="10 mm",
+            operation__passes=200_000,
+            evolution__tolerance=0.005,
+            evolution__stepper="implicit",
+            **own,
+        )
+        ending = replay.run(scenario)
+        assert ending.finished
+        depth[model] = float(ending.depth[-1])
+    assert depth["semi-hertzian"] == pytest.approx(depth["slender"], rel=0.02)
