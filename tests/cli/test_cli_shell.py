@@ -11,7 +11,7 @@ from wearsim.errors import CapabilityError, PluginError, ResultsFileError, Solve
 
 VERBS = [
     *("check", "contact", "dissipation", "run", "resume", "show", "plot", "export"),
-    *("maxent", "reproduce", "plugins", "schema"),
+    *("maxent", "reproduce", "plugins", "schema", "new"),
 ]
 
 

@@ -16,6 +16,11 @@ from plugin_examples import HOOKS, Point, rig
 import wearsim
 from wearsim.errors import ScenarioError
 from wearsim.plugins import LoadSpec, RandomInputSpec, WearLawSpec, hookspecs, registry
+from wearsim.testing import loads, random_inputs
+from wearsim.testing.loads import LoadBench
+from wearsim.testing.random_bench import RandomBench
+from wearsim.testing.specs import Chosen
+from wearsim.testing.wear_laws import WEAR_LAW, WearLawBench
 
 
 def example_of(hook: str) -> str:
@@ -69,12 +74,12 @@ def test_that_the_example_of_a_contact_model_runs(example, monkeypatch):
     result = wearsim.run(
         rig(contact='model = "winkler"\nfoundation_modulus = 4e13\nwidth = "8 mm"\nstrips = 81')
     )
-    assert result.stepper == "explicit"
+    assert result.stepper == "stabilised"
     assert result.finished
     assert result.depth[-1] > 0.0
 
 
-@pytest.mark.parametrize("stepper", ["implicit", "explicit", "per-pass"])
+@pytest.mark.parametrize("stepper", ["implicit", "stabilised", "explicit", "per-pass"])
 def test_that_the_example_of_a_wear_law_runs(example, stepper):
     example("wearsim_wear_laws")
     scenario = rig(
@@ -88,7 +93,7 @@ def test_that_the_example_of_a_wear_law_runs(example, stepper):
     assert result.roller_depth[-1] == pytest.approx(300 * 1e-11 * 25 / 20 / 3, rel=1e-9)
 
 
-@pytest.mark.parametrize("stepper", ["implicit", "explicit", "per-pass"])
+@pytest.mark.parametrize("stepper", ["implicit", "stabilised", "explicit", "per-pass"])
 def test_that_the_example_of_a_load_runs(example, stepper):
     example("wearsim_loads")
     scenario = rig({"evolution.stepper": stepper}, load='kind = "ramp"\nstart = 200.0\nslope = 0.5')
@@ -110,18 +115,27 @@ def test_that_an_option_of_a_load_that_seldom_differs_is_seen_to_change_the_cont
         wearsim.dissipation(scenario, 2)
 
 
-def test_that_the_load_of_the_example_has_exact_moments(example):
-    made = example("wearsim_loads")
-    load = made.Ramp(made.RampOptions(start=200.0, slope=0.5))
-    forces = load.force(np.linspace(10.0, 50.0, 100_001))
-    assert load.mean(10.0, 50.0) == pytest.approx(forces.mean(), rel=1e-9)
-    assert load.deviation(10.0, 50.0) == pytest.approx(forces.std(), rel=1e-4)
+@pytest.mark.parametrize(
+    ("hook", "kind", "name", "checks", "bench"),
+    [
+        ("wearsim_wear_laws", WearLawSpec, "constant-depth", WEAR_LAW, WearLawBench),
+        ("wearsim_loads", LoadSpec, "ramp", loads.BY_ROLE["base"], LoadBench),
+    ],
+)
+def test_that_the_examples_keep_their_promises(example, hook, kind, name, checks, bench):
+    example(hook)
+    chosen = Chosen(registry().get(kind, name))
+    for check in checks:
+        check(bench(chosen))
 
 
 def test_that_the_example_of_a_random_input_runs(example):
     example("wearsim_random_inputs")
     spec = registry().get(RandomInputSpec, "flat")
-    flat = spec.factory(spec.options(low=2.0, high=4.0))
+    bench = RandomBench(Chosen(spec, {"low": 2.0, "high": 4.0}))
+    for check in random_inputs.BY_ROLE["scalar"]:
+        check(bench)
+    flat = bench.thing
     assert flat.quantile(np.array([0.25, 0.5])) == pytest.approx([2.5, 3.0])
     assert (*flat.support, flat.mean) == pytest.approx((2.0, 4.0, 3.0))
     assert flat.std == pytest.approx(1.0 / np.sqrt(3.0), rel=1e-6)

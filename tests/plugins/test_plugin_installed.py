@@ -60,7 +60,7 @@ def test_that_a_run_uses_an_installed_plugin_and_its_file_names_it(tmp_path):
     done = wearsim("run", path, "-o", tmp_path / "rig.h5", "--json", plugins=("tiny",))
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout)
-    assert (told["model"], told["stepper"]) == ("winkler", "explicit")
+    assert (told["model"], told["stepper"]) == ("winkler", "stabilised")
     shown = wearsim("show", tmp_path / "rig.h5", plugins=("tiny",))
     assert "wearsim-tiny" in shown.stdout
 

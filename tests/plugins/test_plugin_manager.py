@@ -25,7 +25,7 @@ def failing():
 
 def test_that_builtins_come_through_the_hooks_of_anyone():
     found = registry()
-    assert found.names(ContactModelSpec) == ["hertz-fastsim", "slender"]
+    assert found.names(ContactModelSpec) == ["hertz", "hertz-fastsim", "semi-hertzian", "slender"]
     assert found.names(WearLawSpec) == ["archard-dissipation", "t-gamma"]
     assert found.names(LoadSpec) == ["constant", "recorded", "spring", "thermal"]
     assert {item.distribution for item in found.all()} == {"wearsim"}

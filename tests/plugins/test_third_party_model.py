@@ -24,13 +24,13 @@ def test_that_a_single_contact_is_solved():
     assert solution.power == pytest.approx(0.1 * 300.0 * 1e-3 * 2.618, rel=1e-4)
 
 
-def test_that_auto_takes_explicit_steps_for_a_model_without_wear_compliance():
+def test_that_auto_takes_stabilised_steps_for_a_model_without_wear_compliance():
     result = wearsim.run(winkler())
-    assert result.stepper == "explicit"
+    assert result.stepper == "stabilised"
     assert result.worn_volume[-1] == pytest.approx(1.1e-11 * result.dissipated_energy[-1], rel=1e-9)
 
 
-def test_that_explicit_steps_agree_with_every_pass_by_itself():
+def test_that_its_steps_agree_with_every_pass_by_itself():
     short = {"operation.duration": "12 s"}
     steps = wearsim.run(winkler(short))
     truth = wearsim.run(winkler(short | {"evolution.stepper": "per-pass"}))
@@ -43,7 +43,7 @@ def test_that_explicit_steps_agree_with_every_pass_by_itself():
 def test_that_rollers_which_differ_run_one_after_another():
     offsets = {"roller.offset": ["-0.5 mm", "0 mm", "0.5 mm"]}
     result = wearsim.run(winkler(offsets))
-    assert result.stepper == "explicit"
+    assert result.stepper == "stabilised"
     assert result.finished
 
 

@@ -12,6 +12,7 @@ from wearsim.cli.contact import contact
 from wearsim.cli.dissipation import dissipation
 from wearsim.cli.export import export
 from wearsim.cli.maxent import maxent
+from wearsim.cli.new import new
 from wearsim.cli.plot import plot
 from wearsim.cli.plugins import plugins
 from wearsim.cli.reproduce import reproduce
@@ -37,6 +38,7 @@ for verb in (
     plugins, schema,
 ):  # fmt: skip
     app.command()(verb)
+app.add_typer(new)
 
 
 def _show_version(asked: bool) -> None:

@@ -1,5 +1,8 @@
-"""What a plugin's author imports: the hooks, the specs they yield and the protocols they keep."""
+"""What a plugin's author imports: hooks, the specs they yield, protocols, options and errors."""
 
+from pydantic import Field
+
+from wearsim.errors import CapabilityError, ContactError
 from wearsim.plugins.hookspecs import hookimpl
 from wearsim.plugins.manager import registry
 from wearsim.plugins.protocols import (
@@ -20,6 +23,7 @@ from wearsim.plugins.random_inputs import (
     Process,
     Uniforms,
 )
+from wearsim.plugins.refusing import refuse_unclaimed
 from wearsim.plugins.shared_wear import SharedWear
 from wearsim.plugins.specs import (
     ContactModelSpec,
@@ -29,29 +33,61 @@ from wearsim.plugins.specs import (
     Spec,
     WearLawSpec,
 )
+from wearsim.quantities import (
+    InputFile,
+    Kind,
+    Limit,
+    NonNegativeStiffness,
+    NonNegativeWearFactor,
+    PositiveDuration,
+    PositiveForce,
+    PositiveLength,
+    PositivePressure,
+    PositiveValue,
+    PositiveWearFactor,
+    Quantity,
+    Value,
+)
 
 __all__ = [
     "BODIES",
     "Body",
     "Capabilities",
+    "CapabilityError",
+    "ContactError",
     "ContactModel",
     "ContactModelSpec",
     "Distribution",
+    "Field",
     "Frame",
     "FrictionField",
+    "InputFile",
     "JointDistribution",
+    "Kind",
+    "Limit",
     "Load",
     "LoadSpec",
     "LoadTerm",
+    "NonNegativeStiffness",
+    "NonNegativeWearFactor",
     "Options",
     "PassLoop",
+    "PositiveDuration",
+    "PositiveForce",
+    "PositiveLength",
+    "PositivePressure",
+    "PositiveValue",
+    "PositiveWearFactor",
     "Process",
+    "Quantity",
     "RandomInputSpec",
     "SharedWear",
     "Spec",
     "Uniforms",
+    "Value",
     "WearLaw",
     "WearLawSpec",
     "hookimpl",
+    "refuse_unclaimed",
     "registry",
 ]

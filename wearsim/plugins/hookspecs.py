@@ -1,4 +1,7 @@
-"""The four hooks a plugin can implement, each with an example that works as it stands."""
+"""The hooks a plugin can implement, each with an example that works as it stands.
+
+docs/plugins.md has a longer example of each; ``wearsim.testing`` holds a plugin to its promises.
+"""
 
 from __future__ import annotations
 
@@ -20,6 +23,9 @@ class HookSpecs:
     @hookspec
     def wearsim_contact_models(self) -> Iterable[ContactModelSpec]:  # type: ignore[empty-body]
         """Yield contact models, chosen in a scenario by ``contact.model``.
+
+        What they keep is promised in `ContactModel`, and put to the test by
+        `wearsim.testing.contact_model_tests`; ``wearsim new plugin NAME`` writes one whole.
 
         Returns
         -------
@@ -51,6 +57,9 @@ class HookSpecs:
     def wearsim_wear_laws(self) -> Iterable[WearLawSpec]:  # type: ignore[empty-body]
         """Yield wear laws, chosen in a scenario by ``wear.law``.
 
+        What they keep is promised in `WearLaw`, and put to the test by
+        `wearsim.testing.wear_law_tests`.
+
         Returns
         -------
         iterable of WearLawSpec
@@ -63,7 +72,7 @@ class HookSpecs:
 
 
             class PerPass(Options):
-                depth: float = 1e-12  # m, wherever there is contact
+                depth: float = 1e-12  # m, wherever the bodies slide
 
 
             class Constant(WearLaw):
@@ -71,7 +80,7 @@ class HookSpecs:
                     self.depth = options.depth
 
                 def depth_per_pass(self, body, solution, rolling_speed):
-                    return self.depth * (solution.line_load > 0.0)
+                    return self.depth * (solution.dissipation > 0.0)
 
 
             @hookimpl
@@ -87,6 +96,9 @@ class HookSpecs:
     @hookspec
     def wearsim_loads(self) -> Iterable[LoadSpec]:  # type: ignore[empty-body]
         """Yield loads, chosen by ``load.kind``, and terms, added by a table ``[load.NAME]``.
+
+        What they keep is promised in `Load` and `LoadTerm`, and put to the test by
+        `wearsim.testing.load_tests`.
 
         Returns
         -------
@@ -131,7 +143,9 @@ class HookSpecs:
         """Yield random inputs, chosen by ``distribution`` in the table that stands for a value.
 
         Options that are measured like the value itself have the types `Value`, `PositiveValue`
-        and `Limit`: "300 N" for a load, a plain number for a coefficient.
+        and `Limit`: "300 N" for a load, a plain number for a coefficient. What they keep is
+        promised in `Distribution` and its like, and put to the test by
+        `wearsim.testing.random_input_tests`.
 
         Returns
         -------
@@ -141,8 +155,7 @@ class HookSpecs:
         --------
         .. code-block:: python
 
-            from wearsim.plugins import Distribution, Options, RandomInputSpec, hookimpl
-            from wearsim.quantities import Value
+            from wearsim.plugins import Distribution, Options, RandomInputSpec, Value, hookimpl
 
 
             class Bounds(Options):

@@ -191,7 +191,10 @@ class ContactModel(ABC):
         Raises
         ------
         ContactError
-            If contact is lost, the solver does not converge or a value is not finite.
+            If contact is lost or reaches beyond the strips, the solver does not converge or a
+            value is not finite.
+        CapabilityError
+            If something is asked that `capabilities` do not claim.
         """
 
     def solve_coupled(
@@ -234,7 +237,7 @@ class ContactModel(ABC):
             return [self.solve(gap[0], longitudinal_curvature, points[0], own, first)]
         raise CapabilityError(
             f"{type(self).__name__} solves one contact at a time, and rollers that differ share the"
-            " cylinder's wear; use evolution.stepper = 'explicit' or 'per-pass'"
+            " cylinder's wear; use evolution.stepper = 'stabilised' or 'per-pass'"
         )
 
     def solve_batch(
@@ -356,24 +359,6 @@ class ContactModel(ABC):
         """Return tractions and slip inside a solved contact; only where `capabilities.fields`."""
         raise CapabilityError(f"{type(self).__name__} gives no fields inside the contact")
 
-    def load_sensitivity(
-        self,
-        solution: ContactSolution,
-        gap: FloatArray,
-        longitudinal_curvature: float,
-        point: OperatingPoint,
-        change: FloatArray,
-    ) -> FloatArray:
-        """Return the fall in line load [N/m] that a small `change` of the gap [m] causes.
-
-        The default solves the contact again with the gap changed; a model that knows its own
-        derivative can do better. The explicit stepper takes its stability limit from it.
-        """
-        scale = 1e-4 * max(solution.approach - float(gap.min()), 1e-12)
-        step = scale / float(np.abs(change).max())
-        nearby = self.solve(gap + step * change, longitudinal_curvature, point, None, solution)
-        return (solution.line_load - nearby.line_load) / step
-
     def pass_loop(self, loop: PassLoop) -> int:
         """Run roller passes in compiled code, where `capabilities.pass_loop`.
 
@@ -450,7 +435,7 @@ class Load(ABC):
 
 
 class LoadTerm(ABC):
-    """A term added to a load, with one number of state per roller that follows the power."""
+    """A term added to a load: one number of state per roller, its force [N], follows the power."""
 
     @abstractmethod
     def advance(self, state: FloatArray, power: FloatArray, duration: float) -> FloatArray:

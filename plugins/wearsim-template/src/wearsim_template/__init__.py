@@ -1,0 +1,91 @@
+"""The contact model `winkler`: an elastic foundation, strip by strip, that slides everywhere."""
+
+from typing import Annotated
+
+import numpy as np
+from scipy.optimize import brentq
+
+import wearsim.plugins as ws
+from wearsim.types import ContactSolution
+
+Modulus = Annotated[float, ws.Quantity(ws.Kind("a modulus", "Pa/m", "1000 GPa/mm"), "positive")]
+
+
+class WinklerOptions(ws.Options):
+    """What may stand beside ``model = "winkler"``, validated with its units."""
+
+    half_length: ws.PositiveLength = ws.Field(0.13e-3, description="of a strip that Hertz loads so")
+    foundation_modulus: Modulus | None = ws.Field(None, description="instead: pressure per depth")
+
+
+class Winkler(ws.ContactModel):
+    """Springs side by side: the pressure is the modulus times the depth, friction mu times it."""
+
+    capabilities = ws.Capabilities(creepage_variation=True, local_friction=True)
+
+    def __init__(self, options):
+        self.options = options
+
+    def prepare(self, grid, materials):
+        """Take the strips; by default K = 3 pi E*/(8 a), see README.md."""
+        compliance = sum((1.0 - m.poisson_ratio**2) / m.youngs_modulus for m in materials)  # 1/E*
+        by_hertz = 3.0 * np.pi / (8.0 * compliance * self.options.half_length)
+        self.grid, self.modulus = grid, self.options.foundation_modulus or by_hertz
+
+    def solve(self, gap, longitudinal_curvature, point, wear_compliance=None, warm=None):
+        """Solve one contact; there is one answer, whatever `warm` is."""
+        ws.refuse_unclaimed(self, point, wear_compliance)
+        force, spacing = point.normal_force, self.grid.spacing
+        if not (0.0 < force < np.inf and np.isfinite(gap).all()):
+            raise ws.ContactError(f"no contact: load {force:.4g} N or a gap that is not finite")
+        stiffness = 4.0 / 3.0 * self.modulus * np.sqrt(2.0 / longitudinal_curvature)
+
+        def depth(approach):
+            return np.maximum(approach - gap, 0.0)
+
+        def excess(approach):
+            return stiffness * (depth(approach) ** 1.5).sum() * spacing - force
+
+        # one strip that carries it all would sink in this far
+        reach = (force / spacing / stiffness) ** (2.0 / 3.0)
+        low = float(gap.min())
+        approach = brentq(excess, low, low + 1.01 * reach, xtol=1e-20, rtol=1e-14)
+        if depth(approach)[[0, -1]].any():
+            raise ws.ContactError("the contact reaches the edge of its strips; raise contact.width")
+        return self._slide(depth(approach), stiffness, longitudinal_curvature, point, approach)
+
+    def _slide(self, depth, stiffness, longitudinal_curvature, point, approach):
+        """Sum up strips that all slide, each against its own rigid slip."""
+        y, load, creepage = self.grid.y, stiffness * depth**1.5, point.creepage
+        half_length = np.sqrt(2.0 * depth / longitudinal_curvature)
+        varies = -creepage.spin * y if creepage.variation is None else creepage.variation
+        along = creepage.longitudinal + varies - np.average(varies, weights=load)
+        slip = np.hypot(along, creepage.lateral)
+        traction = -point.friction * load / np.where(slip > 0.0, slip, 1.0)  # per slip [N/m]
+        dissipation = -traction * slip**2 * point.rolling_speed
+        arm = y - np.average(y, weights=load)
+        sums = dissipation, traction * along, traction * creepage.lateral, -traction * along * arm
+        power, force_x, force_y, moment = (float(part.sum()) * self.grid.spacing for part in sums)
+        if not np.isfinite(power):
+            raise ws.ContactError("the power is not finite; check creepage, friction and speed")
+        return ContactSolution(
+            *(y, half_length, load, dissipation, force_x, force_y, moment, approach),
+            peak_pressure=self.modulus * float(depth.max()),
+            adhesion_fraction=0.0,
+            power=power,
+            longitudinal_creepage=creepage.longitudinal,
+            iterations=1,
+        )
+
+
+SPEC = ws.ContactModelSpec(
+    *("winkler", WinklerOptions, "elastic foundation that slides everywhere"),
+    factory=Winkler,
+    capabilities=Winkler.capabilities,
+)
+
+
+@ws.hookimpl
+def wearsim_contact_models():
+    """Yield the contact model."""
+    yield SPEC

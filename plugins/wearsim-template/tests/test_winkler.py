@@ -1,0 +1,22 @@
+"""The model keeps what every contact model promises, and what its README says of it."""
+
+import numpy as np
+import pytest
+from wearsim_template import SPEC
+
+from wearsim.testing import STEEL, contact_model_tests
+from wearsim.types import Creepage, Grid, OperatingPoint
+
+test_winkler = contact_model_tests(SPEC)
+test_softer_winkler = contact_model_tests(SPEC, {"foundation_modulus": "500 GPa/mm"})
+
+
+def test_that_a_strip_of_the_half_length_carries_what_hertz_gives_it():
+    a, curvature = 0.1e-3, 90.0
+    model = SPEC.factory(SPEC.options(half_length="0.1 mm"))
+    model.prepare(Grid.spanning(-3e-3, 3e-3, 3), (STEEL, STEEL))
+    hertz = np.pi / 4.0 * STEEL.youngs_modulus / (2.0 * (1.0 - 0.3**2)) * curvature * a**2
+    point = OperatingPoint(hertz * 2e-3, 1.0, Creepage(1e-3), 0.1)  # one strip of 2 mm, alone
+    solution = model.solve(np.array([1.0, 0.0, 1.0]), curvature, point)
+    assert solution.half_length[1] == pytest.approx(a, rel=1e-9)
+    assert solution.line_load[1] == pytest.approx(hertz, rel=1e-9)

@@ -1,0 +1,180 @@
+"""The verb that starts something: new plugins from the template, new scenarios that run."""
+
+from __future__ import annotations
+
+import ast
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+from cli_examples import Command
+
+from wearsim.plugins import template
+from wearsim.scenario import parse_scenario
+from wearsim.scenario.known import TABLES
+from wearsim.scenario.starter import starter_scenario
+
+ROOT = Path(__file__).parents[2]
+FILES = {
+    "profile.csv": "y [mm], height [um]\n-20, 0\n0, -1\n20, 0\n",
+    "log.csv": "time [min], load [N]\n0, 300\n450, 310\n",
+}
+
+
+def alternatives() -> list[tuple[str, str, str]]:
+    """Return table, line and remark of every alternative in the starting scenario."""
+    found, table = [], ""
+    for line in starter_scenario().splitlines():
+        if line.startswith("["):
+            table = line[1 : line.index("]")]
+        parts = re.fullmatch(r"# (\w+ = [^#]*?)\s*(#.*)?", line)
+        if parts:
+            found.append((table, parts[1], parts[2] or ""))
+    return found
+
+
+def taken(table: str, line: str, remark: str) -> str:
+    """Return the starting scenario with one alternative taken, as its remark says."""
+    replaced = re.findall(r"instead of (\w+)", remark)
+    beside = re.findall(r'with (\w+ = "[^"]+")', remark)
+    added = [line, *beside]
+    gone = {*replaced, *(item.split(" = ")[0] for item in added)}
+    lines, here = [], ""
+    for text in starter_scenario().splitlines():
+        if text.startswith("["):
+            here = text[1 : text.index("]")]
+            lines.append(text)
+            lines += added if here == table else []
+        elif here != table or text.split(" = ")[0] not in gone:
+            lines.append(text)
+    return "\n".join(lines)
+
+
+def test_that_a_new_scenario_runs_as_it_stands(command: Command) -> None:
+    written = command("new", "scenario")
+    assert (written.exit_code, written.stdout) == (0, "scenario.toml\n")
+    assert written.stderr == "next: wearsim run scenario.toml\n"
+    done = command("run", "scenario.toml", "-q")
+    assert done.exit_code == 0, done.output
+    assert "finished: 1,350,000 passes" in done.stdout
+
+
+def test_that_a_new_scenario_replaces_nothing_unasked(command: Command) -> None:
+    Path("mine.toml").write_text("mine")
+    refused = command("new", "scenario", "mine.toml")
+    assert (refused.exit_code, Path("mine.toml").read_text()) == (2, "mine")
+    assert "mine.toml exists" in refused.stderr
+    assert command("new", "scenario", "mine.toml", "--force").exit_code == 0
+    assert Path("mine.toml").read_text() == starter_scenario()
+
+
+def test_that_a_scenario_goes_into_a_folder_that_exists(command: Command) -> None:
+    refused = command("new", "scenario", "no/where.toml")
+    assert refused.exit_code == 2
+    assert "there is no folder no" in refused.stderr
+
+
+def test_that_the_starting_scenario_shows_every_key() -> None:
+    text = starter_scenario()
+    sections = dict(zip(*[iter(re.split(r"^\[(\w+)\]", text, flags=re.M)[1:])] * 2, strict=True))
+    assert set(sections) == set(TABLES)
+    for table, model in TABLES.items():
+        shown = set(re.findall(r"^(?:# )?(\w+)(?:\.\w+)? = ", sections[table], flags=re.M))
+        assert set(model.model_fields) <= shown, table
+
+
+@pytest.mark.parametrize(("table", "line", "remark"), alternatives())
+def test_that_every_alternative_of_the_starting_scenario_is_right(
+    table: str, line: str, remark: str
+) -> None:
+    text = taken(table, line, remark)
+    key, value = next(iter(tomllib.loads(line).items()))
+    assert tomllib.loads(text)[table][key] == value
+    parse_scenario(text, "new.toml", FILES.__getitem__)
+
+
+def test_that_a_new_plugin_is_the_template_under_another_name(command: Command) -> None:
+    done = command("new", "plugin", "soft-layer", "--directory", "plugins")
+    assert done.exit_code == 0, done.output
+    folder = Path("plugins/wearsim-soft-layer")
+    written = {Path(line).relative_to(folder).as_posix() for line in done.stdout.splitlines()}
+    assert written == {
+        "README.md",
+        "pyproject.toml",
+        "src/wearsim_soft_layer/__init__.py",
+        "tests/test_soft_layer.py",
+    }
+    project = tomllib.loads((folder / "pyproject.toml").read_text())["project"]
+    assert project["name"] == "wearsim-soft-layer"
+    assert project["entry-points"]["wearsim"] == {"soft-layer": "wearsim_soft_layer"}
+    for path in folder.rglob("*"):
+        assert "winkler" not in path.name
+        if path.is_file():
+            text = path.read_text()
+            assert not re.search("winkler|wearsim.template", text, flags=re.IGNORECASE), path
+    module = ast.parse((folder / "src/wearsim_soft_layer/__init__.py").read_text())
+    classes = [node.name for node in module.body if isinstance(node, ast.ClassDef)]
+    assert classes == ["SoftLayerOptions", "SoftLayer"]
+    compile((folder / "tests/test_soft_layer.py").read_text(), "test_soft_layer.py", "exec")
+    assert "pip install -e" in done.stderr
+
+
+@pytest.mark.parametrize(
+    "name", ["Sponge", "soft_layer", "1st", "-a", "a--b", "a-", "", "wearsim-a", "é", "a b", "../a"]
+)
+def test_that_a_plugin_has_a_proper_name(command: Command, name: str) -> None:
+    refused = command("new", "plugin", "--", name)
+    assert refused.exit_code == 2
+    assert "lower-case words" in " ".join(refused.stderr.split())
+    assert not list(Path().iterdir())
+
+
+def test_that_a_plugin_takes_no_name_that_is_taken(command: Command) -> None:
+    refused = command("new", "plugin", "slender")
+    assert refused.exit_code == 2
+    assert "a contact model named 'slender' is installed already" in refused.stderr
+
+
+def test_that_a_plugin_replaces_no_folder(command: Command) -> None:
+    Path("wearsim-sponge").mkdir()
+    refused = command("new", "plugin", "sponge")
+    assert refused.exit_code == 2
+    assert "wearsim-sponge exists" in refused.stderr
+    assert not list(Path("wearsim-sponge").iterdir())
+
+
+def test_that_the_template_is_found_installed_or_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert template.template_folder() == ROOT / "plugins" / "wearsim-template"
+    monkeypatch.setattr(template, "_FOLDERS", (tmp_path, ROOT))
+    assert template.template_folder() == tmp_path
+
+
+def test_that_the_wheel_holds_what_new_writes() -> None:
+    from hatchling.builders.wheel import WheelBuilder
+
+    included = WheelBuilder(str(ROOT)).recurse_included_files()
+    files = {item.distribution_path.replace("\\", "/") for item in included}
+    assert "wearsim/scenario/starter.toml" in files
+    folder = template.template_folder()
+    for name in ("pyproject.toml", "README.md", "src/wearsim_template/__init__.py",
+                 "tests/test_winkler.py"):  # fmt: skip
+        assert (folder / name).is_file()
+        assert f"wearsim/plugin_template/{name}" in files
+    # what an installed package looks in first
+    assert template._FOLDERS[0].relative_to(ROOT).as_posix() == "wearsim/plugin_template"
+
+
+def test_that_an_editable_install_holds_no_copy_of_it(tmp_path: Path) -> None:
+    import zipfile
+
+    from hatchling.builders.wheel import WheelBuilder
+
+    (wheel,) = WheelBuilder(str(ROOT)).build(directory=str(tmp_path), versions=["editable"])
+    with zipfile.ZipFile(wheel) as archive:
+        names = archive.namelist()
+        (path,) = (name for name in names if name.endswith(".pth"))
+        assert archive.read(path).decode().strip() == str(ROOT)
+    assert not [name for name in names if "template" in name]

@@ -1,0 +1,176 @@
+"""docs/plugins.md: every hook has a section whose example runs and keeps its promises."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+from plugin_examples import HOOKS, Point, rig
+
+import wearsim
+from wearsim.errors import CapabilityError
+from wearsim.plugins import (
+    Capabilities,
+    ContactModelSpec,
+    LoadSpec,
+    RandomInputSpec,
+    WearLawSpec,
+    hookspecs,
+    registry,
+)
+from wearsim.quantities import ANGLE, FORCE
+from wearsim.testing import loads, random_inputs
+from wearsim.testing.contact_bench import ContactBench
+from wearsim.testing.kit import CONTACT_MODEL
+from wearsim.testing.loads import LoadBench
+from wearsim.testing.random_bench import RandomBench
+from wearsim.testing.specs import Chosen
+from wearsim.testing.wear_laws import WEAR_LAW, WearLawBench
+
+PAGE = (Path(__file__).parents[2] / "docs" / "plugins.md").read_text(encoding="utf-8")
+LOAD = 'kind = "constant"\nnormal_force = "300 N"'
+
+
+def section(title: str) -> str:
+    """Return the section of the page under a title."""
+    parts = re.split(r"^## (.+)$", PAGE, flags=re.MULTILINE)
+    sections = dict(zip(parts[1::2], parts[2::2], strict=True))
+    assert title in sections, f"docs/plugins.md has no section on {title}"
+    return sections[title]
+
+
+def blocks(text: str, language: str) -> list[str]:
+    """Return the code blocks of a text."""
+    found = re.findall(r"^```(\w*)\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL)
+    return [code for own, code in found if own == language]
+
+
+@pytest.fixture
+def documented(install, monkeypatch):
+    """Install the example in a hook's section; return its tables for the scenario."""
+
+    def documented(hook: str) -> dict[str, str]:
+        text = section(f"`{hook}`")
+        (code,), (toml,) = blocks(text, "python"), blocks(text, "toml")
+        made = ModuleType(f"documented_{hook}")
+        monkeypatch.setitem(sys.modules, made.__name__, made)
+        exec(compile(code, "docs/plugins.md", "exec", dont_inherit=True), vars(made))
+        install(Point(lambda: made, distribution="my-package"))
+        parts = re.split(r"^\[([\w.]+)\]$", toml, flags=re.MULTILINE)
+        return dict(zip(parts[1::2], parts[2::2], strict=True))
+
+    return documented
+
+
+def keeps(checks, bench):
+    for check in checks:
+        check(bench)
+
+
+@pytest.mark.parametrize("hook", [name for name in vars(hookspecs.HookSpecs) if "wearsim" in name])
+def test_that_every_hook_is_documented_and_tested(hook):
+    code = blocks(section(f"`{hook}`"), "python")[0]
+    assert f"@hookimpl\ndef {hook}():" in code
+    assert f'documented("{hook}")' in Path(__file__).read_text(), f"no test here runs {hook}"
+    assert hook in HOOKS
+    assert f"| `{hook}` |" in section("How it is found")
+
+
+def test_that_the_documented_contact_model_keeps_its_promises_and_runs(documented):
+    tables = documented("wearsim_contact_models")
+    spec = registry().get(ContactModelSpec, "plastic")
+    keeps(CONTACT_MODEL, ContactBench(Chosen(spec)))
+    scenario = rig(**tables)
+    assert scenario.contact.options.hardness == 1.2e9
+    solution = wearsim.solve_contact(scenario)
+    assert solution.peak_pressure == 1.2e9
+    result = wearsim.run(scenario)
+    assert result.finished
+    assert result.power[-1] == pytest.approx(3 * 0.1 * 300.0 * 2.618 * 1e-3, rel=1e-4)
+    with pytest.raises(CapabilityError, match="wear compliance"):
+        wearsim.run(rig({"evolution.stepper": "implicit"}, **tables))
+
+
+@pytest.mark.parametrize("stepper", ["auto", "per-pass"])
+def test_that_the_documented_wear_law_keeps_its_promises_and_runs(documented, stepper):
+    tables = documented("wearsim_wear_laws")
+    spec = registry().get(WearLawSpec, "threshold")
+    keeps(WEAR_LAW, WearLawBench(Chosen(spec, {"k_over_h": "1.1e-11 1/Pa"})))
+    changes = {"evolution.stepper": stepper, "operation.duration": "12 s"}
+    result = wearsim.run(rig(changes, **tables))
+    free = wearsim.run(rig(changes | {"wear.threshold": "0 J/m^2"}, **tables))
+    assert 0.0 < result.worn_volume[-1] < 0.9 * free.worn_volume[-1]
+    assert result.width[-1] <= free.width[-1]
+
+
+@pytest.mark.parametrize("stepper", ["auto", "per-pass"])
+def test_that_the_documented_loads_keep_their_promises_and_run(documented, stepper):
+    tables = documented("wearsim_loads")
+    wave = {"normal_force": "300 N", "amplitude": "20 N", "period": "90 s"}
+    warmth = {"time_constant": "1 min"}
+    keeps(loads.BY_ROLE["base"], LoadBench(Chosen(registry().get(LoadSpec, "wave"), wave)))
+    keeps(loads.BY_ROLE["term"], LoadBench(Chosen(registry().get(LoadSpec, "warmth"), warmth)))
+    result = wearsim.run(rig({"evolution.stepper": stepper}, **tables))
+    # a time constant and more under some 0.08 W at 50 N/W, beside a wave of 20 N
+    wave_now = 20.0 * np.sin(2.0 * np.pi * 120.0 / 90.0)
+    warm_now = 50.0 * 0.0785 * (1.0 - np.exp(-2.0))
+    assert result.normal_force[-1] == pytest.approx(300.0 + wave_now + warm_now, rel=5e-3)
+
+
+def test_that_the_documented_random_inputs_keep_their_promises_and_run(documented):
+    tables = documented("wearsim_random_inputs")
+
+    def chosen(name, raw, kind=None):
+        return Chosen(registry().get(RandomInputSpec, name), raw, kind)
+
+    triangle = chosen("triangle", {"mode": "300 N", "width": "30 N"}, FORCE)
+    keeps(random_inputs.BY_ROLE["scalar"], RandomBench(triangle))
+    assert triangle.spec.factory(triangle.options).std == pytest.approx(30.0 / 6**0.5, rel=1e-4)
+    slack = chosen("slack", {"yaw": "1 mrad", "tilt": "0.5 mrad"}, ANGLE)
+    keeps(random_inputs.BY_ROLE["joint"], RandomBench(slack))
+    friction = chosen("triangle", {"mode": 0.1, "width": 0.02})
+    stripes = RandomBench(chosen("stripes", {}), friction)
+    keeps(random_inputs.BY_ROLE["field"], stripes)
+    steady = RandomBench(chosen("steady", {"spacing": "10 s"}), friction)
+    keeps(random_inputs.BY_ROLE["process"], steady)
+    text = "".join(f"\n[{name}]\n{body}" for name, body in tables.items())
+    scenario = rig_with(text)
+    result = wearsim.run(scenario)
+    assert result.finished
+    assert 270.0 < result.drawn["load.normal_force"][0] < 330.0
+    assert np.abs(result.drawn["creepage.tilt"]).max() <= 0.5e-3
+    assert len(set(result.drawn["creepage.yaw"])) == 3
+
+
+def rig_with(tables: str):
+    """Return a short test whose load, misalignment and friction stand in tables of their own."""
+    base = rig().text.replace("coefficient = 0.1\n", "").replace('normal_force = "300 N"\n', "")
+    return wearsim.scenario.parse_scenario(base + tables, "rig.toml", {}.__getitem__)
+
+
+def test_that_every_capability_is_in_the_table():
+    text = PAGE[PAGE.index("### What a model can take besides") :]
+    rows = re.findall(r"^\| `(\w+)` \|", text[: text.index("\n## ")], flags=re.MULTILINE)
+    assert rows == list(vars(Capabilities()))
+
+
+def test_that_every_check_is_in_the_table():
+    rows = re.findall(r"^\| `([\w-]+)` \| (.*) \|$", section("Put it to the test"), re.MULTILINE)
+    assert rows == [(check.name, check.promise) for check in CONTACT_MODEL]
+
+
+@pytest.mark.parametrize("title", ["Options and units", "Put it to the test"])
+def test_that_the_other_examples_run(title):
+    for code in blocks(section(title), "python"):
+        exec(compile(code, "docs/plugins.md", "exec", dont_inherit=True), {})
+
+
+def test_that_the_message_on_the_page_is_what_the_kit_says():
+    (told,) = blocks(section("Put it to the test"), "")
+    check = CONTACT_MODEL["strips-carry-the-load"]
+    flat = " ".join(told.split())
+    assert flat.endswith(f"It breaks a promise: {check.promise} ({check.promised_in})")

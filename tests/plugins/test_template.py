@@ -1,0 +1,104 @@
+"""The template that comes with wearsim: what it may import, how long it is, and what it runs."""
+
+from __future__ import annotations
+
+import ast
+import importlib.util
+import sys
+from pathlib import Path
+
+import pytest
+from plugin_examples import Point, rig
+
+import wearsim
+from wearsim.plugins.template import renamed, template_folder
+from wearsim.testing import contact_model_tests
+
+FOLDER = template_folder()
+MODULE = FOLDER / "src" / "wearsim_template" / "__init__.py"
+ALLOWED = {"numpy", "scipy", "pytest", "wearsim.plugins", "wearsim.testing", "wearsim.types"}
+
+
+def load_template():
+    specification = importlib.util.spec_from_file_location("wearsim_template", MODULE)
+    made = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(made)
+    return made
+
+
+test_winkler = contact_model_tests(load_template().SPEC)
+
+
+@pytest.fixture
+def template(install, monkeypatch):
+    made = load_template()
+    monkeypatch.setitem(sys.modules, "wearsim_template", made)
+    install(Point(lambda: made, "winkler", "wearsim-template", "0.1.0"))
+
+
+def imported(path: Path) -> set[str]:
+    """Return the modules that a file imports."""
+    names = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            names.add(node.module)
+    return names
+
+
+@pytest.mark.parametrize("path", sorted(FOLDER.rglob("*.py")), ids=lambda path: path.name)
+def test_that_it_imports_what_is_meant_for_authors_alone(path):
+    own = {"wearsim_template"} if path != MODULE else set()
+    standard = set(sys.stdlib_module_names)
+    for name in imported(path) - own:
+        assert name in ALLOWED or name.split(".")[0] in (standard | {"numpy", "scipy"}), name
+
+
+def test_that_it_is_short():
+    assert len(MODULE.read_text().splitlines()) < 100
+
+
+def test_that_its_tests_are_one_line_of_the_kit():
+    text = (FOLDER / "tests" / "test_winkler.py").read_text()
+    assert "test_winkler = contact_model_tests(SPEC)\n" in text
+
+
+@pytest.mark.usefixtures("template")
+def test_that_it_replays_the_rig_with_stabilised_steps():
+    result = wearsim.run(rig(contact='model = "winkler"'))
+    assert (result.stepper, result.finished) == ("stabilised", True)
+    # all slides: mu N V |xi| per roller, for three rollers
+    assert result.power[-1] == pytest.approx(3 * 0.1 * 300.0 * 2.618 * 1e-3, rel=1e-4)
+    assert result.worn_volume[-1] == pytest.approx(1.1e-11 * result.dissipated_energy[-1], rel=1e-9)
+
+
+@pytest.mark.usefixtures("template")
+def test_that_its_stabilised_steps_agree_with_every_pass_by_itself():
+    short = {"operation.duration": "12 s"}
+    contact = 'model = "winkler"\nfoundation_modulus = "800 GPa/mm"'
+    steps = wearsim.run(rig(short, contact=contact))
+    truth = wearsim.run(rig(short | {"evolution.stepper": "per-pass"}, contact=contact))
+    assert steps.depth[-1] == pytest.approx(float(truth.depth[-1]), rel=2e-3)
+
+
+@pytest.mark.usefixtures("template")
+@pytest.mark.parametrize(
+    ("option", "told"),
+    [
+        ('foundation_modulus = "1 GPa"', "foundation_modulus: wrong dimension"),
+        ('foundation_modulus = "0 GPa/mm"', "must be above zero"),
+        ("half_length = 0.1", 'expected a length above zero such as "20 mm"'),
+        ('depth = "1 mm"', "depth: unknown key"),
+    ],
+)
+def test_that_its_options_are_validated_with_their_units(option, told):
+    with pytest.raises(wearsim.errors.ScenarioError) as caught:
+        rig(contact=f'model = "winkler"\n{option}')
+    assert told in str(caught.value)
+
+
+def test_that_names_become_those_of_the_new_plugin():
+    assert renamed("wearsim-template wearsim_template Winkler winkler test_winkler", "a-b") == (
+        "wearsim-a-b wearsim_a_b AB a-b test_a_b"
+    )
