@@ -1,7 +1,8 @@
 """Every contact model beside the exact theory and beside the others, as Markdown tables.
 
-``python -m tests.benchmarks.models -o docs/models.md``. A contact model that is installed from
-elsewhere stands in the tables of worn profiles and whole tests with its default options.
+``python -m tests.benchmarks.models -o out/models.md``. A contact model that is installed from
+elsewhere, as the plugin template's is for this, stands in the tables of worn profiles and whole
+tests with its default options.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import argparse
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from tests.benchmarks.replays import SCENARIOS
@@ -27,6 +29,7 @@ from tests.reference.accuracy import (
 from wearsim import load_scenario, run
 from wearsim.errors import WearsimError
 from wearsim.plugins import ContactModelSpec, registry
+from wearsim.plugins.template import template_folder
 
 #: what is drawn or prescribed, by contact model and options
 TANGENTIAL: dict[str, tuple[str, dict[str, Any]]] = {
@@ -169,6 +172,17 @@ def report(tell: Callable[[str], object], share: float = 1.0, repetitions: int =
     return text
 
 
+def install_template(folder: Path) -> None:
+    """Put the plugin template on Python's path, as an installation would have it."""
+    info = folder / "wearsim_template-0.1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(
+        "Metadata-Version: 2.1\nName: wearsim-template\nVersion: 0.1.0\n"
+    )
+    (info / "entry_points.txt").write_text("[wearsim]\nwinkler = wearsim_template\n")
+    sys.path[:0] = [str(folder), str(template_folder() / "src")]
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Print the page, and write it where asked."""
     parser = argparse.ArgumentParser(prog="tests.benchmarks.models", description=__doc__)
@@ -181,7 +195,9 @@ def main(arguments: list[str] | None = None) -> None:
         sys.stdout.flush()
 
     tell(f"Measured on {machine()}.\n")
-    text = report(tell, *((0.002, 1) if asked.quick else ()))
+    with TemporaryDirectory() as folder:
+        install_template(Path(folder))
+        text = report(tell, *((0.002, 1) if asked.quick else ()))
     if asked.output is not None:
         asked.output.parent.mkdir(parents=True, exist_ok=True)
         asked.output.write_text(text, encoding="utf-8")

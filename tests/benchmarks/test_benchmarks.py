@@ -8,7 +8,7 @@ from __future__ import annotations
 import pytest
 
 import wearsim
-from tests.benchmarks import contacts, replays, studies, table
+from tests.benchmarks import contacts, models, replays, studies, table
 from tests.benchmarks.report import QUICK, TABLES
 from wearsim.studies.dissipation import dissipation
 
@@ -62,3 +62,14 @@ def test_that_a_lapse_is_told_in_a_unit_that_suits_it(seconds, text):
 
 def test_that_the_machine_is_named():
     assert "cores, Python 3." in table.machine()
+
+
+def test_that_the_tables_of_models_hold_every_model():
+    told = []
+    text = models.report(told.append, share=0.0005, repetitions=1)
+    assert [part.splitlines()[0][:3] for part in told] == ["## "] * 3
+    whole = told[2].splitlines()[4:]
+    rows = [line for line in whole if line.startswith("|")]
+    assert len(rows) == len(models.normal_models())
+    assert models.FAILED not in told[2]
+    assert all(label in text for label in models.TANGENTIAL)

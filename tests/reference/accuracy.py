@@ -13,7 +13,7 @@ from wearsim.types import ContactSolution, Creepage, FloatArray, Grid, Operating
 
 MATERIALS = (STEEL, STEEL)
 WORN_GRID = Grid.spanning(-4e-3, 4e-3, 321)
-WORN_CURVATURE = 45.0  # 1/m, twice the data's A
+WORN_CURVATURE, WORN_B = 45.0, 0.5  # 1/m, twice the data's A, and its B
 
 
 @dataclass(frozen=True)
@@ -97,8 +97,9 @@ def worn_errors(model: ContactModel, name: str) -> WornErrors:
     exact = worn_profile(name)
     model.prepare(WORN_GRID, MATERIALS)
     gap = np.interp(WORN_GRID.y, exact["y"], exact["w"])
-    # beyond the data there is no contact
-    gap += 1e-3 * np.maximum(np.abs(WORN_GRID.y) - exact["y"][-1], 0.0)
+    # beyond the data, where there is no contact, all profiles go on as the crown does
+    beyond = np.maximum(np.abs(WORN_GRID.y), exact["y"][-1])
+    gap += WORN_B * (beyond**2 - exact["y"][-1] ** 2)
     found = {}
     for case, creepage in CREEPAGES.items():
         point = OperatingPoint(300.0, 1.0, Creepage(*creepage), 0.1)

@@ -41,8 +41,8 @@ def decay_rates(scene: Scene, state: WearState) -> FloatArray:
     answers locally, and then its greatest growth, the maximum norm, is the rate at once. Where the
     contact does not, the first iterate leads to what it answers to.
 
-    One iterate is enough where it finds the rate that the state carries; and that stands where a
-    model that solves the contact fails on one so shaped.
+    One iterate is enough where it finds the rate that the state carries. Where the model cannot
+    solve a contact on the changed profiles, that rate is kept.
     """
     wear = Wearing(present_scene(scene, state), state.contacts, 1.0)
     loaded = contact_values(scene, state.contacts, "line_load") > 0.0

@@ -49,7 +49,7 @@ class WearState:
     step : float
         Passes the step-size control proposes next; 0 where it has yet to choose.
     steps, rejected, solves, full_solves : int
-        Steps taken and refused, contact solves, and passes solved in full.
+        Steps taken and refused, contact solves of the steps taken, and passes solved in full.
     loop_strips : ndarray, shape (3, stations, rollers, realisations, strips), optional
         What the compiled per-pass loop carries: line load, and the line load [N/m] and gap [m]
         where the factorisation in use was made.

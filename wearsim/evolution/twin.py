@@ -74,13 +74,13 @@ class TwinStepper(Stepper):
                 end = scheme(scene, half, 0.5 * step)
                 whole = scheme(scene, twin, step)
                 end = with_pass_errors(scene, state, end, whole, scheme, step)
+                varied = variation_error(scene, end, state.passes, step)
             except (StepError, ContactError) as failure:
                 if self.forced_step:
                     raise
                 cause, rejected, proposed = failure, rejected + 1, 0.2 * step
                 continue
             moved = _moved_apart(scene, (state, twin), (end, whole))
-            varied = variation_error(scene, end, state.passes, step)
             end = replace(
                 end,
                 passes=stop if step == left else end.passes,

@@ -128,7 +128,7 @@ VARIABLES: Mapping[str, Variable] = {
         Variable("depth_error", _TEST, "m", "estimated error of depth, on either body", "history"),
         Variable("volume_error", _TEST, "m^3", "estimated error of the volume worn off", "history"),
         Variable("rejected", _STEP, "1", "steps refused so far", "history"),
-        Variable("solves", _STEP, "1", "contacts solved so far", "history"),
+        Variable("solves", _STEP, "1", "contacts solved so far by the steps taken", "history"),
         Variable("full_solves", _STEP, "1", "passes solved in full so far", "history"),
         Variable("record_passes", ("record",), "1", "roller passes at a record", "record"),
         Variable("record_time", ("record",), "s", "simulated time at a record", "record"),

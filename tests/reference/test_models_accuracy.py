@@ -1,0 +1,77 @@
+"""Every contact model against the exact theory: what the tables of the documentation rest on."""
+
+from functools import cache
+
+import pytest
+
+from tests.reference import WORN
+from tests.reference.accuracy import built, drawn_errors, hard_errors, worn_errors
+from wearsim.errors import ContactError
+
+VARIANTS = ("kik-piotrowski", "ayasse-chollet", "analyn")
+#: rms and worst error of the power, and the median L2 error of P_l(y)
+DRAWN = {
+    ("slender", "strip", "paper"): (4e-4, 1e-3, 3e-3),
+    ("slender", "strip", "partial"): (2e-3, 6e-3, 5e-3),
+    ("hertz", "strip", "paper"): (4e-4, 1e-3, 3e-3),
+    ("hertz", "strip", "partial"): (2e-3, 6e-3, 5e-3),
+    ("hertz", "fastrip", "paper"): (2e-3, 3e-3, 2.5e-2),
+    ("hertz", "fastrip", "partial"): (5e-3, 1.1e-2, 2.5e-2),
+}
+
+
+@cache
+def on_profile(name, profile, **options):
+    return worn_errors(built(name, **options), profile)
+
+
+@pytest.mark.parametrize(("model", "tangential", "kind"), DRAWN)
+def test_that_drawn_contacts_dissipate_like_the_exact_theory(model, tangential, kind):
+    found = drawn_errors(built(model, tangential=tangential), kind)
+    rms, worst, strips = DRAWN[model, tangential, kind]
+    assert found.rms < rms
+    assert found.worst < worst
+    assert found.strips < strips
+
+
+@pytest.mark.parametrize(("tangential", "rms"), [("strip", 5e-3), ("fastrip", 5e-3)])
+def test_that_hard_cases_of_long_contacts_do_so_too(tangential, rms):
+    assert hard_errors(built("hertz", tangential=tangential), 3.0).rms < rms
+
+
+@pytest.mark.parametrize("profile", WORN)
+def test_that_slender_carries_the_line_load_of_the_exact_theory(profile):
+    found = on_profile("slender", profile)
+    # the shallow parabola has a kink, where the exact pressure has no bound
+    assert found.line_load < (6e-3 if profile == "parabola" else 1e-3)
+    assert abs(found.approach) < 1e-4
+    assert found.half_length < 5e-3
+    assert max(abs(error) for error in found.power.values()) < 5e-3
+    assert max(found.dissipation.values()) < 2.5e-2
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+@pytest.mark.parametrize("profile", [name for name in WORN if name != "hertz"])
+def test_that_slender_is_nearer_than_every_semi_hertzian_variant(profile, variant):
+    ours, other = (
+        on_profile("slender", profile),
+        on_profile("semi-hertzian", profile, variant=variant),
+    )
+    assert ours.line_load < 0.1 * other.line_load
+    assert ours.half_length < 0.5 * other.half_length
+    assert abs(ours.approach) < abs(other.approach)
+    for case, error in ours.dissipation.items():
+        assert error < 0.5 * other.dissipation[case]
+
+
+@pytest.mark.parametrize("variant", ["ayasse-chollet", "analyn"])
+def test_that_the_variants_with_hertzs_stiffness_recover_hertz(variant):
+    found = on_profile("semi-hertzian", "hertz", variant=variant)
+    assert found.line_load < 1e-3
+    assert abs(found.approach) < 1e-3
+
+
+@pytest.mark.parametrize("name", ["hertz", "hertz-fastsim"])
+def test_that_one_parabola_is_refused_where_none_will_do(name):
+    with pytest.raises(ContactError, match="Hertz"):
+        on_profile(name, "bump_10um")
