@@ -75,6 +75,28 @@ def test_that_a_scenario_goes_into_a_folder_that_exists(command: Command) -> Non
     assert "there is no folder no" in refused.stderr
 
 
+@pytest.mark.parametrize("asked", [["folder"], ["folder", "--force"]])
+def test_that_a_folder_is_no_scenario(command: Command, asked: list[str]) -> None:
+    Path("folder").mkdir()
+    refused = command("new", "scenario", *asked)
+    assert refused.exit_code == 2
+    told = " ".join(refused.stderr.split())
+    assert "folder is a folder; name a file in it: folder/scenario.toml" in told
+    assert not list(Path("folder").iterdir())
+
+
+def test_that_what_cannot_be_written_is_told(command: Command) -> None:
+    Path("file").write_text("mine")
+    refused = command("new", "plugin", "sponge", "-d", "file")
+    assert (refused.exit_code, Path("file").read_text()) == (2, "mine")
+    assert "cannot write to file (Not a directory)" in " ".join(refused.stderr.split())
+    name = 300 * "a"  # longer than a file's name may be
+    for asked in (["plugin", name], ["scenario", name, "--force"]):
+        refused = command("new", *asked)
+        assert refused.exit_code == 2
+        assert "choose another name or place" in " ".join(refused.stderr.split())
+
+
 def test_that_the_starting_scenario_shows_every_key() -> None:
     text = starter_scenario()
     sections = dict(zip(*[iter(re.split(r"^\[(\w+)\]", text, flags=re.M)[1:])] * 2, strict=True))
@@ -128,6 +150,29 @@ def test_that_a_plugin_has_a_proper_name(command: Command, name: str) -> None:
     assert refused.exit_code == 2
     assert "lower-case words" in " ".join(refused.stderr.split())
     assert not list(Path().iterdir())
+
+
+@pytest.mark.parametrize(
+    ("name", "taken"),
+    [
+        ("contact-solution", "ContactSolution"),
+        ("annotated", "Annotated"),
+        ("modulus", "Modulus"),
+        ("s-p-e-c", "SPEC"),
+        ("contact-models", "wearsim_contact_models"),
+        ("none", "None"),
+    ],
+)
+def test_that_a_plugin_takes_no_name_that_its_code_has_a_use_for(
+    command: Command, name: str, taken: str
+) -> None:
+    refused = command("new", "plugin", name)
+    assert refused.exit_code == 2
+    told = " ".join(refused.stderr.split())
+    assert f"would take the name {taken}," in told
+    assert f"add a word, 'my-{name}'" in told
+    assert not list(Path().iterdir())
+    assert command("new", "plugin", f"my-{name}").exit_code == 0
 
 
 def test_that_a_plugin_takes_no_name_that_is_taken(command: Command) -> None:

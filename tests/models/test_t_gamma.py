@@ -67,6 +67,13 @@ def test_that_rates_are_read_with_their_units():
         Regimes(mild="5.3 ug")
 
 
+def test_that_regimes_out_of_order_are_refused():
+    with pytest.raises(ValidationError, match=r"before severe wear .* at least .* 10\.38"):
+        Regimes(catastrophic_from="5 N/mm^2")
+    with pytest.raises(ValidationError, match=r"such as \"55 ug/\(m mm\^2\)\""):
+        Regimes(severe="55 um")
+
+
 def test_that_a_mildly_worn_test_is_archards():
     law = {"wear": {"law": "t-gamma", "roller": {"factor": 0.5}}}
     scene, state = worn(operation__duration="30 min", **law)

@@ -63,6 +63,10 @@ def test_that_a_run_uses_an_installed_plugin_and_its_file_names_it(tmp_path):
     assert (told["model"], told["stepper"]) == ("winkler", "stabilised")
     shown = wearsim("show", tmp_path / "rig.h5", plugins=("tiny",))
     assert "wearsim-tiny" in shown.stdout
+    resumed = wearsim("resume", tmp_path / "rig.h5", "--until", "2 min", plugins=())
+    assert resumed.returncode == 2
+    assert "needs the contact model 'winkler' of wearsim-tiny 1.2" in resumed.stderr
+    assert "install it and resume again" in resumed.stderr
 
 
 def test_that_asking_for_a_missing_plugin_tells_what_failed_to_load(tmp_path):

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ast
+import importlib
 import importlib.util
+import runpy
 import sys
 from pathlib import Path
 
@@ -11,8 +13,11 @@ import pytest
 from plugin_examples import Point, rig
 
 import wearsim
-from wearsim.plugins.template import renamed, template_folder
+from wearsim.plugins.template import clash, renamed, template_folder, write_plugin
 from wearsim.testing import contact_model_tests
+from wearsim.testing.contact_bench import ContactBench
+from wearsim.testing.kit import CONTACT_MODEL
+from wearsim.testing.specs import Chosen
 
 FOLDER = template_folder()
 MODULE = FOLDER / "src" / "wearsim_template" / "__init__.py"
@@ -99,6 +104,39 @@ def test_that_its_options_are_validated_with_their_units(option, told):
 
 
 def test_that_names_become_those_of_the_new_plugin():
-    assert renamed("wearsim-template wearsim_template Winkler winkler test_winkler", "a-b") == (
-        "wearsim-a-b wearsim_a_b AB a-b test_a_b"
-    )
+    text = "wearsim-template wearsim_template Winkler winkler test_winkler"
+    assert renamed(text, "a-b") == "wearsim-a-b wearsim_a_b AB a-b test_a_b"
+
+
+AWKWARD = ["soft-winkler", "winkler-template", "template", "winkler", "wink-winkler-2", "my-grid"]
+
+
+@pytest.mark.parametrize("name", AWKWARD)
+def test_that_a_name_that_holds_the_templates_own_is_replaced_once(name):
+    under, camel = name.replace("-", "_"), name.title().replace("-", "")
+    text = "wearsim-template wearsim_template Winkler winkler test_winkler"
+    assert renamed(text, name) == (f"wearsim-{name} wearsim_{under} {camel} {name} test_{under}")
+
+
+@pytest.mark.parametrize("name", AWKWARD)
+def test_that_a_plugin_of_an_awkward_name_is_imported_and_solves(name, tmp_path, monkeypatch):
+    written = write_plugin(name, tmp_path)
+    code = [ast.parse(path.read_text()) for path in written if path.suffix == ".py"]
+    assert len(code) == 2
+    under = name.replace("-", "_")
+    monkeypatch.syspath_prepend(tmp_path / f"wearsim-{name}" / "src")
+    monkeypatch.delitem(sys.modules, f"wearsim_{under}", raising=False)
+    made = importlib.import_module(f"wearsim_{under}")
+    monkeypatch.delitem(sys.modules, made.__name__)
+    (yielded,) = made.wearsim_contact_models()
+    assert (yielded.name, made.SPEC) == (name, yielded)
+    # what stands in the test beside it, under names of its own
+    tests = tmp_path / f"wearsim-{name}" / "tests" / f"test_{under}.py"
+    monkeypatch.setitem(sys.modules, made.__name__, made)
+    assert f"test_{under}" in runpy.run_path(str(tests))
+    CONTACT_MODEL["strips-carry-the-load"](ContactBench(Chosen(yielded)))
+
+
+def test_that_no_name_is_refused_that_only_words_of_a_docstring_have():
+    assert clash("springs") is None
+    assert clash("strip") is None

@@ -10,7 +10,7 @@ from wearsim.errors import ContactError
 from wearsim.models.hertz_fastsim import HertzFastsim
 from wearsim.models.slender import Slender
 from wearsim.models.strip_theory import StripTheory
-from wearsim.plugins import Capabilities, ContactModelSpec, Options
+from wearsim.plugins import ContactModelSpec, Options
 from wearsim.types import Creepage, Grid, OperatingPoint
 
 ANY = Creepage(1e-3)
@@ -182,6 +182,14 @@ class Faded(Sound):
         return replace(found, traction_x=0.9 * found.traction_x)
 
 
+class Turned(Sound):
+    """Gives fields whose lateral traction points the wrong way."""
+
+    def fields(self, *args, **kwargs):
+        found = super().fields(*args, **kwargs)
+        return replace(found, traction_y=-found.traction_y)
+
+
 class Averaging(HertzFastsim):
     """Says that it takes a field of friction and takes its mean."""
 
@@ -236,7 +244,13 @@ MUTANTS = {
     ],
     "forces-obey-coulomb": [
         before(lambda gap, point, c: (gap, replace(point, friction=1.1 * point.friction), c)),
+    ],
+    "gross-sliding-leaves-no-adhesion": [
         after(lambda found, gap: {"adhesion_fraction": -0.1}),
+        after(lambda found, gap: {"adhesion_fraction": 1.0 - found.adhesion_fraction}),
+    ],
+    "peak-pressure-is-no-less-than-a-mean": [
+        after(lambda found, gap: {"peak_pressure": 0.5 * found.peak_pressure})
     ],
     "no-creepage-no-power": [before(_crept)],
     "mirror-image-has-the-mirrored-answer": [before(_leaning)],
@@ -271,14 +285,19 @@ MUTANTS = {
     ],
     "local-friction": [without("local_friction"), before(_evened)],
     "friction-field": [without("friction_field", HertzFastsim), Averaging],
-    "fields": [without("fields"), Faded],
+    "fields": [
+        without("fields"),
+        Faded,
+        Turned,
+        after(lambda found, gap: {"peak_pressure": 2.0 * found.peak_pressure}),
+    ],
     "pass-loop": [Idle, Weightless],
 }
 
 
 def spec_of(model, **changes):
-    """Return a spec that builds a mutant and claims everything."""
-    able = Capabilities(**dict.fromkeys(vars(Capabilities()), True))
+    """Return a spec that builds a mutant and claims what it does."""
+    able = model().capabilities
     given = {"name": "mutant", "options": Options, "summary": "a model that breaks a promise"}
     return ContactModelSpec(
         **(given | {"factory": lambda options: model(), "capabilities": able} | changes)

@@ -42,6 +42,8 @@ def test_that_a_broken_promise_is_told(name, model):
         ("options-refuse-what-they-do-not-know", {"options": type("Loose", (Options,), {
             "model_config": {"extra": "ignore"}, "__module__": __name__})}),
         ("spec-claims-what-its-models-claim", {"capabilities": Capabilities()}),
+        ("spec-claims-what-its-models-claim", {"capabilities": Capabilities(friction_field=True,
+            **dict.fromkeys(Sound.capabilities.names(), True))}),
     ],
 )  # fmt: skip
 def test_that_a_broken_spec_is_told(name, changes):

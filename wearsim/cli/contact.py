@@ -106,7 +106,7 @@ def _rows(study: ContactStudy) -> list[tuple[str, str]]:
     point, solution = study.point, study.solution
     edges = patch_edges(solution.y, solution.half_length)
     return [
-        ("contact model", study.model),
+        ("contact model", study.described_model),
         ("strips", f"{study.grid.strips} of {shown(study.grid.spacing, 'um')}"),
         ("normal force", shown(point.normal_force, "N")),
         ("rolling speed", shown(point.rolling_speed, "m/s")),
@@ -150,6 +150,7 @@ def _data(
     return {
         "title": scenario.title,
         "model": study.model,
+        "described_model": study.described_model,
         "normal_force_N": point.normal_force,
         "rolling_speed_m_per_s": point.rolling_speed,
         "friction": point.friction,

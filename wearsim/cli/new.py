@@ -44,6 +44,10 @@ def new_plugin(name: Name, directory: Directory = Path()) -> None:
     except FileExistsError as error:
         told = f"{error}; choose another name or --directory"
         raise typer.BadParameter(told, param_hint="--directory") from error
+    except OSError as error:
+        raise typer.BadParameter(
+            _not_written(error, directory), param_hint="--directory"
+        ) from error
     for path in written:
         typer.echo(path)
     folder = directory / f"wearsim-{name}"
@@ -55,9 +59,20 @@ def new_scenario(file: NewScenario = Path("scenario.toml"), force: Force = False
     """Write a commented scenario that runs as it stands."""
     from wearsim.scenario.starter import starter_scenario
 
-    refuse_existing(file, force, "FILE")
-    if not file.parent.is_dir():
-        raise typer.BadParameter(f"there is no folder {file.parent}", param_hint="FILE")
-    file.write_text(starter_scenario(), encoding="utf-8")
+    try:
+        if file.is_dir():
+            told = f"{file} is a folder; name a file in it: {file / 'scenario.toml'}"
+            raise typer.BadParameter(told, param_hint="FILE")
+        refuse_existing(file, force, "FILE")
+        if not file.parent.is_dir():
+            raise typer.BadParameter(f"there is no folder {file.parent}", param_hint="FILE")
+        file.write_text(starter_scenario(), encoding="utf-8")
+    except OSError as error:
+        raise typer.BadParameter(_not_written(error, file), param_hint="FILE") from error
     typer.echo(file)
     note(f"next: wearsim run {file}")
+
+
+def _not_written(error: OSError, path: Path) -> str:
+    """Return what is told when something cannot be written."""
+    return f"cannot write to {path} ({error.strerror}); choose another name or place"

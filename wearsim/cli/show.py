@@ -81,7 +81,7 @@ def _contents(result: Result) -> list[tuple[str, str]]:
         ("test", standing(result)),
         ("scenario", raw.scenario_file),
         ("input files", ", ".join(raw.files) or "none"),
-        ("contact model", result.model),
+        ("contact model", result.described_model),
         ("stepper", f"{result.stepper}, tolerance {raw.tolerance:g}"),
         ("plugins", "\n".join(_plugins(raw))),
         ("software", ", ".join(f"{name} {number}" for name, number in raw.software.items())),

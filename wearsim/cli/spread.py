@@ -49,7 +49,7 @@ def write_spread(result: DissipationResult, more: Rows) -> None:
     raw = result.raw
     rows = [
         ("realisations", standing(result)),
-        ("contact model", raw.model),
+        ("contact model", result.described_model),
         ("strips", f"{len(result.y)} of {shown(raw.strip_width, 'um')}"),
     ]
     rows += [("friction taken at", raw.friction_grid)] if raw.friction_grid else []

@@ -2,17 +2,28 @@
 
 from __future__ import annotations
 
+from typing import Annotated, Self
+
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from wearsim.plugins import Body, Options, WearLaw, WearLawSpec
 from wearsim.quantities import (
+    Kind,
     NonNegativeMassPerEnergy,
     PositiveDensity,
     PositiveMassPerEnergy,
-    PositivePressure,
+    Quantity,
+    QuantityError,
 )
 from wearsim.types import ContactSolution, FloatArray
+
+RATE = Quantity(
+    Kind("a mass per rolled distance and contact area", "kg/m^3", "55 ug/(m mm^2)"), "positive"
+)
+INDEX = Quantity(
+    Kind("an energy per rolled distance and contact area", "Pa", "77.2 N/mm^2"), "positive"
+)
 
 
 class Regimes(Options):
@@ -25,7 +36,7 @@ class Regimes(Options):
     mild: PositiveMassPerEnergy = Field(
         5.3e-9, description="mass worn per dissipated energy in mild wear, '5.3 ug/J'"
     )
-    severe: PositiveDensity = Field(
+    severe: Annotated[float, RATE] = Field(
         55.0e-3,
         description="mass worn per rolled distance and contact area in severe wear, which does not"
         " depend on the energy, '55 ug/(m mm^2)'",
@@ -33,11 +44,23 @@ class Regimes(Options):
     catastrophic: NonNegativeMassPerEnergy = Field(
         61.9e-9, description="mass worn per energy beyond the last threshold, '61.9 ug/J'"
     )
-    catastrophic_from: PositivePressure = Field(
+    catastrophic_from: Annotated[float, INDEX] = Field(
         77.2e6, description="T gamma over A where catastrophic wear begins, '77.2 N/mm^2'"
     )
     density: PositiveDensity = Field(7850.0, description="density of the body, '7850 kg/m^3'")
     factor: float = Field(1.0, ge=0.0, description="multiplies all rates; 0 for no wear")
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        """Refuse catastrophic wear that begins before severe wear does."""
+        onset = self.severe / self.mild
+        if self.catastrophic_from < onset:
+            raise QuantityError(
+                "catastrophic wear would begin before severe wear does",
+                f"catastrophic_from = {self.catastrophic_from * 1e-6:g} N/mm^2",
+                f"at least severe/mild = {onset * 1e-6:.4g} N/mm^2",
+            )
+        return self
 
     def rate(self, index: FloatArray) -> FloatArray:
         """Return the mass worn per rolled distance and contact area [kg/m^3].

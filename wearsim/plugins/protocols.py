@@ -380,10 +380,10 @@ def naming_contact(error: ContactError, number: int, shape: tuple[int, ...]) -> 
     number : int
         The contact, in the order of the batch.
     shape : tuple of int
-        The batch's leading axes, the last three of them station, roller and realisation.
+        The batch's leading axes, the last three of them station, contact and realisation.
     """
     place = [int(i) for i in np.unravel_index(number, shape)]
-    axes = ("station", "roller", "realisation")[-len(shape) :]
+    axes = ("station", "contact", "realisation")[-len(shape) :]
     parts = [f"{axis} {i}" for axis, i, n in zip(axes, place, shape, strict=True) if n > 1]
     text = f"{', '.join(parts)}: {error}" if parts else str(error)
     return ContactError(text, error.state | {"contact": place})

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from wearsim.report.patch import patch_edges
+from wearsim.report.patch import patch_edges, patches
 from wearsim.report.style import BLUE, ORANGE, PRESSURE, figure_style, name_axes
 from wearsim.report.units import PER_SI, shown
 from wearsim.types import ContactFields, ContactSolution, FloatArray
@@ -57,7 +57,7 @@ def contact_figure(study: ContactStudy, title: str) -> Figure:
 def _caption(study: ContactStudy) -> str:
     solution = study.solution
     return (
-        f"{study.model}: {shown(study.point.normal_force, 'N')},"
+        f"{study.described_model}: {shown(study.point.normal_force, 'N')},"
         f" peak pressure {shown(solution.peak_pressure, 'MPa')},"
         f" power {shown(solution.power, 'W')}"
     )
@@ -81,7 +81,7 @@ def _draw_fields(panels: dict[str, Axes], fields: ContactFields, solution: Conta
     for row in MAPS:
         for name in row:
             ground = SLIDE if name == "areas" else "black"
-            _draw_outline(panels[name], solution, inside, ground)
+            _draw_outline(panels[name], solution, ground)
 
 
 def _pressure(fields: ContactFields, solution: ContactSolution) -> FloatArray:
@@ -138,12 +138,23 @@ def _stride(length: int, wanted: int) -> slice:
     return slice((length - 1) % step // 2 + step // 2, None, step)
 
 
-def _draw_outline(axes: Axes, solution: ContactSolution, inside: slice, ground: str) -> None:
-    """Draw the patch's edge, the leading one up, and fill what no strip's centre covers."""
-    edges = patch_edges(solution.y, solution.half_length)
-    if edges is None:
-        return
-    y, a = solution.y[inside], solution.half_length[inside]
+def _draw_outline(axes: Axes, solution: ContactSolution, ground: str) -> None:
+    """Draw the edge of every patch, the leading one up, and fill what no strip's centre covers."""
+    for strips in patches(solution.half_length):
+        alone = np.zeros_like(solution.half_length)
+        alone[strips] = solution.half_length[strips]
+        edges = patch_edges(solution.y, alone)
+        if edges is not None:
+            _draw_edge(axes, solution.y[strips], solution.half_length[strips], edges, ground)
+    greatest = float(solution.half_length.max()) * MM
+    axes.set_ylim(-1.35 * greatest, 1.2 * greatest)
+    axes.grid(visible=False)
+
+
+def _draw_edge(
+    axes: Axes, y: FloatArray, a: FloatArray, edges: tuple[float, float], ground: str
+) -> None:
+    """Draw the edge of one patch."""
     part = np.linspace(0.0, 1.0, 12)
     left, right = edges[0] + (y[0] - edges[0]) * part, y[-1] + (edges[1] - y[-1]) * part
     outline = np.concatenate([left, y, right]) * MM
@@ -152,8 +163,6 @@ def _draw_outline(axes: Axes, solution: ContactSolution, inside: slice, ground: 
     around = np.concatenate([outline, outline[::-1]]), np.concatenate([height, -height[::-1]])
     axes.fill(*around, color=ground, lw=0, zorder=0)
     axes.plot(*around, "k", lw=0.8)
-    axes.set_ylim(-1.35 * height.max(), 1.2 * height.max())
-    axes.grid(visible=False)
 
 
 def _draw_strips(panels: dict[str, Axes], solution: ContactSolution) -> None:

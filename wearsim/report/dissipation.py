@@ -58,7 +58,7 @@ def dissipation_figure(result: DissipationResult) -> Figure:
 
 def _caption(result: DissipationResult) -> str:
     power, raw = result.summaries["power"], result.raw
-    text = f"{_number_of(result.count)} ({raw.plan}, {raw.model}"
+    text = f"{_number_of(result.count)} ({raw.plan}, {result.described_model}"
     text += f"{'' if result.finished else ', unfinished'}): mean {shown(power.mean, 'W')}"
     if result.count == 1:
         return text

@@ -31,6 +31,19 @@ def patch_edges(y: FloatArray, half_length: FloatArray) -> tuple[float, float] |
     )
 
 
+def patches(half_length: FloatArray) -> list[slice]:
+    """Return the strips of every patch of a contact, from side to side.
+
+    Parameters
+    ----------
+    half_length : ndarray, shape (strips,)
+        Half-length a(y) of the contact [m].
+    """
+    touching = np.concatenate([[False], half_length > 0.0, [False]])
+    ends = np.flatnonzero(np.diff(touching.astype(np.int8)))
+    return [slice(int(i), int(j)) for i, j in zip(ends[::2], ends[1::2], strict=True)]
+
+
 def _beyond(half_length: FloatArray, strip: int, inwards: int) -> float:
     """Return how far the contact goes on past a strip's centre, in strips: a half to one."""
     inner = strip + inwards

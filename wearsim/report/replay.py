@@ -67,7 +67,7 @@ def _caption(result: Result) -> str:
         f"{count(float(result.passes[-1]))} roller passes in"
         f" {shown(float(result.time[-1]), 'min')}: {depth} deep,"
         f" {shown(float(np.max(result.width[-1])), 'mm')} wide"
-        f" ({result.model}, {result.stepper}{'' if result.finished else ', unfinished'})"
+        f" ({result.described_model}, {result.stepper}{'' if result.finished else ', unfinished'})"
     )
 
 

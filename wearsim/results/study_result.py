@@ -49,6 +49,13 @@ class StudyResult(Generic[Data]):
         return self.raw.model
 
     @property
+    def described_model(self) -> str:
+        """The contact model with the options that the scenario gives it."""
+        from wearsim.scenario import described_model  # noqa: PLC0415  (slow to import)
+
+        return described_model(self.raw.model, self.raw.scenario_text)
+
+    @property
     def finished(self) -> bool:
         """Whether all that was asked for is done."""
         return self.raw.finished

@@ -2,6 +2,7 @@
 
 from wearsim.scenario.bodies import Cylinder, Roller, read_profile
 from wearsim.scenario.choices import ContactChoice, LoadChoice, TermChoice, WearChoice
+from wearsim.scenario.describing import described_model
 from wearsim.scenario.overrides import parse_override
 from wearsim.scenario.random_inputs import Persistence, RandomInput
 from wearsim.scenario.reading import load_scenario, parse_scenario
@@ -34,6 +35,7 @@ __all__ = [
     "Scenario",
     "TermChoice",
     "WearChoice",
+    "described_model",
     "load_scenario",
     "parse_override",
     "parse_scenario",

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wearsim.plugins import ContactModel
-from wearsim.scenario import Scenario
+from wearsim.scenario import Scenario, described_model
 from wearsim.studies.build import bare_scene, load_range
 from wearsim.studies.stepping import check_model
 from wearsim.studies.tracks import contact_centres, fresh_patch, profile_grid
@@ -36,6 +36,8 @@ class ContactStudy:
     point : OperatingPoint
     model : str
         Name of the contact model.
+    described_model : str
+        The same with its options.
     notes : tuple of str
         What a user should know.
     """
@@ -46,6 +48,7 @@ class ContactStudy:
     grid: Grid
     point: OperatingPoint
     model: str
+    described_model: str
     notes: tuple[str, ...]
 
 
@@ -104,7 +107,9 @@ def study_contact(
     gap, curvature = scene.nominal_gap[0, 0, 0], scene.kinematics.longitudinal_curvature
     solution = model.solve(gap, curvature, point)
     fields = model.fields(solution, gap, curvature, point) if with_fields else None
-    return ContactStudy(solution, fields, gap, grid, point, scenario.contact.model, scenario.notes)
+    name = scenario.contact.model
+    described = described_model(name, scenario.text)
+    return ContactStudy(solution, fields, gap, grid, point, name, described, scenario.notes)
 
 
 def solve_contact(scenario: Scenario, profile: Profile | None = None) -> ContactSolution:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from wearsim.mechanics.elasticity import combine
-from wearsim.scenario import Scenario
+from wearsim.scenario import Scenario, described_model
 from wearsim.studies.build import build_scene, load_range
 from wearsim.studies.contact import study_contact
 from wearsim.studies.stepping import check_model
@@ -71,7 +71,7 @@ def _contact(scenario: Scenario, load: float) -> Rows:
         ("friction", f"{scenario.friction.coefficient:.4g}"),
         ("creepage", _creepage(scenario)),
         *_random(scenario),
-        ("contact model", f"{scenario.contact.model} ({scenario.contact.spec.summary})"),
+        ("contact model", _contact_model(scenario)),
         ("fresh patch (Hertz)", size),
     ]
 
@@ -128,3 +128,8 @@ def plan(scenario: Scenario) -> Rows:
     check_model(scenario, scenario.contact.build())
     strips = study_contact(scenario).grid.strips
     return [*rows, ("runs as", f"one contact, {strips} strips (no duration or no wear law)")]
+
+
+def _contact_model(scenario: Scenario) -> str:
+    choice = scenario.contact
+    return f"{described_model(choice.model, scenario.text)}: {choice.spec.summary}"

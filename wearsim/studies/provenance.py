@@ -56,6 +56,16 @@ def plugins_in_use(scenario: Scenario) -> list[dict[str, str]]:
     return rows
 
 
+def missing_plugins(rows: list[dict[str, str]]) -> list[str]:
+    """Return what is not installed of the `plugins_in_use` of a file, told by its distribution."""
+    kinds = {kind.kind: kind for kind in (ContactModelSpec, LoadSpec, WearLawSpec, RandomInputSpec)}
+    return [
+        f"the {row['kind']} '{row['name']}' of {row['distribution']} {row['version']}"
+        for row in rows
+        if row["name"] not in registry().names(kinds[row["kind"]])
+    ]
+
+
 def origins(versions: Mapping[str, str], plugins: list[dict[str, str]]) -> dict[str, str]:
     """Return the version of every package, and where every plugin in use comes from, by name."""
     found = dict(versions)

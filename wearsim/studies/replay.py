@@ -22,7 +22,12 @@ from wearsim.scenario import Scenario, parse_scenario
 from wearsim.studies.build import build_scene, start_height, strips_of_run
 from wearsim.studies.draws import draw, drawn_values
 from wearsim.studies.events import Checkpointed, Event, Finished, Started, Stepped, Warned
-from wearsim.studies.provenance import origins, plugins_in_use, software
+from wearsim.studies.provenance import (
+    missing_plugins,
+    origins,
+    plugins_in_use,
+    software,
+)
 from wearsim.studies.recorder import Recorder
 from wearsim.studies.schedule import RecordSchedule
 from wearsim.types import Grid
@@ -99,12 +104,19 @@ def resume(
     Raises
     ------
     ResultsFileError
-        If the file cannot be read, or holds a test that is already past `until`.
+        If the file cannot be read, needs a plugin that is not there, or holds a test that is
+        already past `until`.
     SolverError, Interrupted
         As in `run`.
     """
     path = Path(file)
     data = read_results(path)
+    missing = missing_plugins(data.plugins)
+    if missing:
+        raise ResultsFileError(
+            f"{path}: the run needs {' and '.join(missing)}, which is not installed here; install"
+            " it and resume again"
+        )
     overrides = {"operation.duration": f"{until!r} s"} if until is not None else None
     scenario = parse_scenario(
         data.scenario_text, data.scenario_file, data.files.__getitem__, overrides

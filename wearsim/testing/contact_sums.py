@@ -8,11 +8,17 @@ import numpy as np
 
 from wearsim.testing.checks import Checks, agree, require
 from wearsim.testing.contact_bench import NUMBERS, STRIPS, ContactBench
-from wearsim.types import Creepage
+from wearsim.types import ContactSolution, Creepage
 
 SUMS: Checks[ContactBench] = Checks()
 _SOLUTION = "wearsim.types.ContactSolution"
 _MODEL = "wearsim.plugins.ContactModel"
+_SATURATED = 0.02  # how much may be missing of mu N in gross sliding
+
+
+def sliding(bench: ContactBench) -> ContactSolution:
+    """Return the contact in gross sliding along rolling."""
+    return bench.solve(bench.point(Creepage(0.1)))
 
 
 @SUMS.promised_in(_SOLUTION)
@@ -97,10 +103,29 @@ def forces_obey_coulomb(bench: ContactBench) -> None:
         told = f"{what}: the tangential force is {force:.6g} N, beyond mu N = {most:.6g} N"
         # a march over points sums tractions that it bounds point by point
         require(force <= most * (1.0 + 1e-3), told)
+    agree("the force at a creepage of 0.1", sliding(bench).force_x, -most, _SATURATED)
+
+
+@SUMS.promised_in(_SOLUTION)
+def gross_sliding_leaves_no_adhesion(bench: ContactBench) -> None:
+    """The part of the area that adheres lies between 0 and 1, and is none in gross sliding."""
+    for what, (_, found) in bench.solutions.items():
         share = found.adhesion_fraction
         require(0.0 <= share <= 1.0, f"{what}: adhesion_fraction is {share:.3g}")
-    sliding = bench.solve(bench.point(Creepage(0.1)))
-    agree("the force at a creepage of 0.1", sliding.force_x, -most, 0.02)
+    # Carter: a strip that lacks a part s of its friction adheres over sqrt(s) of its length
+    share, most = sliding(bench).adhesion_fraction, _SATURATED**0.5
+    told = f"adhesion_fraction at a creepage of 0.1 is {share:.3g}, and {most:.2g} is allowed"
+    require(share <= most, told)
+
+
+@SUMS.promised_in(_SOLUTION)
+def peak_pressure_is_no_less_than_a_mean(bench: ContactBench) -> None:
+    """The peak pressure is at least the mean pressure q/(2 a) of every strip."""
+    for what, (_, found) in bench.solutions.items():
+        inside = found.half_length > 0.0
+        mean = float((found.line_load[inside] / (2.0 * found.half_length[inside])).max())
+        told = f"{what}: peak_pressure is {found.peak_pressure:.6g} Pa, a strip's mean {mean:.6g}"
+        require(found.peak_pressure >= mean * (1.0 - bench.case.tolerance), told)
 
 
 @SUMS.promised_in(_MODEL)
