@@ -13,7 +13,7 @@ from wearsim.mechanics.fastrip import fastrip
 from wearsim.mechanics.fastrip_fields import fastrip_fields
 from wearsim.mechanics.fastsim import march
 from wearsim.mechanics.kalker import creepage_coefficients, flexibilities, one_flexibility
-from wearsim.mechanics.strip_with_spin import Motion, amended_moduli
+from wearsim.mechanics.strip_with_spin import Motion, amended_moduli, strip_of
 
 PAIR = combine(STEEL, STEEL)
 SHEAR, NU = PAIR.shear_modulus, PAIR.poisson_ratio
@@ -91,6 +91,37 @@ def test_that_one_creepage_is_carters_closed_form_with_any_number_of_steps(axis)
         assert found[3] == pytest.approx(2.0 * (a - d), abs=1e-18)
     assert np.any(d < a)
     assert np.any(d == a)
+
+
+def about_sliding_throughout(ellipse, number):
+    """Return a strip that just slides throughout, and as it just does not; None where none can."""
+
+    def strip(factor):
+        bound_peak = ellipse.bound_peak * factor
+        return strip_of(number, ellipse.half_length, bound_peak, ellipse.motion, ellipse.moduli)
+
+    a = ellipse.half_length[number]
+    spin = abs(ellipse.creepage[2]) * ellipse.moduli.spin_across * a
+    low, high = 0.5001 * spin / ellipse.bound_peak[number], 1e3  # psi is just below 1, or nothing
+    if strip(low).shift < a:
+        return None
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if strip(middle).shift >= a else (low, middle)
+    return strip(low * (1.0 - 1e-9)), strip(high * (1.0 + 1e-9))
+
+
+def test_that_a_strip_goes_over_to_sliding_throughout_without_a_turn():
+    rng, found = np.random.default_rng(2), []
+    for xi, eta, phi in rng.normal(size=(30, 3)) * (5e-4, 5e-4, 1.0):
+        ellipse = Ellipse(xi, eta, phi, a=1e-3, b=2e-4, strips=11)
+        found.append(about_sliding_throughout(ellipse, 2))
+    pairs = [pair for pair in found if pair is not None]
+    assert len(pairs) > 15
+    for sliding, adhering in pairs:
+        assert sliding.shift == sliding.half_length > adhering.shift
+        assert sliding.direction_x == pytest.approx(adhering.direction_x, abs=1e-5)
+        assert sliding.direction_y == pytest.approx(adhering.direction_y, abs=1e-5)
 
 
 def test_that_a_contact_that_slides_throughout_carries_all_that_friction_can():

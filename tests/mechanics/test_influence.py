@@ -12,6 +12,7 @@ from wearsim.mechanics.influence import (
     mean_asinh,
     middle_curvature,
     read_influence,
+    read_value,
     read_values,
 )
 
@@ -85,6 +86,7 @@ def test_that_the_table_reads_as_the_function(tau, tabulated, function):
     read_influence(table, tau, 40, value, tangent)
     read_values(table, tau, 40, alone)
     np.testing.assert_array_equal(alone, value)
+    assert [read_value(table, tau, k) for k in range(40)] == pytest.approx(value, rel=1e-14)
     np.testing.assert_allclose(value, expected, atol=2e-9)
     step = 1e-4
     if LOWEST < tau < HIGHEST:

@@ -137,12 +137,12 @@ def test_that_virtual_penetration_meets_its_printed_conditions(name):
 @pytest.mark.parametrize(
     ("ratio", "error"), [(0.3, 0.25), (1.0, 0.04), (3.0, 0.1), (11.3, 0.18), (30.0, 0.21)]
 )
-def test_that_virtual_penetration_is_as_far_from_hertz_as_is_known(ratio, error):
+def test_that_virtual_penetration_is_no_farther_from_hertz_than_is_known(ratio, error):
     curvature, patch = patch_of_shape(ratio)
     grid = Grid.spanning(-1.3 * patch.b, 1.3 * patch.b, 80)
     approach, q, _ = solved(KIK_PIOTROWSKI, grid, curvature * grid.y**2)
     missed = np.abs(q - patch.line_load(grid.y)).sum() / q.sum()
-    assert 0.8 * error < missed < error
+    assert missed < error
     assert approach == pytest.approx(patch.approach, rel=0.04)
 
 

@@ -11,7 +11,7 @@ from wearsim.errors import ContactError
 from wearsim.mechanics.elasticity import combine
 from wearsim.models.fastrip_theory import FastripTheory
 from wearsim.models.hertz_model import HertzModel
-from wearsim.models.tangential import Strips, complete
+from wearsim.models.tangential import Strips, complete, spread_work
 from wearsim.types import Creepage, Grid, OperatingPoint
 
 MATERIALS = (STEEL, STEEL)
@@ -99,6 +99,36 @@ def test_that_power_is_the_work_of_the_rigid_slip(creepage):
     work = -(xi * found.force_x + eta * found.force_y + phi * found.spin_moment)
     assert found.power == pytest.approx(work, rel=1e-12)
     assert found.dissipation.sum() * (found.y[1] - found.y[0]) == pytest.approx(work, rel=1e-12)
+
+
+@pytest.mark.parametrize("curvatures", [RIG, (20.0, 20.0), (2.0, 60.0)])
+def test_that_no_strip_grows(curvatures):
+    rng, model = np.random.default_rng(11), HertzModel(FastripTheory(), 41)
+    grid = model.suggest_grid(curvatures[1], curvatures[0], 300.0, MATERIALS)
+    model.prepare(grid, MATERIALS)
+    gap = 0.5 * curvatures[1] * grid.y**2
+    resting = 0
+    for _ in range(250):
+        xi, eta = rng.normal(size=2) * 10.0 ** rng.uniform(-5.0, -2.5, 2)
+        phi = rng.normal() * 10.0 ** rng.uniform(-2.0, 1.0)
+        point = OperatingPoint(300.0, 1.0, Creepage(xi, eta, phi), 0.1)
+        found = model.solve(gap, curvatures[0], point)
+        work = -(xi * found.force_x + eta * found.force_y + phi * found.spin_moment)
+        assert found.dissipation.min() >= 0.0
+        assert found.power == pytest.approx(work, rel=1e-9)
+        resting += np.count_nonzero(found.dissipation == 0.0)
+    assert resting > 0  # such as would have grown
+
+
+def test_that_work_is_spread_without_negative_parts_and_keeps_its_sum():
+    rng = np.random.default_rng(3)
+    for shift in (3.0, 1.0, 0.1, -0.5):
+        work = rng.normal(size=50) + shift
+        found = spread_work(work)
+        assert found.min() >= 0.0
+        assert found.sum() == pytest.approx(max(work.sum(), 0.0), rel=1e-12)
+    assert np.array_equal(spread_work(np.arange(5.0)), np.arange(5.0))
+    assert np.isnan(spread_work(np.array([1.0, np.nan]))).any()
 
 
 def test_that_creepage_that_varies_across_the_track_is_nearly_spins_longitudinal_part():

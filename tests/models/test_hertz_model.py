@@ -7,8 +7,9 @@ from tests.reference import STEEL, rows
 from wearsim.errors import CapabilityError, ContactError
 from wearsim.mechanics.elasticity import combine
 from wearsim.mechanics.hertz import hertz
+from wearsim.models.equivalent_ellipse import EllipseStrips
 from wearsim.models.hertz_fastsim import HertzFastsim, HertzFastsimOptions
-from wearsim.models.hertz_model import SPEC, HertzModel
+from wearsim.models.hertz_model import SPEC, HertzModel, Patch
 from wearsim.models.strip_theory import StripTheory
 from wearsim.types import Creepage, Grid, OperatingPoint
 
@@ -58,6 +59,48 @@ def test_that_strips_partly_covered_keep_forces_and_power_smooth(tangential):
         found = contact(Grid.spanning(-half, half, 81), **chosen)[-1]
         assert found.power == pytest.approx(exact.power, rel=2e-3)
         assert found.force_x == pytest.approx(exact.force_x, rel=2e-3)
+
+
+@pytest.mark.parametrize("tangential", THEORIES)
+def test_that_strips_may_end_anywhere_about_the_patchs_edge(tangential):
+    rng, b = np.random.default_rng(5), 1.5e-3
+    patch = Patch(a="0.14 mm", b="1.5 mm")
+    model = HertzModel(SPEC.factory(SPEC.options(tangential=tangential)).theory, 50, patch)
+    point = OperatingPoint(300.0, 2.618, Creepage(6e-4, 3e-4, 0.05), 0.1)
+
+    def power(grid):
+        model.prepare(grid, MATERIALS)
+        return model.solve(grid.y**2, RIG[0], point).power
+
+    exact = power(Grid.spanning(-b, b, 2000))
+    for _ in range(150):
+        strips, beyond = int(rng.integers(60, 90)), int(rng.integers(1, 4))
+        off = rng.choice((-1.0, 1.0)) * 10.0 ** rng.uniform(-18.0, -6.0)
+        half = b * (1.0 + off) * strips / (strips - 2 * beyond)  # an edge lies at b (1 + off)
+        assert power(Grid.spanning(-half, half, strips)) == pytest.approx(exact, rel=3e-3)
+
+
+def test_that_a_strip_that_carries_anything_has_a_half_length_whose_square_is_positive():
+    ellipse = hertz(45.0, 1.0, 300.0, PAIR.contact_modulus)
+    for covered in 10.0 ** np.arange(-30.0, 0.0):
+        for load, half_length in ((1e-30, 1e-12), (0.0, 1e-12), (1e-30, 0.0)):
+            part, one = np.array([1.0, covered]), np.ones(2)
+            strips = EllipseStrips(
+                y=one,
+                half_length=np.array([1e-4, half_length]),
+                line_load=np.array([1e5, load]),
+                spacing=1e-4,
+                longitudinal_curvature=90.0,
+                approach=1e-6,
+                peak_pressure=1e9,
+                iterations=0,
+                ellipse=ellipse,
+                from_centre=one,
+                coverage=part,
+            ).whole()
+            assert (strips.half_length[1] > 0.0) == (strips.line_load[1] > 0.0)
+            assert np.isfinite(strips.line_load[1] ** 2 / max(strips.half_length[1] ** 2, 1e-60))
+            assert strips.line_load[0] == 1e5
 
 
 @pytest.mark.parametrize("tangential", THEORIES)

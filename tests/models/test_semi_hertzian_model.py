@@ -64,7 +64,7 @@ def difference(exact, solution, name, attribute, power=1):
 def test_that_worn_profiles_carry_nearly_the_line_load_of_the_exact_theory(variant, name):
     exact, solution = on_worn(variant, name, {"longitudinal": 1e-3})
     allowed = LINE_LOAD[variant][WORN.index(name)] / 100.0
-    assert 0.9 * allowed - 0.01 < difference(exact, solution, "q", "line_load") < allowed
+    assert difference(exact, solution, "q", "line_load") < allowed
     bottom = exact["w"].min()
     found = (solution.approach - bottom) / (exact["approach"] - bottom)
     assert found == pytest.approx(1.0, abs=0.17 if name == "parabola" else 0.07)

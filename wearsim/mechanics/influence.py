@@ -168,15 +168,45 @@ def _tabulated(
 
 
 @kernel
-def read_values(table: FloatArray, tau: float, count: int, value: FloatArray) -> None:
-    """Interpolate F_k or C_k for one strip; parameters are those of `read_influence`."""
+def _weights(table: FloatArray, tau: float) -> tuple[int, float, tuple[float, float, float, float]]:
+    """Return the node below `tau`, how far past it in steps, and the weights of the cubic.
+
+    They are those of value and slope at the node, then at the one above.
+    """
     position = max((tau - LOWEST) / STEP, 0.0)
     node = min(int(position), table.shape[0] - 2)
     s = position - node
-    v0 = (1.0 + 2.0 * s) * (1.0 - s) ** 2
-    v1 = s * (1.0 - s) ** 2
-    w0 = s * s * (3.0 - 2.0 * s)
-    w1 = s * s * (s - 1.0)
+    low, low_slope = (1.0 + 2.0 * s) * (1.0 - s) ** 2, s * (1.0 - s) ** 2
+    high, high_slope = s * s * (3.0 - 2.0 * s), s * s * (s - 1.0)
+    return node, s, (low, low_slope, high, high_slope)
+
+
+@kernel
+def read_value(table: FloatArray, tau: float, distance: int) -> float:
+    """Interpolate F_k or C_k for one strip at one distance.
+
+    Parameters
+    ----------
+    table, tau
+        As in `read_influence`.
+    distance : int
+        k.
+
+    Returns
+    -------
+    float
+        F_k (or C_k).
+    """
+    node, _, (v0, v1, w0, w1) = _weights(table, tau)
+    low = v0 * table[node, 0, distance] + v1 * table[node, 1, distance]
+    high = w0 * table[node + 1, 0, distance] + w1 * table[node + 1, 1, distance]
+    return float(low + high)
+
+
+@kernel
+def read_values(table: FloatArray, tau: float, count: int, value: FloatArray) -> None:
+    """Interpolate F_k or C_k for one strip; parameters are those of `read_influence`."""
+    node, _, (v0, v1, w0, w1) = _weights(table, tau)
     low, low_slope = table[node, 0], table[node, 1]
     high, high_slope = table[node + 1, 0], table[node + 1, 1]
     for k in range(count):
@@ -202,14 +232,8 @@ def read_influence(
     tangent : ndarray, shape (>= count,)
         Receives d(q F_k)/dq = F_k + (dF_k/dtau)/2, since a grows as the root of q.
     """
-    position = max((tau - LOWEST) / STEP, 0.0)
-    node = min(int(position), table.shape[0] - 2)
-    s = position - node
-    v0 = (1.0 + 2.0 * s) * (1.0 - s) ** 2
-    v1 = s * (1.0 - s) ** 2
-    w0 = s * s * (3.0 - 2.0 * s)
-    w1 = s * s * (s - 1.0)
-    half = 0.5 / STEP if position > 0.0 else 0.0
+    node, s, (v0, v1, w0, w1) = _weights(table, tau)
+    half = 0.5 / STEP if tau > LOWEST else 0.0
     d0 = v0 + half * 6.0 * s * (s - 1.0)
     d1 = v1 + half * (3.0 * s - 1.0) * (s - 1.0)
     e0 = w0 - half * 6.0 * s * (s - 1.0)

@@ -1,4 +1,4 @@
-"""The one place for numba's options."""
+"""The one place for numba's options, and for the arrays that they make kernels take."""
 
 from __future__ import annotations
 
@@ -9,6 +9,9 @@ from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
 import numba
+import numpy as np
+
+from wearsim.types import FloatArray
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -29,6 +32,11 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
     else:
         _renew_with_any_kernel(compiled)
     return compiled
+
+
+def own_array(array: FloatArray) -> FloatArray:
+    """Return a contiguous copy that can be written to: kernels are compiled for such alone."""
+    return np.array(array, dtype=np.float64, order="C")
 
 
 def _renew_with_any_kernel(compiled: Any) -> None:

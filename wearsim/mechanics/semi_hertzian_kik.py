@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wearsim.mechanics.influence import HIGHEST, LOWEST, STEP
+from wearsim.mechanics.influence import HIGHEST, read_value
 from wearsim.mechanics.jit import kernel
 from wearsim.mechanics.semi_hertzian_levels import contact_levels
 from wearsim.types import FloatArray, IntArray
@@ -15,34 +15,6 @@ TOUCHING = 0.05  # of the depth that goes with it: what of a gap counts as its l
 ROUNDS = 100
 TOLERANCE = 1e-14  # of the load
 CONVERGED, TOO_FINE, NO_CONVERGENCE, NOT_FINITE = range(4)
-
-
-@kernel
-def influence_at(table: FloatArray, distance: int, half_length: float, spacing: float) -> float:
-    """Return what one strip's load does at the centre of another, as `influence` tabulates it.
-
-    Parameters
-    ----------
-    table : ndarray, shape (nodes, 2, strips)
-        From `influence_table`.
-    distance : int
-        How many strips apart they are.
-    half_length, spacing : float
-        Of the loaded strip, and width of a strip [m]; beyond the table its end counts.
-
-    Returns
-    -------
-    float
-        pi E* times displacement over line load.
-    """
-    position = (np.log(half_length / spacing) - LOWEST) / STEP
-    position = min(max(position, 0.0), table.shape[0] - 1.0)
-    node = min(int(position), table.shape[0] - 2)
-    s = position - node
-    rest = 1.0 - s
-    low = rest * rest * ((1.0 + 2.0 * s) * table[node, 0, distance] + s * table[node, 1, distance])
-    high = (3.0 - 2.0 * s) * table[node + 1, 0, distance] - rest * table[node + 1, 1, distance]
-    return float(low + s * s * high)
 
 
 @kernel
@@ -146,9 +118,10 @@ def displacement_at(
     for i in range(len(depth)):
         if depth[i] > 0.0:
             half_length = np.sqrt(2.0 * depth[i] / curvature)
-            near = influence_at(table, abs(i - here), half_length, spacing)
+            tau = min(np.log(half_length / spacing), HIGHEST)
+            near = read_value(table, tau, abs(i - here))
             if part > 0.0:
-                following = influence_at(table, abs(i - here - 1), half_length, spacing)
+                following = read_value(table, tau, abs(i - here - 1))
                 near += part * (following - near)
             pressed += depth[i] * near
     return pressed

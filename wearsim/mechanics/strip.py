@@ -59,6 +59,28 @@ def new_tractions(strips: int) -> StripTractions:
 
 
 @kernel
+def bound_steepness(half_length: FloatArray, line_load: FloatArray) -> float:
+    """Return what the pressure bound of all strips falls by along rolling, 2 p0/a [Pa/m].
+
+    Parameters
+    ----------
+    half_length, line_load : ndarray, shape (strips,)
+        a [m] and q [N/m].
+
+    Returns
+    -------
+    float
+        The mean over the load; zero where there is none.
+    """
+    load, moment = 0.0, 0.0
+    for i in range(line_load.shape[0]):
+        if line_load[i] > 0.0:
+            load += line_load[i]
+            moment += 4.0 / np.pi * (line_load[i] / half_length[i]) ** 2
+    return moment / load if load > 0.0 else 0.0
+
+
+@kernel
 def _fill(
     half_length: FloatArray,
     line_load: FloatArray,
@@ -122,18 +144,16 @@ def solve_strips(
     """
     n = line_load.shape[0]
     first, last = n, -n  # no literal, which induced_slip would be compiled for by itself
-    load, mean, steepness = 0.0, 0.0, 0.0
+    load, mean = 0.0, 0.0
     for i in range(n):
         out.induced_x[i], out.induced_y[i] = 0.0, 0.0
         if line_load[i] > 0.0:
             first, last = min(first, i), i
             load += line_load[i]
             mean += line_load[i] * half_length[i]
-            steepness += 4.0 / np.pi * (line_load[i] / half_length[i]) ** 2
     ratio = equivalent_ratio(half_length, line_load, spacing)
     modulus_x, modulus_y = effective_moduli(ratio, elasticity)
-    if load > 0.0:
-        steepness /= load
+    steepness = bound_steepness(half_length, line_load)
     _fill(
         half_length,
         line_load,

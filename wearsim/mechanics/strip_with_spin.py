@@ -158,7 +158,9 @@ def strip_of(
             along, across = -x / shift, -(y / shift + twist)
     else:
         shift = a
-        along, across = _direction_at_edge(slip_x, slip_y, twist, 2.0 * rise * a, moduli)
+        # the slip that the shift follows from, with which the strip slides throughout by itself
+        driven = motion.drive[j] / moduli.longitudinal
+        along, across = _direction_at_edge(driven, slip_y, twist, 2.0 * rise * a, moduli)
     return Strip(
         a,
         rise,

@@ -12,6 +12,9 @@ from wearsim.mechanics.kalker import Flexibilities, one_flexibility
 from wearsim.models.tangential import LocalSlip, Strips, load_weighted_mean
 from wearsim.types import FloatArray
 
+# covered less than this, a strip's load is all round-off and the square of its half-length zero
+_SLIVER = 1e-12
+
 
 @dataclass(frozen=True)
 class EllipseStrips(Strips):
@@ -38,12 +41,13 @@ class EllipseStrips(Strips):
         """Return strips that carry their loads over their whole width.
 
         Where the patch covers a part of a strip the half-length falls as its root, which is what
-        the strip's load presses together.
+        the strip's load presses together. A strip that the patch hardly reaches carries nothing.
         """
+        reached = (self.coverage > _SLIVER) & (self.half_length > 0.0) & (self.line_load > 0.0)
         return Strips(
             y=self.y,
-            half_length=self.half_length * np.sqrt(self.coverage),
-            line_load=self.line_load,
+            half_length=np.where(reached, self.half_length * np.sqrt(self.coverage), 0.0),
+            line_load=np.where(reached, self.line_load, 0.0),
             spacing=self.spacing,
             longitudinal_curvature=self.longitudinal_curvature,
             approach=self.approach,

@@ -20,7 +20,7 @@ from wearsim.models.tangential import (
     TangentialTheory,
     complete,
     friction_per_strip,
-    local_slip,
+    inside,
     power_not_finite,
 )
 from wearsim.models.tangential_options import TangentialOptions, tangential_theory
@@ -134,11 +134,9 @@ class HertzModel(ContactModel):
     ) -> ContactFields:
         """Return tractions and slip inside a solved contact."""
         strips = self._theory_strips(gap, longitudinal_curvature, point)
-        slip = local_slip(strips, point, solution.longitudinal_creepage)
         friction = self._friction(strips, point)
-        return self.theory.fields(
-            strips, self._pair, slip, friction, point.rolling_speed, points_along
-        )
+        creepage = solution.longitudinal_creepage
+        return inside(self.theory, strips, self._pair, point, creepage, points_along, friction)
 
     def _friction(self, strips: Strips, point: OperatingPoint) -> FloatArray:
         """Return friction as the fields of the theory take it."""

@@ -10,21 +10,20 @@ from pydantic import Field
 from wearsim.errors import ContactError
 from wearsim.mechanics import semi_hertzian as kernels
 from wearsim.mechanics.elasticity import ElasticPair, combine
-from wearsim.mechanics.hertz import hertz
 from wearsim.mechanics.influence import HIGHEST, influence_table
+from wearsim.mechanics.jit import own_array
 from wearsim.mechanics.semi_hertzian_kik import (
     CONVERGED,
     NO_CONVERGENCE,
     NOT_FINITE,
     TOO_FINE,
 )
-from wearsim.models.strip_edges import check_edges
+from wearsim.models.strip_grid import check_edges, grid_about_hertz
 from wearsim.models.tangential import (
     Strips,
     TangentialTheory,
     complete,
-    friction_per_strip,
-    local_slip,
+    inside,
 )
 from wearsim.models.tangential_options import TangentialOptions, tangential_theory
 from wearsim.plugins import Capabilities, ContactModel, ContactModelSpec
@@ -107,9 +106,7 @@ class SemiHertzian(ContactModel):
         materials: tuple[Material, Material],
     ) -> Grid | None:
         """Return 121 strips over 1.2 times the width of the Hertzian patch."""
-        modulus = combine(*materials).contact_modulus
-        patch = hertz(0.5 * longitudinal_curvature, 0.5 * gap_curvature, normal_force, modulus)
-        return Grid.spanning(-1.2 * patch.b, 1.2 * patch.b, 121)
+        return grid_about_hertz(gap_curvature, longitudinal_curvature, normal_force, materials)
 
     def solve(
         self,
@@ -121,10 +118,10 @@ class SemiHertzian(ContactModel):
     ) -> ContactSolution:
         """Solve one contact; `warm` is not used."""
         line_load, half_length = np.zeros(len(gap)), np.zeros(len(gap))
-        compliance = np.zeros(len(gap)) if wear_compliance is None else _own(wear_compliance)
+        compliance = np.zeros(len(gap)) if wear_compliance is None else own_array(wear_compliance)
         status, iterations, approach = kernels.solve_semi_hertzian(
             self._variant,
-            _own(gap),
+            own_array(gap),
             compliance,
             float(point.normal_force),
             self._grid.spacing,
@@ -177,20 +174,8 @@ class SemiHertzian(ContactModel):
             peak_pressure=solution.peak_pressure,
             iterations=solution.iterations,
         )
-        slip = local_slip(strips, point, solution.longitudinal_creepage)
-        return self.theory.fields(
-            strips,
-            self._pair,
-            slip,
-            friction_per_strip(strips, point),
-            point.rolling_speed,
-            points_along,
-        )
-
-
-def _own(array: FloatArray) -> FloatArray:
-    """Return an array that a kernel takes, since it is compiled for contiguous ones alone."""
-    return np.array(array, dtype=np.float64, order="C")
+        creepage = solution.longitudinal_creepage
+        return inside(self.theory, strips, self._pair, point, creepage, points_along)
 
 
 def _build(options: SemiHertzianOptions) -> SemiHertzian:

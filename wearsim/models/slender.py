@@ -12,18 +12,17 @@ from pydantic import Field
 from wearsim.errors import ContactError
 from wearsim.mechanics import slender as kernels
 from wearsim.mechanics.elasticity import ElasticPair, combine
-from wearsim.mechanics.hertz import hertz
 from wearsim.mechanics.influence import HIGHEST, curvature_table, influence_table, no_table
+from wearsim.mechanics.jit import own_array
 from wearsim.mechanics.strip import SUMS, strip_contacts
 from wearsim.mechanics.strip_coupling import strip_elasticity
-from wearsim.models.strip_edges import check_edges
+from wearsim.models.strip_grid import check_edges, grid_about_hertz
 from wearsim.models.strip_theory import StripTheory
 from wearsim.models.tangential import (
     Strips,
     TangentialTheory,
     complete,
-    friction_per_strip,
-    local_slip,
+    inside,
     power_not_finite,
 )
 from wearsim.models.tangential_options import TangentialOptions, tangential_theory
@@ -103,9 +102,7 @@ class Slender(ContactModel):
         materials: tuple[Material, Material],
     ) -> Grid | None:
         """Return 121 strips over 1.2 times the width of the Hertzian patch."""
-        modulus = combine(*materials).contact_modulus
-        patch = hertz(0.5 * longitudinal_curvature, 0.5 * gap_curvature, normal_force, modulus)
-        return Grid.spanning(-1.2 * patch.b, 1.2 * patch.b, 121)
+        return grid_about_hertz(gap_curvature, longitudinal_curvature, normal_force, materials)
 
     def solve(
         self,
@@ -141,11 +138,11 @@ class Slender(ContactModel):
             approach[:] = [solution.approach for solution in warm]
         columns = self._columns(points)
         if columns is not None:
-            loads = _own(columns.normal_force)
+            loads = own_array(columns.normal_force)
         else:
             loads = np.array([point.normal_force for point in points])
         iterations = self._solve_normal(
-            _own(gap),
+            own_array(gap),
             wear.reduced,
             loads,
             longitudinal_curvature,
@@ -224,16 +221,16 @@ class Slender(ContactModel):
         if columns is None:
             return super().solve_batch(gap, longitudinal_curvature, points, wear_compliance, warm)
         shape, strips = gap.shape[:-1], gap.shape[-1]
-        gaps = _own(gap).reshape(-1, strips)
+        gaps = own_array(gap).reshape(-1, strips)
         compliance = np.zeros_like(gaps)
         if wear_compliance is not None:
-            compliance = _own(wear_compliance).reshape(gaps.shape)
+            compliance = own_array(wear_compliance).reshape(gaps.shape)
         line_load, half_length = np.zeros(gaps.shape), np.zeros(gaps.shape)
         approach = np.zeros(len(gaps))
         if warm is not None:
             line_load[:] = [solution.line_load for solution in warm]
             approach[:] = [solution.approach for solution in warm]
-        iterations, loads = np.zeros(len(gaps), dtype=np.int64), _own(columns.normal_force)
+        iterations, loads = np.zeros(len(gaps), dtype=np.int64), own_array(columns.normal_force)
         alone, nothing = np.full((1, 2), NO_BODY), np.zeros((1, 2, strips))
         for k in range(len(gaps)):
             one = slice(k, k + 1)
@@ -282,11 +279,11 @@ class Slender(ContactModel):
             self._grid.spacing,
             strip_elasticity(self._pair.contact_modulus, self._pair.shear_modulus),
             points.rolling_speed,
-            _own(points.longitudinal),
-            _own(points.lateral),
-            _own(points.spin),
-            _own(variation),
-            _own(np.broadcast_to(friction, shape)),
+            own_array(points.longitudinal),
+            own_array(points.lateral),
+            own_array(points.spin),
+            own_array(variation),
+            own_array(np.broadcast_to(friction, shape)),
             dissipation,
             sums,
         )
@@ -345,9 +342,12 @@ class Slender(ContactModel):
         """Run roller passes in compiled code; strip theory only."""
         if not self.capabilities.pass_loop:
             return super().pass_loop(loop)
-        from wearsim.mechanics import slender_pass  # noqa: PLC0415  (slow to load, rarely needed)
+        from wearsim.mechanics import (  # noqa: PLC0415  (slow to load, rarely needed)
+            slender_follower,
+            slender_pass,
+        )
 
-        medium = slender_pass.medium(
+        medium = slender_follower.medium(
             self._grid.spacing,
             self._pair.contact_modulus,
             self._pair.shear_modulus,
@@ -375,10 +375,10 @@ class Slender(ContactModel):
                 loop.cylinder_depth,
                 loop.roller_depth,
             ),
-            slender_pass.Loads(
+            slender_follower.Loads(
                 loop.line_load, loop.anchor, loop.anchor_gap, loop.approach, loop.anchor_approach
             ),
-            slender_pass.empty_follower(medium, *loop.nominal_gap.shape),
+            slender_follower.empty_follower(medium, *loop.nominal_gap.shape),
             loop.energy,
         )
         gap = loop.nominal_gap + loop.cylinder_depth + loop.roller_depth
@@ -407,16 +407,8 @@ class Slender(ContactModel):
             solution.iterations,
             longitudinal_curvature,
         )
-        slip = local_slip(strips, point, solution.longitudinal_creepage)
-        friction = friction_per_strip(strips, point)
-        return self.theory.fields(
-            strips, self._pair, slip, friction, point.rolling_speed, points_along
-        )
-
-
-def _own(array: FloatArray) -> FloatArray:
-    """Return a copy that can be written to, since a kernel is compiled for such arrays alone."""
-    return np.array(array, dtype=np.float64, order="C")
+        creepage = solution.longitudinal_creepage
+        return inside(self.theory, strips, self._pair, point, creepage, points_along)
 
 
 def _build(options: SlenderOptions) -> Slender:
@@ -428,7 +420,7 @@ SPEC = ContactModelSpec(
     factory=_build,
     options=SlenderOptions,
     capabilities=Slender.capabilities,
-    summary="line-contact strips on any profile, closed-form strip theory; the default for replays",
+    summary="line-contact strips on any profile; the default",
     references=(
         "Kalker, On elastic line contact, J. Appl. Mech. 39 (1972), DOI 10.1115/1.3422842",
         "Carter, Proc. R. Soc. A 112 (1926), DOI 10.1098/rspa.1926.0100",

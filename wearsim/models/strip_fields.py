@@ -6,7 +6,7 @@ import numpy as np
 
 from wearsim.mechanics.carter import mean_direction, strip_state
 from wearsim.mechanics.elasticity import ElasticPair
-from wearsim.mechanics.strip import StripTractions
+from wearsim.mechanics.strip import StripTractions, bound_steepness
 from wearsim.mechanics.strip_coupling import effective_moduli, equivalent_ratio, strip_elasticity
 from wearsim.models.tangential import LocalSlip, Strips
 from wearsim.types import BoolArray, ContactFields, FloatArray
@@ -48,8 +48,7 @@ def strip_fields(
     ratio = equivalent_ratio(strips.half_length, strips.line_load, strips.spacing)
     moduli = effective_moduli(ratio, elasticity)
     loaded = np.flatnonzero(strips.line_load > 0.0)
-    squared = (strips.line_load[loaded] / strips.half_length[loaded]) ** 2
-    steepness = 4.0 / np.pi * squared.sum() / strips.line_load[loaded].sum()
+    steepness = bound_steepness(strips.half_length, strips.line_load)
     for i in loaded:
         a, q = float(strips.half_length[i]), float(strips.line_load[i])
         peak = 2.0 * q / (np.pi * a)

@@ -186,6 +186,52 @@ def _balanced_creepage(
     return float(brentq(excess, -reach, reach, xtol=1e-16, rtol=1e-14))
 
 
+def inside(
+    theory: TangentialTheory,
+    strips: Strips,
+    pair: ElasticPair,
+    point: OperatingPoint,
+    longitudinal: float,
+    points_along: int,
+    friction: FloatArray | None = None,
+) -> ContactFields:
+    """Return pressure, traction and slip inside a contact whose mean creepage is `longitudinal`.
+
+    `friction` is in the theory's own form; without it that of every strip is taken.
+    """
+    return theory.fields(
+        strips,
+        pair,
+        local_slip(strips, point, longitudinal),
+        friction_per_strip(strips, point) if friction is None else friction,
+        point.rolling_speed,
+        points_along,
+    )
+
+
+def spread_work(work: FloatArray) -> FloatArray:
+    """Return the dissipation of strips that do some work, negative nowhere and the same in all.
+
+    Parameters
+    ----------
+    work : ndarray, shape (strips,)
+        Work of every strip's traction on the rigid slip. Where a theory's flexibilities are not
+        those of one surface, what elasticity stores need not come back to the same strip, and the
+        work of one that hardly slips may be negative.
+
+    Returns
+    -------
+    ndarray, shape (strips,)
+        The work, where it is negative nowhere. Else such strips get nothing, and the others give
+        alike what makes the sum that of the work; nothing if that is negative.
+    """
+    if not (work < 0.0).any():
+        return work
+    positive = np.maximum(work, 0.0)
+    total = max(float(work.sum()), 0.0)
+    return positive * (total / positive.sum()) if total > 0.0 else 0.0 * positive
+
+
 def power_not_finite(point: OperatingPoint, **state: FloatArray) -> ContactError:
     """Return the error of a contact whose tractions make no sense, with the state it was in."""
     return ContactError(
