@@ -1,6 +1,6 @@
 # make demo    replay the 450-minute wear test: a summary, results and a figure in out/
 # make test    everything that must hold: style, types, layers, tests
-# make bench   measure speed beside error; writes out/benchmarks.md
+# make bench   measure speed beside error, and every model; writes out/benchmarks.md, out/models.md
 # make clean   remove what these made, the environment included
 
 PYTHON ?= python3
@@ -27,6 +27,7 @@ lint: $(VENV)/.installed-dev
 bench: $(VENV)/.installed-dev
 	mkdir -p out
 	$(BIN)/python -m tests.benchmarks.report -o out/benchmarks.md
+	$(BIN)/python -m tests.benchmarks.models -o out/models.md
 
 # the two stamps tell what the environment holds; a change of pyproject.toml renews it
 $(VENV)/bin/python:
