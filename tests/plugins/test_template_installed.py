@@ -72,7 +72,7 @@ def test_that_the_environment_beside_it_knows_nothing_of_it(folder: Path) -> Non
 
 def test_that_a_scenario_with_it_is_checked(folder: Path) -> None:
     told = wearsim(folder, "check", SCENARIO, "--set", "contact.model=sponge")
-    assert "sponge (elastic foundation that slides everywhere)" in " ".join(told.split())
+    assert "sponge: elastic foundation that slides everywhere" in " ".join(told.split())
 
 
 def test_that_the_450_minute_test_runs_to_its_end_and_its_file_names_it(folder: Path) -> None:
