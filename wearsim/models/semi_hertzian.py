@@ -20,10 +20,10 @@ from wearsim.mechanics.semi_hertzian_kik import (
 )
 from wearsim.models.strip_grid import check_edges, grid_about_hertz
 from wearsim.models.tangential import (
-    Strips,
     TangentialTheory,
     complete,
     inside,
+    semi_elliptic_strips,
 )
 from wearsim.models.tangential_options import TangentialOptions, tangential_theory
 from wearsim.plugins import Capabilities, ContactModel, ContactModelSpec
@@ -141,17 +141,8 @@ class SemiHertzian(ContactModel):
         if status != CONVERGED:
             raise ContactError(f"the semi-Hertzian contact failed: {_REMEDY[status]}", state)
         check_edges(self._grid, line_load, state)
-        loaded = half_length > 0.0
-        peak = 2.0 * line_load[loaded] / (np.pi * half_length[loaded])
-        strips = Strips(
-            y=self._grid.y,
-            half_length=half_length,
-            line_load=line_load,
-            spacing=self._grid.spacing,
-            longitudinal_curvature=longitudinal_curvature,
-            approach=approach,
-            peak_pressure=float(peak.max()),
-            iterations=iterations,
+        strips = semi_elliptic_strips(
+            self._grid, line_load, half_length, longitudinal_curvature, approach, iterations
         )
         return complete(self.theory, strips, self._pair, point)
 
@@ -164,15 +155,13 @@ class SemiHertzian(ContactModel):
         points_along: int = 101,
     ) -> ContactFields:
         """Return tractions and slip inside a solved contact."""
-        strips = Strips(
-            y=solution.y,
-            half_length=solution.half_length,
-            line_load=solution.line_load,
-            spacing=self._grid.spacing,
-            longitudinal_curvature=longitudinal_curvature,
-            approach=solution.approach,
-            peak_pressure=solution.peak_pressure,
-            iterations=solution.iterations,
+        strips = semi_elliptic_strips(
+            self._grid,
+            solution.line_load,
+            solution.half_length,
+            longitudinal_curvature,
+            solution.approach,
+            solution.iterations,
         )
         creepage = solution.longitudinal_creepage
         return inside(self.theory, strips, self._pair, point, creepage, points_along)

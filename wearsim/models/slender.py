@@ -19,11 +19,11 @@ from wearsim.mechanics.strip_coupling import strip_elasticity
 from wearsim.models.strip_grid import check_edges, grid_about_hertz
 from wearsim.models.strip_theory import StripTheory
 from wearsim.models.tangential import (
-    Strips,
     TangentialTheory,
     complete,
     inside,
     power_not_finite,
+    semi_elliptic_strips,
 )
 from wearsim.models.tangential_options import TangentialOptions, tangential_theory
 from wearsim.plugins import (
@@ -158,8 +158,13 @@ class Slender(ContactModel):
         return [
             complete(
                 self.theory,
-                self._strips(
-                    line_load[k], half_length[k], approach[k], iterations, longitudinal_curvature
+                semi_elliptic_strips(
+                    self._grid,
+                    line_load[k],
+                    half_length[k],
+                    longitudinal_curvature,
+                    approach[k],
+                    iterations,
                 ),
                 self._pair,
                 point,
@@ -317,27 +322,6 @@ class Slender(ContactModel):
             raise ContactError(f"the slender contact failed: {_REMEDY[status]}", state)
         check_edges(self._grid, line_load, state)
 
-    def _strips(
-        self,
-        line_load: FloatArray,
-        half_length: FloatArray,
-        approach: float,
-        iterations: int,
-        curvature: float,
-    ) -> Strips:
-        inside = line_load > 0.0
-        peak_pressure = 2.0 * (line_load[inside] / (np.pi * half_length[inside])).max()
-        return Strips(
-            y=self._grid.y,
-            half_length=half_length,
-            line_load=line_load,
-            spacing=self._grid.spacing,
-            longitudinal_curvature=curvature,
-            approach=float(approach),
-            peak_pressure=float(peak_pressure),
-            iterations=iterations,
-        )
-
     def pass_loop(self, loop: PassLoop) -> int:
         """Run roller passes in compiled code; strip theory only."""
         if not self.capabilities.pass_loop:
@@ -400,12 +384,13 @@ class Slender(ContactModel):
         points_along: int = 101,
     ) -> ContactFields:
         """Return tractions and slip inside a solved contact."""
-        strips = self._strips(
+        strips = semi_elliptic_strips(
+            self._grid,
             solution.line_load,
             solution.half_length,
+            longitudinal_curvature,
             solution.approach,
             solution.iterations,
-            longitudinal_curvature,
         )
         creepage = solution.longitudinal_creepage
         return inside(self.theory, strips, self._pair, point, creepage, points_along)

@@ -11,7 +11,7 @@ import numpy as np
 
 from wearsim.errors import CapabilityError, ContactError
 from wearsim.mechanics.elasticity import ElasticPair
-from wearsim.types import ContactFields, ContactSolution, FloatArray, OperatingPoint
+from wearsim.types import ContactFields, ContactSolution, FloatArray, Grid, OperatingPoint
 
 
 @dataclass(frozen=True)
@@ -40,6 +40,41 @@ class Strips:
     approach: float
     peak_pressure: float
     iterations: int
+
+
+def semi_elliptic_strips(
+    grid: Grid,
+    line_load: FloatArray,
+    half_length: FloatArray,
+    longitudinal_curvature: float,
+    approach: float,
+    iterations: int,
+) -> Strips:
+    """Return a solved contact whose pressure is semi-elliptic along rolling in every strip.
+
+    Parameters
+    ----------
+    grid : Grid
+        The strips.
+    line_load, half_length : ndarray, shape (strips,)
+        q [N/m] and a [m], of which some are loaded.
+    longitudinal_curvature, approach : float
+        Relative curvature along rolling [1/m], approach [m].
+    iterations : int
+        Iterations of the normal problem.
+    """
+    loaded = line_load > 0.0
+    peak = 2.0 * (line_load[loaded] / (np.pi * half_length[loaded])).max()
+    return Strips(
+        y=grid.y,
+        half_length=half_length,
+        line_load=line_load,
+        spacing=grid.spacing,
+        longitudinal_curvature=longitudinal_curvature,
+        approach=float(approach),
+        peak_pressure=float(peak),
+        iterations=iterations,
+    )
 
 
 @dataclass(frozen=True)
