@@ -264,8 +264,8 @@ class _Replay:
                     part = scatter / relative
                     remedy = f"{part:.0%} of it is what draws at so few passes leave to chance"
             self._warn(
-                f"estimated error of {name}: {relative:.2%} is more than the tolerance of"
-                f" {tolerance:.2%}; {remedy}"
+                f"estimated error of {name}: {100.0 * relative:.2g} % is more than the tolerance"
+                f" of {100.0 * tolerance:.2g} %; {remedy}"
             )
 
     def _step_through(self) -> None:
