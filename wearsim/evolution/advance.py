@@ -15,8 +15,8 @@ from wearsim.evolution.wearing import Contacts, Wearing, exponents_between
 from wearsim.plugins import SharedWear
 from wearsim.types import ContactSolution, FloatArray, OperatingPoint
 
-FIXED_POINT_TOLERANCE = 1e-8
 MAX_FIXED_POINT = 60
+PATIENCE = 20  # iterations after which ten times as much is allowed: strips at an edge come and go
 SAME_LOAD = 1e-9  # relative change of a load that asks for no new solution
 
 
@@ -121,7 +121,7 @@ def implicit_step(scene: Scene, state: WearState, passes: float) -> WearState:
         change = max(_differs(new.opening, foreseen), _differs(new_loads, loads))
         if scene.slip_profile is not None:
             change = max(change, _differs(new.cylinder, wearing.cylinder))
-        if change < FIXED_POINT_TOLERANCE:
+        if change < scene.settled * 10.0 ** ((iteration - 1) // PATIENCE):
             power = contact_values(scene, found, "power")
             begun = replace(state, contacts=found, solves=state.solves + iteration * len(found))
             return worn_state(scene, begun, passes, (new.cylinder, new.roller), power)

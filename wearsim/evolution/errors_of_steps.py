@@ -18,6 +18,7 @@ from wearsim.types import FloatArray
 
 DEPTH_EXPONENT, VOLUME_EXPONENT = 0.5, 0.75  # below those of any groove: 2/3 to 1, and about 1
 Step: TypeAlias = Callable[[Scene, WearState, float], WearState]
+Depths: TypeAlias = tuple[FloatArray, FloatArray]
 COVER = 1.5  # an estimate of first order is about the error itself; half as much for safety
 DEEP = 0.5  # depths are compared where the groove is deeper than this part of its depth
 DEPTHS = ("cylinder_depth", "roller_depth")
@@ -60,8 +61,8 @@ def depth_between(
     return greatest
 
 
-def variation_error(scene: Scene, end: WearState, first: float, passes: float) -> FloatArray:
-    """Return the error that the variation of load and processes within a step can make.
+def variation_bias(scene: Scene, end: WearState, first: float, passes: float) -> Depths | None:
+    """Return what a step leaves out where load and processes vary within it.
 
     The step takes their exact means, but wear is no linear function of them. Half the second
     difference of the wear at the mean and a standard deviation to either side, on the profile of
@@ -77,17 +78,17 @@ def variation_error(scene: Scene, end: WearState, first: float, passes: float) -
 
     Returns
     -------
-    ndarray, shape (2, realisations)
-        In depth [m], and in the volume worn off both bodies [m^3].
+    cylinder, roller : ndarray
+        Depth to add, shapes as in `WearState` [m]; None where nothing varies.
     """
     start, stop = scene.time(first), scene.time(first + passes)
-    spread = np.zeros((2, scene.shape[2]))
     here = scene.at_time(start, stop)
     loads = contact_values(scene, end.contacts, "line_load").sum(axis=-1) * scene.grid.spacing
     everyone = tuple(range(scene.rollers))
     deviations = [("normal_force", everyone, scene.load.deviation(start, stop))]
     deviations += [(v.name, v.rollers, v.path.deviation(start, stop)) for v in scene.varying]
     mean: Wearing | None = None
+    bias: Depths | None = None
     for name, rollers, deviation in deviations:
         values = loads if name == "normal_force" else getattr(here.inputs, name)
         if deviation <= 1e-9 * float(np.abs(values).max()):
@@ -99,8 +100,58 @@ def variation_error(scene: Scene, end: WearState, first: float, passes: float) -
         less, more = (
             _worn_at(here, end, loads, {name: sign * shift}, passes) for sign in (-1.0, 1.0)
         )
-        spread += _bias(scene, end, mean, (less, more))
-    return COVER * spread
+        own = (
+            0.5 * (less.cylinder - 2.0 * mean.cylinder + more.cylinder),
+            0.5 * (less.roller - 2.0 * mean.roller + more.roller),
+        )
+        bias = own if bias is None else (bias[0] + own[0], bias[1] + own[1])
+    return bias
+
+
+def variation_error(scene: Scene, end: WearState, first: float, passes: float) -> FloatArray:
+    """Return the size of `variation_bias`, whose parameters these are, with a factor for safety.
+
+    Returns
+    -------
+    ndarray, shape (2, realisations)
+        In depth [m], and in the volume worn off both bodies [m^3].
+    """
+    bias = variation_bias(scene, end, first, passes)
+    if bias is None:
+        return np.zeros((2, scene.shape[2]))
+    biased = _worn_further(end, bias)
+    volumes = np.abs(whole_volume(scene, biased) - whole_volume(scene, end))
+    return COVER * np.array([depth_between(end, biased), volumes])
+
+
+def biased_twin(end: WearState, twin: WearState, bias: Depths | None) -> WearState:
+    """Return the twin of a test with the bias that the variation within a step makes.
+
+    It is worn into the twin's profile, where the wear to come forgets it as it would in the test.
+    Its sign is the one that takes the two further apart, so that it hides no other error.
+
+    Parameters
+    ----------
+    end, twin : WearState
+        The test and its twin after the step.
+    bias : tuple of ndarray, optional
+        As `variation_bias` returns it.
+    """
+    if bias is None:
+        return twin
+    apart = [getattr(twin, name) - getattr(end, name) for name in DEPTHS]
+    along = sum((a * b).sum(axis=(0, 1, 3)) for a, b in zip(apart, bias, strict=True))
+    sign = np.where(along < 0.0, -1.0, 1.0)[:, None]
+    return _worn_further(twin, (sign * bias[0], sign * bias[1]))
+
+
+def _worn_further(state: WearState, depths: Depths) -> WearState:
+    """Return `state` with depths added to those of cylinder and rollers."""
+    return replace(
+        state,
+        cylinder_depth=state.cylinder_depth + depths[0],
+        roller_depth=state.roller_depth + depths[1],
+    )
 
 
 def _worn_at(
@@ -115,25 +166,6 @@ def _worn_at(
     shifted = replace(scene, inputs=scene.inputs.with_values(values))
     contacts = solve_present(shifted, end, loads + shifts.get("normal_force", 0.0))
     return Wearing(shifted, contacts, passes)
-
-
-def _bias(scene: Scene, end: WearState, mean: Wearing, pair: tuple[Wearing, Wearing]) -> FloatArray:
-    """Return half the second difference of depth and volume, shape (2, realisations)."""
-    less, more = pair
-    changes = (
-        0.5 * (less.cylinder - 2.0 * mean.cylinder + more.cylinder),
-        0.5 * (less.roller - 2.0 * mean.roller + more.roller),
-    )
-    size = np.zeros((2, scene.shape[2]))
-    depths = end.cylinder_depth, end.roller_depth
-    radii = scene.kinematics.cylinder_radius, scene.kinematics.roller_radius
-    weights = np.ones(1), scene.kinematics.multiplicity
-    for change, depth, radius, weight in zip(changes, depths, radii, weights, strict=True):
-        deep = depth >= DEEP * depth.max(axis=(0, 1, 3), keepdims=True)
-        size[0] = np.maximum(size[0], np.where(deep, np.abs(change), 0.0).max(axis=(0, 1, 3)))
-        volume = worn_volume(change, scene.grid.spacing, radius)
-        size[1] += np.abs((volume * weight[None, :, None]).sum(axis=1).mean(axis=0))
-    return size
 
 
 def coarse_start(scene: Scene, state: WearState) -> WearState:

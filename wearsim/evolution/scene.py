@@ -120,6 +120,8 @@ class Scene:
         Draws the inputs of single passes, see `Redraw`.
     expectation : Scene, optional
         The same scene with contacts that stand for passes drawn one by one, to record by.
+    settled : float
+        Relative change of wear and loads below which the iterations of an implicit step end.
     """
 
     grid: Grid
@@ -140,6 +142,7 @@ class Scene:
     varying: tuple[Varying, ...] = ()
     redraw: Redraw | None = None
     expectation: Scene | None = None
+    settled: float = 1e-8
 
     @cached_property
     def shape(self) -> tuple[int, int, int]:

@@ -40,8 +40,6 @@ class WearState:
         Dissipated energy of all rollers [J].
     depth_error, volume_error : ndarray, shape (realisations,)
         Estimated error of depth, on either body [m], and of the volume worn off both [m^3] so far.
-    spread : ndarray, shape (2, realisations)
-        Part of those errors that the variation of load and processes within the steps has made.
     quadrature : ndarray, shape (2, realisations)
         Part of those errors that the quadrature over inputs drawn at every pass has made.
     scatter : ndarray, shape (2, realisations)
@@ -71,7 +69,6 @@ class WearState:
     energy: FloatArray
     depth_error: FloatArray
     volume_error: FloatArray
-    spread: FloatArray
     quadrature: FloatArray
     scatter: FloatArray
     step: float = 0.0
@@ -117,10 +114,11 @@ class WearState:
             if part:
                 values[twin] = cls.from_arrays(part)
             arrays = {name: a for name, a in arrays.items() if not name.startswith(start)}
+        known = {item.name for item in fields(cls)}  # of older files some are no longer kept
         for name, array in arrays.items():
             if name in _SCALARS:
                 values[name] = array.item()
-            elif not name.startswith(_CONTACT):
+            elif name in known:
                 values[name] = np.array(array)
         contact = {
             name[len(_CONTACT) :]: array
@@ -128,7 +126,7 @@ class WearState:
             if name.startswith(_CONTACT)
         }
         for name in ("quadrature", "scatter"):  # files of version 0.1.0 have none
-            values.setdefault(name, np.zeros_like(arrays["spread"], dtype=np.float64))
+            values.setdefault(name, np.zeros((2, len(arrays["depth_error"]))))
         count = len(contact["power"])
         values["contacts"] = tuple(
             ContactSolution(**_unpack({name: column[k] for name, column in contact.items()}))
@@ -216,7 +214,6 @@ def fresh_state(scene: Scene) -> WearState:
         energy=np.zeros(realisations),
         depth_error=np.zeros(realisations),
         volume_error=np.zeros(realisations),
-        spread=np.zeros((2, realisations)),
         quadrature=np.zeros((2, realisations)),
         scatter=np.zeros((2, realisations)),
         solves=len(contacts),

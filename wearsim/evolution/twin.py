@@ -13,9 +13,10 @@ from wearsim.evolution.errors_of_steps import (
     COVER,
     DEPTHS,
     Step,
+    biased_twin,
     depth_between,
     excess,
-    variation_error,
+    variation_bias,
     whole_volume,
     with_pass_errors,
 )
@@ -74,7 +75,8 @@ class TwinStepper(Stepper):
                 end = scheme(scene, half, 0.5 * step)
                 whole = scheme(scene, twin, step)
                 end = with_pass_errors(scene, state, end, whole, scheme, step)
-                varied = variation_error(scene, end, state.passes, step)
+                bias = variation_bias(scene, end, state.passes, step)
+                whole = biased_twin(end, whole, bias)
             except (StepError, ContactError) as failure:
                 if self.forced_step:
                     raise
@@ -84,14 +86,13 @@ class TwinStepper(Stepper):
             end = replace(
                 end,
                 passes=stop if step == left else end.passes,
-                spread=state.spread + varied,
                 steps=state.steps + 1,
                 rejected=rejected,
                 solves=end.solves + whole.solves - twin.solves,
             )
             end = _with_errors(state, end, whole, moved[1])
             reached = np.array([end.depth_error, end.volume_error]) - end.irreducible
-            over = excess(self.control, scene, state, end, moved + varied, stop, reached)
+            over = excess(self.control, scene, state, end, moved, stop, reached)
             chosen = self.control.next_step(step, over, self.order)
             if self.forced_step or over <= 1.0:
                 # a step cut short by the stop says little about how long the next may be
@@ -125,7 +126,7 @@ def _with_errors(
     start: WearState, end: WearState, whole: WearState, volume_apart: FloatArray
 ) -> WearState:
     """Return `end` with the errors that its twin `whole` and all else tell, and with that twin."""
-    others = [state.spread + state.irreducible for state in (start, end)]
+    others = [state.irreducible for state in (start, end)]
     twins = {
         name: replace(twin, passes=end.passes, shadow=None, coarse=None)
         for name, twin in (("shadow", whole), ("coarse", end.coarse))

@@ -21,6 +21,8 @@ from wearsim.quantities import (
 from wearsim.scenario.hosts import Joint
 from wearsim.scenario.validation import Report, Table
 
+DEFAULT_TOLERANCE = 1e-3
+
 
 class TopTable(Table):
     """The keys that stand above the tables."""
@@ -91,7 +93,10 @@ class EvolutionTable(Table):
         " compliance, else stabilised.",
     )
     tolerance: float = Field(
-        default=1e-3, gt=0.0, le=0.1, description="Relative error of the final depth and volume."
+        default=DEFAULT_TOLERANCE,
+        gt=0.0,
+        le=0.1,
+        description="Relative error of the final depth and volume.",
     )
     step: int | None = Field(default=None, gt=0, description="Force every step to so many passes.")
     allow_unstable: bool = Field(

@@ -21,6 +21,9 @@ from wearsim.studies.stepping import build_stepper, check_model, chosen_stepper
 from wearsim.studies.tracks import Drawn, run_grid
 from wearsim.types import FloatArray, Grid, Profile
 
+SETTLED = 1e-3  # of the tolerance: what the iterations of one step may leave
+SETTLED_RANGE = 1e-8, 1e-5
+
 
 def merged_rollers(draws: Draws) -> tuple[list[int], FloatArray]:
     """Return the first of each kind of roller, and how many are alike."""
@@ -275,4 +278,5 @@ def bare_scene(
         tilt_shifts=creepage.tilt_shifts_contact,
         free=creepage.drive == "free",
         slip_profile=slip_profile(scenario, s, height) if creepage.differential_slip else None,
+        settled=float(np.clip(SETTLED * scenario.evolution.tolerance, *SETTLED_RANGE)),
     )

@@ -11,9 +11,11 @@ from wearsim.mechanics.elasticity import combine
 from wearsim.mechanics.hertz import HertzContact, hertz
 from wearsim.plugins import WearLaw
 from wearsim.scenario import Scenario
+from wearsim.scenario.sections import DEFAULT_TOLERANCE
 from wearsim.types import ContactSolution, FloatArray, Grid, Profile
 
-STRIPS_PER_HALF_WIDTH = 12  # of the fresh patch; a run's error in y is then about 1e-3
+STRIPS_PER_HALF_WIDTH = 12  # of the fresh patch; a run's error in y is then below 1e-3
+FEWEST_PER_HALF_WIDTH = 5  # it is below 1e-2 then, and grows as the square of their width
 MOST_STRIPS = 801
 PROFILE_STRIPS_PER_HALF_WIDTH = 24  # where one contact is solved on a profile's whole width
 FEWEST_PROFILE_STRIPS = 161
@@ -143,6 +145,12 @@ def wear_per_load(
     return float((depth / line_load).max())
 
 
+def strips_per_half_width(tolerance: float) -> float:
+    """Return into how many strips half the fresh patch is cut for a relative error of the test."""
+    needed = STRIPS_PER_HALF_WIDTH * np.sqrt(DEFAULT_TOLERANCE / tolerance)
+    return float(np.clip(needed, FEWEST_PER_HALF_WIDTH, STRIPS_PER_HALF_WIDTH))
+
+
 def greatest_slip(scenario: Scenario, half_width: float, drawn: Drawn) -> float:
     """Return the greatest rigid slip within `half_width` [m] of a contact's middle."""
     creepage, roller = scenario.creepage, scenario.roller
@@ -181,7 +189,7 @@ def run_grid(scenario: Scenario, load: float, drawn: Drawn = NOTHING_DRAWN) -> G
     width = choice.width if choice.width is not None else 2.0 * half
     strips = choice.strips
     if strips is None:
-        strips = int(np.ceil(width / (patch.b / STRIPS_PER_HALF_WIDTH)))
+        strips = int(np.ceil(width / patch.b * strips_per_half_width(scenario.evolution.tolerance)))
         strips = min(strips + (strips + 1) % 2, MOST_STRIPS)
     if width < 2.0 * (reach + patch.b):
         needed = f"at least {2e3 * (reach + patch.b):.4g} mm"
