@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -52,6 +53,9 @@ class ScenarioError(WearsimError):
         self.problems = problems
         super().__init__("\n".join(f"{file}: {problem}" for problem in problems))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.file, self.problems)
+
 
 class PluginError(WearsimError):
     """A plugin is missing, broken, or shares its name with another."""
@@ -93,6 +97,22 @@ class ContactError(SolverError):
 
 class StepError(SolverError):
     """A step of the evolution did not converge, or would be unstable."""
+
+
+class WorkerError(WearsimError):
+    """Work cannot be spread over workers: they die of it, are not there, or are not alike.
+
+    Parameters
+    ----------
+    message : str
+        What happened, and what to try.
+    realisations : sequence of int
+        Those that the workers died of.
+    """
+
+    def __init__(self, message: str, realisations: Sequence[int] = ()) -> None:
+        self.realisations = tuple(realisations)
+        super().__init__(message)
 
 
 class Interrupted(WearsimError):  # noqa: N818  (it is how a run ends, not what went wrong)

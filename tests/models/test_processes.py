@@ -57,6 +57,20 @@ def test_that_it_has_its_marginal_at_every_time():
     assert stats.kstest(starts, "gumbel_r").pvalue > 1e-4
 
 
+def test_that_a_level_lasts_for_the_whole_path_and_leaves_the_marginal():
+    made = process(correlation_time="1 min", level=0.6)
+    runs, far = 4000, 20 * 20  # twenty correlation times apart
+    ends = scores(np.array([made.path(far + 1, uniforms(k))[[0, far]] for k in range(runs)]))
+    assert stats.kstest(ends[:, 1], "norm").pvalue > 1e-3
+    # what is left of the correlation is the level's
+    found = np.mean(ends[:, 0] * ends[:, 1])
+    assert found == pytest.approx(0.6, abs=4.0 * np.sqrt((1 + 0.6**2) / runs))
+    plain = process(correlation_time="1 min", level=0.0)
+    assert (
+        plain.path(9, uniforms(3)) == process(correlation_time="1 min").path(9, uniforms(3))
+    ).all()
+
+
 @pytest.mark.parametrize("points", [1, 2, 3, 100, 777])
 def test_that_a_longer_path_begins_with_the_shorter_one(points):
     made = process(correlation_time="5 min")

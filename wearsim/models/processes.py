@@ -14,6 +14,7 @@ from wearsim.types import FloatArray
 
 _STEPS = 20  # per correlation time, unless a spacing is given
 _FEWEST = 4
+_LEVEL_AT = 1 << 40  # position of the level's number, beyond any path
 
 
 class OrnsteinUhlenbeckOptions(Options):
@@ -24,6 +25,13 @@ class OrnsteinUhlenbeckOptions(Options):
     )
     spacing: PositiveDuration | None = Field(
         None, description="step of its time grid; a twentieth of the correlation time by default"
+    )
+
+    level: float = Field(
+        0.0,
+        ge=0.0,
+        lt=1.0,
+        description="part of its variance that never changes: a level of the whole test",
     )
 
     @model_validator(mode="after")
@@ -46,19 +54,27 @@ class OrnsteinUhlenbeck(Process):
     mapped to the marginal. The correlation holds for the scores; where the marginal is not
     normal that of the values is a little less. Between the points of the grid the value is linear,
     and its variance over all times (2 + r)/3 of the marginal's: 1.6 % less at a twentieth.
+
+    With a level l the scores are sqrt(l) z_0 + sqrt(1 - l) z_k, z_0 drawn once: the marginal over
+    many tests stays, and each test keeps to a level of its own.
     """
 
     def __init__(self, options: OrnsteinUhlenbeckOptions, marginal: Distribution) -> None:
         self.marginal = marginal
         self.correlation_time = options.correlation_time
         self.spacing = options.spacing or options.correlation_time / _STEPS
+        self.level = options.level
 
     def path(self, points: int, uniforms: Uniforms) -> FloatArray:
         """Return one realisation at the times 0, spacing, 2 spacing, ..., shape (points,)."""
         from scipy.special import ndtr, ndtri  # noqa: PLC0415  (slow to import)
 
         memory = math.exp(-self.spacing / self.correlation_time)
-        return self.marginal.quantile(ndtr(follow(ndtri(uniforms(0, points)), memory)))
+        scores = follow(ndtri(uniforms(0, points)), memory)
+        if self.level > 0.0:
+            lasting = float(ndtri(uniforms(_LEVEL_AT, 1))[0])
+            scores = math.sqrt(self.level) * lasting + math.sqrt(1.0 - self.level) * scores
+        return self.marginal.quantile(ndtr(scores))
 
 
 SPECS = (

@@ -24,6 +24,9 @@ Draw: TypeAlias = Callable[[str, int, int, int], FloatArray]
 
 BELOW_ONE = 1.0 - 2.0**-53
 
+REPLICATES = 8
+"""Independent Sobol sequences of a plan whose estimates need intervals: 7 degrees of freedom."""
+
 
 def monte_carlo(seed: int, name: str, dimension: int, first: int, count: int) -> FloatArray:
     """Return independent uniform numbers.
@@ -95,7 +98,36 @@ def _strata(seed: int, total: int, name: str, component: int) -> IntArray:
     return order
 
 
-def drawing(plan: PlanName, seed: int, total: int | None) -> Draw:
+def replicated_sobol(
+    seed: int, replicates: int, name: str, dimension: int, first: int, count: int
+) -> FloatArray:
+    """Return points of several independently scrambled Sobol sequences in turn.
+
+    Realisation k has the point k // replicates of the sequence k % replicates: each sequence alone
+    is an unbiased sample, and how far they differ tells the error of all of them together
+    (Owen 1997, DOI 10.1137/S0036142994277468).
+
+    Parameters
+    ----------
+    seed, name, dimension, first, count
+        As of `monte_carlo`.
+    replicates : int
+        Number of sequences; of one, it is the plain scrambled Sobol sequence.
+
+    Returns
+    -------
+    ndarray, shape (count, dimension)
+        Strictly between 0 and 1.
+    """
+    points = np.empty((count, dimension))
+    for ahead in range(min(replicates, count)):
+        start, replicate = divmod(first + ahead, replicates)
+        own = points[ahead::replicates]
+        own[:] = sobol.scrambled(seed, name, dimension, start, len(own), replicate)
+    return points
+
+
+def drawing(plan: PlanName, seed: int, total: int | None, replicates: int = 1) -> Draw:
     """Return how a plan draws one input.
 
     Parameters
@@ -106,6 +138,8 @@ def drawing(plan: PlanName, seed: int, total: int | None) -> Draw:
         Seed of the scenario.
     total : int, optional
         Realisations of the whole plan, needed by "latin-hypercube".
+    replicates : int
+        Independent sequences that "sobol" takes in turn; other plans have none.
 
     Returns
     -------
@@ -115,16 +149,18 @@ def drawing(plan: PlanName, seed: int, total: int | None) -> Draw:
     Raises
     ------
     ValueError
-        If the plan is unknown, or `total` is missing or not positive.
+        If the plan is unknown, or `total` is missing or not positive, or `replicates` is not.
     """
     if plan not in PLANS:
         raise ValueError(f'unknown sampling plan "{plan}", expected one of {", ".join(PLANS)}')
     if total is not None and total < 1:
         raise ValueError(f"total must be 1 or more realisations, got {total}")
+    if replicates < 1:
+        raise ValueError(f"replicates must be 1 or more sequences, got {replicates}")
     if plan == "monte-carlo":
         return lambda *where: monte_carlo(seed, *where)
     if plan == "sobol":
-        return lambda *where: sobol.scrambled(seed, *where)
+        return lambda *where: replicated_sobol(seed, replicates, *where)
     if total is None:
         raise ValueError("a latin-hypercube plan needs total, the realisations of the whole plan")
     return lambda *where: latin_hypercube(seed, total, *where)

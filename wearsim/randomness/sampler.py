@@ -29,6 +29,9 @@ class Sampler:
     correlations : sequence of (str, str, float)
         Rank correlations between inputs of one number each. They come after the plan: what is
         tied to another input keeps its law, and is no longer as evenly spread.
+    replicates : int
+        Independent sequences that "sobol" takes in turn: realisation k is number k // replicates
+        of sequence k % replicates.
 
     Raises
     ------
@@ -43,9 +46,10 @@ class Sampler:
         plan: PlanName = "monte-carlo",
         total: int | None = None,
         correlations: Sequence[Correlation] = (),
+        replicates: int = 1,
     ) -> None:
         self._dimensions = _dimensions(inputs)
-        self._draw = drawing(plan, seed, total)
+        self._draw = drawing(plan, seed, total, replicates)
         self._copula = GaussianCopula(correlations, self._dimensions)
         if plan == "sobol":
             _refuse_shared_slots(self._dimensions)

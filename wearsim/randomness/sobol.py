@@ -66,7 +66,9 @@ def slots(name: str, dimension: int) -> range | None:
     return range(shift + slot, shift + slot + dimension) if int(roller) < _ROLLERS else None
 
 
-def scrambled(seed: int, name: str, dimension: int, first: int, count: int) -> FloatArray:
+def scrambled(
+    seed: int, name: str, dimension: int, first: int, count: int, replicate: int = 0
+) -> FloatArray:
     """Return the scrambled Sobol points of one input, strictly between 0 and 1.
 
     Every component is scrambled by itself (Owen 1995, DOI 10.1007/978-1-4612-2552-2_19), so that
@@ -82,6 +84,8 @@ def scrambled(seed: int, name: str, dimension: int, first: int, count: int) -> F
         How many uniform numbers it takes.
     first, count : int
         The first realisation, and how many.
+    replicate : int
+        Which of the independent scrambles of the sequence.
 
     Returns
     -------
@@ -94,12 +98,12 @@ def scrambled(seed: int, name: str, dimension: int, first: int, count: int) -> F
         )
     fixed = slots(name, dimension)
     words = (
-        _padded(seed, name, dimension, first, count)
+        _padded(seed, name, dimension, first, count, replicate)
         if fixed is None
         else _sequence(fixed.stop, first, count)[:, fixed.start :]
     )
     for k in range(dimension):
-        words[:, k] = nested_scramble(words[:, k], _key(seed, name, _VALUES, k))
+        words[:, k] = nested_scramble(words[:, k], _key(seed, name, _VALUES, k, replicate))
     return np.asarray((words + 0.5) * 2.0**-_BITS, dtype=np.float64)
 
 
@@ -117,7 +121,7 @@ def _sequence(dimensions: int, first: int, count: int) -> Words:
     return np.asarray(points * 2.0**_BITS).astype(np.uint32)
 
 
-def _padded(seed: int, name: str, dimension: int, first: int, count: int) -> Words:
+def _padded(seed: int, name: str, dimension: int, first: int, count: int, replicate: int) -> Words:
     """Return the first two dimensions of the sequence in a random order for each two components.
 
     The order is a nested scramble of the index: 2^m realisations on end from a multiple of 2^m
@@ -126,7 +130,7 @@ def _padded(seed: int, name: str, dimension: int, first: int, count: int) -> Wor
     index = np.arange(first, first + count, dtype=np.uint64).astype(np.uint32)
     words = np.empty((count, dimension), dtype=np.uint32)
     for k in range(0, dimension, 2):
-        order = nested_scramble(index, _key(seed, name, _ORDER, k))
+        order = nested_scramble(index, _key(seed, name, _ORDER, k, replicate))
         words[:, k] = reverse_bits(order)
         if k + 1 < dimension:
             words[:, k + 1] = _second_dimension(order)
@@ -176,10 +180,11 @@ def nested_scramble(words: Words, key: Words) -> Words:
     return reverse_bits(mixed)
 
 
-@lru_cache(maxsize=256)
-def _key(seed: int, name: str, use: int, component: int) -> Words:
+@lru_cache(maxsize=2048)
+def _key(seed: int, name: str, use: int, component: int, replicate: int = 0) -> Words:
     """Return the random constants of one scramble."""
-    words = Stream(seed, name, "plan").words(0, 3 * _ROUNDS, use, component)
+    needed = 3 * _ROUNDS
+    words = Stream(seed, name, "plan").words(replicate * needed, needed, use, component)
     key = (words >> np.uint64(32)).astype(np.uint32).reshape(_ROUNDS, 3)
     key[:, 1] &= ~np.uint32(1)
     key[:, 2] |= np.uint32(1)

@@ -31,6 +31,8 @@ class Content:
         Those of the layout.
     checkpoint : dict of str to ndarray
         The state to resume from; nothing where there is nothing to resume.
+    reserved : frozenset of str
+        Variables that are given a place and no values; only their shape and type count here.
     """
 
     layout: Layout
@@ -39,6 +41,7 @@ class Content:
     files: dict[str, str]
     variables: Arrays
     checkpoint: Arrays
+    reserved: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

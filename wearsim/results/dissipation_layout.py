@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
-from wearsim.results.layout import Axis, Layout, Variable
+from wearsim.results.layout import Axis, Layout, Variable, with_drawn
 
 FORMAT = "wearsim-dissipation"
 VERSION = 1
@@ -68,8 +67,4 @@ def with_inputs(inputs: Sequence[Mapping[str, str]]) -> Layout:
     -------
     Layout
     """
-    drawn = {
-        item["key"]: Variable(item["key"], _EACH, item["unit"], "drawn value", "record")
-        for item in inputs
-    }
-    return replace(DISSIPATION, variables={**VARIABLES, **drawn})
+    return with_drawn(DISSIPATION, inputs)

@@ -1,7 +1,8 @@
-"""The only module that speaks HDF5: the image of a file, and the pieces of an open one.
+"""Writes HDF5: the image of a file, whole or with holes where rows are to come.
 
-The image is made through h5py's low-level calls, which are three times as quick as its objects.
-It depends on the content alone (no time stamps), so that equal runs give equal files.
+With `hdf5_reading` all that speaks HDF5. It uses h5py's low-level calls, which are three times as
+quick as its objects. A file depends on the content alone (no time stamps), so that equal runs give
+equal files.
 """
 
 from __future__ import annotations
@@ -12,21 +13,20 @@ import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 import numpy.typing as npt
-from h5py import h5a, h5d, h5ds, h5f, h5g, h5p, h5s, h5t
+from h5py import h5a, h5d, h5ds, h5f, h5fd, h5g, h5p, h5s, h5t
 
-from wearsim.results.content import Arrays, Content, as_plain
-from wearsim.results.layout import Layout, axis_lengths
+from wearsim.results.content import Content, as_plain
+from wearsim.results.layout import axis_lengths
+from wearsim.results.sparse_image import SparseImage
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 CHECKPOINT, INPUTS, ABOUT, SCENARIO, FILES = "checkpoint", "inputs", "about", "scenario", "files"
 
-_ERRORS = "surrogatepass"  # so that every Python string comes back as it was
+ERRORS = "surrogatepass"  # so that every Python string comes back as it was
 _LABEL_LENGTH = 1000  # an attribute holds 64 kB at most
 _SCALAR = h5s.create(h5s.SCALAR)
 _ORDERED = h5p.CRT_ORDER_TRACKED | h5p.CRT_ORDER_INDEXED
@@ -50,31 +50,65 @@ def file_image(content: Content) -> bytes:
     ValueError
         If the variables are not those of the layout, or do not fit together.
     """
-    layout, variables = content.layout, content.variables
-    lengths = axis_lengths(variables, layout.variables)
-    file = _memory_file()
-    try:
-        _put_labels(file, content)
-        _put_variables(file, variables, layout, lengths)
-        _put_inputs(h5g.create(file, INPUTS.encode()), content)
-        checkpoint = h5g.create(file, CHECKPOINT.encode())
-        for name, array in content.checkpoint.items():
-            _put_array(checkpoint, name, array)
+    access = h5p.create(h5p.FILE_ACCESS)
+    access.set_fapl_core(1 << 20, False)
+    name = f"wearsim-{os.getpid()}-{next(_number)}"  # of no file: the image stays in memory
+    with _new_file(name.encode(), access) as file:
+        _put_content(file, content)
         h5f.flush(file)
         image: bytes = file.get_file_image()
-    finally:
-        file.close()
     return image
 
 
-def _memory_file() -> Any:
+def sparse_image(content: Content) -> SparseImage:
+    """Return a file whose reserved variables are holes, so that it may be of any size.
+
+    Every variable stands in one piece. Where it stands is told by `hdf5_reading.extents`, so that
+    rows can be written there later by plain writes, which leave the structure alone.
+
+    Parameters
+    ----------
+    content : Content
+        What it shall hold.
+
+    Returns
+    -------
+    SparseImage
+
+    Raises
+    ------
+    ValueError
+        If the variables are not those of the layout, or do not fit together.
+    """
+    image = SparseImage()
     access = h5p.create(h5p.FILE_ACCESS)
-    access.set_fapl_core(1 << 20, False)
+    access.set_fileobj_driver(h5fd.fileobj_driver, image)
+    with _new_file(b"sparse", access) as file:
+        _put_content(file, content)
+    return image
+
+
+@contextmanager
+def _new_file(name: bytes, access: Any) -> Iterator[Any]:
     access.set_fclose_degree(h5f.CLOSE_STRONG)
     creation = h5p.create(h5p.FILE_CREATE)
     creation.set_link_creation_order(_ORDERED)
-    name = f"wearsim-{os.getpid()}-{next(_number)}"  # of no file: the image stays in memory
-    return h5f.create(name.encode(), h5f.ACC_TRUNC, creation, access)
+    creation.set_obj_track_times(False)
+    file = h5f.create(name, h5f.ACC_TRUNC, creation, access)
+    try:
+        yield file
+    finally:
+        file.close()
+
+
+def _put_content(file: Any, content: Content) -> None:
+    lengths = axis_lengths(content.variables, content.layout.variables)
+    _put_labels(file, content)
+    _put_variables(file, content, lengths)
+    _put_inputs(_group(file, INPUTS), content)
+    checkpoint = _group(file, CHECKPOINT)
+    for name, array in content.checkpoint.items():
+        _put_array(checkpoint, name, array)
 
 
 def _put_labels(file: Any, content: Content) -> None:
@@ -90,19 +124,19 @@ def _put_labels(file: Any, content: Content) -> None:
             _put_attribute(file, name, value)
 
 
-def _put_variables(
-    file: Any, variables: Arrays, layout: Layout, lengths: Mapping[str, int]
-) -> None:
-    scales = {}
+def _put_variables(file: Any, content: Content, lengths: Mapping[str, int]) -> None:
+    layout = content.layout
+    scales: dict[str, Any] = {}
+    datasets: dict[str, Any] = {}
     for axis in layout.axes.values():
         numbers = np.arange(axis.first, axis.first + lengths[axis.name])
-        scales[axis.name] = _put_described(file, axis.name, numbers, "1", axis.long_name)
-    datasets = {}
+        scales[axis.name] = _put_array(file, axis.name, numbers)
+        _describe(scales[axis.name], "1", axis.long_name)
     for name, variable in layout.variables.items():
-        datasets[name] = _put_described(
-            file, name, variables[name], variable.unit, variable.long_name
-        )
-    scales["y"] = datasets.pop("y")
+        put = _reserve if name in content.reserved else _put_array
+        dataset = put(file, name, content.variables[name])
+        _describe(dataset, variable.unit, variable.long_name)
+        (scales if variable.dims == (name,) else datasets)[name] = dataset
     for name, scale in scales.items():
         h5ds.set_scale(scale, name.encode())
     for name, dataset in datasets.items():
@@ -113,16 +147,20 @@ def _put_variables(
 def _put_inputs(group: Any, content: Content) -> None:
     _put_text(group, SCENARIO, content.scenario_text)
     _put_text(group, ABOUT, json.dumps(content.about, default=as_plain))
-    files = h5g.create(group, FILES.encode())
+    files = _group(group, FILES)
     for number, (path, text) in enumerate(content.files.items()):
         _put_attribute(_put_text(files, str(number), text), "path", path)
 
 
-def _put_described(file: Any, name: str, array: npt.NDArray[Any], unit: str, what: str) -> Any:
-    dataset = _put_array(file, name, array)
+def _group(group: Any, name: str) -> Any:
+    creation = h5p.create(h5p.GROUP_CREATE)
+    creation.set_obj_track_times(False)
+    return h5g.create(group, name.encode(), gcpl=creation)
+
+
+def _describe(dataset: Any, unit: str, what: str) -> None:
     _put_attribute(dataset, "units", unit)
     _put_attribute(dataset, "long_name", what)
-    return dataset
 
 
 def _put_array(group: Any, name: str, array: npt.NDArray[Any]) -> Any:
@@ -132,6 +170,15 @@ def _put_array(group: Any, name: str, array: npt.NDArray[Any]) -> Any:
     if array.size:
         dataset.write(h5s.ALL, h5s.ALL, array)
     return dataset
+
+
+def _reserve(group: Any, name: str, array: npt.NDArray[Any]) -> Any:
+    """Give an array its place, all of it at once, and write nothing: the file has holes."""
+    creation = _creation().copy()
+    creation.set_alloc_time(h5d.ALLOC_TIME_EARLY)
+    creation.set_fill_time(h5d.FILL_TIME_NEVER)
+    space = h5s.create_simple(array.shape)
+    return h5d.create(group, name.encode(), _type_of(array.dtype), space, creation)
 
 
 def _put_text(group: Any, name: str, text: str) -> Any:
@@ -152,7 +199,7 @@ def _put_attribute(target: Any, name: str, value: object) -> None:
 
 def _text(text: str) -> tuple[npt.NDArray[Any], Any]:
     """Return a text as an array and its HDF5 type, of fixed length: no heap, no limit but 4 GB."""
-    content = text.encode("utf-8", _ERRORS)
+    content = text.encode("utf-8", ERRORS)
     size = len(content) + 1
     return np.array(content, f"S{size}"), _text_type(size)
 
@@ -168,6 +215,8 @@ def _text_type(size: int) -> Any:
 
 @lru_cache(maxsize=256)
 def _type_of(dtype: np.dtype[Any]) -> Any:
+    if dtype.kind == "S":
+        return _text_type(dtype.itemsize)
     if dtype.kind not in "biuf":
         raise ValueError(f"an array of {dtype} cannot be stored")
     return h5t.py_create(dtype, logical=True)
@@ -178,61 +227,3 @@ def _creation() -> Any:
     creation = h5p.create(h5p.DATASET_CREATE)
     creation.set_obj_track_times(False)
     return creation
-
-
-@contextmanager
-def opened(path: Path) -> Iterator[h5py.File]:
-    """Open an HDF5 file for reading; no lock is needed, since files are only ever replaced.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Raises
-    ------
-    OSError
-        If it is not HDF5, or truncated.
-    """
-    with h5py.File(path, "r", locking=False) as file:
-        yield file
-
-
-def get_text(dataset: h5py.Dataset) -> str:
-    """Return a text that `file_image` wrote.
-
-    Parameters
-    ----------
-    dataset : h5py.Dataset
-        Where it stands.
-    """
-    kind = dataset.id.get_type()
-    content = np.empty((), f"S{kind.get_size()}")
-    dataset.id.read(h5s.ALL, h5s.ALL, content, kind)
-    return content.tobytes()[:-1].decode("utf-8", _ERRORS)  # to the byte, where h5py strips zeros
-
-
-def get_label(item: h5py.Dataset | h5py.Group, name: str) -> str:
-    """Return a text attribute that `file_image` wrote.
-
-    Parameters
-    ----------
-    item : h5py.Dataset or h5py.Group
-        What it belongs to.
-    name : str
-        Its name.
-    """
-    content = item.attrs[name]
-    return content if isinstance(content, str) else bytes(content).decode("utf-8", _ERRORS)
-
-
-def get_arrays(group: h5py.Group) -> Arrays:
-    """Return all arrays of a group by name, with their types.
-
-    Parameters
-    ----------
-    group : h5py.Group
-        The group; what else it holds is left out.
-    """
-    items = group.items()
-    return {name: np.asarray(item[()]) for name, item in items if isinstance(item, h5py.Dataset)}

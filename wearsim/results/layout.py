@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias
-
-import numpy.typing as npt
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, Protocol, TypeAlias
 
 FORMAT = "wearsim-replay"
 VERSION = 1
 
 Kind: TypeAlias = Literal["static", "history", "record", "statistic"]
+
+
+class Shaped(Protocol):
+    """An array, or the place of one."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Its length along each axis."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +77,7 @@ class Layout:
     holds : str
         What is in it and which command writes it, for messages.
     axes : mapping of str to Axis
-        Every axis but y, whose coordinate is a variable of its own.
+        Every axis but those whose coordinate is a variable of their own, such as y.
     variables : mapping of str to Variable
         The table of variables, by name.
     """
@@ -156,15 +162,38 @@ VARIABLES: Mapping[str, Variable] = {
 REPLAY = Layout(FORMAT, VERSION, "a wear test, from `wearsim run`", AXES, VARIABLES)
 
 
+def with_drawn(layout: Layout, inputs: Sequence[Mapping[str, str]]) -> Layout:
+    """Return the layout of a study, a variable for each value that was drawn.
+
+    Parameters
+    ----------
+    layout : Layout
+        The layout without them.
+    inputs : sequence of mapping
+        Dotted key and SI unit of each drawn value, and ``"rollers": "each"`` where every roller
+        has its own: ``{"key": "load.normal_force", "unit": "N"}``.
+
+    Returns
+    -------
+    Layout
+    """
+    drawn = {}
+    for item in inputs:
+        each = ("roller",) if item.get("rollers") == "each" else ()
+        key, dims = item["key"], ("realisation", *each)
+        drawn[key] = Variable(key, dims, item["unit"], "drawn value", "record")
+    return replace(layout, variables={**layout.variables, **drawn})
+
+
 def axis_lengths(
-    arrays: Mapping[str, npt.NDArray[Any]], table: Mapping[str, Variable] = VARIABLES
+    arrays: Mapping[str, Shaped], table: Mapping[str, Variable] = VARIABLES
 ) -> dict[str, int]:
     """Return the length of every axis.
 
     Parameters
     ----------
     arrays : mapping of str to ndarray
-        All variables of the table, by name.
+        All variables of the table, by name, or anything that has their shapes.
     table : mapping of str to Variable
         The table; by default that of a run.
 
@@ -184,8 +213,8 @@ def axis_lengths(
     lengths: dict[str, int] = {}
     for name, array in arrays.items():
         dims = table[name].dims
-        if array.ndim != len(dims):
-            raise ValueError(f"{name} has {array.ndim} axes, expected {', '.join(dims)}")
+        if len(array.shape) != len(dims):
+            raise ValueError(f"{name} has {len(array.shape)} axes, expected {', '.join(dims)}")
         for dim, length in zip(dims, array.shape, strict=True):
             if lengths.setdefault(dim, length) != length:
                 raise ValueError(f"{name} has {length} along {dim}, others have {lengths[dim]}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from wearsim.results.content import Arrays, StudyData
 from wearsim.results.data import RunData
 from wearsim.results.dissipation_data import DissipationData
 from wearsim.results.dissipation_layout import DISSIPATION, with_inputs
+from wearsim.results.ensemble_layout import ENSEMBLE
 from wearsim.results.layout import REPLAY, Layout, axis_lengths
 
 if TYPE_CHECKING:
@@ -22,7 +23,13 @@ if TYPE_CHECKING:
 _SMALLEST = 96  # bytes: no HDF5 file is shorter
 # what h5py, json and numpy raise on content that is not as it was written
 _DAMAGE = (OSError, RuntimeError, ValueError, TypeError, KeyError, AttributeError, OverflowError)
-_LAYOUTS = {layout.format: layout for layout in (REPLAY, DISSIPATION)}
+FileKind: TypeAlias = Literal["replay", "dissipation", "ensemble"]
+_KINDS: dict[str, FileKind] = {
+    REPLAY.format: "replay",
+    DISSIPATION.format: "dissipation",
+    ENSEMBLE.format: "ensemble",
+}
+_LAYOUTS = {layout.format: layout for layout in (REPLAY, DISSIPATION, ENSEMBLE)}
 
 Stored = TypeVar("Stored")
 
@@ -44,30 +51,53 @@ def read_results(path: str | Path) -> RunData:
     ResultsFileError
         If it is missing, foreign, truncated, damaged, or written by a newer wearsim.
     """
-    return _read(path, lambda file: _run_data(path, file))
+    return read_file(path, lambda file: _run_data(path, file))
 
 
 def read_dissipation(path: str | Path) -> DissipationData:
     """Read the file of a study of the dissipation of a contact; see `read_results`."""
-    return _read(path, lambda file: _dissipation_data(path, file))
+    return read_file(path, lambda file: _dissipation_data(path, file))
+
+
+def kind_of(path: str | Path) -> FileKind:
+    """Return what a results file holds; raises as `read_results`.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+
+    Returns
+    -------
+    {"replay", "dissipation", "ensemble"}
+    """
+    return read_file(path, lambda file: _KINDS[_layout_of(path, file).format])
 
 
 def is_dissipation(path: str | Path) -> bool:
     """Tell whether a results file holds a study of a contact; raises as `read_results`."""
-    return _read(path, lambda file: _layout_of(path, file) is DISSIPATION)
+    return kind_of(path) == "dissipation"
 
 
-def _read(path: str | Path, take: Callable[[h5py.File], Stored]) -> Stored:
-    """Open a file and take from it; whatever goes wrong becomes a ResultsFileError."""
-    from wearsim.results import hdf5  # noqa: PLC0415  (h5py takes 0.2 s to import)
+def read_file(path: str | Path, take: Callable[[h5py.File], Stored]) -> Stored:
+    """Open a file and take from it; whatever goes wrong becomes a ResultsFileError.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    take : callable
+        Returns what is wanted of the open file.
+    """
+    from wearsim.results import hdf5, hdf5_reading  # noqa: PLC0415  (h5py takes 0.2 s to import)
 
     _check_signature(path, hdf5.SIGNATURE)
     try:
-        with hdf5.opened(Path(path)) as file:
+        with hdf5_reading.opened(Path(path)) as file:
             return take(file)
     except _DAMAGE as error:
         if "truncated" in str(error):
-            raise ResultsFileError(_truncated(path)) from error
+            raise ResultsFileError(truncated(path)) from error
         raise ResultsFileError(f"{path}: is damaged ({_first_line(error)})") from error
 
 
@@ -84,11 +114,12 @@ def _check_signature(path: str | Path, signature: bytes) -> None:
     if start.startswith(signature) and len(start) == _SMALLEST:
         return
     if start.startswith(signature) or signature.startswith(start):
-        raise ResultsFileError(_truncated(path))
+        raise ResultsFileError(truncated(path))
     raise ResultsFileError(f"{path}: is not a results file of wearsim, not even HDF5")
 
 
-def _truncated(path: str | Path) -> str:
+def truncated(path: str | Path) -> str:
+    """Return what is said of a file whose end is missing."""
     return f"{path}: is truncated: its end is missing, as after a copy that was cut short"
 
 
@@ -120,10 +151,10 @@ def _check_format(path: str | Path, file: h5py.File, wanted: Layout) -> None:
 
 def _run_data(path: str | Path, file: h5py.File) -> RunData:
     # nothing is drawn in files of version 0.1.0, which do not say so
-    told = _told(path, file, REPLAY, RunData, groups=["checkpoint"], optional=["drawn"])
+    found = told(path, file, REPLAY, RunData, groups=["checkpoint"], optional=["drawn"])
     variables = _variables(file, REPLAY)
     return RunData(
-        **told,
+        **found,
         static=_of_kind("static", variables),
         history=_of_kind("history", variables),
         records=_of_kind("record", variables),
@@ -132,13 +163,13 @@ def _run_data(path: str | Path, file: h5py.File) -> RunData:
 
 
 def _dissipation_data(path: str | Path, file: h5py.File) -> DissipationData:
-    told = _told(path, file, DISSIPATION, DissipationData)
-    layout = with_inputs(told["inputs"])
-    _check_complete(path, [name for name in layout.variables if name not in file])
-    return DissipationData(**told, variables=_variables(file, layout))
+    found = told(path, file, DISSIPATION, DissipationData)
+    layout = with_inputs(found["inputs"])
+    check_complete(path, [name for name in layout.variables if name not in file])
+    return DissipationData(**found, variables=_variables(file, layout))
 
 
-def _told(
+def told(
     path: str | Path,
     file: h5py.File,
     layout: Layout,
@@ -146,18 +177,35 @@ def _told(
     groups: Sequence[str] = (),
     optional: Sequence[str] = (),
 ) -> dict[str, Any]:
-    """Return all fields of `kind` but arrays, having checked that these are there too."""
-    from wearsim.results import hdf5  # noqa: PLC0415
+    """Return all that a file tells besides arrays, having checked that these are there too.
+
+    Parameters
+    ----------
+    path, file : str or Path, h5py.File
+        The file.
+    layout : Layout
+        The kind of file that it must be.
+    kind : type of StudyData
+        What is made of it.
+    groups : sequence of str
+        Groups that must be there.
+    optional : sequence of str
+        What may be missing, as in files of older versions.
+    """
+    from wearsim.results import hdf5, hdf5_reading  # noqa: PLC0415
 
     _check_format(path, file, layout)
     about_at, scenario_at = f"{hdf5.INPUTS}/{hdf5.ABOUT}", f"{hdf5.INPUTS}/{hdf5.SCENARIO}"
     files_at = f"{hdf5.INPUTS}/{hdf5.FILES}"
     wanted = (*layout.variables, about_at, scenario_at, files_at, *groups)
-    _check_complete(path, [name for name in wanted if name not in file])
-    about: dict[str, Any] = json.loads(hdf5.get_text(file[about_at]))
+    check_complete(path, [name for name in wanted if name not in file])
+    about: dict[str, Any] = json.loads(hdf5_reading.get_text(file[about_at]))
     names = kind.told()
-    _check_complete(path, [name for name in names if name not in {*about, *optional}])
-    texts = {"scenario_text": hdf5.get_text(file[scenario_at]), "files": _files(file[files_at])}
+    check_complete(path, [name for name in names if name not in {*about, *optional}])
+    texts = {
+        "scenario_text": hdf5_reading.get_text(file[scenario_at]),
+        "files": _files(file[files_at]),
+    }
     return {name: about[name] for name in names if name in about} | texts
 
 
@@ -168,21 +216,22 @@ def _variables(file: h5py.File, layout: Layout) -> Arrays:
 
 
 def _checkpoint(file: h5py.File) -> Arrays:
-    from wearsim.results import hdf5  # noqa: PLC0415
+    from wearsim.results import hdf5, hdf5_reading  # noqa: PLC0415
 
-    return hdf5.get_arrays(file[hdf5.CHECKPOINT])
+    return hdf5_reading.get_arrays(file[hdf5.CHECKPOINT])
 
 
-def _check_complete(path: str | Path, missing: list[str]) -> None:
+def check_complete(path: str | Path, missing: list[str]) -> None:
+    """Refuse a file that lacks something; see `read_file`."""
     if missing:
         raise ResultsFileError(f"{path}: is damaged (lacks {', '.join(missing)})")
 
 
 def _files(group: h5py.Group) -> dict[str, str]:
-    from wearsim.results import hdf5  # noqa: PLC0415
+    from wearsim.results.hdf5_reading import get_label, get_text  # noqa: PLC0415
 
     datasets = [group[str(number)] for number in range(len(group))]
-    return {hdf5.get_label(item, "path"): hdf5.get_text(item) for item in datasets}
+    return {get_label(item, "path"): get_text(item) for item in datasets}
 
 
 def _of_kind(kind: str, variables: Arrays) -> Arrays:

@@ -6,10 +6,12 @@ import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import IO
 
 from wearsim.errors import ResultsFileError
 from wearsim.results.data import RunData
 from wearsim.results.dissipation_data import DissipationData
+from wearsim.results.file_lock import refuse_if_locked
 from wearsim.results.inputs import refuse_inputs
 
 OTHER_KINDS = (".png", ".pdf", ".svg", ".toml", ".csv")
@@ -33,7 +35,14 @@ or kills the process.
 
 
 @contextmanager
-def _stage(name: str) -> Iterator[None]:
+def stage(name: str) -> Iterator[None]:
+    """Call the seam before and after what is done inside.
+
+    Parameters
+    ----------
+    name : str
+        Which of STAGES it is.
+    """
     on_write_stage(f"before {name}")
     yield
     on_write_stage(f"after {name}")
@@ -76,35 +85,89 @@ def write_whole(path: str | Path, content: bytes) -> None:
     ResultsFileError
         If it cannot be written; a file that stood there is untouched.
     """
+    write_pieces(path, [(0, content)], len(content))
+
+
+def write_pieces(
+    path: str | Path, pieces: Iterable[tuple[int, bytes]], size: int | None = None
+) -> None:
+    """Write a file with holes; see `write_whole`.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file; the pieces go to `path`.part first.
+    pieces : iterable of tuple
+        How many bytes stand before each piece, and the piece.
+    size : int, optional
+        Bytes of the file, holes included; by default it ends with the last piece.
+
+    Raises
+    ------
+    ResultsFileError
+        If it cannot be written; a file that stood there is untouched.
+    """
     target = Path(path).resolve()  # where a link points: the link stays one
     part = target.with_name(target.name + ".part")
-    try:
+    with refused_in_a_line(path):
         try:
-            _write_part(part, content)
-            with _stage("rename"):
+            _write_part(part, pieces, size)
+            with stage("rename"):
                 os.replace(part, target)
         except BaseException:
             part.unlink(missing_ok=True)
             raise
-        with _stage("fsync folder"):
+        with stage("fsync folder"):
             _sync_folder(target.parent)
+
+
+@contextmanager
+def refused_in_a_line(path: str | Path) -> Iterator[None]:
+    """Turn what the system says of a file that cannot be written into a ResultsFileError.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file, as the user calls it.
+    """
+    try:
+        yield
     except OSError as error:
         raise ResultsFileError(f"{path}: cannot be written ({error.strerror or error})") from error
 
 
-def _write_part(part: Path, content: bytes) -> None:
+def write_chunks(file: IO[bytes], content: bytes | memoryview) -> None:
+    """Write to an open file where it stands, in chunks that are each a "write" of the seam.
+
+    Parameters
+    ----------
+    file : binary file
+        With or without a buffer.
+    content : bytes or memoryview
+        What to write.
+    """
     view = memoryview(content)
+    for start in range(0, len(view), _CHUNK):
+        with stage("write"):
+            rest = view[start : start + _CHUNK]
+            while rest:  # a file without a buffer may take less than it is given
+                rest = rest[file.write(rest) :]
+
+
+def _write_part(part: Path, pieces: Iterable[tuple[int, bytes]], size: int | None) -> None:
     on_write_stage("before open")
     with part.open("wb") as file:
         on_write_stage("after open")
-        for start in range(0, len(view), _CHUNK):
-            with _stage("write"):
-                file.write(view[start : start + _CHUNK])
-        with _stage("flush"):
+        for offset, piece in pieces:
+            file.seek(offset)
+            write_chunks(file, piece)
+        with stage("flush"):
             file.flush()
-        with _stage("fsync"):
+            if size is not None:
+                file.truncate(size)  # a hole may be the last
+        with stage("fsync"):
             os.fsync(file.fileno())
-        with _stage("close"):
+        with stage("close"):
             file.close()
 
 
@@ -134,7 +197,8 @@ def check_output(path: str | Path, force: bool, inputs: Iterable[Path] = ()) -> 
     ------
     ResultsFileError
         If it exists and `force` is not set, if it is an input, if its name is that of a figure, a
-        scenario or a table, or if its folder is missing or not writable.
+        scenario or a table, if its folder is missing or not writable, or if another process is
+        writing it.
     """
     refuse_inputs(path, inputs)
     target = Path(path).resolve()
@@ -156,5 +220,6 @@ def check_output(path: str | Path, force: bool, inputs: Iterable[Path] = ()) -> 
             raise ResultsFileError(
                 f"{path}: already exists; --force replaces it, -o chooses another"
             )
+        refuse_if_locked(path)
     if not os.access(folder, os.W_OK | os.X_OK):
         raise ResultsFileError(f"{path}: the folder {folder} is not writable; choose with -o")

@@ -142,7 +142,9 @@ def load_range(scenario: Scenario, load: Load, stop: float) -> tuple[float, floa
     return low, high
 
 
-def build_scene(scenario: Scenario, grid: Grid | None = None) -> tuple[Scene, Stepper, str]:
+def build_scene(
+    scenario: Scenario, grid: Grid | None = None, draws: Draws | None = None
+) -> tuple[Scene, Stepper, str]:
     """Return the scene of a run, its stepper and the stepper's name.
 
     Parameters
@@ -150,6 +152,8 @@ def build_scene(scenario: Scenario, grid: Grid | None = None) -> tuple[Scene, St
     scenario : Scenario
     grid : Grid, optional
         Strips of an earlier part of the run, in place of the scenario's choice.
+    draws : Draws, optional
+        Of the scenario's random inputs, where they are drawn already.
 
     Raises
     ------
@@ -159,7 +163,7 @@ def build_scene(scenario: Scenario, grid: Grid | None = None) -> tuple[Scene, St
         If the contact model cannot do what is asked.
     """
     require_run(scenario)
-    draws = draw(scenario)
+    draws = draws if draws is not None else draw(scenario)
     scenario = draws.scenario
     load, model = scenario.load.build(), scenario.contact.build()
     check_model(scenario, model)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from wearsim.errors import CapabilityError, Problem, ScenarioError
 from wearsim.evolution.inputs import Varying
 from wearsim.mechanics.piecewise import PiecewiseLinear
 from wearsim.plugins import JointDistribution, Process, Uniforms
+from wearsim.randomness.plans import REPLICATES, PlanName
 from wearsim.randomness.sampler import Sampler
 from wearsim.randomness.streams import Stream
 from wearsim.scenario import RandomInput, Scenario, realise
@@ -36,12 +37,18 @@ class Draws:
         Processes; their rollers are the scenario's.
     passes : tuple of RandomInput
         What is drawn anew at every pass.
+    values : mapping of str to ndarray, shape () or (rollers,)
+        All that is drawn for the test and for its rollers, by the scenario's key [SI].
+    time_means : mapping of str to ndarray, shape () or (rollers,)
+        Mean over the test of what follows a process, by the scenario's key [SI].
     """
 
     scenario: Scenario
     rollers: Mapping[str, FloatArray] = field(default_factory=dict)
     varying: tuple[Varying, ...] = ()
     passes: tuple[RandomInput, ...] = ()
+    values: Mapping[str, FloatArray] = field(default_factory=dict)
+    time_means: Mapping[str, FloatArray] = field(default_factory=dict)
 
     @property
     def tells_rollers_apart(self) -> bool:
@@ -117,68 +124,7 @@ def draw(scenario: Scenario) -> Draws:
     CapabilityError
         If there is a friction field, which is a matter of one contact.
     """
-    if not scenario.random:
-        return Draws(scenario)
-    _refuse(scenario)
-    lasting = _lasting(scenario)
-    values = _lasting_values(scenario, lasting)
-    listed = {
-        key: tuple(float(number) for number in array) if array.ndim else float(array)
-        for key, array in values.items()
-        if array.ndim == 0 or key in LISTED
-    }
-    means = {item.name: item.mean[0] for item in lasting}
-    rollers = {
-        CONTACT_FIELDS[key]: array - origin(key, means[key])
-        for key, array in values.items()
-        if key not in listed
-    }
-    return Draws(
-        scenario=realise(scenario, listed) if listed else scenario,
-        rollers=rollers,
-        varying=_varying(scenario),
-        passes=tuple(item for item in scenario.random if item.persistence == "per-pass"),
-    )
-
-
-def drawn_values(scenario: Scenario) -> dict[str, dict[str, object]]:
-    """Return what is drawn for the test and its rollers, as plain values for a results file.
-
-    Parameters
-    ----------
-    scenario : Scenario
-
-    Returns
-    -------
-    dict of str to dict
-        By the scenario's key: `values`, one for the test or one per roller, and their SI `unit`.
-    """
-    lasting = _lasting(scenario)
-    if not lasting:
-        return {}
-    units = {
-        key: item.quantity.kind.unit if item.quantity else "1"
-        for item in lasting
-        for key in item.keys
-    }
-    return {
-        key: {"values": np.atleast_1d(value).tolist(), "unit": units[key]}
-        for key, value in _lasting_values(scenario, lasting).items()
-    }
-
-
-def _lasting(scenario: Scenario) -> list[RandomInput]:
-    """Return the inputs that are drawn once for the test or once for each roller."""
-    return [
-        item
-        for item in scenario.random
-        if item.role in {"scalar", "joint"} and item.persistence != "per-pass"
-    ]
-
-
-def _refuse(scenario: Scenario) -> None:
-    """Refuse what a run cannot draw."""
-    if scenario.sampling.plan == "latin-hypercube":
+    if scenario.sampling.plan == "latin-hypercube" and scenario.random:
         problem = Problem(
             "sampling",
             "plan",
@@ -187,6 +133,171 @@ def _refuse(scenario: Scenario) -> None:
             '"monte-carlo" or "sobol"',
         )
         raise ScenarioError(scenario.file, [problem])
+    return Drawer(scenario, scenario.sampling.plan).draw(scenario.sampling.realisation)
+
+
+class Drawer:
+    """Draws the random inputs of a scenario, realisation by realisation.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    plan : str
+        Name of a plan of `wearsim.randomness.plans`.
+    total : int, optional
+        Realisations of the whole plan, where it needs to know.
+
+    Raises
+    ------
+    CapabilityError
+        If there is a friction field, which is a matter of one contact.
+    """
+
+    def __init__(self, scenario: Scenario, plan: PlanName, total: int | None = None) -> None:
+        _refuse_fields(scenario)
+        self.scenario = scenario
+        self.items = [
+            item
+            for item in scenario.random
+            if item.role in {"scalar", "joint"} and item.persistence != "per-pass"
+        ]
+        self._processes = [item for item in scenario.random if item.role == "process"]
+        self._names = {item: _names(item, scenario.operation.rollers) for item in self.items}
+        kinds = {item.name: item for item in self.items}
+        correlations = [
+            (one, other, rank)
+            for first, second, rank in scenario.sampling.correlation
+            if first in kinds and second in kinds
+            for one, other in zip(
+                self._names[kinds[first]], self._names[kinds[second]], strict=True
+            )
+        ]
+        inputs = [(name, item.dimension) for item in self.items for name in self._names[item]]
+        self._sampler = Sampler(
+            scenario.seed,
+            inputs,
+            plan,
+            total,
+            correlations=correlations,
+            replicates=REPLICATES if plan == "sobol" else 1,
+        )
+
+    @property
+    def groups(self) -> list[str]:
+        """Names of the inputs whose draws tell realisations apart; per-pass ones do not."""
+        return [item.name for item in (*self.items, *self._processes)]
+
+    def draw(self, realisation: int, sources: Mapping[str, int] | None = None) -> Draws:
+        """Return the draws of one realisation.
+
+        Parameters
+        ----------
+        realisation : int
+        sources : mapping of str to int, optional
+            Number of the realisation whose draw an input takes, where it is another.
+
+        Returns
+        -------
+        Draws
+
+        Raises
+        ------
+        ScenarioError
+            If a value is out of its bounds, or a process is far too fast.
+        """
+        table = self.scenario.sampling.model_copy(update={"realisation": realisation})
+        scenario = replace(self.scenario, sampling=table)
+        if not scenario.random:
+            return Draws(scenario)
+        sources = sources or {}
+        numbers = {item.name: sources.get(item.name, realisation) for item in scenario.random}
+        columns = {n: self.columns(n, 1) for n in sorted({numbers[i.name] for i in self.items})}
+        values = {
+            key: np.asarray(columns[numbers[item.name]][key][0])
+            for item in self.items
+            for key in item.keys
+        }
+        listed = {
+            key: tuple(float(number) for number in array) if array.ndim else float(array)
+            for key, array in values.items()
+            if array.ndim == 0 or key in LISTED
+        }
+        means = {item.name: item.mean[0] for item in self.items}
+        paths = {item: _paths(scenario, item, numbers) for item in self._processes}
+        return Draws(
+            scenario=realise(scenario, listed) if listed else scenario,
+            rollers={
+                CONTACT_FIELDS[key]: array - origin(key, means[key])
+                for key, array in values.items()
+                if key not in listed
+            },
+            varying=tuple(one for found in paths.values() for one in found),
+            passes=tuple(item for item in scenario.random if item.persistence == "per-pass"),
+            values=values,
+            time_means={item.name: _means(scenario, item, found) for item, found in paths.items()},
+        )
+
+    def columns(self, first: int, count: int) -> dict[str, FloatArray]:
+        """Return what is drawn for whole tests and rollers, in realisations on end.
+
+        Parameters
+        ----------
+        first, count : int
+            The first realisation, and how many.
+
+        Returns
+        -------
+        dict of str to ndarray, shape (count,) or (count, rollers)
+            By the scenario's key, in SI.
+        """
+        uniforms = self._sampler.uniforms(first, count)
+        columns = {}
+        for item in self.items:
+            found = np.stack([item.values(uniforms[name]) for name in self._names[item]], axis=1)
+            for number, key in enumerate(item.keys):
+                whole = item.persistence == "per-test"
+                columns[key] = found[:, 0, number] if whole else found[:, :, number]
+        return columns
+
+
+def drawn_values(scenario: Scenario, draws: Draws) -> dict[str, dict[str, object]]:
+    """Return what is drawn for the test and its rollers, as plain values for a results file.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The one that was drawn from.
+    draws : Draws
+
+    Returns
+    -------
+    dict of str to dict
+        By the scenario's key: `values`, one for the test or one per roller, and their SI `unit`.
+    """
+    units = units_of(scenario)
+    return {
+        key: {"values": np.atleast_1d(value).tolist(), "unit": units[key]}
+        for key, value in draws.values.items()
+    }
+
+
+def units_of(scenario: Scenario) -> dict[str, str]:
+    """Return the SI unit of every value that random inputs set, by the scenario's key."""
+    return {
+        key: item.quantity.kind.unit if item.quantity else "1"
+        for item in scenario.random
+        for key in item.keys
+    }
+
+
+def _names(item: RandomInput, rollers: int) -> list[str]:
+    """Return under which names an input is drawn: its own, or one for each roller."""
+    if item.persistence == "per-test":
+        return [item.name]
+    return [f"{item.name}@{number}" for number in range(rollers)]
+
+
+def _refuse_fields(scenario: Scenario) -> None:
     for item in scenario.random:
         if item.role == "field":
             raise CapabilityError(
@@ -196,61 +307,39 @@ def _refuse(scenario: Scenario) -> None:
             )
 
 
-def _lasting_values(scenario: Scenario, items: Sequence[RandomInput]) -> dict[str, FloatArray]:
-    """Return the draws for the test, of no axis, and for its rollers, (rollers,), by key."""
-    numbers = range(scenario.operation.rollers)
-    names = {
-        item: [item.name]
-        if item.persistence == "per-test"
-        else [f"{item.name}@{number}" for number in numbers]
-        for item in items
-    }
-    kinds = {item.name: item for item in items}
-    correlations = [
-        (one, other, rank)
-        for first, second, rank in scenario.sampling.correlation
-        if first in kinds and second in kinds
-        for one, other in zip(names[kinds[first]], names[kinds[second]], strict=True)
-    ]
-    inputs = [(name, item.dimension) for item in items for name in names[item]]
-    sampler = Sampler(scenario.seed, inputs, scenario.sampling.plan, correlations=correlations)
-    uniforms = sampler.uniforms(scenario.sampling.realisation, 1)
-    values = {}
-    for item in items:
-        found = np.concatenate([item.values(uniforms[name]) for name in names[item]])
-        for column, key in enumerate(item.keys):
-            whole = item.persistence == "per-test"
-            values[key] = found[0, column] if whole else found[:, column]
-    return {key: np.asarray(value) for key, value in values.items()}
-
-
-def _varying(scenario: Scenario) -> tuple[Varying, ...]:
-    """Return the paths of the processes over the whole test."""
+def _paths(scenario: Scenario, item: RandomInput, numbers: Mapping[str, int]) -> list[Varying]:
+    """Return the paths of a process over the whole test, one or one for each roller."""
+    process = item.distribution
+    if not isinstance(process, Process):
+        raise TypeError(f"{item.name} is no process")
+    points = int(np.ceil(scenario.total_time / process.spacing)) + 2
+    if points > LONGEST_PATH:
+        table, key = item.name.rsplit(".", 1)
+        problem = Problem(
+            table,
+            key,
+            f"the process would take {points:,} steps of {process.spacing:.3g} s over the test",
+            None,
+            'a longer correlation_time, or persistence = "per-pass" in place of a process',
+        )
+        raise ScenarioError(scenario.file, [problem])
     everyone = tuple(range(scenario.operation.rollers))
+    groups = [everyone] if item.persistence == "per-test" else [(r,) for r in everyone]
+    times = process.spacing * np.arange(points, dtype=np.float64)
+    stream = Stream(scenario.seed, item.name, "process")
     found = []
-    for item in scenario.random:
-        process = item.distribution
-        if not isinstance(process, Process):
-            continue
-        points = int(np.ceil(scenario.total_time / process.spacing)) + 2
-        if points > LONGEST_PATH:
-            table, key = item.name.rsplit(".", 1)
-            problem = Problem(
-                table,
-                key,
-                f"the process would take {points:,} steps of {process.spacing:.3g} s over the test",
-                None,
-                'a longer correlation_time, or persistence = "per-pass" in place of a process',
-            )
-            raise ScenarioError(scenario.file, [problem])
-        groups = [everyone] if item.persistence == "per-test" else [(r,) for r in everyone]
-        for block, group in enumerate(groups):
-            stream = Stream(scenario.seed, item.name, "process")
-            path = process.path(points, _uniforms(stream, scenario.sampling.realisation, block))
-            times = process.spacing * np.arange(points, dtype=np.float64)
-            value = path - origin(item.name, item.mean[0])
-            found.append(Varying(CONTACT_FIELDS[item.name], group, PiecewiseLinear(times, value)))
-    return tuple(found)
+    for block, group in enumerate(groups):
+        path = process.path(points, _uniforms(stream, numbers[item.name], block))
+        value = path - origin(item.name, item.mean[0])
+        found.append(Varying(CONTACT_FIELDS[item.name], group, PiecewiseLinear(times, value)))
+    return found
+
+
+def _means(scenario: Scenario, item: RandomInput, paths: list[Varying]) -> FloatArray:
+    """Return the mean of a process over the test, one or one for each roller [SI]."""
+    start = origin(item.name, item.mean[0])
+    found = np.array([one.path.mean(0.0, scenario.total_time) + start for one in paths])
+    return found if item.persistence == "per-roller" else found[0]
 
 
 def _uniforms(stream: Stream, realisation: int, block: int) -> Uniforms:

@@ -14,6 +14,7 @@ from wearsim.plugins import (
     WearLawSpec,
     registry,
 )
+from wearsim.results.content import StudyData
 from wearsim.scenario import Scenario
 
 SOFTWARE = ("wearsim", "numpy", "scipy", "numba", "h5py")
@@ -66,7 +67,27 @@ def missing_plugins(rows: list[dict[str, str]]) -> list[str]:
     ]
 
 
-def origins(versions: Mapping[str, str], plugins: list[dict[str, str]]) -> dict[str, str]:
+def changed_origins(data: StudyData, scenario: Scenario) -> list[str]:
+    """Return a warning for everything that is not what a file was written with.
+
+    Parameters
+    ----------
+    data : StudyData
+        What the file holds.
+    scenario : Scenario
+        Its scenario.
+    """
+    before = _origins(data.software, data.plugins)
+    now = _origins(software(), plugins_in_use(scenario))
+    return [
+        f"this file was written with {name} {before[name]} and goes on with {now[name]}: the last"
+        " digits may differ from those of an unbroken run"
+        for name in now
+        if before.get(name, now[name]) != now[name]
+    ]
+
+
+def _origins(versions: Mapping[str, str], plugins: list[dict[str, str]]) -> dict[str, str]:
     """Return the version of every package, and where every plugin in use comes from, by name."""
     found = dict(versions)
     for row in plugins:

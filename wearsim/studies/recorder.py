@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -99,6 +98,34 @@ def record_row(scene: Scene, state: WearState, pass_by_pass: bool) -> Row:
     return row
 
 
+def due_states(
+    scene: Scene, stepper: Stepper, schedule: RecordSchedule, advance: Advance, stop: float
+) -> list[WearState]:
+    """Return the states that are to be recorded on the way of a step, in their order.
+
+    Parameters
+    ----------
+    scene : Scene
+    stepper : Stepper
+        Takes the side steps to what falls due within the step.
+    schedule : RecordSchedule
+    advance : Advance
+        The step.
+    stop : float
+        Passes at the end of the test, which is recorded too.
+    """
+    by_pass = stepper.pass_by_pass
+    found = []
+    for first, last in zip(advance.path[:-1], advance.path[1:], strict=True):
+        passes = schedule.due_after(first.passes, by_pass)
+        while passes < last.passes:
+            found.append(at_record(scene, stepper, first, passes))
+            passes = schedule.due_after(passes, by_pass)
+        if passes == last.passes or last.passes >= stop:
+            found.append(last)
+    return found
+
+
 class Recorder:
     """Collects history and records; what it shows is always that of a whole number of steps.
 
@@ -139,24 +166,12 @@ class Recorder:
     def add(self, advance: Advance, stop: float) -> None:
         """Take note of a step, and record what fell due on its way or at the end of the test."""
         start, end = advance.path[0], advance.end
-        due = []
-        for first, last in zip(advance.path[:-1], advance.path[1:], strict=True):
-            passes = self._next_record(first.passes)
-            while passes < last.passes:
-                due.append(at_record(self.scene, self.stepper, first, passes))
-                passes = self._next_record(passes)
-            if passes == last.passes or last.passes >= stop:
-                due.append(last)
+        due = due_states(self.scene, self.stepper, self.schedule, advance, stop)
         pass_by_pass = self.stepper.pass_by_pass
         self._records += [record_row(self.scene, state, pass_by_pass) for state in due]
         self._history.append(history_row(self.scene, end, start, self.threshold, pass_by_pass))
         # one assignment: an interrupt in the lines above leaves the step before in force
         self._kept = len(self._history), len(self._records), end
-
-    def _next_record(self, passes: float) -> float:
-        """Return the passes of the first record after `passes`; a pass by itself has no parts."""
-        due = self.schedule.next_record(passes)
-        return float(math.ceil(due)) if self.stepper.pass_by_pass else due
 
     def drop_unfinished(self) -> None:
         """Forget what an interrupted `add` left behind."""

@@ -23,8 +23,8 @@ from wearsim.studies.build import build_scene, start_height, strips_of_run
 from wearsim.studies.draws import draw, drawn_values
 from wearsim.studies.events import Checkpointed, Event, Finished, Started, Stepped, Warned
 from wearsim.studies.provenance import (
+    changed_origins,
     missing_plugins,
-    origins,
     plugins_in_use,
     software,
 )
@@ -185,7 +185,7 @@ class _Replay:
         self.stop_requested = stop_requested or (lambda: False)
         self.stop = float(scenario.total_passes)
         self.software, self.plugins = dict(software()), plugins_in_use(scenario)
-        self.drawn = drawn_values(scenario)
+        self.drawn = drawn_values(scenario, draw(scenario))
         self.warnings: list[str] = []
         self.created = datetime.now(UTC).isoformat(timespec="seconds")
         self.wall_before, self.started = 0.0, time.monotonic()
@@ -202,14 +202,8 @@ class _Replay:
         self.recorder = self._recorder(state, data)
         self.warnings, self.created = list(data.warnings), data.created
         self.wall_before = data.wall_seconds
-        before = origins(data.software, data.plugins)
-        now = origins(self.software, self.plugins)
-        for name in now:
-            if before.get(name, now[name]) != now[name]:
-                self._warn(
-                    f"this file was written with {name} {before[name]} and goes on with"
-                    f" {now[name]}: the last digits may differ from those of an unbroken run"
-                )
+        for text in changed_origins(data, self.scenario):
+            self._warn(text)
 
     def _recorder(self, state: WearState, data: RunData | None = None) -> Recorder:
         schedule = RecordSchedule.of(self.scenario, self.record_base)

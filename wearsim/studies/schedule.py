@@ -5,8 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from wearsim.scenario import Scenario
 from wearsim.scenario.sections import DEFAULT_RECORDS
+from wearsim.types import FloatArray
 
 _ROUND_OFF = 1e-9
 
@@ -53,3 +56,23 @@ class RecordSchedule:
         # a record due at the end of the test must not fall a round-off before it
         whole = float(round(due))
         return whole if abs(due - whole) <= 1e-15 * whole and whole > passes else due
+
+    def all_records(self, stop: float, pass_by_pass: bool) -> FloatArray:
+        """Return the passes of every record of a test, from the fresh state to its end.
+
+        Parameters
+        ----------
+        stop : float
+            Passes at the end of the test.
+        pass_by_pass : bool
+            Whether every pass is a step, so that records fall on whole ones.
+        """
+        found = [0.0]
+        while found[-1] < stop:
+            found.append(min(self.due_after(found[-1], pass_by_pass), stop))
+        return np.array(found)
+
+    def due_after(self, passes: float, pass_by_pass: bool) -> float:
+        """Return the passes of the first record after `passes`; a pass by itself has no parts."""
+        due = self.next_record(passes)
+        return float(math.ceil(due)) if pass_by_pass else due

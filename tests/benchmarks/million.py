@@ -1,0 +1,67 @@
+"""Streams realisations that cost nothing through an ensemble's file, and tells what that takes.
+
+``python -m tests.benchmarks.million COUNT`` prints JSON. Every test is the closed form of full
+slip, so that what is measured is the way into the file, and from the file into statistics.
+"""
+
+from __future__ import annotations
+
+import json
+import resource
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from tests.benchmarks.ensemble_cases import Size, drawn
+from wearsim.results import Outcome
+from wearsim.results.ensemble_layout import OBSERVABLES
+from wearsim.studies import ensemble as study
+from wearsim.studies.depth_control import closed_form_depths
+from wearsim.studies.member import Members
+
+
+class ClosedForm(Members):
+    """Members whose depth is that of full slip of rigid bodies, and nothing else is known."""
+
+    def __call__(self, numbers: Sequence[int]) -> list[Outcome]:
+        """Return what realisations on end would wear, in closed form."""
+        first, count = numbers[0], len(numbers)
+        columns = self.drawer.columns(first, count)
+        depths = closed_form_depths(self.scenario, columns, count)
+        return [
+            Outcome(
+                number=first + k,
+                drawn={key: column[k] for key, column in columns.items()},
+                observables={name: depths[k] * np.array([0.0, 1.0]) for name in OBSERVABLES},
+                scalars=dict.fromkeys(("depth_error", "volume_error", "steps", "solves"), 0.0),
+                profile=np.zeros(self.grid.strips),
+            )
+            for k in range(count)
+        ]
+
+
+def main(count: int) -> None:
+    """Run an ensemble of `count` and print its peak memory, time and size."""
+    study.Members = ClosedForm  # type: ignore[misc]
+    begun = time.perf_counter()
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "many.h5"
+        result = study.ensemble(drawn("per-test", Size()), count, path, scheduler="serial")
+        if result.count != count:
+            raise RuntimeError(f"{result.count} of {count} realisations ended well")
+        size = path.stat().st_blocks * 512
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024  # kB on Linux
+    told = {
+        "seconds": time.perf_counter() - begun,
+        "megabytes": peak / 1e6,
+        "file_megabytes": size / 1e6,
+    }
+    sys.stdout.write(json.dumps(told))
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]))

@@ -1,0 +1,89 @@
+"""Run as a process: writes ensembles and kills itself at every stage, as an outage would."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import sys
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+from ensemble_examples import some_header, some_outcome, some_static
+
+from wearsim.results import EnsembleFile, Outcome, writer
+from wearsim.results.ensemble_layout import DONE
+
+ASKED, STRIPS = 5, 60
+BATCHES = ([3, 0, 1], [4, 2])
+FAILED = (1, 4)
+SMALL_CHUNK = 400  # two writes to a profile, so that a kill may leave half of one
+
+
+def outcome(number: int, fails: bool) -> Outcome:
+    """Return a realisation of the ensemble that is killed."""
+    error = f"realisation {number} lost contact" if fails else ""
+    return some_outcome(number, STRIPS, error)
+
+
+def create(path: Path) -> None:
+    """Write an ensemble of pending realisations."""
+    EnsembleFile.create(path, some_header(ASKED), some_static(STRIPS)).close()
+
+
+def go_on(path: Path, batches: Iterable[list[int]] = BATCHES) -> None:
+    """Put what is not there yet, a state after each batch, then what has failed once more."""
+    with EnsembleFile.open(path) as file:
+        for batch in batches:
+            missing = [number for number in batch if not file.status[number]]
+            file.put([outcome(number, number in FAILED) for number in missing])
+            file.put_state({"wall_seconds": file.data.wall_seconds + len(missing)})
+        again = [number for batch in batches for number in batch if file.status[number] != DONE]
+        file.clear(again)
+        file.put([outcome(number, fails=False) for number in again])
+
+
+def kill_while(work: Callable[[], None], at: int) -> int:
+    """Fork, and kill the child at its call number `at` of the seam; return the signal."""
+    child = os.fork()
+    if child:
+        return os.WTERMSIG(os.waitpid(child, 0)[1])
+    calls = iter(range(10**6))
+
+    def kill(stage: str) -> None:
+        if next(calls) == at:
+            os.kill(os.getpid(), signal.SIGKILL)
+
+    writer.on_write_stage = kill
+    work()
+    os._exit(0)
+
+
+def stages_of(work: Callable[[], None]) -> list[str]:
+    """Return every call of the seam, in order."""
+    seen: list[str] = []
+    writer.on_write_stage = seen.append
+    work()
+    writer.on_write_stage = lambda _: None
+    return seen
+
+
+def kill_at_every_stage(kind: str, start: Path | None, work: Callable[[Path], None]) -> None:
+    """Kill the work on a copy of a file, or on none, at every stage, and say where and how."""
+    for at, name in enumerate(stages_of(lambda: work(whole))):
+        if name.startswith("before"):  # nothing is done between that and the "after" before it
+            target = folder / f"{kind}-{at}.h5"
+            if start:
+                shutil.copy(start, target)
+            killed_by = kill_while(lambda: work(target), at)  # noqa: B023
+            sys.stdout.write(f"{target.name},{killed_by},{name}\n")
+
+
+if __name__ == "__main__":
+    folder = Path(sys.argv[1])
+    fresh, whole = folder / "fresh.h5", folder / "whole.h5"
+    create(fresh)
+    kill_at_every_stage("create", None, create)
+    writer._CHUNK = SMALL_CHUNK
+    kill_at_every_stage("rows", fresh, lambda path: go_on(path, BATCHES[:1]))
+    go_on(whole)

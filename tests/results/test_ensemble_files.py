@@ -1,0 +1,288 @@
+"""The file of an ensemble: every bit back, for any reader, and whatever is wrong with it told."""
+
+from __future__ import annotations
+
+import tracemalloc
+from dataclasses import fields
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import xarray
+from ensemble_examples import (
+    RECORDS,
+    ROLLERS,
+    SCALARS,
+    STRIPS,
+    some_header,
+    some_outcome,
+    some_static,
+    some_statistics,
+)
+from run_examples import some_run
+from test_dissipation_files import some_study
+
+from wearsim.errors import ResultsFileError
+from wearsim.results import (
+    EnsembleData,
+    EnsembleFile,
+    is_dissipation,
+    kind_of,
+    read_dissipation,
+    read_ensemble,
+    read_results,
+    write_results,
+)
+from wearsim.results.ensemble_layout import DONE, FAILED, OBSERVABLES, PENDING, QUANTILES
+from wearsim.results.ensemble_state import PLACES
+
+ERROR = "lost contact at 1.2e6 passes: µ = 0.3"
+
+
+@pytest.fixture
+def ensemble_file(tmp_path: Path) -> Path:
+    """Realisations 0 to 3 and 17 are done, 5 failed."""
+    path = tmp_path / "ensemble.h5"
+    with EnsembleFile.create(path, some_header(), some_static()) as file:
+        file.put([some_outcome(number) for number in (2, 0, 1)])
+        file.put([some_outcome(5, error=ERROR), some_outcome(17), some_outcome(3)])
+        file.put_state({"wall_seconds": 2.5, "warnings": ["slow"], "statistics": {"a": [1.5]}})
+    return path
+
+
+def _complaint(path: Path) -> str:
+    with pytest.raises(ResultsFileError) as caught:
+        read_ensemble(path)
+    text = str(caught.value)
+    assert text.startswith(f"{path}: ")
+    assert "\n" not in text
+    return text.removeprefix(f"{path}: ")
+
+
+def test_that_every_bit_of_an_ensemble_comes_back(ensemble_file):
+    data, header = read_ensemble(ensemble_file), some_header()
+    changed = {"wall_seconds": 2.5, "warnings": ["slow"], "statistics": {"a": [1.5]}}
+    for item in fields(EnsembleData):
+        if item.name not in {"variables", "status", "errors"}:
+            expected = changed.get(item.name, getattr(header, item.name))
+            assert getattr(data, item.name) == expected, item.name
+    assert data.errors == {5: ERROR}
+    assert data.done.tolist() == [0, 1, 2, 3, 17]
+    assert data.failed.tolist() == [5]
+    for name, array in some_static().items():
+        assert data.variables[name].tobytes() == array.tobytes(), name
+    for number in data.done:
+        for name, value in some_outcome(number).values.items():
+            assert data.variables[name][number].tobytes() == np.asarray(value).tobytes(), name
+
+
+def test_that_rows_of_failed_realisations_are_nan_but_for_what_was_drawn(ensemble_file):
+    variables = read_ensemble(ensemble_file).variables
+    for name, value in some_outcome(5, error=ERROR).drawn.items():
+        assert variables[name][5].tobytes() == np.asarray(value).tobytes()
+    for name in (*OBSERVABLES, *SCALARS, "profile"):
+        assert np.isnan(variables[name][5]).all(), name
+
+
+def test_that_a_column_is_one_record_of_every_realisation(ensemble_file, monkeypatch):
+    data = read_ensemble(ensemble_file)
+    depth = data.variables["depth"]
+    for record in (0, RECORDS - 1, -1):
+        np.testing.assert_array_equal(data.column("depth", record), depth[:, record])
+    monkeypatch.setattr("wearsim.results.ensemble_rows._BLOCK", 7 * depth[0].nbytes)
+    np.testing.assert_array_equal(data.column("depth", -1), depth[:, -1])  # in several blocks
+    np.testing.assert_array_equal(data.variables.rows("depth", 3, 6), depth[3:6])
+
+
+def test_that_a_long_error_is_cut_between_two_characters(tmp_path):
+    path = tmp_path / "ensemble.h5"
+    long, surrogate = "x" + "µ" * 300, "half \ud800"
+    with EnsembleFile.create(path, some_header(), some_static()) as file:
+        file.put([some_outcome(1, error=long), some_outcome(2, error=surrogate)])
+    errors = read_ensemble(path).errors
+    assert errors[1].endswith("µ…")
+    assert long.startswith(errors[1].removesuffix("…"))
+    assert 397 <= len(errors[1].encode()) <= 399
+    assert errors[2] == "half ?"
+
+
+def test_that_a_control_variate_has_a_variable_of_its_own(tmp_path):
+    path, control = tmp_path / "ensemble.h5", {"mean": 1.5, "std": 0.1, "draws": 1000000}
+    outcome = some_outcome(0)
+    outcome.scalars["control"] = 1.25
+    with EnsembleFile.create(path, some_header(control=control), some_static()) as file:
+        file.put([outcome])
+    data = read_ensemble(path)
+    assert data.control == control
+    assert data.variables["control"][0] == 1.25
+
+
+def test_that_xarray_opens_an_ensemble_with_named_dimensions_and_units(ensemble_file):
+    statistics = some_statistics(ensemble_file)
+    with EnsembleFile.open(ensemble_file) as file:
+        file.put_statistics(statistics)
+    with xarray.open_dataset(ensemble_file, engine="h5netcdf") as dataset:
+        assert dataset.sizes == {
+            "realisation": 20,
+            "record": RECORDS,
+            "roller": ROLLERS,
+            "y": STRIPS,
+            "kept": 20,
+            "quantile": len(QUANTILES),
+        }
+        assert tuple(dataset["quantile"].values) == QUANTILES
+        assert dataset["depth"].dims == ("realisation", "record")
+        assert dataset["depth"].attrs["units"] == "m"
+        assert dataset["creepage.yaw"].dims == ("realisation", "roller")
+        assert dataset["depth_quantiles"].dims == ("quantile", "record")
+        assert dataset["depth_quantiles"].attrs["units"] == "m"
+        assert dataset["realisation"].values[0] == 0
+        assert dataset["record"].values[0] == 0
+        assert dataset["error"].values[5].decode() == ERROR
+        assert dataset["status"].values[:7].tolist() == [DONE] * 4 + [PENDING, FAILED, PENDING]
+        assert all({"units", "long_name"} <= set(found.attrs) for found in dataset.values())
+        assert dataset.attrs["format"] == "wearsim-ensemble"
+        assert "finished" not in dataset.attrs  # it would not change
+        for name, array in statistics.items():
+            np.testing.assert_array_equal(dataset[name].values, array)
+
+
+def test_that_statistics_are_nan_until_they_are_made(ensemble_file):
+    variables = read_ensemble(ensemble_file).variables
+    assert np.isnan(variables["width_quantiles"]).all()
+    assert np.isnan(variables["profile_low"]).all()
+
+
+def test_that_every_kind_of_file_is_told_from_the_others(ensemble_file, tmp_path):
+    run, study = tmp_path / "run.h5", tmp_path / "study.h5"
+    write_results(run, some_run())
+    write_results(study, some_study())
+    assert [kind_of(path) for path in (run, study, ensemble_file)] == [
+        "replay",
+        "dissipation",
+        "ensemble",
+    ]
+    assert not is_dissipation(ensemble_file)
+    for read, needed in ((read_results, "a wear test"), (read_dissipation, "realisations of one")):
+        with pytest.raises(ResultsFileError) as caught:
+            read(ensemble_file)
+        assert str(caught.value).startswith(
+            f"{ensemble_file}: holds an ensemble of wear tests, from `wearsim ensemble`; what is"
+            f" needed is {needed}"
+        )
+    assert _complaint(run).startswith("holds a wear test, from `wearsim run`; what is needed is an")
+    with pytest.raises(ResultsFileError, match="holds a wear test"):
+        EnsembleFile.open(run)
+
+
+def test_that_missing_and_foreign_files_are_told(tmp_path):
+    path = tmp_path / "a.h5"
+    assert _complaint(path) == "there is no such file"
+    path.write_bytes(b"y [mm],z [um]\n0,1\n" * 99)
+    assert _complaint(path) == "is not a results file of wearsim, not even HDF5"
+
+
+def test_that_a_truncated_ensemble_is_told_at_any_length(ensemble_file):
+    content = ensemble_file.read_bytes()
+    size = len(content)
+    near = {1, 95, 96, 97, 2048, size - 4096, size - 8, size - 1}
+    for length in sorted(near | set(range(100, size, size // 40))):
+        ensemble_file.write_bytes(content[:length])
+        assert _complaint(ensemble_file).startswith("is truncated"), length
+
+
+def _newer(file: h5py.File) -> None:
+    file.attrs["format_version"] = 2
+
+
+def _lacking(file: h5py.File) -> None:
+    del file["depth"], file["checkpoint/state_1"]
+
+
+def _lacking_a_draw(file: h5py.File) -> None:
+    del file["creepage.yaw"]
+
+
+def _of_wrong_shape(file: h5py.File) -> None:
+    del file["depth"]
+    file["depth"] = np.zeros((20, 1))
+
+
+def _of_wrong_type(file: h5py.File) -> None:
+    del file["depth"]
+    file["depth"] = np.zeros((20, RECORDS), np.float32)
+
+
+def _compressed(file: h5py.File) -> None:
+    del file["depth"]
+    file.create_dataset("depth", data=np.zeros((20, RECORDS)), compression="gzip")
+
+
+def _of_unknown_status(file: h5py.File) -> None:
+    file["status"][7] = 9
+
+
+def _without_state(file: h5py.File) -> None:
+    for place in PLACES:
+        file[f"checkpoint/{place}"][20] ^= 1
+
+
+@pytest.mark.parametrize(
+    ("change", "complaint"),
+    [
+        (_newer, "was written by a newer wearsim (format 2, this one reads up to 1)"),
+        (_lacking, "is damaged (lacks depth, checkpoint/state_1)"),
+        (_lacking_a_draw, "is damaged (lacks creepage.yaw)"),
+        (_of_wrong_shape, "is damaged (depth has 1 along record, others have 4)"),
+        (_of_wrong_type, "is damaged (depth is stored as float32)"),
+        (_compressed, "is damaged (/depth is not in one piece, as after h5repack)"),
+        (_of_unknown_status, "is damaged (a realisation has the status 9)"),
+        (_without_state, "is damaged (its state is not sound in either place)"),
+    ],
+)
+def test_that_an_ensemble_that_is_not_as_written_is_told(ensemble_file, change, complaint):
+    with h5py.File(ensemble_file, "r+") as file:
+        change(file)
+    assert _complaint(ensemble_file).startswith(complaint)
+    before = ensemble_file.read_bytes()
+    with pytest.raises(ResultsFileError):
+        EnsembleFile.open(ensemble_file)
+    assert ensemble_file.read_bytes() == before
+
+
+def test_that_a_file_that_changes_under_the_reader_is_told(ensemble_file, tmp_path):
+    data = read_ensemble(ensemble_file)
+    other = tmp_path / "other.h5"
+    EnsembleFile.create(other, some_header(), some_static()).close()
+    content = ensemble_file.read_bytes()
+    ensemble_file.write_bytes(content[:1000])
+    with pytest.raises(ResultsFileError, match="is truncated"):
+        data.variables["depth"]
+    other.replace(ensemble_file)
+    with pytest.raises(ResultsFileError, match="was replaced by another"):
+        data.column("depth", -1)
+    ensemble_file.unlink()
+    with pytest.raises(ResultsFileError, match="cannot be read"):
+        data.variables["depth"]
+
+
+def test_that_a_million_realisations_take_no_memory_and_no_disk_before_they_are_done(tmp_path):
+    path, million = tmp_path / "ensemble.h5", 10**6
+    header, static = some_header(million), some_static(500)
+    EnsembleFile.create(tmp_path / "small.h5", some_header(10), static).close()  # loads h5py
+    tracemalloc.start()
+    with EnsembleFile.create(path, header, static) as file:
+        file.put([some_outcome(number, 500) for number in (3, million - 1)])
+    data = read_ensemble(path)
+    depth = data.column("depth", 1)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    numbers = million * len(OBSERVABLES) * RECORDS
+    assert path.stat().st_size > 8 * numbers
+    assert peak < 0.1 * 8 * numbers  # numbering the realisations takes most of it
+    assert path.stat().st_blocks * 512 < 0.1 * 8 * numbers
+    assert data.done.tolist() == [3, million - 1]
+    for number in data.done:
+        assert depth[number] == some_outcome(number, 500).observables["depth"][1]
+    assert len(data.variables["profile"]) == 16_000_000 // 500

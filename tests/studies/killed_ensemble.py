@@ -1,0 +1,79 @@
+"""Run as a process: has ensembles killed, finishes what they left, and tells what came of it.
+
+One process does all: it compiles and runs once, and forks for every ensemble that is to be killed.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import sys
+import time
+from pathlib import Path
+
+from killed_run import ended, forked, killing, stages_of, tell
+
+from tests.studies.ensemble_cases import small, unlike
+from wearsim.results import open_ensemble, writer
+from wearsim.scenario import Scenario
+from wearsim.studies import ensemble_grid
+from wearsim.studies.ensemble import ensemble, resume_ensemble
+from wearsim.studies.ensemble_work import EnsembleWork
+
+
+def go(scenario: Scenario, count: int, path: Path, scheduler: str = "serial") -> int:
+    """Run an ensemble, or go on with what there is; return how many were done, -1 for no file."""
+    if not path.exists():
+        ensemble(scenario, count, path, scheduler=scheduler)
+        return -1
+    done = int((open_ensemble(path).raw.status != 0).sum())
+    resume_ensemble(path, scheduler=scheduler)
+    return done
+
+
+def kill_at_stages(scenario: Scenario, count: int, folder: Path) -> None:
+    """Kill an ensemble at every call of the seam, and every fifth once more as it goes on."""
+    whole = ensemble(scenario, count, folder / "one.h5", scheduler="serial")
+    stages = stages_of(lambda: go(scenario, count, folder / "whole.h5"))
+    for number, stage in enumerate(stages):
+        path = folder / f"{number}.h5"
+        again = [7 * number % 30] if number % 5 == 0 else []
+        killed = []
+        for at in (number, *again):
+
+            def work(at: int = at, path: Path = path) -> None:
+                writer.on_write_stage = killing(at)
+                go(scenario, count, path)
+
+            killed.append(ended(forked(work)))
+        done = go(scenario, count, path)
+        tell(stage=stage, killed=killed, done=done, unlike=unlike(path, whole))
+
+
+def kill_at_moments(scenario: Scenario, count: int, folder: Path, times: int) -> None:
+    """Kill ensembles at random moments, half of them once more as they go on."""
+    whole = ensemble(scenario, count, folder / "one.h5", scheduler="serial")
+    begun = time.perf_counter()
+    ended(forked(lambda: go(scenario, count, folder / "whole.h5")))
+    took, moments = time.perf_counter() - begun, random.Random(11)
+    for number in range(times):
+        path, killed = folder / f"{number}.h5", []
+        for _ in range(1 + number % 2):
+            child = forked(lambda path=path: go(scenario, count, path))
+            time.sleep(moments.uniform(0.0, 1.0) * took)
+            os.kill(child, signal.SIGKILL)
+            killed.append(ended(child))
+        done = go(scenario, count, path)
+        tell(killed=killed, done=done, unlike=unlike(path, whole))
+
+
+if __name__ == "__main__":
+    EnsembleWork._batch_size = lambda self: 2
+    ensemble_grid.PROBES = 3  # each kill starts anew
+    mode, where = sys.argv[1], Path(sys.argv[2])
+    tests = small(passes=400, contact__strips=31)
+    if mode == "stages":
+        kill_at_stages(tests, 3, where)
+    else:
+        kill_at_moments(tests, 8, where, int(sys.argv[3]))

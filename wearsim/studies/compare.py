@@ -1,0 +1,188 @@
+"""Runs and ensembles side by side: how deep each wears, and how surely one wears deeper."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from wearsim.randomness.estimates import Design
+from wearsim.randomness.intervals import Interval
+from wearsim.randomness.plans import REPLICATES
+from wearsim.randomness.superiority import Paired, paired, superiority
+from wearsim.results import EnsembleResult, Result
+from wearsim.types import FloatArray, IntArray
+
+QUANTILES = (0.05, 0.5, 0.95)
+_ERRORS = {"depth": "depth_error", "worn_volume": "volume_error"}
+
+Comparable: TypeAlias = Result | EnsembleResult
+
+
+@dataclass(frozen=True)
+class Compared:
+    """One of what is compared.
+
+    Parameters
+    ----------
+    label : str
+        What it is called.
+    kind : str
+        "run" or "ensemble".
+    count : int
+        Realisations.
+    value : Interval
+        Mean with its confidence interval; of a run its value with its stated error.
+    std : Interval, optional
+        Standard deviation, of an ensemble.
+    quantiles : tuple of (float, Interval)
+        Of an ensemble.
+    deeper : Interval, optional
+        Probability that it has more of the observable than the first, one test against another;
+        None for the first.
+    paired : Paired, optional
+        The same, realisation by realisation, where both have the same random numbers.
+    values : ndarray, shape (count,)
+        Every realisation, rising.
+    """
+
+    label: str
+    kind: str
+    count: int
+    value: Interval
+    std: Interval | None
+    quantiles: tuple[tuple[float, Interval], ...]
+    deeper: Interval | None
+    paired: Paired | None
+    values: FloatArray
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Runs and ensembles side by side.
+
+    Parameters
+    ----------
+    observable : str
+        What is compared at the end of the tests.
+    rows : list of Compared
+        In the order given.
+    """
+
+    observable: str
+    rows: list[Compared]
+
+
+def compare(
+    results: Sequence[Comparable], labels: Sequence[str], observable: str = "depth"
+) -> Comparison:
+    """Compare runs and ensembles at the ends of their tests.
+
+    Parameters
+    ----------
+    results : sequence of Result or EnsembleResult
+        Two or more.
+    labels : sequence of str
+        What each is called.
+    observable : str
+        "depth", "width", "worn_volume", "dissipated_energy" or another that all have.
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than two, one has no realisations, or lacks the observable.
+    """
+    if len(results) < 2:
+        raise ValueError("there must be two or more to compare")
+    for label, result in zip(labels, results, strict=True):
+        _check(label, result, observable)
+    rows = [
+        _row(label, result, observable, results[0] if number else None)
+        for number, (label, result) in enumerate(zip(labels, results, strict=True))
+    ]
+    return Comparison(observable, rows)
+
+
+def observables_of(result: Comparable) -> tuple[str, ...]:
+    """Return what can be compared of a run or an ensemble."""
+    if isinstance(result, EnsembleResult):
+        return result.observables
+    return ("depth", "width", "worn_volume", "roller_depth", "dissipated_energy", "power")
+
+
+def _check(label: str, result: Comparable, observable: str) -> None:
+    if observable not in observables_of(result):
+        known = ", ".join(observables_of(result))
+        raise ValueError(f"{label} has no '{observable}'; it has {known}")
+    if isinstance(result, EnsembleResult) and result.count == 0:
+        raise ValueError(f"{label} has no realisation that ended well")
+
+
+def _values(result: Comparable, observable: str) -> tuple[IntArray, FloatArray]:
+    """Return numbers and end values of independent tests."""
+    if isinstance(result, EnsembleResult):
+        return result.independent(observable)
+    return np.zeros(1, np.int64), np.array([float(np.max(result.values(observable)[-1]))])
+
+
+def _row(label: str, result: Comparable, observable: str, first: Comparable | None) -> Compared:
+    _, values = _values(result, observable)
+    deeper = None if first is None else superiority(values, _values(first, observable)[1])
+    if isinstance(result, Result):
+        error = _stated_error(result, observable)
+        value = Interval(float(values[0]), float(values[0]) - error, float(values[0]) + error)
+        return Compared(label, "run", 1, value, None, (), deeper, None, values)
+    found = result.estimate(observable, probabilities=QUANTILES)
+    return Compared(
+        label=label,
+        kind="ensemble",
+        count=len(values),
+        value=found.mean,
+        std=found.std,
+        quantiles=found.quantiles,
+        deeper=deeper,
+        paired=_paired(result, first, observable),
+        values=np.sort(values),
+    )
+
+
+def _paired(result: EnsembleResult, first: Comparable | None, observable: str) -> Paired | None:
+    """Return how tests with the same random numbers differ, where there are any."""
+    if not isinstance(first, EnsembleResult) or not have_same_draws(result, first):
+        return None
+    (numbers, values), (others, theirs) = (_values(one, observable) for one in (result, first))
+    both, mine, yours = np.intersect1d(numbers, others, assume_unique=True, return_indices=True)
+    if len(both) == 0:
+        return None
+    plan: Design = "sobol" if result.plan == "sobol" else "monte-carlo"
+    return paired(values[mine], theirs[yours], plan, both % REPLICATES)
+
+
+def _stated_error(result: Result, observable: str) -> float:
+    """Return what a run says of its error; nothing where it does not tell."""
+    if observable not in _ERRORS:
+        return 0.0
+    return float(np.max(result.values(_ERRORS[observable])[-1]))
+
+
+def have_same_draws(one: EnsembleResult, other: EnsembleResult) -> bool:
+    """Tell whether realisation k of two ensembles has the same random numbers."""
+    plans = [
+        "monte-carlo" if result.plan == "control-variate" else result.plan
+        for result in (one, other)
+    ]
+    keys, groups = (
+        [{item[name] for item in getattr(result.raw, kind)} for result in (one, other)]
+        for kind, name in (("inputs", "key"), ("groups", "name"))
+    )
+    # strata depend on the number of realisations, and Saltelli's rows on that of the inputs
+    sizes = [one.asked, other.asked] if plans[0] == "latin-hypercube" else [0, 0]
+    rows = groups if plans[0] == "saltelli" else [set(), set()]
+    same = plans[0] == plans[1] and sizes[0] == sizes[1] and rows[0] == rows[1]
+    return same and one.raw.seed == other.raw.seed and bool(keys[0] & keys[1])

@@ -1,0 +1,243 @@
+"""The work on an ensemble: batches go out, outcomes come in, and each goes into the file."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from wearsim.errors import Interrupted
+from wearsim.randomness.intervals import UNKNOWN
+from wearsim.randomness.targets import Target
+from wearsim.results import EnsembleFile, EnsembleResult, Outcome
+from wearsim.results.ensemble_layout import DONE, FAILED, PENDING
+from wearsim.studies.checkpoints import checkpoints
+from wearsim.studies.ensemble_events import EnsembleProgress
+from wearsim.studies.executors import Executor
+from wearsim.studies.member import Members
+
+SECONDS = 1.0  # that a batch should take
+MOST_IN_BATCH = 256
+FIRST_BATCH = 8
+BETWEEN_ESTIMATES = 0.5  # s
+DEFAULT_TARGET = Target.parse("depth.mean 1%")
+
+
+class EnsembleWork:
+    """Runs what is pending in an ensemble's file.
+
+    Which realisations an ensemble ends with depends on their outcomes alone: an estimate is held
+    against its target at numbers of realisations that are fixed beforehand, and what lies beyond
+    them is not written before they are passed.
+
+    Parameters
+    ----------
+    file : EnsembleFile
+        Open for writing.
+    members : Members
+    target : Target, optional
+        What ends the ensemble early.
+    pool : Executor
+    on_progress : callable, optional
+        Told how far it has come.
+    stop_requested : callable, optional
+        Asked after every batch.
+    """
+
+    def __init__(
+        self,
+        file: EnsembleFile,
+        members: Members,
+        target: Target | None,
+        pool: Executor,
+        on_progress: Callable[[EnsembleProgress], None] | None,
+        stop_requested: Callable[[], bool] | None,
+    ) -> None:
+        self.file, self.members, self.target, self.pool = file, members, target, pool
+        self.tell = on_progress or (lambda progress: None)
+        self.stop_requested = stop_requested or (lambda: False)
+        self.asked = len(file.status)
+        self.begun, self.before = time.monotonic(), file.data.wall_seconds
+        self.warnings = list(file.data.warnings)
+        self._marks = checkpoints(members.plan, self.asked) if target else []
+        self._limit = self._marks[0] if self._marks else self.asked
+        self._held: dict[int, Outcome] = {}
+        self._stopping = self._reached = False
+        self._run, self._rate = 0, 0.0
+        self._shown, self._estimate = -math.inf, UNKNOWN
+
+    def warn(self, text: str) -> None:
+        """Keep a warning with the results."""
+        if text not in self.warnings:
+            self.warnings.append(text)
+
+    def finish(self) -> None:
+        """Run all that is pending.
+
+        Raises
+        ------
+        Interrupted
+            If it was stopped before the end.
+        """
+        self._pass_marks()
+        self._run_through(self._pending())
+        if self._stopping and not self._is_complete():
+            self._write_state(finished=False)
+            raise self._interrupted()
+        self._close()
+
+    def run_again(self, numbers: Sequence[int]) -> None:
+        """Run realisations that failed once more, and nothing else; raises as `finish`."""
+        finished = self.file.data.finished
+        if finished:
+            self.warnings = []  # what was judged of it will be judged anew
+        self.file.clear(numbers)
+        self._marks, self._limit, self.target = [], self.asked, None
+        self._run_through(iter(numbers))
+        left = [number for number in numbers if self.file.status[number] == PENDING]
+        if left or not finished:
+            self._write_state(finished=False)
+            if left:
+                raise self._interrupted()
+            return
+        self._close()
+
+    def _run_through(self, numbers: Iterator[int]) -> None:
+        """Send numbers out in batches until there are no more, or a stop is asked for."""
+        try:
+            for _, outcomes in self.pool.results(self.members, self._batches(numbers)):
+                self._take(outcomes)
+                self._stopping = self._stopping or self.stop_requested()
+                self._tell_progress(len(outcomes))
+        except KeyboardInterrupt:
+            self._stopping = True
+
+    def _pending(self) -> Iterator[int]:
+        """Yield pending realisations, no further ahead of the next mark than workers need."""
+        for number in np.flatnonzero(self.file.status == PENDING).tolist():
+            if self._reached:
+                return
+            yield number
+
+    def _batches(self, numbers: Iterator[int]) -> Iterator[list[int]]:
+        """Yield batches that take about `SECONDS` each; which numbers share one changes nothing."""
+        batch: list[int] = []
+        for number in numbers:
+            batch.append(number)
+            if len(batch) >= self._batch_size():
+                yield batch
+                batch = []
+            if self._stopping or self._reached:
+                return
+        if batch:
+            yield batch
+
+    def _batch_size(self) -> int:
+        if not self._rate:
+            return FIRST_BATCH
+        return int(np.clip(SECONDS * self._rate / self.pool.workers, 1, MOST_IN_BATCH))
+
+    def _take(self, outcomes: Sequence[Outcome]) -> None:
+        """Write outcomes, those beyond the next mark later."""
+        now = [item for item in outcomes if item.number < self._limit]
+        self._held.update({item.number: item for item in outcomes if item.number >= self._limit})
+        self._run += len(outcomes)
+        self._rate = self._run / max(time.monotonic() - self.begun, 1e-9)
+        if now and not self._reached:
+            self.file.put(now)
+        self._pass_marks()
+
+    def _pass_marks(self) -> None:
+        """Go on to the next mark for as long as all realisations before this one are there."""
+        while self._marks and not self._reached:
+            if (self.file.status[: self._limit] == PENDING).any():
+                return
+            if self.target and self.target.reached(self._result().estimate_for(self.target)):
+                self._reached = True
+                return
+            self._marks = self._marks[1:]
+            self._limit = self._marks[0] if self._marks else self.asked
+            due = sorted(number for number in self._held if number < self._limit)
+            if due:
+                self.file.put([self._held.pop(number) for number in due])
+
+    def _is_complete(self) -> bool:
+        return self._reached or not (self.file.status == PENDING).any()
+
+    def _result(self) -> EnsembleResult:
+        """Return what is in the file by now."""
+        data = replace(self.file.data, status=self.file.status.copy())
+        return EnsembleResult(data, self.file.path)
+
+    def _close(self) -> None:
+        """Write what is only known at the end."""
+        result = self._result()
+        if result.count:
+            self.file.put_statistics(result.statistics())
+        self._judge(result)
+        self._write_state(finished=True, result=result)
+
+    def _judge(self, result: EnsembleResult) -> None:
+        """Warn of what a user should know before trusting the ensemble."""
+        data = result.raw
+        if result.count:
+            errors = result.values("depth_error")
+            deepest = np.maximum(result.at_end("depth"), result.at_end("roller_depth"))
+            beyond = int((errors > data.tolerance * deepest).sum())
+            if beyond:
+                self.warn(
+                    f"the estimated error of depth is more than the tolerance in {beyond} of"
+                    f" {result.count} realisations; lower evolution.tolerance"
+                )
+        kept = len(result.raw.variables["profile"])
+        if kept < data.asked:
+            self.warn(
+                f"the profiles of the first {kept} realisations are kept, and mean profile and"
+                " band are theirs"
+            )
+        if self.target and not self._reached:
+            self.warn(f"{self.target} was not reached by {data.asked} realisations")
+
+    def _write_state(self, finished: bool, result: EnsembleResult | None = None) -> None:
+        told = result.told_estimates() if result is not None and result.count else {}
+        self.file.put_state(
+            {
+                "finished": finished,
+                "warnings": self.warnings,
+                "notes": self.file.data.notes,
+                "wall_seconds": self.before + time.monotonic() - self.begun,
+                "statistics": told,
+            }
+        )
+
+    def _interrupted(self) -> Interrupted:
+        path, status = self.file.path, self.file.status
+        done = int((status != PENDING).sum())
+        return Interrupted(
+            f"stopped after {done} of {self.asked} realisations; go on with: wearsim resume {path}"
+        )
+
+    def _tell_progress(self, fresh: int) -> None:
+        status = self.file.status
+        done, failed = int((status == DONE).sum()), int((status == FAILED).sum())
+        target = self.target or DEFAULT_TARGET
+        now = time.monotonic()
+        if done and now - self._shown > BETWEEN_ESTIMATES:
+            self._shown = now
+            self._estimate = target.interval(self._result().estimate_for(target))
+        left = self.asked - done - failed
+        self.tell(
+            EnsembleProgress(
+                done=done,
+                failed=failed,
+                asked=self.asked,
+                rate=self._rate,
+                left=left / self._rate if self._rate else math.nan,
+                what=target.what,
+                estimate=self._estimate,
+                workers=self.pool.describe,
+            )
+        )

@@ -1,0 +1,69 @@
+"""One ensemble for each of several values of a key, all with the same random numbers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from wearsim.results import EnsembleResult, check_output
+from wearsim.scenario import Scenario
+from wearsim.studies.ensemble import ensemble
+
+
+def sweep(
+    scenario_of: Callable[[str], Scenario],
+    values: Sequence[str],
+    realisations: int,
+    output: str | Path,
+    *,
+    on_value: Callable[[str, Path], None] | None = None,
+    **options: Any,
+) -> list[EnsembleResult]:
+    """Run an ensemble for each of several values, each to a file of its own.
+
+    Draws have the names of their inputs as addresses, so that realisation k is the same test in all
+    of them but for the value: what differs between the ensembles is not left to chance.
+
+    Parameters
+    ----------
+    scenario_of : callable
+        Returns the scenario with one of the values.
+    values : sequence of str
+        As they stand in the names of the files.
+    realisations : int
+        Of each ensemble.
+    output : path
+        ``FILE.h5`` stands for ``FILE-VALUE.h5``.
+    on_value : callable, optional
+        Told value and file before each ensemble.
+    **options
+        Of `ensemble`.
+
+    Returns
+    -------
+    list of EnsembleResult
+
+    Raises
+    ------
+    As `ensemble`
+        Before the first one runs, where a scenario or a file is at fault.
+    """
+    scenarios = [scenario_of(value) for value in values]
+    paths = [path_of(output, value) for value in values]
+    for scenario, path in zip(scenarios, paths, strict=True):
+        check_output(path, options.get("force", False), scenario.paths)
+    found = []
+    for value, scenario, path in zip(values, scenarios, paths, strict=True):
+        if on_value is not None:
+            on_value(value, path)
+        found.append(ensemble(scenario, realisations, path, **options))
+    return found
+
+
+def path_of(output: str | Path, value: str) -> Path:
+    """Return the file of one value: 'out/test.h5' and '250 N' make 'out/test-250N.h5'."""
+    path = Path(output)
+    plain = re.sub(r"[^\w.+-]+", "", value.replace("/", "_per_").replace("^", ""))
+    return path.with_name(f"{path.stem}-{plain}{path.suffix}")
