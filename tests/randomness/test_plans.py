@@ -178,3 +178,50 @@ def test_that_other_names_have_no_fixed_dimension(name, dimension):
 def test_that_a_sobol_plan_says_where_it_ends():
     with pytest.raises(ValueError, match="has 4294967296 realisations"):
         sobol.scrambled(1, "a", 1, 2**32 - 1, 2)
+
+
+@pytest.mark.parametrize("name", [KNOWN[0], UNKNOWN[0]])
+def test_that_the_first_replicate_is_the_plain_scramble_and_others_are_nets_of_their_own(name):
+    plain = sobol.scrambled(11, name, 1, 0, 256)
+    np.testing.assert_array_equal(sobol.scrambled(11, name, 1, 0, 256, 0), plain)
+    drawn = [sobol.scrambled(11, name, 1, 0, 256, replicate)[:, 0] for replicate in range(4)]
+    for one, other in itertools.combinations(drawn, 2):
+        assert not (one == other).any()
+    for one in drawn:
+        np.testing.assert_array_equal(strata(one, 256), 1)
+
+
+@pytest.mark.parametrize("name", [KNOWN[0], UNKNOWN[0]])
+def test_that_realisations_take_the_replicates_in_turn(name):
+    drawn = drawing("sobol", 11, None, 8)(name, 1, 0, 100)
+    for replicate in range(8):
+        own = drawn[replicate::8]
+        known = sobol.scrambled(11, name, 1, 0, len(own), replicate)
+        np.testing.assert_array_equal(own, known)
+
+
+def test_that_one_replicate_is_the_plan_as_it_was():
+    drawn = drawing("sobol", 11, None)("creepage.misalignment", 2, 5, 40)
+    known = sobol.scrambled(11, "creepage.misalignment", 2, 5, 40)
+    np.testing.assert_array_equal(drawn, known)
+    np.testing.assert_array_equal(
+        drawing("sobol", 11, None, 1)("creepage.misalignment", 2, 5, 40), known
+    )
+
+
+def test_that_replicates_are_independent_of_each_other():
+    # means of replicates, over many seeds
+    count, seeds = 16, 400
+    means = np.array(
+        [
+            [sobol.scrambled(seed, "a", 1, 0, count, replicate).mean() for replicate in range(3)]
+            for seed in range(seeds)
+        ]
+    )
+    correlation = np.corrcoef(means.T)[np.triu_indices(3, 1)]
+    assert np.abs(correlation).max() < 4.0 / np.sqrt(seeds)
+
+
+def test_that_no_replicates_are_refused():
+    with pytest.raises(ValueError, match="replicates must be 1 or more sequences, got 0"):
+        drawing("sobol", 1, None, 0)

@@ -90,3 +90,13 @@ def test_that_realisations_before_the_first_are_refused(make):
 def test_that_inputs_that_cannot_be_drawn_are_refused(inputs, told):
     with pytest.raises(ValueError, match=told):
         Sampler(1, inputs, "sobol")
+
+
+@pytest.mark.parametrize("batch", [1, 3, 8, 49])
+def test_that_batches_change_no_bit_of_replicates(batch):
+    sampler = Sampler(4, INPUTS, "sobol", correlations=TIED, replicates=8)
+    whole = sampler.uniforms(0, TOTAL)
+    for start in range(0, TOTAL, batch):
+        count = min(batch, TOTAL - start)
+        part = sampler.uniforms(start, count)
+        assert_same({name: whole[name][start : start + count] for name in whole}, part)

@@ -285,4 +285,4 @@ def test_that_a_million_realisations_take_no_memory_and_no_disk_before_they_are_
     assert data.done.tolist() == [3, million - 1]
     for number in data.done:
         assert depth[number] == some_outcome(number, 500).observables["depth"][1]
-    assert len(data.variables["profile"]) == 16_000_000 // 500
+    assert len(data.variables["profile"]) == 4_000_000 // 500

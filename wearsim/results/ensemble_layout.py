@@ -19,7 +19,7 @@ ERROR_BYTES = 400
 """Length of the text that says why a realisation failed, its final zero included."""
 QUANTILES = (0.025, 0.05, 0.25, 0.5, 0.75, 0.95, 0.975)
 """Probabilities of the quantiles that stand in the file."""
-MOST_KEPT = 16_000_000  # numbers of worn profiles that are kept; they take 128 MB
+MOST_KEPT = 4_000_000  # numbers of worn profiles that are kept; they take 32 MB
 
 AXES: Mapping[str, Axis] = {
     axis.name: axis

@@ -117,10 +117,10 @@ class EnsembleWork:
 
     def _pending(self) -> Iterator[int]:
         """Yield pending realisations, no further ahead of the next mark than workers need."""
-        for number in np.flatnonzero(self.file.status == PENDING).tolist():
+        for number in np.flatnonzero(self.file.status == PENDING):
             if self._reached:
                 return
-            yield number
+            yield int(number)
 
     def _batches(self, numbers: Iterator[int]) -> Iterator[list[int]]:
         """Yield batches that take about `SECONDS` each; which numbers share one changes nothing."""
