@@ -3,43 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
 
-import numpy as np
-
-from wearsim.errors import CapabilityError, Problem, ResultsFileError, ScenarioError
+from wearsim.errors import ResultsFileError, ScenarioError
 from wearsim.randomness.targets import Target
-from wearsim.results import (
-    EnsembleData,
-    EnsembleFile,
-    EnsembleResult,
-    check_output,
-    open_ensemble,
-    read_ensemble,
-)
+from wearsim.results import EnsembleFile, EnsembleResult, check_output, open_ensemble, read_ensemble
 from wearsim.results.ensemble_layout import OBSERVABLES
 from wearsim.scenario import Scenario, parse_scenario, require_run
-from wearsim.studies.build import build_scene
-from wearsim.studies.depth_control import control_of
-from wearsim.studies.draws import Drawer, units_of
+from wearsim.studies.draws import Drawer
 from wearsim.studies.ensemble_events import EnsembleProgress
 from wearsim.studies.ensemble_grid import shared_grid
-from wearsim.studies.ensemble_plan import (
-    BASE_PLANS,
-    EnsemblePlan,
-    check_plan,
-    plan_called,
-    whole_count,
-)
+from wearsim.studies.ensemble_header import header_of, nothing_random, static_of
+from wearsim.studies.ensemble_plan import check_plan, plan_called, whole_count
 from wearsim.studies.ensemble_work import EnsembleWork
 from wearsim.studies.executors import executor
 from wearsim.studies.member import Members
-from wearsim.studies.provenance import changed_origins, missing_plugins, plugins_in_use, software
-from wearsim.studies.schedule import RecordSchedule
+from wearsim.studies.provenance import changed_origins, missing_plugins
 from wearsim.studies.study_size import checked_count
-from wearsim.types import FloatArray, Grid
+from wearsim.types import Grid
 
 Watcher = Callable[[EnsembleProgress], None]
 
@@ -56,6 +37,7 @@ def ensemble(
     force: bool = False,
     on_progress: Watcher | None = None,
     stop_requested: Callable[[], bool] | None = None,
+    on_notice: Callable[[str], None] | None = None,
 ) -> EnsembleResult:
     """Run a whole wear test for each of many realisations of a scenario's random inputs.
 
@@ -81,6 +63,8 @@ def ensemble(
         Told how far it has come.
     stop_requested : callable, optional
         Asked after every batch; True ends the study with what is out by then.
+    on_notice : callable, optional
+        Told that a worker was lost, or that a cluster has none.
 
     Returns
     -------
@@ -107,12 +91,12 @@ def ensemble(
     drawer = Drawer(scenario, "monte-carlo")
     by_pass = any(item.persistence == "per-pass" for item in scenario.random)
     if not drawer.groups and not (by_pass and scenario.evolution.stepper == "per-pass"):
-        raise ScenarioError(scenario.file, [_nothing_random(scenario)])
+        raise ScenarioError(scenario.file, [nothing_random(scenario)])
     count = whole_count(chosen, drawer.groups, realisations)
-    with executor(scheduler, workers) as pool:
+    with executor(scheduler, workers, tell=on_notice) as pool:
         grid = shared_grid(scenario)
-        header = _header(scenario, drawer, chosen, count, target, grid)
-        with EnsembleFile.create(path, header, _static(scenario, grid)) as file:
+        header = header_of(scenario, drawer, chosen, count, target, grid)
+        with EnsembleFile.create(path, header, static_of(scenario, grid)) as file:
             members = Members(scenario, chosen, count, grid)
             EnsembleWork(file, members, target, pool, on_progress, stop_requested).finish()
     return open_ensemble(path)
@@ -126,6 +110,7 @@ def resume_ensemble(
     scheduler: str = "processes",
     on_progress: Watcher | None = None,
     stop_requested: Callable[[], bool] | None = None,
+    on_notice: Callable[[str], None] | None = None,
 ) -> EnsembleResult:
     """Go on with an ensemble from its file alone; it ends bit for bit as if unbroken.
 
@@ -135,7 +120,7 @@ def resume_ensemble(
         Results file of an ensemble that was stopped, or finished.
     failed : bool
         Run the realisations that failed once more, and no others.
-    workers, scheduler, on_progress, stop_requested
+    workers, scheduler, on_progress, stop_requested, on_notice
         As in `ensemble`.
 
     Returns
@@ -165,7 +150,7 @@ def resume_ensemble(
     target = Target.parse(data.until) if data.until else None
     grid = Grid(data.variables["y"], data.strip_width)
     members = Members(scenario, plan, data.asked, grid)
-    with executor(scheduler, workers) as pool, EnsembleFile.open(path) as opened:
+    with executor(scheduler, workers, tell=on_notice) as pool, EnsembleFile.open(path) as opened:
         work = EnsembleWork(opened, members, target, pool, on_progress, stop_requested)
         for text in changed_origins(data, scenario):
             work.warn(text)
@@ -185,110 +170,3 @@ def _target(text: str) -> Target:
             f" of {', '.join(OBSERVABLES)}"
         )
     return target
-
-
-def _header(
-    scenario: Scenario,
-    drawer: Drawer,
-    plan: EnsemblePlan,
-    count: int,
-    target: Target | None,
-    grid: Grid,
-) -> EnsembleData:
-    """Return what an ensemble's file says before the first realisation."""
-    means = replace(
-        scenario, random=tuple(i for i in scenario.random if i.name not in drawer.groups)
-    )
-    _, _, stepper = build_scene(
-        means, grid
-    )  # what cannot run is refused before anything is written
-    return EnsembleData(
-        scenario_text=scenario.text,
-        scenario_file=scenario.file,
-        title=scenario.title,
-        sha256=scenario.sha256,
-        files=dict(scenario.files),
-        seed=scenario.seed,
-        software=dict(software()),
-        plugins=plugins_in_use(scenario),
-        model=scenario.contact.model,
-        finished=False,
-        wall_seconds=0.0,
-        created=datetime.now(UTC).isoformat(timespec="seconds"),
-        notes=list(scenario.notes),
-        stepper=stepper,
-        tolerance=scenario.evolution.tolerance,
-        width_threshold=scenario.outputs.width_threshold,
-        total_passes=float(scenario.total_passes),
-        total_time=scenario.total_time,
-        strip_width=grid.spacing,
-        plan=plan,
-        asked=count,
-        until="" if target is None else str(target),
-        inputs=_inputs(scenario, drawer),
-        groups=[
-            {
-                "name": item.name,
-                "role": item.role,
-                "persistence": item.persistence,
-                "text": item.describe(),
-            }
-            for item in scenario.random
-            if item.name in drawer.groups
-        ],
-        control=_control(scenario, plan),
-    )
-
-
-def _inputs(scenario: Scenario, drawer: Drawer) -> list[dict[str, str]]:
-    """Return key, unit and random input of every value that a realisation draws."""
-    units = units_of(scenario)
-    return [
-        {
-            "key": key,
-            "unit": units[key],
-            "input": item.name,
-            "rollers": "each" if item.persistence == "per-roller" else "",
-        }
-        for item in scenario.random
-        if item.name in drawer.groups
-        for key in item.keys
-    ]
-
-
-def _control(scenario: Scenario, plan: EnsemblePlan) -> dict[str, float]:
-    """Return what is known of the control variate; nothing where the plan has none."""
-    if plan != "control-variate":
-        return {}
-    known = control_of(Drawer(scenario, BASE_PLANS[plan]))
-    if known is None:
-        raise CapabilityError(
-            f"{scenario.file}: the control variate is a depth in closed form, which takes a wear"
-            " law linear in the dissipation; choose another plan, such as monte-carlo"
-        )
-    return {"mean": known.mean, "std": known.std, "draws": known.draws}
-
-
-def _static(scenario: Scenario, grid: Grid) -> dict[str, FloatArray]:
-    """Return what all realisations have in common."""
-    stop = float(scenario.total_passes)
-    passes = RecordSchedule.of(scenario, stop).all_records(
-        stop, scenario.evolution.stepper == "per-pass"
-    )
-    return {
-        "y": grid.y,
-        "multiplicity": np.ones(scenario.operation.rollers),
-        "record_passes": passes,
-        "record_time": passes / scenario.pass_rate,
-    }
-
-
-def _nothing_random(scenario: Scenario) -> Problem:
-    what = "no random input tells one test from another"
-    if scenario.random:
-        what += ': those drawn anew at every pass average out, but with stepper = "per-pass"'
-    expected = (
-        "a distribution in the place of a value, such as friction.coefficient ="
-        ' {distribution = "maxent", support = [0, "inf"], mean = 0.1, std = 0.02}'
-    )
-    return Problem("", "", what, None, expected)

@@ -16,7 +16,7 @@ from wearsim.evolution.loop import evolve
 from wearsim.evolution.scene import Scene
 from wearsim.evolution.state import SIGMAS, WearState, fresh_state, widened, widened_state
 from wearsim.evolution.stepper import Advance, Stepper
-from wearsim.results import Result, RunData, check_output, read_results, write_results
+from wearsim.results import Result, RunData, check_output, kind_of, read_results, write_results
 from wearsim.results.layout import VARIABLES
 from wearsim.scenario import Scenario, parse_scenario
 from wearsim.studies.build import build_scene, start_height, strips_of_run
@@ -110,6 +110,11 @@ def resume(
         As in `run`.
     """
     path = Path(file)
+    if kind_of(path) == "ensemble":
+        raise ResultsFileError(
+            f"{path}: holds an ensemble of wear tests, with which resume_ensemble goes on; what is"
+            " needed is a wear test"
+        )
     data = read_results(path)
     missing = missing_plugins(data.plugins)
     if missing:
