@@ -133,10 +133,9 @@ def _values(result: Comparable, observable: str) -> tuple[IntArray, FloatArray]:
 
 def _row(label: str, result: Comparable, observable: str, first: Comparable | None) -> Compared:
     _, values = _values(result, observable)
-    deeper = None if first is None else superiority(values, _values(first, observable)[1])
+    deeper = None if first is None else _deeper(result, first, observable)
     if isinstance(result, Result):
-        error = _stated_error(result, observable)
-        value = Interval(float(values[0]), float(values[0]) - error, float(values[0]) + error)
+        value = _of_run(result, observable)
         return Compared(label, "run", 1, value, None, (), deeper, None, values)
     found = result.estimate(observable, probabilities=QUANTILES)
     return Compared(
@@ -152,6 +151,25 @@ def _row(label: str, result: Comparable, observable: str, first: Comparable | No
     )
 
 
+def _deeper(result: Comparable, first: Comparable, observable: str) -> Interval:
+    """Return the probability that one has more of the observable than the other.
+
+    A run is one test, held against every realisation of an ensemble. Of two runs one has more for
+    sure, or it is open where their stated errors overlap.
+    """
+    values, others = _values(result, observable)[1], _values(first, observable)[1]
+    if isinstance(result, EnsembleResult) and isinstance(first, EnsembleResult):
+        return superiority(values, others)
+    if isinstance(result, EnsembleResult) or isinstance(first, EnsembleResult):
+        values, others = np.broadcast_arrays(values, others)
+        return paired(values, others).share
+    one, other = _of_run(result, observable), _of_run(first, observable)
+    if one.low <= other.high and other.low <= one.high:
+        return Interval(0.5, 0.0, 1.0)
+    certain = float(one.value > other.value)
+    return Interval(certain, certain, certain)
+
+
 def _paired(result: EnsembleResult, first: Comparable | None, observable: str) -> Paired | None:
     """Return how tests with the same random numbers differ, where there are any."""
     if not isinstance(first, EnsembleResult) or not have_same_draws(result, first):
@@ -164,11 +182,13 @@ def _paired(result: EnsembleResult, first: Comparable | None, observable: str) -
     return paired(values[mine], theirs[yours], plan, both % REPLICATES)
 
 
-def _stated_error(result: Result, observable: str) -> float:
-    """Return what a run says of its error; nothing where it does not tell."""
-    if observable not in _ERRORS:
-        return 0.0
-    return float(np.max(result.values(_ERRORS[observable])[-1]))
+def _of_run(result: Result, observable: str) -> Interval:
+    """Return a run's value and what it says of its error; no width where it does not tell."""
+    value = float(_values(result, observable)[1][0])
+    error = 0.0
+    if observable in _ERRORS:
+        error = float(np.max(result.values(_ERRORS[observable])[-1]))
+    return Interval(value, value - error, value + error)
 
 
 def have_same_draws(one: EnsembleResult, other: EnsembleResult) -> bool:
