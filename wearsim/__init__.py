@@ -9,10 +9,19 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from wearsim.results import DissipationResult, Result, open_dissipation, open_results
+    from wearsim.results import (
+        DissipationResult,
+        EnsembleResult,
+        Result,
+        open_dissipation,
+        open_ensemble,
+        open_results,
+    )
     from wearsim.scenario import Scenario, load_scenario
+    from wearsim.studies.compare import compare
     from wearsim.studies.contact import ContactStudy, solve_contact, study_contact
     from wearsim.studies.dissipation import dissipation
+    from wearsim.studies.ensemble import ensemble, resume_ensemble
     from wearsim.studies.replay import resume, run
     from wearsim.types import ContactSolution, Profile
 
@@ -20,14 +29,19 @@ __all__ = [
     "ContactSolution",
     "ContactStudy",
     "DissipationResult",
+    "EnsembleResult",
     "Profile",
     "Result",
     "Scenario",
+    "compare",
     "dissipation",
+    "ensemble",
     "load_scenario",
     "open_dissipation",
+    "open_ensemble",
     "open_results",
     "resume",
+    "resume_ensemble",
     "run",
     "solve_contact",
     "study_contact",
@@ -37,14 +51,19 @@ _HOMES = {
     "ContactSolution": "wearsim.types",
     "ContactStudy": "wearsim.studies.contact",
     "DissipationResult": "wearsim.results",
+    "EnsembleResult": "wearsim.results",
     "Profile": "wearsim.types",
     "Result": "wearsim.results",
     "Scenario": "wearsim.scenario",
+    "compare": "wearsim.studies.compare",
     "dissipation": "wearsim.studies.dissipation",
+    "ensemble": "wearsim.studies.ensemble",
     "load_scenario": "wearsim.scenario",
     "open_dissipation": "wearsim.results",
+    "open_ensemble": "wearsim.results",
     "open_results": "wearsim.results",
     "resume": "wearsim.studies.replay",
+    "resume_ensemble": "wearsim.studies.ensemble",
     "run": "wearsim.studies.replay",
     "solve_contact": "wearsim.studies.contact",
     "study_contact": "wearsim.studies.contact",

@@ -10,8 +10,8 @@ import wearsim.cli.check
 from wearsim.errors import CapabilityError, PluginError, ResultsFileError, SolverError
 
 VERBS = [
-    *("check", "contact", "dissipation", "run", "resume", "show", "plot", "export"),
-    *("maxent", "reproduce", "plugins", "schema", "new"),
+    *("check", "contact", "dissipation", "run", "ensemble", "resume", "show", "plot", "compare"),
+    *("export", "maxent", "reproduce", "plugins", "schema", "new"),
 ]
 
 

@@ -8,8 +8,10 @@ from typing import Annotated
 import typer
 
 from wearsim.cli.check import check
+from wearsim.cli.compare import compare
 from wearsim.cli.contact import contact
 from wearsim.cli.dissipation import dissipation
+from wearsim.cli.ensemble import ensemble
 from wearsim.cli.export import export
 from wearsim.cli.maxent import maxent
 from wearsim.cli.new import new
@@ -34,8 +36,8 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 for verb in (
-    check, contact, dissipation, run, resume, show, plot, export, maxent, reproduce,
-    plugins, schema,
+    check, contact, dissipation, run, ensemble, resume, show, plot, compare, export, maxent,
+    reproduce, plugins, schema,
 ):  # fmt: skip
     app.command()(verb)
 app.add_typer(new)

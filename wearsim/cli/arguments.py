@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypeAlias
 
@@ -36,6 +37,38 @@ Figure: TypeAlias = Annotated[
     Path | None,
     typer.Option(
         "--output", "-o", metavar="FIG", help="Figure: .png, .pdf or .svg.", show_default=False
+    ),
+]
+
+Drawing: TypeAlias = Annotated[
+    Path | None,
+    typer.Option("--figure", metavar="FIG", help="Figure: .png, .pdf or .svg.", show_default=False),
+]
+Realisations: TypeAlias = Annotated[
+    int, typer.Option("--realisations", "-n", min=1, metavar="N", help="How many realisations.")
+]
+Seed: TypeAlias = Annotated[
+    int | None,
+    typer.Option(
+        min=0, metavar="SEED", help="Seed; by default the scenario's.", show_default=False
+    ),
+]
+Workers: TypeAlias = Annotated[
+    int | None,
+    typer.Option(
+        min=1,
+        metavar="K",
+        help="Realisations that run at a time; by default as many as there are processors.",
+        show_default=False,
+    ),
+]
+Scheduler: TypeAlias = Annotated[
+    str | None,
+    typer.Option(
+        metavar="WHO",
+        help="Who does the work: processes (the default), threads, serial, dask, or the address"
+        " of a Dask scheduler, tcp://host:port.",
+        show_default=False,
     ),
 ]
 
@@ -79,6 +112,62 @@ def check_figure(path: Path, option: str = "-o") -> None:
         )
     if not path.parent.is_dir():
         raise typer.BadParameter(f"there is no folder {path.parent}", param_hint=option)
+
+
+def check_drawing(path: Path, output: Path, inputs: Iterable[Path]) -> None:
+    """Raise if a figure would take the place of the results file, or of an input.
+
+    Parameters
+    ----------
+    path : Path
+        The figure, named by --figure.
+    output : Path
+        The results file.
+    inputs : iterable of Path
+        What the scenario is read from.
+
+    Raises
+    ------
+    ResultsFileError, typer.BadParameter
+        If it would.
+    """
+    from wearsim.results import refuse_inputs, same_file
+
+    refuse_inputs(path, inputs, option="--figure")
+    if same_file(path, output):
+        raise typer.BadParameter(
+            f"{path} is the results file too, as -o says; give them different names",
+            param_hint="--figure",
+        )
+
+
+def check_workforce(scheduler: str | None, workers: int | None) -> str:
+    """Return who does the work of a study, checked.
+
+    Parameters
+    ----------
+    scheduler : str, optional
+        As given at the shell.
+    workers : int, optional
+        How many.
+
+    Raises
+    ------
+    typer.BadParameter
+        If there is no such scheduler, or it cannot have so many workers.
+    """
+    from wearsim.studies.executors import check_scheduler
+
+    chosen = scheduler or "processes"
+    try:
+        check_scheduler(chosen)
+    except ValueError as error:
+        raise typer.BadParameter(str(error), param_hint="--scheduler") from error
+    try:
+        check_scheduler(chosen, workers)
+    except ValueError as error:
+        raise typer.BadParameter(str(error), param_hint="--workers") from error
+    return chosen
 
 
 def read_text(path: Path) -> str:

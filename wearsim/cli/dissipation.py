@@ -7,16 +7,24 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from wearsim.cli.arguments import Force, Json, Quiet, ScenarioFile, Settings, check_figure
-from wearsim.cli.output import note, refuse_existing, write_json
+from wearsim.cli.arguments import (
+    Drawing,
+    Force,
+    Json,
+    Quiet,
+    Realisations,
+    ScenarioFile,
+    Seed,
+    Settings,
+    check_drawing,
+    check_figure,
+)
+from wearsim.cli.output import refuse_existing, tell_notes, write_json
 
 if TYPE_CHECKING:
     from wearsim.results import DissipationResult
     from wearsim.scenario import Scenario
 
-Number = Annotated[
-    int, typer.Option("--realisations", "-n", min=1, metavar="N", help="How many realisations.")
-]
 Output = Annotated[
     Path | None,
     typer.Option(
@@ -28,10 +36,6 @@ Output = Annotated[
         show_default=False,
     ),
 ]
-Drawing = Annotated[
-    Path | None,
-    typer.Option("--figure", metavar="FIG", help="Figure: .png, .pdf or .svg.", show_default=False),
-]
 Plan = Annotated[
     str | None,
     typer.Option(
@@ -40,13 +44,6 @@ Plan = Annotated[
         show_default=False,
     ),
 ]
-Seed = Annotated[
-    int | None,
-    typer.Option(
-        min=0, metavar="SEED", help="Seed; by default the scenario's.", show_default=False
-    ),
-]
-
 _STOPPING = (
     "stopping after these realisations, and what is done is kept; once more to stop at once and"
     " lose it"
@@ -55,7 +52,7 @@ _STOPPING = (
 
 def dissipation(
     scenario: ScenarioFile,
-    realisations: Number = 1000,
+    realisations: Realisations = 1000,
     output: Output = None,
     figure: Drawing = None,
     plan: Plan = None,
@@ -72,7 +69,7 @@ def dissipation(
     loaded = _read(scenario, settings, plan, seed)
     path = output if output is not None else Path(f"{scenario.stem}-dissipation.h5")
     if figure is not None:
-        _check_apart(figure, path, loaded)
+        check_drawing(figure, path, loaded.paths)
     from wearsim.cli.counting import counting
     from wearsim.cli.stop import stop_on_signals
     from wearsim.studies.dissipation import dissipation as study
@@ -100,18 +97,6 @@ def _read(path: Path, settings: list[str] | None, plan: str | None, seed: int | 
     return read_scenario(path, [*(settings or []), *more])
 
 
-def _check_apart(figure: Path, output: Path, scenario: Scenario) -> None:
-    """Raise if the figure would take the place of the results file, or of an input."""
-    from wearsim.results import refuse_inputs, same_file
-
-    refuse_inputs(figure, scenario.paths, option="--figure")
-    if same_file(figure, output):
-        raise typer.BadParameter(
-            f"{figure} is the results file too, as -o says; give them different names",
-            param_hint="--figure",
-        )
-
-
 def _report(result: DissipationResult, json: bool, figure: Path | None) -> None:
     from wearsim.cli.spread import as_json, write_spread
 
@@ -120,15 +105,7 @@ def _report(result: DissipationResult, json: bool, figure: Path | None) -> None:
         return
     more = [("results file", str(result.path))]
     write_spread(result, [*more, *([("figure", str(figure))] if figure else [])])
-    tell(result)
-
-
-def tell(result: DissipationResult) -> None:
-    """Write what a user should know of a study to stderr."""
-    for text in result.notes:
-        note(f"note: {text}")
-    for text in result.warnings:
-        note(f"warning: {text}")
+    tell_notes(result)
 
 
 def draw(result: DissipationResult, path: Path) -> None:

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from wearsim.cli.arguments import ResultsFile
+
+if TYPE_CHECKING:
+    from wearsim.results import DissipationResult, EnsembleResult, Result
+    from wearsim.results.reader import FileKind
 
 Folder = Annotated[
     Path,
@@ -19,8 +24,18 @@ Folder = Annotated[
 
 def export(file: ResultsFile, output: Folder) -> None:
     """Write a results file as CSV, units in the headers."""
-    from wearsim.results import export_csv, is_dissipation, open_dissipation, open_results
+    from wearsim.results import (
+        export_csv,
+        kind_of,
+        open_dissipation,
+        open_ensemble,
+        open_results,
+    )
 
-    result = open_dissipation(file) if is_dissipation(file) else open_results(file)
-    for path in export_csv(result, output):
+    openers: dict[FileKind, Callable[[Path], Result | DissipationResult | EnsembleResult]] = {
+        "replay": open_results,
+        "dissipation": open_dissipation,
+        "ensemble": open_ensemble,
+    }
+    for path in export_csv(openers[kind_of(file)](file), output):
         typer.echo(str(path))

@@ -15,6 +15,8 @@ from wearsim.errors import ResultsFileError
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from wearsim.results.study_result import StudyResult
+
 _WIDE = 110  # columns of a table that goes into a file or a pipe
 
 
@@ -33,12 +35,14 @@ def write_table(title: str, rows: Iterable[tuple[str, str]]) -> None:
     from rich import box
     from rich.table import Table
 
+    screen = console()
     table = Table(title=title, title_justify="left", show_header=False, box=box.SIMPLE_HEAD)
+    table.min_width = min(len(title), screen.width)  # or a long title would be folded
     table.add_column(no_wrap=True)
     table.add_column(overflow="fold")
     for row in rows:
         table.add_row(*row)
-    console().print(table)
+    screen.print(table)
 
 
 def write_list(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
@@ -73,6 +77,14 @@ def plain(value: Any) -> Any:
 def note(text: str) -> None:
     """Write a line to stderr."""
     typer.echo(text, err=True)
+
+
+def tell_notes(result: StudyResult[Any]) -> None:
+    """Write what a user should know of a study to stderr."""
+    for text in result.notes:
+        note(f"note: {text}")
+    for text in result.warnings:
+        note(f"warning: {text}")
 
 
 def refuse_existing(path: Path, force: bool, option: str = "-o") -> None:

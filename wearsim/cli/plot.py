@@ -25,30 +25,41 @@ Measured = Annotated[
 def plot(
     file: ResultsFile, figure: Figure = None, measured: Measured = None, force: Force = False
 ) -> None:
-    """Draw what a results file holds: a test, or a study."""
+    """Draw what a results file holds, whatever made it."""
     path = figure if figure is not None else Path(f"{file.stem}.png")
     check_figure(path)
     refuse_existing(path, force)
-    from wearsim.results import is_dissipation, refuse_inputs
+    from wearsim.results import kind_of, refuse_inputs
 
     refuse_inputs(path, [file], "the figure")
     refuse_inputs(path, measured or [], "a measured profile")
-    if is_dissipation(file):
-        _draw_study(file, path, measured)
-    else:
+    kind = kind_of(file)
+    if kind == "replay":
         _draw_test(file, path, measured)
+    elif measured:
+        what = "a study of one contact" if kind == "dissipation" else "an ensemble"
+        raise typer.BadParameter(
+            f"goes with a wear test, and this is {what}", param_hint="--measured"
+        )
+    elif kind == "ensemble":
+        _draw_ensemble(file, path)
+    else:
+        _draw_study(file, path)
     note(f"figure: {path}")
 
 
-def _draw_study(file: Path, path: Path, measured: list[Path] | None) -> None:
-    if measured:
-        raise typer.BadParameter(
-            "goes with a wear test, and this is a study of one contact", param_hint="--measured"
-        )
+def _draw_study(file: Path, path: Path) -> None:
     from wearsim.cli.dissipation import draw
     from wearsim.results import open_dissipation
 
     draw(open_dissipation(file), path)
+
+
+def _draw_ensemble(file: Path, path: Path) -> None:
+    from wearsim.cli.ensemble import draw
+    from wearsim.results import open_ensemble
+
+    draw(open_ensemble(file), path)
 
 
 def _draw_test(file: Path, path: Path, measured: list[Path] | None) -> None:

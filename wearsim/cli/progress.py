@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 Watcher: TypeAlias = Callable[[Event], None]
 BETWEEN_LINES = 1.0  # s
-_ROOM_FOR_BAR = 115  # columns
+ROOM_FOR_BAR = 115  # columns
 
 
 @contextmanager
@@ -130,7 +130,7 @@ def _bar(screen: Console) -> Progress:
 
     text = "{task.percentage:3.0f} %  {task.fields[passes]}  {task.fields[details]}"
     columns = [TextColumn(text, markup=False)]
-    if screen.width >= _ROOM_FOR_BAR:
+    if screen.width >= ROOM_FOR_BAR:
         return Progress(BarColumn(bar_width=24), *columns, console=screen)
     return Progress(*columns, console=screen)
 

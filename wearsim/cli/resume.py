@@ -1,34 +1,89 @@
-"""`wearsim resume`: go on with a run from its file alone."""
+"""`wearsim resume`: go on with a run or an ensemble from its file alone."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from wearsim.cli.arguments import Json, Quiet, ResultsFile
-from wearsim.cli.run import report
+from wearsim.cli.arguments import Json, Quiet, ResultsFile, Scheduler, Workers, check_workforce
 
 Until = Annotated[
     str | None,
     typer.Option(
-        metavar="TIME", help="New end of the test, '600 min'; extends it.", show_default=False
+        metavar="TIME",
+        help="New end of a wear test, '600 min'; extends it.",
+        show_default=False,
     ),
+]
+Failed = Annotated[
+    bool, typer.Option("--failed", help="Run the realisations of an ensemble that failed again.")
 ]
 
 
 def resume(
-    file: ResultsFile, until: Until = None, json: Json = False, quiet: Quiet = False
+    file: ResultsFile,
+    until: Until = None,
+    failed: Failed = False,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    json: Json = False,
+    quiet: Quiet = False,
 ) -> None:
-    """Go on with a run from its file alone, or extend it."""
+    """Go on with a run or an ensemble from its file alone."""
+    from wearsim.results import kind_of
+
+    if kind_of(file) == "ensemble":
+        _refuse({"--until": until is not None}, "extends a wear test, and this is an ensemble")
+        _resume_ensemble(file, failed, workers, scheduler, json, quiet)
+        return
+    given = {
+        "--failed": failed,
+        "--workers": workers is not None,
+        "--scheduler": scheduler is not None,
+    }
+    _refuse(given, "goes with an ensemble, and this is none")
+    _resume_run(file, until, json, quiet)
+
+
+def _refuse(given: dict[str, bool], why: str) -> None:
+    for option, is_given in given.items():
+        if is_given:
+            raise typer.BadParameter(f"{why}; leave it out", param_hint=option)
+
+
+def _resume_run(file: Path, until: str | None, json: bool, quiet: bool) -> None:
     seconds = _seconds(until)
     from wearsim.cli.progress import watching
+    from wearsim.cli.run import report
     from wearsim.cli.stop import stop_on_signals
     from wearsim.studies import replay
 
     with stop_on_signals() as stop, watching(quiet) as watch:
         result = replay.resume(file, seconds, on_event=watch, stop_requested=stop.requested)
     report(result, json)
+
+
+def _resume_ensemble(
+    file: Path, failed: bool, workers: int | None, scheduler: str | None, json: bool, quiet: bool
+) -> None:
+    chosen = check_workforce(scheduler, workers)
+    from wearsim.cli.ensemble import STOPPING, report
+    from wearsim.cli.ensemble_progress import watching_ensemble
+    from wearsim.cli.stop import stop_on_signals
+    from wearsim.studies.ensemble import resume_ensemble
+
+    with stop_on_signals(STOPPING) as stop, watching_ensemble(quiet) as watch:
+        result = resume_ensemble(
+            file,
+            failed=failed,
+            workers=workers,
+            scheduler=chosen,
+            on_progress=watch,
+            stop_requested=stop.requested,
+        )
+    report(result, json, None, watch.workers)
 
 
 def _seconds(text: str | None) -> float | None:

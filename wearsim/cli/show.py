@@ -5,19 +5,24 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from wearsim.cli.arguments import Json, ResultsFile
-from wearsim.cli.output import note, write_json, write_table
+from wearsim.cli.output import tell_notes, write_json, write_table
 
 if TYPE_CHECKING:
-    from wearsim.results import DissipationData, DissipationResult, Result, RunData
+    from wearsim.results import DissipationResult, EnsembleResult, Result
+    from wearsim.results.content import StudyData
 
 
 def show(file: ResultsFile, json: Json = False) -> None:
     """Tell what is in a results file, and its end state."""
     from wearsim.cli.summary import end_state
-    from wearsim.results import is_dissipation, open_dissipation, open_results
+    from wearsim.results import kind_of, open_dissipation, open_ensemble, open_results
 
-    if is_dissipation(file):
+    kind = kind_of(file)
+    if kind == "dissipation":
         _show_study(open_dissipation(file), json)
+        return
+    if kind == "ensemble":
+        _show_ensemble(open_ensemble(file), json)
         return
     result = open_results(file)
     if json:
@@ -25,39 +30,53 @@ def show(file: ResultsFile, json: Json = False) -> None:
         return
     write_table(result.title, _contents(result))
     write_table("end state" if result.finished else "state so far", end_state(result))
-    for text in result.notes:
-        note(f"note: {text}")
-    for text in result.warnings:
-        note(f"warning: {text}")
+    tell_notes(result)
 
 
 def _show_study(result: DissipationResult, json: bool) -> None:
-    from wearsim.cli.dissipation import tell
     from wearsim.cli.spread import as_json, write_spread
 
     raw = result.raw
     if json:
         write_json({**as_json(result), **_origin(raw)})
         return
-    more = [
+    write_spread(result, _sources(raw))
+    tell_notes(result)
+
+
+def _show_ensemble(result: EnsembleResult, json: bool) -> None:
+    from wearsim.cli.ensemble import tell_failures
+    from wearsim.cli.ensemble_table import as_json, write_ensemble
+
+    raw = result.raw
+    if json:
+        write_json({**as_json(result), **_origin(raw)})
+        return
+    groups = [(f"random {item['name']}", item["text"]) for item in raw.groups]
+    write_ensemble(result, [*groups, *_sources(raw)])
+    tell_notes(result)
+    tell_failures(result)
+
+
+def _sources(raw: StudyData) -> list[tuple[str, str]]:
+    """Return what the realisations of a study were made from, and with what."""
+    return [
         ("scenario", raw.scenario_file),
         ("input files", ", ".join(raw.files) or "none"),
         ("plugins", "\n".join(_plugins(raw))),
         ("software", ", ".join(f"{name} {number}" for name, number in raw.software.items())),
         ("written", raw.created),
     ]
-    write_spread(result, more)
-    tell(result)
 
 
-def _plugins(raw: RunData | DissipationData) -> list[str]:
+def _plugins(raw: StudyData) -> list[str]:
     return [
         f"{item['kind']} {item['name']} ({item['distribution']} {item['version']})"
         for item in raw.plugins
     ]
 
 
-def _origin(raw: RunData | DissipationData) -> dict[str, Any]:
+def _origin(raw: StudyData) -> dict[str, Any]:
     """Return what a file was made from, and with what."""
     return {
         "scenario_file": raw.scenario_file,

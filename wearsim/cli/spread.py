@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
+from wearsim.cli.drawn import CONSTANT, drawn_data, drawn_rows
 from wearsim.cli.output import write_list, write_table
 from wearsim.cli.summary import still_random
 from wearsim.randomness.statistics import is_constant
@@ -33,7 +33,6 @@ WORDS = {
 }
 _SI = {"W": "W", "N": "N", "N mm": "N_m", "MPa": "Pa"}
 _ROUNDING = 1e-12  # of forces, in parts of the load
-CONSTANT = "constant"
 _TOO_FEW = "too few realisations"
 
 
@@ -59,7 +58,7 @@ def write_spread(result: DissipationResult, more: Rows) -> None:
     write_list(heads, [_line(name, result) for name in UNITS])
     effort = f"{lapse(raw.solve_seconds)} for the contacts, {lapse(raw.wall_seconds)} in all"
     random = [(f"random {name}", text) for name, text in still_random(result).items()]
-    write_table("", [*_inputs(result), *random, ("wall time", effort), *more])
+    write_table("", [*drawn_rows(raw.inputs, result.inputs), *random, ("wall time", effort), *more])
 
 
 def standing(result: DissipationResult) -> str:
@@ -124,24 +123,6 @@ def _line(name: str, result: DissipationResult) -> tuple[str, ...]:
     )
 
 
-def _inputs(result: DissipationResult) -> Rows:
-    """Return mean and standard deviation of what was drawn."""
-    from wearsim.quantities import in_engineers_unit
-
-    rows = []
-    for item in result.raw.inputs:
-        values, unit = result.inputs[item["key"]], item["unit"]
-        mean = float(values.mean())
-        std = float(values.std(ddof=1)) if len(values) > 1 else math.nan
-        text = f"mean {in_engineers_unit(mean, unit, 4)}"
-        if is_constant(mean, std):
-            text = f"{CONSTANT} {in_engineers_unit(mean, unit, 4)}"
-        elif len(values) > 1:
-            text += f", std {in_engineers_unit(std, unit, 4)}"
-        rows.append((f"drawn {item['key']}", text))
-    return rows
-
-
 def as_json(result: DissipationResult) -> dict[str, Any]:
     """Return what a study found, in SI."""
     raw = result.raw
@@ -156,14 +137,7 @@ def as_json(result: DissipationResult) -> dict[str, Any]:
         "finished": result.finished,
         "mean_problem_power_W": result.mean_problem_power,
         **found,
-        "inputs": {
-            item["key"]: {
-                "unit": item["unit"],
-                "mean": result.inputs[item["key"]].mean(),
-                "std": result.inputs[item["key"]].std(ddof=1) if result.count > 1 else None,
-            }
-            for item in raw.inputs
-        },
+        "inputs": drawn_data(raw.inputs, result.inputs),
         "random": still_random(result),
         "friction_grid": raw.friction_grid or None,
         "strips": {

@@ -9,7 +9,7 @@ import numpy as np
 from wearsim.report.units import count, lapse, shown
 
 if TYPE_CHECKING:
-    from wearsim.results import DissipationResult, Result
+    from wearsim.results import DissipationResult, EnsembleResult, Result
 
 Rows = list[tuple[str, str]]
 
@@ -66,21 +66,22 @@ def draws(result: Result) -> Rows:
     return rows + [(f"random {name}", text) for name, text in still_random(result).items()]
 
 
-def still_random(result: Result | DissipationResult) -> dict[str, str]:
+def still_random(result: Result | DissipationResult | EnsembleResult) -> dict[str, str]:
     """Return the random inputs that no one drawn value tells, by key and in words.
 
     They are fields, processes and what is drawn at every pass. The stored scenario tells them;
     where a plugin of theirs is missing, it cannot be read, and that is told instead.
     """
     from wearsim.errors import PluginError, ScenarioError
-    from wearsim.results import Result
+    from wearsim.results import EnsembleResult, Result
 
     try:
         random = result.scenario.random
     except (PluginError, ScenarioError) as error:
         return {"inputs": f"not told, since the scenario cannot be read here: {error}"}
-    if isinstance(result, Result):
-        told = [item for item in random if not set(item.keys) <= set(result.raw.drawn)]
+    if isinstance(result, Result | EnsembleResult):
+        drawn = result.raw.drawn if isinstance(result, Result) else result.inputs
+        told = [item for item in random if not set(item.keys) <= set(drawn)]
     else:
         told = [item for item in random if item.role in {"field", "process"}]
     return {item.name: item.describe() for item in told}

@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from wearsim.report.style import BLUE, GREEN, GREY, ORANGE, figure_style, name_axes
+from wearsim.report.settling import draw_settling
+from wearsim.report.style import BLUE, GREEN, GREY, ORANGE, figure_style, name_axes, say
 from wearsim.report.units import PER_SI, count, shown
-from wearsim.types import FloatArray, IntArray
 
 if TYPE_CHECKING:
     from wearsim.results import DissipationResult
@@ -22,7 +21,6 @@ MOST_LINES = 200
 CLASSES = 30
 _ROOM = 1.28  # height of the density's panel over its highest class, for the legend
 _SAME = 1e-9  # of the greatest, by which curves differ that are drawn as one
-_SETTLING = 10  # realisations before which an estimate is too wild to set the scale
 PANELS: list[Any] = [["mean", "density", "realisations"], ["std", "density", "band"]]
 
 
@@ -43,10 +41,12 @@ def dissipation_figure(result: DissipationResult) -> Figure:
         figure = Figure(figsize=(13.0, 6.8), layout="constrained")
         panels = figure.subplot_mosaic(PANELS, width_ratios=[1.0, 1.15, 1.1])
         found, constant = result.convergence(), result.summaries["power"].is_constant
-        _draw_settling(panels["mean"], found.count, found.mean, found.mean_error, constant)
+        # or rounding would be drawn
+        spreads = found.mean_error, found.std, found.std_error
+        mean_error, std, std_error = (np.zeros_like(e) if constant else e for e in spreads)
+        for name, value, error in (("mean", found.mean, mean_error), ("std", std, std_error)):
+            draw_settling(panels[name], found.count, value, value - error, value + error)
         name_axes(panels["mean"], "Mean power, with its standard error", "", "mean of $P_d$ [W]")
-        std = np.zeros_like(found.std) if constant else found.std  # or rounding would be drawn
-        _draw_settling(panels["std"], found.count, std, found.std_error, constant)
         title = "Standard deviation, with its standard error"
         name_axes(panels["std"], title, "realisations", "std of $P_d$ [W]")
         _draw_density(panels["density"], result)
@@ -71,28 +71,6 @@ def _caption(result: DissipationResult) -> str:
 
 def _number_of(realisations: int) -> str:
     return f"{count(realisations)} realisation{'s' if realisations > 1 else ''}"
-
-
-def _draw_settling(
-    axes: Axes, counts: IntArray, value: FloatArray, error: FloatArray, constant: bool
-) -> None:
-    """Draw an estimate against the number of realisations, and its standard error as a band."""
-    if constant:
-        error = np.zeros_like(error)
-        top = 2.0 * float(value[-1]) or 1.0
-        axes.set_ylim(-0.05 * top, top)  # so that a line at zero is seen
-    axes.fill_between(counts, value - error, value + error, color=BLUE, alpha=0.25, lw=0)
-    marker = "o" if len(counts) == 1 else ""
-    axes.plot(counts, value, color=BLUE, marker=marker)
-    axes.set_xscale("log")
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda number, _: count(number)))
-    axes.xaxis.set_minor_formatter(NullFormatter())
-    settled = (counts >= min(_SETTLING, int(counts[-1]))) & np.isfinite(error)
-    if settled.any() and error[settled].max() > 0.0:
-        low, high = (value - error)[settled].min(), (value + error)[settled].max()
-        axes.set_ylim(low - 0.05 * (high - low), high + 0.05 * (high - low))
-        axes.axhline(value[-1], color=GREY, lw=0.8, ls="--")
-    axes.set_xlim(max(1.0, 0.5 * min(_SETTLING, counts[-1])), max(2.0, 1.05 * float(counts[-1])))
 
 
 def _draw_density(axes: Axes, result: DissipationResult) -> None:
@@ -127,9 +105,7 @@ def _tell_one_value(axes: Axes, result: DissipationResult) -> None:
     power = shown(result.summaries["power"].mean, "W")
     lines = [f"{power} in {_number_of(result.count)}: no density to draw"]
     lines.append(f"inputs at their mean: {shown(result.mean_problem_power, 'W')}")
-    axes.text(0.5, 0.5, "\n".join(lines), ha="center", va="center", transform=axes.transAxes)
-    axes.set_title("Density of the dissipated power", loc="left")
-    axes.set_axis_off()
+    say(axes, "Density of the dissipated power", lines)
 
 
 def _draw_realisations(axes: Axes, result: DissipationResult) -> None:

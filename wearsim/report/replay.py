@@ -11,12 +11,12 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
 
 from wearsim.errors import WearsimError
+from wearsim.report.depth_axes import set_depth_axes
 from wearsim.report.measured import Measured
 from wearsim.report.style import BLUE, GREEN, GREY, ORANGE, RECORDS, RED, figure_style, name_axes
-from wearsim.report.units import PER_SI, count, shown
+from wearsim.report.units import PER_SI, count, pass_unit, shown
 from wearsim.types import FloatArray, IntArray
 
 if TYPE_CHECKING:
@@ -71,15 +71,6 @@ def _caption(result: Result) -> str:
     )
 
 
-def _pass_unit(greatest: float) -> tuple[float, str]:
-    """Return what passes are divided by to be read easily, and its name."""
-    if greatest >= 1e6:
-        return 1e6, "million roller passes"
-    if greatest >= 1e4:
-        return 1e3, "thousand roller passes"
-    return 1.0, "roller passes"
-
-
 class _Colours:
     """Which records are drawn, each in the colour of its passes; the fresh state is black."""
 
@@ -89,7 +80,7 @@ class _Colours:
         worn = passes[passes > 0.0]
         last = float(worn[-1]) if len(worn) else 1.0
         crowded = len(worn) > 2 and float(np.median(worn)) < 0.15 * last
-        unit, self.name = (1.0, "roller passes") if crowded else _pass_unit(last)
+        unit, self.name = (1.0, "roller passes") if crowded else pass_unit(last)
         self._passes = passes / unit
         self._norm = LogNorm(float(worn[0]), last) if crowded else Normalize(0.0, last / unit)
         self._map = colormaps[RECORDS].reversed()
@@ -157,16 +148,9 @@ def _draw_depth(axes: Axes, result: Result) -> None:
     """Draw depth against passes: on logarithmic scales where the steps cover two decades."""
     passes, depth = np.asarray(result.passes), np.asarray(result.depth)
     error = np.asarray(result.depth_error)
-    worn = (passes > 0.0) & (depth > 0.0)
-    logarithmic = worn.sum() > 3 and passes[worn][-1] > 100.0 * passes[worn][0]
-    if logarithmic:
-        unit, name = 1.0, "roller passes"
-        passes, depth, error = passes[worn], depth[worn], error[worn]
-        axes.set_xscale("log")
-        axes.set_yscale("log")
-        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    else:
-        unit, name = _pass_unit(float(passes[-1]))
+    drawn, unit, name = set_depth_axes(axes, passes, depth)
+    passes, depth, error = passes[drawn], depth[drawn], error[drawn]
+    logarithmic = axes.get_yscale() == "log"
     visible = bool((error > 0.05 * depth).any())
     said = f"estimated error {shown(float(error[-1]), 'um', 2)} at the end"
     if visible:

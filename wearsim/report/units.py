@@ -63,6 +63,21 @@ def count(value: float) -> str:
     return f"{value:,.0f}"
 
 
+def pass_unit(greatest: float) -> tuple[float, str]:
+    """Return what passes are divided by to be read easily on an axis, and its name.
+
+    Parameters
+    ----------
+    greatest : float
+        Number of passes at the end of the axis.
+    """
+    if greatest >= 1e6:
+        return 1e6, "million roller passes"
+    if greatest >= 1e4:
+        return 1e3, "thousand roller passes"
+    return 1.0, "roller passes"
+
+
 def lapse(seconds: float) -> str:
     """Return a wall time that is easy to read: "0.05 s", "12 s", "3 min 20 s", "2 h 5 min"."""
     if not math.isfinite(seconds):

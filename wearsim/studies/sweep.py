@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from wearsim.errors import Interrupted
 from wearsim.results import EnsembleResult, check_output
 from wearsim.scenario import Scenario
 from wearsim.studies.ensemble import ensemble
@@ -58,7 +59,13 @@ def sweep(
     for value, scenario, path in zip(values, scenarios, paths, strict=True):
         if on_value is not None:
             on_value(value, path)
-        found.append(ensemble(scenario, realisations, path, **options))
+        try:
+            found.append(ensemble(scenario, realisations, path, **options))
+        except Interrupted as stop:
+            left = values[len(found) + 1 :]
+            raise Interrupted(
+                f"{stop}; not begun: {', '.join(left)}" if left else str(stop)
+            ) from stop
     return found
 
 

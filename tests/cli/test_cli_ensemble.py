@@ -1,0 +1,449 @@
+"""`wearsim ensemble`, and what the other verbs do with its file."""
+
+from __future__ import annotations
+
+import io
+import json
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cli_examples import SCENARIOS, Command
+from rich.console import Console
+
+import wearsim
+from tests.report.made_up_ensembles import made_up
+from tests.studies.ensemble_cases import frail, small
+from wearsim.cli import ensemble_progress
+from wearsim.cli.ensemble_progress import EnsembleLines, LiveEnsemble, told, watching_ensemble
+from wearsim.cli.ensemble_table import write_ensemble
+from wearsim.cli.progress import Clock
+from wearsim.errors import Interrupted, ResultsFileError
+from wearsim.randomness.intervals import UNKNOWN, Interval
+from wearsim.randomness.targets import Target
+from wearsim.results import open_ensemble
+from wearsim.studies.ensemble import ensemble
+from wearsim.studies.ensemble_events import EnsembleProgress
+
+HERE = ("--scheduler", "serial", "-q")
+
+
+@pytest.fixture(scope="session")
+def done_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("ensemble") / "e.h5"
+    ensemble(small(), 40, path, scheduler="serial")
+    return path
+
+
+@pytest.fixture
+def done(done_once: Path, tmp_path: Path) -> Path:
+    """A finished ensemble's own copy of its file."""
+    path = tmp_path / "e.h5"
+    path.write_bytes(done_once.read_bytes())
+    return path
+
+
+@pytest.fixture
+def tests(tmp_path: Path) -> Path:
+    """A scenario of short tests."""
+    path = tmp_path / "tests.toml"
+    path.write_text(small().text)
+    return path
+
+
+@pytest.fixture
+def failing(tmp_path: Path) -> Path:
+    """A scenario of short tests of which a part fails."""
+    path = tmp_path / "failing.toml"
+    path.write_text(frail().text)
+    return path
+
+
+def cells(line: str) -> list[str]:
+    return line.split()
+
+
+def test_that_an_ensemble_tells_the_spread_of_its_ends(command: Command, tests: Path) -> None:
+    result = command("ensemble", tests, "-n", 40, *HERE)
+    assert result.exit_code == 0, result.output
+    found = open_ensemble("tests-ensemble.h5")
+    depth = found.estimate("depth").mean
+    lines = result.stdout.splitlines()
+    place = next(k for k, line in enumerate(lines) if line.startswith("depth [um]"))
+    assert float(cells(lines[place])[2]) == pytest.approx(depth.value * 1e6, rel=1e-2)
+    low, high = cells(lines[place + 1])[3].split("..")
+    assert float(low) == pytest.approx(depth.low * 1e6, rel=1e-2)
+    assert float(high) == pytest.approx(depth.high * 1e6, rel=1e-2)
+    for text in (
+        "40 done, 0 failed, of 40",
+        "monte-carlo, seed 1",
+        "3,000 passes",
+        "implicit, tolerance 0.01",
+        "what moves the depth",
+        "drawn load.normal_force",
+        "realisations a second",
+        "tests-ensemble.h5",
+    ):
+        assert text in result.stdout
+    assert "worn volume [mm^3]" in result.stdout
+    assert "roller depth" not in result.stdout  # the rollers do not wear
+
+
+def test_that_json_is_si_and_all_of_stdout(command: Command, tests: Path) -> None:
+    result = command("ensemble", tests, "-n", 12, *HERE, "-o", "a.h5", "--json")
+    assert result.exit_code == 0
+    assert result.stderr == ""
+    data, kept = json.loads(result.stdout), open_ensemble("a.h5")
+    for key, name in (
+        ("depth_m", "depth"),
+        ("worn_volume_m3", "worn_volume"),
+        ("dissipated_energy_J", "dissipated_energy"),
+        ("peak_pressure_Pa", "peak_pressure"),
+    ):
+        assert data[key]["mean"]["value"] == kept.estimate(name).mean.value
+        assert data[key]["std"]["high"] == kept.estimate(name).std.high
+    assert data["depth_m"]["quantiles"][0]["low"] is None  # too few for it
+    assert {item["input"] for item in data["sensitivity_of_depth"]} == {
+        item["name"] for item in kept.raw.groups
+    }
+    assert data["inputs"]["load.normal_force"]["unit"] == "N"
+    assert (data["realisations"], data["failed"], data["finished"]) == (12, 0, True)
+    assert (data["plan"], data["until_reached"], data["output"]) == ("monte-carlo", None, "a.h5")
+
+
+def test_that_plan_and_seed_reach_the_file(command: Command, tests: Path) -> None:
+    arguments = ("--plan", "saltelli", "--seed", 7, "-n", 10, *HERE)
+    result = command("ensemble", tests, *arguments)
+    assert result.exit_code == 0, result.output
+    kept = open_ensemble("tests-ensemble.h5")
+    assert (kept.plan, kept.raw.seed, kept.scenario.seed) == ("saltelli", 7, 7)
+    assert "with all others" not in result.stdout  # two rows are too few for an index
+    assert f"of {kept.asked}" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--plan", "sobo"], "unknown plan 'sobo', expected one of monte-carlo"),
+        (["--until", "depth"], 'cannot read the target "depth"'),
+        (["--until", "dept.mean 1%"], "'dept', which is not followed, expected one of depth"),
+        (["--scheduler", "cloud"], "no scheduler 'cloud', expected processes"),
+        (["--scheduler", "serial", "--workers", "3"], "there is one worker"),
+        (["--workers", "0"], "--workers"),
+        (["--sweep", "load.normal_force"], "is not a key with values"),
+        (["--sweep", "load.normal_force=250N"], "has one value, expected two or more"),
+        (["--sweep", "load.normal_force=250N,"], "has an empty value"),
+        (["--sweep", "load.normal_force=250N,0.25 kN"], "are the same value"),
+        (["--sweep", "seed=1,1.0"], "'1' and '1.0' are the same value"),
+        (["--sweep", "seed=1,2", "--seed", "3"], "seed is set besides"),
+        (["--figure", "a.gif"], "ends in no kind of figure"),
+    ],
+)
+def test_that_mistakes_of_options_are_told_before_anything_is_done(
+    command: Command, tests: Path, arguments: list[str], words: str
+) -> None:
+    result = command("ensemble", tests, *arguments)
+    assert result.exit_code == 2
+    assert words in " ".join(result.stderr.split())
+    assert not list(tests.parent.glob("*.h5"))
+
+
+def test_that_a_plan_that_cannot_grow_has_no_target(command: Command, tests: Path) -> None:
+    options = ("--plan", "latin-hypercube", "--until", "depth.mean 1%")
+    result = command("ensemble", tests, *options)
+    assert result.exit_code == 2
+    assert "cannot grow" in result.stderr
+
+
+def test_that_a_target_ends_it_and_a_control_variate_saves(command: Command, tests: Path) -> None:
+    options = ("--plan", "control-variate", "--until", "depth.mean 20%")
+    result = command("ensemble", tests, "-n", 200, *options, *HERE)
+    assert result.exit_code == 0, result.output
+    found = open_ensemble("tests-ensemble.h5")
+    assert found.count < 200
+    assert f"reached: {found.count} realisations tell it within" in result.stdout
+    assert "not reached" not in result.stdout
+    assert "of the variance, as good as" in result.stdout
+
+
+def test_that_a_target_that_is_missed_is_told(command: Command, tests: Path) -> None:
+    result = command("ensemble", tests, "-n", 10, "--until", "depth.mean 1%", *HERE)
+    assert result.exit_code == 0
+    found = open_ensemble("tests-ensemble.h5")
+    target = Target.parse(found.until)
+    within = 100.0 * target.achieved(found.estimate_for(target))
+    assert f"not reached: 10 realisations tell it within {within:.2g} %" in result.stdout
+
+
+def test_that_failed_realisations_are_told_and_can_be_run_again(
+    command: Command, failing: Path
+) -> None:
+    result = command("ensemble", failing, "-n", 30, *HERE, "-o", "f.h5")
+    found = open_ensemble("f.h5")
+    assert 0 < found.failed < 30
+    assert result.exit_code == 0
+    first = min(found.errors)
+    assert (
+        f"warning: {found.failed} of 30 realisations failed, the first of them number {first}: "
+        f"{found.errors[first]}"
+    ) in result.stderr
+    assert "wearsim resume f.h5 --failed" in result.stderr
+    assert f"{found.count} done, {found.failed} failed, of 30" in result.stdout
+    again = command("resume", "f.h5", "--failed", "--scheduler", "serial", "--workers", 1, "-q")
+    assert again.exit_code == 0
+    assert f"warning: {found.failed} of 30 realisations failed" in again.stderr
+
+
+def test_that_an_ensemble_of_failures_alone_fails(command: Command, failing: Path) -> None:
+    few = ("--set", "evolution.max_steps=1")
+    result = command("ensemble", failing, "-n", 3, *few, *HERE, "-o", "f.h5")
+    assert result.exit_code == 1
+    assert "0 done, 3 failed, of 3" in result.stdout
+    assert "warning: 3 of 3 realisations failed" in result.stderr
+    assert "error: f.h5: no realisation ended well" in result.stderr
+    as_json = command("ensemble", failing, "-n", 3, *few, *HERE, "-o", "f.h5", "--json", "--force")
+    assert as_json.exit_code == 1
+    assert len(json.loads(as_json.stdout)["errors"]) == 3
+    assert command("show", "f.h5").exit_code == 0
+    assert command("plot", "f.h5").exit_code == 0
+
+
+def test_that_figure_results_and_inputs_have_a_file_each(command: Command, tests: Path) -> None:
+    arguments = ("ensemble", tests, "-n", 4, *HERE, "-o", "a.h5", "--figure", "a.png")
+    assert command(*arguments).exit_code == 0
+    assert Path("a.png").read_bytes().startswith(b"\x89PNG")
+    assert "a.png exists; choose another name with --figure" in command(*arguments).stderr
+    Path("a.png").unlink()
+    assert "a.h5: already exists" in command(*arguments).stderr
+    assert command(*arguments, "--force").exit_code == 0
+    both = command("ensemble", tests, "-o", "b.png", "--figure", "b.png")
+    assert both.exit_code == 2
+    assert "is the results file too" in both.stderr
+
+
+def test_that_a_sweep_has_a_file_for_each_value_and_compares_them(
+    command: Command, tests: Path
+) -> None:
+    swept = ("--sweep", "load.normal_force=250N,350 N", "-o", "s.h5", "--figure", "s.png")
+    result = command("ensemble", tests, "-n", 12, *swept, *HERE)
+    assert result.exit_code == 0, result.output
+    light, heavy = (open_ensemble(f"s-{value}.h5") for value in ("250N", "350N"))
+    assert light.scenario.load.build().mean(0.0, 1.0) == 250.0
+    assert (heavy.at_end("depth") > light.at_end("depth")).all()
+    rows = " ".join(result.stdout.split())
+    assert "compared depth at the end, for values of load.normal_force" in rows
+    assert "350 N deeper than 250 N" in rows
+    assert "with the same draws in 100.0 %" in rows
+    assert Path("s.png").read_bytes().startswith(b"\x89PNG")
+    again = command("ensemble", tests, "-n", 12, *swept, *HERE)
+    assert again.exit_code == 2
+
+
+def test_that_a_sweep_in_json_is_its_comparison(command: Command, tests: Path) -> None:
+    swept = ("--sweep", "friction.coefficient=0.08,0.12", "-o", "s.h5", "--json")
+    result = command("ensemble", tests, "-n", 8, *swept, *HERE)
+    assert result.exit_code == 0, result.output
+    data = json.loads(result.stdout)
+    assert [item["file"] for item in data["compared"]] == ["s-0.08.h5", "s-0.12.h5"]
+    assert data["title"] == "friction.coefficient"
+    kept = open_ensemble("s-0.12.h5").estimate("depth").mean.value
+    assert data["compared"][1]["value"]["value"] == kept
+
+
+def test_that_a_key_that_is_none_is_told_before_a_sweep(command: Command, tests: Path) -> None:
+    result = command("ensemble", tests, "--sweep", "lod.normal_force=250N,300N", *HERE)
+    assert result.exit_code == 2
+    assert "did you mean 'load'?" in result.stderr
+    assert not list(tests.parent.glob("*.h5"))
+
+
+def test_that_show_tells_what_is_in_the_file(command: Command, done: Path) -> None:
+    result = command("show", done)
+    assert result.exit_code == 0
+    for text in ("40 done, 0 failed, of 40", "software", "random creepage.misalignment", "disc"):
+        assert text in result.stdout
+    assert max(len(line.rstrip()) for line in result.stdout.splitlines()) <= 110
+    data = json.loads(command("show", done, "--json").stdout)
+    assert data["depth_m"]["count"] == 40
+    assert "[load.normal_force]" in data["scenario"]
+
+
+def test_that_plot_draws_an_ensemble(command: Command, done: Path) -> None:
+    assert command("plot", done).exit_code == 0
+    assert Path("e.png").read_bytes().startswith(b"\x89PNG")
+    refused = command("plot", done, "-o", "b.png", "--measured", "m.csv")
+    assert refused.exit_code == 2
+    assert "goes with a wear test" in refused.stderr
+
+
+def test_that_export_writes_realisations_courses_and_profile(command: Command, done: Path) -> None:
+    result = command("export", done, "-o", "out")
+    assert result.exit_code == 0, result.output
+    assert result.stdout.splitlines() == [
+        f"out/{name}"
+        for name in ("realisations.csv", "courses.csv", "profile.csv", "scenario.toml")
+    ]
+    kept = open_ensemble(done)
+    text = Path("out/realisations.csv").read_text().splitlines()
+    table = np.loadtxt(text[1:], delimiter=",")
+    head = text[0].split(",")
+    for title, values in {
+        "load.normal_force [N]": kept.inputs["load.normal_force"],
+        "depth [um]": kept.at_end("depth") * 1e6,
+        "width [mm]": kept.at_end("width") * 1e3,
+    }.items():
+        np.testing.assert_allclose(table[:, head.index(title)], values, rtol=1e-11)
+
+
+def test_that_resume_goes_on_with_an_ensemble(command: Command) -> None:
+    whole = ensemble(small(), 12, "whole.h5", scheduler="serial")
+    with pytest.raises(Interrupted):
+        ensemble(small(), 12, "part.h5", scheduler="serial", stop_requested=lambda: True)
+    assert open_ensemble("part.h5").count < 12
+    result = command("resume", "part.h5", "--scheduler", "serial", "-q")
+    assert result.exit_code == 0, result.output
+    assert "12 done, 0 failed, of 12" in result.stdout
+    found = open_ensemble("part.h5")
+    np.testing.assert_array_equal(found.values("depth"), whole.values("depth"))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--until", "5 min"], "extends a wear test, and this is an ensemble"),
+        (["--scheduler", "cloud"], "no scheduler 'cloud'"),
+    ],
+)
+def test_that_resume_refuses_what_an_ensemble_has_no_use_for(
+    command: Command, done: Path, arguments: list[str], words: str
+) -> None:
+    result = command("resume", done, *arguments)
+    assert result.exit_code == 2
+    assert words in " ".join(result.stderr.split())
+
+
+@pytest.mark.parametrize("arguments", [["--failed"], ["--workers", "2"], ["--scheduler", "serial"]])
+def test_that_resume_refuses_what_a_run_has_no_use_for(
+    command: Command, finished: Path, arguments: list[str]
+) -> None:
+    result = command("resume", finished, *arguments)
+    assert result.exit_code == 2
+    assert f"for {arguments[0]}: goes with an ensemble" in result.stderr
+
+
+def test_that_a_signal_ends_an_ensemble_that_goes_on_from_its_file(
+    tests: Path, tmp_path: Path
+) -> None:
+    options = ["-n", "100000", "-o", "a.h5", "--workers", "1"]
+    arguments = [sys.executable, "-m", "wearsim", "ensemble", str(tests), *options]
+    with subprocess.Popen(arguments, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as running:
+        assert running.stderr is not None
+        for line in running.stderr:
+            if "100,000 realisations" in line:
+                break
+        running.send_signal(signal.SIGINT)
+        said = running.stderr.read()
+    assert running.returncode == 130
+    assert "stopping after the realisations that run now" in said
+    kept = open_ensemble(tmp_path / "a.h5")
+    assert not kept.finished
+    assert f"stopped after {kept.count} of 100000 realisations" in said
+    assert "go on with: wearsim resume a.h5" in said
+
+
+PROGRESS = EnsembleProgress(
+    done=1200,
+    failed=3,
+    asked=5000,
+    rate=12.34,
+    left=307.7,
+    what="depth.mean",
+    estimate=Interval(21.5e-6, 21.0e-6, 22.0e-6),
+    workers="2 processes",
+)
+
+
+def test_that_progress_tells_rate_time_left_and_the_estimate_so_far() -> None:
+    assert told(PROGRESS) == (
+        "1,200 of 5,000 realisations, 3 failed, 12.3/s, 5 min 8 s left,"
+        " depth.mean 21.50 um [21.00, 22.00]"
+    )
+
+
+def test_that_progress_tells_nothing_that_is_unknown() -> None:
+    none = PROGRESS.__class__(0, 5, 5, 2.0, 0.0, "depth.mean", UNKNOWN, "serial")
+    assert told(none) == "0 of 5 realisations, 5 failed, 2/s"
+
+
+def test_that_progress_lines_are_a_second_apart() -> None:
+    times = iter([0.0, 0.0, 0.5, 1.1, 1.2, 2.2])
+    lines: list[str] = []
+    watch = EnsembleLines(lines.append, Clock(lambda: next(times)))
+    for _ in range(4):
+        watch(PROGRESS)
+    assert lines == [told(PROGRESS)] * 2
+    assert watch.workers == "2 processes"
+
+
+def test_that_a_terminal_gets_a_live_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    screen = io.StringIO()
+    terminal = Console(file=screen, force_terminal=True, width=140, markup=False, highlight=False)
+    monkeypatch.setattr(ensemble_progress, "console", lambda **_: terminal)
+    with watching_ensemble(quiet=False) as watch:
+        assert isinstance(watch, LiveEnsemble)
+        watch(PROGRESS)
+    assert "24 %" in screen.getvalue()
+    assert told(PROGRESS, what="") in screen.getvalue()
+
+
+def test_that_quiet_shows_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    with watching_ensemble(quiet=True) as watch:
+        watch(PROGRESS)
+    assert capsys.readouterr() == ("", "")
+    assert watch.workers == "2 processes"
+
+
+def test_that_a_scenario_in_which_nothing_is_drawn_is_bad_input(command: Command) -> None:
+    result = command("ensemble", SCENARIOS / "rig-450min.toml", *HERE)
+    assert result.exit_code == 2
+    assert "no random input" in result.stderr
+
+
+def test_that_what_has_no_effect_is_told_with_what_it_may_have(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    found = made_up(400, seed=2)
+    write_ensemble(found, [])
+    (none,) = [item for item in found.sensitivity() if item.without_effect]
+    rows = " ".join(capsys.readouterr().out.split())
+    assert f"{none.name} none seen, at most {100.0 * none.first.high:.2g} %" in rows
+
+
+def test_that_one_realisation_has_no_spread_and_constant_ones_say_so(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    write_ensemble(made_up(1), [])
+    one = capsys.readouterr().out
+    assert "95 % interval" not in one
+    assert "what moves the depth: too few realisations to tell" in one
+    write_ensemble(made_up(20, spread=0.0), [])
+    same = capsys.readouterr().out
+    assert ["depth", "[um]", "20.00", "constant", "-", "-", "-"] in [
+        line.split() for line in same.splitlines()
+    ]
+    assert "what moves the depth: nothing, it is the same in all" in same
+
+
+def test_that_saltelli_tells_total_indices_too(capsys: pytest.CaptureFixture[str]) -> None:
+    found = made_up(5 * 60, "saltelli")
+    write_ensemble(found, [])
+    assert "with all others" in capsys.readouterr().out
+
+
+def test_that_resume_of_a_run_names_what_goes_on_with_an_ensemble(done: Path) -> None:
+    with pytest.raises(ResultsFileError, match="with which resume_ensemble goes on"):
+        wearsim.resume(done)
+    assert wearsim.resume_ensemble(done).count == wearsim.open_ensemble(done).count == 40

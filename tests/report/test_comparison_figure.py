@@ -1,0 +1,107 @@
+"""The figure of a comparison, and how estimates are told with their intervals."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from tests.report.made_up_ensembles import made_up
+from tests.studies.study_examples import short
+from wearsim.randomness.intervals import UNKNOWN, Interval
+from wearsim.report.ensemble_comparison import MOST_POINTS, comparison_figure
+from wearsim.report.intervals import cells, part_with_interval, with_interval
+from wearsim.report.saving import save_figure
+from wearsim.studies import replay
+from wearsim.studies.compare import compare
+
+
+@pytest.fixture(scope="module")
+def comparison():
+    run = replay.run(short())
+    results = [made_up(300, scale=0.1), made_up(300, scale=0.12), run]
+    return compare(results, ["light", "heavy", "one"])
+
+
+def curves(axes):
+    return {line.get_label().split(" (")[0]: line for line in axes.get_lines()}
+
+
+def test_that_ensembles_are_distribution_functions_and_a_run_a_line(comparison):
+    axes = comparison_figure(comparison, "loads").axes[0]
+    drawn = curves(axes)
+    light, _, run = comparison.rows
+    x, y = drawn["light"].get_data()
+    np.testing.assert_allclose(x[1:], light.values * 1e6)
+    np.testing.assert_allclose(y[1:], 100.0 * np.arange(1, 301) / 300)
+    assert drawn["one"].get_xdata() == [run.value.value * 1e6] * 2
+    (error,) = axes.patches
+    assert error.get_x() == pytest.approx(run.value.low * 1e6)
+    assert error.get_width() == pytest.approx((run.value.high - run.value.low) * 1e6)
+
+
+def test_that_ranges_are_drawn_with_means_and_intervals(comparison):
+    axes = comparison_figure(comparison).axes[1]
+    light = comparison.rows[0]
+    lines = [line.get_xdata() for line in axes.get_lines() if (line.get_ydata() == 0).all()]
+    quantiles = dict(light.quantiles)
+    for ends in (
+        [quantiles[0.05].value, quantiles[0.95].value],
+        [quantiles[0.5].value],
+        [light.value.low, light.value.high],
+        [light.value.value],
+    ):
+        wanted = 1e6 * np.array(ends)
+        assert any(len(x) == len(wanted) and np.allclose(x, wanted) for x in lines)
+    labels = [label.get_text().splitlines() for label in axes.get_yticklabels()]
+    assert [label[0] for label in labels] == ["light", "heavy", "one"]
+    assert labels[1][2] == f"in {part_with_interval(comparison.rows[1].deeper)}"
+
+
+def test_that_many_realisations_are_drawn_at_fewer_points_of_one_function():
+    results = [made_up(3 * MOST_POINTS), made_up(3 * MOST_POINTS, scale=1.1)]
+    found = compare(results, ["a", "b"], "width")
+    axes = comparison_figure(found).axes[0]
+    x, y = curves(axes)["a"].get_data()
+    assert len(x) <= MOST_POINTS + 1
+    assert (x[-1], y[-1]) == (found.rows[0].values[-1] * 1e3, 100.0)
+    assert axes.get_xlabel() == "width at the end [mm]"
+
+
+@pytest.mark.parametrize("number", [2, 9])
+def test_that_any_comparison_can_be_drawn(tmp_path, number):
+    results = [made_up(1), made_up(20, spread=0.0), *(made_up(30, seed=k) for k in range(number))]
+    found = compare(results, [f"{k}" for k in range(len(results))])
+    save_figure(comparison_figure(found), tmp_path / "a.png")
+    assert (tmp_path / "a.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("found", "unit", "text"),
+    [
+        (Interval(21.4873e-6, 21.0e-6, 21.98e-6), "um", "21.49 um [21.00, 21.98]"),
+        (Interval(21.4873e-6, 21.4870e-6, 21.4876e-6), "um", "21.48730 um [21.48700, 21.48760]"),
+        (Interval(21.4873e-6, 10e-6, 33e-6), "um", "21.5 um [10.0, 33.0]"),
+        (Interval(1758.4, 1718.6, 1797.7), "J", "1758 J [1719, 1798]"),
+        (Interval(-3e-7, -5e-7, 1e-7), "um", "-0.300 um [-0.500, 0.100]"),
+        (Interval(3.0, 3.0, 3.0), "N", "3.000 N"),
+        (Interval(3.0, -math.inf, math.inf), "N", "3.000 N too few"),
+        (Interval(2e-12, 1e-12, 3e-12), "um", "2.000e-06 um [1.000e-06, 3.000e-06]"),
+        (UNKNOWN, "N", "- too few"),
+    ],
+)
+def test_that_an_estimate_has_the_digits_that_its_interval_gives_sense_to(found, unit, text):
+    assert with_interval(found, unit) == text
+
+
+def test_that_a_column_has_no_units():
+    assert cells(Interval(21.4873e-6, 21.0e-6, 21.98e-6), "um") == ("21.49", "21.00..21.98")
+    assert cells(Interval(3.0, 3.0, 3.0), "N") == ("3.000", "")
+    assert cells(UNKNOWN, "N") == ("-", "too few")
+
+
+def test_that_parts_are_told_in_per_cent():
+    assert part_with_interval(Interval(0.571, 0.54, 0.6023)) == "57.1 % [54.0, 60.2]"
+    assert part_with_interval(Interval(1.0, 1.0, 1.0)) == "100.0 %"
+    assert part_with_interval(UNKNOWN) == "-"

@@ -1,0 +1,164 @@
+"""The figure of an ensemble: that it holds what was computed, whatever there is of it."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_hex
+
+from tests.report.made_up_ensembles import INPUTS, made_up
+from wearsim.randomness.targets import Target
+from wearsim.report.ensemble import FEW, ensemble_figure
+from wearsim.report.saving import save_figure
+from wearsim.report.settling import settling
+from wearsim.report.style import GREY
+from wearsim.results import EnsembleResult
+
+
+@pytest.fixture(scope="module")
+def result():
+    return made_up(400, seed=2)
+
+
+@pytest.fixture(scope="module")
+def figure(result):
+    return ensemble_figure(result)
+
+
+def panel(figure, title):
+    (axes,) = [axes for axes in figure.axes if axes.get_title(loc="left").startswith(title)]
+    return axes
+
+
+def labelled(axes, label):
+    (line,) = [line for line in axes.get_lines() if line.get_label() == label]
+    return line
+
+
+def test_that_the_course_holds_median_mean_band_and_a_few_realisations(figure, result):
+    axes, course = panel(figure, "Depth of the groove"), result.course("depth")
+    for label, values in (("median", course.quantiles[0.5]), ("mean", course.mean)):
+        np.testing.assert_allclose(labelled(axes, label).get_ydata(), values * 1e6)
+        np.testing.assert_allclose(labelled(axes, label).get_xdata(), course.passes / 1e6)
+    assert axes.get_xlabel() == "million roller passes"
+    thin = [line for line in axes.get_lines() if line.get_linewidth() < 1.0]
+    assert len(thin) == FEW
+    np.testing.assert_allclose(thin[3].get_ydata(), result.values("depth")[3] * 1e6)
+    heights = axes.collections[0].get_paths()[0].vertices[:, 1]
+    assert heights.max() == pytest.approx(course.quantiles[0.95].max() * 1e6)
+
+
+def test_that_records_over_decades_have_logarithmic_axes(result):
+    passes = np.array([0.0, 10.0, 1e3, 1e4, 1e5, 1e6])
+    raw = replace(result.raw, variables={**result.raw.variables, "record_passes": passes})
+    axes = panel(ensemble_figure(EnsembleResult(raw)), "Depth of the groove")
+    assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
+    assert labelled(axes, "median").get_xdata()[0] == 10.0
+
+
+def test_that_the_density_has_unit_area_and_marks_what_was_estimated(figure, result):
+    axes = panel(figure, "Final depth")
+    area = sum(bar.get_width() * bar.get_height() for bar in axes.patches)
+    assert area == pytest.approx(1.0)
+    found = result.estimate("depth", -1, (0.05, 0.5, 0.95))
+    marks = [line.get_xdata()[0] for line in axes.get_lines()]
+    wanted = [found.mean, found.quantile(0.5), found.quantile(0.05), found.quantile(0.95)]
+    np.testing.assert_allclose(marks, [item.value * 1e6 for item in wanted])
+
+
+def test_that_the_estimate_settles_at_that_of_all(figure, result):
+    axes, found = panel(figure, "Mean of depth"), result.estimate("depth").mean
+    counts, values = axes.get_lines()[0].get_data()
+    assert (counts[0], counts[-1]) == (1, 400)
+    assert values[-1] == pytest.approx(found.value * 1e6)
+    heights = axes.collections[0].get_paths()[0].vertices[:, 1]
+    for end in (found.low, found.high):
+        assert np.isclose(heights, end * 1e6).any()
+
+
+@pytest.mark.parametrize("plan", ["monte-carlo", "sobol", "saltelli", "control-variate"])
+def test_that_what_settles_is_what_fewer_realisations_would_have_told(plan):
+    whole, target = made_up(100, plan, failed=[5]), Target.parse("depth.mean 1%")
+    counts, found = settling(whole, target)
+    place = int(np.flatnonzero(counts >= 40)[0])
+    last = int(whole.numbers[counts[place] - 1])
+    status = np.where(np.arange(100) <= last, whole.raw.status, 0)
+    part = EnsembleResult(replace(whole.raw, status=status))
+    assert part.count == counts[place]
+    assert found[place] == target.interval(part.estimate_for(target))
+
+
+def test_that_a_target_is_drawn_for_what_it_is_about():
+    figure = ensemble_figure(made_up(50, until="width.q95 2%"))
+    axes = panel(figure, "95 % quantile of width")
+    assert axes.get_ylabel() == "width [mm]"
+    last = axes.get_lines()[0].get_ydata()[-1]
+    ends = sorted(line.get_ydata()[0] for line in axes.get_lines()[-2:])
+    assert ends == pytest.approx([0.98 * last, 1.02 * last])
+
+
+def test_that_the_profile_lies_downwards_with_its_band(figure, result):
+    axes, band = panel(figure, "Worn profile"), result.band()
+    line = labelled(axes, "mean")
+    np.testing.assert_allclose(line.get_xdata(), band.y * 1e3)
+    np.testing.assert_allclose(line.get_ydata(), -band.mean * 1e6)
+    heights = axes.collections[0].get_paths()[0].vertices[:, 1]
+    assert heights.min() == pytest.approx(-band.high.max() * 1e6)
+
+
+def test_that_a_profile_of_some_says_of_how_many():
+    axes = panel(ensemble_figure(made_up(60, kept=20)), "Worn profile")
+    assert axes.get_title(loc="left").endswith("of the first 20")
+
+
+def test_that_effects_are_bars_and_those_without_one_are_grey(figure, result):
+    axes, effects = panel(figure, "What moves"), result.sensitivity("depth")
+    assert {item.name for item in effects} == set(INPUTS)
+    assert [item.name for item in effects if item.without_effect] == ["roller.offset"]
+    assert len(axes.patches) == len(effects)
+    for bar, label, item in zip(axes.patches, axes.get_yticklabels(), effects, strict=True):
+        assert bar.get_width() == pytest.approx(100.0 * item.first.value)
+        assert (to_hex(bar.get_facecolor()) == GREY) == item.without_effect
+        assert (label.get_text() == f"{item.name} (none seen)") == item.without_effect
+
+
+def test_that_total_indices_are_drawn_where_the_plan_tells_them():
+    result = made_up(5 * 80, "saltelli")
+    axes = panel(ensemble_figure(result), "What moves")
+    drawn = [line for line in axes.get_lines() if line.get_marker() == "D"]
+    marks = [line.get_xdata()[0] for line in drawn if len(line.get_xdata())]
+    totals = [100.0 * item.total.value for item in result.sensitivity("depth")]
+    assert marks == pytest.approx(totals)
+
+
+@pytest.mark.parametrize(
+    ("example", "told"),
+    [
+        ({"count": 1}, "1 realisation, monte-carlo"),
+        ({"count": 2}, "2 realisations, monte-carlo"),
+        ({"count": 5, "failed": [0, 4]}, "3 realisations (2 failed)"),
+        ({"count": 30, "pending": 10}, "20 realisations of 30, monte-carlo"),
+        ({"count": 20, "spread": 0.0}, "the same in all"),
+        ({"count": 3, "failed": [0, 1, 2]}, "0 realisations (3 failed)"),
+        ({"count": 4, "pending": 4}, "0 realisations of 4"),
+    ],
+)
+def test_that_any_ensemble_has_a_figure(tmp_path, example, told):
+    figure = ensemble_figure(made_up(**example))
+    assert told in figure.get_suptitle()
+    save_figure(figure, tmp_path / "a.png")
+    assert (tmp_path / "a.png").stat().st_size > 10_000
+
+
+def test_that_one_value_has_no_density_and_nothing_that_moves_it():
+    figure = ensemble_figure(made_up(20, spread=0.0))
+    (text,) = panel(figure, "Final depth").texts
+    assert re.fullmatch(r"20\.00 um in all 20: no density to draw", text.get_text())
+    assert "the same in all" in panel(figure, "What moves").texts[0].get_text()
+    settled = panel(figure, "Mean of depth")
+    low, high = settled.get_ylim()
+    assert low < 0.0
+    assert high == pytest.approx(40.0)

@@ -1,0 +1,282 @@
+"""`wearsim ensemble`: a whole wear test for each realisation of the random inputs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from wearsim.cli.arguments import (
+    Drawing,
+    Force,
+    Json,
+    Quiet,
+    Realisations,
+    ScenarioFile,
+    Scheduler,
+    Seed,
+    Settings,
+    Workers,
+    check_drawing,
+    check_figure,
+    check_workforce,
+    read_scenario,
+)
+from wearsim.cli.output import note, refuse_existing, tell_notes, write_json
+
+if TYPE_CHECKING:
+    from wearsim.cli.sweeping import Swept
+    from wearsim.results import EnsembleResult
+    from wearsim.scenario import Scenario
+
+Output = Annotated[
+    Path | None,
+    typer.Option(
+        "--output",
+        "-o",
+        metavar="FILE.h5",
+        help="Results file; by default the scenario's name with -ensemble.h5, in the current"
+        " folder.",
+        show_default=False,
+    ),
+]
+Until = Annotated[
+    str | None,
+    typer.Option(
+        metavar="TARGET",
+        help="Stop as soon as this is known well enough, 'depth.mean 1%': half of its 95 %"
+        " interval, in parts of it.",
+        show_default=False,
+    ),
+]
+Plan = Annotated[
+    str | None,
+    typer.Option(
+        metavar="PLAN",
+        help="monte-carlo, latin-hypercube, sobol, saltelli or control-variate; by default the"
+        " scenario's.",
+        show_default=False,
+    ),
+]
+Sweep = Annotated[
+    str | None,
+    typer.Option(
+        metavar="KEY=V1,V2,...",
+        help="An ensemble for each value, and their comparison: load.normal_force=250N,300N.",
+        show_default=False,
+    ),
+]
+STOPPING = "stopping after the realisations that run now; once more to stop at once"
+
+
+def ensemble(
+    scenario: ScenarioFile,
+    realisations: Realisations = 1000,
+    output: Output = None,
+    figure: Drawing = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    until: Until = None,
+    plan: Plan = None,
+    sweep: Sweep = None,
+    seed: Seed = None,
+    settings: Settings = None,
+    json: Json = False,
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Run a wear test for each realisation of the random inputs."""
+    if figure is not None:
+        check_figure(figure, "--figure")
+        refuse_existing(figure, force, "--figure")
+    options: dict[str, Any] = {
+        "plan": _plan(plan),
+        "until": _until(until),
+        "scheduler": check_workforce(scheduler, workers),
+        "workers": workers,
+        "force": force,
+    }
+    texts = [*(settings or []), *([f"seed={seed}"] if seed is not None else [])]
+    path = output if output is not None else Path(f"{scenario.stem}-ensemble.h5")
+    if sweep is not None:
+        from wearsim.cli.sweeping import parse_sweep
+
+        swept = parse_sweep(sweep)
+        if any(text.partition("=")[0].strip() == swept.key for text in texts):
+            raise typer.BadParameter(
+                f"{swept.key} is set besides; leave it to --sweep", param_hint="--set"
+            )
+        _sweep(scenario, texts, swept, realisations, path, figure, options, json, quiet)
+        return
+    loaded = read_scenario(scenario, texts)
+    if figure is not None:
+        check_drawing(figure, path, loaded.paths)
+    _run(loaded, realisations, path, figure, options, json, quiet)
+
+
+def _run(
+    loaded: Scenario,
+    realisations: int,
+    path: Path,
+    figure: Path | None,
+    options: dict[str, Any],
+    json: bool,
+    quiet: bool,
+) -> None:
+    from wearsim.cli.ensemble_progress import watching_ensemble
+    from wearsim.cli.stop import stop_on_signals
+    from wearsim.studies.ensemble import ensemble as study
+
+    with stop_on_signals(STOPPING) as stop, watching_ensemble(quiet) as watch:
+        result = study(
+            loaded,
+            realisations,
+            path,
+            on_progress=watch,
+            stop_requested=stop.requested,
+            **options,
+        )
+    if figure is not None:
+        draw(result, figure)
+    report(result, json, figure, watch.workers)
+
+
+def _plan(name: str | None) -> str | None:
+    """Return a plan's name, checked."""
+    if name is None:
+        return None
+    from wearsim.studies.ensemble_plan import plan_called
+
+    try:
+        return plan_called(name)
+    except ValueError as error:
+        raise typer.BadParameter(str(error), param_hint="--plan") from error
+
+
+def _until(text: str | None) -> str | None:
+    """Return what is to be reached, checked."""
+    if text is None:
+        return None
+    from wearsim.randomness.targets import Target
+    from wearsim.results.ensemble_layout import OBSERVABLES
+
+    try:
+        target = Target.parse(text)
+    except ValueError as error:
+        raise typer.BadParameter(str(error), param_hint="--until") from error
+    if target.observable not in OBSERVABLES:
+        raise typer.BadParameter(
+            f"'{text}' asks for '{target.observable}', which is not followed, expected one of"
+            f" {', '.join(OBSERVABLES)}",
+            param_hint="--until",
+        )
+    return text
+
+
+def _sweep(
+    scenario: Path,
+    settings: list[str],
+    swept: Swept,
+    realisations: int,
+    path: Path,
+    figure: Path | None,
+    options: dict[str, Any],
+    json: bool,
+    quiet: bool,
+) -> None:
+    """Run an ensemble for each value, and compare them."""
+    from wearsim.cli.ensemble_progress import watching_ensemble
+    from wearsim.cli.stop import stop_on_signals
+    from wearsim.studies.sweep import path_of
+    from wearsim.studies.sweep import sweep as study
+
+    scenarios = {
+        value: read_scenario(scenario, [*settings, swept.setting(value)]) for value in swept.values
+    }
+    if figure is not None:
+        for value, loaded in scenarios.items():
+            check_drawing(figure, path_of(path, value), loaded.paths)
+
+    def announce(value: str, file: Path) -> None:
+        if not quiet:
+            note(f"{swept.key} = {value}: {file}")
+
+    with stop_on_signals(STOPPING) as stop, watching_ensemble(quiet) as watch:
+        results = study(
+            scenarios.__getitem__,
+            swept.values,
+            realisations,
+            path,
+            on_value=announce,
+            on_progress=watch,
+            stop_requested=stop.requested,
+            **options,
+        )
+    from wearsim.cli.comparison_table import report_comparison
+
+    for result in results:
+        tell_failures(result)
+        _refuse_nothing(result)
+    report_comparison(results, list(swept.values), "depth", swept.key, figure, json)
+
+
+def report(result: EnsembleResult, json: bool, figure: Path | None, workers: str = "") -> None:
+    """Write how an ensemble ended to stdout, and what failed to stderr.
+
+    Parameters
+    ----------
+    result : EnsembleResult
+    json : bool
+        As one JSON object.
+    figure : Path, optional
+        The figure that was drawn.
+    workers : str
+        Who did the work.
+
+    Raises
+    ------
+    SolverError
+        If every realisation failed.
+    """
+    from wearsim.cli.ensemble_table import as_json, write_ensemble
+
+    if json:
+        write_json({**as_json(result), "workers": workers or None, "figure": figure})
+    else:
+        more = [("results file", str(result.path))]
+        more += [("figure", str(figure))] if figure else []
+        write_ensemble(result, more, workers)
+        tell_notes(result)
+    tell_failures(result)
+    _refuse_nothing(result)
+
+
+def tell_failures(result: EnsembleResult) -> None:
+    """Write how many realisations failed, and why the first did, to stderr."""
+    if not result.failed:
+        return
+    from wearsim.report.units import count
+
+    first, text = next(iter(result.errors.items()))
+    note(
+        f"warning: {count(result.failed)} of {count(result.count + result.failed)} realisations"
+        f" failed, the first of them number {first}: {text}\n"
+        f"run them again with: wearsim resume {result.path} --failed"
+    )
+
+
+def _refuse_nothing(result: EnsembleResult) -> None:
+    """End with exit code 1 where not one realisation ended well."""
+    if result.failed and not result.count:
+        from wearsim.errors import SolverError
+
+        raise SolverError(f"{result.path}: no realisation ended well")
+
+
+def draw(result: EnsembleResult, path: Path) -> None:
+    """Write the figure of an ensemble."""
+    from wearsim.report.ensemble import ensemble_figure
+    from wearsim.report.saving import save_figure
+
+    save_figure(ensemble_figure(result), path)
