@@ -135,6 +135,7 @@ def _run(
             path,
             on_progress=watch,
             stop_requested=stop.requested,
+            on_notice=note,
             **options,
         )
     if figure is not None:
@@ -211,6 +212,7 @@ def _sweep(
             on_value=announce,
             on_progress=watch,
             stop_requested=stop.requested,
+            on_notice=note,
             **options,
         )
     from wearsim.cli.comparison_table import report_comparison

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from wearsim.cli.arguments import Json, Quiet, ResultsFile, Scheduler, Workers, check_workforce
+from wearsim.cli.output import note
 
 Until = Annotated[
     str | None,
@@ -82,6 +83,7 @@ def _resume_ensemble(
             scheduler=chosen,
             on_progress=watch,
             stop_requested=stop.requested,
+            on_notice=note,
         )
     report(result, json, None, watch.workers)
 
