@@ -90,7 +90,7 @@ def test_that_a_sweep_refuses_an_existing_file_before_it_runs(swept, tmp_path):
 
 def test_that_values_make_names_of_files():
     assert path_of("out/a.h5", "250 N").name == "a-250N.h5"
-    assert path_of("a.h5", "1e-11 1/Pa").name == "a-1e-111_per_Pa.h5"
+    assert path_of("a.h5", "1e-11 1/Pa").name == "a-1e-11_1_per_Pa.h5"
 
 
 def test_that_a_comparison_tells_which_wears_deeper(swept):

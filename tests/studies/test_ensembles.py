@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
+
 import numpy as np
 import pytest
 
@@ -159,6 +161,104 @@ def test_that_failed_realisations_alone_run_once_more(tmp_path, monkeypatch):
     assert unlike(again, whole) == []
 
 
+def test_that_a_kill_while_failed_ones_run_once_more_costs_nothing(tmp_path, monkeypatch):
+    from wearsim.studies.member import Members
+
+    monkeypatch.setattr(ensemble_work.EnsembleWork, "_batch_size", lambda self: 1)
+    whole = ensemble(small(), 6, tmp_path / "whole.h5", **SERIAL)
+    run = Members._run
+
+    def failing(self, number, *rest):
+        if number in {2, 4}:
+            raise wearsim.errors.StepError("no step is short enough")
+        return run(self, number, *rest)
+
+    monkeypatch.setattr(Members, "_run", failing)
+    path = tmp_path / "failing.h5"
+    ensemble(small(), 6, path, **SERIAL)
+
+    def killed(self, number, *rest):
+        if number == 4:
+            raise SystemExit  # as a kill would: nothing after it is written
+        return run(self, number, *rest)
+
+    monkeypatch.setattr(Members, "_run", killed)
+    with pytest.raises(SystemExit):
+        resume_ensemble(path, failed=True, **SERIAL)
+    assert not open_ensemble(path).finished
+    monkeypatch.setattr(Members, "_run", run)
+    assert unlike(resume_ensemble(path, **SERIAL), whole) == []
+
+
+def test_that_failed_ones_count_for_the_target_once_they_have_run(tmp_path, monkeypatch):
+    from wearsim.studies.member import Members
+
+    monkeypatch.setattr("wearsim.studies.checkpoints.FEWEST", 32)
+    whole = ensemble(small(), 90, tmp_path / "whole.h5", until="depth.mean 8%", **SERIAL)
+    run = Members._run
+
+    def failing(self, number, *rest):
+        if number % 9 == 0:
+            raise wearsim.errors.StepError("no step is short enough")
+        return run(self, number, *rest)
+
+    monkeypatch.setattr(Members, "_run", failing)
+    path = tmp_path / "failing.h5"
+    ensemble(small(), 90, path, until="depth.mean 8%", **SERIAL)
+    monkeypatch.setattr(Members, "_run", run)
+    again = resume_ensemble(path, failed=True, **SERIAL)
+    estimate = again.estimate("depth").mean
+    assert again.finished
+    assert again.failed == 0
+    assert estimate.half_width <= 0.08 * estimate.value
+    np.testing.assert_array_equal(again.at_end("depth")[:32], whole.at_end("depth")[:32])
+
+
+def test_that_a_value_that_is_not_finite_fails_its_realisation_alone(tmp_path, monkeypatch):
+    from wearsim.studies import member
+
+    observed = member.observed
+
+    def spoilt(scenario, *rest):
+        rows, state = observed(scenario, *rest)
+        if scenario.sampling.realisation == 1:
+            rows[-1]["peak_pressure"] = np.nan
+        return rows, state
+
+    monkeypatch.setattr(member, "observed", spoilt)
+    result = ensemble(small(), 3, tmp_path / "e.h5", **SERIAL)
+    assert result.errors == {1: "peak_pressure is not finite at record 2"}
+    assert result.finished
+
+
+def test_that_a_straggler_holds_no_more_than_a_few_back(tmp_path, monkeypatch):
+    from wearsim.studies.ensemble_work import AHEAD, EnsembleWork
+
+    monkeypatch.setattr(EnsembleWork, "_batch_size", lambda self: 1)
+    taken, greatest = EnsembleWork._take, []
+
+    def watched(self, outcomes):
+        taken(self, outcomes)
+        greatest.append(len(self._held))
+
+    monkeypatch.setattr(EnsembleWork, "_take", watched)
+    monkeypatch.setattr("wearsim.studies.checkpoints.FEWEST", 4)
+
+    class Late:
+        """Has the first batch done last."""
+
+        workers, describe = 1, "one that is late"
+
+        def results(self, work, batches):
+            outcomes = [(batch, work(batch)) for batch in batches]
+            yield from [*outcomes[1:], *outcomes[:1]]
+
+    monkeypatch.setattr("wearsim.studies.ensemble.executor", lambda *_, **__: nullcontext(Late()))
+    result = ensemble(small(), 20, tmp_path / "e.h5", until="depth.mean 0.01%")
+    assert result.count == 20
+    assert max(greatest) <= AHEAD
+
+
 def test_that_a_plugins_mistake_ends_one_realisation_alone(tmp_path, monkeypatch):
     from wearsim.studies.member import Members
 
@@ -238,6 +338,34 @@ def test_that_saltellis_rows_are_whole_and_their_inputs_taken_in_turn(tmp_path):
     slack = 2 + groups.index("creepage.misalignment")  # yaw and tilt are one group
     assert (yaw[:, slack] == yaw[:, 1]).all()
     assert (tilt[:, slack] == tilt[:, 1]).all()
+
+
+def test_that_saltellis_blocks_are_those_of_their_inputs_with_a_process_among_them(tmp_path):
+    load = {"distribution": "ornstein-uhlenbeck", "correlation_time": "20 s", "marginal": LOAD}
+    scenario = small(load__normal_force=load)
+    result = ensemble(scenario, 7, tmp_path / "e.h5", plan="saltelli", **SERIAL)
+    groups = [item["name"] for item in result.raw.groups]
+    for name in groups:
+        key = "creepage.yaw" if name == "creepage.misalignment" else name
+        values = result.values(key).reshape(-1, len(groups) + 2)
+        changed = values != values[:, :1]
+        assert changed[:, [1, 2 + groups.index(name)]].all()
+        assert changed.sum() == 2 * len(values)
+
+
+def test_that_a_control_is_left_out_where_realisations_fail(tmp_path):
+    result = ensemble(frail(), 12, tmp_path / "e.h5", plan="control-variate", **SERIAL)
+    assert 0 < result.failed < 12
+    estimate = result.estimate("depth")
+    assert estimate.variance_saved is None
+    assert estimate.mean.value == pytest.approx(result.at_end("depth").mean())
+    assert any("plain Monte Carlo" in text for text in result.warnings)
+
+
+def test_that_correlated_inputs_are_told_with_what_they_move(tmp_path):
+    ties = [["load.normal_force", "creepage.longitudinal", 0.6]]
+    result = ensemble(small(sampling__correlation=ties), 4, tmp_path / "e.h5", **SERIAL)
+    assert any("correlated" in text for text in result.warnings)
 
 
 def test_that_inputs_without_effect_are_told(tmp_path):

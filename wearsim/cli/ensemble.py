@@ -159,19 +159,12 @@ def _until(text: str | None) -> str | None:
     """Return what is to be reached, checked."""
     if text is None:
         return None
-    from wearsim.randomness.targets import Target
-    from wearsim.results.ensemble_layout import OBSERVABLES
+    from wearsim.studies.ensemble import target_of
 
     try:
-        target = Target.parse(text)
+        target_of(text)
     except ValueError as error:
         raise typer.BadParameter(str(error), param_hint="--until") from error
-    if target.observable not in OBSERVABLES:
-        raise typer.BadParameter(
-            f"'{text}' asks for '{target.observable}', which is not followed, expected one of"
-            f" {', '.join(OBSERVABLES)}",
-            param_hint="--until",
-        )
     return text
 
 

@@ -67,7 +67,9 @@ class Controlled:
     def error(self, parts: FloatArray) -> float:
         """Return the standard error of the weighted mean of `parts`, (n,)."""
         own = 1.0 / self.draws + self._apart**2 / self._square
-        left = float(((self.weights * self.residuals(parts) / (1.0 - own)) ** 2).sum())
+        # a realisation that the line goes through by itself leaves nothing
+        free = np.maximum(1.0 - own, np.finfo(float).eps)
+        left = float(((self.weights * self.residuals(parts) / free) ** 2).sum())
         return math.sqrt(left + (self._slope(parts) * self._mean_error) ** 2)
 
     def variance_saved(self, values: FloatArray) -> float:

@@ -157,6 +157,25 @@ class EnsembleData(StudyData):
             return self.variables.rows(name, start, stop)
         return self.variables[name][start:stop]
 
+    def columns(self, name: str, records: slice) -> FloatArray:
+        """Return an observable at some records in every realisation, as `column` does.
+
+        Parameters
+        ----------
+        name : str
+            One of `ensemble_layout.OBSERVABLES`.
+        records : slice
+            From which record to which.
+
+        Returns
+        -------
+        ndarray
+            Shape (asked, records).
+        """
+        if isinstance(self.variables, StoredArrays):
+            return self.variables.columns(name, records)
+        return self.variables[name][:, records]
+
     def column(self, name: str, record: int) -> FloatArray:
         """Return an observable at one record in every realisation, pending and failed ones too.
 

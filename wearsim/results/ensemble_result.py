@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
@@ -16,7 +16,7 @@ from wearsim.randomness.intervals import Interval
 from wearsim.randomness.plans import REPLICATES
 from wearsim.randomness.statistics import summarise
 from wearsim.results.ensemble_data import EnsembleData
-from wearsim.results.ensemble_layout import DONE, OBSERVABLES, QUANTILES
+from wearsim.results.ensemble_layout import DONE, OBSERVABLES, QUANTILES, kept_profiles
 from wearsim.results.ensemble_reader import read_ensemble
 from wearsim.results.study_result import StudyResult
 from wearsim.types import FloatArray, IntArray
@@ -24,6 +24,7 @@ from wearsim.types import FloatArray, IntArray
 if TYPE_CHECKING:
     from wearsim.randomness.targets import Target
 
+_AT_ONCE = 4_000_000  # numbers that are read at once
 PROBABILITIES = (0.025, 0.05, 0.5, 0.95, 0.975)
 
 
@@ -226,13 +227,28 @@ class EnsembleResult(StudyResult[EnsembleData]):
         Estimate
         """
         chosen = self._independent
-        numbers, values = self.independent(name, record)
-        control = None
-        if self.plan == "control-variate":
-            known = self.raw.control
-            error = known["std"] / np.sqrt(known["draws"])
-            control = Control(self.values("control")[chosen], known["mean"], error)
-        return estimate(values, probabilities, self.plan, numbers % REPLICATES, control)
+        return self._estimate(self.at_end(name, record)[chosen], probabilities)
+
+    def _estimate(self, values: FloatArray, probabilities: tuple[float, ...]) -> Estimate:
+        """Return what values of the independent realisations tell."""
+        replicate = self.numbers[self._independent] % REPLICATES
+        return estimate(values, probabilities, self.design, replicate, self._control)
+
+    @property
+    def design(self) -> Design:
+        """What the intervals take the realisations for.
+
+        Where some fail, the mean of a control is that of others than those that are left.
+        """
+        return "monte-carlo" if self.plan == "control-variate" and self.failed else self.plan
+
+    @cached_property
+    def _control(self) -> Control | None:
+        if self.design != "control-variate":
+            return None
+        known = self.raw.control
+        error = known["std"] / np.sqrt(known["draws"])
+        return Control(self.values("control"), known["mean"], error)
 
     def estimate_for(self, target: Target) -> Estimate:
         """Return the estimate that a target is about."""
@@ -240,7 +256,7 @@ class EnsembleResult(StudyResult[EnsembleData]):
 
     def told_estimates(self) -> dict[str, Any]:
         """Return the estimates at the end by observable, as plain values."""
-        return {name: asdict(self.estimate(name)) for name in self.observables}
+        return {name: asdict(self.estimate(name)) for name in self.observables if self.count}
 
     @cached_property
     def _independent(self) -> slice | IntArray:
@@ -261,8 +277,7 @@ class EnsembleResult(StudyResult[EnsembleData]):
         -------
         Course
         """
-        records = range(len(self.record_passes))
-        found = [self.estimate(name, record, QUANTILES) for record in records]
+        found = [self._estimate(values, QUANTILES) for values in self._by_record(name)]
         means = [item.mean for item in found]
         return Course(
             passes=self.record_passes,
@@ -273,6 +288,19 @@ class EnsembleResult(StudyResult[EnsembleData]):
             std=np.array([item.std.value for item in found]),
             quantiles={p: np.array([item.quantile(p).value for item in found]) for p in QUANTILES},
         )
+
+    def _by_record(self, name: str) -> Iterator[FloatArray]:
+        """Yield an observable of the independent realisations at one record after the other."""
+        records, together = len(self.record_passes), max(_AT_ONCE // max(self.asked, 1), 1)
+        for first in range(0, records, together):
+            some = self.raw.columns(name, slice(first, min(first + together, records)))
+            for values in some[self.numbers][self._independent].T:
+                yield np.ascontiguousarray(values)
+
+    @property
+    def kept(self) -> int:
+        """How many realisations, the first ones, have their profiles kept."""
+        return kept_profiles(self.asked, len(self.y))
 
     @cached_property
     def profiles(self) -> FloatArray:
@@ -306,7 +334,7 @@ class EnsembleResult(StudyResult[EnsembleData]):
         """
         from wearsim.randomness.sensitivity import without_effect  # noqa: PLC0415  (rarely needed)
 
-        groups = {item["name"]: item["text"] for item in self.raw.groups}
+        groups = {item["name"]: item["text"] for item in self.raw.groups if self.count}
         first, total = self._indices(name, list(groups))
         effects = [
             Effect(

@@ -84,7 +84,7 @@ class StoredArrays(Mapping[str, npt.NDArray[Any]]):
         return found.reshape(shape)
 
     def column(self, name: str, index: int) -> npt.NDArray[Any]:
-        """Return one entry of every row, with no more than a few rows in memory at a time.
+        """Return one entry of every row; see `columns`.
 
         Parameters
         ----------
@@ -98,11 +98,29 @@ class StoredArrays(Mapping[str, npt.NDArray[Any]]):
         ndarray
             As many as the array has rows.
         """
+        place = index % self.extents[name].row_shape[0]
+        return self.columns(name, slice(place, place + 1))[:, 0]
+
+    def columns(self, name: str, places: slice) -> npt.NDArray[Any]:
+        """Return some entries of every row, with no more than a few rows read at a time.
+
+        Parameters
+        ----------
+        name : str
+            An array with two axes.
+        places : slice
+            Which entries.
+
+        Returns
+        -------
+        ndarray
+            Shape (rows, entries).
+        """
         extent = self.extents[name]
-        rows = extent.shape[0]
+        rows, width = extent.shape[0], len(range(*places.indices(extent.row_shape[0])))
         step = max(_BLOCK // extent.row_bytes, 1)
-        found = np.empty(rows, extent.dtype)
+        found = np.empty((rows, width), extent.dtype)
         for start in range(0, rows, step):
             stop = min(start + step, rows)
-            found[start:stop] = self.rows(name, start, stop)[:, index]
+            found[start:stop] = self.rows(name, start, stop)[:, places]
         return found

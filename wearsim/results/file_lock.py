@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import struct
 from pathlib import Path
@@ -32,7 +33,10 @@ def lock_or_refuse(file: IO[bytes], path: str | Path) -> None:
     try:
         _lock(file.fileno())
     except OSError as error:
-        raise busy from error
+        if error.errno in {errno.EAGAIN, errno.EACCES}:
+            raise busy from error
+        what = error.strerror or str(error)
+        raise ResultsFileError(f"{path}: cannot be locked for writing ({what})") from error
     if not os.path.samestat(os.fstat(file.fileno()), os.stat(path)):
         raise busy
 

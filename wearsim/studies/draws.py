@@ -185,9 +185,15 @@ class Drawer:
     @property
     def groups(self) -> list[str]:
         """Names of the inputs whose draws tell realisations apart; per-pass ones do not."""
-        return [item.name for item in (*self.items, *self._processes)]
+        lasting = {item.name for item in (*self.items, *self._processes)}
+        return [item.name for item in self.scenario.random if item.name in lasting]
 
-    def draw(self, realisation: int, sources: Mapping[str, int] | None = None) -> Draws:
+    def draw(
+        self,
+        realisation: int,
+        sources: Mapping[str, int] | None = None,
+        passes: int | None = None,
+    ) -> Draws:
         """Return the draws of one realisation.
 
         Parameters
@@ -195,6 +201,8 @@ class Drawer:
         realisation : int
         sources : mapping of str to int, optional
             Number of the realisation whose draw an input takes, where it is another.
+        passes : int, optional
+            Number of the realisation whose draws at every pass it takes, where it is another.
 
         Returns
         -------
@@ -205,7 +213,8 @@ class Drawer:
         ScenarioError
             If a value is out of its bounds, or a process is far too fast.
         """
-        table = self.scenario.sampling.model_copy(update={"realisation": realisation})
+        of_passes = realisation if passes is None else passes
+        table = self.scenario.sampling.model_copy(update={"realisation": of_passes})
         scenario = replace(self.scenario, sampling=table)
         if not scenario.random:
             return Draws(scenario)

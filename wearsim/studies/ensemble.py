@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 from wearsim.errors import ResultsFileError, ScenarioError
 from wearsim.randomness.targets import Target
@@ -14,7 +15,7 @@ from wearsim.studies.draws import Drawer
 from wearsim.studies.ensemble_events import EnsembleProgress
 from wearsim.studies.ensemble_grid import shared_grid
 from wearsim.studies.ensemble_header import header_of, nothing_random, static_of
-from wearsim.studies.ensemble_plan import check_plan, plan_called, whole_count
+from wearsim.studies.ensemble_plan import EnsemblePlan, check_plan, plan_called, whole_count
 from wearsim.studies.ensemble_work import EnsembleWork
 from wearsim.studies.executors import executor
 from wearsim.studies.member import Members
@@ -81,25 +82,69 @@ def ensemble(
     Interrupted
         If it was stopped; `resume_ensemble` goes on from the file.
     """
-    checked_count(scenario, realisations)
-    chosen = plan_called(plan or scenario.sampling.plan)
-    target = None if until is None else _target(until)
-    check_plan(scenario, chosen, until or "")
+    asked = checked(scenario, realisations, plan, until)
     path = Path(output)
     check_output(path, force, scenario.paths)
+    with executor(scheduler, workers, tell=on_notice) as pool:
+        grid = shared_grid(scenario)
+        header = header_of(scenario, asked.plan, asked.realisations, asked.target, grid)
+        with EnsembleFile.create(path, header, static_of(scenario, grid)) as file:
+            members = Members(scenario, asked.plan, asked.realisations, grid)
+            EnsembleWork(file, members, asked.target, pool, on_progress, stop_requested).finish()
+    return open_ensemble(path)
+
+
+class Asked(NamedTuple):
+    """What is asked of an ensemble, and can be had.
+
+    Parameters
+    ----------
+    plan : str
+    realisations : int
+        At most.
+    target : Target, optional
+        What ends it before that.
+    """
+
+    plan: EnsemblePlan
+    realisations: int
+    target: Target | None
+
+
+def checked(scenario: Scenario, realisations: int, plan: str | None, until: str | None) -> Asked:
+    """Return what is asked of an ensemble, or refuse it; parameters and errors as of `ensemble`."""
+    checked_count(scenario, realisations)
     require_run(scenario)
+    chosen = plan_called(plan or scenario.sampling.plan)
+    target = None if until is None else target_of(until)
+    check_plan(scenario, chosen, until or "")
     drawer = Drawer(scenario, "monte-carlo")
     by_pass = any(item.persistence == "per-pass" for item in scenario.random)
     if not drawer.groups and not (by_pass and scenario.evolution.stepper == "per-pass"):
         raise ScenarioError(scenario.file, [nothing_random(scenario)])
-    count = whole_count(chosen, drawer.groups, realisations)
-    with executor(scheduler, workers, tell=on_notice) as pool:
-        grid = shared_grid(scenario)
-        header = header_of(scenario, drawer, chosen, count, target, grid)
-        with EnsembleFile.create(path, header, static_of(scenario, grid)) as file:
-            members = Members(scenario, chosen, count, grid)
-            EnsembleWork(file, members, target, pool, on_progress, stop_requested).finish()
-    return open_ensemble(path)
+    return Asked(chosen, whole_count(chosen, drawer.groups, realisations), target)
+
+
+def target_of(text: str) -> Target:
+    """Return what is to be reached.
+
+    Parameters
+    ----------
+    text : str
+        As `Target.parse` reads it.
+
+    Raises
+    ------
+    ValueError
+        If it cannot be read, or nothing of the kind is observed.
+    """
+    target = Target.parse(text)
+    if target.observable not in OBSERVABLES:
+        raise ValueError(
+            f"'{text}' asks for '{target.observable}', which is not followed, expected one of"
+            f" {', '.join(OBSERVABLES)}"
+        )
+    return target
 
 
 def resume_ensemble(
@@ -142,8 +187,7 @@ def resume_ensemble(
             f"{path}: the ensemble needs {' and '.join(missing)}, which is not installed here;"
             " install it and resume again"
         )
-    again = data.failed.tolist() if failed else []
-    if data.finished and not again:
+    if data.finished and not (failed and len(data.failed)):
         return open_ensemble(path)
     scenario = parse_scenario(data.scenario_text, data.scenario_file, data.files.__getitem__)
     plan = plan_called(data.plan)
@@ -154,19 +198,8 @@ def resume_ensemble(
         work = EnsembleWork(opened, members, target, pool, on_progress, stop_requested)
         for text in changed_origins(data, scenario):
             work.warn(text)
-        if again:
-            work.run_again(again)
+        if failed:
+            work.run_again()
         else:
             work.finish()
     return open_ensemble(path)
-
-
-def _target(text: str) -> Target:
-    """Return what is to be reached; raise ValueError where nothing of the kind is observed."""
-    target = Target.parse(text)
-    if target.observable not in OBSERVABLES:
-        raise ValueError(
-            f'the target "{text}" is about {target.observable}, which is not observed; choose one'
-            f" of {', '.join(OBSERVABLES)}"
-        )
-    return target

@@ -22,19 +22,33 @@ from wearsim.types import FloatArray, Grid
 
 def header_of(
     scenario: Scenario,
-    drawer: Drawer,
     plan: EnsemblePlan,
     count: int,
     target: Target | None,
     grid: Grid,
 ) -> EnsembleData:
-    """Return what an ensemble's file says before the first realisation."""
-    means = replace(
-        scenario, random=tuple(i for i in scenario.random if i.name not in drawer.groups)
-    )
-    _, _, stepper = build_scene(
-        means, grid
-    )  # what cannot run is refused before anything is written
+    """Return what an ensemble's file says before the first realisation.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    plan : str
+    count : int
+        Realisations at most.
+    target : Target, optional
+        What ends the ensemble before that.
+    grid : Grid
+        Strips that its members share.
+
+    Raises
+    ------
+    ScenarioError, CapabilityError
+        If the scenario cannot run, or the plan has no control variate for it.
+    """
+    drawer = Drawer(scenario, BASE_PLANS[plan], count)
+    averaged = tuple(item for item in scenario.random if item.name not in drawer.groups)
+    # what cannot run is refused before anything is written
+    _, _, stepper = build_scene(replace(scenario, random=averaged), grid)
     return EnsembleData(
         scenario_text=scenario.text,
         scenario_file=scenario.file,
@@ -69,7 +83,7 @@ def header_of(
             for item in scenario.random
             if item.name in drawer.groups
         ],
-        control=_control(scenario, plan),
+        control=_control(drawer, plan),
     )
 
 
@@ -89,15 +103,15 @@ def _inputs(scenario: Scenario, drawer: Drawer) -> list[dict[str, str]]:
     ]
 
 
-def _control(scenario: Scenario, plan: EnsemblePlan) -> dict[str, float]:
+def _control(drawer: Drawer, plan: EnsemblePlan) -> dict[str, float]:
     """Return what is known of the control variate; nothing where the plan has none."""
     if plan != "control-variate":
         return {}
-    known = control_of(Drawer(scenario, BASE_PLANS[plan]))
+    known = control_of(drawer)
     if known is None:
         raise CapabilityError(
-            f"{scenario.file}: the control variate is a depth in closed form, which takes a wear"
-            " law linear in the dissipation; choose another plan, such as monte-carlo"
+            f"{drawer.scenario.file}: the control variate is a depth in closed form, which takes a"
+            " wear law linear in the dissipation; choose another plan, such as monte-carlo"
         )
     return {"mean": known.mean, "std": known.std, "draws": known.draws}
 

@@ -68,6 +68,14 @@ def sources(plan: EnsemblePlan, groups: Sequence[str], realisation: int) -> dict
     }
 
 
+def passes_of(plan: EnsemblePlan, groups: Sequence[str], realisation: int) -> int:
+    """Return whose draws at every pass a realisation takes: in Saltelli's plan a row shares them.
+
+    What differs within a row is then what is exchanged, and no chance besides.
+    """
+    return realisation // (len(groups) + 2) if plan == "saltelli" else realisation
+
+
 def whole_count(plan: EnsemblePlan, groups: Sequence[str], asked: int) -> int:
     """Return how many realisations a plan makes of those asked for: Saltelli's go in whole rows."""
     if plan != "saltelli":

@@ -4,24 +4,25 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from wearsim.errors import Interrupted
+from wearsim.errors import Interrupted, WorkerError
 from wearsim.randomness.intervals import UNKNOWN
 from wearsim.randomness.targets import Target
 from wearsim.results import EnsembleFile, EnsembleResult, Outcome
 from wearsim.results.ensemble_layout import DONE, FAILED, PENDING
 from wearsim.studies.checkpoints import checkpoints
 from wearsim.studies.ensemble_events import EnsembleProgress
+from wearsim.studies.ensemble_judging import judged
 from wearsim.studies.executors import Executor
 from wearsim.studies.member import Members
 
-SECONDS = 1.0  # that a batch should take
+SECONDS = 4.0  # that a batch should take at most
 MOST_IN_BATCH = 256
-FIRST_BATCH = 8
+AHEAD = 3  # batches for each worker that may be beyond the next mark
 BETWEEN_ESTIMATES = 0.5  # s
 DEFAULT_TARGET = Target.parse("depth.mean 1%")
 
@@ -61,7 +62,8 @@ class EnsembleWork:
         self.stop_requested = stop_requested or (lambda: False)
         self.asked = len(file.status)
         self.begun, self.before = time.monotonic(), file.data.wall_seconds
-        self.warnings = list(file.data.warnings)
+        # what was judged of a finished ensemble is judged anew
+        self.warnings = [] if file.data.finished else list(file.data.warnings)
         self._marks = checkpoints(members.plan, self.asked) if target else []
         self._limit = self._marks[0] if self._marks else self.asked
         self._held: dict[int, Outcome] = {}
@@ -83,47 +85,72 @@ class EnsembleWork:
             If it was stopped before the end.
         """
         self._pass_marks()
-        self._run_through(self._pending())
-        if self._stopping and not self._is_complete():
+        while not (self._is_complete() or self._stopping):
+            self._run_through(self._pending())
+        if not self._is_complete():
             self._write_state(finished=False)
             raise self._interrupted()
         self._close()
 
-    def run_again(self, numbers: Sequence[int]) -> None:
-        """Run realisations that failed once more, and nothing else; raises as `finish`."""
-        finished = self.file.data.finished
-        if finished:
-            self.warnings = []  # what was judged of it will be judged anew
-        self.file.clear(numbers)
-        self._marks, self._limit, self.target = [], self.asked, None
-        self._run_through(iter(numbers))
-        left = [number for number in numbers if self.file.status[number] == PENDING]
-        if left or not finished:
-            self._write_state(finished=False)
-            if left:
-                raise self._interrupted()
-            return
-        self._close()
+    def run_again(self) -> None:
+        """Run the realisations that failed once more; raises as `finish`.
 
-    def _run_through(self, numbers: Iterator[int]) -> None:
+        A finished ensemble is finished anew. Of one that is not, what is pending stays so.
+        """
+        numbers = np.flatnonzero(self.file.status == FAILED).tolist()
+        finished = self.file.data.finished
+        self._write_state(finished=False)  # before anything is cleared, or a kill would lose it
+        self.file.clear(numbers)
+        if finished:
+            self.finish()
+            return
+        self._limit, self._marks = self.asked, []
+        self._run_through(numbers)
+        self._write_state(finished=False)
+        if (self.file.status[numbers] == PENDING).any():
+            raise self._interrupted()
+
+    def _run_through(self, numbers: Iterable[int]) -> None:
         """Send numbers out in batches until there are no more, or a stop is asked for."""
         try:
             for _, outcomes in self.pool.results(self.members, self._batches(numbers)):
                 self._take(outcomes)
                 self._stopping = self._stopping or self.stop_requested()
-                self._tell_progress(len(outcomes))
+                self._tell_progress()
+        except WorkerError as error:
+            self._run_singly(error)
         except KeyboardInterrupt:
             self._stopping = True
 
-    def _pending(self) -> Iterator[int]:
-        """Yield pending realisations, no further ahead of the next mark than workers need."""
-        for number in np.flatnonzero(self.file.status == PENDING):
-            if self._reached:
+    def _run_singly(self, error: WorkerError) -> None:
+        """Find which of the realisations that workers died of is at fault, and let it fail."""
+        suspects = [n for n in error.realisations if self.file.status[n] == PENDING]
+        if not suspects:
+            raise error
+        for number in suspects:
+            if self._stopping:
                 return
-            yield int(number)
+            try:
+                found = self.pool.results(self.members, iter([[number]]))
+                outcomes = [outcome for _, some in found for outcome in some]
+            except WorkerError:
+                text = "the worker that ran it died each time: out of memory, or killed"
+                outcomes = [Outcome(number=number, error=text)]
+            self._take(outcomes)
+            self._stopping = self.stop_requested()
+            self._tell_progress()
 
-    def _batches(self, numbers: Iterator[int]) -> Iterator[list[int]]:
-        """Yield batches that take about `SECONDS` each; which numbers share one changes nothing."""
+    def _pending(self) -> Iterator[int]:
+        """Yield pending realisations, no further beyond the next mark than keeps workers busy."""
+        for number in np.flatnonzero(self.file.status == PENDING):
+            ahead = AHEAD * self.pool.workers * self._batch_size()
+            if self._reached or number >= self._limit + ahead:
+                return
+            if number not in self._held:
+                yield int(number)
+
+    def _batches(self, numbers: Iterable[int]) -> Iterator[list[int]]:
+        """Yield batches of numbers; which of them share one changes nothing."""
         batch: list[int] = []
         for number in numbers:
             batch.append(number)
@@ -136,9 +163,11 @@ class EnsembleWork:
             yield batch
 
     def _batch_size(self) -> int:
-        if not self._rate:
-            return FIRST_BATCH
-        return int(np.clip(SECONDS * self._rate / self.pool.workers, 1, MOST_IN_BATCH))
+        """Return as many as take `SECONDS`, and no more than let all workers end together."""
+        workers = max(self.pool.workers, 1)
+        left = self.asked - int((self.file.status != PENDING).sum())
+        fair = -(-left // (2 * workers))
+        return int(np.clip(SECONDS * self._rate / workers, 1, max(min(fair, MOST_IN_BATCH), 1)))
 
     def _take(self, outcomes: Sequence[Outcome]) -> None:
         """Write outcomes, those beyond the next mark later."""
@@ -177,50 +206,28 @@ class EnsembleWork:
         result = self._result()
         if result.count:
             self.file.put_statistics(result.statistics())
-        self._judge(result)
-        self._write_state(finished=True, result=result)
+        for text in judged(result, self.target, self._reached):
+            self.warn(text)
+        self._write_state(finished=True, statistics=result.told_estimates())
 
-    def _judge(self, result: EnsembleResult) -> None:
-        """Warn of what a user should know before trusting the ensemble."""
-        data = result.raw
-        if result.count:
-            errors = result.values("depth_error")
-            deepest = np.maximum(result.at_end("depth"), result.at_end("roller_depth"))
-            beyond = int((errors > data.tolerance * deepest).sum())
-            if beyond:
-                self.warn(
-                    f"the estimated error of depth is more than the tolerance in {beyond} of"
-                    f" {result.count} realisations; lower evolution.tolerance"
-                )
-        kept = len(result.raw.variables["profile"])
-        if kept < data.asked:
-            self.warn(
-                f"the profiles of the first {kept} realisations are kept, and mean profile and"
-                " band are theirs"
-            )
-        if self.target and not self._reached:
-            self.warn(f"{self.target} was not reached by {data.asked} realisations")
-
-    def _write_state(self, finished: bool, result: EnsembleResult | None = None) -> None:
-        told = result.told_estimates() if result is not None and result.count else {}
+    def _write_state(self, finished: bool, statistics: object = None) -> None:
         self.file.put_state(
             {
                 "finished": finished,
                 "warnings": self.warnings,
-                "notes": self.file.data.notes,
                 "wall_seconds": self.before + time.monotonic() - self.begun,
-                "statistics": told,
+                "statistics": statistics or {},
             }
         )
 
     def _interrupted(self) -> Interrupted:
-        path, status = self.file.path, self.file.status
-        done = int((status != PENDING).sum())
+        done = int((self.file.status != PENDING).sum())
         return Interrupted(
-            f"stopped after {done} of {self.asked} realisations; go on with: wearsim resume {path}"
+            f"stopped after {done} of {self.asked} realisations; go on with: wearsim resume"
+            f" {self.file.path}"
         )
 
-    def _tell_progress(self, fresh: int) -> None:
+    def _tell_progress(self) -> None:
         status = self.file.status
         done, failed = int((status == DONE).sum()), int((status == FAILED).sum())
         target = self.target or DEFAULT_TARGET

@@ -1,32 +1,24 @@
-"""Batches done by the workers of a Dask cluster, one that runs somewhere or one of our own."""
+"""A Dask cluster to work on: one that runs somewhere, or one of our own."""
 
 from __future__ import annotations
 
 import asyncio
 import logging
-import pickle
-import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
-from importlib.metadata import PackageNotFoundError, version
-from itertools import islice
-from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING
 
 from wearsim.errors import WorkerError
-from wearsim.studies.executors import AHEAD, GUARDED, Batch, Results, Teller, Work, named
-from wearsim.studies.worker_process import Answer, answer, starting_workers
+from wearsim.studies.executors import GUARDED, Teller
+from wearsim.studies.executors_cluster import Cluster
+from wearsim.studies.worker_process import starting_workers
 
 if TYPE_CHECKING:
-    from distributed import Client, Future, LocalCluster
+    from distributed import Client, LocalCluster
 
 CONNECTING = 10.0
 """Time for a scheduler to answer [s]."""
-LOOKING = 2.0
-"""Time between two looks at who is there [s]."""
-PATIENCE = 60.0
-"""How long a cluster may be without workers where nobody can be told [s]."""
 
 
 @contextmanager
@@ -59,132 +51,6 @@ def cluster(address: str | None, count: int, tell: Teller | None) -> Iterator[Cl
         found = Cluster(client, address, tell)
         found.check_versions()
         yield found
-
-
-class Cluster:
-    """Has batches done by the workers of a Dask cluster, as many as it has at the time.
-
-    Dask does again what a worker was doing that is lost, thrice unless it is set otherwise.
-
-    Parameters
-    ----------
-    client : Client
-    address : str
-        Of the scheduler.
-    tell : callable, optional
-        As in `cluster`.
-    """
-
-    def __init__(self, client: Client, address: str, tell: Teller | None) -> None:
-        self._client, self._address, self._tell = client, address, tell
-        self._threads, self._looked = 0, -LOOKING
-        self._lacking_since: float | None = None
-
-    @property
-    def workers(self) -> int:
-        """How many batches the cluster does at the same time, as it is now."""
-        if time.monotonic() - self._looked > LOOKING:
-            self._look()
-        return self._threads
-
-    @property
-    def describe(self) -> str:
-        """Where the cluster is, and how large."""
-        count = self.workers
-        return f"dask {self._address}, {count} worker{'s' if count != 1 else ''}"
-
-    def check_versions(self) -> None:
-        """Wait for a worker, and raise unless all that are there have this wearsim."""
-        while not self.workers:
-            time.sleep(min(LOOKING, 0.1))
-        found = self._client.run(version, "wearsim", on_error="return")
-        for where, theirs in found.items():
-            if isinstance(theirs, PackageNotFoundError):
-                theirs = "none"  # noqa: PLW2901
-            if isinstance(theirs, str):  # else it was lost meanwhile
-                _check_version(theirs, version("wearsim"), where)
-
-    def results(self, work: Work, batches: Iterator[Batch]) -> Results:
-        """Yield every batch with its results, as `Executor.results` says."""
-        # a task, and not scattered data: it is made again where all who had it are gone
-        unpickled = self._client.submit(pickle.loads, pickle.dumps(work), pure=False)
-        ours = version("wearsim")
-        out: dict[Future[Answer], Batch] = {}
-        done: SimpleQueue[Future[Answer]] = SimpleQueue()
-        try:
-            while True:
-                for numbers in islice(batches, max(AHEAD * max(self.workers, 1) - len(out), 0)):
-                    future = self._client.submit(_do, unpickled, numbers, ours, pure=False)
-                    future.add_done_callback(done.put)
-                    out[future] = numbers
-                if not out:
-                    return
-                future = self._next(done)
-                results, error = self._fetched(future, out[future])
-                if error is not None:
-                    raise error
-                yield out.pop(future), results
-        finally:
-            self._client.cancel([unpickled, *out])
-
-    def _next(self, done: SimpleQueue[Future[Answer]]) -> Future[Answer]:
-        while True:
-            try:
-                return done.get(timeout=LOOKING)
-            except Empty:
-                self._look()
-
-    def _fetched(self, future: Future[Answer], numbers: Batch) -> Answer:
-        from distributed import CancelledError, KilledWorker  # noqa: PLC0415  (slow to import)
-
-        patience = LOOKING
-        while True:
-            try:
-                found: Answer = future.result(timeout=patience)
-            except TimeoutError:  # they are long, or who had them is gone and they are made again
-                patience *= 2.0
-                self._look()
-            except KilledWorker as error:
-                raise WorkerError(
-                    f"workers of {self._address} died of {named(numbers)} again and again;"
-                    " more memory for each may help",
-                    numbers,
-                ) from error
-            except CancelledError as error:
-                raise WorkerError(f"the scheduler at {self._address} is gone") from error
-            except Exception as error:
-                raise WorkerError(
-                    f"a worker of {self._address} could not do {named(numbers)}:"
-                    f" {type(error).__name__}: {error}"
-                ) from error
-            else:
-                return found
-
-    def _look(self) -> None:
-        """See how many workers there are, and tell if there are none.
-
-        Raises
-        ------
-        WorkerError
-            If there have been none for too long, and nobody can be told.
-        """
-        try:
-            self._threads = sum(self._client.nthreads().values())
-        except (OSError, TimeoutError):
-            return  # the connection is lost; the client tries for a while, then gives up all work
-        self._looked = now = time.monotonic()
-        if self._threads:
-            self._lacking_since = None
-            return
-        if self._lacking_since is None:
-            self._lacking_since = now
-            if self._tell is not None:
-                self._tell(f"waiting for workers: there are none at {self._address}")
-        elif self._tell is None and now - self._lacking_since > PATIENCE:
-            raise WorkerError(
-                f"the scheduler at {self._address} has had no workers for {PATIENCE:g} s; start"
-                f" some with: dask worker {self._address}"
-            )
 
 
 def _own(count: int) -> LocalCluster:
@@ -230,20 +96,3 @@ async def _greeted(address: str) -> None:
     answering = connect(address, timeout=CONNECTING, **arguments)
     comm = await asyncio.wait_for(answering, CONNECTING)
     await comm.close()
-
-
-def _do(work: Work, numbers: Batch, ours: str) -> Answer:
-    """Do a batch on a worker, if its wearsim is ours; it may have joined after the check."""
-    try:
-        _check_version(version("wearsim"), ours, "it")
-    except WorkerError as error:
-        return [], error
-    return answer(work, numbers)
-
-
-def _check_version(theirs: str, ours: str, where: str) -> None:
-    if theirs != ours:
-        raise WorkerError(
-            f"wearsim {ours} is here, and {theirs} on the worker {where}; results of both cannot be"
-            " mixed: install the same on all"
-        )

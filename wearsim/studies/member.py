@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from wearsim.errors import WearsimError
+from wearsim.errors import StepError, WearsimError
 from wearsim.evolution.loop import evolve
 from wearsim.evolution.scene import Scene
 from wearsim.evolution.state import WearState, fresh_state
@@ -18,7 +19,7 @@ from wearsim.scenario import Scenario, parse_scenario
 from wearsim.studies.build import build_scene, strips_of_run
 from wearsim.studies.depth_control import closed_form_depths
 from wearsim.studies.draws import Drawer, Draws
-from wearsim.studies.ensemble_plan import BASE_PLANS, EnsemblePlan, sources
+from wearsim.studies.ensemble_plan import BASE_PLANS, EnsemblePlan, passes_of, sources
 from wearsim.studies.recorder import due_states, history_row
 from wearsim.studies.schedule import RecordSchedule
 from wearsim.types import FloatArray, Grid
@@ -74,7 +75,9 @@ class Members:
     def _outcome(self, number: int) -> Outcome:
         drawn: dict[str, float | FloatArray] = {}
         try:
-            draws = self.drawer.draw(number, sources(self.plan, self.drawer.groups, number))
+            groups = self.drawer.groups
+            taken = sources(self.plan, groups, number)
+            draws = self.drawer.draw(number, taken, passes_of(self.plan, groups, number))
             drawn = {**draws.values, **draws.time_means}
             return self._run(number, draws, drawn)
         except WearsimError as error:
@@ -88,6 +91,7 @@ class Members:
         fits = covers(grid, own)
         scene, stepper, _ = build_scene(scenario, grid if fits else own, draws)
         rows, state = observed(scenario, scene, stepper)
+        _check_finite(rows)
         worn = state.cylinder_depth[:, 0, 0].mean(axis=0)
         if not fits:
             worn = np.interp(grid.y, own.y, worn, left=0.0, right=0.0)
@@ -112,6 +116,13 @@ class Members:
             return {}
         columns = {key: value[None] for key, value in draws.values.items()}
         return {"control": float(closed_form_depths(self.scenario, columns, 1)[0])}
+
+
+def _check_finite(rows: Sequence[Mapping[str, float]]) -> None:
+    for number, row in enumerate(rows):
+        for name, value in row.items():
+            if not math.isfinite(value):
+                raise StepError(f"{name} is not finite at record {number}", dict(row))
 
 
 def covers(grid: Grid, other: Grid) -> bool:

@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from wearsim.errors import Interrupted
+from wearsim.errors import Interrupted, ResultsFileError
 from wearsim.results import EnsembleResult, check_output
 from wearsim.scenario import Scenario
-from wearsim.studies.ensemble import ensemble
+from wearsim.studies.ensemble import checked, ensemble
 
 
 def sweep(
@@ -48,12 +48,20 @@ def sweep(
 
     Raises
     ------
-    As `ensemble`
-        Before the first one runs, where a scenario or a file is at fault.
+    ResultsFileError
+        If a file exists, or would be that of two values.
+    ScenarioError, CapabilityError, TypeError, ValueError
+        As `ensemble`; what can be known beforehand, before the first one runs.
+    Interrupted
+        If it was stopped, telling the values that are left.
     """
     scenarios = [scenario_of(value) for value in values]
     paths = [path_of(output, value) for value in values]
+    same = [path for path in paths if paths.count(path) > 1]
+    if same:
+        raise ResultsFileError(f"{same[0]}: would be the file of two values; write them apart")
     for scenario, path in zip(scenarios, paths, strict=True):
+        checked(scenario, realisations, options.get("plan"), options.get("until"))
         check_output(path, options.get("force", False), scenario.paths)
     found = []
     for value, scenario, path in zip(values, scenarios, paths, strict=True):
@@ -72,5 +80,7 @@ def sweep(
 def path_of(output: str | Path, value: str) -> Path:
     """Return the file of one value: 'out/test.h5' and '250 N' make 'out/test-250N.h5'."""
     path = Path(output)
-    plain = re.sub(r"[^\w.+-]+", "", value.replace("/", "_per_").replace("^", ""))
+    joined = re.sub(r"\s+(?=[A-Za-z])", "", value.strip())  # a number and its unit
+    plain = re.sub(r"\s+", "_", joined.replace("/", "_per_").replace("%", "percent"))
+    plain = re.sub(r"[^\w.+-]+", "", plain)
     return path.with_name(f"{path.stem}-{plain}{path.suffix}")

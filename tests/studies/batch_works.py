@@ -1,0 +1,106 @@
+"""Works that tests hand to executors; the processes that do them import this module."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class Squares:
+    """Tells the squares, and by whom; may take its time, over the numbers below one above all."""
+
+    seconds: float = 0.0
+    first: float = 0.0
+
+    def __call__(self, numbers: Sequence[int]) -> list[tuple[int, int]]:
+        time.sleep(self.first if min(numbers) < 1 else self.seconds)
+        return [(number * number, os.getpid()) for number in numbers]
+
+
+@dataclass(frozen=True)
+class Deadly:
+    """Kills its process as it comes to one number, so many times."""
+
+    folder: Path
+    at: int
+    times: int
+
+    def __call__(self, numbers: Sequence[int]) -> list[int]:
+        time.sleep(0.02)
+        if self.at in numbers and not self._all_killed():
+            os.kill(os.getpid(), signal.SIGKILL)
+        with (self.folder / f"done {min(numbers)}").open("a") as file:
+            file.write(".")
+        return [number * number for number in numbers]
+
+    def _all_killed(self) -> bool:
+        for turn in range(self.times):
+            try:
+                (self.folder / f"killed {turn}").touch(exist_ok=False)
+            except FileExistsError:
+                continue
+            return False
+        return True
+
+
+@dataclass(frozen=True)
+class KilledAsItSends:
+    """Has its process killed, once, when a part of its results is on its way."""
+
+    folder: Path
+    length: int
+
+    def __call__(self, numbers: Sequence[int]) -> list[bytes]:
+        if 0 in numbers and not (self.folder / "killed").exists():
+            (self.folder / "killed").touch()
+            Connection._send.__defaults__ = (_write_and_die,)
+        return [bytes(self.length) for _ in numbers]
+
+
+def _write_and_die(handle: int, content: bytes) -> int:
+    os.write(handle, bytes(content[:1000]))
+    os.kill(os.getpid(), signal.SIGKILL)
+    return 0
+
+
+class Raising:
+    """Raises an error of a kind."""
+
+    def __init__(self, kind: type[Exception], *arguments: object) -> None:
+        self.kind, self.arguments = kind, arguments
+
+    def __call__(self, numbers: Sequence[int]) -> list[int]:
+        raise self.kind(*self.arguments)
+
+
+class UnsendableError(Exception):
+    """An error that can be pickled, but not unpickled."""
+
+    def __init__(self, one: str, other: str) -> None:
+        super().__init__(f"{one} and {other}")
+
+
+@dataclass(frozen=True)
+class Unreadable:
+    """A work that no other process can unpickle."""
+
+    def __setstate__(self, state: object) -> None:
+        raise LookupError("cannot be read here")
+
+    def __getstate__(self) -> dict[str, int]:
+        return {"some": 1}
+
+    def __call__(self, numbers: Sequence[int]) -> list[int]:
+        return list(numbers)
+
+
+def surroundings(numbers: Sequence[int]) -> list[tuple[str, bool]]:
+    """Return how many threads BLAS may use here, and whether a Ctrl-C is ignored."""
+    ignored = signal.getsignal(signal.SIGINT) == signal.SIG_IGN
+    return [(os.environ["OPENBLAS_NUM_THREADS"], ignored) for _ in numbers]

@@ -1,0 +1,22 @@
+"""Run as a process: names the processes that work for it, and then has them work for minutes."""
+
+from __future__ import annotations
+
+import sys
+
+from batch_works import Squares
+
+from wearsim.studies.executors import executor
+
+
+def main(scheduler: str) -> None:
+    """Have quick batches done, and slow ones, of which there are as many as workers."""
+    batches = [*([number] for number in range(1, 9)), *([-number] for number in range(4))]
+    with executor(scheduler, 2) as workers:
+        for _, results in workers.results(Squares(0.05, 600.0), iter(batches)):
+            sys.stdout.write(f"{results[0][1]}\n")
+            sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])
