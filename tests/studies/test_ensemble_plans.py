@@ -7,6 +7,7 @@ import pytest
 
 import wearsim
 from tests.studies.ensemble_cases import small
+from wearsim.errors import Interrupted
 from wearsim.studies.checkpoints import checkpoints
 from wearsim.studies.compare import compare, have_same_draws
 from wearsim.studies.draws import Drawer
@@ -86,6 +87,24 @@ def test_that_a_sweep_refuses_an_existing_file_before_it_runs(swept, tmp_path):
     with pytest.raises(wearsim.errors.ResultsFileError, match="already exists"):
         sweep(lambda text: small(), ["1", "2"], 3, tmp_path / "creep.h5", **SERIAL)
     assert not (tmp_path / "creep-1.h5").exists()
+
+
+def test_that_a_sweep_goes_on_where_it_was_stopped(tmp_path):
+    def scenario_of_value(text):
+        return small(creepage__longitudinal=float(text))
+
+    values, path = ["8e-4", "1e-3", "1.2e-3"], tmp_path / "creep.h5"
+    answers = iter([False] * 4 + [True])
+    with pytest.raises(Interrupted, match=r"not begun: 1.2e-3; the same command once more"):
+        sweep(
+            scenario_of_value, values, 3, path, stop_requested=lambda: next(answers, True), **SERIAL
+        )
+    kept = (tmp_path / "creep-8e-4.h5").read_bytes()
+    found = sweep(scenario_of_value, values, 3, path, **SERIAL)
+    assert [result.count for result in found] == [3, 3, 3]
+    assert (tmp_path / "creep-8e-4.h5").read_bytes() == kept
+    with pytest.raises(wearsim.errors.ResultsFileError, match="already exists"):
+        sweep(scenario_of_value, values, 4, path, **SERIAL)  # another ensemble
 
 
 def test_that_values_make_names_of_files():

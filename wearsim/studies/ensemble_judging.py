@@ -23,7 +23,13 @@ def judged(result: EnsembleResult, target: Target | None, reached: bool) -> list
     -------
     list of str
     """
-    found = [_errors(result), _kept(result), _correlated(result), _control(result)]
+    found = [
+        _errors(result),
+        _kept(result),
+        _correlated(result),
+        _control(result),
+        _uneven(result),
+    ]
     if target is not None and not reached:
         found.append(f"{target} was not reached by {result.asked} realisations")
     return [text for text in found if text]
@@ -58,6 +64,18 @@ def _correlated(result: EnsembleResult) -> str:
     return (
         "some inputs are correlated: what one of them moves includes what it shares with others, so"
         " that the parts may add up to more than all"
+    )
+
+
+def _uneven(result: EnsembleResult) -> str:
+    if result.plan not in {"sobol", "latin-hypercube"}:
+        return ""
+    processes = [item["name"] for item in result.raw.groups if item["role"] == "process"]
+    if not processes:
+        return ""
+    return (
+        f"{' and '.join(processes)} follow processes, whose paths are drawn at random whatever the"
+        f" plan: {result.plan} spreads the other inputs alone"
     )
 
 

@@ -20,7 +20,7 @@ from wearsim.studies.ensemble_judging import judged
 from wearsim.studies.executors import Executor
 from wearsim.studies.member import Members
 
-SECONDS = 4.0  # that a batch should take at most
+SECONDS = 2.0  # that a batch should take at most
 MOST_IN_BATCH = 256
 AHEAD = 3  # batches for each worker that may be beyond the next mark
 BETWEEN_ESTIMATES = 0.5  # s

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from wearsim.errors import Interrupted, ResultsFileError
-from wearsim.results import EnsembleResult, check_output
+from wearsim.results import EnsembleResult, check_output, read_ensemble
 from wearsim.scenario import Scenario
-from wearsim.studies.ensemble import checked, ensemble
+from wearsim.studies.ensemble import Asked, checked, ensemble, resume_ensemble
 
 
 def sweep(
@@ -25,7 +25,8 @@ def sweep(
     """Run an ensemble for each of several values, each to a file of its own.
 
     Draws have the names of their inputs as addresses, so that realisation k is the same test in all
-    of them but for the value: what differs between the ensembles is not left to chance.
+    of them but for the value: what differs between the ensembles is not left to chance. An ensemble
+    that an earlier go has begun is gone on with.
 
     Parameters
     ----------
@@ -57,24 +58,49 @@ def sweep(
     """
     scenarios = [scenario_of(value) for value in values]
     paths = [path_of(output, value) for value in values]
+    force = options.get("force", False)
     same = [path for path in paths if paths.count(path) > 1]
     if same:
         raise ResultsFileError(f"{same[0]}: would be the file of two values; write them apart")
     for scenario, path in zip(scenarios, paths, strict=True):
-        checked(scenario, realisations, options.get("plan"), options.get("until"))
-        check_output(path, options.get("force", False), scenario.paths)
-    found = []
+        asked = checked(scenario, realisations, options.get("plan"), options.get("until"))
+        if not _is_part(path, scenario, asked, force):
+            check_output(path, force, scenario.paths)
+    found: list[EnsembleResult] = []
     for value, scenario, path in zip(values, scenarios, paths, strict=True):
         if on_value is not None:
             on_value(value, path)
+        asked = checked(scenario, realisations, options.get("plan"), options.get("until"))
         try:
-            found.append(ensemble(scenario, realisations, path, **options))
+            if _is_part(path, scenario, asked, force):
+                found.append(resume_ensemble(path, **_of_work(options)))
+            else:
+                found.append(ensemble(scenario, realisations, path, **options))
         except Interrupted as stop:
             left = values[len(found) + 1 :]
-            raise Interrupted(
-                f"{stop}; not begun: {', '.join(left)}" if left else str(stop)
-            ) from stop
+            rest = f"; not begun: {', '.join(left)}" if left else ""
+            again = "; the same command once more goes on with the sweep"
+            raise Interrupted(f"{stop}{rest}{again}") from stop
     return found
+
+
+def _is_part(path: Path, scenario: Scenario, asked: Asked, force: bool) -> bool:
+    """Tell whether a file is that of a value from an earlier go at the same sweep."""
+    if force or not path.exists():
+        return False
+    try:
+        data = read_ensemble(path)
+    except ResultsFileError:  # whatever it is, it stays
+        return False
+    until = "" if asked.target is None else str(asked.target)
+    mine = (scenario.sha256, asked.plan, asked.realisations, until)
+    return mine == (data.sha256, data.plan, data.asked, data.until)
+
+
+def _of_work(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the options of an ensemble that say how it is run, not what it is."""
+    what = {"plan", "until", "force"}
+    return {name: value for name, value in options.items() if name not in what}
 
 
 def path_of(output: str | Path, value: str) -> Path:
