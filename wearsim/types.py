@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import TypeAlias, overload
+from typing import Any, TypeAlias, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +14,8 @@ import numpy.typing as npt
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 IntArray: TypeAlias = npt.NDArray[np.int64]
 BoolArray: TypeAlias = npt.NDArray[np.bool_]
+Number: TypeAlias = float | FloatArray
+"""One number for all realisations, or one for each, shape (realisations,)."""
 
 
 @dataclass(frozen=True)
@@ -211,6 +214,12 @@ class OperatingPoints(Sequence[OperatingPoint]):
     def __len__(self) -> int:
         return len(self.normal_force)
 
+    def at(self, numbers: IntArray) -> OperatingPoints:
+        """Return some of the points, by number and in that order."""
+        names = ("normal_force", "longitudinal", "lateral", "spin", "friction", "variation")
+        columns = {n: getattr(self, n) for n in names}
+        return replace(self, **{n: c[numbers] for n, c in columns.items() if c is not None})
+
     @overload
     def __getitem__(self, index: int) -> OperatingPoint: ...
 
@@ -316,9 +325,9 @@ class ContactFields:
     power_density: FloatArray
 
 
-@dataclass(frozen=True)
-class BatchSolution:
-    """Many solved contacts, column by column.
+@dataclass(frozen=True, eq=False)
+class BatchSolution(Sequence[ContactSolution]):
+    """Many solved contacts, column by column; a sequence of them one by one, last axis fastest.
 
     Parameters
     ----------
@@ -337,10 +346,8 @@ class BatchSolution:
     @classmethod
     def of(cls, shape: tuple[int, ...], solutions: Sequence[ContactSolution]) -> BatchSolution:
         """Gather contacts that were solved one after another, last axis fastest."""
-        columns = {}
-        for name in _COLUMNS:
-            values = np.array([getattr(solution, name) for solution in solutions])
-            columns[name] = values.reshape(shape + values.shape[1:])
+        rows = {name: rows_of(solutions, name) for name in _COLUMNS}
+        columns = {name: values.reshape(shape + values.shape[1:]) for name, values in rows.items()}
         return cls(shape, solutions[0].y, columns)
 
     def stack(self, name: str) -> npt.NDArray[np.generic]:
@@ -365,5 +372,47 @@ class BatchSolution:
             for values in zip(*flat, strict=True)
         )
 
+    def __len__(self) -> int:
+        return math.prod(self.shape)
+
+    @overload
+    def __getitem__(self, index: int) -> ContactSolution: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> tuple[ContactSolution, ...]: ...
+
+    def __getitem__(self, index: int | slice) -> ContactSolution | tuple[ContactSolution, ...]:
+        return self.solutions[index]
+
+    def at(self, numbers: IntArray) -> BatchSolution:
+        """Return the contacts at some places of the last leading axis, in that order."""
+        last = len(self.shape) - 1
+        columns = {name: np.take(c, numbers, axis=last) for name, c in self.columns.items()}
+        return BatchSolution((*self.shape[:-1], len(numbers)), self.y, columns)
+
+    def joined_with(self, *others: BatchSolution) -> BatchSolution:
+        """Return these contacts and others behind them along the last leading axis."""
+        last, parts = len(self.shape) - 1, (self, *others)
+        columns = {
+            name: np.concatenate([part.columns[name] for part in parts], axis=last)
+            for name in self.columns
+        }
+        count = sum(part.shape[-1] for part in parts)
+        return BatchSolution((*self.shape[:-1], count), self.y, columns)
+
+    def with_others(self, numbers: IntArray, others: BatchSolution) -> BatchSolution:
+        """Return these contacts with others at some places of the last leading axis."""
+        order = np.arange(self.shape[-1])
+        order[numbers] = len(order) + np.arange(len(numbers))
+        return self.joined_with(others).at(order)
+
 
 _COLUMNS = tuple(item.name for item in fields(ContactSolution) if item.name != "y")
+
+
+def rows_of(contacts: Sequence[ContactSolution], name: str) -> npt.NDArray[Any]:
+    """Return the field `name` of all contacts, first axis contact."""
+    if isinstance(contacts, BatchSolution):
+        values = contacts.stack(name)
+        return values.reshape(-1, *values.shape[len(contacts.shape) :])
+    return np.array([getattr(contact, name) for contact in contacts])

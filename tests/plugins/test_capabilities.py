@@ -72,6 +72,25 @@ def test_coupled(case):
     assert one.line_load == pytest.approx(alone.line_load, rel=1e-6, abs=1e-3)
 
 
+def test_that_many_sets_are_coupled_as_each_by_itself(case):
+    if not case.model.capabilities.coupled:
+        pytest.skip("solves one contact at a time")
+    softness = np.array([1e-13, 5e-13, 0.0])[:, None, None, None]
+    bodies = np.zeros((2, 2), dtype=np.int64)
+    wear = SharedWear(bodies, softness * np.ones((3, 2, 2, case.grid.strips)))
+    lighter = replace(POINT, normal_force=0.8 * POINT.normal_force)
+    gap, points = np.array([[case.gap, case.gap]] * 3), [POINT, lighter] * 3
+    found = list(case.model.solve_coupled_batch(gap, CURVATURE, points, wear))
+    again = list(case.model.solve_coupled_batch(gap, CURVATURE, points, wear, found))
+    for k in range(3):
+        own = slice(2 * k, 2 * k + 2)
+        alone = case.model.solve_coupled(gap[k], CURVATURE, points[own], wear.at(k))
+        warm = case.model.solve_coupled(gap[k], CURVATURE, points[own], wear.at(k), found[own])
+        for one, other in zip([*found[own], *again[own]], [*alone, *warm], strict=True):
+            assert (one.line_load == other.line_load).all()
+            assert one.power == other.power
+
+
 def test_creepage_variation(case):
     assert case.model.capabilities.creepage_variation
     variation = 2e-4 * np.sign(case.grid.y)

@@ -51,3 +51,22 @@ def test_that_cylinder_and_roller_of_the_same_contacts_are_one_body():
     assert not own.any()
     assert (members[:, 0] == 0).all()
     assert (shared[:, 0] == 2.0).all()
+
+
+def test_that_many_are_reduced_as_each_by_itself():
+    random = np.random.default_rng(0)
+    bodies = np.array([[0, 0], [0, 0], [0, 1]])
+    wears = np.array([[1, 1], [1, 0], [0, 1], [0, 0], [1, 1], [0, 1]])[:, None, :, None]
+    many = SharedWear(bodies, wears * random.random((6, 3, 2, 5)))
+    line_load = random.random((6, 3, 5))
+    opening, seen = many.opening(line_load), []
+    for numbers, own, members, shared in many.groups:
+        for place, number in enumerate(numbers.tolist()):
+            alone = many.at(number)
+            expected = alone.reduced
+            assert (own[place] == expected[0]).all()
+            assert (members == expected[1]).all()
+            assert (shared[place] == expected[2]).all()
+            assert (opening[number] == alone.opening(line_load[number])).all()
+            seen.append(number)
+    assert sorted(seen) == list(range(6))

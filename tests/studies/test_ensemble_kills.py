@@ -35,7 +35,7 @@ def _killed(*arguments: object) -> list[dict[str, Any]]:
 
 def test_that_a_kill_around_every_write_costs_nothing(tmp_path: Path) -> None:
     rows = _killed("stages", tmp_path)
-    assert len(rows) > 100
+    assert sum(row["stage"] == "before write" for row in rows) > 50
     for row in rows:
         assert row["killed"][0] == signal.SIGKILL
         assert row["unlike"] == []

@@ -139,14 +139,14 @@ def test_that_failed_realisations_alone_run_once_more(tmp_path, monkeypatch):
     from wearsim.studies.member import Members
 
     whole = ensemble(small(), 8, tmp_path / "whole.h5", **SERIAL)
-    run, seen = Members._run, []
+    run, seen = Members._member, []
 
     def failing(self, number, *rest):
         if number in {2, 5}:
             raise wearsim.errors.StepError("no step is short enough")
         return run(self, number, *rest)
 
-    monkeypatch.setattr(Members, "_run", failing)
+    monkeypatch.setattr(Members, "_member", failing)
     path = tmp_path / "failing.h5"
     assert sorted(ensemble(small(), 8, path, **SERIAL).errors) == [2, 5]
     assert resume_ensemble(path, **SERIAL).failed == 2  # no more than asked for
@@ -155,7 +155,7 @@ def test_that_failed_realisations_alone_run_once_more(tmp_path, monkeypatch):
         seen.append(number)
         return run(self, number, *rest)
 
-    monkeypatch.setattr(Members, "_run", watched)
+    monkeypatch.setattr(Members, "_member", watched)
     again = resume_ensemble(path, failed=True, **SERIAL)
     assert seen == [2, 5]
     assert unlike(again, whole) == []
@@ -166,14 +166,14 @@ def test_that_a_kill_while_failed_ones_run_once_more_costs_nothing(tmp_path, mon
 
     monkeypatch.setattr(ensemble_work.EnsembleWork, "_batch_size", lambda self: 1)
     whole = ensemble(small(), 6, tmp_path / "whole.h5", **SERIAL)
-    run = Members._run
+    run = Members._member
 
     def failing(self, number, *rest):
         if number in {2, 4}:
             raise wearsim.errors.StepError("no step is short enough")
         return run(self, number, *rest)
 
-    monkeypatch.setattr(Members, "_run", failing)
+    monkeypatch.setattr(Members, "_member", failing)
     path = tmp_path / "failing.h5"
     ensemble(small(), 6, path, **SERIAL)
 
@@ -182,11 +182,11 @@ def test_that_a_kill_while_failed_ones_run_once_more_costs_nothing(tmp_path, mon
             raise SystemExit  # as a kill would: nothing after it is written
         return run(self, number, *rest)
 
-    monkeypatch.setattr(Members, "_run", killed)
+    monkeypatch.setattr(Members, "_member", killed)
     with pytest.raises(SystemExit):
         resume_ensemble(path, failed=True, **SERIAL)
     assert not open_ensemble(path).finished
-    monkeypatch.setattr(Members, "_run", run)
+    monkeypatch.setattr(Members, "_member", run)
     assert unlike(resume_ensemble(path, **SERIAL), whole) == []
 
 
@@ -195,17 +195,17 @@ def test_that_failed_ones_count_for_the_target_once_they_have_run(tmp_path, monk
 
     monkeypatch.setattr("wearsim.studies.checkpoints.FEWEST", 32)
     whole = ensemble(small(), 90, tmp_path / "whole.h5", until="depth.mean 8%", **SERIAL)
-    run = Members._run
+    run = Members._member
 
     def failing(self, number, *rest):
         if number % 9 == 0:
             raise wearsim.errors.StepError("no step is short enough")
         return run(self, number, *rest)
 
-    monkeypatch.setattr(Members, "_run", failing)
+    monkeypatch.setattr(Members, "_member", failing)
     path = tmp_path / "failing.h5"
     ensemble(small(), 90, path, until="depth.mean 8%", **SERIAL)
-    monkeypatch.setattr(Members, "_run", run)
+    monkeypatch.setattr(Members, "_member", run)
     again = resume_ensemble(path, failed=True, **SERIAL)
     estimate = again.estimate("depth").mean
     assert again.finished
@@ -219,11 +219,12 @@ def test_that_a_value_that_is_not_finite_fails_its_realisation_alone(tmp_path, m
 
     observed = member.observed
 
-    def spoilt(scenario, *rest):
-        rows, state = observed(scenario, *rest)
-        if scenario.sampling.realisation == 1:
-            rows[-1]["peak_pressure"] = np.nan
-        return rows, state
+    def spoilt(group):
+        found = observed(group)
+        for each, one in zip(group, found, strict=True):
+            if each.number == 1:
+                one.rows[-1]["peak_pressure"] = np.nan
+        return found
 
     monkeypatch.setattr(member, "observed", spoilt)
     result = ensemble(small(), 3, tmp_path / "e.h5", **SERIAL)
@@ -262,12 +263,12 @@ def test_that_a_straggler_holds_no_more_than_a_few_back(tmp_path, monkeypatch):
 def test_that_a_plugins_mistake_ends_one_realisation_alone(tmp_path, monkeypatch):
     from wearsim.studies.member import Members
 
-    run = Members._run
+    run = Members._member
 
     def failing(self, number, *rest):
         return run(self, number, *rest) if number != 1 else 1 / 0
 
-    monkeypatch.setattr(Members, "_run", failing)
+    monkeypatch.setattr(Members, "_member", failing)
     result = ensemble(small(), 3, tmp_path / "e.h5", **SERIAL)
     assert result.errors == {1: "ZeroDivisionError: division by zero"}
 

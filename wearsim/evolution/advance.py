@@ -8,12 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from wearsim.errors import StepError
+from wearsim.evolution.joining import scene_of, state_of
 from wearsim.evolution.observables import depth, worn_volume
-from wearsim.evolution.scene import Scene
-from wearsim.evolution.state import WearState, contact_values
-from wearsim.evolution.wearing import Contacts, Wearing, exponents_between
-from wearsim.plugins import SharedWear
-from wearsim.types import ContactSolution, FloatArray, OperatingPoint
+from wearsim.evolution.scene import Scene, one_of
+from wearsim.evolution.state import Contacts, WearState, as_batch, contact_values
+from wearsim.evolution.wearing import Wearing, exponents_between
+from wearsim.evolution.yielding import REALISATION, solve_yielding
+from wearsim.types import FloatArray, Number
 
 MAX_FIXED_POINT = 60
 PATIENCE = 20  # iterations after which ten times as much is allowed: strips at an edge come and go
@@ -23,7 +24,7 @@ SAME_LOAD = 1e-9  # relative change of a load that asks for no new solution
 def mean_loads(
     scene: Scene,
     state: WearState,
-    passes: float,
+    passes: Number,
     gaps: Sequence[FloatArray],
     power: FloatArray,
 ) -> FloatArray:
@@ -32,104 +33,88 @@ def mean_loads(
     The load itself is integrated exactly; the feedback takes the mean of the descents at `gaps`,
     as a rule those at the step's ends, and each term its exact mean at constant `power`.
     """
-    start, stop = scene.time(state.passes), scene.time(state.passes + passes)
+    start, stop = scene.time(state.now), scene.time(state.now + passes)
     scene = scene.at_time(start, stop)
-    loads = _loads(scene, scene.load.mean(start, stop))
-    if scene.load.stiffness != 0.0:
+    loads = _loads(scene, scene.mean_load(start, stop))
+    if scene.has_spring:
         descents = [scene.descent(gap) for gap in gaps]
-        loads -= scene.load.stiffness * np.mean(descents, axis=0)
+        loads -= scene.stiffness * np.mean(descents, axis=0)
     for number, term in enumerate(scene.terms.values()):
         # a station's power counts like any other's
         mean = scene.per_roller(power).mean(axis=0)
-        loads += term.mean_force(state.terms[number], mean, stop - start)[scene.roller]
-    return checked_loads(loads, state.passes)
+        duration = one_of(stop - start)
+        loads += term.mean_force(state.terms[number], mean, duration)[scene.roller]
+    return checked_loads(loads, state.now)
 
 
-def _loads(scene: Scene, force: float) -> FloatArray:
+def _loads(scene: Scene, force: Number) -> FloatArray:
     """Return the load of every contact before feedback where that of the scene is `force` [N]."""
     return np.broadcast_to(force + scene.inputs.normal_force, scene.shape).copy()
 
 
-def checked_loads(loads: FloatArray, passes: float) -> FloatArray:
+def checked_loads(loads: FloatArray, passes: Number) -> FloatArray:
     """Return `loads` if all are positive; a contact that has lost its load cannot go on."""
     if not (loads > 0.0).all():
         raise StepError(
-            f"contact is lost at pass {passes:.0f}: the load has fallen to {loads.min():.4g} N;"
-            " the spring has run out of travel, or the log or a draw falls to zero",
+            f"contact is lost at pass {one_of(passes):.0f}: the load has fallen to"
+            f" {loads.min():.4g} N; the spring has run out of travel, or the log or a draw falls to"
+            " zero",
             {"normal_force": loads, "passes": passes},
         )
     return loads
 
 
-def _solve_all(
-    scene: Scene,
-    gap: FloatArray,
-    points: Sequence[OperatingPoint],
-    compliance: list[SharedWear],
-    warm: Contacts,
-) -> Contacts:
-    """Solve every realisation's coupled contacts; order as `WearState.contacts`."""
-    stations, contacts, realisations = scene.shape
-    curvature = scene.kinematics.longitudinal_curvature
-    if realisations == 1:
-        gaps = gap.reshape(len(warm), -1)
-        return tuple(scene.model.solve_coupled(gaps, curvature, points, compliance[0], warm))
-    solved: dict[tuple[int, ...], ContactSolution] = {}
-    flat = {index: number for number, index in enumerate(scene.contacts)}
-    for v in range(realisations):
-        members = [(s, r, v) for s, r in np.ndindex(stations, contacts)]
-        found = scene.model.solve_coupled(
-            np.array([gap[index] for index in members]),
-            curvature,
-            [points[flat[index]] for index in members],
-            compliance[v],
-            [warm[flat[index]] for index in members],
-        )
-        solved.update(zip(members, found, strict=True))
-    return tuple(solved[index] for index in scene.contacts)
+def _differs(new: FloatArray, old: FloatArray) -> FloatArray:
+    """Return the greatest change of each realisation, relative, from (S, C, N, ...)."""
+    axes = (0, 1, 3)[: new.ndim - 1]
+    change, scale = np.abs(new - old).max(axis=axes), np.abs(new).max(axis=axes)
+    relative: FloatArray = np.divide(change, scale, out=np.zeros(len(scale)), where=scale > 0.0)
+    return relative
 
 
-def _differs(new: FloatArray, old: FloatArray) -> float:
-    scale = float(np.abs(new).max())
-    return float(np.abs(new - old).max()) / scale if scale > 0.0 else 0.0
-
-
-def implicit_step(scene: Scene, state: WearState, passes: float) -> WearState:
+def implicit_step(scene: Scene, state: WearState, passes: Number) -> WearState:
     """Step over `passes` passes with the contacts solved on the profiles at the step's end.
 
     The wear of the step enters the contact problem as a compliance, so that no step is too long
     for stability. Compliance, loads and creepage depend on the answer and are iterated; where wear
-    is no multiple of the line load, its exponent is learnt from one iterate to the next.
+    is no multiple of the line load, its exponent is learnt from one iterate to the next. A
+    realisation that has settled is let be while others go on.
 
     Raises
     ------
     StepError
         If they do not settle.
     """
-    scene = scene.at_time(scene.time(state.passes), scene.time(state.passes + passes))
+    scene = scene.at_time(scene.time(state.now), scene.time(state.now + passes))
     gap = scene.gap(state.cylinder_depth, state.roller_depth)
     contacts = state.contacts
     wearing = Wearing(scene, contacts, passes)
     loads = _end_loads(scene, state, passes, wearing, contacts)
+    moving = np.ones(scene.shape[REALISATION], dtype=np.bool_)
+    iterations = np.zeros(len(moving), dtype=np.int64)
     for iteration in range(1, MAX_FIXED_POINT + 1):
         ends = state.cylinder_depth + wearing.cylinder, state.roller_depth + wearing.roller
         points = scene.points(loads, *ends)
-        found = _solve_all(scene, gap + wearing.offset, points, wearing.compliance, contacts)
+        open_gap, wear = gap + wearing.offset, wearing.compliance
+        found = solve_yielding(scene, open_gap, points, wear, contacts, moving)
+        iterations += moving
         new = Wearing(scene, found, passes)
         new_loads = _end_loads(scene, state, passes, new, found)
         foreseen = wearing.foreseen(contact_values(scene, found, "line_load"))
-        change = max(_differs(new.opening, foreseen), _differs(new_loads, loads))
+        change = np.maximum(_differs(new.opening, foreseen), _differs(new_loads, loads))
         if scene.slip_profile is not None:
-            change = max(change, _differs(new.cylinder, wearing.cylinder))
-        if change < scene.settled * 10.0 ** ((iteration - 1) // PATIENCE):
+            change = np.maximum(change, _differs(new.cylinder, wearing.cylinder))
+        moving &= ~(change < scene.settled * 10.0 ** ((iteration - 1) // PATIENCE))
+        if not moving.any():
             power = contact_values(scene, found, "power")
-            begun = replace(state, contacts=found, solves=state.solves + iteration * len(found))
+            solves = iterations * (len(found) // len(moving))
+            begun = state.moved(state.now, solves, contacts=found)
             return worn_state(scene, begun, passes, (new.cylinder, new.roller), power)
         new.exponents = exponents_between(wearing, new)
         contacts, wearing, loads = found, new, new_loads
     raise StepError(
-        f"an implicit step of {passes:.4g} passes from pass {state.passes:.0f} did not settle"
-        f" (last change {change:.1e})",
+        f"an implicit step of {one_of(passes):.4g} passes from pass {one_of(state.now):.0f} did not"
+        f" settle (last change {change.max():.1e})",
         state.to_arrays(),
     )
 
@@ -137,7 +122,7 @@ def implicit_step(scene: Scene, state: WearState, passes: float) -> WearState:
 def _end_loads(
     scene: Scene,
     state: WearState,
-    passes: float,
+    passes: Number,
     wearing: Wearing,
     contacts: Contacts,
 ) -> FloatArray:
@@ -148,7 +133,7 @@ def _end_loads(
     return mean_loads(scene, state, passes, gaps, contact_values(scene, contacts, "power"))
 
 
-def explicit_step(scene: Scene, state: WearState, passes: float) -> WearState:
+def explicit_step(scene: Scene, state: WearState, passes: Number) -> WearState:
     """Step over `passes` passes on the profiles of the step's start, under its mean load."""
     here = scene.at_time(scene.time(state.passes), scene.time(state.passes + passes))
     foreseen = Wearing(here, state.contacts, passes)
@@ -164,20 +149,20 @@ def explicit_step(scene: Scene, state: WearState, passes: float) -> WearState:
 
 def present_scene(scene: Scene, state: WearState) -> Scene:
     """Return the scene with every process at its value of this moment."""
-    now = scene.time(state.passes)
+    now = scene.time(state.now)
     return scene.at_time(now, now)
 
 
 def present_loads(scene: Scene, state: WearState) -> FloatArray:
     """Return the load of each contact at this moment, shape (S, C, N) [N]."""
     scene = present_scene(scene, state)
-    loads = _loads(scene, float(scene.load.force(np.array([scene.time(state.passes)]))[0]))
-    if scene.load.stiffness != 0.0:
+    loads = _loads(scene, scene.force(scene.time(state.now)))
+    if scene.has_spring:
         gap = scene.gap(state.cylinder_depth, state.roller_depth)
-        loads -= scene.load.stiffness * scene.descent(gap)
+        loads -= scene.stiffness * scene.descent(gap)
     for number in range(len(scene.terms)):
         loads += state.terms[number][scene.roller]
-    return checked_loads(loads, state.passes)
+    return checked_loads(loads, state.now)
 
 
 def contacts_at(scene: Scene, state: WearState, loads: FloatArray) -> Contacts:
@@ -186,11 +171,19 @@ def contacts_at(scene: Scene, state: WearState, loads: FloatArray) -> Contacts:
     A step over many passes leaves them solved on the profile it leads to; where they carry these
     loads already there is nothing left to solve.
     """
+    if scene.varying:
+        return solve_present(scene, state, loads)
     line_load = contact_values(scene, state.contacts, "line_load")
     carried = line_load.sum(axis=-1) * scene.grid.spacing
-    if not scene.varying and np.abs(carried - loads).max() <= SAME_LOAD * loads.max():
+    apart, most = np.abs(carried - loads).max(axis=(0, 1)), loads.max(axis=(0, 1))
+    others = np.flatnonzero(apart > SAME_LOAD * most)
+    if not others.size:
         return state.contacts
-    return solve_present(scene, state, loads)
+    if others.size == loads.shape[REALISATION]:
+        return solve_present(scene, state, loads)
+    chosen, part = scene_of(scene, others), state_of(state, others)
+    found = solve_present(chosen, part, np.take(loads, others, axis=REALISATION))
+    return state.batch.with_others(others, as_batch(found, chosen.shape))
 
 
 def solve_present(scene: Scene, state: WearState, loads: FloatArray) -> Contacts:
@@ -198,16 +191,15 @@ def solve_present(scene: Scene, state: WearState, loads: FloatArray) -> Contacts
     scene = present_scene(scene, state)
     points = scene.points(loads, state.cylinder_depth, state.roller_depth)
     gap = scene.gap(state.cylinder_depth, state.roller_depth)
-    batch = scene.model.solve_batch(
-        gap, scene.kinematics.longitudinal_curvature, points, None, list(state.contacts) or None
+    return scene.model.solve_batch(
+        gap, scene.kinematics.longitudinal_curvature, points, None, state.contacts or None
     )
-    return tuple(batch.solutions)
 
 
 def worn_state(
     scene: Scene,
     state: WearState,
-    passes: float,
+    passes: Number,
     worn: tuple[FloatArray, FloatArray],
     power: FloatArray,
 ) -> WearState:
@@ -218,23 +210,22 @@ def worn_state(
     scene : Scene
     state : WearState
         Where the step began; its contacts stand in the state returned too.
-    passes : float
+    passes : float or ndarray, shape (realisations,)
         Length of the step.
     worn : tuple of ndarray
         Depth the step has worn off cylinder and rollers, shapes as in `WearState` [m].
     power : ndarray, shape (stations, contacts, realisations)
         Mean dissipated power of the step [W], of the same dissipation as the wear.
     """
-    duration = scene.time(state.passes + passes) - scene.time(state.passes)
+    duration = one_of(scene.time(state.now + passes) - scene.time(state.now))
     terms = np.array(
         [
             term.advance(state.terms[number], scene.per_roller(power).mean(axis=0), duration)
             for number, term in enumerate(scene.terms.values())
         ]
     ).reshape(state.terms.shape)
-    return replace(
-        state,
-        passes=state.passes + passes,
+    return state.moved(
+        state.now + passes,
         cylinder_depth=state.cylinder_depth + worn[0],
         roller_depth=state.roller_depth + worn[1],
         terms=terms,

@@ -11,13 +11,13 @@ import numpy as np
 from wearsim.evolution.advance import solve_present
 from wearsim.evolution.control import StepControl
 from wearsim.evolution.observables import worn_volume
-from wearsim.evolution.scene import Scene
+from wearsim.evolution.scene import Scene, sum_in_order
 from wearsim.evolution.state import WearState, contact_values
 from wearsim.evolution.wearing import Wearing
-from wearsim.types import FloatArray
+from wearsim.types import FloatArray, Number
 
 DEPTH_EXPONENT, VOLUME_EXPONENT = 0.5, 0.75  # below those of any groove: 2/3 to 1, and about 1
-Step: TypeAlias = Callable[[Scene, WearState, float], WearState]
+Step: TypeAlias = Callable[[Scene, WearState, Number], WearState]
 Depths: TypeAlias = tuple[FloatArray, FloatArray]
 COVER = 1.5  # an estimate of first order is about the error itself; half as much for safety
 DEEP = 0.5  # depths are compared where the groove is deeper than this part of its depth
@@ -35,7 +35,9 @@ def whole_volume(scene: Scene, state: WearState) -> FloatArray:
     kinematics, spacing = scene.kinematics, scene.grid.spacing
     cylinder = worn_volume(state.cylinder_depth, spacing, kinematics.cylinder_radius)
     rollers = worn_volume(state.roller_depth[0], spacing, kinematics.roller_radius)
-    total: FloatArray = cylinder.mean(axis=(0, 1)) + kinematics.multiplicity @ rollers
+    total: FloatArray = cylinder.mean(axis=(0, 1)) + sum_in_order(
+        kinematics.multiplicity[:, None] * rollers, axis=0
+    )
     return total
 
 
@@ -61,7 +63,7 @@ def depth_between(
     return greatest
 
 
-def variation_bias(scene: Scene, end: WearState, first: float, passes: float) -> Depths | None:
+def variation_bias(scene: Scene, end: WearState, first: Number, passes: Number) -> Depths | None:
     """Return what a step leaves out where load and processes vary within it.
 
     The step takes their exact means, but wear is no linear function of them. Half the second
@@ -73,7 +75,7 @@ def variation_bias(scene: Scene, end: WearState, first: float, passes: float) ->
     scene : Scene
     end : WearState
         The state at the step's end.
-    first, passes : float
+    first, passes : float or ndarray, shape (realisations,)
         Where the step began, and its length [passes].
 
     Returns
@@ -84,19 +86,20 @@ def variation_bias(scene: Scene, end: WearState, first: float, passes: float) ->
     start, stop = scene.time(first), scene.time(first + passes)
     here = scene.at_time(start, stop)
     loads = contact_values(scene, end.contacts, "line_load").sum(axis=-1) * scene.grid.spacing
-    everyone = tuple(range(scene.rollers))
-    deviations = [("normal_force", everyone, scene.load.deviation(start, stop))]
-    deviations += [(v.name, v.rollers, v.path.deviation(start, stop)) for v in scene.varying]
     mean: Wearing | None = None
     bias: Depths | None = None
-    for name, rollers, deviation in deviations:
+    for name, rollers, deviation in scene.deviations(start, stop):
         values = loads if name == "normal_force" else getattr(here.inputs, name)
-        if deviation <= 1e-9 * float(np.abs(values).max()):
+        values = values.reshape(-1, values.shape[-1])
+        felt = deviation > 1e-9 * np.abs(values).max(axis=0)
+        if not felt.any():
             continue
         # a load and a friction coefficient are never below zero
-        most = 0.9 * float(values.min()) if name in {"normal_force", "friction"} else np.inf
+        bounded = name in {"normal_force", "friction"}
+        most = 0.9 * values.min(axis=0) if bounded else np.inf
+        size = np.where(felt, np.minimum(deviation, most), 0.0)
         mean = mean if mean is not None else _worn_at(here, end, loads, {}, passes)
-        shift = np.where(np.isin(scene.roller, rollers), min(deviation, most), 0.0)[:, None]
+        shift = np.where(np.isin(scene.roller, rollers)[:, None], size, 0.0)
         less, more = (
             _worn_at(here, end, loads, {name: sign * shift}, passes) for sign in (-1.0, 1.0)
         )
@@ -108,7 +111,7 @@ def variation_bias(scene: Scene, end: WearState, first: float, passes: float) ->
     return bias
 
 
-def variation_error(scene: Scene, end: WearState, first: float, passes: float) -> FloatArray:
+def variation_error(scene: Scene, end: WearState, first: Number, passes: Number) -> FloatArray:
     """Return the size of `variation_bias`, whose parameters these are, with a factor for safety.
 
     Returns
@@ -140,7 +143,10 @@ def biased_twin(end: WearState, twin: WearState, bias: Depths | None) -> WearSta
     if bias is None:
         return twin
     apart = [getattr(twin, name) - getattr(end, name) for name in DEPTHS]
-    along = sum((a * b).sum(axis=(0, 1, 3)) for a, b in zip(apart, bias, strict=True))
+    along = sum(
+        sum_in_order((a * b).sum(axis=-1), axis=axis).sum(axis=0)
+        for axis, a, b in zip((0, 1), apart, bias, strict=True)
+    )
     sign = np.where(along < 0.0, -1.0, 1.0)[:, None]
     return _worn_further(twin, (sign * bias[0], sign * bias[1]))
 
@@ -155,7 +161,7 @@ def _worn_further(state: WearState, depths: Depths) -> WearState:
 
 
 def _worn_at(
-    scene: Scene, end: WearState, loads: FloatArray, shifts: dict[str, FloatArray], passes: float
+    scene: Scene, end: WearState, loads: FloatArray, shifts: dict[str, FloatArray], passes: Number
 ) -> Wearing:
     """Return what passes on the profiles of `end` wear off with loads and inputs shifted."""
     values = {
@@ -181,7 +187,7 @@ def coarse_start(scene: Scene, state: WearState) -> WearState:
 
 
 def with_pass_errors(
-    scene: Scene, start: WearState, end: WearState, whole: WearState, step: Step, passes: float
+    scene: Scene, start: WearState, end: WearState, whole: WearState, step: Step, passes: Number
 ) -> WearState:
     """Return `end` with what the draws at every pass of a step make uncertain.
 
@@ -218,7 +224,7 @@ def with_pass_errors(
     )
 
 
-def _volume_variance(scene: Scene, end: WearState, passes: float) -> FloatArray:
+def _volume_variance(scene: Scene, end: WearState, passes: Number) -> FloatArray:
     """Return the variance of the volume that so many passes wear, shape (realisations,) [m^6]."""
     kinematics, spacing = scene.kinematics, scene.grid.spacing
     cylinder, roller = scene.wear_per_pass(end.contacts)
@@ -239,8 +245,8 @@ def excess(
     added: FloatArray,
     stop: float,
     reached: FloatArray | None = None,
-) -> float:
-    """Return what a step adds to the errors over what it may add.
+) -> FloatArray:
+    """Return what a step adds to the errors over what it may add, shape (realisations,).
 
     Wear forgets, and its errors make room again: where `reached` tells them, all of them together
     may also be what a first step might have added.
@@ -258,16 +264,17 @@ def excess(
     reached : ndarray, shape (2, realisations), optional
         Error of depth [m] and volume [m^3] after the step, at most `added` and what was before.
     """
-    part, worst = end.passes / stop, 0.0
+    worst = np.zeros(scene.shape[2])
+    parts = np.broadcast_to(end.now / stop, worst.shape).tolist()
     sizes = deepest(end), whole_volume(scene, end)
     # what no shorter step would take away must not shorten it
     reducible = np.array([start.depth_error, start.volume_error]) - start.irreducible
-    after = reducible + added if reached is None else reached
+    arrays = reducible, added, reducible + added if reached is None else reached
     for kind, exponent in enumerate((DEPTH_EXPONENT, VOLUME_EXPONENT)):
-        columns = sizes[kind], reducible[kind], added[kind], after[kind]
-        for size, before, error, total in zip(*columns, strict=True):
+        columns = (column.tolist() for column in (sizes[kind], *(a[kind] for a in arrays)))
+        for v, (part, size, before, error, total) in enumerate(zip(parts, *columns, strict=True)):
             if size > 0.0:
-                allowed = control.allowance(float(size), exponent, float(before), part)
-                anew = control.allowance(float(size), exponent, 0.0, part)
-                worst = max(worst, min(float(error) / allowed, float(total) / anew))
+                allowed = control.allowance(size, exponent, before, part)
+                anew = control.allowance(size, exponent, 0.0, part)
+                worst[v] = max(worst[v], min(error / allowed, total / anew))
     return worst

@@ -74,7 +74,7 @@ class ExplicitStepper(Stepper):
             step = min(proposed, left) if self.forced_step else fitted(proposed, left)
             end = explicit_step(scene, state, step)
             added = _errors(scene, state, end, step)
-            over = excess(self.control, scene, state, end, added, stop)
+            over = float(excess(self.control, scene, state, end, added, stop).max())
             chosen = self.control.next_step(step, over)
             if self.forced_step or over <= 1.0:
                 break

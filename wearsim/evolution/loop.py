@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -42,16 +43,24 @@ def evolve(
     """
     while state.passes < stop:
         if state.steps >= max_steps and not stepper.pass_by_pass:
-            raise StepError(
-                f"{max_steps} steps have reached pass {state.passes:.0f} of {stop:.0f};"
-                " raise evolution.max_steps or evolution.tolerance",
-                state.to_arrays(),
-            )
+            raise too_many_steps(max_steps, state.passes, stop, state.to_arrays())
         end = min(stop, next_record(state.passes)) if stepper.pass_by_pass else stop
         advance = stepper.advance(scene, state, end)
         state = advance.end
         if not (np.isfinite(state.cylinder_depth).all() and np.isfinite(state.energy).all()):
-            raise StepError(
-                f"a value is not finite after pass {state.passes:.0f}", state.to_arrays()
-            )
+            raise not_finite(state.passes, state.to_arrays())
         yield advance
+
+
+def too_many_steps(steps: int, passes: float, stop: float, state: Mapping[str, Any]) -> StepError:
+    """Return the error of a test that has taken all the steps it may."""
+    return StepError(
+        f"{steps} steps have reached pass {passes:.0f} of {stop:.0f};"
+        " raise evolution.max_steps or evolution.tolerance",
+        dict(state),
+    )
+
+
+def not_finite(passes: float, state: Mapping[str, Any]) -> StepError:
+    """Return the error of a test that has reached a value which is not finite."""
+    return StepError(f"a value is not finite after pass {passes:.0f}", dict(state))

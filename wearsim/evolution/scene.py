@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import overload
 
 import numpy as np
 
@@ -16,8 +17,10 @@ from wearsim.types import (
     FloatArray,
     Grid,
     IntArray,
+    Number,
     OperatingPoint,
     OperatingPoints,
+    rows_of,
 )
 
 
@@ -122,6 +125,9 @@ class Scene:
         The same scene with contacts that stand for passes drawn one by one, to record by.
     settled : float
         Relative change of wear and loads below which the iterations of an implicit step end.
+    members : tuple of Scene
+        Of tests that are stepped together, the scene of each: they have loads, wear factors and
+        paths in time of their own. Where there are none, all realisations share those of the scene.
     """
 
     grid: Grid
@@ -143,6 +149,7 @@ class Scene:
     redraw: Redraw | None = None
     expectation: Scene | None = None
     settled: float = 1e-8
+    members: tuple[Scene, ...] = ()
 
     @cached_property
     def shape(self) -> tuple[int, int, int]:
@@ -179,13 +186,20 @@ class Scene:
         return tuple((s, c, v) for s in stations for c in contacts for v in realisations)
 
     @cached_property
+    def bodies(self) -> IntArray:
+        """The station and the roller that each contact touches, shape (stations * contacts, 2)."""
+        stations, contacts, _ = self.shape
+        station, contact = np.divmod(np.arange(stations * contacts), contacts)
+        return np.stack([station, self.roller[contact]], axis=1)
+
+    @cached_property
     def nominal_gap(self) -> FloatArray:
         """Gap before wear, shape (stations, contacts, realisations, strips) [m].
 
         A tilted roller keeps its crown and turns about its apex: tilt adds a linear term, which
         moves the contact by R_crown times tilt.
         """
-        gap = self.flat_gap[:, self.roller]
+        gap = np.take(self.flat_gap, self.roller, axis=1)
         if self.tilt_shifts and self.inputs.tilt.any():
             gap = gap + self.inputs.tilt[:, :, None] * self.from_apex[self.roller][:, None, :]
         return gap
@@ -203,14 +217,50 @@ class Scene:
         share = kinematics.multiplicity[self.roller] * self.weight
         return np.asarray(share / kinematics.physical_rollers)
 
-    def at_time(self, start: float, stop: float) -> Scene:
+    @cached_property
+    def stiffness(self) -> Number:
+        """What the load loses per descent [N/m]."""
+        each = [scene.load.stiffness for scene in self.members]
+        return np.array(each) if each else self.load.stiffness
+
+    @cached_property
+    def has_spring(self) -> bool:
+        """Whether a load falls as its roller descends."""
+        return bool(np.any(self.stiffness))
+
+    def force(self, time: Number) -> Number:
+        """Return the load at a time [s] [N]."""
+        if not self.members:
+            return float(self.load.force(np.array([time]))[0])
+        times = np.broadcast_to(time, len(self.members))[:, None]
+        forces = [scene.load.force(own)[0] for scene, own in zip(self.members, times, strict=True)]
+        return np.array(forces)
+
+    def mean_load(self, start: Number, stop: Number) -> Number:
+        """Return the exact mean of the load between two times [s] [N]."""
+        if not self.members:
+            return self.load.mean(one_of(start), one_of(stop))
+        return each_between([scene.load.mean for scene in self.members], start, stop)
+
+    def deviations(self, start: Number, stop: Number) -> list[tuple[str, tuple[int, ...], Number]]:
+        """Return what varies between two times [s]: field, rollers and standard deviation."""
+        scenes, everyone = self.members or (self,), tuple(range(self.rollers))
+        load = each_between([scene.load.deviation for scene in scenes], start, stop)
+        found: list[tuple[str, tuple[int, ...], Number]] = [("normal_force", everyone, load)]
+        for k, item in enumerate(self.varying):
+            paths = [scene.varying[k].path.deviation for scene in scenes]
+            found.append((item.name, item.rollers, each_between(paths, start, stop)))
+        return found
+
+    def at_time(self, start: Number, stop: Number) -> Scene:
         """Return the scene with every process at its mean between two times [s]."""
         if not self.varying:
             return self
-        inputs = self.inputs
-        for item in self.varying:
+        inputs, scenes = self.inputs, self.members or (self,)
+        for k, item in enumerate(self.varying):
             chosen = np.isin(self.roller, item.rollers)[:, None]
-            values = np.where(chosen, item.path.mean(start, stop), getattr(inputs, item.name))
+            mean = each_between([scene.varying[k].path.mean for scene in scenes], start, stop)
+            values = np.where(chosen, mean, getattr(inputs, item.name))
             inputs = inputs.with_values({item.name: values})
         return replace(self, inputs=inputs, varying=())
 
@@ -238,7 +288,13 @@ class Scene:
         alone = np.ones(len(rollers))
         return replace(self, inputs=inputs, roller=rollers, weight=alone, varying=())
 
-    def time(self, passes: float) -> float:
+    @overload
+    def time(self, passes: float) -> float: ...
+
+    @overload
+    def time(self, passes: Number) -> Number: ...
+
+    def time(self, passes: Number) -> Number:
         """Return the time at which `passes` roller passes are done [s]."""
         return passes / self.kinematics.pass_rate
 
@@ -366,13 +422,26 @@ class Scene:
 
     def _depth_per_pass(self, body: Body, contacts: Sequence[ContactSolution]) -> FloatArray:
         """Return the depth one pass of each contact wears off `body` [m]."""
-        speed = self.kinematics.rolling_speed
-        factor = self.law.depth_per_dissipation(body, speed)
+        factor, shape = self.wear_factors[body], (*self.shape, self.grid.strips)
         if factor is not None:
-            depths = factor * np.array([contact.dissipation for contact in contacts])
-        else:
-            depths = np.array([self.law.depth_per_pass(body, c, speed) for c in contacts])
-        return depths.reshape(*self.shape, self.grid.strips)
+            dissipation = rows_of(contacts, "dissipation").reshape(shape)
+            return np.asarray(per_strip(factor) * dissipation)
+        speed = self.kinematics.rolling_speed
+        depths = np.array([self.law.depth_per_pass(body, c, speed) for c in contacts])
+        return depths.reshape(shape)
+
+    @cached_property
+    def wear_factors(self) -> dict[Body, Number | None]:
+        """Depth per pass over dissipation of either body [m/(W/m)] where wear is linear in it."""
+        return {body: self._wear_factor(body) for body in BODIES}
+
+    def _wear_factor(self, body: Body) -> Number | None:
+        scenes, speed = self.members or (self,), self.kinematics.rolling_speed
+        factors = [scene.law.depth_per_dissipation(body, speed) for scene in scenes]
+        known = [factor for factor in factors if factor is not None]
+        if len(known) < len(factors):
+            return None
+        return np.array(known) if self.members else known[0]
 
     def shared_wear(
         self, cylinder: FloatArray, roller: FloatArray
@@ -408,5 +477,33 @@ class Scene:
     def total_power(self, power: FloatArray) -> FloatArray:
         """Return the power of all physical rollers, shape (N,) [W], from (S, C, N)."""
         share = self.cylinder_share[None, :, None] * self.kinematics.physical_rollers
-        total: FloatArray = (power * share).sum(axis=1).mean(axis=0)
+        total: FloatArray = sum_in_order(power * share, axis=1).mean(axis=0)
         return total
+
+
+def one_of(numbers: Number) -> float:
+    """Return a number that is one for all realisations, or that of the first."""
+    return numbers if isinstance(numbers, float) else float(np.ravel(numbers)[0])
+
+
+def each_between(
+    values: Sequence[Callable[[float, float], float]], start: Number, stop: Number
+) -> FloatArray:
+    """Return values between two times [s], each between its own where these differ."""
+    count = len(values)
+    first, last = (np.broadcast_to(time, count).tolist() for time in (start, stop))
+    return np.array([value(a, b) for value, a, b in zip(values, first, last, strict=True)])
+
+
+def per_strip(number: Number) -> FloatArray:
+    """Return a number, or one per realisation, to go with arrays whose last axis is strips."""
+    return np.asarray(number)[..., None]
+
+
+def sum_in_order(values: FloatArray, axis: int) -> FloatArray:
+    """Return a sum that is the same to the bit however many realisations stand beside it.
+
+    The order in which numpy sums an axis depends on the lengths of the others.
+    """
+    total: FloatArray = np.take(np.add.accumulate(values, axis=axis), -1, axis=axis)
+    return total

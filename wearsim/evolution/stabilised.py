@@ -20,9 +20,9 @@ from wearsim.evolution.errors_of_steps import Step
 from wearsim.evolution.legendre import legendre_stages, stages_for
 from wearsim.evolution.scene import Scene
 from wearsim.evolution.stability import decay_rates
-from wearsim.evolution.state import WearState, contact_values
+from wearsim.evolution.state import Contacts, WearState, contact_values
 from wearsim.evolution.twin import TwinStepper
-from wearsim.evolution.wearing import Contacts, Wearing
+from wearsim.evolution.wearing import Wearing
 from wearsim.types import FloatArray
 
 SAFETY = 1.2  # on the greatest rate of decay, which is estimated and may grow within the step

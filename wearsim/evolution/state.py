@@ -2,20 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from wearsim.evolution.scene import Scene
-from wearsim.types import ContactSolution, FloatArray
+from wearsim.types import BatchSolution, ContactSolution, FloatArray, IntArray, Number, rows_of
 
 SIGMAS = 2.0  # of the scatter that draws at every pass leave, counted as error
+Contacts: TypeAlias = Sequence[ContactSolution]
 _CONTACT = "contact_"
 _TWINS = ("shadow", "coarse")
 _SCALARS = ("passes", "step", "steps", "rejected", "solves", "full_solves")
+
+
+@dataclass(frozen=True)
+class Separate:
+    """Where tests stand that are stepped together and go each its own way.
+
+    Parameters
+    ----------
+    passes : ndarray, shape (realisations,)
+        Roller passes done.
+    solves : ndarray of int, shape (realisations,)
+        Contact solves of the steps taken.
+    """
+
+    passes: FloatArray
+    solves: IntArray
+
+    def at(self, numbers: IntArray) -> Separate:
+        """Return those of some tests."""
+        return Separate(self.passes[numbers], self.solves[numbers])
 
 
 @dataclass(frozen=True)
@@ -34,7 +55,7 @@ class WearState:
         Worn depth of each roller [m].
     terms : ndarray, shape (terms, rollers, realisations)
         State of each load term.
-    contacts : tuple of ContactSolution
+    contacts : sequence of ContactSolution
         The last solution of every contact.
     energy : ndarray, shape (realisations,)
         Dissipated energy of all rollers [J].
@@ -59,13 +80,15 @@ class WearState:
         The shadow with half the contacts that stand for inputs drawn at every pass.
     decay : ndarray, shape (realisations,), optional
         Greatest rate at which wear flattens a profile, where last measured [1/pass].
+    each : Separate, optional
+        In place of `passes` and `solves` where the realisations are tests that go each its own way.
     """
 
     passes: float
     cylinder_depth: FloatArray
     roller_depth: FloatArray
     terms: FloatArray
-    contacts: tuple[ContactSolution, ...]
+    contacts: Contacts
     energy: FloatArray
     depth_error: FloatArray
     volume_error: FloatArray
@@ -81,6 +104,43 @@ class WearState:
     shadow: WearState | None = None
     coarse: WearState | None = None
     decay: FloatArray | None = None
+    each: Separate | None = None
+
+    @property
+    def now(self) -> Number:
+        """Passes done: one number, or one for each realisation that goes its own way."""
+        return self.passes if self.each is None else self.each.passes
+
+    @property
+    def batch(self) -> BatchSolution:
+        """The contacts as columns with leading axes (station, contact, realisation)."""
+        stations, _, realisations = self.cylinder_depth.shape[:3]
+        contacts = len(self.contacts) // (stations * realisations)
+        return as_batch(self.contacts, (stations, contacts, realisations))
+
+    def moved(self, now: Number, solves: IntArray | None = None, **others: Any) -> WearState:
+        """Return the state with other passes done, and whatever else is new.
+
+        Parameters
+        ----------
+        now : float or ndarray, shape (realisations,)
+            Passes done.
+        solves : ndarray of int, shape (realisations,), optional
+            Further solves.
+        **others
+            Other fields.
+        """
+        if self.each is None:
+            count = self.solves if solves is None else self.solves + int(solves.sum())
+            return replace(self, passes=float(now), solves=count, **others)
+        counts = self.each.solves if solves is None else self.each.solves + solves
+        return replace(self, each=Separate(np.asarray(now), counts), **others)
+
+    def solves_since(self, before: WearState) -> IntArray:
+        """Return the contact solves since an earlier state, of all or of each realisation."""
+        if self.each is None or before.each is None:
+            return np.array(self.solves - before.solves)
+        return self.each.solves - before.each.solves
 
     @property
     def irreducible(self) -> FloatArray:
@@ -93,11 +153,11 @@ class WearState:
         arrays: dict[str, npt.NDArray[np.generic]] = {
             item.name: np.asarray(getattr(self, item.name))
             for item in fields(self)
-            if item.name not in {"contacts", *_TWINS} and getattr(self, item.name) is not None
+            if item.name not in {"contacts", "each", *_TWINS}
+            and getattr(self, item.name) is not None
         }
         for item in fields(ContactSolution):
-            stacked = np.array([getattr(contact, item.name) for contact in self.contacts])
-            arrays[_CONTACT + item.name] = stacked
+            arrays[_CONTACT + item.name] = np.array(rows_of(self.contacts, item.name))
         for name in _TWINS:
             twin = getattr(self, name)
             if twin is not None:
@@ -137,6 +197,20 @@ class WearState:
 
 def _unpack(values: dict[str, Any]) -> dict[str, Any]:
     return {n: v.item() if v.ndim == 0 else np.array(v) for n, v in values.items()}
+
+
+def as_batch(contacts: Contacts, shape: tuple[int, ...]) -> BatchSolution:
+    """Return contacts as columns with given leading axes."""
+    if not isinstance(contacts, BatchSolution):
+        return BatchSolution.of(shape, contacts)
+    if contacts.shape == shape:
+        return contacts
+    axes = len(contacts.shape)
+    columns = {
+        name: np.reshape(column, shape + column.shape[axes:])
+        for name, column in contacts.columns.items()
+    }
+    return BatchSolution(shape, contacts.y, columns)
 
 
 def widened(array: FloatArray, strips: int) -> FloatArray:
@@ -182,9 +256,9 @@ def widened_state(state: WearState, y: FloatArray, strips: int) -> WearState:
     )
 
 
-def contact_values(scene: Scene, contacts: tuple[ContactSolution, ...], name: str) -> FloatArray:
+def contact_values(scene: Scene, contacts: Contacts, name: str) -> FloatArray:
     """Return the field `name` of all contacts, leading axes (station, contact, realisation)."""
-    values = np.array([getattr(contact, name) for contact in contacts])
+    values = rows_of(contacts, name)
     return values.reshape(scene.shape + values.shape[1:])
 
 
@@ -196,21 +270,18 @@ def fresh_state(scene: Scene) -> WearState:
     cylinder_depth = np.zeros((stations, 1, realisations, n))
     roller_depth = np.zeros((1, scene.rollers, realisations, n))
     terms = np.zeros((len(scene.terms), scene.rollers, realisations))
-    force = float(scene.load.force(np.zeros(1))[0]) + scene.inputs.normal_force
-    contacts = []
-    for index in scene.contacts:
-        point = scene.point(*index[1:], float(force[index[1:]]), np.zeros(n), np.zeros(n))
-        contacts.append(
-            scene.model.solve(
-                scene.nominal_gap[index], scene.kinematics.longitudinal_curvature, point
-            )
-        )
+    loads = np.broadcast_to(scene.force(0.0) + scene.inputs.normal_force, scene.shape)
+    contacts = scene.model.solve_batch(
+        scene.nominal_gap,
+        scene.kinematics.longitudinal_curvature,
+        scene.points(loads, cylinder_depth, roller_depth),
+    )
     return WearState(
         passes=0.0,
         cylinder_depth=cylinder_depth,
         roller_depth=roller_depth,
         terms=terms,
-        contacts=tuple(contacts),
+        contacts=contacts,
         energy=np.zeros(realisations),
         depth_error=np.zeros(realisations),
         volume_error=np.zeros(realisations),
@@ -218,3 +289,12 @@ def fresh_state(scene: Scene) -> WearState:
         scatter=np.zeros((2, realisations)),
         solves=len(contacts),
     )
+
+
+def separate_state(scene: Scene) -> WearState:
+    """Return the fresh state of tests that are joined in a scene and go each its own way."""
+    state = fresh_state(scene)
+    count = scene.shape[2]
+    solves = np.full(count, state.solves // count)
+    state = replace(state, solves=0, each=Separate(np.zeros(count), solves))
+    return replace(state, shadow=state)

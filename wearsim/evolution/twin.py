@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,10 +22,26 @@ from wearsim.evolution.errors_of_steps import (
 )
 from wearsim.evolution.scene import Scene
 from wearsim.evolution.state import WearState, contact_values
-from wearsim.evolution.stepper import Advance, Stepper, fitted
-from wearsim.types import FloatArray
+from wearsim.evolution.stepper import Advance, Stepper
+from wearsim.evolution.trial import Trial
+from wearsim.types import FloatArray, Number
 
-SMALLEST_STEP = 1e-3  # passes
+
+@dataclass(frozen=True)
+class Attempt:
+    """A step that has been tried.
+
+    Parameters
+    ----------
+    half, end : WearState
+        The state in its middle and at its end.
+    excess : ndarray, shape (realisations,)
+        What it adds to the error over what it may add.
+    """
+
+    half: WearState
+    end: WearState
+    excess: FloatArray
 
 
 class TwinStepper(Stepper):
@@ -58,56 +74,68 @@ class TwinStepper(Stepper):
         It is asked for once at the start `state` of each step, for all that is stepped there.
         """
 
-    def side_step(self, scene: Scene, state: WearState, passes: float) -> WearState:
+    def side_step(self, scene: Scene, state: WearState, passes: Number) -> WearState:
         """Return the state `passes` passes later, in one step."""
         return self.scheme(scene, state)(scene, state, passes)
 
     def advance(self, scene: Scene, state: WearState, stop: float) -> Advance:
         """Take one step, shortened until what it adds to the error is allowed."""
-        twin, scheme = state.shadow or state, self.scheme(scene, state)
-        proposed = self.forced_step or state.step or _first_step(scene, state)
-        rejected, cause = state.rejected, None
-        while proposed >= SMALLEST_STEP:
-            left = stop - state.passes
-            step = min(proposed, left) if self.forced_step else fitted(proposed, left)
+        scheme, trial = self.scheme(scene, state), self.trial(scene, state)
+        while True:
+            step = trial.step(state.passes, stop)
             try:
-                half = scheme(scene, state, 0.5 * step)
-                end = scheme(scene, half, 0.5 * step)
-                whole = scheme(scene, twin, step)
-                end = with_pass_errors(scene, state, end, whole, scheme, step)
-                bias = variation_bias(scene, end, state.passes, step)
-                whole = biased_twin(end, whole, bias)
+                tried = self.attempt(scene, state, step, stop, scheme)
             except (StepError, ContactError) as failure:
-                if self.forced_step:
-                    raise
-                cause, rejected, proposed = failure, rejected + 1, 0.2 * step
+                trial.refuse(failure, step)
                 continue
-            moved = _moved_apart(scene, (state, twin), (end, whole))
-            end = replace(
-                end,
-                passes=stop if step == left else end.passes,
-                steps=state.steps + 1,
-                rejected=rejected,
-                solves=end.solves + whole.solves - twin.solves,
-            )
-            end = _with_errors(state, end, whole, moved[1])
-            reached = np.array([end.depth_error, end.volume_error]) - end.irreducible
-            over = excess(self.control, scene, state, end, moved, stop, reached)
-            chosen = self.control.next_step(step, over, self.order)
-            if self.forced_step or over <= 1.0:
-                # a step cut short by the stop says little about how long the next may be
-                chosen = max(chosen, proposed) if step < proposed else chosen
-                end = replace(end, step=self.forced_step or chosen)
-                return Advance(path=(state, half, end))
-            rejected += 1
-            proposed = min(chosen, 0.7 * step)
-        if isinstance(cause, ContactError):
-            raise cause
-        raise StepError(
-            f"no step is short enough at pass {state.passes:.0f} (tried down to"
-            f" {SMALLEST_STEP:g} passes); {cause or 'the error does not fall with the step'}",
-            state.to_arrays(),
-        )
+            if trial.stands(float(tried.excess.max()), step):
+                end = replace(
+                    tried.end,
+                    step=trial.proposed,
+                    steps=state.steps + 1,
+                    rejected=state.rejected + trial.rejected,
+                )
+                return Advance(path=(state, tried.half, end))
+
+    def trial(self, scene: Scene, state: WearState) -> Trial:
+        """Return the search for the next step of a test."""
+        proposed = self.forced_step or state.step or float(first_steps(scene, state).min())
+        return Trial(proposed, self.control, self.order, bool(self.forced_step), state.to_arrays)
+
+    def attempt(
+        self, scene: Scene, state: WearState, step: Number, stop: float, scheme: Step
+    ) -> Attempt:
+        """Take a step in halves and whole, and tell what it adds to the error.
+
+        Parameters
+        ----------
+        scene : Scene
+        state : WearState
+        step : float or ndarray, shape (realisations,)
+            Passes of the step.
+        stop : float
+            Passes at the end of the test.
+        scheme : callable
+            From `scheme`.
+
+        Raises
+        ------
+        StepError, ContactError
+            If the step is too long for one of the realisations.
+        """
+        twin = state.shadow or state
+        half = scheme(scene, state, 0.5 * step)
+        end = scheme(scene, half, 0.5 * step)
+        whole = scheme(scene, twin, step)
+        end = with_pass_errors(scene, state, end, whole, scheme, step)
+        whole = biased_twin(end, whole, variation_bias(scene, end, state.now, step))
+        moved = _moved_apart(scene, (state, twin), (end, whole))
+        now = np.where(step == stop - state.now, stop, end.now)
+        end = end.moved(now, whole.solves_since(twin))
+        end = _with_errors(state, end, whole, moved[1])
+        reached = np.array([end.depth_error, end.volume_error]) - end.irreducible
+        over = excess(self.control, scene, state, end, moved, stop, reached)
+        return Attempt(half, end, over)
 
 
 def _moved_apart(
@@ -128,7 +156,7 @@ def _with_errors(
     """Return `end` with the errors that its twin `whole` and all else tell, and with that twin."""
     others = [state.irreducible for state in (start, end)]
     twins = {
-        name: replace(twin, passes=end.passes, shadow=None, coarse=None)
+        name: twin.moved(end.now, shadow=None, coarse=None)
         for name, twin in (("shadow", whole), ("coarse", end.coarse))
         if twin is not None
     }
@@ -141,10 +169,11 @@ def _with_errors(
     )
 
 
-def _first_step(scene: Scene, state: WearState) -> float:
-    """Return the passes that wear a tenth of the elastic approach off the fresh contact."""
+def first_steps(scene: Scene, state: WearState) -> FloatArray:
+    """Return the passes that wear a tenth of the elastic approach off, shape (realisations,)."""
     cylinder, roller = scene.shared_wear(*scene.wear_per_pass(state.contacts))
-    rate = float((cylinder + roller).max())
+    rate = (cylinder + roller).max(axis=(0, 1, 3))
     gap = scene.gap(state.cylinder_depth, state.roller_depth)
     approach = contact_values(scene, state.contacts, "approach") - gap.min(axis=-1)
-    return 0.1 * float(approach.min()) / rate if rate > 0.0 else np.inf
+    worn = np.where(rate > 0.0, rate, 1.0)
+    return np.asarray(np.where(rate > 0.0, 0.1 * approach.min(axis=(0, 1)) / worn, np.inf))

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TypeAlias
 
 import numpy as np
 
-from wearsim.evolution.scene import Scene
+from wearsim.evolution.scene import Scene, per_strip
+from wearsim.evolution.state import Contacts
 from wearsim.mechanics.wear_of_strips import learn_exponents, ratio_to_load
 from wearsim.plugins import SharedWear
-from wearsim.types import ContactSolution, FloatArray
-
-Contacts: TypeAlias = tuple[ContactSolution, ...]
+from wearsim.types import FloatArray, Number, rows_of
 
 SLIDING = 1.0  # exponent of dissipation in full sliding, the greatest there is
 STEEPEST = 50.0  # where catastrophic wear begins, T gamma's law goes as the power 44
@@ -28,8 +26,8 @@ class Wearing:
     Parameters
     ----------
     scene : Scene
-    contacts : tuple of ContactSolution
-    passes : float
+    contacts : sequence of ContactSolution
+    passes : float or ndarray, shape (realisations,)
         Length of the step.
 
     Attributes
@@ -41,15 +39,15 @@ class Wearing:
         out, which full sliding makes exact.
     """
 
-    def __init__(self, scene: Scene, contacts: Contacts, passes: float) -> None:
+    def __init__(self, scene: Scene, contacts: Contacts, passes: Number) -> None:
         cylinder, roller = scene.wear_per_pass(contacts)
-        rates = scene.shared_wear(cylinder, roller)
-        self.cylinder, self.roller = rates[0] * passes, rates[1] * passes
+        rates, length = scene.shared_wear(cylinder, roller), per_strip(passes)
+        self.cylinder, self.roller = rates[0] * length, rates[1] * length
         self.exponents: FloatArray | None = None
         self.scene, self.contacts = scene, contacts
         # each contact's own part in the wear of the bodies
-        share = passes * scene.cylinder_share[None, :, None, None]
-        own = passes * scene.kinematics.roller_share / scene.shape[0]
+        share = length * scene.cylinder_share[None, :, None, None]
+        own = length * scene.kinematics.roller_share / scene.shape[0]
         self._parts = cylinder * share, roller * own * scene.weight[None, :, None, None]
 
     @property
@@ -59,19 +57,17 @@ class Wearing:
         return worn
 
     @cached_property
-    def compliance(self) -> list[SharedWear]:
-        """How the step's wear yields, one per realisation; contacts are (station, contact)."""
+    def compliance(self) -> SharedWear:
+        """How the step's wear yields, realisation by realisation; contacts as in the scene."""
         parts = self._parts
         if self.exponents is not None:
             parts = self.exponents * parts[0], self.exponents * parts[1]
-        scene = self.scene
-        stations, contacts, realisations = scene.shape
-        station, contact = np.divmod(np.arange(stations * contacts), contacts)
-        bodies = np.stack([station, scene.roller[contact]], axis=1)
+        stations, contacts, realisations = self.scene.shape
         # to (realisations, stations, contacts, sides, strips)
         ratios = np.stack([_ratio(part, self.contacts) for part in parts])
-        ratios = ratios.transpose(3, 1, 2, 0, 4).reshape(realisations, -1, 2, scene.grid.strips)
-        return [SharedWear(bodies, ratio) for ratio in ratios]
+        ratios = ratios.transpose(3, 1, 2, 0, 4)
+        each = ratios.reshape(realisations, stations * contacts, 2, self.scene.grid.strips)
+        return SharedWear(self.scene.bodies, each)
 
     @cached_property
     def offset(self) -> FloatArray | float:
@@ -94,21 +90,16 @@ class Wearing:
         """Return the opening that compliance and offset make of a line load, shape as `opening`."""
         stations, contacts, realisations, strips = line_load.shape
         flat = line_load.transpose(2, 0, 1, 3).reshape(realisations, -1, strips)
-        yielding = [wear.opening(q) for wear, q in zip(self.compliance, flat, strict=True)]
-        shaped = np.reshape(yielding, (realisations, stations, contacts, strips))
+        yielding = self.compliance.opening(flat)
+        shaped = yielding.reshape(realisations, stations, contacts, strips)
         opening: FloatArray = shaped.transpose(1, 2, 0, 3) + self.offset
         return opening
-
-
-def _column(contacts: Contacts, name: str) -> FloatArray:
-    """Return a field of all contacts, shape (contacts, strips)."""
-    return np.array([getattr(contact, name) for contact in contacts])
 
 
 def _ratio(wear: FloatArray, contacts: Contacts) -> FloatArray:
     """Return wear over line load, carried on into strips without load, last axis strips."""
     flat = np.ascontiguousarray(wear).reshape(len(contacts), -1)
-    return ratio_to_load(flat, _column(contacts, "line_load")).reshape(wear.shape)
+    return ratio_to_load(flat, rows_of(contacts, "line_load")).reshape(wear.shape)
 
 
 def exponents_between(old: Wearing, new: Wearing) -> FloatArray:
@@ -126,10 +117,10 @@ def exponents_between(old: Wearing, new: Wearing) -> FloatArray:
     """
     scene, known = old.scene, old.exponents
     exponents = np.ones((*scene.shape, scene.grid.strips)) if known is None else known.copy()
-    linear = scene.law.depth_per_dissipation("cylinder", scene.kinematics.rolling_speed)
+    linear = scene.wear_factors["cylinder"]
     learn_exponents(
-        _column(old.contacts, "line_load"),
-        _column(new.contacts, "line_load"),
+        rows_of(old.contacts, "line_load"),
+        rows_of(new.contacts, "line_load"),
         old.per_contact,
         new.per_contact,
         SLIDING if linear is not None else STEEPEST,

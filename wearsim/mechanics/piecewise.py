@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from wearsim.types import FloatArray
@@ -32,9 +34,12 @@ class PiecewiseLinear:
 
     def _integrals(self, time: float) -> tuple[float, float]:
         """Return the integrals of the value and of its square from the first sample to `time`."""
-        k = int(np.clip(np.searchsorted(self.time, time) - 1, 0, len(self.time) - 2))
-        here = float(np.interp(time, self.time, self.value))
-        first, duration = float(self.value[k]), time - float(self.time[k])
+        # plain numbers: a step asks for few of them, but many times
+        k = min(max(int(self.time.searchsorted(time)) - 1, 0), len(self.time) - 2)
+        start, stop = float(self.time[k]), float(self.time[k + 1])
+        first, last = float(self.value[k]), float(self.value[k + 1])
+        part = min(max((time - start) / (stop - start), 0.0), 1.0)
+        here, duration = first + (last - first) * part, time - start
         area = 0.5 * duration * (first + here)
         square = duration * (first * first + first * here + here * here) / 3.0
         return float(self._area[k]) + area, float(self._square[k]) + square
@@ -55,5 +60,6 @@ class PiecewiseLinear:
         """Return the exact standard deviation between two times [s]."""
         if stop <= start:
             return 0.0
-        square = (self._integrals(stop)[1] - self._integrals(start)[1]) / (stop - start)
-        return float(np.sqrt(max(0.0, square - self.mean(start, stop) ** 2)))
+        before, after = self._integrals(start), self._integrals(stop)
+        mean, square = ((b - a) / (stop - start) for a, b in zip(before, after, strict=True))
+        return math.sqrt(max(0.0, square - mean**2))

@@ -31,6 +31,7 @@ from wearsim.mechanics.slender import (
     start_contact,
     take_step,
 )
+from wearsim.mechanics.slender_each import attempts, forget_start
 from wearsim.types import FloatArray, IntArray
 
 
@@ -133,3 +134,55 @@ def solve_coupled(
         if status != GOING_ON:
             return status, iteration
     return NO_CONVERGENCE, MAX_ITERATIONS
+
+
+@kernel
+def solve_each_coupled(
+    gap: FloatArray,
+    own: FloatArray,
+    members: IntArray,
+    shared: FloatArray,
+    loads: FloatArray,
+    spacing: float,
+    contact_modulus: float,
+    longitudinal_curvature: float,
+    table: FloatArray,
+    bend: FloatArray,
+    line_load: FloatArray,
+    approach: FloatArray,
+    half_length: FloatArray,
+    status: IntArray,
+    iterations: IntArray,
+) -> None:
+    """Solve sets of coupled contacts one by one, as `slender_each.solve_each` does uncoupled ones.
+
+    Parameters
+    ----------
+    gap, own, members, shared, loads, line_load, approach, half_length : ndarray
+        As in `solve_coupled`, with the axis of the sets first, except for `members`.
+    spacing, contact_modulus, longitudinal_curvature, table, bend
+        As in `solve_coupled`.
+    status, iterations : ndarray of int, shape (sets,)
+        Filled with what `solve_coupled` returns.
+    """
+    for m in range(gap.shape[0]):
+        for attempt in range(attempts(line_load[m])):
+            if attempt > 0:
+                forget_start(line_load[m])
+            status[m], iterations[m] = solve_coupled(
+                gap[m],
+                own[m],
+                members,
+                shared[m],
+                loads[m],
+                spacing,
+                contact_modulus,
+                longitudinal_curvature,
+                table,
+                bend,
+                line_load[m],
+                approach[m],
+                half_length[m],
+            )
+            if status[m] == CONVERGED:
+                break

@@ -16,6 +16,7 @@ from wearsim.mechanics.influence import HIGHEST, curvature_table, influence_tabl
 from wearsim.mechanics.jit import own_array
 from wearsim.mechanics.strip import SUMS, strip_contacts
 from wearsim.mechanics.strip_coupling import strip_elasticity
+from wearsim.models.slender_normal import Medium, NormalContacts
 from wearsim.models.strip_grid import check_edges, grid_about_hertz
 from wearsim.models.strip_theory import StripTheory
 from wearsim.models.tangential import (
@@ -34,14 +35,12 @@ from wearsim.plugins import (
     SharedWear,
 )
 from wearsim.plugins.protocols import naming_contact
-from wearsim.plugins.shared_wear import NO_BODY
 from wearsim.types import (
     BatchSolution,
     ContactFields,
     ContactSolution,
     FloatArray,
     Grid,
-    IntArray,
     Material,
     OperatingPoint,
     OperatingPoints,
@@ -129,89 +128,41 @@ class Slender(ContactModel):
         points: Sequence[OperatingPoint],
         wear: SharedWear,
         warm: Sequence[ContactSolution] | None = None,
-    ) -> list[ContactSolution]:
+    ) -> Sequence[ContactSolution]:
         """Solve several contacts that wear a profile they share, all at once."""
-        line_load, half_length = np.zeros(gap.shape), np.zeros(gap.shape)
-        approach = np.zeros(len(points))
-        if warm is not None:
-            line_load[:] = [solution.line_load for solution in warm]
-            approach[:] = [solution.approach for solution in warm]
-        columns = self._columns(points)
+        one = SharedWear(wear.bodies, wear.compliance[None])
+        return self.solve_coupled_batch(gap[None], longitudinal_curvature, points, one, warm)
+
+    def solve_coupled_batch(
+        self,
+        gap: FloatArray,
+        longitudinal_curvature: float,
+        points: Sequence[OperatingPoint],
+        wear: SharedWear,
+        warm: Sequence[ContactSolution] | None = None,
+    ) -> Sequence[ContactSolution]:
+        """Solve many sets of contacts that wear profiles they share, in one call."""
+        leading, columns = (*gap.shape[:2], 1), self._columns(points)
         if columns is not None:
-            loads = own_array(columns.normal_force)
-        else:
-            loads = np.array([point.normal_force for point in points])
-        iterations = self._solve_normal(
-            own_array(gap),
-            wear.reduced,
-            loads,
-            longitudinal_curvature,
-            line_load,
-            approach,
-            half_length,
-        )
-        if columns is not None:
-            count = np.full(len(loads), iterations, dtype=np.int64)
-            shape = (len(loads),)
-            found = self._completed(line_load, half_length, approach, count, columns, shape)
-            return list(found.solutions)
+            return self._solve(gap, longitudinal_curvature, columns, wear, warm, leading)
+        loads = np.array([point.normal_force for point in points])
+        normal = self._solve_normal(gap, longitudinal_curvature, loads, wear, warm, leading)
         return [
             complete(
                 self.theory,
                 semi_elliptic_strips(
                     self._grid,
-                    line_load[k],
-                    half_length[k],
+                    normal.line_load[place],
+                    normal.half_length[place],
                     longitudinal_curvature,
-                    approach[k],
-                    iterations,
+                    float(normal.approach[place]),
+                    int(normal.iterations[place[0]]),
                 ),
                 self._pair,
                 point,
             )
-            for k, point in enumerate(points)
+            for place, point in zip(np.ndindex(gap.shape[:2]), points, strict=True)
         ]
-
-    def _solve_normal(
-        self,
-        gap: FloatArray,
-        wear: tuple[FloatArray, IntArray, FloatArray],
-        loads: FloatArray,
-        longitudinal_curvature: float,
-        line_load: FloatArray,
-        approach: FloatArray,
-        half_length: FloatArray,
-    ) -> int:
-        """Solve normal contacts in place from what they start with; return the iterations."""
-        if not np.isfinite(gap).all():  # the kernel would leave such strips out of the contact
-            self._check(kernels.NOT_FINITE, gap, loads, line_load, approach)
-        own, members, shared = wear
-        medium = (
-            self._grid.spacing,
-            self._pair.contact_modulus,
-            longitudinal_curvature,
-            self._table,
-            self._bend,
-        )
-        found = (line_load, approach, half_length)
-
-        def solve() -> tuple[int, int]:
-            if not shared.any():
-                return kernels.solve_slender(gap, own, loads, *medium, *found)
-            from wearsim.mechanics.slender_coupled import (  # noqa: PLC0415  (rarely needed)
-                solve_coupled,
-            )
-
-            return solve_coupled(gap, own, members, shared, loads, *medium, *found)
-
-        started = bool(line_load.any())
-        status, iterations = solve()
-        if status != kernels.CONVERGED and started:
-            # a start from far away can mislead Newton; the foundation's guess is always near
-            line_load[:] = 0.0
-            status, iterations = solve()
-        self._check(status, gap, loads, line_load, approach)
-        return int(iterations)
 
     def solve_batch(
         self,
@@ -225,33 +176,65 @@ class Slender(ContactModel):
         columns = self._columns(points)
         if columns is None:
             return super().solve_batch(gap, longitudinal_curvature, points, wear_compliance, warm)
-        shape, strips = gap.shape[:-1], gap.shape[-1]
-        gaps = own_array(gap).reshape(-1, strips)
-        compliance = np.zeros_like(gaps)
+        alone = gap.reshape(-1, 1, gap.shape[-1])
+        own = np.zeros(alone.shape)
         if wear_compliance is not None:
-            compliance = own_array(wear_compliance).reshape(gaps.shape)
-        line_load, half_length = np.zeros(gaps.shape), np.zeros(gaps.shape)
-        approach = np.zeros(len(gaps))
-        if warm is not None:
-            line_load[:] = [solution.line_load for solution in warm]
-            approach[:] = [solution.approach for solution in warm]
-        iterations, loads = np.zeros(len(gaps), dtype=np.int64), own_array(columns.normal_force)
-        alone, nothing = np.full((1, 2), NO_BODY), np.zeros((1, 2, strips))
-        for k in range(len(gaps)):
-            one = slice(k, k + 1)
+            own[:] = wear_compliance.reshape(alone.shape)
+        return self._solve(alone, longitudinal_curvature, columns, own, warm, gap.shape[:-1])
+
+    def _solve(
+        self,
+        gap: FloatArray,
+        longitudinal_curvature: float,
+        points: OperatingPoints,
+        wear: SharedWear | FloatArray,
+        warm: Sequence[ContactSolution] | None,
+        leading: tuple[int, ...],
+    ) -> BatchSolution:
+        """Solve sets of contacts, (sets, contacts, strips), by strip theory.
+
+        What they wear is shared, or each contact's own compliance.
+        """
+        loads = points.normal_force
+        normal = self._solve_normal(gap, longitudinal_curvature, loads, wear, warm, leading)
+        return self._completed(normal, points, leading)
+
+    def _solve_normal(
+        self,
+        gap: FloatArray,
+        longitudinal_curvature: float,
+        loads: FloatArray,
+        wear: SharedWear | FloatArray,
+        warm: Sequence[ContactSolution] | None,
+        leading: tuple[int, ...],
+    ) -> NormalContacts:
+        """Solve the normal problem of sets of contacts; `leading` is for naming one that fails."""
+        medium = Medium(
+            self._grid.spacing,
+            self._pair.contact_modulus,
+            longitudinal_curvature,
+            self._table,
+            self._bend,
+        )
+        normal = NormalContacts.starting(gap, loads, warm)
+        if isinstance(wear, SharedWear):
+            normal.solve(wear, medium)
+        else:
+            normal.solve_apart(wear, medium)
+        for number in normal.failed.tolist():
             try:
-                iterations[k] = self._solve_normal(
-                    gaps[one],
-                    (compliance[one], alone, nothing),
-                    loads[one],
-                    longitudinal_curvature,
-                    line_load[one],
-                    approach[one],
-                    half_length[one],
+                self._check(
+                    int(normal.status[number]),
+                    normal.gap[number],
+                    normal.loads[number],
+                    normal.line_load[number],
+                    normal.approach[number],
                 )
             except ContactError as error:
-                raise naming_contact(error, k, shape) from error
-        return self._completed(line_load, half_length, approach, iterations, columns, shape)
+                if gap.shape[1] > 1:
+                    raise
+                raise naming_contact(error, number, leading) from error
+        return normal
 
     def _columns(self, points: Sequence[OperatingPoint]) -> OperatingPoints | None:
         """Return the points as columns where strip theory can take them all at once, or None."""
@@ -262,21 +245,16 @@ class Slender(ContactModel):
         return columns if plain else None
 
     def _completed(
-        self,
-        line_load: FloatArray,
-        half_length: FloatArray,
-        approach: FloatArray,
-        iterations: IntArray,
-        points: OperatingPoints,
-        leading: tuple[int, ...],
+        self, normal: NormalContacts, points: OperatingPoints, leading: tuple[int, ...]
     ) -> BatchSolution:
         """Return the solutions of normal contacts by strip theory, all in one call."""
-        y, shape = self._grid.y, line_load.shape
+        y, shape = self._grid.y, (len(points), self._grid.strips)
+        line_load, half_length = normal.line_load.reshape(shape), normal.half_length.reshape(shape)
         variation = points.variation
         if variation is None:
             variation = -points.spin[:, None] * y
         friction = points.friction if points.friction.ndim > 1 else points.friction[:, None]
-        dissipation, sums = np.empty(shape), np.empty((len(SUMS), len(approach)))
+        dissipation, sums = np.empty(shape), np.empty((len(SUMS), len(points)))
         strip_contacts(
             line_load,
             half_length,
@@ -301,9 +279,9 @@ class Slender(ContactModel):
             "half_length": half_length,
             "line_load": line_load,
             "dissipation": dissipation,
-            "approach": approach,
+            "approach": normal.approach.ravel(),
             "longitudinal_creepage": points.longitudinal,
-            "iterations": iterations,
+            "iterations": np.repeat(normal.iterations, normal.gap.shape[1]),
             **dict(zip(SUMS, sums, strict=True)),
         }
         shaped = {name: a.reshape(leading + a.shape[1:]) for name, a in columns.items()}

@@ -204,7 +204,7 @@ class ContactModel(ABC):
         points: Sequence[OperatingPoint],
         wear: SharedWear,
         warm: Sequence[ContactSolution] | None = None,
-    ) -> list[ContactSolution]:
+    ) -> Sequence[ContactSolution]:
         """Solve several contacts that wear bodies they share, by what they carry in the end.
 
         Parameters
@@ -222,7 +222,7 @@ class ContactModel(ABC):
 
         Returns
         -------
-        list of ContactSolution
+        sequence of ContactSolution
 
         Raises
         ------
@@ -239,6 +239,48 @@ class ContactModel(ABC):
             f"{type(self).__name__} solves one contact at a time, and rollers that differ share the"
             " cylinder's wear; use evolution.stepper = 'stabilised' or 'per-pass'"
         )
+
+    def solve_coupled_batch(
+        self,
+        gap: FloatArray,
+        longitudinal_curvature: float,
+        points: Sequence[OperatingPoint],
+        wear: SharedWear,
+        warm: Sequence[ContactSolution] | None = None,
+    ) -> Sequence[ContactSolution]:
+        """Solve many sets of contacts as `solve_coupled` does one; by default one after another.
+
+        Parameters
+        ----------
+        gap : ndarray, shape (sets, contacts, strips)
+            Gap of each contact [m].
+        longitudinal_curvature : float
+            Relative curvature along rolling [1/m].
+        points : sequence of OperatingPoint
+            One per contact, set by set.
+        wear : SharedWear
+            Its compliance has the axis of the sets first.
+        warm : sequence of ContactSolution, optional
+            Solutions nearby, in the order of `points`.
+
+        Returns
+        -------
+        sequence of ContactSolution
+            In the order of `points`.
+
+        Raises
+        ------
+        ContactError, CapabilityError
+            As `solve_coupled`, of the first set that fails.
+        """
+        found: list[ContactSolution] = []
+        for k, gaps in enumerate(gap):
+            own = slice(k * len(gaps), (k + 1) * len(gaps))
+            start = None if warm is None else warm[own]
+            found += self.solve_coupled(
+                gaps, longitudinal_curvature, points[own], wear.at(k), start
+            )
+        return found
 
     def solve_batch(
         self,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from itertools import product
 
 import numpy as np
 
@@ -29,7 +30,8 @@ class SharedWear:
         Number of the cylinder's station, and of the roller, that each contact touches; either
         column counts by itself.
     compliance : ndarray, shape (contacts, 2, strips)
-        Depth that a contact wears off either body per unit of its line load [m/(N/m)].
+        Depth that a contact wears off either body per unit of its line load [m/(N/m)]. One more
+        axis before these may count sets of contacts that share nothing with each other.
     """
 
     bodies: IntArray
@@ -41,10 +43,14 @@ class SharedWear:
         both = np.stack([compliance, np.zeros_like(compliance)])
         return cls(np.zeros((1, 2), dtype=np.int64), both[None])
 
+    def at(self, numbers: int | IntArray) -> SharedWear:
+        """Return the wear of one set of contacts, or of some."""
+        return SharedWear(self.bodies, self.compliance[numbers])
+
     @property
     def total(self) -> FloatArray:
         """Gap that a contact opens for itself per unit of its line load, (contacts, strips)."""
-        own: FloatArray = self.compliance.sum(axis=1)
+        own: FloatArray = self.compliance.sum(axis=-2)
         return own
 
     def opening(self, line_load: FloatArray) -> FloatArray:
@@ -52,12 +58,14 @@ class SharedWear:
         gap = np.zeros_like(line_load)
         for side in (0, 1):
             numbers = self.bodies[:, side]
-            depth = np.zeros((int(numbers.max()) + 1, line_load.shape[1]))
-            np.add.at(depth, numbers, self.compliance[:, side] * line_load)
-            gap += depth[numbers]
+            worn = self.compliance[..., side, :] * line_load
+            depth = np.zeros((*worn.shape[:-2], int(numbers.max()) + 1, worn.shape[-1]))
+            for contact, number in enumerate(numbers):
+                depth[..., number, :] += worn[..., contact, :]
+            gap += depth[..., numbers, :]
         return gap
 
-    @cached_property
+    @property
     def reduced(self) -> tuple[FloatArray, IntArray, FloatArray]:
         """The same wear with as few shared bodies as there need be.
 
@@ -71,24 +79,48 @@ class SharedWear:
             Number of each contact's shared bodies, counted over both columns, or -1.
         shared : ndarray, shape (contacts, 2, strips)
         """
-        if len(self.bodies) == 1:
-            return self.total, np.full((1, 2), NO_BODY), np.zeros_like(self.compliance)
-        shared = self.compliance.copy()
-        merged, members = _membership(self.bodies.tobytes(), len(self.bodies))
-        if merged:
-            shared[:, 0] += shared[:, 1]
-            shared[:, 1] = 0.0
-        idle = np.logical_not(shared.any(axis=(0, 2)))
-        members = np.where(idle, NO_BODY, members)
-        alone = (members == NO_BODY)[:, :, None]
-        own: FloatArray = np.where(alone, shared, 0.0).sum(axis=1)
-        shared[alone[:, :, 0]] = 0.0
-        return own, _counted(members) if idle[0] else members, shared
+        _, own, members, shared = self.groups[0]
+        return own[0], members, shared[0]
+
+    @cached_property
+    def groups(self) -> list[tuple[IntArray, FloatArray, IntArray, FloatArray]]:
+        """The wear of many as `reduced` has it, in groups of those in which the same bodies wear.
+
+        Returns
+        -------
+        list of tuple
+            Numbers of those that a group holds, and `own`, `members` and `shared` of `reduced`,
+            of which `own` and `shared` have a first axis more.
+        """
+        bodies, contacts = self.bodies.tobytes(), len(self.bodies)
+        wear = self.compliance.reshape(-1, *self.compliance.shape[-3:])
+        if contacts == 1:
+            alone = np.full((1, 2), NO_BODY)
+            return [(np.arange(len(wear)), wear.sum(axis=2), alone, np.zeros_like(wear))]
+        if _merged(bodies, contacts):
+            both = wear.sum(axis=2)
+            wear = np.stack([both, np.zeros_like(both)], axis=2)
+        idle = np.logical_not(wear.any(axis=(1, 3)))
+        groups = []
+        for kind in product((False, True), repeat=2):
+            numbers = np.flatnonzero((idle == kind).all(axis=1))
+            if numbers.size:
+                members = _membership(bodies, contacts, kind)
+                alone = (members == NO_BODY)[:, :, None]
+                own = np.where(alone, wear[numbers], 0.0).sum(axis=2)
+                groups.append((numbers, own, members, np.where(alone, 0.0, wear[numbers])))
+        return groups
 
 
 @lru_cache(maxsize=64)
-def _membership(bodies: bytes, contacts: int) -> tuple[bool, IntArray]:
-    """Return whether both sides are one, and which shared bodies each contact has.
+def _merged(bodies: bytes, contacts: int) -> bool:
+    """Tell whether a cylinder and a roller that the same contacts touch are one body."""
+    return _same_groups(np.frombuffer(bodies, dtype=np.int64).reshape(contacts, 2))
+
+
+@lru_cache(maxsize=64)
+def _membership(bodies: bytes, contacts: int, idle: tuple[bool, bool]) -> IntArray:
+    """Return which shared bodies each contact has.
 
     Parameters
     ----------
@@ -96,16 +128,17 @@ def _membership(bodies: bytes, contacts: int) -> tuple[bool, IntArray]:
         The array `bodies` of a `SharedWear`.
     contacts : int
         Its length.
+    idle : tuple of bool
+        Whether the bodies of either column do not wear.
     """
     members = np.frombuffer(bodies, dtype=np.int64).reshape(contacts, 2).copy()
-    merged = _same_groups(members)
-    if merged:
+    if _merged(bodies, contacts):
         members[:, 1] = NO_BODY
     for side in (0, 1):
         numbers, place, count = np.unique(members[:, side], return_inverse=True, return_counts=True)
         members[(count == 1)[place] | (numbers[place] == NO_BODY), side] = NO_BODY
     members[:, 1] += (members[:, 0].max() + 1) * (members[:, 1] != NO_BODY)
-    return merged, _counted(members)
+    return _counted(np.where(idle, NO_BODY, members))
 
 
 def _counted(members: IntArray) -> IntArray:

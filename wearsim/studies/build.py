@@ -143,7 +143,10 @@ def load_range(scenario: Scenario, load: Load, stop: float) -> tuple[float, floa
 
 
 def build_scene(
-    scenario: Scenario, grid: Grid | None = None, draws: Draws | None = None
+    scenario: Scenario,
+    grid: Grid | None = None,
+    draws: Draws | None = None,
+    model: ContactModel | None = None,
 ) -> tuple[Scene, Stepper, str]:
     """Return the scene of a run, its stepper and the stepper's name.
 
@@ -154,6 +157,8 @@ def build_scene(
         Strips of an earlier part of the run, in place of the scenario's choice.
     draws : Draws, optional
         Of the scenario's random inputs, where they are drawn already.
+    model : ContactModel, optional
+        From `prepared_model`, where it is there already; with a grid alone.
 
     Raises
     ------
@@ -165,17 +170,18 @@ def build_scene(
     require_run(scenario)
     draws = draws if draws is not None else draw(scenario)
     scenario = draws.scenario
-    load, model = scenario.load.build(), scenario.contact.build()
-    check_model(scenario, model)
+    load, chosen = scenario.load.build(), model or scenario.contact.build()
+    check_model(scenario, chosen)
     first, multiplicity = merged_rollers(draws)
-    name = chosen_stepper(scenario, model, 2 if draws.passes else len(first))
+    name = chosen_stepper(scenario, chosen, 2 if draws.passes else len(first))
     stepper = build_stepper(scenario, name)
     if scenario.evolution.nodes is not None and (stepper.pass_by_pass or not draws.passes):
         what = "has no meaning where no expectation over passes is taken"
         raise ScenarioError(scenario.file, [Problem("evolution", "nodes", what)])
     grid = grid if grid is not None else strips_of_run(draws)
-    model.prepare(grid, (scenario.cylinder.material, scenario.roller.material))
-    scene = bare_scene(scenario, model, load, grid, first, multiplicity, scenario.cylinder.profile)
+    if model is None:
+        chosen.prepare(grid, (scenario.cylinder.material, scenario.roller.material))
+    scene = bare_scene(scenario, chosen, load, grid, first, multiplicity, scenario.cylinder.profile)
     scene = with_draws(scene, draws, first)
     if draws.passes and stepper.pass_by_pass:
         nodes = with_nodes(scene, scenario, draws.passes, fewest_nodes(draws.passes))
@@ -183,6 +189,13 @@ def build_scene(
     elif draws.passes:
         scene = with_enough_nodes(scene, draws)
     return scene, stepper, name
+
+
+def prepared_model(scenario: Scenario, grid: Grid) -> ContactModel:
+    """Return the scenario's contact model, prepared for the strips."""
+    model = scenario.contact.build()
+    model.prepare(grid, (scenario.cylinder.material, scenario.roller.material))
+    return model
 
 
 def strips_of_run(draws: Draws) -> Grid:

@@ -16,6 +16,7 @@ from wearsim.results import EnsembleResult, Result
 from wearsim.types import FloatArray, IntArray
 
 QUANTILES = (0.05, 0.5, 0.95)
+_SAME_LENGTH = 1e-9  # what rounding leaves between the ends of tests of one length
 _ERRORS = {"depth": "depth_error", "worn_volume": "volume_error"}
 
 Comparable: TypeAlias = Result | EnsembleResult
@@ -32,7 +33,13 @@ class Compared:
     kind : str
         "run" or "ensemble".
     count : int
-        Realisations.
+        Realisations that are draws by themselves; of Saltelli's plan fewer than were run.
+    done, failed, asked : int
+        Realisations that ended well, that failed, and that were asked for at most.
+    finished : bool
+        Whether all that was asked for is done.
+    passes, time : float
+        Roller passes and simulated time at which it is compared [s].
     value : Interval
         Mean with its confidence interval; of a run its value with its stated error.
     std : Interval, optional
@@ -44,6 +51,8 @@ class Compared:
         None for the first.
     paired : Paired, optional
         The same, realisation by realisation, where both have the same random numbers.
+    apart : Interval, optional
+        Of two runs, how much more this one has than the first, with the stated errors of both.
     values : ndarray, shape (count,)
         Every realisation, rising.
     """
@@ -51,11 +60,18 @@ class Compared:
     label: str
     kind: str
     count: int
+    done: int
+    failed: int
+    asked: int
+    finished: bool
+    passes: float
+    time: float
     value: Interval
     std: Interval | None
     quantiles: tuple[tuple[float, Interval], ...]
     deeper: Interval | None
     paired: Paired | None
+    apart: Interval | None
     values: FloatArray
 
 
@@ -73,6 +89,12 @@ class Comparison:
 
     observable: str
     rows: list[Compared]
+
+    @property
+    def are_as_long(self) -> bool:
+        """Whether all tests are compared after as many passes and as long a time."""
+        ends = np.array([(row.passes, row.time) for row in self.rows])
+        return bool(np.allclose(ends, ends[0], rtol=_SAME_LENGTH, atol=0.0))
 
 
 def compare(
@@ -135,18 +157,41 @@ def _row(label: str, result: Comparable, observable: str, first: Comparable | No
     _, values = _values(result, observable)
     deeper = None if first is None else _deeper(result, first, observable)
     if isinstance(result, Result):
-        value = _of_run(result, observable)
-        return Compared(label, "run", 1, value, None, (), deeper, None, values)
+        return Compared(
+            label=label,
+            kind="run",
+            count=1,
+            done=1,
+            failed=0,
+            asked=1,
+            finished=result.finished,
+            passes=float(result.passes[-1]),
+            time=float(result.time[-1]),
+            value=_of_run(result, observable),
+            std=None,
+            quantiles=(),
+            deeper=deeper,
+            paired=None,
+            apart=_apart(result, first, observable) if isinstance(first, Result) else None,
+            values=values,
+        )
     found = result.estimate(observable, probabilities=QUANTILES)
     return Compared(
         label=label,
         kind="ensemble",
         count=len(values),
+        done=result.count,
+        failed=result.failed,
+        asked=result.asked,
+        finished=result.finished,
+        passes=float(result.record_passes[-1]),
+        time=float(result.record_time[-1]),
         value=found.mean,
         std=found.std,
         quantiles=found.quantiles,
         deeper=deeper,
         paired=_paired(result, first, observable),
+        apart=None,
         values=np.sort(values),
     )
 
@@ -157,17 +202,23 @@ def _deeper(result: Comparable, first: Comparable, observable: str) -> Interval:
     A run is one test, held against every realisation of an ensemble. Of two runs one has more for
     sure, or it is open where their stated errors overlap.
     """
+    if isinstance(result, Result) and isinstance(first, Result):
+        apart = _apart(result, first, observable)
+        if apart.low <= 0.0 <= apart.high:
+            return Interval(0.5, 0.0, 1.0)
+        certain = float(apart.value > 0.0)
+        return Interval(certain, certain, certain)
     values, others = _values(result, observable)[1], _values(first, observable)[1]
     if isinstance(result, EnsembleResult) and isinstance(first, EnsembleResult):
         return superiority(values, others)
-    if isinstance(result, EnsembleResult) or isinstance(first, EnsembleResult):
-        values, others = np.broadcast_arrays(values, others)
-        return paired(values, others).share
-    one, other = _of_run(result, observable), _of_run(first, observable)
-    if one.low <= other.high and other.low <= one.high:
-        return Interval(0.5, 0.0, 1.0)
-    certain = float(one.value > other.value)
-    return Interval(certain, certain, certain)
+    values, others = np.broadcast_arrays(values, others)
+    return paired(values, others).share
+
+
+def _apart(result: Result, first: Result, observable: str) -> Interval:
+    """Return how much more one run has than another, their stated errors added."""
+    mine, its = (_of_run(run, observable) for run in (result, first))
+    return Interval(mine.value - its.value, mine.low - its.high, mine.high - its.low)
 
 
 def _paired(result: EnsembleResult, first: Comparable | None, observable: str) -> Paired | None:

@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from wearsim.errors import StepError, WearsimError
-from wearsim.evolution.loop import evolve
-from wearsim.evolution.scene import Scene
-from wearsim.evolution.state import WearState, fresh_state
-from wearsim.evolution.stepper import Stepper
+from wearsim.errors import WearsimError
+from wearsim.plugins import ContactModel
 from wearsim.results import Outcome
 from wearsim.scenario import Scenario, parse_scenario
-from wearsim.studies.build import build_scene, strips_of_run
+from wearsim.studies.build import build_scene, prepared_model, strips_of_run
 from wearsim.studies.depth_control import closed_form_depths
 from wearsim.studies.draws import Drawer, Draws
 from wearsim.studies.ensemble_plan import BASE_PLANS, EnsemblePlan, passes_of, sources
-from wearsim.studies.recorder import due_states, history_row
-from wearsim.studies.schedule import RecordSchedule
+from wearsim.studies.member_group import observed
+from wearsim.studies.member_runs import Member, Observed, Row, grouped
 from wearsim.types import FloatArray, Grid
 
 
@@ -42,11 +39,13 @@ class Members:
     def __init__(self, scenario: Scenario, plan: EnsemblePlan, total: int, grid: Grid) -> None:
         self.text, self.file, self.files = scenario.text, scenario.file, dict(scenario.files)
         self.plan, self.total, self.grid = plan, total, grid
+        self._prepared: tuple[object, ContactModel] | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what is sent: not what was made of it here, which each process makes anew."""
         made = {"scenario", "drawer"}
-        return {name: value for name, value in self.__dict__.items() if name not in made}
+        kept = {name: value for name, value in self.__dict__.items() if name not in made}
+        return {**kept, "_prepared": None}
 
     @cached_property
     def scenario(self) -> Scenario:
@@ -70,43 +69,57 @@ class Members:
         list of Outcome
             In the same order.
         """
-        return [self._outcome(number) for number in numbers]
+        outcomes: dict[int, Outcome] = {}
+        members = []
+        for number in numbers:
+            drawn: dict[str, float | FloatArray] = {}
+            try:
+                members.append(self._member(number, drawn))
+            except Exception as error:  # it ends this realisation and no other
+                outcomes[number] = Outcome(number=number, drawn=drawn, error=told(error))
+        for group in grouped(members):
+            for member, found in zip(group, observed(group), strict=True):
+                outcomes[member.number] = self._outcome(member, found)
+        return [outcomes[number] for number in numbers]
 
-    def _outcome(self, number: int) -> Outcome:
-        drawn: dict[str, float | FloatArray] = {}
-        try:
-            groups = self.drawer.groups
-            taken = sources(self.plan, groups, number)
-            draws = self.drawer.draw(number, taken, passes_of(self.plan, groups, number))
-            drawn = {**draws.values, **draws.time_means}
-            return self._run(number, draws, drawn)
-        except WearsimError as error:
-            return Outcome(number=number, drawn=drawn, error=str(error) or type(error).__name__)
-        except Exception as error:
-            return Outcome(number=number, drawn=drawn, error=f"{type(error).__name__}: {error}")
-
-    def _run(self, number: int, draws: Draws, drawn: dict[str, float | FloatArray]) -> Outcome:
-        scenario, grid = draws.scenario, self.grid
+    def _member(self, number: int, drawn: dict[str, float | FloatArray]) -> Member:
+        """Draw a realisation, whose values are left in `drawn`, and make it ready to be run."""
+        groups = self.drawer.groups
+        taken = sources(self.plan, groups, number)
+        draws = self.drawer.draw(number, taken, passes_of(self.plan, groups, number))
+        drawn.update({**draws.values, **draws.time_means})
         own = strips_of_run(draws)
-        fits = covers(grid, own)
-        scene, stepper, _ = build_scene(scenario, grid if fits else own, draws)
-        rows, state = observed(scenario, scene, stepper)
-        _check_finite(rows)
-        worn = state.cylinder_depth[:, 0, 0].mean(axis=0)
-        if not fits:
-            worn = np.interp(grid.y, own.y, worn, left=0.0, right=0.0)
+        grid = self.grid if covers(self.grid, own) else own
+        model = self._model(draws.scenario, grid)
+        scene, stepper, _ = build_scene(draws.scenario, grid, draws, model)
+        return Member(number, drawn, draws, scene, stepper)
+
+    def _model(self, scenario: Scenario, grid: Grid) -> ContactModel:
+        """Return the contact model for the strips: one for all members that can share it."""
+        materials = scenario.cylinder.material, scenario.roller.material
+        key = scenario.contact, materials
+        if grid is not self.grid:
+            return prepared_model(scenario, grid)
+        if self._prepared is None or self._prepared[0] != key:
+            self._prepared = key, prepared_model(scenario, grid)
+        return self._prepared[1]
+
+    def _outcome(self, member: Member, found: Observed | Exception) -> Outcome:
+        number, drawn = member.number, dict(member.drawn)
+        if isinstance(found, Exception):
+            return Outcome(number=number, drawn=drawn, error=told(found))
+        spoilt = not_finite(found.rows)
+        if spoilt:
+            return Outcome(number=number, drawn=drawn, error=spoilt)
+        worn, grid = found.profile, member.scene.grid
+        if grid is not self.grid:
+            worn = np.interp(self.grid.y, grid.y, worn, left=0.0, right=0.0)
+        rows = found.rows
         return Outcome(
             number=number,
-            error="",
             drawn=drawn,
             observables={name: np.array([row[name] for row in rows]) for name in rows[0]},
-            scalars={
-                "depth_error": float(state.depth_error[0]),
-                "volume_error": float(state.volume_error[0]),
-                "steps": float(state.steps),
-                "solves": float(state.solves),
-                **self._control(draws),
-            },
+            scalars={**found.scalars, **self._control(member.draws)},
             profile=worn,
         )
 
@@ -118,13 +131,6 @@ class Members:
         return {"control": float(closed_form_depths(self.scenario, columns, 1)[0])}
 
 
-def _check_finite(rows: Sequence[Mapping[str, float]]) -> None:
-    for number, row in enumerate(rows):
-        for name, value in row.items():
-            if not math.isfinite(value):
-                raise StepError(f"{name} is not finite at record {number}", dict(row))
-
-
 def covers(grid: Grid, other: Grid) -> bool:
     """Tell whether strips reach as far as others on both sides."""
     ends = [np.array([g.y[0] - 0.5 * g.spacing, g.y[-1] + 0.5 * g.spacing]) for g in (grid, other)]
@@ -132,38 +138,16 @@ def covers(grid: Grid, other: Grid) -> bool:
     return bool(ends[0][0] <= ends[1][0] + slack and ends[0][1] >= ends[1][1] - slack)
 
 
-def observed(
-    scenario: Scenario, scene: Scene, stepper: Stepper
-) -> tuple[list[dict[str, float]], WearState]:
-    """Step through a test; return what is observed at every record, and the state at the end."""
-    stop, state = float(scenario.total_passes), fresh_state(scene)
-    schedule = RecordSchedule.of(scenario, stop)
-    threshold = scenario.outputs.width_threshold
-    rows = [_row(scene, stepper, state, threshold)]
-    for advance in evolve(
-        scene, state, stepper, stop, schedule.next_record, scenario.evolution.max_steps
-    ):
-        due = due_states(scene, stepper, schedule, advance, stop)
-        rows += [_row(scene, stepper, one, threshold) for one in due]
-        state = advance.end
-    return rows, state
+def told(error: Exception) -> str:
+    """Return what is told of an error; one that nobody foresaw with its kind."""
+    kind = type(error).__name__
+    return str(error) or kind if isinstance(error, WearsimError) else f"{kind}: {error}"
 
 
-def _row(scene: Scene, stepper: Stepper, state: WearState, threshold: float) -> dict[str, float]:
-    """Return the observables of a state, one number each."""
-    row: dict[str, Any] = history_row(scene, state, None, threshold, stepper.pass_by_pass)
-    count = scene.kinematics.multiplicity
-    power, time = float(row["power"][0]), float(row["time"])
-    energy = float(row["dissipated_energy"][0])
-    return {
-        "depth": float(row["depth"][0]),
-        "width": float(row["width"][0]),
-        "worn_volume": float(row["worn_volume"][0]),
-        "roller_depth": float(row["roller_depth"].max()),
-        "roller_worn_volume": float((row["roller_worn_volume"][:, 0] * count).sum()),
-        "dissipated_energy": energy,
-        "mean_power": energy / time if time > 0.0 else power,
-        "power": power,
-        "normal_force": float((row["normal_force"][:, 0] * count).sum() / count.sum()),
-        "peak_pressure": float(row["peak_pressure"].max()),
-    }
+def not_finite(rows: Sequence[Row]) -> str:
+    """Return what is said of a test that has come to a value which is not finite, or nothing."""
+    for number, row in enumerate(rows):
+        for name, value in row.items():
+            if not math.isfinite(value):
+                return f"{name} is not finite at record {number}"
+    return ""

@@ -33,9 +33,9 @@ def history_row(
     worn = state.cylinder_depth
     power = contact_values(scene, state.contacts, "power")
     row: Row = {
-        "passes": state.passes,
-        "time": scene.time(state.passes),
-        "step_passes": 0.0 if before is None else state.passes - before.passes,
+        "passes": state.now,
+        "time": scene.time(state.now),
+        "step_passes": 0.0 if before is None else state.now - before.now,
         "depth": cylinder_depth_of(state),
         "width": np.array(
             [width(scene.grid.y, worn[:, 0, v].max(axis=0), threshold) for v in realisations]
@@ -114,15 +114,13 @@ def due_states(
     stop : float
         Passes at the end of the test, which is recorded too.
     """
-    by_pass = stepper.pass_by_pass
     found = []
     for first, last in zip(advance.path[:-1], advance.path[1:], strict=True):
-        passes = schedule.due_after(first.passes, by_pass)
-        while passes < last.passes:
-            found.append(at_record(scene, stepper, first, passes))
-            passes = schedule.due_after(passes, by_pass)
-        if passes == last.passes or last.passes >= stop:
-            found.append(last)
+        between, at_end = schedule.due_between(
+            first.passes, last.passes, stop, stepper.pass_by_pass
+        )
+        found += [at_record(scene, stepper, first, passes) for passes in between]
+        found += [last] if at_end else []
     return found
 
 

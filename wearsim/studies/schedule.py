@@ -72,6 +72,27 @@ class RecordSchedule:
             found.append(min(self.due_after(found[-1], pass_by_pass), stop))
         return np.array(found)
 
+    def due_between(
+        self, first: float, last: float, stop: float, pass_by_pass: bool = False
+    ) -> tuple[list[float], bool]:
+        """Return what falls due between two states of a test, and whether the second itself does.
+
+        Parameters
+        ----------
+        first, last : float
+            Passes done at the two.
+        stop : float
+            Passes at the end of the test, which is recorded too.
+        pass_by_pass : bool
+            As in `all_records`.
+        """
+        found: list[float] = []
+        passes = self.due_after(first, pass_by_pass)
+        while passes < last:
+            found.append(passes)
+            passes = self.due_after(passes, pass_by_pass)
+        return found, passes == last or last >= stop
+
     def due_after(self, passes: float, pass_by_pass: bool) -> float:
         """Return the passes of the first record after `passes`; a pass by itself has no parts."""
         due = self.next_record(passes)

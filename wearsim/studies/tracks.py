@@ -101,7 +101,9 @@ def foreseen_half_width(scenario: Scenario, load: float, drawn: Drawn) -> float:
         line_loads = 0.75 * load / np.array([patch.b, max(half, patch.b)])
         per_load = wear_per_load(scenario, law, line_loads, friction * slip)
         depth = (0.75 * per_load * load * scenario.total_passes / np.sqrt(crown)) ** (2.0 / 3.0)
-        half = float(np.sqrt(crown * (depth + start)))
+        before, half = half, float(np.sqrt(crown * (depth + start)))
+        if half == before:
+            break
     return half
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -92,7 +92,7 @@ def coupled(bench: ContactBench) -> None:
     each = 0.25 * softening(bench)
     wear = SharedWear(np.array([[0, 0], [0, 1]]), np.array([[each, each], [each, 0.0 * each]]))
 
-    def ask() -> list[ContactSolution]:
+    def ask() -> Sequence[ContactSolution]:
         return bench.model.solve_coupled(gap, bench.case.curvature, points, wear)
 
     if refuses(bench, "coupled", ask):
