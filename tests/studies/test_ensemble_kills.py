@@ -2,39 +2,18 @@
 
 from __future__ import annotations
 
-import json
 import os
 import signal
-import subprocess
-import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
-
-HERE = Path(__file__).parent
-ROOT = HERE.parents[1]
-# one thread, since the process forks; and the same wearsim as here
-ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)}
+from killed_scripts import rows_of
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork and SIGKILL")
 
 
-def _killed(*arguments: object) -> list[dict[str, Any]]:
-    done = subprocess.run(
-        [sys.executable, str(HERE / "killed_ensemble.py"), *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        check=False,
-        env=os.environ | ENVIRONMENT,
-        cwd=ROOT,
-    )
-    assert done.returncode == 0, done.stderr
-    return [json.loads(line) for line in done.stdout.splitlines()]
-
-
 def test_that_a_kill_around_every_write_costs_nothing(tmp_path: Path) -> None:
-    rows = _killed("stages", tmp_path)
+    rows = rows_of("killed_ensemble.py", "stages", tmp_path)
     assert sum(row["stage"] == "before write" for row in rows) > 50
     for row in rows:
         assert row["killed"][0] == signal.SIGKILL
@@ -44,7 +23,7 @@ def test_that_a_kill_around_every_write_costs_nothing(tmp_path: Path) -> None:
 
 
 def test_that_a_kill_at_any_moment_costs_nothing(tmp_path: Path) -> None:
-    rows = _killed("moments", tmp_path, 10)
+    rows = rows_of("killed_ensemble.py", "moments", tmp_path, 10)
     assert len(rows) == 10
     for row in rows:
         assert row["unlike"] == []

@@ -144,8 +144,20 @@ def test_that_of_two_runs_one_is_deeper_or_it_is_open():
     assert abs(depths[0] - depths[1]) > 0.02 * depths[0]  # twice the tolerance
     row = compare(runs, ["a", "b"]).rows[1]
     assert row.deeper.value == float(depths[1] > depths[0])
+    errors = sum(float(run.depth_error[-1]) for run in runs)
+    assert row.apart.value == pytest.approx(depths[1] - depths[0])
+    assert row.apart.half_width == pytest.approx(errors)
     same = compare([runs[0], runs[0]], ["a", "b"]).rows[1].deeper
     assert (same.value, same.low, same.high) == (0.5, 0.0, 1.0)
+
+
+def test_that_a_comparison_knows_how_long_the_tests_are(swept):
+    run = wearsim.run(small(passes=2000))
+    assert compare(swept, ["low", "high"]).are_as_long
+    found = compare([swept[0], run], ["low", "run"])
+    assert not found.are_as_long
+    assert [row.passes for row in found.rows] == [3000.0, 2000.0]
+    assert found.rows[1].time == pytest.approx(2.0 / 3.0 * found.rows[0].time)
 
 
 def test_that_another_seed_is_not_paired(swept, tmp_path):

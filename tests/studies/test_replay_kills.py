@@ -2,45 +2,26 @@
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any
 
 import pytest
+from killed_scripts import ROOT, rows_of
 from study_examples import RIG, unlike
 
 import wearsim
 from wearsim.results import open_results, writer
 from wearsim.scenario import Scenario
 
-HERE = Path(__file__).parent
-ROOT = HERE.parents[1]
-# one thread, since the process forks; and the same wearsim as here
-ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)}
-
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork and SIGKILL")
 
 
-def _killed_runs(*arguments: object) -> list[dict[str, Any]]:
-    done = subprocess.run(
-        [sys.executable, str(HERE / "killed_run.py"), *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        check=False,
-        env=os.environ | ENVIRONMENT,
-        cwd=ROOT,
-    )
-    assert done.returncode == 0, done.stderr
-    return [json.loads(line) for line in done.stdout.splitlines()]
-
-
 def test_that_a_kill_around_every_write_flush_and_rename_costs_nothing(tmp_path: Path) -> None:
-    rows = _killed_runs("stages", tmp_path)
+    rows = rows_of("killed_run.py", "stages", tmp_path)
     stages = [row["stage"] for row in rows]
     # fresh bodies, two steps, and the end: four files, each written through all stages
     assert {stage.split(maxsplit=1)[1] for stage in stages} == set(writer.STAGES)
@@ -59,7 +40,7 @@ def test_that_a_kill_around_every_write_flush_and_rename_costs_nothing(tmp_path:
 
 
 def test_that_a_kill_at_any_moment_costs_nothing(tmp_path: Path) -> None:
-    rows = _killed_runs("moments", tmp_path, 20)
+    rows = rows_of("killed_run.py", "moments", tmp_path, 20)
     assert len(rows) == 20
     for row in rows:
         assert row["unlike"] == []

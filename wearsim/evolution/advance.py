@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from wearsim.errors import StepError
+from wearsim.evolution.each import one_of
 from wearsim.evolution.joining import scene_of, state_of
 from wearsim.evolution.observables import depth, worn_volume
-from wearsim.evolution.scene import Scene, one_of
+from wearsim.evolution.scene import Scene
 from wearsim.evolution.state import Contacts, WearState, as_batch, contact_values
 from wearsim.evolution.wearing import Wearing, exponents_between
 from wearsim.evolution.yielding import REALISATION, solve_yielding

@@ -10,8 +10,9 @@ import numpy as np
 
 from wearsim.evolution.advance import solve_present
 from wearsim.evolution.control import StepControl
+from wearsim.evolution.each import sum_in_order
 from wearsim.evolution.observables import worn_volume
-from wearsim.evolution.scene import Scene, sum_in_order
+from wearsim.evolution.scene import Scene
 from wearsim.evolution.state import WearState, contact_values
 from wearsim.evolution.wearing import Wearing
 from wearsim.types import FloatArray, Number

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import overload
 
 import numpy as np
 
+from wearsim.evolution.each import each_between, one_of, per_strip, sum_in_order
 from wearsim.evolution.inputs import ContactInputs, Redraw, Varying
+from wearsim.evolution.kinematics import Kinematics
 from wearsim.plugins import BODIES, Body, ContactModel, Load, LoadTerm, WearLaw
 from wearsim.types import (
     ContactSolution,
@@ -22,62 +24,6 @@ from wearsim.types import (
     OperatingPoints,
     rows_of,
 )
-
-
-@dataclass(frozen=True)
-class Kinematics:
-    """How the rollers run on the cylinder.
-
-    Parameters
-    ----------
-    cylinder_radius, roller_radius, crown_radius : float
-        Radii [m].
-    rolling_speed : float
-        Rolling velocity V [m/s].
-    multiplicity : ndarray of int, shape (rollers,)
-        Physical rollers behind each roller of the scene; alike ones are merged.
-    """
-
-    cylinder_radius: float
-    roller_radius: float
-    crown_radius: float
-    rolling_speed: float
-    multiplicity: FloatArray
-
-    @cached_property
-    def physical_rollers(self) -> float:
-        """Number of rollers on the cylinder."""
-        return float(self.multiplicity.sum())
-
-    @cached_property
-    def pass_rate(self) -> float:
-        """Roller passes per second, all rollers together."""
-        turns = self.rolling_speed / (2.0 * np.pi * self.cylinder_radius)
-        return self.physical_rollers * turns
-
-    @cached_property
-    def longitudinal_curvature(self) -> float:
-        """Relative curvature along rolling [1/m]."""
-        return 1.0 / self.cylinder_radius + 1.0 / self.roller_radius
-
-    @cached_property
-    def roller_share(self) -> float:
-        """Times a point of one roller is rolled over, per pass of all rollers."""
-        return self.cylinder_radius / self.roller_radius / self.physical_rollers
-
-
-class NoWear(WearLaw):
-    """The law of a scene in which nothing wears, such as a contact by itself."""
-
-    def depth_per_pass(
-        self, body: Body, solution: ContactSolution, rolling_speed: float
-    ) -> FloatArray:
-        """Return zeros, shape (strips,) [m]."""
-        return np.zeros_like(solution.dissipation)
-
-    def depth_per_dissipation(self, body: Body, rolling_speed: float) -> float:
-        """Return zero [m/(W/m)]."""
-        return 0.0
 
 
 @dataclass(frozen=True)
@@ -479,31 +425,3 @@ class Scene:
         share = self.cylinder_share[None, :, None] * self.kinematics.physical_rollers
         total: FloatArray = sum_in_order(power * share, axis=1).mean(axis=0)
         return total
-
-
-def one_of(numbers: Number) -> float:
-    """Return a number that is one for all realisations, or that of the first."""
-    return numbers if isinstance(numbers, float) else float(np.ravel(numbers)[0])
-
-
-def each_between(
-    values: Sequence[Callable[[float, float], float]], start: Number, stop: Number
-) -> FloatArray:
-    """Return values between two times [s], each between its own where these differ."""
-    count = len(values)
-    first, last = (np.broadcast_to(time, count).tolist() for time in (start, stop))
-    return np.array([value(a, b) for value, a, b in zip(values, first, last, strict=True)])
-
-
-def per_strip(number: Number) -> FloatArray:
-    """Return a number, or one per realisation, to go with arrays whose last axis is strips."""
-    return np.asarray(number)[..., None]
-
-
-def sum_in_order(values: FloatArray, axis: int) -> FloatArray:
-    """Return a sum that is the same to the bit however many realisations stand beside it.
-
-    The order in which numpy sums an axis depends on the lengths of the others.
-    """
-    total: FloatArray = np.take(np.add.accumulate(values, axis=axis), -1, axis=axis)
-    return total

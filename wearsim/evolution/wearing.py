@@ -6,7 +6,8 @@ from functools import cached_property
 
 import numpy as np
 
-from wearsim.evolution.scene import Scene, per_strip
+from wearsim.evolution.each import per_strip
+from wearsim.evolution.scene import Scene
 from wearsim.evolution.state import Contacts
 from wearsim.mechanics.wear_of_strips import learn_exponents, ratio_to_load
 from wearsim.plugins import SharedWear

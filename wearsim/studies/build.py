@@ -10,7 +10,8 @@ from wearsim.errors import Problem, ScenarioError
 from wearsim.evolution.advance import explicit_step
 from wearsim.evolution.errors_of_steps import coarse_start, whole_volume
 from wearsim.evolution.inputs import ContactInputs
-from wearsim.evolution.scene import Kinematics, NoWear, Scene
+from wearsim.evolution.kinematics import Kinematics, NoWear
+from wearsim.evolution.scene import Scene
 from wearsim.evolution.state import fresh_state
 from wearsim.evolution.stepper import Stepper
 from wearsim.plugins import ContactModel, Load

@@ -15,7 +15,7 @@ from wearsim.results import DissipationData, DissipationResult, check_output, wr
 from wearsim.results.content import Arrays
 from wearsim.results.dissipation_result import BAND, as_numbers, summaries
 from wearsim.scenario import Scenario
-from wearsim.studies.provenance import plugins_in_use, software
+from wearsim.studies.provenance import origin_of
 from wearsim.studies.realisations import Realisations
 from wearsim.studies.study_size import checked_count
 from wearsim.types import BatchSolution
@@ -169,15 +169,7 @@ class _Study:
     def _data(self) -> DissipationData:
         scenario, contacts, variables = self.scenario, self.contacts, self._variables()
         return DissipationData(
-            scenario_text=scenario.text,
-            scenario_file=scenario.file,
-            title=scenario.title,
-            sha256=scenario.sha256,
-            files=dict(scenario.files),
-            seed=scenario.seed,
-            software=dict(software()),
-            plugins=plugins_in_use(scenario),
-            model=scenario.contact.model,
+            **origin_of(scenario),
             plan=scenario.sampling.plan,
             inputs=[{"key": key, "unit": unit} for key, unit in contacts.draws.units.items()],
             asked=contacts.count,

@@ -15,7 +15,7 @@ from wearsim.studies.build import build_scene
 from wearsim.studies.depth_control import control_of
 from wearsim.studies.draws import Drawer, units_of
 from wearsim.studies.ensemble_plan import BASE_PLANS, EnsemblePlan
-from wearsim.studies.provenance import plugins_in_use, software
+from wearsim.studies.provenance import origin_of
 from wearsim.studies.schedule import RecordSchedule
 from wearsim.types import FloatArray, Grid
 
@@ -50,15 +50,7 @@ def header_of(
     # what cannot run is refused before anything is written
     _, _, stepper = build_scene(replace(scenario, random=averaged), grid)
     return EnsembleData(
-        scenario_text=scenario.text,
-        scenario_file=scenario.file,
-        title=scenario.title,
-        sha256=scenario.sha256,
-        files=dict(scenario.files),
-        seed=scenario.seed,
-        software=dict(software()),
-        plugins=plugins_in_use(scenario),
-        model=scenario.contact.model,
+        **origin_of(scenario),
         finished=False,
         wall_seconds=0.0,
         created=datetime.now(UTC).isoformat(timespec="seconds"),

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from wearsim.evolution.each import sum_in_order
 from wearsim.evolution.joining import alike
 from wearsim.evolution.loop import evolve
-from wearsim.evolution.scene import Scene, sum_in_order
+from wearsim.evolution.scene import Scene
 from wearsim.evolution.state import WearState, fresh_state
 from wearsim.evolution.stepper import Stepper
 from wearsim.evolution.together import can_go_together

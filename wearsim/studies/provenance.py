@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
+from typing import Any
 
 from wearsim.plugins import (
     ContactModelSpec,
@@ -55,6 +56,21 @@ def plugins_in_use(scenario: Scenario) -> list[dict[str, str]]:
             }
         )
     return rows
+
+
+def origin_of(scenario: Scenario) -> dict[str, Any]:
+    """Return what every file tells of where it comes from: the fields of `StudyData` about it."""
+    return {
+        "scenario_text": scenario.text,
+        "scenario_file": scenario.file,
+        "title": scenario.title,
+        "sha256": scenario.sha256,
+        "files": dict(scenario.files),
+        "seed": scenario.seed,
+        "software": dict(software()),
+        "plugins": plugins_in_use(scenario),
+        "model": scenario.contact.model,
+    }
 
 
 def missing_plugins(rows: list[dict[str, str]]) -> list[str]:

@@ -25,8 +25,7 @@ from wearsim.studies.events import Checkpointed, Event, Finished, Started, Stepp
 from wearsim.studies.provenance import (
     changed_origins,
     missing_plugins,
-    plugins_in_use,
-    software,
+    origin_of,
 )
 from wearsim.studies.recorder import Recorder
 from wearsim.studies.schedule import RecordSchedule
@@ -189,7 +188,7 @@ class _Replay:
         self.tell: Watcher = on_event or (lambda event: None)
         self.stop_requested = stop_requested or (lambda: False)
         self.stop = float(scenario.total_passes)
-        self.software, self.plugins = dict(software()), plugins_in_use(scenario)
+        self.origin = origin_of(scenario)
         self.drawn = drawn_values(scenario, draw(scenario))
         self.warnings: list[str] = []
         self.created = datetime.now(UTC).isoformat(timespec="seconds")
@@ -337,16 +336,8 @@ class _Replay:
         checkpoint["record_base"] = np.asarray(self.record_base)
         checkpoint["spacing"] = np.asarray(scene.grid.spacing)
         return RunData(
-            scenario_text=scenario.text,
-            scenario_file=scenario.file,
-            title=scenario.title,
-            sha256=scenario.sha256,
-            files=dict(scenario.files),
-            seed=scenario.seed,
-            software=self.software,
-            plugins=self.plugins,
+            **self.origin,
             drawn=self.drawn,
-            model=scenario.contact.model,
             stepper=self.stepper_name,
             tolerance=scenario.evolution.tolerance,
             width_threshold=scenario.outputs.width_threshold,

@@ -1,0 +1,67 @@
+"""How rollers run on a cylinder, and the law of a scene in which nothing wears."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from wearsim.plugins import Body, WearLaw
+from wearsim.types import ContactSolution, FloatArray
+
+
+@dataclass(frozen=True)
+class Kinematics:
+    """How the rollers run on the cylinder.
+
+    Parameters
+    ----------
+    cylinder_radius, roller_radius, crown_radius : float
+        Radii [m].
+    rolling_speed : float
+        Rolling velocity V [m/s].
+    multiplicity : ndarray of int, shape (rollers,)
+        Physical rollers behind each roller of the scene; alike ones are merged.
+    """
+
+    cylinder_radius: float
+    roller_radius: float
+    crown_radius: float
+    rolling_speed: float
+    multiplicity: FloatArray
+
+    @cached_property
+    def physical_rollers(self) -> float:
+        """Number of rollers on the cylinder."""
+        return float(self.multiplicity.sum())
+
+    @cached_property
+    def pass_rate(self) -> float:
+        """Roller passes per second, all rollers together."""
+        turns = self.rolling_speed / (2.0 * np.pi * self.cylinder_radius)
+        return self.physical_rollers * turns
+
+    @cached_property
+    def longitudinal_curvature(self) -> float:
+        """Relative curvature along rolling [1/m]."""
+        return 1.0 / self.cylinder_radius + 1.0 / self.roller_radius
+
+    @cached_property
+    def roller_share(self) -> float:
+        """Times a point of one roller is rolled over, per pass of all rollers."""
+        return self.cylinder_radius / self.roller_radius / self.physical_rollers
+
+
+class NoWear(WearLaw):
+    """The law of a scene in which nothing wears, such as a contact by itself."""
+
+    def depth_per_pass(
+        self, body: Body, solution: ContactSolution, rolling_speed: float
+    ) -> FloatArray:
+        """Return zeros, shape (strips,) [m]."""
+        return np.zeros_like(solution.dissipation)
+
+    def depth_per_dissipation(self, body: Body, rolling_speed: float) -> float:
+        """Return zero [m/(W/m)]."""
+        return 0.0
