@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
 from cli_examples import SCENARIOS, Command
 
-from tests.studies.ensemble_cases import small
+from tests.studies.ensemble_cases import frail, small
+from wearsim.errors import Interrupted
 from wearsim.results import open_ensemble, open_results
 from wearsim.scenario import load_scenario
 from wearsim.studies.compare import compare
@@ -25,6 +27,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     heavy = small(load__normal_force="400 N")
     ensemble(heavy, 30, path / "b.h5", scheduler="serial")
     run(small(), path / "r.h5")
+    run(small(passes=2000), path / "short.h5")
+    ensemble(frail(), 12, path / "f.h5", scheduler="serial")
+    with pytest.raises(Interrupted):
+        ensemble(small(), 12, path / "u.h5", scheduler="serial", stop_requested=lambda: True)
+    ensemble(small(), 1, path / "one.h5", scheduler="serial")
     paper = load_scenario(SCENARIOS / "paper-monte-carlo.toml", {"contact.mx": 4, "contact.my": 4})
     dissipation(paper, 5, path / "d.h5")
     (path / "other").mkdir()
@@ -97,6 +104,7 @@ def test_that_files_of_one_name_are_told_apart_by_their_folders(here: Command) -
         (["a.h5"], "there is one file, a.h5; name another"),
         (["a.h5", "a.h5"], "a.h5 is there twice"),
         (["a.h5", "d.h5"], "holds realisations of one contact"),
+        (["a.h5", "d.h5"], "runs and ensembles can be compared"),
         (["a.h5", "none.h5"], "there is no such file"),
         (["a.h5", "b.h5", "--observable", "dept"], "a has no 'dept', expected one of depth"),
         (["a.h5", "r.h5", "--observable", "mean_power"], "r has no 'mean_power'"),
@@ -110,3 +118,68 @@ def test_that_what_cannot_be_compared_is_bad_input(
     assert result.exit_code == 2
     assert words in " ".join(result.stderr.split())
     assert result.stdout == ""
+
+
+def test_that_tests_of_unlike_length_are_told(here: Command) -> None:
+    result = here("compare", "a.h5", "short.h5")
+    assert "warning: the tests are not of the same length (a: 3,000 passes" in result.stderr
+    rows = " ".join(result.stdout.split())
+    assert "ensemble of 30; 3,000 passes, 1.000 min; a.h5" in rows
+    assert "run; 2,000 passes" in rows
+    data = json.loads(here("compare", "a.h5", "short.h5", "--json").stdout)
+    assert not data["same_length"]
+    assert [item["passes"] for item in data["compared"]] == [3000.0, 2000.0]
+    assert data["compared"][0]["time_s"] == open_ensemble("a.h5").record_time[-1]
+    assert "length" not in here("compare", "a.h5", "r.h5").stderr
+
+
+def test_that_failed_and_unfinished_are_told(here: Command) -> None:
+    result = here("compare", "a.h5", "f.h5", "u.h5")
+    failing, part = open_ensemble("f.h5"), open_ensemble("u.h5")
+    assert 0 < failing.failed < 12
+    rows = " ".join(result.stdout.split())
+    assert f"ensemble of {failing.count} of 12, {failing.failed} failed;" in rows
+    assert f"ensemble of {part.count} of 12, unfinished;" in rows
+    assert f"warning: {failing.failed} of the 12 realisations of f failed" in result.stderr
+    assert "may be biased" in result.stderr
+    items = json.loads(here("compare", "a.h5", "f.h5", "u.h5", "--json").stdout)["compared"]
+    assert [item["failed"] for item in items] == [0, failing.failed, 0]
+    assert [item["asked"] for item in items] == [30, 12, 12]
+    assert [item["finished"] for item in items] == [True, True, False]
+    assert "biased" not in here("compare", "a.h5", "u.h5").stderr
+
+
+def test_that_ties_and_a_single_pair_are_told_as_such(here: Command) -> None:
+    same = here("compare", "a.h5", "other/../a.h5").stdout
+    assert "with the same draws the same in every test" in " ".join(same.split())
+    alike = " ".join(here("compare", "one.h5", "a.h5").stdout.split())
+    assert "with the same draws the same in the one pair of tests" in alike
+    apart = open_ensemble("b.h5").at_end("depth")[0] - open_ensemble("a.h5").at_end("depth")[0]
+    pair = " ".join(here("compare", "one.h5", "b.h5").stdout.split())
+    assert f"with the same draws deeper by {apart * 1e6:.4g} um in the one pair of tests" in pair
+    none = " ".join(here("compare", "a.h5", "b.h5", "--observable", "roller_depth").stdout.split())
+    assert "b more than a the same in every test" in none
+
+
+def test_that_of_two_runs_it_is_said_which_is_deeper_and_by_how_much(here: Command) -> None:
+    result = here("compare", "r.h5", "short.h5")
+    one, other = open_results("r.h5"), open_results("short.h5")
+    by = float(one.depth[-1] - other.depth[-1]) * 1e6
+    assert by > 1e6 * (one.depth_error[-1] + other.depth_error[-1])
+    rows = " ".join(result.stdout.split())
+    found = re.search(r"short against r shallower by ([\d.]+) um \(stated errors", rows)
+    assert found is not None
+    assert float(found[1]) == pytest.approx(by, rel=1e-3)
+    assert "pairs of tests" not in rows
+    item = json.loads(here("compare", "r.h5", "short.h5", "--json").stdout)["compared"][1]
+    assert item["difference_from_first"]["value"] * 1e6 == pytest.approx(-by)
+    assert item["difference_from_first"]["high"] < 0.0
+
+
+def test_that_of_two_runs_within_their_errors_it_is_open(here: Command) -> None:
+    run(small(evolution__tolerance=5e-3), Path("finer.h5"), force=True)
+    rows = " ".join(here("compare", "r.h5", "finer.h5").stdout.split())
+    assert "finer against r open: " in rows
+    assert "apart, within the stated errors" in rows
+    rows = " ".join(here("compare", "r.h5", "other/../r.h5").stdout.split())
+    assert "the same (stated errors" in rows

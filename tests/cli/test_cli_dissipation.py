@@ -140,7 +140,7 @@ def test_that_a_study_is_no_wear_test(command: Command, studied: Path) -> None:
     assert result.exit_code == 2
     assert result.stderr == (
         f"error: {studied}: holds realisations of one contact, from `wearsim dissipation`; what is"
-        " needed is a wear test, from `wearsim run`\n"
+        " needed is a wear test, from `wearsim run`. In Python, wearsim.open_dissipation opens it\n"
     )
 
 

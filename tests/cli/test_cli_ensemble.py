@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import signal
 import subprocess
 import sys
@@ -24,7 +25,8 @@ from wearsim.cli.progress import Clock
 from wearsim.errors import Interrupted, ResultsFileError
 from wearsim.randomness.intervals import UNKNOWN, Interval
 from wearsim.randomness.targets import Target
-from wearsim.results import open_ensemble
+from wearsim.results import EnsembleResult, open_ensemble
+from wearsim.studies.checkpoints import checkpoints
 from wearsim.studies.ensemble import ensemble
 from wearsim.studies.ensemble_events import EnsembleProgress
 
@@ -166,7 +168,7 @@ def test_that_a_target_ends_it_and_a_control_variate_saves(command: Command, tes
     assert found.count < 200
     assert f"reached: {found.count} realisations tell it within" in result.stdout
     assert "not reached" not in result.stdout
-    assert "of the variance, as good as" in result.stdout
+    assert "of depth's variance, as good as" in result.stdout
 
 
 def test_that_a_target_that_is_missed_is_told(command: Command, tests: Path) -> None:
@@ -190,10 +192,12 @@ def test_that_failed_realisations_are_told_and_can_be_run_again(
         f"warning: {found.failed} of 30 realisations failed, the first of them number {first}: "
         f"{found.errors[first]}"
     ) in result.stderr
+    assert "the same draws fail again unless the scenario or the software" in result.stderr
     assert "wearsim resume f.h5 --failed" in result.stderr
     assert f"{found.count} done, {found.failed} failed, of 30" in result.stdout
     again = command("resume", "f.h5", "--failed", "--scheduler", "serial", "--workers", 1, "-q")
     assert again.exit_code == 0
+    assert "this process, one realisation after the other" in again.stdout
     assert f"warning: {found.failed} of 30 realisations failed" in again.stderr
 
 
@@ -227,7 +231,7 @@ def test_that_figure_results_and_inputs_have_a_file_each(command: Command, tests
 def test_that_a_sweep_has_a_file_for_each_value_and_compares_them(
     command: Command, tests: Path
 ) -> None:
-    swept = ("--sweep", "load.normal_force=250N,350 N", "-o", "s.h5", "--figure", "s.png")
+    swept = ("--sweep", "load.normal_force=250N,350 N", "-o", "s.h5", "--figure", "s.svg")
     result = command("ensemble", tests, "-n", 12, *swept, *HERE)
     assert result.exit_code == 0, result.output
     light, heavy = (open_ensemble(f"s-{value}.h5") for value in ("250N", "350N"))
@@ -237,7 +241,8 @@ def test_that_a_sweep_has_a_file_for_each_value_and_compares_them(
     assert "compared depth at the end, for values of load.normal_force" in rows
     assert "350 N deeper than 250 N" in rows
     assert "with the same draws in 100.0 %" in rows
-    assert Path("s.png").read_bytes().startswith(b"\x89PNG")
+    figure = Path("s.svg").read_text()
+    assert f"{light.title}, for values of load.normal_force" in figure
     again = command("ensemble", tests, "-n", 12, *swept, *HERE)
     assert again.exit_code == 2
 
@@ -388,6 +393,30 @@ def test_that_progress_lines_are_a_second_apart() -> None:
     assert watch.workers == "2 processes"
 
 
+@pytest.mark.parametrize(
+    ("room", "line"),
+    [
+        (53, "1,200 of 5,000, 3 failed, 12.3/s, 5 min 8 s left"),
+        (30, "1,200 of 5,000, 3 failed"),
+        (5, "1,200 of 5,000"),
+        (76, "1,200 of 5,000, 3 failed, 5 min 8 s left, depth.mean 21.50 um [21.00, 22.00]"),
+    ],
+)
+def test_that_a_narrow_line_drops_whole_parts(room: int, line: str) -> None:
+    assert told(PROGRESS, "", room) == line
+
+
+def test_that_a_line_of_60_columns_is_not_cut(monkeypatch: pytest.MonkeyPatch) -> None:
+    screen = io.StringIO()
+    terminal = Console(file=screen, force_terminal=True, width=60, markup=False, highlight=False)
+    monkeypatch.setattr(ensemble_progress, "console", lambda **_: terminal)
+    with watching_ensemble(quiet=False) as watch:
+        watch(PROGRESS)
+    assert "12.3/s, 5 min 8 s left" in screen.getvalue()
+    assert "\u2026" not in screen.getvalue()
+    assert "um" not in screen.getvalue()
+
+
 def test_that_a_terminal_gets_a_live_line(monkeypatch: pytest.MonkeyPatch) -> None:
     screen = io.StringIO()
     terminal = Console(file=screen, force_terminal=True, width=140, markup=False, highlight=False)
@@ -447,3 +476,76 @@ def test_that_resume_of_a_run_names_what_goes_on_with_an_ensemble(done: Path) ->
     with pytest.raises(ResultsFileError, match="with which resume_ensemble goes on"):
         wearsim.resume(done)
     assert wearsim.resume_ensemble(done).count == wearsim.open_ensemble(done).count == 40
+
+
+@pytest.mark.parametrize(
+    ("found", "told_as"),
+    [
+        (made_up(20, until="depth.q95 50%"), "not reached: too few realisations to tell"),
+        (
+            made_up(20, until="roller_depth.mean 5%"),
+            "not reached: it is the same in all 20 realisations, and so few may agree by luck",
+        ),
+        (
+            made_up(40, until="roller_depth.mean 5%"),
+            "reached: it is the same in all 40 realisations",
+        ),
+        (made_up(20, until="depth.mean 90%"), "%, and so few may agree by luck"),
+    ],
+)
+def test_that_a_target_says_what_is_known_of_it(
+    capsys: pytest.CaptureFixture[str], found: EnsembleResult, told_as: str
+) -> None:
+    write_ensemble(found, [])
+    said = " ".join(capsys.readouterr().out.split())
+    assert f"{told_as} drawn" in said
+    assert "within -" not in said
+
+
+def test_that_too_few_says_how_many_suffice(capsys: pytest.CaptureFixture[str]) -> None:
+    write_ensemble(made_up(10), [])
+    told_number = re.search(r"too few realisations to tell, (\d+) suffice", capsys.readouterr().out)
+    assert told_number is not None
+    enough = int(told_number[1])
+    assert all(np.isfinite(item.first.value) for item in made_up(enough).sensitivity())
+    fewer = made_up(enough - 1)
+    (unknown,) = [item for item in fewer.sensitivity() if not np.isfinite(item.first.value)]
+    write_ensemble(fewer, [])
+    said = " ".join(capsys.readouterr().out.split())
+    assert f"{unknown.name} too few realisations to tell, {enough} suffice" in said
+
+
+def test_that_saltellis_too_few_counts_whole_rows(capsys: pytest.CaptureFixture[str]) -> None:
+    write_ensemble(made_up(5 * 3, "saltelli"), [])
+    told_number = re.search(r"too few realisations to tell, (\d+) suffice", capsys.readouterr().out)
+    assert told_number is not None
+    enough = int(told_number[1])
+    assert enough % 5 == 0
+    for count, is_known in ((enough, True), (enough - 5, False)):
+        effects = made_up(count, "saltelli").sensitivity()
+        assert all(np.isfinite(item.first.value) == is_known for item in effects)
+
+
+def test_that_a_resume_that_has_nothing_to_do_says_so(command: Command, done: Path) -> None:
+    finished = command("resume", done, "-q")
+    assert finished.stderr.startswith("note: nothing to do: the ensemble is finished")
+    none = command("resume", done, "--failed", "-q")
+    assert none.stderr.startswith("note: nothing to do: no realisation has failed")
+
+
+def test_that_until_says_when_it_first_looks(command: Command) -> None:
+    said = " ".join(command("ensemble", "--help").stdout.split())
+    first = checkpoints("monte-carlo", 1000)[0]
+    assert f"first looked at after {first} realisations" in said
+
+
+def test_that_a_file_is_no_folder_to_export_to(command: Command, done: Path) -> None:
+    Path("a.png").write_text("mine")
+    result = command("export", done, "-o", "a.png")
+    assert result.exit_code == 2
+    assert "a.png: is a file; tables go into a folder" in result.stderr
+
+
+def test_that_an_ensemble_opened_as_a_run_names_what_opens_it(done: Path) -> None:
+    with pytest.raises(ResultsFileError, match=r"In Python, wearsim\.open_ensemble opens it"):
+        wearsim.open_results(done)

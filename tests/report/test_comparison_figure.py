@@ -56,7 +56,25 @@ def test_that_ranges_are_drawn_with_means_and_intervals(comparison):
         assert any(len(x) == len(wanted) and np.allclose(x, wanted) for x in lines)
     labels = [label.get_text().splitlines() for label in axes.get_yticklabels()]
     assert [label[0] for label in labels] == ["light", "heavy", "one"]
-    assert labels[1][2] == f"in {part_with_interval(comparison.rows[1].deeper)}"
+    share = part_with_interval(comparison.rows[1].deeper)
+    assert labels[1][2] == f"in {share} of pairs of tests"
+
+
+def test_that_few_realisations_have_no_range_and_say_how_many_failed():
+    rows = [made_up(12, failed=[1, 2]), made_up(12)]
+    left, right = comparison_figure(compare(rows, ["few", "more"])).axes
+    assert "few (10 of 12, 2 failed)" in [line.get_label() for line in left.get_lines()]
+    assert "5 to 95 %" not in right.get_title(loc="left")
+
+
+def test_that_of_runs_it_is_drawn_which_is_deeper(comparison):
+    one = comparison.rows[2]
+    other = replay.run(short())
+    axes = comparison_figure(compare([other, other], ["a", "b"])).axes[1]
+    assert axes.get_title(loc="left") == "Value with its stated error"
+    (_, told) = axes.get_yticklabels()[1].get_text().split("\n", 1)
+    assert told.startswith("the same (stated errors")
+    assert one.apart is None  # of a run against an ensemble
 
 
 def test_that_many_realisations_are_drawn_at_fewer_points_of_one_function():

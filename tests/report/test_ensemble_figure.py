@@ -162,3 +162,24 @@ def test_that_one_value_has_no_density_and_nothing_that_moves_it():
     low, high = settled.get_ylim()
     assert low < 0.0
     assert high == pytest.approx(40.0)
+
+
+@pytest.mark.parametrize("number", [2, 19, 20, 71, 72])
+def test_that_figure_and_table_know_the_same_of_bands(number):
+    result = made_up(number)
+    figure = ensemble_figure(result)
+    ends = [result.estimate("depth", -1, (p,)).quantile(p) for p in (0.05, 0.95)]
+    is_known = all(np.isfinite(end.half_width) for end in ends)
+    assert ("90 % within" in figure.get_suptitle()) == is_known
+    course = panel(figure, "Depth of the groove")
+    assert bool(course.collections) == (number >= 20)  # one realisation beyond each end
+    marked = [line.get_label() for line in panel(figure, "Final depth").get_lines()]
+    assert ("5 and 95 %" in marked) == (number >= 20)
+
+
+def test_that_the_profile_of_a_few_has_the_outermost_of_them():
+    result = made_up(5)
+    axes = panel(ensemble_figure(result), "Worn profile")
+    heights = axes.collections[0].get_paths()[0].vertices[:, 1]
+    assert heights.min() == pytest.approx(-result.profiles.max() * 1e6)
+    assert axes.collections[0].get_label() == "least to greatest"

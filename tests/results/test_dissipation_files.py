@@ -122,7 +122,7 @@ def test_that_the_wrong_kind_of_file_is_told_in_a_line(study_file, tmp_path):
         open_results(study_file)
     assert str(caught.value) == (
         f"{study_file}: holds realisations of one contact, from `wearsim dissipation`; what is"
-        " needed is a wear test, from `wearsim run`"
+        " needed is a wear test, from `wearsim run`. In Python, wearsim.open_dissipation opens it"
     )
     with pytest.raises(ResultsFileError, match="holds a wear test, from `wearsim run`; what is"):
         open_dissipation(run_file)

@@ -60,7 +60,14 @@ def _opened(file: Path) -> Result | EnsembleResult:
     from wearsim.errors import ResultsFileError
     from wearsim.results import kind_of, open_ensemble, open_results
 
-    if kind_of(file) != "ensemble":
+    kind = kind_of(file)
+    if kind == "dissipation":
+        from wearsim.results.dissipation_layout import DISSIPATION
+
+        raise ResultsFileError(
+            f"{file}: holds {DISSIPATION.holds}; runs and ensembles can be compared"
+        )
+    if kind == "replay":
         return open_results(file)
     result = open_ensemble(file)
     if result.count == 0:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from wearsim.cli.ensemble_table import INTERVAL, TO_TELL
+from wearsim.cli.ensemble_table import INTERVAL
 from wearsim.cli.output import note, write_json, write_list, write_table
-from wearsim.report.intervals import cells, part_with_interval, with_interval
+from wearsim.report.comparison_words import against, kind, length
+from wearsim.report.intervals import cells
 from wearsim.report.observables import OBSERVABLES, si_key
 from wearsim.report.units import NOTHING, count
 
@@ -48,14 +48,40 @@ def report_comparison(
 
     found = compare(results, labels, observable)
     if figure is not None:
-        _draw(found, title, figure)
+        _draw(found, _heading(results, title), figure)
     if json:
         files = [str(result.path) for result in results]
         write_json({**as_json(found, files), "title": title or None, "figure": figure})
-        return
-    _write(found, results, title)
-    if figure is not None:
-        note(f"figure: {figure}")
+    else:
+        _write(found, results, title)
+        if figure is not None:
+            note(f"figure: {figure}")
+    for text in _doubts(found):
+        note(f"warning: {text}")
+
+
+def _heading(results: Sequence[Result | EnsembleResult], title: str) -> str:
+    """Return what stands above the figure: the tests' title where they share one, and the key."""
+    titles = {result.title for result in results}
+    shared = titles.pop() if len(titles) == 1 else ""
+    return ", ".join([shared] * bool(shared) + [f"for values of {title}"] * bool(title))
+
+
+def _doubts(found: Comparison) -> list[str]:
+    """Return why what is compared may not be alike."""
+    texts = []
+    if not found.are_as_long:
+        ends = "; ".join(f"{row.label}: {length(row)}" for row in found.rows)
+        texts.append(
+            f"the tests are not of the same length ({ends}): what differs at their ends is that too"
+        )
+    texts += [
+        f"{count(row.failed)} of the {count(row.done + row.failed)} realisations of {row.label}"
+        " failed: what is told of it is of those that ended well, which may be biased"
+        for row in found.rows
+        if row.failed
+    ]
+    return texts
 
 
 def _draw(found: Comparison, title: str, path: Path) -> None:
@@ -74,16 +100,11 @@ def _write(found: Comparison, results: Sequence[Result | EnsembleResult], title:
     probabilities = [p for p, _ in next((row.quantiles for row in found.rows if row.quantiles), ())]
     heads = ["[" + named.unit + "]", "mean", "std", *(f"{100 * p:g} %" for p in probabilities)]
     write_list(heads, [line for row in found.rows for line in _lines(row, named.unit, len(heads))])
-    first = found.rows[0].label
-    rows = []
-    for row in found.rows[1:]:
-        rows += _against(row, first, named.unit, found.observable)
-    write_table("", rows)
+    write_table("", [line for row in found.rows[1:] for line in against(found, row)])
 
 
 def _told(row: Compared, file: str) -> str:
-    kind = "run" if row.kind == "run" else f"ensemble of {count(row.count)}"
-    return f"{kind}, {file}"
+    return f"{kind(row)}; {length(row)}; {file}"
 
 
 def _lines(row: Compared, unit: str, columns: int) -> list[list[str]]:
@@ -101,31 +122,23 @@ def _lines(row: Compared, unit: str, columns: int) -> list[list[str]]:
     ]
 
 
-def _against(row: Compared, first: str, unit: str, observable: str) -> list[tuple[str, str]]:
-    """Return how one compares with the first."""
-    word = "deeper" if observable == "depth" else "more"
-    rows = []
-    if row.deeper is not None:
-        known = math.isfinite(row.deeper.value)
-        told = f"in {part_with_interval(row.deeper)} of pairs of tests" if known else TO_TELL
-        rows.append((f"{row.label} {word} than {first}", told))
-    if row.paired is not None:
-        share = part_with_interval(row.paired.share)
-        apart = with_interval(row.paired.difference, unit)
-        rows.append(("  with the same draws", f"in {share}, by {apart} on average"))
-    return rows
-
-
 def as_json(found: Comparison, files: Sequence[str]) -> dict[str, Any]:
     """Return a comparison in SI, the first being what the others are held against."""
     return {
         "observable": si_key(found.observable),
+        "same_length": found.are_as_long,
         "compared": [
             {
                 "label": row.label,
                 "file": file,
                 "kind": row.kind,
                 "realisations": row.count,
+                "done": row.done,
+                "failed": row.failed,
+                "asked": row.asked,
+                "finished": row.finished,
+                "passes": row.passes,
+                "time_s": row.time,
                 "value": asdict(row.value),
                 "std": asdict(row.std) if row.std is not None else None,
                 "quantiles": [{"probability": p, **asdict(found)} for p, found in row.quantiles],
@@ -136,6 +149,7 @@ def as_json(found: Comparison, files: Sequence[str]) -> dict[str, Any]:
                 }
                 if row.paired is not None
                 else None,
+                "difference_from_first": asdict(row.apart) if row.apart else None,
             }
             for row, file in zip(found.rows, files, strict=True)
         ],

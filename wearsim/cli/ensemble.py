@@ -46,7 +46,7 @@ Until = Annotated[
     typer.Option(
         metavar="TARGET",
         help="Stop as soon as this is known well enough, 'depth.mean 1%': half of its 95 %"
-        " interval, in parts of it.",
+        " interval, in parts of it. It is first looked at after 64 realisations.",
         show_default=False,
     ),
 ]
@@ -67,6 +67,7 @@ Sweep = Annotated[
         show_default=False,
     ),
 ]
+_ALONE = "this process, one realisation after the other"
 STOPPING = "stopping after the realisations that run now; once more to stop at once"
 
 
@@ -140,7 +141,7 @@ def _run(
         )
     if figure is not None:
         draw(result, figure)
-    report(result, json, figure, watch.workers)
+    report(result, json, figure, in_words(watch.workers))
 
 
 def _plan(name: str | None) -> str | None:
@@ -257,8 +258,17 @@ def tell_failures(result: EnsembleResult) -> None:
     note(
         f"warning: {count(result.failed)} of {count(result.count + result.failed)} realisations"
         f" failed, the first of them number {first}: {text}\n"
-        f"run them again with: wearsim resume {result.path} --failed"
+        "the same draws fail again unless the scenario or the software changes; after a lack of"
+        " memory, a killed worker or an updated plugin run them again with:"
+        f" wearsim resume {result.path} --failed"
     )
+
+
+def in_words(workers: str) -> str:
+    """Return who did the work; where one worker does, it is this process whatever was asked for."""
+    from wearsim.studies.executors import InProcess
+
+    return _ALONE if workers == InProcess.describe else workers
 
 
 def _refuse_nothing(result: EnsembleResult) -> None:

@@ -17,6 +17,10 @@ if TYPE_CHECKING:
     from wearsim.randomness.intervals import Interval
     from wearsim.studies.ensemble_events import EnsembleProgress
 
+_BY_NEED = (0, 1, 3, 4, 2)  # parts of a line: how many, failed, time left, estimate, rate
+_PERCENT = len("100 %  ")
+_BAR = 16
+
 
 class EnsembleWatcher(Protocol):
     """What is told how far an ensemble is."""
@@ -47,12 +51,12 @@ def watching_ensemble(quiet: bool) -> Iterator[EnsembleWatcher]:
     from rich.progress import BarColumn, Progress, TextColumn
 
     text = TextColumn("{task.percentage:3.0f} %  {task.fields[told]}", markup=False)
-    bar = [BarColumn(16)] if screen.width >= ROOM_FOR_BAR else []
+    bar = [BarColumn(_BAR)] if screen.width >= ROOM_FOR_BAR else []
     with Progress(*bar, text, console=screen) as progress:
-        yield LiveEnsemble(progress)
+        yield LiveEnsemble(progress, _PERCENT + (_BAR + 1 if bar else 0))
 
 
-def told(progress: EnsembleProgress, what: str = " realisations") -> str:
+def told(progress: EnsembleProgress, what: str = " realisations", room: float = math.inf) -> str:
     """Return how far an ensemble is, in a line.
 
     Parameters
@@ -60,16 +64,24 @@ def told(progress: EnsembleProgress, what: str = " realisations") -> str:
     progress : EnsembleProgress
     what : str
         What is counted; a narrow line has no room for it.
+    room : float
+        Columns there are; parts for which there is no room are left out, the last needed first.
     """
-    parts = [f"{count(progress.done)} of {count(progress.asked)}{what}"]
-    if progress.failed:
-        parts.append(f"{count(progress.failed)} failed")
-    parts.append(_rate(progress.rate))
-    if progress.done + progress.failed < progress.asked:
-        parts.append(f"{lapse(progress.left)} left")
-    if progress.estimate is not None and math.isfinite(progress.estimate.value):
-        parts.append(_with_estimate(progress.what, progress.estimate))
-    return ", ".join(parts)
+    left = progress.done + progress.failed < progress.asked
+    estimated = progress.estimate is not None and math.isfinite(progress.estimate.value)
+    parts = [
+        f"{count(progress.done)} of {count(progress.asked)}{what}",
+        f"{count(progress.failed)} failed" if progress.failed else "",
+        _rate(progress.rate),
+        f"{lapse(progress.left)} left" if left else "",
+        _with_estimate(progress.what, progress.estimate) if estimated else "",
+    ]
+    chosen: list[int] = []
+    for number in _BY_NEED:
+        with_it = sorted([*chosen, number]) if parts[number] else chosen
+        if not chosen or len(", ".join(parts[k] for k in with_it)) <= room:
+            chosen = with_it
+    return ", ".join(parts[k] for k in chosen)
 
 
 def _rate(rate: float) -> str:
@@ -126,12 +138,14 @@ class LiveEnsemble:
     ----------
     progress : rich.progress.Progress
         Draws the line.
+    taken : int
+        Columns of the line that are taken by other things.
     """
 
     workers = ""
 
-    def __init__(self, progress: Progress) -> None:
-        self._progress = progress
+    def __init__(self, progress: Progress, taken: int = 0) -> None:
+        self._progress, self._taken = progress, taken
         self._task = progress.add_task("", total=1.0, told="starting")
 
     def __call__(self, progress: EnsembleProgress) -> None:
@@ -141,5 +155,5 @@ class LiveEnsemble:
             self._task,
             total=progress.asked,
             completed=progress.done + progress.failed,
-            told=told(progress, what=""),
+            told=told(progress, "", self._progress.console.width - self._taken),
         )

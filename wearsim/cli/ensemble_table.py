@@ -10,6 +10,7 @@ from wearsim.cli.drawn import CONSTANT, drawn_data, drawn_rows
 from wearsim.cli.output import write_list, write_table
 from wearsim.cli.summary import Rows, still_random
 from wearsim.randomness.targets import Target
+from wearsim.report.enough import TO_TELL, too_few
 from wearsim.report.intervals import cells, part_with_interval
 from wearsim.report.observables import OBSERVABLES, si_key
 from wearsim.report.units import NOTHING, count, lapse, shown
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
 
 QUANTILES = (0.05, 0.5, 0.95)
 _HEADS = ("at the end", "mean", "std", "5 %", "median", "95 %")
-TO_TELL = "too few realisations to tell"
 INTERVAL = "  95 % interval"
 
 
@@ -86,13 +86,14 @@ def _write_effects(result: EnsembleResult) -> None:
     effects = [] if result.count == 1 or constant else result.sensitivity("depth")
     print_gap()
     if not any(math.isfinite(item.first.value) for item in effects):
-        nothing = "nothing, it is the same in all" if result.count > 1 and constant else TO_TELL
-        write_list([f"{head}: {nothing}"], [])
+        same = result.count > 1 and constant
+        told = "nothing, it is the same in all" if same else too_few(result)
+        write_list([f"{head}: {told}"], [])
         return
     totals = any(item.total is not None for item in effects)
     order = sorted(effects, key=lambda item: item.without_effect)
     heads = [head, "by itself", *(["with all others"] if totals else [])]
-    write_list(heads, [_effect(item, totals) for item in order])
+    write_list(heads, [_effect(result, item, totals) for item in order])
 
 
 def print_gap() -> None:
@@ -102,10 +103,10 @@ def print_gap() -> None:
     typer.echo("")
 
 
-def _effect(item: Effect, totals: bool) -> list[str]:
+def _effect(result: EnsembleResult, item: Effect, totals: bool) -> list[str]:
     """Return the parts of the variance that an input makes, as cells."""
     if not math.isfinite(item.first.value):
-        return [item.name, TO_TELL, *([""] if totals else [])]
+        return [item.name, too_few(result, [item.name]), *([""] if totals else [])]
     if item.without_effect:
         return [item.name, *(_none_seen(found) for found in (item.first, item.total) if found)]
     return [item.name, *(part_with_interval(found) for found in (item.first, item.total) if found)]
@@ -119,17 +120,31 @@ def _reached(result: EnsembleResult) -> Rows:
     """Return whether the target was reached, and what a control variate saved."""
     rows = []
     if result.count and result.until:
-        target = Target.parse(result.until)
-        found = result.estimate_for(target)
-        word = "reached" if target.reached(found) else "not reached"
-        within = shown(target.achieved(found), "%", 2)
-        told = f"{word}: {count(result.count)} realisations tell it within {within}"
-        rows.append((f"until {result.until}", told))
+        rows.append((f"until {result.until}", _target_met(result, Target.parse(result.until))))
     saved = result.estimate("depth", -1, ()).variance_saved if result.count else None
     if saved is not None:
         worth = f", as good as {count(result.count / (1.0 - saved))} without" if saved < 1.0 else ""
-        rows.append(("control variate", f"saves {shown(saved, '%', 3)} of the variance{worth}"))
+        rows.append(("control variate", f"saves {shown(saved, '%', 3)} of depth's variance{worth}"))
     return rows
+
+
+def _target_met(result: EnsembleResult, target: Target) -> str:
+    """Return whether a target was reached, and how well its estimate is known."""
+    found = result.estimate_for(target)
+    interval, within = target.interval(found), target.achieved(found)
+    is_reached, told = target.reached(found), f"{count(result.count)} realisations"
+    word = "reached" if is_reached else "not reached"
+    if not math.isfinite(interval.half_width) or math.isnan(interval.value):
+        return f"{word}: {TO_TELL}"
+    if interval.half_width == 0.0:
+        text = f"{word}: it is the same in all {told}"
+    elif math.isinf(within):
+        return f"{word}: the estimate is 0, of which no interval is a part"
+    else:
+        text = f"{word}: {told} tell it within {shown(within, '%', 2)}"
+    # narrow enough, and yet not taken for it
+    by_luck = within <= target.width and not is_reached
+    return f"{text}, and so few may agree by luck" if by_luck else text
 
 
 def _effort(result: EnsembleResult) -> str:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from wearsim.cli.arguments import Json, Quiet, ResultsFile, Scheduler, Workers, check_workforce
 from wearsim.cli.output import note
+
+if TYPE_CHECKING:
+    from wearsim.results import EnsembleResult
 
 Until = Annotated[
     str | None,
@@ -70,11 +73,15 @@ def _resume_ensemble(
     file: Path, failed: bool, workers: int | None, scheduler: str | None, json: bool, quiet: bool
 ) -> None:
     chosen = check_workforce(scheduler, workers)
-    from wearsim.cli.ensemble import STOPPING, report
+    from wearsim.cli.ensemble import STOPPING, in_words, report
     from wearsim.cli.ensemble_progress import watching_ensemble
     from wearsim.cli.stop import stop_on_signals
+    from wearsim.results import open_ensemble
     from wearsim.studies.ensemble import resume_ensemble
 
+    nothing = _nothing_to_do(open_ensemble(file), failed)
+    if nothing:
+        note(f"note: nothing to do: {nothing}")
     with stop_on_signals(STOPPING) as stop, watching_ensemble(quiet) as watch:
         result = resume_ensemble(
             file,
@@ -85,7 +92,16 @@ def _resume_ensemble(
             stop_requested=stop.requested,
             on_notice=note,
         )
-    report(result, json, None, watch.workers)
+    report(result, json, None, in_words(watch.workers))
+
+
+def _nothing_to_do(before: EnsembleResult, failed: bool) -> str:
+    """Return why there is nothing to do; empty where there is something."""
+    if failed:
+        none = "no realisation has failed"
+        go_on = f"; go on with the others with: wearsim resume {before.path}"
+        return "" if before.failed else none + ("" if before.finished else go_on)
+    return "the ensemble is finished" if before.finished else ""
 
 
 def _seconds(text: str | None) -> float | None:

@@ -17,7 +17,7 @@ SMALL = 0.01
 
 _NONE = Interval(0.0, 0.0, 0.0)
 _MOST = 65536  # realisations a fit looks at: indices are known to 0.5 % by then
-_FEWEST_BASES = 10
+FEWEST_BASES = 10
 
 
 def without_effect(index: Interval) -> bool:
@@ -138,7 +138,7 @@ def saltelli_indices(
     96 % of 500, total ones in 85 to 95, 92 to 95 and 93 to 96 %.
     """
     whole = blocks[np.isfinite(blocks).all(axis=1)]
-    if len(whole) < _FEWEST_BASES:
+    if len(whole) < FEWEST_BASES:
         return dict.fromkeys(names, (UNKNOWN, UNKNOWN))
     centre = float(whole[:, :2].mean())
     base, other, *mixed = (whole - centre).T

@@ -11,7 +11,7 @@ from wearsim.randomness.estimates import Design, estimate
 from wearsim.randomness.intervals import UNKNOWN, Interval, student
 from wearsim.types import FloatArray, IntArray
 
-_FEWEST = 5  # values, of which an error can be told
+FEWEST = 5  # values, of which an error can be told
 _NEAR_CERTAIN = 0.1  # of 0 or 1, where few realisations of one ensemble are among the other's
 _HALVINGS = 60
 
@@ -39,7 +39,7 @@ def superiority(first: FloatArray, second: FloatArray) -> Interval:
     (2006), DOI 10.1002/sim.2324.
     """
     n, m = len(first), len(second)
-    if min(n, m) < _FEWEST:
+    if min(n, m) < FEWEST:
         return UNKNOWN
     of_first, of_second = _part_below(first, second), 1.0 - _part_below(second, first)
     chance = float(of_first.mean())

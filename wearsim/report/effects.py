@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 
+from wearsim.report.enough import too_few
 from wearsim.report.style import BLUE, GREY, ORANGE, name_axes, say
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ def draw_effects(axes: Axes, result: EnsembleResult) -> None:
     """
     effects = result.sensitivity("depth")
     if result.count == 1 or not any(np.isfinite(item.first.value) for item in effects):
-        say(axes, _TITLE, ["too few realisations to tell"])
+        say(axes, _TITLE, [too_few(result)])
         return
     if result.is_constant("depth"):
         say(axes, _TITLE, ["nothing: the depth is the same in all realisations"])

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from wearsim.randomness.targets import Target
+from wearsim.report.bands import NINE_IN_TEN, enough_for, known_ends
 from wearsim.report.depth_axes import set_depth_axes
 from wearsim.report.effects import draw_effects
 from wearsim.report.observables import OBSERVABLES, statistic_in_words
@@ -79,13 +80,17 @@ def _number_of(realisations: int) -> str:
 def _depth_told(result: EnsembleResult) -> str:
     if result.count == 0:
         return ""
-    depth = result.estimate("depth", -1, (0.05, 0.95))
+    depth = result.estimate("depth", -1, ())
     what = "depth" if result.count == 1 else "mean depth"
     text = f": {what} {shown(depth.mean.value, 'um')}"
     if result.count == 1 or result.is_constant("depth"):
         return text if result.count == 1 else f"{text}, the same in all"
-    ends = [shown(depth.quantile(p).value, "um", 3).removesuffix(" um") for p in (0.05, 0.95)]
-    return f"{text}, std {shown(depth.std.value, 'um', 3)}, 90 % within {' to '.join(ends)} um"
+    text += f", std {shown(depth.std.value, 'um', 3)}"
+    known = known_ends(result, "depth")
+    if known is None:
+        return text
+    ends = [shown(end, "um", 3).removesuffix(" um") for end in known]
+    return f"{text}, 90 % within {' to '.join(ends)} um"
 
 
 def _draw_course(axes: Axes, result: EnsembleResult) -> None:
@@ -98,7 +103,8 @@ def _draw_course(axes: Axes, result: EnsembleResult) -> None:
     axes.plot(passes, rows[1:].T, color=GREY, lw=0.6, alpha=0.6)
     if result.count > 1:
         low, median, high = (course.quantiles[p][drawn] * UM for p in (0.05, 0.5, 0.95))
-        axes.fill_between(passes, low, high, color=BLUE, alpha=0.25, lw=0, label="5 to 95 %")
+        if enough_for(result.count, NINE_IN_TEN[0]):
+            axes.fill_between(passes, low, high, color=BLUE, alpha=0.25, lw=0, label="5 to 95 %")
         axes.plot(passes, median, color=BLUE, label="median")
         axes.plot(passes, course.mean[drawn] * UM, color="black", ls="--", lw=1.0, label="mean")
     name_axes(axes, "Depth of the groove", name, "greatest worn depth [um]")
@@ -132,8 +138,9 @@ def _draw_density(axes: Axes, result: EnsembleResult) -> None:
         "-",
         f"median {shown(found.quantile(0.5).value, 'um')}",
     )
-    _mark(axes, found.quantile(0.05).value, GREY, ":", "5 and 95 %")
-    _mark(axes, found.quantile(0.95).value, GREY, ":", None)
+    if enough_for(result.count, NINE_IN_TEN[0]):
+        _mark(axes, found.quantile(0.05).value, GREY, ":", "5 and 95 %")
+        _mark(axes, found.quantile(0.95).value, GREY, ":", None)
     name_axes(axes, title, "depth [um]", "density [1/um]")
     axes.set_ylim(top=_ROOM * axes.get_ylim()[1])
     axes.legend(loc="upper right", ncols=2)
@@ -169,10 +176,11 @@ def _draw_profile(axes: Axes, result: EnsembleResult) -> None:
     y = band.y * MM
     told = "" if band.kept == result.count else f", of the first {count(band.kept)}"
     if band.kept > 1:
-        label = "2.5 to 97.5 %"
-        axes.fill_between(
-            y, -band.high * UM, -band.low * UM, color=BLUE, alpha=0.25, lw=0, label=label
-        )
+        low, high, label = band.low, band.high, "2.5 to 97.5 %"
+        if not enough_for(band.kept, 0.025):
+            kept = result.profiles
+            low, high, label = kept.min(axis=0), kept.max(axis=0), "least to greatest"
+        axes.fill_between(y, -high * UM, -low * UM, color=BLUE, alpha=0.25, lw=0, label=label)
     axes.plot(y, -band.mean * UM, color="black", label="mean")
     touched = y[band.high > _TOUCHED * max(float(band.high.max()), 0.0)]
     if len(touched) > 1:

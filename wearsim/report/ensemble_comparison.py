@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,10 +11,10 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
-from wearsim.report.intervals import part_with_interval
+from wearsim.report.bands import enough_for
+from wearsim.report.comparison_words import against, realisations
 from wearsim.report.observables import OBSERVABLES, Named
 from wearsim.report.style import BLUE, GREEN, ORANGE, RECORDS, RED, figure_style, name_axes
-from wearsim.report.units import count
 
 if TYPE_CHECKING:
     from wearsim.studies.compare import Compared, Comparison
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 FEW = (BLUE, ORANGE, GREEN, RED)
 MOST_POINTS = 2000  # of a distribution function that is drawn
 _ROW = 0.52  # in, height of a row
+_LABEL = 48  # letters in a line of a label
 _INNER, _OUTER = 5.0, 1.4  # widths of the lines of a range
 
 
@@ -75,7 +77,7 @@ def _draw_law(axes: Axes, row: Compared, colour: str, named: Named) -> None:
     parts = 100.0 * (picks + 1.0) / len(values)
     # from zero up: the first value is a step too
     across = np.concatenate([values[:1], values[picks]])
-    label = f"{row.label} ({count(row.count)})"
+    label = f"{row.label} ({realisations(row)})"
     axes.step(across, np.concatenate([[0.0], parts]), where="post", color=colour, label=label)
 
 
@@ -85,9 +87,10 @@ def _draw_ranges(axes: Axes, comparison: Comparison, named: Named) -> None:
     places = np.arange(len(rows))
     for place, row, colour in zip(places, rows, _colours(len(rows)), strict=True):
         level = [place, place]
-        if row.quantiles:
+        if _has_range(row):
             ends = [row.quantiles[0][1].value, row.quantiles[-1][1].value]
             axes.plot(np.array(ends) * named.per_si, level, color=colour, lw=_OUTER)
+        if row.quantiles:
             middle = dict(row.quantiles)[0.5].value * named.per_si
             axes.plot([middle], [place], "|", color=colour, ms=13.0, mew=_OUTER)
         if np.isfinite([row.value.low, row.value.high]).all():
@@ -97,16 +100,27 @@ def _draw_ranges(axes: Axes, comparison: Comparison, named: Named) -> None:
                 solid_capstyle="butt",
             )  # fmt: skip
         axes.plot([row.value.value * named.per_si], [place], "o", color=colour, ms=4.5)
-    axes.set_yticks(places, [_told(row) for row in rows])
+    axes.set_yticks(places, [_told(comparison, row) for row in rows])
     axes.set_ylim(len(rows) - 0.5, -0.5)
     axes.set_xlim(left=min(0.0, axes.get_xlim()[0]))
     axes.grid(visible=False, axis="y")
-    title = "Mean with its 95 % interval (dot), median (bar), 5 to 95 % (line)"
-    name_axes(axes, title, f"{named.words} at the end [{named.unit}]", "")
+    title = ["Mean with its 95 % interval (dot)", "median (bar)"]
+    title += ["5 to 95 % (line)"] if any(_has_range(row) for row in rows) else []
+    if not any(row.quantiles for row in rows):
+        title = ["Value with its stated error"]
+    name_axes(axes, ", ".join(title), f"{named.words} at the end [{named.unit}]", "")
 
 
-def _told(row: Compared) -> str:
-    """Return a row's label, and how surely it has more than the first."""
-    if row.deeper is None or not np.isfinite(row.deeper.value):
+def _has_range(row: Compared) -> bool:
+    """Tell whether there are enough realisations to draw where nine in ten of them end."""
+    return bool(row.quantiles) and enough_for(row.count, row.quantiles[0][0])
+
+
+def _told(comparison: Comparison, row: Compared) -> str:
+    """Return a row's label, and how it compares with the first."""
+    if row is comparison.rows[0]:
         return row.label
-    return f"{row.label}\nmore than the first\nin {part_with_interval(row.deeper)}"
+    told = [text for _, text in against(comparison, row)][:1]
+    if told and told[0].startswith("in "):
+        told = ["more than the first", *told]
+    return "\n".join([row.label, *(fill(line, _LABEL) for line in told)])

@@ -46,9 +46,15 @@ def export_csv(
     Raises
     ------
     ResultsFileError
-        If a file exists already (then none is written), or cannot be written.
+        If the folder is a file, or a file exists already (then none is written), or cannot be
+        written.
     """
     folder = Path(folder)
+    if folder.exists() and not folder.is_dir():
+        raise ResultsFileError(
+            f"{folder}: is a file; tables go into a folder, name one with -o, which is made where"
+            " there is none"
+        )
     contents = _with_scenario(_tables(result), result.raw)
     pieces = {folder / name: content for name, content in contents.items()}
     existing = [str(path) for path in pieces if path.exists()]

@@ -29,6 +29,11 @@ _KINDS: dict[str, FileKind] = {
     DISSIPATION.format: "dissipation",
     ENSEMBLE.format: "ensemble",
 }
+_OPENERS: dict[FileKind, str] = {
+    "replay": "open_results",
+    "dissipation": "open_dissipation",
+    "ensemble": "open_ensemble",
+}
 _LAYOUTS = {layout.format: layout for layout in (REPLAY, DISSIPATION, ENSEMBLE)}
 
 Stored = TypeVar("Stored")
@@ -140,7 +145,10 @@ def _layout_of(path: str | Path, file: h5py.File) -> Layout:
 def _check_format(path: str | Path, file: h5py.File, wanted: Layout) -> None:
     found = _layout_of(path, file)
     if found is not wanted:
-        raise ResultsFileError(f"{path}: holds {found.holds}; what is needed is {wanted.holds}")
+        raise ResultsFileError(
+            f"{path}: holds {found.holds}; what is needed is {wanted.holds}. In Python,"
+            f" wearsim.{_OPENERS[_KINDS[found.format]]} opens it"
+        )
     version = int(file.attrs["format_version"])
     if version > wanted.version:
         raise ResultsFileError(
