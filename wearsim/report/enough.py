@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wearsim.randomness.polynomial_fit import fewest_realisations
-from wearsim.randomness.sensitivity import FEWEST_BASES as FEWEST_BASES
+from wearsim.randomness.sensitivity import FEWEST_BASES
 from wearsim.report.units import count
 
 if TYPE_CHECKING:
