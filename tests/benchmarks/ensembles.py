@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import wearsim
-from tests.benchmarks.ensemble_cases import ALL, end_values
+from tests.benchmarks.ensemble_cases import ALL, Size, drawn, end_values
 from tests.benchmarks.table import Row, machine, markdown, part, timed
 from wearsim.scenario import Scenario
 
@@ -56,26 +56,34 @@ def truth(quick: bool) -> list[Row]:
 def cost(quick: bool) -> list[Row]:
     """Measure the time that tests take against their number, their strips and the workers."""
     few, many = (2, 4) if quick else (100, 1000)
-    cases: list[tuple[str, int, int, dict[str, object]]] = [
-        ("", few, CPUS, {}),
-        ("", few, 1, {}),
-        (", tolerance 1e-3", few, CPUS, {"evolution.tolerance": 1e-3}),
-        (", 61 strips", few, CPUS, {"contact.strips": 61}),
-        (", 121 strips", few, CPUS, {"contact.strips": 121}),
-        (", 241 strips", few, CPUS, {"contact.strips": 241}),
-        ("", many, CPUS, {}),
+    alike = drawn("per-test", Size(passes=SHORT if quick else None))
+    tight, records = {"evolution.tolerance": 1e-3}, {"outputs.records": 20}
+    strips = {count: {"contact.strips": count} for count in (61, 121, 241)}
+    cases: list[tuple[str, Scenario, int, int, str]] = [
+        ("", scenario(quick), few, CPUS, ""),
+        ("", scenario(quick), few, 1, ""),
+        (", 61 strips", scenario(quick, strips[61]), few, CPUS, ""),
+        (", 121 strips", scenario(quick, strips[121]), few, CPUS, ""),
+        (", 241 strips", scenario(quick, strips[241]), few, CPUS, ""),
+        (", tolerance 1e-3", scenario(quick, tight), few, CPUS, ""),
+        (", 20 records", scenario(quick, records), few, CPUS, ""),
+        ("", scenario(quick), many, CPUS, "2 min, aim 15 s"),
+        (", rollers alike, one contact", alike, many, CPUS, "2 min, aim 15 s"),
     ]
     rows = []
-    for words, count, workers, more in cases:
-        made = scenario(quick, more)
+    for words, made, count, workers, asked in cases:
 
         def run(made: Scenario = made, count: int = count, workers: int = workers) -> None:
             end_values(made, count, workers=workers)
 
         seconds = timed(run)
         each = f"{1e3 * seconds * workers / count:.3g} ms of a processor for each"
-        rows.append(Row(f"{count} tests, {workers} workers{words}", seconds, each))
+        rows.append(Row(f"{count} tests, {_workers(workers)}{words}", seconds, asked, each))
     return rows
+
+
+def _workers(count: int) -> str:
+    return "1 process" if count == 1 else f"{count} processes"
 
 
 def memory(quick: bool) -> list[Row]:

@@ -352,7 +352,7 @@ def test_that_a_signal_ends_an_ensemble_that_goes_on_from_its_file(
         running.send_signal(signal.SIGINT)
         said = running.stderr.read()
     assert running.returncode == 130
-    assert "stopping after the realisations that run now" in said
+    assert "stopping as soon as the next batch is in" in said
     kept = open_ensemble(tmp_path / "a.h5")
     assert not kept.finished
     assert f"stopped after {kept.count} of 100000 realisations" in said

@@ -68,7 +68,7 @@ Sweep = Annotated[
     ),
 ]
 _ALONE = "this process, one realisation after the other"
-STOPPING = "stopping after the realisations that run now; once more to stop at once"
+STOPPING = "stopping as soon as the next batch is in; once more to stop at once"
 
 
 def ensemble(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
@@ -20,7 +21,7 @@ from wearsim.studies.ensemble_judging import judged
 from wearsim.studies.executors import Executor
 from wearsim.studies.member import Members
 
-SECONDS = 2.0  # that a batch should take at most
+SECONDS = 4.0  # that a batch should take; of twenty tests each costs a third more than of forty
 MOST_IN_BATCH = 256
 AHEAD = 3  # batches for each worker that may be beyond the next mark
 BETWEEN_ESTIMATES = 0.5  # s
@@ -113,10 +114,13 @@ class EnsembleWork:
     def _run_through(self, numbers: Iterable[int]) -> None:
         """Send numbers out in batches until there are no more, or a stop is asked for."""
         try:
-            for _, outcomes in self.pool.results(self.members, self._batches(numbers)):
-                self._take(outcomes)
-                self._stopping = self._stopping or self.stop_requested()
-                self._tell_progress()
+            with closing(self.pool.results(self.members, self._batches(numbers))) as found:
+                for _, outcomes in found:
+                    self._take(outcomes)
+                    self._stopping = self._stopping or self.stop_requested()
+                    self._tell_progress()
+                    if self._stopping or self._reached:
+                        return  # what is out is left; it will be run again if it is needed
         except WorkerError as error:
             self._run_singly(error)
         except KeyboardInterrupt:
@@ -157,8 +161,6 @@ class EnsembleWork:
             if len(batch) >= self._batch_size():
                 yield batch
                 batch = []
-            if self._stopping or self._reached:
-                return
         if batch:
             yield batch
 
