@@ -1,6 +1,7 @@
 # make demo    replay the 450-minute wear test: a summary, results and a figure in out/
 # make test    everything that must hold: style, types, layers, tests
 # make bench   measure speed beside error, and every model; writes out/benchmarks.md, out/models.md
+# make bench-ensembles   a quarter of an hour: why persistence matters, what ensembles cost
 # make clean   remove what these made, the environment included
 
 PYTHON ?= python3
@@ -8,7 +9,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 JOBS ?= 2
 
-.PHONY: demo test lint bench clean
+.PHONY: demo test lint bench bench-ensembles clean
 .DEFAULT_GOAL := demo
 
 demo: $(VENV)/.installed
@@ -28,6 +29,11 @@ bench: $(VENV)/.installed-dev
 	mkdir -p out
 	$(BIN)/python -m tests.benchmarks.report -o out/benchmarks.md
 	$(BIN)/python -m tests.benchmarks.models -o out/models.md
+
+bench-ensembles: $(VENV)/.installed-dev
+	mkdir -p out
+	$(BIN)/python -m tests.benchmarks.persistence -o out/persistence.md
+	$(BIN)/python -m tests.benchmarks.ensembles -o out/ensembles.md
 
 # the two stamps tell what the environment holds; a change of pyproject.toml renews it
 $(VENV)/bin/python:

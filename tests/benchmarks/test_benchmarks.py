@@ -8,7 +8,16 @@ from __future__ import annotations
 import pytest
 
 import wearsim
-from tests.benchmarks import contacts, models, replays, studies, table
+from tests.benchmarks import (
+    contacts,
+    ensemble_cases,
+    ensembles,
+    models,
+    persistence,
+    replays,
+    studies,
+    table,
+)
 from tests.benchmarks.report import QUICK, TABLES
 from wearsim.studies.dissipation import dissipation
 
@@ -50,6 +59,20 @@ def test_that_the_in_process_rows_of_the_report_hold_numbers():
     assert all(row.seconds > 0.0 for row in rows)
     text = table.markdown("One contact", rows)
     assert "| what | measured | asked | error beside it |" in text
+    assert "nan" not in text
+
+
+def test_that_members_of_ensembles_are_held_against_single_passes():
+    rows = ensembles.truth(quick=True)
+    assert all(row.seconds > 0.0 for row in rows)
+    assert "nan" not in table.markdown("truth", rows)
+
+
+def test_that_the_spread_of_tests_is_told_by_how_long_draws_last(monkeypatch):
+    monkeypatch.setattr(persistence, "SINGLE_PASSES", 200)
+    monkeypatch.setattr(persistence, "SINGLE_TESTS", 3)
+    text = persistence.table(persistence.spreads(ensemble_cases.Size(4, 1500)), 1.35e6)
+    assert text.count("\n| ") == 4
     assert "nan" not in text
 
 

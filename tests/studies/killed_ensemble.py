@@ -71,11 +71,11 @@ def kill_at_moments(scenario: Scenario, count: int, folder: Path, times: int) ->
 
 
 if __name__ == "__main__":
-    EnsembleWork._batch_size = lambda self: 2
+    EnsembleWork._batch_size = lambda self: 1
     ensemble_grid.PROBES = 3  # each kill starts anew
     mode, where = sys.argv[1], Path(sys.argv[2])
     tests = small(passes=400, contact__strips=31)
     if mode == "stages":
-        kill_at_stages(tests, 3, where)
+        kill_at_stages(tests, 2, where)
     else:
         kill_at_moments(tests, 8, where, int(sys.argv[3]))
