@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 
@@ -69,6 +70,7 @@ class EnsembleWork:
         self._limit = self._marks[0] if self._marks else self.asked
         self._held: dict[int, Outcome] = {}
         self._stopping = self._reached = False
+        self._ahead = AHEAD * max(pool.workers, 1)
         self._run, self._rate = 0, 0.0
         self._shown, self._estimate = -math.inf, UNKNOWN
 
@@ -147,21 +149,15 @@ class EnsembleWork:
     def _pending(self) -> Iterator[int]:
         """Yield pending realisations, no further beyond the next mark than keeps workers busy."""
         for number in np.flatnonzero(self.file.status == PENDING):
-            ahead = AHEAD * self.pool.workers * self._batch_size()
-            if self._reached or number >= self._limit + ahead:
+            if self._reached or number >= self._limit + self._ahead:
                 return
             if number not in self._held:
                 yield int(number)
 
     def _batches(self, numbers: Iterable[int]) -> Iterator[list[int]]:
         """Yield batches of numbers; which of them share one changes nothing."""
-        batch: list[int] = []
-        for number in numbers:
-            batch.append(number)
-            if len(batch) >= self._batch_size():
-                yield batch
-                batch = []
-        if batch:
+        remaining = iter(numbers)
+        while batch := list(islice(remaining, self._batch_size())):
             yield batch
 
     def _batch_size(self) -> int:
@@ -169,7 +165,10 @@ class EnsembleWork:
         workers = max(self.pool.workers, 1)
         left = self.asked - int((self.file.status != PENDING).sum())
         fair = -(-left // (2 * workers))
-        return int(np.clip(SECONDS * self._rate / workers, 1, max(min(fair, MOST_IN_BATCH), 1)))
+        most = max(min(fair, MOST_IN_BATCH), 1)
+        size = int(np.clip(SECONDS * self._rate / workers, 1, most))
+        self._ahead = AHEAD * workers * size
+        return size
 
     def _take(self, outcomes: Sequence[Outcome]) -> None:
         """Write outcomes, those beyond the next mark later."""
