@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import typer
 
@@ -71,6 +71,23 @@ Scheduler: TypeAlias = Annotated[
         show_default=False,
     ),
 ]
+
+
+def results_option(ending: str) -> Any:
+    """Return the option that names the results file of a study.
+
+    Parameters
+    ----------
+    ending : str
+        What follows the scenario's name where it is not given, "-ensemble.h5".
+    """
+    return typer.Option(
+        "--output",
+        "-o",
+        metavar="FILE.h5",
+        help=f"Results file; by default the scenario's name with {ending}, in the current folder.",
+        show_default=False,
+    )
 
 
 def read_scenario(path: Path, settings: list[str] | None) -> Scenario:

@@ -18,6 +18,7 @@ from wearsim.cli.arguments import (
     Settings,
     check_drawing,
     check_figure,
+    results_option,
 )
 from wearsim.cli.output import refuse_existing, tell_notes, write_json
 
@@ -25,17 +26,7 @@ if TYPE_CHECKING:
     from wearsim.results import DissipationResult
     from wearsim.scenario import Scenario
 
-Output = Annotated[
-    Path | None,
-    typer.Option(
-        "--output",
-        "-o",
-        metavar="FILE.h5",
-        help="Results file; by default the scenario's name with -dissipation.h5, in the current"
-        " folder.",
-        show_default=False,
-    ),
-]
+Output = Annotated[Path | None, results_option("-dissipation.h5")]
 Plan = Annotated[
     str | None,
     typer.Option(

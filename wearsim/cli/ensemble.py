@@ -22,6 +22,7 @@ from wearsim.cli.arguments import (
     check_figure,
     check_workforce,
     read_scenario,
+    results_option,
 )
 from wearsim.cli.output import note, refuse_existing, tell_notes, write_json
 
@@ -30,17 +31,7 @@ if TYPE_CHECKING:
     from wearsim.results import EnsembleResult
     from wearsim.scenario import Scenario
 
-Output = Annotated[
-    Path | None,
-    typer.Option(
-        "--output",
-        "-o",
-        metavar="FILE.h5",
-        help="Results file; by default the scenario's name with -ensemble.h5, in the current"
-        " folder.",
-        show_default=False,
-    ),
-]
+Output = Annotated[Path | None, results_option("-ensemble.h5")]
 Until = Annotated[
     str | None,
     typer.Option(

@@ -63,7 +63,8 @@ def ensemble(
     on_progress : callable, optional
         Told how far it has come.
     stop_requested : callable, optional
-        Asked after every batch; True ends the study with what is out by then.
+        Asked after every batch; True ends the study there, and what is out then is run again by
+        `resume_ensemble`.
     on_notice : callable, optional
         Told that a worker was lost, or that a cluster has none.
 

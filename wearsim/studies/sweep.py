@@ -62,17 +62,18 @@ def sweep(
     same = [path for path in paths if paths.count(path) > 1]
     if same:
         raise ResultsFileError(f"{same[0]}: would be the file of two values; write them apart")
+    begun = []
     for scenario, path in zip(scenarios, paths, strict=True):
         asked = checked(scenario, realisations, options.get("plan"), options.get("until"))
-        if not _is_part(path, scenario, asked, force):
+        begun.append(_is_part(path, scenario, asked, force))
+        if not begun[-1]:
             check_output(path, force, scenario.paths)
     found: list[EnsembleResult] = []
-    for value, scenario, path in zip(values, scenarios, paths, strict=True):
+    for value, scenario, path, is_part in zip(values, scenarios, paths, begun, strict=True):
         if on_value is not None:
             on_value(value, path)
-        asked = checked(scenario, realisations, options.get("plan"), options.get("until"))
         try:
-            if _is_part(path, scenario, asked, force):
+            if is_part:
                 found.append(resume_ensemble(path, **_of_work(options)))
             else:
                 found.append(ensemble(scenario, realisations, path, **options))
