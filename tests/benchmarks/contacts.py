@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from tests.benchmarks.table import Effort, Row, best, best_short, part
+from tests.benchmarks.table import Effort, Row, part
+from wearsim.bench.timing import best, best_short
 from wearsim.mechanics.elasticity import combine
 from wearsim.mechanics.hertz import HertzContact, hertz
 from wearsim.models.hertz_fastsim import HertzFastsim, HertzFastsimOptions

@@ -15,7 +15,9 @@ from pathlib import Path
 
 import wearsim
 from tests.benchmarks.ensemble_cases import ALL, Size, drawn, end_values
-from tests.benchmarks.table import Row, machine, markdown, part, timed
+from tests.benchmarks.table import Row, markdown, part
+from wearsim.bench.machine import this_machine
+from wearsim.bench.timing import timed
 from wearsim.scenario import Scenario
 
 MEMBERS = 5
@@ -123,7 +125,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--quick", action="store_true", help="shorten everything")
     parser.add_argument("-o", "--output", type=Path, metavar="FILE.md", help="write them here too")
     asked = parser.parse_args(arguments)
-    text = f"Measured on {machine()}.\n"
+    text = f"Measured on {this_machine()}.\n"
     sys.stdout.write(text)
     for name in asked.parts or PARTS:
         title, rows = PARTS[name]

@@ -15,9 +15,9 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from tests.benchmarks.replays import SCENARIOS
-from tests.benchmarks.table import best_short, lapse, machine, part, timed
-from tests.reference import WORN, rows
-from tests.reference.accuracy import (
+from tests.benchmarks.table import lapse, part
+from wearsim import load_scenario, run
+from wearsim.bench.accuracy import (
     PowerErrors,
     WornErrors,
     built,
@@ -26,7 +26,9 @@ from tests.reference.accuracy import (
     solved,
     worn_errors,
 )
-from wearsim import load_scenario, run
+from wearsim.bench.exact import WORN, rows
+from wearsim.bench.machine import this_machine
+from wearsim.bench.timing import best_short, timed
 from wearsim.errors import WearsimError
 from wearsim.plugins import ContactModelSpec, registry
 from wearsim.plugins.template import template_folder
@@ -194,7 +196,7 @@ def main(arguments: list[str] | None = None) -> None:
         sys.stdout.write(text + "\n")
         sys.stdout.flush()
 
-    tell(f"Measured on {machine()}.\n")
+    tell(f"Measured on {this_machine()}.\n")
     with TemporaryDirectory() as folder:
         install_template(Path(folder))
         text = report(tell, *((0.002, 1) if asked.quick else ()))

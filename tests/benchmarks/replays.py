@@ -6,7 +6,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import wearsim
-from tests.benchmarks.table import Effort, Row, best, part, timed
+from tests.benchmarks.table import Effort, Row, part
+from wearsim.bench.timing import best, timed
 from wearsim.results import Result, open_results, write_results
 from wearsim.scenario import Scenario
 

@@ -11,7 +11,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tests.benchmarks import contacts, replays, starts, studies
-from tests.benchmarks.table import Effort, Row, machine, markdown
+from tests.benchmarks.table import Effort, Row, markdown
+from wearsim.bench.machine import this_machine
 
 TABLES: dict[str, list[Callable[[Effort], list[Row]]]] = {
     "One contact": [contacts.hertz_rows, contacts.mean_rows, contacts.slender_rows],
@@ -29,7 +30,7 @@ QUICK = Effort(repetitions=1, part=0.005)
 
 def report(effort: Effort, tell: Callable[[str], object]) -> str:
     """Measure everything and return the report; `tell` gets each table as soon as it is done."""
-    text = f"Measured on {machine()}; best of {effort.repetitions}.\n"
+    text = f"Measured on {this_machine()}; best of {effort.repetitions}.\n"
     if effort.quick:
         text += "\nShortened tests: these numbers only show that the report works.\n"
     tell(text)

@@ -10,7 +10,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from tests.benchmarks.replays import SCENARIOS
-from tests.benchmarks.table import Effort, Row, best, timed
+from tests.benchmarks.table import Effort, Row
+from wearsim.bench.timing import best, timed
 
 WEARSIM = [sys.executable, "-m", "wearsim"]
 

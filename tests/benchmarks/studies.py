@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.benchmarks.table import Effort, Row, best, part
+from tests.benchmarks.table import Effort, Row, part
+from wearsim.bench.timing import best
 from wearsim.randomness.maxent import maximum_entropy
 from wearsim.randomness.streams import Stream
 from wearsim.scenario import Scenario, load_scenario

@@ -83,10 +83,6 @@ def test_that_a_lapse_is_told_in_a_unit_that_suits_it(seconds, text):
     assert table.lapse(seconds) == text
 
 
-def test_that_the_machine_is_named():
-    assert "cores, Python 3." in table.machine()
-
-
 def test_that_the_tables_of_models_hold_every_model():
     told = []
     text = models.report(told.append, share=0.0005, repetitions=1)

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.mechanics.line_contact import rolling_strip
-from tests.reference import STEEL, rows
+from wearsim.bench.exact import STEEL, rows
 from wearsim.mechanics.carter import SPIN_LIMIT, TURNED, mean_direction, strip_force
 from wearsim.mechanics.elasticity import combine
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.reference import STEEL, rows, table
+from wearsim.bench.exact import STEEL, rows, table
 from wearsim.mechanics.elasticity import combine
 from wearsim.mechanics.fastrip import fastrip
 from wearsim.mechanics.fastrip_fields import fastrip_fields

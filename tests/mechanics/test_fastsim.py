@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.reference import rows, table
+from wearsim.bench.exact import rows, table
 from wearsim.mechanics.fastsim import march, march_local, new_sums
 from wearsim.mechanics.fastsim_closed_form import closed_form, closed_form_parabolic
 from wearsim.mechanics.fastsim_fields import element_sum, march_fields, march_local_fields

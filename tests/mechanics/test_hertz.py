@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.special import ellipe, ellipkm1
 
-from tests.reference import rows
+from wearsim.bench.exact import rows
 from wearsim.mechanics.hertz import (
     CONVERGED,
     LEAVES_STRIPS,

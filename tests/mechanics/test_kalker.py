@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.reference import rows
+from wearsim.bench.exact import rows
 from wearsim.mechanics.kalker import (
     creepage_coefficients,
     flexibilities,

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.reference import STEEL, rig_random_rows, rows, table
+from wearsim.bench.exact import STEEL, rows, strips_of, table
 from wearsim.mechanics.elasticity import combine
 from wearsim.mechanics.strip import SUMS, new_tractions, solve_strips, strip_contacts
 from wearsim.mechanics.strip_coupling import strip_elasticity
@@ -49,11 +49,12 @@ def errors(found):
     [("paper", 5e-4, 1.2e-3, 3e-3), ("partial", 2.2e-3, 6.5e-3, 5e-3)],
 )
 def test_that_random_inputs_dissipate_like_the_exact_theory(kind, rms, worst, row_error):
-    exact_rows, powers, distances = rig_random_rows(), [], []
-    for row, exact in zip(rows("rig_random", kind=kind), exact_rows[kind], strict=True):
+    powers, distances = [], []
+    y_over_b, dissipation = strips_of(kind)
+    for row, exact in zip(rows("rig_random", kind=kind), dissipation, strict=True):
         y, found = solve_row(row["a_m"], row["b_m"], row["N_N"], row["mu"], row)
         powers.append((found.work.sum() * (y[1] - y[0]), row["P_over_V_N"]))
-        ours = np.interp(exact_rows["y_over_b"] * row["b_m"], y, found.work, left=0.0, right=0.0)
+        ours = np.interp(y_over_b * row["b_m"], y, found.work, left=0.0, right=0.0)
         distances.append(np.linalg.norm(ours - exact) / np.linalg.norm(exact))
     assert len(powers) == 40
     found_rms, found_worst = errors(powers)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.reference import rows
+from wearsim.bench.exact import rows
 from wearsim.mechanics.strip import new_tractions, solve_strips
 from wearsim.mechanics.strip_coupling import (
     coupling_length,

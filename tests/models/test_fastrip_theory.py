@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.reference import CREEPAGES, STEEL, rig_random_rows, rows, worn_profile
+from wearsim.bench.exact import CREEPAGES, STEEL, rows, strips_of, worn_profile
 from wearsim.errors import ContactError
 from wearsim.mechanics.elasticity import combine
 from wearsim.models.fastrip_theory import FastripTheory
@@ -51,12 +51,12 @@ def test_that_the_rigs_power_is_that_of_the_exact_theory(kind, bound, worst):
 
 @pytest.mark.parametrize("kind", ["paper", "partial"])
 def test_that_the_rigs_power_is_spread_over_the_strips_as_in_the_exact_theory(kind):
-    exact = rig_random_rows()
+    y_over_b, exact = strips_of(kind)
     distances = []
     for number, case in enumerate(rows("rig_random", kind=kind)):
         *_, solution = contact(case)
         place = solution.y / (solution.y[-1] + 0.5 * (solution.y[1] - solution.y[0]))
-        expected = np.interp(place, exact["y_over_b"], exact[kind][number])
+        expected = np.interp(place, y_over_b, exact[number])
         off = np.linalg.norm(solution.dissipation - expected)
         distances.append(off / np.linalg.norm(expected))
     assert np.median(distances) < 0.022

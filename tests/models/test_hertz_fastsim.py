@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from tests.reference import STEEL, rows, table, worn_profile
+from wearsim.bench.exact import STEEL, rows, table, worn_profile
 from wearsim.errors import CapabilityError, ContactError
 from wearsim.mechanics.elasticity import combine
 from wearsim.mechanics.fastsim_closed_form import closed_form_parabolic

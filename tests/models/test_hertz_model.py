@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.reference import STEEL, rows
+from wearsim.bench.exact import STEEL, rows
 from wearsim.errors import CapabilityError, ContactError
 from wearsim.mechanics.elasticity import combine
 from wearsim.mechanics.hertz import hertz

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tests.reference import CREEPAGES, STEEL, WORN, worn_profile
 from tests.studies.study_examples import short
+from wearsim.bench.exact import CREEPAGES, STEEL, WORN, worn_profile
 from wearsim.errors import ContactError
 from wearsim.models.semi_hertzian import SPEC, SemiHertzianOptions
 from wearsim.studies import replay

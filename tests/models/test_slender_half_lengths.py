@@ -6,7 +6,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from tests.reference import STEEL, WORN, half_space, worn_profile
+from tests.reference import half_space
+from wearsim.bench.exact import STEEL, WORN, worn_profile
 from wearsim.mechanics.elasticity import combine
 from wearsim.mechanics.hertz import hertz
 from wearsim.models.slender import SPEC, SlenderOptions

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from tests.reference import CREEPAGES, STEEL, WORN, rows, worn_profile
+from wearsim.bench.exact import CREEPAGES, STEEL, WORN, rows, worn_profile
 from wearsim.errors import ContactError
 from wearsim.models.slender import SPEC, Slender, SlenderOptions
 from wearsim.models.strip_theory import StripTheory

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from tests.reference import WORN, half_space, worn_profile
+from tests.reference import half_space
+from wearsim.bench.exact import WORN, worn_profile
 from wearsim.mechanics.hertz import hertz
 
 MODULUS = 200e9 / (2.0 * (1.0 - 0.3**2))

@@ -4,8 +4,8 @@ from functools import cache
 
 import pytest
 
-from tests.reference import WORN
-from tests.reference.accuracy import built, drawn_errors, hard_errors, worn_errors
+from wearsim.bench.accuracy import built, drawn_errors, hard_errors, worn_errors
+from wearsim.bench.exact import WORN
 from wearsim.errors import ContactError
 
 VARIANTS = ("kik-piotrowski", "ayasse-chollet", "analyn")

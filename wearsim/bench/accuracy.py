@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from tests.reference import CREEPAGES, STEEL, rig_random_rows, rows, worn_profile
+from wearsim.bench.exact import CREEPAGES, STEEL, rows, strips_of, worn_profile
+from wearsim.errors import ContactError
 from wearsim.plugins import ContactModel, ContactModelSpec, registry
 from wearsim.types import ContactSolution, Creepage, FloatArray, Grid, OperatingPoint
 
@@ -51,6 +52,8 @@ def solved(model: ContactModel, row: dict[str, Any]) -> ContactSolution:
     """Solve an elliptic case of the reference data at V = 1 m/s on strips of the model's choice."""
     curvatures = 2.0 * row["B_per_m"], 2.0 * row["A_per_m"]
     grid = model.suggest_grid(*curvatures, row["N_N"], MATERIALS)
+    if grid is None:
+        raise ContactError("the model suggests no strips for an elliptic contact", {})
     model.prepare(grid, MATERIALS)
     creepage = Creepage(row["xi"], row["eta"], row["phi_per_m"])
     point = OperatingPoint(row["N_N"], 1.0, creepage, row["mu"])
@@ -64,13 +67,12 @@ def l2(found: FloatArray, exact: FloatArray) -> float:
 
 def drawn_errors(model: ContactModel, kind: str) -> PowerErrors:
     """Return the errors over the 40 draws of `rig_random` of a kind, `paper` or `partial`."""
-    exact_rows = rig_random_rows()
+    y_over_b, dissipation = strips_of(kind)
     powers, strips = [], []
-    for row, exact in zip(rows("rig_random", kind=kind), exact_rows[kind], strict=True):
+    for row, exact in zip(rows("rig_random", kind=kind), dissipation, strict=True):
         solution = solved(model, row)
         powers.append(solution.power / row["P_over_V_N"] - 1.0)
-        y = exact_rows["y_over_b"] * row["b_m"]
-        strips.append(l2(solution.dissipation, np.interp(solution.y, y, exact)))
+        strips.append(l2(solution.dissipation, np.interp(solution.y, y_over_b * row["b_m"], exact)))
     return _summed(powers, strips)
 
 
@@ -107,7 +109,8 @@ def worn_errors(model: ContactModel, name: str) -> WornErrors:
     solution = found["mean"]
 
     def at_strips(key: str) -> FloatArray:
-        return np.interp(WORN_GRID.y, exact["y"], exact[key], left=0.0, right=0.0)
+        found: FloatArray = np.interp(WORN_GRID.y, exact["y"], exact[key], left=0.0, right=0.0)
+        return found
 
     q, a = at_strips("q"), at_strips("a")
     return WornErrors(

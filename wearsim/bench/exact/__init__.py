@@ -1,0 +1,57 @@
+"""Exact contact solutions to hold models against; `data/README.md` tells source and error."""
+
+import json
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wearsim.types import FloatArray, Material
+
+DATA = Path(__file__).parent / "data"
+
+STEEL = Material(youngs_modulus=200e9, poisson_ratio=0.3)
+WORN = ("hertz", "flat", "bump_1um", "bump_10um", "parabola")
+CREEPAGES = {
+    "mean": (1e-3, 0.0, 0.0),
+    "partial": (4e-4, 0.0, 0.0),
+    "combined": (4e-4, 5e-4, 0.05),
+}
+
+
+@cache
+def table(name: str) -> dict[str, Any]:
+    """Return a JSON file of the data by its name, such as "hertz"; its cases are in `rows`."""
+    found: dict[str, Any] = json.loads((DATA / f"{name}.json").read_text(encoding="utf-8"))
+    return found
+
+
+def rows(name: str, **where: Any) -> list[dict[str, Any]]:
+    """Return the rows of a JSON file whose values are those of `where`."""
+    return [r for r in table(name)["rows"] if all(r[key] == value for key, value in where.items())]
+
+
+@cache
+def strips_of(kind: str) -> tuple[FloatArray, FloatArray]:
+    """Return y over b, (124,), and P_l over V [N/m], (cases, 124), of elliptic cases.
+
+    Parameters
+    ----------
+    kind : str
+        "paper" or "partial", the draws of `rig_random`, or "hard", those of `hard_cases`.
+    """
+    name = "hard_cases" if kind == "hard" else "rig_random"
+    with np.load(DATA / f"{name}_rows.npz") as file:
+        return np.array(file["y_over_b"]), np.array(file[kind], dtype=np.float64)
+
+
+@cache
+def worn_profile(name: str) -> dict[str, Any]:
+    """Return a worn profile by its name in `WORN`.
+
+    Its keys: y, w, q, a, approach, peak_pressure, and per creepage P_l_over_V_* and P_over_V_*.
+    """
+    with np.load(DATA / f"worn_{name}.npz") as file:
+        found = {key: np.array(file[key], dtype=np.float64) for key in file.files}
+    return {key: float(value) if value.ndim == 0 else value for key, value in found.items()}
