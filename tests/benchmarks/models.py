@@ -15,7 +15,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from tests.benchmarks.replays import SCENARIOS
-from tests.benchmarks.table import lapse, part
+from tests.benchmarks.table import part
 from wearsim import load_scenario, run
 from wearsim.bench.accuracy import (
     PowerErrors,
@@ -26,12 +26,14 @@ from wearsim.bench.accuracy import (
     solved,
     worn_errors,
 )
-from wearsim.bench.exact import WORN, rows
+from wearsim.bench.contact_cases import elliptic_cases
+from wearsim.bench.exact import WORN
 from wearsim.bench.machine import this_machine
 from wearsim.bench.timing import best_short, timed
 from wearsim.errors import WearsimError
 from wearsim.plugins import ContactModelSpec, registry
 from wearsim.plugins.template import template_folder
+from wearsim.report.units import brief
 
 #: what is drawn or prescribed, by contact model and options
 TANGENTIAL: dict[str, tuple[str, dict[str, Any]]] = {
@@ -67,13 +69,13 @@ def drawn_table(repetitions: int) -> str:
     lines = []
     for label, (name, options) in TANGENTIAL.items():
         model = built(name, **options)
-        row = rows("rig_random", kind="partial")[0]
-        seconds = best_short(lambda model=model, row=row: solved(model, row), repetitions)
+        case = elliptic_cases("partial")[0]
+        seconds = best_short(lambda model=model, case=case: solved(model, case), repetitions)
         cells = [label]
         for kind in ("paper", "partial"):
             found = drawn_errors(model, kind)
             cells += [_spread(found), percent(found.strips)]
-        cells += [_spread(hard_errors(model, LONG)), lapse(seconds)]
+        cells += [_spread(hard_errors(model, LONG)), brief(seconds)]
         lines.append(cells)
     head = (
         "tangential theory",
@@ -149,7 +151,7 @@ def _whole_cells(name: str, options: dict[str, Any], share: float) -> list[str]:
         result.stepper,
         str(result.steps),
         str(result.solves[-1]),
-        lapse(seconds),
+        brief(seconds),
     ]
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from wearsim.report.units import brief
+
 
 @dataclass(frozen=True)
 class Row:
@@ -15,7 +17,7 @@ class Row:
     error: str = ""
 
     def __str__(self) -> str:
-        return f"| {self.what} | {lapse(self.seconds)} | {self.asked} | {self.error} |"
+        return f"| {self.what} | {brief(self.seconds)} | {self.asked} | {self.error} |"
 
 
 @dataclass(frozen=True)
@@ -29,14 +31,6 @@ class Effort:
     def quick(self) -> bool:
         """Whether the numbers only show that the report works."""
         return self.part < 1.0
-
-
-def lapse(seconds: float) -> str:
-    """Return a time with three digits and a unit that suits it."""
-    for unit, scale in (("s", 1.0), ("ms", 1e3)):
-        if seconds * scale >= 1.0:
-            return f"{seconds * scale:.3g} {unit}"
-    return f"{seconds * 1e6:.3g} us"
 
 
 def part(value: float) -> str:

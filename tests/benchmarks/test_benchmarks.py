@@ -76,13 +76,6 @@ def test_that_the_spread_of_tests_is_told_by_how_long_draws_last(monkeypatch):
     assert "nan" not in text
 
 
-@pytest.mark.parametrize(
-    ("seconds", "text"), [(2.5e-6, "2.5 us"), (0.0312, "31.2 ms"), (1.5, "1.5 s"), (84.0, "84 s")]
-)
-def test_that_a_lapse_is_told_in_a_unit_that_suits_it(seconds, text):
-    assert table.lapse(seconds) == text
-
-
 def test_that_the_tables_of_models_hold_every_model():
     told = []
     text = models.report(told.append, share=0.0005, repetitions=1)

@@ -8,7 +8,7 @@ import pytest
 from wearsim.errors import ScenarioError
 from wearsim.report.measured import read_measured
 from wearsim.report.patch import patch_edges
-from wearsim.report.units import count, lapse, shown
+from wearsim.report.units import brief, count, lapse, shown
 
 
 @pytest.mark.parametrize(
@@ -70,3 +70,11 @@ def test_that_depth_counts_downwards_and_height_upwards() -> None:
 def test_that_a_measurement_without_either_is_refused() -> None:
     with pytest.raises(ScenarioError, match="column 'height' is missing"):
         read_measured("y [mm], z [um]\n-1, -2\n1, -3\n", "probe.csv")
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [(2.5e-6, "2.5 us"), (0.0312, "31.2 ms"), (1.5, "1.5 s"), (84.0, "84 s"), (np.nan, "-")],
+)
+def test_that_a_time_too_short_to_feel_is_told_in_a_unit_that_suits_it(seconds, text):
+    assert brief(seconds) == text

@@ -9,7 +9,7 @@ import typer
 
 from wearsim.cli.arguments import Figure, Force, Json, ScenarioFile, Settings, check_figure
 from wearsim.cli.arguments import read_scenario as load
-from wearsim.cli.output import note, refuse_existing, write_json, write_table
+from wearsim.cli.output import note, refuse_existing, write_json, write_line, write_table
 
 if TYPE_CHECKING:
     from wearsim.scenario import Scenario
@@ -52,7 +52,10 @@ def contact(
     if json:
         write_json(_data(loaded, study, notes, figure))
     else:
+        from wearsim.cli.own_line import contact_line
+
         write_table(loaded.title, _rows(study))
+        write_line(contact_line(study))
     if figure is not None:
         _draw(loaded, study, figure)
     if not json:
@@ -167,6 +170,8 @@ def _data(
         "power_W": solution.power,
         "adhesion_fraction": solution.adhesion_fraction,
         "iterations": solution.iterations,
+        "power_error_W": None if study.grid_error is None else study.grid_error * solution.power,
+        "solve_seconds": study.seconds,
         "strips": {
             "y_m": solution.y,
             "half_length_m": solution.half_length,

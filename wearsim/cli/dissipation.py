@@ -20,7 +20,7 @@ from wearsim.cli.arguments import (
     check_figure,
     results_option,
 )
-from wearsim.cli.output import refuse_existing, tell_notes, write_json
+from wearsim.cli.output import refuse_existing, tell_notes, write_json, write_line
 
 if TYPE_CHECKING:
     from wearsim.results import DissipationResult
@@ -89,6 +89,7 @@ def _read(path: Path, settings: list[str] | None, plan: str | None, seed: int | 
 
 
 def _report(result: DissipationResult, json: bool, figure: Path | None) -> None:
+    from wearsim.cli.own_line import dissipation_line
     from wearsim.cli.spread import as_json, write_spread
 
     if json:
@@ -96,6 +97,7 @@ def _report(result: DissipationResult, json: bool, figure: Path | None) -> None:
         return
     more = [("results file", str(result.path))]
     write_spread(result, [*more, *([("figure", str(figure))] if figure else [])])
+    write_line(dissipation_line(result))
     tell_notes(result)
 
 

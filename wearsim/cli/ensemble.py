@@ -24,7 +24,7 @@ from wearsim.cli.arguments import (
     read_scenario,
     results_option,
 )
-from wearsim.cli.output import note, refuse_existing, tell_notes, write_json
+from wearsim.cli.output import note, refuse_existing, tell_notes, write_json, write_line
 
 if TYPE_CHECKING:
     from wearsim.cli.sweeping import Swept
@@ -227,6 +227,7 @@ def report(result: EnsembleResult, json: bool, figure: Path | None, workers: str
         If every realisation failed.
     """
     from wearsim.cli.ensemble_table import as_json, write_ensemble
+    from wearsim.cli.own_line import ensemble_line
 
     if json:
         write_json({**as_json(result), "workers": workers or None, "figure": figure})
@@ -234,6 +235,7 @@ def report(result: EnsembleResult, json: bool, figure: Path | None, workers: str
         more = [("results file", str(result.path))]
         more += [("figure", str(figure))] if figure else []
         write_ensemble(result, more, workers)
+        write_line(ensemble_line(result))
         tell_notes(result)
     tell_failures(result)
     _refuse_nothing(result)

@@ -54,6 +54,11 @@ def write_list(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
         typer.echo("  ".join(cells).rstrip())
 
 
+def write_line(text: str) -> None:
+    """Write a line to stdout."""
+    typer.echo(text)
+
+
 def write_json(data: Mapping[str, Any]) -> None:
     """Write one JSON object to stdout; numbers that are not finite become null."""
     typer.echo(json.dumps(plain(data), indent=2, ensure_ascii=False, allow_nan=False))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from wearsim.cli.arguments import Force, Json, Quiet, ScenarioFile, Settings, read_scenario
-from wearsim.cli.output import note, write_json, write_table
+from wearsim.cli.output import note, write_json, write_line, write_table
 
 if TYPE_CHECKING:
     from wearsim.results import Result
@@ -51,6 +51,7 @@ def run(
 
 def report(result: Result, json: bool) -> None:
     """Write how a run ended to stdout."""
+    from wearsim.cli.own_line import run_line
     from wearsim.cli.summary import as_json, draws, effort, end_state, standing
 
     if json:
@@ -58,3 +59,4 @@ def report(result: Result, json: bool) -> None:
         return
     rows = [("test", standing(result)), *draws(result), *end_state(result), *effort(result)]
     write_table(result.title, [*rows, ("results file", str(result.path))])
+    write_line(run_line(result))

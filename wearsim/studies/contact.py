@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from time import perf_counter
 
 import numpy as np
 
+from wearsim.errors import WearsimError
 from wearsim.plugins import ContactModel
 from wearsim.scenario import Scenario, described_model
 from wearsim.studies.build import bare_scene, load_range
@@ -19,6 +22,8 @@ from wearsim.types import (
     OperatingPoint,
     Profile,
 )
+
+_FEWEST = 5  # strips that tell an error
 
 
 @dataclass(frozen=True)
@@ -38,6 +43,11 @@ class ContactStudy:
         Name of the contact model.
     described_model : str
         The same with its options.
+    grid_error : float, optional
+        What half as many strips change of the power, as a part of it: more than these are off.
+        None where the model has no answer on those.
+    seconds : float
+        What the contact took, once compiled [s].
     notes : tuple of str
         What a user should know.
     """
@@ -49,6 +59,8 @@ class ContactStudy:
     point: OperatingPoint
     model: str
     described_model: str
+    grid_error: float | None
+    seconds: float
     notes: tuple[str, ...]
 
 
@@ -95,21 +107,61 @@ def study_contact(
     CapabilityError
         If the model cannot do what is asked.
     """
-    model, load = scenario.contact.build(), scenario.load.build()
+    model = scenario.contact.build()
     check_model(scenario, model)
-    force = load_range(scenario, load, 0.0)[0]
+    force = load_range(scenario, scenario.load.build(), 0.0)[0]
     profile = profile if profile is not None else scenario.cylinder.profile
     grid = _grid(scenario, model, force, profile)
+    gap, curvature, point = _problem(scenario, model, grid, force, profile)
+    solution = model.solve(gap, curvature, point)
+    seconds = _seconds(lambda: model.solve(gap, curvature, point))
+    fields = model.fields(solution, gap, curvature, point) if with_fields else None
+    name = scenario.contact.model
+    return ContactStudy(
+        solution,
+        fields,
+        gap,
+        grid,
+        point,
+        name,
+        described_model(name, scenario.text),
+        _grid_error(scenario, grid, force, profile, solution.power),
+        seconds,
+        scenario.notes,
+    )
+
+
+def _problem(
+    scenario: Scenario, model: ContactModel, grid: Grid, force: float, profile: Profile | None
+) -> tuple[FloatArray, float, OperatingPoint]:
+    """Prepare a model for strips; return gap [m], curvature along rolling [1/m] and the point."""
     model.prepare(grid, (scenario.cylinder.material, scenario.roller.material))
+    load = scenario.load.build()
     scene = bare_scene(scenario, model, load, grid, [0], np.ones(1), profile)
     unworn = np.zeros(grid.strips)
     point = scene.point(0, 0, force, unworn, unworn)
-    gap, curvature = scene.nominal_gap[0, 0, 0], scene.kinematics.longitudinal_curvature
-    solution = model.solve(gap, curvature, point)
-    fields = model.fields(solution, gap, curvature, point) if with_fields else None
-    name = scenario.contact.model
-    described = described_model(name, scenario.text)
-    return ContactStudy(solution, fields, gap, grid, point, name, described, scenario.notes)
+    return scene.nominal_gap[0, 0, 0], scene.kinematics.longitudinal_curvature, point
+
+
+def _grid_error(
+    scenario: Scenario, grid: Grid, force: float, profile: Profile | None, power: float
+) -> float | None:
+    """Return what half as many strips change of the power, as a part of it."""
+    ends = grid.y[0] - 0.5 * grid.spacing, grid.y[-1] + 0.5 * grid.spacing
+    if grid.strips < 2 * _FEWEST or power == 0.0:
+        return None
+    coarse, model = Grid.spanning(*ends, (grid.strips + 1) // 2), scenario.contact.build()
+    try:
+        solution = model.solve(*_problem(scenario, model, coarse, force, profile))
+    except WearsimError:
+        return None
+    return abs(solution.power / power - 1.0)
+
+
+def _seconds(function: Callable[[], object]) -> float:
+    start = perf_counter()
+    function()
+    return perf_counter() - start
 
 
 def solve_contact(scenario: Scenario, profile: Profile | None = None) -> ContactSolution:
