@@ -44,6 +44,7 @@ EVERYTHING = f"""
 import importlib, json, pkgutil
 import wearsim, wearsim.mechanics
 from pathlib import Path
+from wearsim.mechanics.kernel_dispatcher import Whole
 from wearsim.models.hertz_fastsim import HertzFastsim
 from wearsim.types import Creepage, Grid, Material, OperatingPoint
 
@@ -84,8 +85,10 @@ counts = {{}}
 for module in pkgutil.iter_modules(wearsim.mechanics.__path__):
     held = importlib.import_module(f"wearsim.mechanics.{{module.name}}")
     for name, value in vars(held).items():
-        if hasattr(value, "signatures") and value.__module__ == held.__name__:
-            counts[f"{{module.name}}.{{name}}"] = [str(types) for types in value.signatures]
+        if isinstance(value, Whole) and value.__module__ == held.__name__:
+            # as Python calls it and as other kernels do
+            called = {{str(types) for form in (value, value.part) for types in form.signatures}}
+            counts[f"{{module.name}}.{{name}}"] = sorted(called)
 print(json.dumps(counts))
 """
 

@@ -2,7 +2,7 @@
 
 ``python -m tests.benchmarks.models -o out/models.md``. A contact model that is installed from
 elsewhere, as the plugin template's is for this, stands in the tables of worn profiles and whole
-tests with its default options.
+tests with its default options and every choice that changes the normal contact.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from wearsim.bench.accuracy import (
     worn_errors,
 )
 from wearsim.bench.contact_cases import elliptic_cases
+from wearsim.bench.contact_methods import normal_methods
 from wearsim.bench.exact import WORN
 from wearsim.bench.machine import this_machine
 from wearsim.bench.timing import best_short, timed
 from wearsim.errors import WearsimError
-from wearsim.plugins import ContactModelSpec, registry
 from wearsim.plugins.template import template_folder
 from wearsim.report.units import brief
 
@@ -48,20 +48,13 @@ TANGENTIAL: dict[str, tuple[str, dict[str, Any]]] = {
     "fastsim, parabolic, one flexibility": ("hertz-fastsim", {"flexibility": "one"}),
     "strip, on `slender` (the default)": ("slender", {}),
 }
-VARIANTS = ("kik-piotrowski", "ayasse-chollet", "analyn")
 LONG = 3.0  # b/a from which the theories of strips apply
 FAILED = "no: "
 
 
 def normal_models() -> dict[str, tuple[str, dict[str, Any]]]:
-    """Return every registered contact model, with its variants, each with default options."""
-    found: dict[str, tuple[str, dict[str, Any]]] = {}
-    for name in registry().names(ContactModelSpec):
-        if name == "semi-hertzian":
-            found |= {f"{name}, {variant}": (name, {"variant": variant}) for variant in VARIANTS}
-        else:
-            found[name] = (name, {})
-    return found
+    """Return every registered contact model, with every choice that changes the normal contact."""
+    return {method.name: (method.model, dict(method.options)) for method in normal_methods()}
 
 
 def drawn_table(repetitions: int) -> str:

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from study_examples import LOADS, ROLLERS, STEPPERS, short, unlike
 
+from wearsim.errors import StepError
 from wearsim.evolution.per_pass import PerPassStepper
+from wearsim.evolution.twin import TwinStepper
 from wearsim.results import Result
 from wearsim.studies import replay
 
@@ -63,6 +65,42 @@ def _shared(one: Result, other: Result) -> tuple[list[int], list[int]]:
     _, here, there = np.intersect1d(one.record_passes, other.record_passes, return_indices=True)
     assert len(here) >= 2
     return here.tolist(), there.tolist()
+
+
+def _short_side_steps(monkeypatch: pytest.MonkeyPatch, longest: float) -> list[float]:
+    """Let side steps longer than `longest` passes fail; return the lengths of those taken."""
+    taken, side_step = [], TwinStepper.side_step
+
+    def step(self, scene, state, passes):
+        if passes > longest:
+            raise StepError(f"{passes} passes are too many")
+        taken.append(passes)
+        return side_step(self, scene, state, passes)
+
+    monkeypatch.setattr(TwinStepper, "side_step", step)
+    return taken
+
+
+def test_that_a_record_out_of_reach_of_one_step_is_reached_in_halves(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    scenario = short(**{"outputs.records": 12, "outputs.spacing": "log"})
+    whole = replay.run(scenario)
+    taken = _short_side_steps(monkeypatch, 40.0)
+    halves = replay.run(scenario)
+    assert max(taken) <= 40.0
+    assert {name.partition(".")[0] for name in unlike(halves, whole)} <= {"records"}
+    np.testing.assert_array_equal(halves.record_passes, whole.record_passes)
+    apart = np.abs(halves.profiles - whole.profiles).max()
+    assert 0.0 < apart < 1e-3 * whole.depth[-1]
+
+
+def test_that_a_record_out_of_reach_of_any_step_ends_the_run(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    _short_side_steps(monkeypatch, 0.0)
+    with pytest.raises(StepError, match="too many"):
+        replay.run(short(**{"outputs.records": 12, "outputs.spacing": "log"}))
 
 
 @pytest.mark.parametrize("stepper", ["compiled passes", "passes in Python"])

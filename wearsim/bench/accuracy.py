@@ -2,24 +2,38 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from wearsim.bench.exact import CREEPAGES, STEEL, rows, strips_of, worn_profile
+from wearsim.bench.contact_cases import MATERIALS, Case, elliptic_cases, worn_cases
+from wearsim.bench.contact_width import contact_width
+from wearsim.bench.exact import worn_profile
 from wearsim.errors import ContactError
 from wearsim.plugins import ContactModel, ContactModelSpec, registry
-from wearsim.types import ContactSolution, Creepage, FloatArray, Grid, OperatingPoint
+from wearsim.types import ContactSolution, FloatArray, Grid
 
-MATERIALS = (STEEL, STEEL)
-WORN_GRID = Grid.spanning(-4e-3, 4e-3, 321)
-WORN_CURVATURE, WORN_B = 45.0, 0.5  # 1/m, twice the data's A, and its B
+WORN_STRIPS = 321
+
+
+@dataclass(frozen=True)
+class CaseErrors:
+    """Errors of one contact, relative to the exact theory; all but that of P_l(y) have a sign.
+
+    Power, P_l(y) (L2 over the strips), width and greatest pressure.
+    """
+
+    power: float
+    dissipation: float
+    width: float
+    peak_pressure: float
 
 
 @dataclass(frozen=True)
 class PowerErrors:
-    """Errors over many draws: of the power, rms and worst, and L2 of P_l(y), median."""
+    """Errors over many contacts: of the power, rms and worst, and L2 of P_l(y), median."""
 
     rms: float
     worst: float
@@ -48,16 +62,37 @@ def built(name: str, **options: Any) -> ContactModel:
     return spec.factory(spec.options(**options))
 
 
-def solved(model: ContactModel, row: dict[str, Any]) -> ContactSolution:
-    """Solve an elliptic case of the reference data at V = 1 m/s on strips of the model's choice."""
-    curvatures = 2.0 * row["B_per_m"], 2.0 * row["A_per_m"]
-    grid = model.suggest_grid(*curvatures, row["N_N"], MATERIALS)
-    if grid is None:
-        raise ContactError("the model suggests no strips for an elliptic contact", {})
+def solved(
+    model: ContactModel, case: Case, strips: int | None = None
+) -> tuple[ContactSolution, Grid]:
+    """Prepare a model and solve a case, by default on strips of the model's choice."""
+    grid = case.grid(model, strips)
     model.prepare(grid, MATERIALS)
-    creepage = Creepage(row["xi"], row["eta"], row["phi_per_m"])
-    point = OperatingPoint(row["N_N"], 1.0, creepage, row["mu"])
-    return model.solve(row["B_per_m"] * grid.y**2, curvatures[1], point)
+    return model.solve(case.gap_at(grid.y), case.longitudinal_curvature, case.point), grid
+
+
+def errors_of(solution: ContactSolution, grid: Grid, case: Case) -> CaseErrors:
+    """Return the errors of a solution.
+
+    Raises
+    ------
+    ContactError
+        If one is not finite.
+    """
+    exact = case.exact
+    errors = CaseErrors(
+        power=solution.power / exact.power - 1.0,
+        dissipation=l2(
+            solution.dissipation,
+            np.interp(solution.y, exact.y, exact.dissipation, left=0.0, right=0.0),
+        ),
+        width=contact_width(solution.line_load, grid.spacing) / exact.width - 1.0,
+        peak_pressure=solution.peak_pressure / exact.peak_pressure - 1.0,
+    )
+    wrong = [name for name, error in vars(errors).items() if not np.isfinite(error)]
+    if wrong:
+        raise ContactError(f"what it gives for {', '.join(wrong)} is not finite", vars(errors))
+    return errors
 
 
 def l2(found: FloatArray, exact: FloatArray) -> float:
@@ -65,27 +100,27 @@ def l2(found: FloatArray, exact: FloatArray) -> float:
     return float(np.sqrt(((found - exact) ** 2).sum() / (exact**2).sum()))
 
 
+def rms(errors: Iterable[float]) -> float:
+    """Return the root of the mean square of errors."""
+    return float(np.sqrt(np.mean(np.square(list(errors)))))
+
+
 def drawn_errors(model: ContactModel, kind: str) -> PowerErrors:
     """Return the errors over the 40 draws of `rig_random` of a kind, `paper` or `partial`."""
-    y_over_b, dissipation = strips_of(kind)
-    powers, strips = [], []
-    for row, exact in zip(rows("rig_random", kind=kind), dissipation, strict=True):
-        solution = solved(model, row)
-        powers.append(solution.power / row["P_over_V_N"] - 1.0)
-        strips.append(l2(solution.dissipation, np.interp(solution.y, y_over_b * row["b_m"], exact)))
-    return _summed(powers, strips)
+    return _over(model, elliptic_cases(kind))
 
 
 def hard_errors(model: ContactModel, least_ratio: float) -> PowerErrors:
-    """Return the errors over the hard cases whose b/a is at least so much; no strips are known."""
-    chosen = [row for row in rows("hard_cases") if row["b_m"] >= least_ratio * row["a_m"]]
-    powers = [solved(model, row).power / row["P_over_V_N"] - 1.0 for row in chosen]
-    return _summed(powers, [np.nan])
+    """Return the errors over the hard cases whose b/a is at least so much."""
+    cases = elliptic_cases("hard")
+    return _over(model, [c for c in cases if c.patch.b >= least_ratio * c.patch.a])
 
 
-def _summed(powers: list[float], strips: list[float]) -> PowerErrors:
-    rms = float(np.sqrt(np.mean(np.square(powers))))
-    return PowerErrors(rms, float(np.abs(powers).max()), float(np.median(strips)))
+def _over(model: ContactModel, cases: Iterable[Case]) -> PowerErrors:
+    found = [errors_of(*solved(model, case), case) for case in cases]
+    powers = [errors.power for errors in found]
+    strips = float(np.median([errors.dissipation for errors in found]))
+    return PowerErrors(rms(powers), float(np.abs(powers).max()), strips)
 
 
 def worn_errors(model: ContactModel, name: str) -> WornErrors:
@@ -96,28 +131,20 @@ def worn_errors(model: ContactModel, name: str) -> WornErrors:
     ContactError
         If the model has no answer on it.
     """
-    exact = worn_profile(name)
-    model.prepare(WORN_GRID, MATERIALS)
-    gap = np.interp(WORN_GRID.y, exact["y"], exact["w"])
-    # beyond the data, where there is no contact, all profiles go on as the crown does
-    beyond = np.maximum(np.abs(WORN_GRID.y), exact["y"][-1])
-    gap += WORN_B * (beyond**2 - exact["y"][-1] ** 2)
-    found = {}
-    for case, creepage in CREEPAGES.items():
-        point = OperatingPoint(300.0, 1.0, Creepage(*creepage), 0.1)
-        found[case] = model.solve(gap, WORN_CURVATURE, point)
-    solution = found["mean"]
+    exact, cases = worn_profile(name), worn_cases(name)
+    found = {slip: solved(model, case, WORN_STRIPS) for slip, case in cases.items()}
+    errors = {slip: errors_of(*found[slip], case) for slip, case in cases.items()}
+    solution, grid = found["mean"]
 
-    def at_strips(key: str) -> FloatArray:
-        found: FloatArray = np.interp(WORN_GRID.y, exact["y"], exact[key], left=0.0, right=0.0)
-        return found
+    def l1(values: FloatArray, key: str) -> float:
+        true = np.interp(grid.y, exact["y"], exact[key], left=0.0, right=0.0)
+        return float(np.abs(values - true).sum() / true.sum())
 
-    q, a = at_strips("q"), at_strips("a")
     return WornErrors(
-        line_load=float(np.abs(solution.line_load - q).sum() / q.sum()),
-        half_length=float(np.abs(solution.half_length - a).sum() / a.sum()),
+        line_load=l1(solution.line_load, "q"),
+        half_length=l1(solution.half_length, "a"),
         approach=solution.approach / exact["approach"] - 1.0,
-        peak_pressure=solution.peak_pressure / exact["peak_pressure"] - 1.0,
-        dissipation={c: l2(s.dissipation, at_strips(f"P_l_over_V_{c}")) for c, s in found.items()},
-        power={c: s.power / exact[f"P_over_V_{c}"] - 1.0 for c, s in found.items()},
+        peak_pressure=errors["mean"].peak_pressure,
+        dissipation={slip: error.dissipation for slip, error in errors.items()},
+        power={slip: error.power for slip, error in errors.items()},
     )

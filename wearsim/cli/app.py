@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from wearsim.cli.bench import bench
 from wearsim.cli.check import check
 from wearsim.cli.compare import compare
 from wearsim.cli.contact import contact
@@ -37,7 +38,7 @@ app = typer.Typer(
 )
 for verb in (
     check, contact, dissipation, run, ensemble, resume, show, plot, compare, export, maxent,
-    reproduce, plugins, schema,
+    reproduce, bench, plugins, schema,
 ):  # fmt: skip
     app.command()(verb)
 app.add_typer(new)

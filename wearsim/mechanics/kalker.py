@@ -174,17 +174,18 @@ def spline(which: int) -> Spline:
     short = np.array(_SHORT.split(), dtype=np.float64).reshape(-1, 4, 3)[:, which]
     long = np.array(_LONG.split(), dtype=np.float64).reshape(-1, 4, 3)[::-1, which]
     ratios = [*_RATIOS, *(1.0 / ratio for ratio in _RATIOS[-2::-1])]
-    table = np.vstack([short, long])
+    known = np.vstack([short, long])
     if which == 3:
         ratios.append(20.0)
-        table = np.vstack([table, _C33_AT_20])
-    knots, values = np.log(ratios), np.log(table)
-    outside, inside = ratios[0], 1.0 / ratios[-1]
+        known = np.vstack([known, _C33_AT_20])
+    knots, values = np.log(ratios), np.log(known)
+    # just outside the knots no slope counts
+    table = Spline(knots, values, np.zeros_like(values))
     small = 1e-5
     first, last = np.empty(3), np.empty(3)
     for k, nu in enumerate(_NODES):
-        below = _approach_short(which, outside * math.exp(-small), outside, table[0, k], nu)
-        above = _approach_long(which, inside * math.exp(-small), inside, table[-1, k], nu)
+        below = coefficient(which, math.exp(knots[0] - small), nu, table)
+        above = coefficient(which, math.exp(knots[-1] + small), nu, table)
         first[k] = (values[0, k] - math.log(below)) / small
         last[k] = (math.log(above) - values[-1, k]) / small
     slopes = _spline_slopes(knots, values, first, last)

@@ -26,7 +26,7 @@ def ratio_to_load(wear: FloatArray, line_load: FloatArray) -> FloatArray:
         Linear between loaded strips, and constant beyond them [m/(N/m)].
     """
     contacts, n = wear.shape
-    ratio = np.zeros((contacts, n))
+    ratio = np.empty((contacts, n))
     for k in range(contacts):
         last = -1
         for i in range(n):

@@ -13,6 +13,7 @@ from wearsim.evolution.joining import Flock, joined_states, scene_of, state_of
 from wearsim.evolution.state import WearState
 from wearsim.evolution.together import Path, Together
 from wearsim.studies.member_runs import Member, Observed, Row, observed_alone, rows_of_states
+from wearsim.studies.recorder import stepped_aside
 from wearsim.studies.schedule import RecordSchedule
 from wearsim.types import FloatArray, IntArray
 
@@ -133,7 +134,8 @@ class MemberGroup:
         if not sides.size:
             return flock.state
         some, later = flock.at(sides), passes[sides]
-        stepped = self._stepper.side_step(some.scene, some.state, later - now[sides])
+        step = self._stepper.side_step
+        stepped = stepped_aside(step, some.scene, some.state, later - now[sides])
         order = np.arange(len(now))
         order[sides] = len(order) + np.arange(len(sides))
         return state_of(joined_states([flock.state, stepped.moved(later)]), order)

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from wearsim.errors import ContactError, StepError
 from wearsim.evolution.advance import (
     contacts_at,
     cylinder_depth_of,
@@ -14,12 +15,14 @@ from wearsim.evolution.advance import (
     present_loads,
     solve_present,
 )
+from wearsim.evolution.errors_of_steps import Step
 from wearsim.evolution.observables import depth, width, worn_volume
 from wearsim.evolution.scene import Scene
 from wearsim.evolution.state import WearState, contact_values
 from wearsim.evolution.stepper import Advance, Stepper
+from wearsim.evolution.trial import SMALLEST_STEP
 from wearsim.studies.schedule import RecordSchedule
-from wearsim.types import FloatArray
+from wearsim.types import FloatArray, Number
 
 Row = dict[str, object]
 
@@ -68,7 +71,37 @@ def at_record(scene: Scene, stepper: Stepper, start: WearState, passes: float) -
     A profile interpolated between two steps would not fit its contact: line loads feel a tenth of
     a micrometre. A side step does, and leaves the run as it is.
     """
-    return replace(stepper.side_step(scene, start, passes - start.passes), passes=passes)
+
+    def step(scene: Scene, state: WearState, passes: Number) -> WearState:
+        return stepper.side_step(scene, state, float(passes))
+
+    return replace(stepped_aside(step, scene, start, passes - start.passes), passes=passes)
+
+
+def stepped_aside(step: Step, scene: Scene, state: WearState, passes: Number) -> WearState:
+    """Return the state `passes` later by one side step, or by halves where there is no such step.
+
+    Parameters
+    ----------
+    step : callable
+        Takes a scene, a state and a number of passes to the state after them.
+    scene : Scene
+    state : WearState
+    passes : float or ndarray, shape (realisations,)
+        Halved for one test alone: what becomes of it must not hang on others.
+
+    Raises
+    ------
+    StepError, ContactError
+        If halves would be too short.
+    """
+    try:
+        return step(scene, state, passes)
+    except (StepError, ContactError):
+        half = 0.5 * passes
+        if np.size(half) > 1 or np.max(half) < SMALLEST_STEP:
+            raise
+    return stepped_aside(step, scene, stepped_aside(step, scene, state, half), half)
 
 
 def present_contacts(scene: Scene, state: WearState, pass_by_pass: bool) -> tuple[Scene, WearState]:

@@ -153,6 +153,20 @@ def strips_per_half_width(tolerance: float) -> float:
     return float(np.clip(needed, FEWEST_PER_HALF_WIDTH, STRIPS_PER_HALF_WIDTH))
 
 
+def strips_over(width: float, half_width: float, tolerance: float) -> int:
+    """Return into how many strips a run cuts a track, an odd number.
+
+    Parameters
+    ----------
+    width, half_width : float
+        Of the track, and of the fresh patch [m].
+    tolerance : float
+        Relative error of the test.
+    """
+    strips = int(np.ceil(width / half_width * strips_per_half_width(tolerance)))
+    return min(strips + (strips + 1) % 2, MOST_STRIPS)
+
+
 def greatest_slip(scenario: Scenario, half_width: float, drawn: Drawn) -> float:
     """Return the greatest rigid slip within `half_width` [m] of a contact's middle."""
     creepage, roller = scenario.creepage, scenario.roller
@@ -191,8 +205,7 @@ def run_grid(scenario: Scenario, load: float, drawn: Drawn = NOTHING_DRAWN) -> G
     width = choice.width if choice.width is not None else 2.0 * half
     strips = choice.strips
     if strips is None:
-        strips = int(np.ceil(width / patch.b * strips_per_half_width(scenario.evolution.tolerance)))
-        strips = min(strips + (strips + 1) % 2, MOST_STRIPS)
+        strips = strips_over(width, patch.b, scenario.evolution.tolerance)
     if width < 2.0 * (reach + patch.b):
         needed = f"at least {2e3 * (reach + patch.b):.4g} mm"
         problem = Problem(

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 Answer: TypeAlias = tuple[list[Any], Exception | None]
 """The results of a batch, or what went wrong."""
 
-_ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 
 def answer(work: Work, numbers: Batch) -> Answer:
@@ -82,8 +82,8 @@ def _sendable(error: Exception) -> Exception:
 @contextmanager
 def starting_workers() -> Iterator[None]:
     """Let processes that are started meanwhile use one thread each and never see a Ctrl-C."""
-    before = {name: os.environ.get(name) for name in _ONE_THREAD}
-    os.environ.update(_ONE_THREAD)
+    before = {name: os.environ.get(name) for name in ONE_THREAD}
+    os.environ.update(ONE_THREAD)
     try:
         if sys.platform == "win32":
             yield

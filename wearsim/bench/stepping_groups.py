@@ -1,0 +1,225 @@
+"""What is stepped, and how: every stepper, every contact model, every number of strips."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import get_args
+
+from wearsim.bench.contact_measured import why
+from wearsim.bench.contact_methods import Method
+from wearsim.bench.measured import Measurement
+from wearsim.bench.stepping_solvers import SOLVERS, Solver, solved_by
+from wearsim.bench.stepping_tests import End, Ready, WearTest, errors_of
+from wearsim.bench.timing import least
+from wearsim.evolution.per_pass import is_compiled
+from wearsim.evolution.scene import Scene
+from wearsim.scenario.sections import DEFAULT_TOLERANCE, EvolutionTable
+
+EVERY_PASS = "per-pass"
+CONVERGED = 1e-5  # tolerance of a solver whose error no stepper comes near
+MOST_STEPS = 1500  # after which a stepper is not asked for still closer tolerances
+_FEW = 1e-4  # of the passes, stepped first so that nothing compiles while it is timed
+_STEPPERS = tuple(
+    name
+    for name in get_args(EvolutionTable.model_fields["stepper"].annotation)
+    if name not in {"auto", EVERY_PASS}
+)
+#: takes passes, and steps a test from fresh bodies over as many
+Steps = Callable[[float], End]
+
+
+@dataclass(frozen=True)
+class Bench:
+    """A test that is stepped by one contact model, and how often each way is timed.
+
+    Parameters
+    ----------
+    group : str
+        Name of the group that its measurements belong to.
+    test : WearTest
+    model : Method
+        The contact model.
+    repetitions : int
+    """
+
+    group: str
+    test: WearTest
+    model: Method
+    repetitions: int
+
+    def ready(self, strips: int, **evolution: object) -> Ready:
+        """Return the test on so many strips, with keys of its table [evolution]."""
+        contact = {"model": self.model.model, "strips": strips, **self.model.options}
+        return Ready(self.test.asked({"contact": contact, "evolution": evolution}))
+
+    def exact(self, strips: int) -> tuple[Measurement, End]:
+        """Return the end that the others are held against, and what it took.
+
+        Every pass by itself where there is compiled code for it, else what a solver converges to.
+
+        Raises
+        ------
+        SolverError, CapabilityError
+            If it has none.
+        """
+        ready = self.ready(strips, stepper=EVERY_PASS)
+        if is_compiled(ready.scene):
+            ready.stepped(1.0)
+            end, seconds = least(lambda: ready.stepped(ready.stop), 1)
+            return self._row(EVERY_PASS, "every pass", seconds, end), end
+        steps = partial(by_solver, "LSODA", ready.scene, CONVERGED)
+        end, seconds = least(lambda: steps(ready.stop), 1)
+        return self._row("LSODA", f"converged, {_power(CONVERGED)}", seconds, end), end
+
+    def measured(
+        self,
+        method: str,
+        setting: str,
+        prepare: Callable[[], tuple[Steps, float]],
+        exact: End,
+        default: bool = False,
+    ) -> Measurement:
+        """Return error and time of one way to step the test.
+
+        Parameters
+        ----------
+        method, setting : str
+        prepare : callable
+            Returns what steps the test, and its passes.
+        exact : End
+        default : bool
+        """
+        try:
+            steps, stop = prepare()
+            steps(max(_FEW * stop, 1.0))
+            end, seconds = least(lambda: steps(stop), self.repetitions)
+            return self._row(method, setting, seconds, end, errors_of(end, exact), default)
+        except Exception as error:
+            return Measurement(self.group, method, setting, failed=why(error))
+
+    def _row(
+        self,
+        method: str,
+        setting: str,
+        seconds: float,
+        end: End,
+        errors: Mapping[str, float] | None = None,
+        default: bool = False,
+    ) -> Measurement:
+        state = end.state
+        counts = {"steps": state.steps} if state.steps else {}
+        return Measurement(
+            group=self.group,
+            method=method,
+            setting=setting,
+            seconds=seconds,
+            errors=errors or {},
+            counts={**counts, "solves": state.solves},
+            default=default,
+        )
+
+
+def by_solver(solver: Solver, scene: Scene, tolerance: float, passes: float) -> End:
+    """Step a scene over some passes by a solver of scipy's; parameters as of `solved_by`."""
+    return End(scene, solved_by(solver, scene, passes, tolerance))
+
+
+def of_steppers(bench: Bench, tolerances: Sequence[float]) -> Iterator[Measurement]:
+    """Yield every stepper and solver over tolerances, all on the strips of the default one.
+
+    Parameters
+    ----------
+    bench : Bench
+    tolerances : sequence of float
+        The coarsest first. A way that fails at several for one reason is told once; one that takes
+        more than `MOST_STEPS` goes no further.
+    """
+    strips = bench.test.grid().strips
+    try:
+        row, exact = bench.exact(strips)
+    except Exception as error:
+        yield Measurement(bench.group, EVERY_PASS, "every pass", failed=why(error))
+        return
+    yield row
+    usual = bench.ready(strips).name
+    for method in (*_STEPPERS, *SOLVERS):
+        told = set()
+        for tolerance in tolerances:
+            found = bench.measured(
+                method,
+                f"tolerance {_power(tolerance)}",
+                partial(_prepared, bench, strips, method, tolerance),
+                exact,
+                default=method == usual and tolerance == DEFAULT_TOLERANCE,
+            )
+            if found.failed not in told or not found.failed:
+                yield found
+            told.add(found.failed)
+            if found.counts.get("steps", 0) > MOST_STEPS:
+                break
+
+
+def _prepared(bench: Bench, strips: int, method: str, tolerance: float) -> tuple[Steps, float]:
+    solver = next((name for name in SOLVERS if name == method), None)
+    if solver is not None:
+        ready = bench.ready(strips)
+        return partial(by_solver, solver, ready.scene, tolerance), ready.stop
+    ready = bench.ready(strips, stepper=method, tolerance=tolerance)
+    return ready.stepped, ready.stop
+
+
+def of_model(bench: Bench, tolerances: Sequence[float]) -> Iterator[Measurement]:
+    """Yield a contact model with the stepper it gets, held against its own end and no other's.
+
+    Parameters
+    ----------
+    bench : Bench
+    tolerances : sequence of float
+    """
+    strips, name = bench.test.grid().strips, bench.model.name
+    try:
+        _, exact = bench.exact(strips)
+        usual = bench.ready(strips).name
+    except Exception as error:
+        yield Measurement(bench.group, name, "every pass", failed=why(error))
+        return
+    for tolerance in tolerances:
+        yield bench.measured(
+            name,
+            f"{usual}, {_power(tolerance)}",
+            partial(_prepared, bench, strips, usual, tolerance),
+            exact,
+            default=bench.model.default and tolerance == DEFAULT_TOLERANCE,
+        )
+
+
+def of_strips(bench: Bench, counts: Sequence[int]) -> Iterator[Measurement]:
+    """Yield numbers of strips, by the default steps and by steps whose error is next to none.
+
+    They are held against twice as many strips as there are by default.
+
+    Parameters
+    ----------
+    bench : Bench
+    counts : sequence of int
+        Numbers of strips, besides that of the default.
+    """
+    default = bench.test.grid().strips
+    finest = bench.ready(2 * default + 1)
+    exact = by_solver("LSODA", finest.scene, CONVERGED, finest.stop)
+    for method, tolerance in ((finest.name, DEFAULT_TOLERANCE), ("LSODA", CONVERGED)):
+        for strips in sorted({*counts, default}):
+            yield bench.measured(
+                f"{method}, {_power(tolerance)}",
+                f"{strips} strips",
+                partial(_prepared, bench, strips, method, tolerance),
+                exact,
+                default=method == finest.name and strips == default,
+            )
+
+
+def _power(tolerance: float) -> str:
+    """Return a tolerance in as few characters as it takes: "1e-3"."""
+    return f"{tolerance:.0e}".replace("e-0", "e-")
