@@ -59,6 +59,15 @@ def test_that_contacts_are_taken_and_joined_along_the_last_axis():
     assert all(column.flags.c_contiguous for column in replaced.columns.values())
 
 
+def test_that_an_axis_of_contacts_is_moved_and_moved_back():
+    found = batch()
+    moved = found.with_axis_moved(2, 0)
+    assert moved.shape == (3, 1, 2)
+    assert numbers(moved) == [0, 3, 1, 4, 2, 5]
+    assert moved.columns["line_load"].flags.c_contiguous
+    assert numbers(moved.with_axis_moved(0, 2)) == numbers(found)
+
+
 def test_that_points_are_taken_by_number():
     column = np.arange(4.0)
     points = OperatingPoints(

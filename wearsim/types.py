@@ -144,6 +144,17 @@ class OperatingPoint:
     rolling_radius: FloatArray | None = None
     friction_carried: bool = False
 
+    @property
+    def kind(self) -> tuple[object, ...]:
+        """What points must have in common to be columns of `OperatingPoints`."""
+        return (
+            self.rolling_speed,
+            self.bearing_torque,
+            np.shape(self.friction),
+            self.friction_carried,
+            self.creepage.variation is None,
+        )
+
 
 @dataclass(frozen=True)
 class OperatingPoints(Sequence[OperatingPoint]):
@@ -173,12 +184,12 @@ class OperatingPoints(Sequence[OperatingPoint]):
     friction_carried: bool = False
 
     def __post_init__(self) -> None:
+        count = len(self.normal_force)
         for name in ("longitudinal", "lateral", "spin", "friction", "variation"):
             column = getattr(self, name)
-            if column is not None and len(column) != len(self.normal_force):
+            if column is not None and len(column) != count:
                 raise ValueError(
-                    f"{name} has {len(column)} values for {len(self.normal_force)} contacts;"
-                    " give every contact one"
+                    f"{name} has {len(column)} values for {count} contacts; give every contact one"
                 )
 
     @classmethod
@@ -186,17 +197,9 @@ class OperatingPoints(Sequence[OperatingPoint]):
         """Return `points` as columns, or None where they are not all of one kind."""
         if isinstance(points, cls):
             return points
-        kinds = {
-            (
-                point.rolling_speed,
-                point.bearing_torque,
-                np.shape(point.friction),
-                point.friction_carried,
-                point.creepage.variation is None,
-            )
-            for point in points
-        }
-        if len(kinds) != 1 or points[0].bearing_torque is not None:
+        if not points or points[0].bearing_torque is not None:
+            return None
+        if len(points) > 1 and len({point.kind for point in points}) > 1:
             return None
         creepages = [point.creepage for point in points]
         plain = creepages[0].variation is None
@@ -341,7 +344,7 @@ class BatchSolution(Sequence[ContactSolution]):
 
     shape: tuple[int, ...]
     y: FloatArray
-    columns: Mapping[str, npt.NDArray[np.generic]]
+    columns: Mapping[str, npt.NDArray[Any]]
 
     @classmethod
     def of(cls, shape: tuple[int, ...], solutions: Sequence[ContactSolution]) -> BatchSolution:
@@ -350,7 +353,7 @@ class BatchSolution(Sequence[ContactSolution]):
         columns = {name: values.reshape(shape + values.shape[1:]) for name, values in rows.items()}
         return cls(shape, solutions[0].y, columns)
 
-    def stack(self, name: str) -> npt.NDArray[np.generic]:
+    def stack(self, name: str) -> npt.NDArray[Any]:
         """Return the field `name` of every contact as one array with the leading axes first."""
         if name == "y":
             return np.broadcast_to(self.y, self.shape + self.y.shape)
@@ -387,8 +390,19 @@ class BatchSolution(Sequence[ContactSolution]):
     def at(self, numbers: IntArray) -> BatchSolution:
         """Return the contacts at some places of the last leading axis, in that order."""
         last = len(self.shape) - 1
-        columns = {name: np.take(c, numbers, axis=last) for name, c in self.columns.items()}
+        columns = {name: c.take(numbers, axis=last) for name, c in self.columns.items()}
         return BatchSolution((*self.shape[:-1], len(numbers)), self.y, columns)
+
+    def with_axis_moved(self, source: int, target: int) -> BatchSolution:
+        """Return the contacts in another order, with a leading axis at another place."""
+        axes = len(self.shape)
+        order = list(range(axes))
+        order.insert(target, order.pop(source))
+        columns = {
+            name: np.ascontiguousarray(c.transpose(*order, *range(axes, c.ndim)))
+            for name, c in self.columns.items()
+        }
+        return BatchSolution(tuple(self.shape[axis] for axis in order), self.y, columns)
 
     def joined_with(self, *others: BatchSolution) -> BatchSolution:
         """Return these contacts and others behind them along the last leading axis."""

@@ -5,11 +5,19 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+import scipy.special
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wearsim.bench.exact import rows, table
-from wearsim.mechanics.fastsim import march, march_local, new_sums
+from wearsim.mechanics.fastsim import (
+    bound_shape,
+    end_weights,
+    march,
+    march_local,
+    new_sums,
+    place_of,
+)
 from wearsim.mechanics.fastsim_closed_form import closed_form, closed_form_parabolic
 from wearsim.mechanics.fastsim_fields import element_sum, march_fields, march_local_fields
 from wearsim.mechanics.hertz import hertz
@@ -72,6 +80,23 @@ def rig(strips=50, xi=1e-3, eta=0.0, phi=0.0, elliptic=False, curvatures=(45.0, 
     )
 
 
+def edge(points, elliptic):
+    """Return what the last inner point weighs: by this a parabola is integrated exactly."""
+    place = 1.0 - 2.0 * np.arange(1, points) / points
+    if elliptic:
+        return 1.0 - scipy.special.zeta(-0.5) * math.sqrt(points / (points - 1.0))
+    missing = 4.0 / 3.0 - 2.0 / points * (1.0 - place**2).sum()
+    return 1.0 + 0.25 * points * missing / (1.0 - place[0] ** 2)
+
+
+def weights(sticks, elliptic):
+    """Return the weights of a march's points, (points, strips), for where it sticks."""
+    points = len(sticks)
+    found = [end_weights(k, points, elliptic) for k in range(1, points + 1)]
+    sticking, sliding = np.array(found).T[:, :, None]
+    return np.where(sticks, sticking, sliding)
+
+
 def twin(half_length, bound_peak, elliptic, gradient_x, gradient_y, gradient_spin, points):
     """March one strip after another, as a textbook would write it."""
     sums = np.zeros((4, len(half_length)))
@@ -90,7 +115,12 @@ def twin(half_length, bound_peak, elliptic, gradient_x, gradient_y, gradient_spi
                 traction = traction * (bound / size)
             else:
                 sums[3, j] += dx
-            sums[:3, j] += traction[0] * dx, traction[1] * dx, x * traction[1] * dx
+            weight = dx
+            if k == 0:
+                weight *= edge(points, elliptic) if size > bound else 13.0 / 12.0
+            elif k == points - 2:
+                weight *= edge(points, elliptic)
+            sums[:3, j] += np.array([traction[0], traction[1], x * traction[1]]) * weight
     return sums
 
 
@@ -100,7 +130,15 @@ def local(case, friction, first=0):
     half_length, bound_peak, elliptic, *gradients = case.arguments
     flexible = case.flex.longitudinal, case.flex.lateral
     march_local(
-        half_length, bound_peak / 0.1, friction, first, elliptic, *gradients, *flexible, sums
+        len(half_length),
+        half_length,
+        bound_peak / 0.1,
+        friction,
+        first,
+        elliptic,
+        *gradients,
+        *flexible,
+        sums,
     )
     return sums
 
@@ -130,15 +168,16 @@ def test_that_the_fields_add_up_to_the_sums_of_the_march(scene, elliptic):
     traction_x, traction_y, cut_x, cut_y = march_fields(*case.arguments, 40)
     place = np.linspace(1.0, -1.0, 41)[:, None] * case.half_length
     dx = case.half_length / 20.0
+    sticks = (cut_x == 0.0) & (cut_y == 0.0)
+    counted = weights(sticks[1:], elliptic)
     for found, whole in (
         (sums[0], traction_x),
         (sums[1], traction_y),
         (sums[2], place * traction_y),
     ):
-        expected = whole.sum(axis=0) * dx
+        expected = (counted * whole[1:]).sum(axis=0) * dx
         assert found == pytest.approx(expected, rel=1e-9, abs=1e-10 * np.abs(whole).max() * dx[5])
-    sticks = ((cut_x == 0.0) & (cut_y == 0.0))[1:].sum(axis=0)
-    assert sums[3] == pytest.approx(sticks * dx, rel=1e-12)
+    assert sums[3] == pytest.approx(sticks[1:].sum(axis=0) * dx, rel=1e-12)
 
 
 @pytest.mark.parametrize("elliptic", [False, True])
@@ -164,10 +203,22 @@ def test_that_a_field_of_friction_adds_up_as_its_inside_does(scene):
     assert np.all(size <= bound * (1.0 + 1e-12) + 1e-3)
     found, dx = local(case, friction, first=2), half_length / 15.0
     scale = size.max() * dx.max()
-    assert found.force_x == pytest.approx(inside[0].sum(axis=0) * dx, abs=1e-12 * scale)
-    assert found.force_y == pytest.approx(inside[1].sum(axis=0) * dx, abs=1e-12 * scale)
+    counted = weights(((inside[2] == 0.0) & (inside[3] == 0.0))[1:], elliptic)
+    for force, traction in zip((found.force_x, found.force_y), inside[:2, 1:], strict=True):
+        assert force == pytest.approx((counted * traction).sum(axis=0) * dx, abs=1e-12 * scale)
     expected = element_sum(inside, case.flex.longitudinal, case.flex.lateral, 1.0)
     assert found.work == pytest.approx(expected, rel=1e-10, abs=1e-12 * expected.max())
+
+
+@pytest.mark.parametrize("elliptic", [False, True])
+@pytest.mark.parametrize("points", [2, 3, 8, 13, 50])
+def test_that_the_weights_at_the_edges_integrate_the_bound(points, elliptic):
+    counted = [end_weights(k, points, elliptic)[1] for k in range(1, points + 1)]
+    shapes = [bound_shape(place_of(k, points), elliptic) for k in range(1, points + 1)]
+    whole = math.pi / 2.0 if elliptic else 4.0 / 3.0
+    # the root's next correction is left out
+    missing = 0.07 * points**-2.5 if elliptic else 1e-14
+    assert 2.0 / points * np.dot(counted, shapes) == pytest.approx(whole, rel=missing)
 
 
 def test_that_full_sliding_integrates_friction_times_pressure():
@@ -270,25 +321,28 @@ def order(points, values):
     return -np.polyfit(np.log(points), np.log(np.abs(values)), 1)[0]
 
 
-@pytest.mark.parametrize("scene", [{}, {"eta": 5e-4}], ids=["one-way", "lateral"])
+@pytest.mark.parametrize(
+    "scene", [{}, {"eta": 5e-4}, {"eta": 5e-4, "phi": 0.05}], ids=["one-way", "lateral", "spin"]
+)
 def test_that_the_rigid_slips_work_is_second_order_and_the_element_sum_first(scene):
     points = np.array([10, 20, 50, 100, 200])
     work, textbook = errors(points, **scene)
-    assert order(points, work) == pytest.approx(2.0, abs=0.15)
+    # where a strip begins to slide a corner is cut, of either sign: together they do better
+    assert np.all(np.abs(work) * points**2 < 0.25)
     assert order(points, textbook) == pytest.approx(1.0, abs=0.1)
     assert np.all(textbook < 0.0)
 
 
-def test_that_the_rigid_slips_work_is_second_order_with_spin_too():
-    points = np.array([10, 20, 40, 80])
-    work, _ = errors(points, eta=5e-4, phi=0.05)
-    assert order(points, work) == pytest.approx(2.0, abs=0.2)
+def test_that_few_steps_do_where_spin_turns_the_slip():
+    for count, worst in ((6, 1e-2), (10, 3.5e-3), (16, 1.2e-3), (40, 3e-4)):
+        work, _ = errors(np.array([count]), xi=-4e-4, eta=5e-4, phi=0.5)
+        assert abs(work[0]) < worst
 
 
 def test_that_the_errors_of_the_grids_are_those_measured_before():
     work, textbook = errors(np.array([10, 20, 50, 200]))
     assert textbook == pytest.approx([-0.165, -0.082, -0.032, -0.008], abs=5e-4)
-    assert np.all(np.abs(work) < [8e-3, 2.2e-3, 3.6e-4, 3e-5])
+    assert np.all(np.abs(work) < [2e-3, 3e-4, 5e-5, 2e-6])
 
 
 @settings(deadline=None, max_examples=30)
@@ -310,9 +364,9 @@ def test_that_power_stays_between_nothing_and_full_sliding(xi, eta, phi, ellipti
     case = rig(strips=9, xi=xi, eta=eta, phi=phi, elliptic=elliptic)
     power = case.power(march(*case.arguments, 60))
     # every point of the bound sliding at the rigid slip there
-    place = np.linspace(-1.0, 1.0, 61)[:, None]
+    place = np.linspace(-1.0, 1.0, 601)[:, None]
     shape = 1.0 - place**2
     slip = np.hypot(case.slip_x, eta + phi * place * case.half_length)
     bound = case.bound_peak * (np.sqrt(shape) if elliptic else shape)
-    most = SPEED * (bound * slip).sum(axis=0) @ case.half_length / 30.0 * case.spacing
-    assert -1e-3 * most - 1e-18 <= power <= most * (1.0 + 1e-9) + 1e-18
+    most = SPEED * (bound * slip).sum(axis=0) @ case.half_length / 300.0 * case.spacing
+    assert -1e-3 * most - 1e-18 <= power <= most * (1.0 + 1e-3) + 1e-18

@@ -165,6 +165,29 @@ def test_that_no_friction_and_no_creepage_dissipate_nothing():
     np.testing.assert_array_equal(still.adhesion_length, 2.0 * half_length)
 
 
+@pytest.mark.parametrize(("lateral", "spin"), [(0.0, 0.0), (3e-4, 0.5), (1e-4, 20.0)])
+def test_that_strips_without_friction_or_load_carry_nothing_and_harm_no_other(lateral, spin):
+    y, half_length, line_load = ellipse(1e-4, 1e-3, 200.0, strips=50)
+    slip_x, friction = 3e-4 - spin * y, np.full(50, 0.1)
+    friction[20:30] = 0.0
+    found = solve(half_length, line_load, friction, slip_x, lateral, spin, y[1] - y[0])
+    assert not np.array(found)[:5, 20:30].any()
+    assert np.all(found.work[:20] > 0.0)
+    # what strips beside the contact hold of an earlier one counts for nothing
+    room, rest = np.zeros(3), np.full(3, 7e-5)
+    wider = solve(
+        np.concatenate([rest, half_length, rest]),
+        np.concatenate([room, line_load, room]),
+        np.concatenate([room, friction, room]),
+        np.concatenate([rest, slip_x, rest]),
+        lateral,
+        spin,
+        y[1] - y[0],
+    )
+    np.testing.assert_array_equal(np.array(wider)[:5, 3:-3], np.array(found)[:5])
+    assert not np.array(wider)[:5, [0, 1, 2, -3, -2, -1]].any()
+
+
 def test_that_contacts_are_the_sums_of_their_strips():
     y, half_length, line_load = ellipse(1.4e-4, 1.5e-3, 300.0, strips=60)
     spacing, speed, friction = y[1] - y[0], 2.6, np.full(60, 0.2)

@@ -1,6 +1,7 @@
 """The contact model `slender` against the exact theory, and its balances."""
 
 import math
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from wearsim.bench.exact import CREEPAGES, STEEL, WORN, rows, worn_profile
 from wearsim.errors import ContactError
 from wearsim.models.slender import SPEC, Slender, SlenderOptions
 from wearsim.models.strip_theory import StripTheory
-from wearsim.types import Creepage, Grid, OperatingPoint
+from wearsim.types import ContactSolution, Creepage, Grid, OperatingPoint
 
 MATERIALS = (STEEL, STEEL)
 SPEED = 1000.0 * 2.0 * math.pi / 60.0 * 25e-3
@@ -198,6 +199,42 @@ def test_that_friction_may_be_given_per_strip():
     *_, mixed = contact(grid=grid, creepage={"longitudinal": 5e-3}, mu=local)
     *_, low = contact(grid=grid, creepage={"longitudinal": 5e-3}, mu=0.1)
     np.testing.assert_allclose(mixed.dissipation, low.dissipation * local / 0.1, rtol=1e-10)
+
+
+@pytest.mark.parametrize("warm", [False, True])
+@pytest.mark.parametrize(
+    "creepage",
+    [
+        {"longitudinal": 1e-3},
+        {"longitudinal": -3e-4, "lateral": 2e-4, "spin": 0.4},
+        {"longitudinal": 4e-4, "variation": np.linspace(-1e-4, 2e-4, 121)},
+    ],
+)
+def test_that_a_contact_alone_is_that_of_a_batch_to_the_bit(creepage, warm):
+    mu = np.linspace(0.05, 0.15, 121) if "spin" in creepage else 0.1
+    model, gap, point, start = contact(creepage=dict(creepage), mu=mu)
+    near = start if warm else None
+    point, compliance = replace(point, normal_force=310.0), np.full_like(gap, 1e-13)
+    alone = model.solve(gap, RIG, point, compliance, near)
+    others = [point, replace(point, normal_force=280.0)]
+    batch = model.solve_batch(
+        np.stack([gap, gap]),
+        RIG,
+        others,
+        np.stack([compliance, compliance]),
+        [near, near] if warm else None,
+    )
+    for item in fields(ContactSolution):
+        assert np.array_equal(getattr(alone, item.name), getattr(batch[0], item.name))
+
+
+def test_that_power_that_is_not_finite_is_an_error_naming_its_contact():
+    model, gap, point, _ = contact()
+    bad = replace(point, creepage=Creepage(np.nan))
+    with pytest.raises(ContactError, match=r"^the dissipated power is not finite"):
+        model.solve(gap, RIG, bad)
+    with pytest.raises(ContactError, match=r"^realisation 1: the dissipated power is not finite"):
+        model.solve_batch(np.stack([gap, gap]), RIG, [point, bad])
 
 
 def test_that_wear_compliance_makes_the_contact_softer_and_conserves_the_load():

@@ -197,6 +197,7 @@ def _rubbing() -> list[HardCase]:
         HardCase(
             "creepage through zero in y",
             {"creepage.longitudinal": 1e-4, "creepage.differential_slip": True},
+            rough=True,  # nothing wears where nothing slips: two ridges are left standing
         ),
         HardCase("creepage through zero in time", {"creepage.longitudinal": wandering}),
     ]

@@ -12,7 +12,7 @@ from wearsim.evolution.each import one_of
 from wearsim.evolution.joining import scene_of, state_of
 from wearsim.evolution.observables import depth, worn_volume
 from wearsim.evolution.scene import Scene
-from wearsim.evolution.state import Contacts, WearState, as_batch, contact_values
+from wearsim.evolution.state import Contacts, Depths, WearState, as_batch, contact_values
 from wearsim.evolution.wearing import Wearing, exponents_between
 from wearsim.evolution.yielding import REALISATION, solve_yielding
 from wearsim.types import FloatArray, Number
@@ -26,19 +26,19 @@ def mean_loads(
     scene: Scene,
     state: WearState,
     passes: Number,
-    gaps: Sequence[FloatArray],
+    depths: Sequence[Depths],
     power: FloatArray,
 ) -> FloatArray:
     """Return the mean load of each contact over a step, shape (S, C, N) [N].
 
-    The load itself is integrated exactly; the feedback takes the mean of the descents at `gaps`,
-    as a rule those at the step's ends, and each term its exact mean at constant `power`.
+    The load itself is integrated exactly; the feedback takes the mean of the descents at worn
+    `depths`, as a rule those at the step's ends, and each term its exact mean at constant `power`.
     """
     start, stop = scene.time(state.now), scene.time(state.now + passes)
     scene = scene.at_time(start, stop)
     loads = _loads(scene, scene.mean_load(start, stop))
     if scene.has_spring:
-        descents = [scene.descent(gap) for gap in gaps]
+        descents = [scene.descent(scene.gap(*worn)) for worn in depths]
         loads -= scene.stiffness * np.mean(descents, axis=0)
     for number, term in enumerate(scene.terms.values()):
         # a station's power counts like any other's
@@ -50,12 +50,14 @@ def mean_loads(
 
 def _loads(scene: Scene, force: Number) -> FloatArray:
     """Return the load of every contact before feedback where that of the scene is `force` [N]."""
-    return np.broadcast_to(force + scene.inputs.normal_force, scene.shape).copy()
+    loads = np.empty(scene.shape)
+    loads[:] = force + scene.inputs.normal_force
+    return loads
 
 
 def checked_loads(loads: FloatArray, passes: Number) -> FloatArray:
     """Return `loads` if all are positive; a contact that has lost its load cannot go on."""
-    if not (loads > 0.0).all():
+    if np.count_nonzero(loads > 0.0) < loads.size:
         raise StepError(
             f"contact is lost at pass {one_of(passes):.0f}: the load has fallen to"
             f" {loads.min():.4g} N; the spring has run out of travel, or the log or a draw falls to"
@@ -69,7 +71,8 @@ def _differs(new: FloatArray, old: FloatArray) -> FloatArray:
     """Return the greatest change of each realisation, relative, from (S, C, N, ...)."""
     axes = (0, 1, 3)[: new.ndim - 1]
     change, scale = np.abs(new - old).max(axis=axes), np.abs(new).max(axis=axes)
-    relative: FloatArray = np.divide(change, scale, out=np.zeros(len(scale)), where=scale > 0.0)
+    scale[scale == 0.0] = np.inf
+    relative: FloatArray = change / scale
     return relative
 
 
@@ -90,27 +93,30 @@ def implicit_step(scene: Scene, state: WearState, passes: Number) -> WearState:
     gap = scene.gap(state.cylinder_depth, state.roller_depth)
     contacts = state.contacts
     wearing = Wearing(scene, contacts, passes)
-    loads = _end_loads(scene, state, passes, wearing, contacts)
+    ends = _ends(state, wearing)
+    loads = _end_loads(scene, state, passes, ends, contacts)
     moving = np.ones(scene.shape[REALISATION], dtype=np.bool_)
     iterations = np.zeros(len(moving), dtype=np.int64)
     for iteration in range(1, MAX_FIXED_POINT + 1):
-        ends = state.cylinder_depth + wearing.cylinder, state.roller_depth + wearing.roller
         points = scene.points(loads, *ends)
         open_gap, wear = gap + wearing.offset, wearing.compliance
         found = solve_yielding(scene, open_gap, points, wear, contacts, moving)
         iterations += moving
         new = Wearing(scene, found, passes)
-        new_loads = _end_loads(scene, state, passes, new, found)
+        ends = _ends(state, new)
         foreseen = wearing.foreseen(contact_values(scene, found, "line_load"))
-        change = np.maximum(_differs(new.opening, foreseen), _differs(new_loads, loads))
+        change, new_loads = _differs(new.opening, foreseen), loads
+        if scene.has_feedback:
+            new_loads = _end_loads(scene, state, passes, ends, found)
+            change = np.maximum(change, _differs(new_loads, loads))
         if scene.slip_profile is not None:
             change = np.maximum(change, _differs(new.cylinder, wearing.cylinder))
         moving &= ~(change < scene.settled * 10.0 ** ((iteration - 1) // PATIENCE))
-        if not moving.any():
+        if not np.count_nonzero(moving):
             power = contact_values(scene, found, "power")
             solves = iterations * (len(found) // len(moving))
             begun = state.moved(state.now, solves, contacts=found)
-            return worn_state(scene, begun, passes, (new.cylinder, new.roller), power)
+            return worn_state(scene, begun, passes, ends, power)
         new.exponents = exponents_between(wearing, new)
         contacts, wearing, loads = found, new, new_loads
     raise StepError(
@@ -120,31 +126,30 @@ def implicit_step(scene: Scene, state: WearState, passes: Number) -> WearState:
     )
 
 
+def _ends(state: WearState, wearing: Wearing) -> Depths:
+    """Return the worn depths at the end of a step."""
+    return state.cylinder_depth + wearing.cylinder, state.roller_depth + wearing.roller
+
+
 def _end_loads(
-    scene: Scene,
-    state: WearState,
-    passes: Number,
-    wearing: Wearing,
-    contacts: Contacts,
+    scene: Scene, state: WearState, passes: Number, ends: Depths, contacts: Contacts
 ) -> FloatArray:
-    gaps = (
-        scene.gap(state.cylinder_depth, state.roller_depth),
-        scene.gap(state.cylinder_depth + wearing.cylinder, state.roller_depth + wearing.roller),
-    )
-    return mean_loads(scene, state, passes, gaps, contact_values(scene, contacts, "power"))
+    """Return the mean loads of a step that leads to depths `ends`."""
+    power = contact_values(scene, contacts, "power")
+    return mean_loads(scene, state, passes, (state.depths, ends), power)
 
 
 def explicit_step(scene: Scene, state: WearState, passes: Number) -> WearState:
     """Step over `passes` passes on the profiles of the step's start, under its mean load."""
     here = scene.at_time(scene.time(state.passes), scene.time(state.passes + passes))
     foreseen = Wearing(here, state.contacts, passes)
-    mean = _end_loads(here, state, passes, foreseen, state.contacts)
+    mean = _end_loads(here, state, passes, _ends(state, foreseen), state.contacts)
     solve = solve_present if scene.varying else contacts_at
     contacts = solve(here, state, mean)
     solves = len(contacts) if contacts is state.contacts else 2 * len(contacts)
     wearing, power = Wearing(here, contacts, passes), contact_values(here, contacts, "power")
     begun = replace(state, contacts=contacts, solves=state.solves + solves)
-    worn = worn_state(here, begun, passes, (wearing.cylinder, wearing.roller), power)
+    worn = worn_state(here, begun, passes, _ends(state, wearing), power)
     return replace(worn, contacts=solve_present(scene, worn, present_loads(scene, worn)))
 
 
@@ -162,7 +167,7 @@ def present_loads(scene: Scene, state: WearState) -> FloatArray:
         gap = scene.gap(state.cylinder_depth, state.roller_depth)
         loads -= scene.stiffness * scene.descent(gap)
     for number in range(len(scene.terms)):
-        loads += state.terms[number][scene.roller]
+        loads += scene.at_contacts(state.terms[number][None])[0]
     return checked_loads(loads, state.now)
 
 
@@ -201,7 +206,7 @@ def worn_state(
     scene: Scene,
     state: WearState,
     passes: Number,
-    worn: tuple[FloatArray, FloatArray],
+    ends: Depths,
     power: FloatArray,
 ) -> WearState:
     """Return the state that a step leads to.
@@ -213,22 +218,21 @@ def worn_state(
         Where the step began; its contacts stand in the state returned too.
     passes : float or ndarray, shape (realisations,)
         Length of the step.
-    worn : tuple of ndarray
-        Depth the step has worn off cylinder and rollers, shapes as in `WearState` [m].
+    ends : tuple of ndarray
+        Worn depths of cylinder and rollers at its end, shapes as in `WearState` [m].
     power : ndarray, shape (stations, contacts, realisations)
         Mean dissipated power of the step [W], of the same dissipation as the wear.
     """
-    duration = one_of(scene.time(state.now + passes) - scene.time(state.now))
-    terms = np.array(
-        [
-            term.advance(state.terms[number], scene.per_roller(power).mean(axis=0), duration)
-            for number, term in enumerate(scene.terms.values())
-        ]
-    ).reshape(state.terms.shape)
+    terms = state.terms
+    if scene.terms:
+        duration = one_of(scene.time(state.now + passes) - scene.time(state.now))
+        mean = scene.per_roller(power).mean(axis=0)
+        each = enumerate(scene.terms.values())
+        terms = np.array([term.advance(terms[number], mean, duration) for number, term in each])
     return state.moved(
         state.now + passes,
-        cylinder_depth=state.cylinder_depth + worn[0],
-        roller_depth=state.roller_depth + worn[1],
+        cylinder_depth=ends[0],
+        roller_depth=ends[1],
         terms=terms,
         energy=state.energy + scene.total_power(power) * (passes / scene.kinematics.pass_rate),
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TypeAlias
 
@@ -10,16 +10,15 @@ import numpy as np
 
 from wearsim.evolution.advance import solve_present
 from wearsim.evolution.control import StepControl
-from wearsim.evolution.each import sum_in_order
+from wearsim.evolution.each import mean_along, sum_in_order
 from wearsim.evolution.observables import worn_volume
 from wearsim.evolution.scene import Scene
-from wearsim.evolution.state import WearState, contact_values
+from wearsim.evolution.state import Depths, WearState, contact_values
 from wearsim.evolution.wearing import Wearing
-from wearsim.types import FloatArray, Number
+from wearsim.types import BoolArray, FloatArray, Number
 
 DEPTH_EXPONENT, VOLUME_EXPONENT = 0.5, 0.75  # below those of any groove: 2/3 to 1, and about 1
 Step: TypeAlias = Callable[[Scene, WearState, Number], WearState]
-Depths: TypeAlias = tuple[FloatArray, FloatArray]
 COVER = 1.5  # an estimate of first order is about the error itself; half as much for safety
 DEEP = 0.5  # depths are compared where the groove is deeper than this part of its depth
 DEPTHS = ("cylinder_depth", "roller_depth")
@@ -33,35 +32,44 @@ def deepest(state: WearState) -> FloatArray:
 
 def whole_volume(scene: Scene, state: WearState) -> FloatArray:
     """Return the volume worn off the cylinder and all its rollers, shape (realisations,) [m^3]."""
+    return volume_of(scene, state.depths)
+
+
+def volume_of(scene: Scene, depths: Depths) -> FloatArray:
+    """Return the volume of depths of cylinder and rollers, shape (realisations,) [m^3]."""
     kinematics, spacing = scene.kinematics, scene.grid.spacing
-    cylinder = worn_volume(state.cylinder_depth, spacing, kinematics.cylinder_radius)
-    rollers = worn_volume(state.roller_depth[0], spacing, kinematics.roller_radius)
-    total: FloatArray = cylinder.mean(axis=(0, 1)) + sum_in_order(
-        kinematics.multiplicity[:, None] * rollers, axis=0
+    cylinder = worn_volume(depths[0], spacing, kinematics.cylinder_radius)
+    rollers = worn_volume(depths[1][0], spacing, kinematics.roller_radius)
+    mean: FloatArray = mean_along(mean_along(cylinder, axis=1), axis=0)[0, 0]
+    return mean + sum_in_order(kinematics.multiplicity[:, None] * rollers, axis=0)
+
+
+def apart(one: WearState, other: WearState) -> Depths:
+    """Return how far the depths of two states lie apart."""
+    return one.cylinder_depth - other.cylinder_depth, one.roller_depth - other.roller_depth
+
+
+def grooves(state: WearState) -> tuple[BoolArray, BoolArray]:
+    """Return where cylinder and rollers are deep, shapes as of the depths."""
+    cylinder, roller = (
+        worn >= DEEP * worn.max(axis=(0, 1, 3), keepdims=True) for worn in state.depths
     )
-    return total
+    return cylinder, roller
 
 
-def depth_between(
-    one: WearState, other: WearState, moved: Sequence[FloatArray] | None = None
-) -> FloatArray:
-    """Return how far two states lie apart where their grooves are deep, shape (realisations,) [m].
-
-    Parameters
-    ----------
-    one, other : WearState
-    moved : sequence of ndarray, optional
-        What to take off the difference of each body first.
-    """
-    greatest = np.zeros(one.cylinder_depth.shape[2])
-    for number, name in enumerate(DEPTHS):
-        worn = getattr(one, name)
-        apart = worn - getattr(other, name)
-        if moved is not None:
-            apart = apart - moved[number]
-        deep = worn >= DEEP * worn.max(axis=(0, 1, 3), keepdims=True)
-        greatest = np.maximum(greatest, np.where(deep, np.abs(apart), 0.0).max(axis=(0, 1, 3)))
+def greatest_in(deep: tuple[BoolArray, BoolArray], depths: Depths) -> FloatArray:
+    """Return the greatest size of depths where grooves are deep, shape (realisations,) [m]."""
+    cylinder, roller = (
+        np.where(here, np.abs(depth), 0.0).max(axis=(0, 1, 3))
+        for here, depth in zip(deep, depths, strict=True)
+    )
+    greatest: FloatArray = np.maximum(cylinder, roller)
     return greatest
+
+
+def depth_between(one: WearState, other: WearState) -> FloatArray:
+    """Return how far two states lie apart where the first is deep, shape (realisations,) [m]."""
+    return greatest_in(grooves(one), apart(one, other))
 
 
 def variation_bias(scene: Scene, end: WearState, first: Number, passes: Number) -> Depths | None:
@@ -86,10 +94,15 @@ def variation_bias(scene: Scene, end: WearState, first: Number, passes: Number) 
     """
     start, stop = scene.time(first), scene.time(first + passes)
     here = scene.at_time(start, stop)
-    loads = contact_values(scene, end.contacts, "line_load").sum(axis=-1) * scene.grid.spacing
     mean: Wearing | None = None
     bias: Depths | None = None
+    loads: FloatArray | None = None
     for name, rollers, deviation in scene.deviations(start, stop):
+        if not np.count_nonzero(deviation):
+            continue
+        if loads is None:
+            carried = contact_values(scene, end.contacts, "line_load").sum(axis=-1)
+            loads = carried * scene.grid.spacing
         values = loads if name == "normal_force" else getattr(here.inputs, name)
         values = values.reshape(-1, values.shape[-1])
         felt = deviation > 1e-9 * np.abs(values).max(axis=0)
@@ -143,10 +156,9 @@ def biased_twin(end: WearState, twin: WearState, bias: Depths | None) -> WearSta
     """
     if bias is None:
         return twin
-    apart = [getattr(twin, name) - getattr(end, name) for name in DEPTHS]
     along = sum(
         sum_in_order((a * b).sum(axis=-1), axis=axis).sum(axis=0)
-        for axis, a, b in zip((0, 1), apart, bias, strict=True)
+        for axis, a, b in zip((0, 1), apart(twin, end), bias, strict=True)
     )
     sign = np.where(along < 0.0, -1.0, 1.0)[:, None]
     return _worn_further(twin, (sign * bias[0], sign * bias[1]))
@@ -154,8 +166,7 @@ def biased_twin(end: WearState, twin: WearState, bias: Depths | None) -> WearSta
 
 def _worn_further(state: WearState, depths: Depths) -> WearState:
     """Return `state` with depths added to those of cylinder and rollers."""
-    return replace(
-        state,
+    return state.but(
         cylinder_depth=state.cylinder_depth + depths[0],
         roller_depth=state.roller_depth + depths[1],
     )
@@ -216,10 +227,10 @@ def with_pass_errors(
     volume = whole_volume(scene, end)
     variance = start.scatter[1] + _volume_variance(scene, end, passes)
     depth = np.square(deepest(end) / np.where(volume > 0.0, volume, 1.0)) * variance
-    apart = np.abs(whole_volume(scene, whole) - whole_volume(scene, coarse))
+    volumes = np.abs(whole_volume(scene, whole) - whole_volume(scene, coarse))
     return replace(
         end,
-        quadrature=np.array([depth_between(whole, coarse), apart]),
+        quadrature=np.array([depth_between(whole, coarse), volumes]),
         scatter=np.array([depth, variance]),
         coarse=coarse,
     )
@@ -233,8 +244,8 @@ def _volume_variance(scene: Scene, end: WearState, passes: Number) -> FloatArray
     volume = worn_volume(cylinder, spacing, kinematics.cylinder_radius)
     volume = volume + worn_volume(roller * ratio, spacing, kinematics.roller_radius)
     # what differs from roller to roller is no chance
-    apart = volume - scene.per_roller(volume)[:, scene.roller]
-    variance: FloatArray = (scene.cylinder_share[None, :, None] * apart**2).sum(axis=1).max(axis=0)
+    chance = volume - scene.per_roller(volume)[:, scene.roller]
+    variance: FloatArray = (scene.cylinder_share[None, :, None] * chance**2).sum(axis=1).max(axis=0)
     return passes * variance
 
 

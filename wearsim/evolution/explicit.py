@@ -128,8 +128,8 @@ def _errors(scene: Scene, start: WearState, end: WearState, step: float) -> Floa
     """
     # the processes at their means over the step, as the step itself took them
     here = scene.at_time(scene.time(start.passes), scene.time(start.passes + step))
-    gaps = [here.gap(state.cylinder_depth, state.roller_depth) for state in (start, end)]
-    loads = mean_loads(here, start, step, gaps, contact_values(here, end.contacts, "power"))
+    depths = start.depths, end.depths
+    loads = mean_loads(here, start, step, depths, contact_values(here, end.contacts, "power"))
     solve = solve_present if scene.varying else contacts_at
     again = Wearing(here, solve(here, end, loads), step)
     other = replace(

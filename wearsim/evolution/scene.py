@@ -9,11 +9,19 @@ from typing import overload
 
 import numpy as np
 
-from wearsim.evolution.each import each_between, one_of, per_strip, sum_in_order
+from wearsim.evolution.each import (
+    each_between,
+    mean_along,
+    one_of,
+    per_strip,
+    sum_along,
+    sum_in_order,
+)
 from wearsim.evolution.inputs import ContactInputs, Redraw, Varying
 from wearsim.evolution.kinematics import Kinematics
 from wearsim.plugins import BODIES, Body, ContactModel, Load, LoadTerm, WearLaw
 from wearsim.types import (
+    BatchSolution,
     ContactSolution,
     Creepage,
     FloatArray,
@@ -114,6 +122,15 @@ class Scene:
         return len(self.roller) > self.rollers
 
     @cached_property
+    def _roller_each(self) -> bool:
+        """Whether every contact is a roller's only one, in the order of the rollers."""
+        return np.array_equal(self.roller, np.arange(self.rollers))
+
+    def at_contacts(self, values: FloatArray) -> FloatArray:
+        """Return the values of the roller of each contact, (S, R, ...) to (S, C, ...)."""
+        return values if self._roller_each else values[:, self.roller]
+
+    @cached_property
     def halved(self) -> Scene:
         """The scene with the first half of every roller's contacts in the place of all."""
         chosen = np.flatnonzero(self.half == 0)
@@ -151,6 +168,12 @@ class Scene:
         return gap
 
     @cached_property
+    def _nominal_least(self) -> FloatArray:
+        """Least gap of each contact before wear, shape (stations, contacts, realisations) [m]."""
+        least: FloatArray = self.nominal_gap.min(axis=-1)
+        return least
+
+    @cached_property
     def spin(self) -> FloatArray:
         """Spin of every contact, shape (contacts, realisations) [1/m]."""
         spin: FloatArray = self.inputs.tilt / self.kinematics.roller_radius
@@ -164,6 +187,12 @@ class Scene:
         return np.asarray(share / kinematics.physical_rollers)
 
     @cached_property
+    def _physical_contacts(self) -> FloatArray:
+        """Physical rollers behind each contact, to go with (stations, contacts, realisations)."""
+        each: FloatArray = self.cylinder_share * self.kinematics.physical_rollers
+        return each[None, :, None]
+
+    @cached_property
     def stiffness(self) -> Number:
         """What the load loses per descent [N/m]."""
         each = [scene.load.stiffness for scene in self.members]
@@ -173,6 +202,11 @@ class Scene:
     def has_spring(self) -> bool:
         """Whether a load falls as its roller descends."""
         return bool(np.any(self.stiffness))
+
+    @cached_property
+    def has_feedback(self) -> bool:
+        """Whether a load depends on what the contacts do."""
+        return self.has_spring or bool(self.terms)
 
     def force(self, time: Number) -> Number:
         """Return the load at a time [s] [N]."""
@@ -246,7 +280,7 @@ class Scene:
 
     def gap(self, cylinder_depth: FloatArray, roller_depth: FloatArray) -> FloatArray:
         """Return the gap of every contact [m]; depths as in `WearState`."""
-        return self.nominal_gap + cylinder_depth + roller_depth[:, self.roller]
+        return self.nominal_gap + cylinder_depth + self.at_contacts(roller_depth)
 
     def descent(self, gap: FloatArray) -> FloatArray:
         """Return how far each contact's roller has sunk into worn material, shape (S, C, N) [m].
@@ -254,7 +288,7 @@ class Scene:
         It is the rise of the least gap: rigid bodies would approach by that much. On one track it
         equals the worn depth.
         """
-        risen: FloatArray = gap.min(axis=-1) - self.nominal_gap.min(axis=-1)
+        risen: FloatArray = gap.min(axis=-1) - self._nominal_least
         return risen
 
     def _variation(
@@ -302,20 +336,16 @@ class Scene:
                 )
                 for s, c, v in self.contacts
             ]
-        inputs, shape = self.inputs, self.shape
         variation = self._variation(
             self.roller[None, :, None],
             self.spin[None, :, :, None],
             cylinder_depth,
-            roller_depth[:, self.roller],
+            self.at_contacts(roller_depth),
         )
         if variation is not None:
             strips = self.grid.strips
-            variation = np.broadcast_to(variation, (*shape, strips)).reshape(-1, strips)
-        columns = (inputs.longitudinal, inputs.yaw, self.spin, inputs.friction)
-        longitudinal, lateral, spin, friction = (
-            np.broadcast_to(column, shape).ravel() for column in columns
-        )
+            variation = np.broadcast_to(variation, (*self.shape, strips)).reshape(-1, strips)
+        longitudinal, lateral, spin, friction = self._columns
         return OperatingPoints(
             normal_force=loads.ravel(),
             longitudinal=longitudinal,
@@ -325,6 +355,16 @@ class Scene:
             rolling_speed=self.kinematics.rolling_speed,
             variation=variation,
         )
+
+    @cached_property
+    def _columns(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Both creepages, spin and friction of the contacts in their order, (contacts,) each."""
+        inputs = self.inputs
+        longitudinal, lateral, spin, friction = (
+            np.broadcast_to(column, self.shape).ravel()
+            for column in (inputs.longitudinal, inputs.yaw, self.spin, inputs.friction)
+        )
+        return longitudinal, lateral, spin, friction
 
     def point(
         self,
@@ -355,6 +395,13 @@ class Scene:
             rolling_radius=radius,
         )
 
+    def values_of(self, contacts: Sequence[ContactSolution], name: str) -> FloatArray:
+        """Return the field `name` of all contacts, with the axes of `shape` first."""
+        if isinstance(contacts, BatchSolution) and contacts.shape == self.shape:
+            return contacts.stack(name)
+        values = rows_of(contacts, name)
+        return values.reshape(self.shape + values.shape[1:])
+
     def wear_per_pass(self, contacts: Sequence[ContactSolution]) -> tuple[FloatArray, FloatArray]:
         """Return the depth one pass of each contact wears off either body, where it touches.
 
@@ -363,18 +410,25 @@ class Scene:
         cylinder, roller : ndarray, shape (stations, contacts, realisations, strips)
             Depth per pass of that contact [m].
         """
-        cylinder, roller = (self._depth_per_pass(body, contacts) for body in BODIES)
+        dissipation = self.values_of(contacts, "dissipation")
+        cylinder, roller = (self._depth_per_pass(body, contacts, dissipation) for body in BODIES)
         return cylinder, roller
 
-    def _depth_per_pass(self, body: Body, contacts: Sequence[ContactSolution]) -> FloatArray:
-        """Return the depth one pass of each contact wears off `body` [m]."""
-        factor, shape = self.wear_factors[body], (*self.shape, self.grid.strips)
-        if factor is not None:
-            dissipation = rows_of(contacts, "dissipation").reshape(shape)
-            return np.asarray(per_strip(factor) * dissipation)
-        speed = self.kinematics.rolling_speed
-        depths = np.array([self.law.depth_per_pass(body, c, speed) for c in contacts])
-        return depths.reshape(shape)
+    def _depth_per_pass(
+        self,
+        body: Body,
+        contacts: Sequence[ContactSolution],
+        dissipation: FloatArray,
+        times: Number = 1.0,
+    ) -> FloatArray:
+        """Return the depth one pass of each contact wears off `body` [m], `times` over."""
+        factor, speed = self.wear_factors[body], self.kinematics.rolling_speed
+        if factor is None:
+            depths = np.array([self.law.depth_per_pass(body, c, speed) for c in contacts])
+            return times * depths.reshape(dissipation.shape)
+        if isinstance(factor, float) and factor == 0.0:
+            return np.zeros(dissipation.shape)
+        return (times * per_strip(factor)) * dissipation
 
     @cached_property
     def wear_factors(self) -> dict[Body, Number | None]:
@@ -403,10 +457,40 @@ class Scene:
         roller_rate : ndarray, shape (1, rollers, realisations, strips)
             Depth per roller pass [m].
         """
-        share = self.cylinder_share[None, :, None, None]
-        cylinder_rate = (cylinder * share).sum(axis=1, keepdims=True)
-        own = self.per_roller(roller).mean(axis=0, keepdims=True)
-        return cylinder_rate, own * self.kinematics.roller_share
+        shares = self.wear_shares
+        return self.sum_of_parts(cylinder * shares["cylinder"], roller * shares["roller"])
+
+    @cached_property
+    def wear_shares(self) -> dict[Body, FloatArray]:
+        """Part that a pass of each contact has in the wear of either body per roller pass.
+
+        To go with (stations, contacts, realisations, strips).
+        """
+        own = self.weight * self.kinematics.roller_share / self.shape[0]
+        shares: dict[Body, FloatArray] = {"cylinder": self.cylinder_share, "roller": own}
+        return {body: share[None, :, None, None] for body, share in shares.items()}
+
+    def sum_of_parts(
+        self, cylinder: FloatArray, roller: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the wear of the bodies from each contact's own part in it, as `shared_wear`."""
+        return sum_along(cylinder, axis=1), sum_along(self.sum_of_roller(roller), axis=0)
+
+    def wear_parts(
+        self, contacts: Sequence[ContactSolution], passes: Number
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return each contact's own part in the wear of the bodies over some passes [m].
+
+        Returns
+        -------
+        cylinder, roller : ndarray, shape (stations, contacts, realisations, strips)
+        """
+        dissipation, length = self.values_of(contacts, "dissipation"), per_strip(passes)
+        cylinder, roller = (
+            self._depth_per_pass(body, contacts, dissipation, self.wear_shares[body] * length)
+            for body in BODIES
+        )
+        return cylinder, roller
 
     def per_roller(self, values: FloatArray) -> FloatArray:
         """Return the weighted mean over each roller's contacts, (S, C, ...) to (S, R, ...)."""
@@ -417,11 +501,13 @@ class Scene:
 
     def sum_of_roller(self, values: FloatArray) -> FloatArray:
         """Return the sum over each roller's contacts, (S, C, ...) to (S, R, ...)."""
+        if self._roller_each:
+            return values
         found = [values[:, self.roller == r].sum(axis=1) for r in range(self.rollers)]
         return np.stack(found, axis=1)
 
     def total_power(self, power: FloatArray) -> FloatArray:
         """Return the power of all physical rollers, shape (N,) [W], from (S, C, N)."""
-        share = self.cylinder_share[None, :, None] * self.kinematics.physical_rollers
-        total: FloatArray = sum_in_order(power * share, axis=1).mean(axis=0)
+        rollers = sum_in_order(power * self._physical_contacts, axis=1)
+        total: FloatArray = mean_along(rollers, axis=0)[0]
         return total

@@ -86,7 +86,8 @@ def stabilised_step(scene: Scene, state: WearState, passes: float, decay: FloatA
         )
         before, change = change, _sum(*weighted)
     begun = replace(state, contacts=contacts, solves=state.solves + solves, decay=decay)
-    worn = worn_state(here, begun, passes, change[:2], change[2])
+    ends = state.cylinder_depth + change[0], state.roller_depth + change[1]
+    worn = worn_state(here, begun, passes, ends, change[2])
     return replace(worn, contacts=solve_present(scene, worn, present_loads(scene, worn)))
 
 
@@ -116,7 +117,7 @@ def _rate(
     """
     cylinder, roller = state.cylinder_depth + change[0], state.roller_depth + change[1]
     power = contact_values(here, state.contacts, "power")
-    loads = mean_loads(here, state, passes, (here.gap(cylinder, roller),), power)
+    loads = mean_loads(here, state, passes, ((cylinder, roller),), power)
     stage = replace(state, cylinder_depth=cylinder, roller_depth=roller)
     contacts = solve(here, stage, loads)
     wearing = Wearing(here, contacts, passes)

@@ -14,6 +14,8 @@ from wearsim.types import BatchSolution, ContactSolution, FloatArray, IntArray, 
 
 SIGMAS = 2.0  # of the scatter that draws at every pass leave, counted as error
 Contacts: TypeAlias = Sequence[ContactSolution]
+Depths: TypeAlias = tuple[FloatArray, FloatArray]
+"""Of cylinder and rollers, shapes as in `WearState` [m]."""
 _CONTACT = "contact_"
 _TWINS = ("shadow", "coarse")
 _SCALARS = ("passes", "step", "steps", "rejected", "solves", "full_solves")
@@ -118,6 +120,17 @@ class WearState:
         contacts = len(self.contacts) // (stations * realisations)
         return as_batch(self.contacts, (stations, contacts, realisations))
 
+    @property
+    def depths(self) -> Depths:
+        """Worn depths of cylinder and rollers."""
+        return self.cylinder_depth, self.roller_depth
+
+    def but(self, **others: Any) -> WearState:
+        """Return the state with other fields: as `replace`, which takes ten times as long."""
+        state = object.__new__(WearState)
+        state.__dict__.update(self.__dict__, **others)
+        return state
+
     def moved(self, now: Number, solves: IntArray | None = None, **others: Any) -> WearState:
         """Return the state with other passes done, and whatever else is new.
 
@@ -132,9 +145,9 @@ class WearState:
         """
         if self.each is None:
             count = self.solves if solves is None else self.solves + int(solves.sum())
-            return replace(self, passes=float(now), solves=count, **others)
+            return self.but(passes=float(now), solves=count, **others)
         counts = self.each.solves if solves is None else self.each.solves + solves
-        return replace(self, each=Separate(np.asarray(now), counts), **others)
+        return self.but(each=Separate(np.asarray(now), counts), **others)
 
     def solves_since(self, before: WearState) -> IntArray:
         """Return the contact solves since an earlier state, of all or of each realisation."""
@@ -207,7 +220,7 @@ def as_batch(contacts: Contacts, shape: tuple[int, ...]) -> BatchSolution:
         return contacts
     axes = len(contacts.shape)
     columns = {
-        name: np.reshape(column, shape + column.shape[axes:])
+        name: column.reshape(shape + column.shape[axes:])
         for name, column in contacts.columns.items()
     }
     return BatchSolution(shape, contacts.y, columns)
@@ -258,8 +271,7 @@ def widened_state(state: WearState, y: FloatArray, strips: int) -> WearState:
 
 def contact_values(scene: Scene, contacts: Contacts, name: str) -> FloatArray:
     """Return the field `name` of all contacts, leading axes (station, contact, realisation)."""
-    values = rows_of(contacts, name)
-    return values.reshape(scene.shape + values.shape[1:])
+    return scene.values_of(contacts, name)
 
 
 def fresh_state(scene: Scene) -> WearState:

@@ -10,6 +10,7 @@ from wearsim.evolution.control import StepControl
 from wearsim.evolution.stepper import fitted
 
 SMALLEST_STEP = 1e-3  # passes
+_SMALLEST_PART = 1e-8  # of the passes done: with shorter steps a test would never end
 
 
 class Trial:
@@ -56,11 +57,12 @@ class Trial:
         StepError, ContactError
             If it would be too short.
         """
-        if self.proposed < SMALLEST_STEP:
+        shortest = max(SMALLEST_STEP, _SMALLEST_PART * passes)
+        if self.proposed < shortest:
             if isinstance(self._cause, ContactError):
                 raise self._cause
             raise StepError(
-                f"no step is short enough at pass {passes:.0f} (tried down to {SMALLEST_STEP:g}"
+                f"no step is short enough at pass {passes:.0f} (tried down to {shortest:.2g}"
                 f" passes); {self._cause or 'the error does not fall with the step'}",
                 self._state(),
             )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,13 +11,14 @@ from wearsim.errors import ContactError, StepError
 from wearsim.evolution.control import StepControl
 from wearsim.evolution.errors_of_steps import (
     COVER,
-    DEPTHS,
     Step,
+    apart,
     biased_twin,
-    depth_between,
     excess,
+    greatest_in,
+    grooves,
     variation_bias,
-    whole_volume,
+    volume_of,
     with_pass_errors,
 )
 from wearsim.evolution.scene import Scene
@@ -89,8 +90,7 @@ class TwinStepper(Stepper):
                 trial.refuse(failure, step)
                 continue
             if trial.stands(float(tried.excess.max()), step):
-                end = replace(
-                    tried.end,
+                end = tried.end.but(
                     step=trial.proposed,
                     steps=state.steps + 1,
                     rejected=state.rejected + trial.rejected,
@@ -129,44 +129,49 @@ class TwinStepper(Stepper):
         whole = scheme(scene, twin, step)
         end = with_pass_errors(scene, state, end, whole, scheme, step)
         whole = biased_twin(end, whole, variation_bias(scene, end, state.now, step))
-        moved = _moved_apart(scene, (state, twin), (end, whole))
         now = np.where(step == stop - state.now, stop, end.now)
         end = end.moved(now, whole.solves_since(twin))
-        end = _with_errors(state, end, whole, moved[1])
+        end, added = _with_errors(scene, (state, twin), (end, whole))
         reached = np.array([end.depth_error, end.volume_error]) - end.irreducible
-        over = excess(self.control, scene, state, end, moved, stop, reached)
+        over = excess(self.control, scene, state, end, added, stop, reached)
         return Attempt(half, end, over)
 
 
-def _moved_apart(
-    scene: Scene, before: tuple[WearState, WearState], after: tuple[WearState, WearState]
-) -> FloatArray:
-    """Return how far a step moves a test and its twin apart, in depth and volume.
-
-    Shape (2, realisations): [m] and [m^3], with the factor for safety.
-    """
-    moved = tuple(getattr(before[0], name) - getattr(before[1], name) for name in DEPTHS)
-    volumes = [whole_volume(scene, one) - whole_volume(scene, two) for one, two in (before, after)]
-    return COVER * np.array([depth_between(*after, moved), np.abs(volumes[1] - volumes[0])])
-
-
 def _with_errors(
-    start: WearState, end: WearState, whole: WearState, volume_apart: FloatArray
-) -> WearState:
-    """Return `end` with the errors that its twin `whole` and all else tell, and with that twin."""
+    scene: Scene, before: tuple[WearState, WearState], after: tuple[WearState, WearState]
+) -> tuple[WearState, FloatArray]:
+    """Return a test after a step, with its errors and its twin, and what the step adds to them.
+
+    Parameters
+    ----------
+    scene : Scene
+    before, after : tuple of WearState
+        The test and its twin at the step's ends.
+
+    Returns
+    -------
+    end : WearState
+    added : ndarray, shape (2, realisations)
+        How far the step moves the two apart, in depth [m] and volume [m^3], with the factor for
+        safety.
+    """
+    (start, _), (end, whole) = before, after
+    deep, first, last = grooves(end), apart(*before), apart(*after)
+    moved = last[0] - first[0], last[1] - first[1]
+    added = COVER * np.array([greatest_in(deep, moved), np.abs(volume_of(scene, moved))])
     others = [state.irreducible for state in (start, end)]
     twins = {
         name: twin.moved(end.now, shadow=None, coarse=None)
         for name, twin in (("shadow", whole), ("coarse", end.coarse))
         if twin is not None
     }
-    return replace(
-        end,
-        depth_error=COVER * depth_between(end, whole) + others[1][0],
-        volume_error=start.volume_error - others[0][1] + volume_apart + others[1][1],
+    end = end.but(
+        depth_error=COVER * greatest_in(deep, last) + others[1][0],
+        volume_error=start.volume_error - others[0][1] + added[1] + others[1][1],
         shadow=twins["shadow"],
         coarse=twins.get("coarse"),
     )
+    return end, added
 
 
 def first_steps(scene: Scene, state: WearState) -> FloatArray:

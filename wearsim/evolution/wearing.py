@@ -6,7 +6,6 @@ from functools import cached_property
 
 import numpy as np
 
-from wearsim.evolution.each import per_strip
 from wearsim.evolution.scene import Scene
 from wearsim.evolution.state import Contacts
 from wearsim.mechanics.wear_of_strips import learn_exponents, ratio_to_load
@@ -41,15 +40,10 @@ class Wearing:
     """
 
     def __init__(self, scene: Scene, contacts: Contacts, passes: Number) -> None:
-        cylinder, roller = scene.wear_per_pass(contacts)
-        rates, length = scene.shared_wear(cylinder, roller), per_strip(passes)
-        self.cylinder, self.roller = rates[0] * length, rates[1] * length
+        self._parts = scene.wear_parts(contacts, passes)
+        self.cylinder, self.roller = scene.sum_of_parts(*self._parts)
         self.exponents: FloatArray | None = None
         self.scene, self.contacts = scene, contacts
-        # each contact's own part in the wear of the bodies
-        share = length * scene.cylinder_share[None, :, None, None]
-        own = length * scene.kinematics.roller_share / scene.shape[0]
-        self._parts = cylinder * share, roller * own * scene.weight[None, :, None, None]
 
     @property
     def per_contact(self) -> FloatArray:
@@ -64,10 +58,14 @@ class Wearing:
         if self.exponents is not None:
             parts = self.exponents * parts[0], self.exponents * parts[1]
         stations, contacts, realisations = self.scene.shape
-        # to (realisations, stations, contacts, sides, strips)
-        ratios = np.stack([_ratio(part, self.contacts) for part in parts])
-        ratios = ratios.transpose(3, 1, 2, 0, 4)
-        each = ratios.reshape(realisations, stations * contacts, 2, self.scene.grid.strips)
+        strips, together = self.scene.grid.strips, stations * contacts
+        each = np.zeros((realisations, together, 2, strips))
+        line_load = rows_of(self.contacts, "line_load")
+        for side, part in enumerate(parts):
+            if not np.count_nonzero(part):
+                continue
+            ratio = _ratio(part, line_load).transpose(2, 0, 1, 3)
+            each[:, :, side] = ratio.reshape(realisations, together, strips)
         return SharedWear(self.scene.bodies, each)
 
     @cached_property
@@ -76,16 +74,15 @@ class Wearing:
         if self.exponents is None:
             return 0.0
         kept = 1.0 - self.exponents
-        on_cylinder, on_roller = self._parts
-        on_cylinder = (kept * on_cylinder).sum(axis=1, keepdims=True)
-        on_roller = self.scene.sum_of_roller((kept * on_roller).sum(axis=0, keepdims=True))
-        opening: FloatArray = on_cylinder + on_roller[:, self.scene.roller]
-        return opening
+        return self._opening(*self.scene.sum_of_parts(*(kept * part for part in self._parts)))
 
     @property
     def opening(self) -> FloatArray:
         """Gap that the step opens at every contact, (stations, contacts, realisations, strips)."""
-        return self.cylinder + self.roller[:, self.scene.roller]
+        return self._opening(self.cylinder, self.roller)
+
+    def _opening(self, cylinder: FloatArray, roller: FloatArray) -> FloatArray:
+        return cylinder + self.scene.at_contacts(roller)
 
     def foreseen(self, line_load: FloatArray) -> FloatArray:
         """Return the opening that compliance and offset make of a line load, shape as `opening`."""
@@ -93,14 +90,14 @@ class Wearing:
         flat = line_load.transpose(2, 0, 1, 3).reshape(realisations, -1, strips)
         yielding = self.compliance.opening(flat)
         shaped = yielding.reshape(realisations, stations, contacts, strips)
-        opening: FloatArray = shaped.transpose(1, 2, 0, 3) + self.offset
-        return opening
+        opening = shaped.transpose(1, 2, 0, 3)
+        return opening if self.exponents is None else opening + self.offset
 
 
-def _ratio(wear: FloatArray, contacts: Contacts) -> FloatArray:
+def _ratio(wear: FloatArray, line_load: FloatArray) -> FloatArray:
     """Return wear over line load, carried on into strips without load, last axis strips."""
-    flat = np.ascontiguousarray(wear).reshape(len(contacts), -1)
-    return ratio_to_load(flat, rows_of(contacts, "line_load")).reshape(wear.shape)
+    flat = np.ascontiguousarray(wear).reshape(line_load.shape)
+    return ratio_to_load(flat, line_load).reshape(wear.shape)
 
 
 def exponents_between(old: Wearing, new: Wearing) -> FloatArray:

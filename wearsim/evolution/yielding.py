@@ -48,7 +48,7 @@ def solve_yielding(
     sequence of ContactSolution
         In the scene's order.
     """
-    if moving.all():
+    if np.count_nonzero(moving) == len(moving):
         return _solve(scene, gap, points, wear, warm)
     numbers = np.flatnonzero(moving)
     places = np.arange(len(points)).reshape(-1, len(moving))[:, numbers].ravel()
@@ -86,10 +86,9 @@ def _solve(
     sets = gap.reshape(together, realisations, strips).transpose(1, 0, 2)
     if realisations == 1:
         return model.solve_coupled_batch(sets, curvature, points, wear, warm)
-    order = np.arange(len(points)).reshape(together, realisations).T
-    there, back = order.ravel(), np.argsort(order.ravel())
-    flat = as_batch(warm, (len(points),))
-    found = model.solve_coupled_batch(
-        sets, curvature, some_points(points, there), wear, flat.at(there)
-    )
-    return as_batch(as_batch(found, (len(points),)).at(back), gap.shape[:-1])
+    # the model takes set by set, which is realisation by realisation
+    order = np.arange(len(points)).reshape(together, realisations).T.ravel()
+    near = as_batch(warm, gap.shape[:-1]).with_axis_moved(REALISATION, 0)
+    found = model.solve_coupled_batch(sets, curvature, some_points(points, order), wear, near)
+    by_set = as_batch(found, (realisations, stations, contacts))
+    return by_set.with_axis_moved(0, REALISATION)

@@ -162,29 +162,91 @@ def strip_force(
         return 0.0, 0.0, 0.0, 2.0 * half_length
     if bound <= 0.0:
         return 0.0, 0.0, 0.0, 0.0
-    t, e_x, e_y, u_x, u_y, psi, turned, scrubbed = strip_state(
-        half_length, friction * steepness, slip_x, slip_y, spin, modulus_x, modulus_y
+    steep = friction * steepness
+    force_x, force_y, moment, adhering = straight_force(
+        half_length, bound, steep, slip_x, slip_y, spin, modulus_x, modulus_y
     )
-    if t < 1.0:
-        left = (1.0 - t) * (1.0 - t)
-        behind = 0.5 * t * t
-        force_x = e_x * (1.0 - left) + behind * (u_x - e_x)
-        force_y = e_y - left * (e_y - psi) + behind * (u_y - e_y)
-        moment = t * (t * (0.75 * t - 1.0) * (u_y - e_y) - left * (e_y - psi))
-        adhering = 2.0 * (1.0 - t) * half_length
-    else:
-        elastic = 0.5 / (t * t)
-        force_x = u_x + elastic * (e_x - u_x)
-        force_y = u_y + elastic * (e_y - u_y)
-        moment = 0.25 * (e_y - u_y) / t
-        adhering = 0.0
-    if turned > 0.0 or scrubbed > 0.0:
+    state = strip_state(half_length, steep, slip_x, slip_y, spin, modulus_x, modulus_y)
+    if state.turned > 0.0 or state.scrubbed > 0.0:
         mean_x, mean_y, turning = mean_direction(slip_x, slip_y, spin * half_length)
-        force_x += turned * (mean_x - u_x)
-        force_y += turned * (mean_y - u_y)
-        moment += turned * (turning - 0.25 * (e_y - u_y) / t)
-        force_x += scrubbed * (mean_x - force_x)
-        force_y += scrubbed * (mean_y - force_y)
-        moment += scrubbed * (turning - moment)
+        turned, scrubbed, lever = state.turned, state.scrubbed, bound * half_length
+        force_x += turned * bound * (state.u_x - mean_x)
+        force_y += turned * bound * (state.u_y - mean_y)
+        moment += turned * (-lever * turning - moment)
+        force_x += scrubbed * (-bound * mean_x - force_x)
+        force_y += scrubbed * (-bound * mean_y - force_y)
+        moment += scrubbed * (-lever * turning - moment)
         adhering *= 1.0 - scrubbed
+    return force_x, force_y, moment, adhering
+
+
+@kernel
+def spin_turns(
+    half_length: float,
+    steepness: float,
+    slip_x: float,
+    slip_y: float,
+    spin: float,
+    modulus_y: float,
+) -> bool:
+    """Tell whether spin may ask for more of a strip than `straight_force`; cheap, and no root.
+
+    Parameters
+    ----------
+    half_length, steepness, slip_x, slip_y, spin, modulus_y
+        As in `strip_state`.
+    """
+    turn = spin * half_length
+    straight = TURNED * TURNED * (slip_x * slip_x + slip_y * slip_y)
+    strong = abs(spin) * modulus_y > SPIN_LIMIT * steepness
+    return (straight < turn * turn) | strong  # `or` would branch
+
+
+@kernel
+def straight_force(
+    half_length: float,
+    bound: float,
+    steepness: float,
+    slip_x: float,
+    slip_y: float,
+    spin: float,
+    modulus_x: float,
+    modulus_y: float,
+) -> tuple[float, float, float, float]:
+    """Return what `strip_force` does where spin neither turns the slip nor exceeds its limit.
+
+    One formula for all stages, without a branch, so that strips are done several at a time: with
+    s = min(t, 1) and r = min(1/t, 1) the weight of u is w = (1 + s^2 - r^2)/2, and
+
+        F = -mu q [(2 - 3s/2) r^3 d + (1 - w) psi y^ + w u].
+
+    Parameters
+    ----------
+    half_length, bound, steepness : float
+        a [m], mu q [N/m] and mu 2 p0/a [Pa/m]; a and the last positive.
+    slip_x, slip_y, spin, modulus_x, modulus_y
+        As in `strip_force`.
+
+    Returns
+    -------
+    force_x, force_y, moment, adhesion_length
+        As `strip_force` returns them.
+    """
+    per = 1.0 / (steepness * half_length)
+    d_x, d_y = slip_x * modulus_x * per, slip_y * modulus_y * per
+    psi = min(max(spin * half_length * modulus_y * per, -SPIN_LIMIT), SPIN_LIMIT)
+    rest, part = 1.0 - psi * psi, d_y * psi
+    shift = part + math.sqrt(part * part + rest * (d_x * d_x + d_y * d_y))  # t times rest
+    greater = max(shift, rest)
+    once = 1.0 / (rest * greater)
+    s, r = min(shift, rest) * greater * once, rest * rest * once
+    slip = math.sqrt(slip_x * slip_x + slip_y * slip_y)
+    per_slip = 1.0 / slip if slip > 0.0 else 0.0
+    u_x, u_y = slip_x * per_slip, slip_y * per_slip
+    weight = 0.5 * (1.0 + s * s - r * r)
+    kept = (2.0 - 1.5 * s) * (r * r * r)
+    force_x = kept * d_x + weight * u_x
+    force_y = kept * d_y + (1.0 - weight) * psi + weight * u_y
+    moment = s * r * (0.75 * s - 1.0) * (s * (u_y - psi) - r * d_y) - (1.0 - s) * (1.0 - s) * d_y
+    adhering = 2.0 * (1.0 - s) * half_length
     return -bound * force_x, -bound * force_y, -bound * half_length * moment, adhering

@@ -74,6 +74,7 @@ def fastrip(
             continue
         if beyond_strip_theory(j, half_length, bound_peak, motion, moduli):
             march_into(
+                1,
                 half_length[j : j + 1],
                 bound_peak[j : j + 1],
                 elliptic,
@@ -85,8 +86,11 @@ def fastrip(
             )
         else:
             strip = strip_of(j, half_length, bound_peak, motion, moduli)
+            one_way = motion.lateral == 0.0 or motion.longitudinal[j] == 0.0
+            # what slides one way does not turn, and one step is exact
+            steps = 1 if motion.spin == 0.0 and one_way else 1 + points // _FEWER
             _adhere(j, strip, sums)
-            _slide(j, strip, 1 + points // _FEWER, sums)
+            _slide(j, strip, steps, sums)
     return stacked(sums)
 
 

@@ -10,6 +10,8 @@ import numpy as np
 from wearsim.mechanics.jit import kernel
 from wearsim.types import FloatArray
 
+_ROOT_CORNER = 0.2078862249773546  # -zeta(-1/2)
+
 
 class Sums(NamedTuple):
     """What a march sums up in every strip, and the traction where it stands; all (strips,).
@@ -40,9 +42,10 @@ def march(
     """March the traction from the leading to the trailing edge of every strip at once.
 
     A step of dx adds -gradient dx to the traction; where that exceeds the bound at the new point
-    the traction is scaled back to it. Sums over the points are trapezoidal, as the traction
-    vanishes at both edges; the work of the rigid slip follows from them without an error of its
-    own, and is second order in dx.
+    the traction is scaled back to it. Sums over the points are trapezoidal, corrected at both
+    edges, where the traction vanishes (`end_weights`); the work of the rigid slip follows from
+    them without an error of its own. It is second order in dx: what is left comes from where a
+    strip begins to slide, with either sign, and averages out over strips.
 
     Parameters
     ----------
@@ -71,6 +74,7 @@ def march(
     """
     sums = new_sums(len(half_length))
     march_into(
+        len(half_length),
         half_length,
         bound_peak,
         elliptic,
@@ -127,24 +131,26 @@ def stacked(sums: Sums) -> FloatArray:
 
 
 @kernel
-def clear(sums: Sums) -> None:
-    """Set the sums to zero, as at the leading edge.
+def clear(strips: int, sums: Sums) -> None:
+    """Set the sums of the first strips to zero, as at the leading edge.
 
     Parameters
     ----------
+    strips : int
+        How many.
     sums : Sums
         Overwritten.
     """
-    for j in range(len(sums.force_x)):
+    for j in range(strips):
         sums.force_x[j] = sums.force_y[j] = sums.moment[j] = 0.0
         sums.adhesion[j] = sums.work[j] = 0.0
         sums.traction_x[j] = sums.traction_y[j] = 0.0
 
 
 @kernel
-def _times_step(sums: Sums, half_length: FloatArray, cell: float) -> None:
-    """Turn sums over the points into integrals along the strips."""
-    for j in range(len(half_length)):
+def _times_step(strips: int, sums: Sums, half_length: FloatArray, cell: float) -> None:
+    """Turn sums over the points into integrals along the first strips."""
+    for j in range(strips):
         dx = cell * half_length[j]
         sums.force_x[j] *= dx
         sums.force_y[j] *= dx
@@ -154,6 +160,7 @@ def _times_step(sums: Sums, half_length: FloatArray, cell: float) -> None:
 
 @kernel
 def march_into(
+    strips: int,
     half_length: FloatArray,
     bound_peak: FloatArray,
     elliptic: bool,
@@ -167,26 +174,38 @@ def march_into(
 
     Parameters
     ----------
+    strips : int
+        How many of the strips to march through, the first ones; four at a time go fastest.
     half_length, bound_peak, elliptic, gradient_x, gradient_y, gradient_spin, points
         As in `march`.
     sums : Sums
         Overwritten.
     """
-    clear(sums)
+    clear(strips, sums)
     cell = 2.0 / points
     for k in range(1, points + 1):
         place = place_of(k, points)
         shape = bound_shape(place, elliptic)
-        for j in range(len(half_length)):
+        sticking, sliding = end_weights(k, points, elliptic)
+        for j in range(strips):
             a = half_length[j]
             across = gradient_y + gradient_spin * (place + 0.5 * cell) * a
-            _step(j, place, cell * a, gradient_x[j], across, shape * bound_peak[j], sums)
-    _times_step(sums, half_length, cell)
+            bound = shape * bound_peak[j]
+            _step(j, place, cell * a, gradient_x[j], across, bound, sticking, sliding, sums)
+    _times_step(strips, sums, half_length, cell)
 
 
 @kernel
 def _step(
-    j: int, place: float, dx: float, along: float, across: float, bound: float, sums: Sums
+    j: int,
+    place: float,
+    dx: float,
+    along: float,
+    across: float,
+    bound: float,
+    sticking: float,
+    sliding: float,
+    sums: Sums,
 ) -> tuple[float, float, float]:
     """Take strip `j` a step on; return the trial tractions and the factor that held them.
 
@@ -200,6 +219,8 @@ def _step(
         Rise of the tractions over the step [Pa/m].
     bound : float
         Traction bound where the step ends [Pa].
+    sticking, sliding : float
+        What the point weighs in the sums, as it adheres or slides.
     sums : Sums
         Brought up to date, but for the work.
     """
@@ -208,9 +229,10 @@ def _step(
     sticks, scale = hold(tx, ty, bound)
     sums.traction_x[j] = scale * tx
     sums.traction_y[j] = scale * ty
-    sums.force_x[j] += scale * tx
-    sums.force_y[j] += scale * ty
-    sums.moment[j] += place * (scale * ty)
+    weighed = scale * (sticking if sticks else sliding)
+    sums.force_x[j] += weighed * tx
+    sums.force_y[j] += weighed * ty
+    sums.moment[j] += place * (weighed * ty)
     sums.adhesion[j] += 1.0 if sticks else 0.0
     return tx, ty, scale
 
@@ -225,6 +247,33 @@ def place_of(step: int, points: int) -> float:
         Number of the step, from 1 on, and steps mx along the strip.
     """
     return 1.0 - 2.0 / points * step if step < points else -1.0
+
+
+@kernel
+def end_weights(step: int, points: int, elliptic: bool) -> tuple[float, float]:
+    """Return what the traction where a step ends weighs in the sums, as it adheres or slides.
+
+    One everywhere but next to the edges. There the trapezoidal rule cuts a corner, which Euler and
+    Maclaurin give back: h/12 of the first value of a traction that rises evenly, or along the
+    parabola, and -zeta(-1/2) h of one that rises as a root.
+
+    Parameters
+    ----------
+    step, points : int
+        Number of the step, from 1 on, and steps mx along the strip.
+    elliptic : bool
+        As in `march`.
+    """
+    sticking = sliding = 1.0
+    inner = points / max(points - 1.0, 1.0)  # the bound's rise at the edge, over that of its chord
+    corner = _ROOT_CORNER * math.sqrt(inner) if elliptic else inner / 12.0
+    if step == 1:
+        sticking += 1.0 / 12.0
+        sliding += corner
+    if step == points - 1:
+        sticking += corner
+        sliding += corner
+    return sticking, sliding
 
 
 @kernel
@@ -258,6 +307,7 @@ def hold(traction_x: float, traction_y: float, bound: float) -> tuple[bool, floa
 
 @kernel
 def march_local(
+    strips: int,
     half_length: FloatArray,
     bound_peak: FloatArray,
     friction: FloatArray,
@@ -274,6 +324,8 @@ def march_local(
 
     Parameters
     ----------
+    strips : int
+        As in `march_into`.
     half_length, elliptic, gradient_x, gradient_y, gradient_spin
         As in `march`.
     bound_peak : ndarray, shape (strips,)
@@ -287,17 +339,20 @@ def march_local(
     sums : Sums
         Overwritten; `work` is the textbook's element sum over the rolling velocity.
     """
-    clear(sums)
+    clear(strips, sums)
     points = len(friction)
     cell = 2.0 / points
     for k in range(1, points + 1):
         place = place_of(k, points)
         shape = bound_shape(place, elliptic)
-        for j in range(len(half_length)):
+        sticking, sliding = end_weights(k, points, elliptic)
+        for j in range(strips):
             a = half_length[j]
             across = gradient_y + gradient_spin * (place + 0.5 * cell) * a
             bound = shape * (friction[k - 1, first + j] * bound_peak[j])
-            tx, ty, scale = _step(j, place, cell * a, gradient_x[j], across, bound, sums)
+            tx, ty, scale = _step(
+                j, place, cell * a, gradient_x[j], across, bound, sticking, sliding, sums
+            )
             cut = scale * (1.0 - scale)
             sums.work[j] += cut * (longitudinal * tx * tx + lateral * ty * ty)
-    _times_step(sums, half_length, cell)
+    _times_step(strips, sums, half_length, cell)

@@ -40,12 +40,15 @@ def closed_form(
     Integrated here from the march of Kalker (1982), DOI 10.1080/00423118208968684.
     """
     sums = new_sums(len(half_length))
-    closed_form_into(half_length, bound_peak, elliptic, gradient_x, gradient_y, sums)
+    closed_form_into(
+        len(half_length), half_length, bound_peak, elliptic, gradient_x, gradient_y, sums
+    )
     return stacked(sums)
 
 
 @kernel
 def closed_form_into(
+    strips: int,
     half_length: FloatArray,
     bound_peak: FloatArray,
     elliptic: bool,
@@ -57,13 +60,15 @@ def closed_form_into(
 
     Parameters
     ----------
+    strips : int
+        How many of the strips to integrate, the first ones.
     half_length, bound_peak, elliptic, gradient_x, gradient_y
         As in `march`.
     sums : Sums
         Overwritten.
     """
-    clear(sums)
-    for j in range(len(half_length)):
+    clear(strips, sums)
+    for j in range(strips):
         a, peak = half_length[j], bound_peak[j]
         size = math.sqrt(gradient_x[j] * gradient_x[j] + gradient_y * gradient_y)
         if a > 0.0 and size > 0.0 and peak > 0.0:

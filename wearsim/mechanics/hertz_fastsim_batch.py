@@ -13,7 +13,6 @@ from wearsim.mechanics.fastsim import (
     march_into,
     march_local,
     new_sums,
-    part_of,
 )
 from wearsim.mechanics.fastsim_closed_form import closed_form_into
 from wearsim.mechanics.hertz import CONVERGED
@@ -25,6 +24,7 @@ from wearsim.types import FloatArray, IntArray
 NEVER, EXACT, ALWAYS = range(3)  # where the closed form takes the march's place
 TABLE, LINE_LIMIT, GIVEN = range(3)  # where Kalker's coefficients come from
 NO_LIMIT, NOT_FINITE = 30, 31  # statuses beside those of `hertz_patches`
+_LANES = 4  # strips that a march takes at a time; each one left over costs as much as they
 
 
 class Theory(NamedTuple):
@@ -82,14 +82,19 @@ class Found(NamedTuple):
 
 
 class Work(NamedTuple):
-    """Room for one contact, all (strips,): coverage, slip, gradients, bounds."""
+    """Room for one contact: coverage and slip of all strips, and what the march takes.
+
+    Half-lengths, gradients and bounds begin at the first strip in contact, and have room for as
+    many strips as make up whole lanes.
+    """
 
     middle: FloatArray
     coverage: FloatArray
     longitudinal: FloatArray
     spin_part: FloatArray
-    gradient_x: FloatArray
     peak: FloatArray
+    half_length: FloatArray
+    gradient_x: FloatArray
     bound: FloatArray
 
 
@@ -124,9 +129,9 @@ def solve_contacts(
         The first contact that failed, or their number.
     """
     strips = len(bodies.y)
-    room = np.empty((7, strips))
-    work = Work(room[0], room[1], room[2], room[3], room[4], room[5], room[6])
-    total, sums = new_sums(strips), new_sums(strips)
+    room, lanes = np.empty((5, strips)), np.empty((3, _whole_lanes(strips)))
+    work = Work(room[0], room[1], room[2], room[3], room[4], lanes[0], lanes[1], lanes[2])
+    total, sums = new_sums(strips), new_sums(_whole_lanes(strips))
     alike = np.ones((theory.points, strips))
     given = theory.given
     find_patches(bodies, gaps, row, asked.normal_force, patches)
@@ -234,35 +239,46 @@ def _solve_tractions(
         lateral, turning = longitudinal, longitudinal
     parabola = 2.0 * asked.normal_force[k] / (math.pi * a * b)
     _put_bounds(b, patches.peak_pressure[k], parabola, theory.elliptic, work)
-    for j in range(first, stop):
-        mean = work.longitudinal[j] - work.spin_part[j]
-        work.gradient_x[j] = mean / longitudinal + work.spin_part[j] / turning
+    count, whole = stop - first, _whole_lanes(stop - first)
+    for j in range(count):
+        here = first + j
+        mean = work.longitudinal[here] - work.spin_part[here]
+        work.gradient_x[j] = mean / longitudinal + work.spin_part[here] / turning
+        work.half_length[j] = found.half_length[k, here]
+        work.bound[j] = work.peak[here]
+    for j in range(count, whole):  # strips of no length and no traction
+        work.gradient_x[j] = work.half_length[j] = work.bound[j] = 0.0
     gradient_y, gradient_spin = asked.lateral[k] / lateral, asked.spin[k] / turning
     slopes = gradient_y, gradient_spin, longitudinal, lateral
-    half_length, part = found.half_length[k][first:stop], part_of(sums, first, stop)
-    gradient_x, peak = work.gradient_x[first:stop], work.peak[first:stop]
-    bound, friction = work.bound[first:stop], asked.friction[k]
+    half_length, gradient_x, bound = work.half_length, work.gradient_x, work.bound
+    friction = asked.friction[k]
     lanes, columns = friction.shape
-    clear(total)
+    clear(len(total.force_x), total)
     if lanes > 1 and not asked.carried:
-        march_local(half_length, peak, friction, first, theory.elliptic, gradient_x, *slopes, part)
-        _add(part, 1.0, first, total)
+        march_local(
+            count, half_length, bound, friction, first, theory.elliptic, gradient_x, *slopes, sums
+        )
+        _add(count, sums, 1.0, first, total)
         return
     closed = theory.closed_form == ALWAYS
     closed = closed or (theory.closed_form == EXACT and asked.spin[k] == 0.0)
     for lane in range(lanes):  # the particles of a pattern that rolls through, or one for all
-        for j in range(stop - first):
-            bound[j] = friction[lane, first + j if columns > 1 else 0] * peak[j]
+        for j in range(count):
+            bound[j] = friction[lane, first + j if columns > 1 else 0] * work.peak[first + j]
         if theory.element_sum:
             march_local(
-                half_length, bound, alike, first, theory.elliptic, gradient_x, *slopes, part
+                count, half_length, bound, alike, first, theory.elliptic, gradient_x, *slopes, sums
             )
         elif closed:
-            closed_form_into(half_length, bound, theory.elliptic, gradient_x, gradient_y, part)
+            closed_form_into(
+                count, half_length, bound, theory.elliptic, gradient_x, gradient_y, sums
+            )
             if asked.spin[k] != 0.0:
-                part.moment[:] = 0.0  # phi x is left out, of the work as of the traction
+                for j in range(count):
+                    sums.moment[j] = 0.0  # phi x is left out, of the work as of the traction
         else:
             march_into(
+                whole,
                 half_length,
                 bound,
                 theory.elliptic,
@@ -270,9 +286,15 @@ def _solve_tractions(
                 gradient_y,
                 gradient_spin,
                 theory.points,
-                part,
+                sums,
             )
-        _add(part, 1.0 / lanes, first, total)
+        _add(count, sums, 1.0 / lanes, first, total)
+
+
+@kernel
+def _whole_lanes(strips: int) -> int:
+    """Return as many strips, or a few more, as are marched through without one left over."""
+    return (strips + _LANES - 1) // _LANES * _LANES
 
 
 @kernel
@@ -309,9 +331,9 @@ def _put_bounds(
 
 
 @kernel
-def _add(part: Sums, weight: float, first: int, total: Sums) -> None:
+def _add(count: int, part: Sums, weight: float, first: int, total: Sums) -> None:
     """Add the weighted sums of the strips from `first` on to those of all."""
-    for j in range(len(part.force_x)):
+    for j in range(count):
         total.force_x[first + j] += weight * part.force_x[j]
         total.force_y[first + j] += weight * part.force_y[j]
         total.moment[first + j] += weight * part.moment[j]

@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wearsim.mechanics.carter import strip_force
+from wearsim.mechanics.carter import spin_turns, straight_force, strip_force
 from wearsim.mechanics.jit import kernel
 from wearsim.mechanics.strip_coupling import (
     StripElasticity,
@@ -33,6 +33,8 @@ from wearsim.mechanics.strip_coupling import (
 from wearsim.types import FloatArray
 
 SUMS = ("force_x", "force_y", "spin_moment", "power", "peak_pressure", "adhesion_fraction")
+
+_LEAST = 1e-30  # Pa/m, added to the steepness of a bound: less than a rounding, but where it is 0
 
 
 class StripTractions(NamedTuple):
@@ -81,7 +83,7 @@ def bound_steepness(half_length: FloatArray, line_load: FloatArray) -> float:
 
 
 @kernel
-def _fill(
+def _fill_forces(
     half_length: FloatArray,
     line_load: FloatArray,
     friction: FloatArray,
@@ -92,27 +94,53 @@ def _fill(
     modulus_x: float,
     modulus_y: float,
     out: StripTractions,
-) -> tuple[float, float]:
-    """Fill forces and work for the slip that strips see; return the work of that and of the rigid.
+) -> None:
+    """Fill the forces for the slip that strips see; that induced is read from `out`.
 
-    The slip induced is read from `out`.
+    All strips are done alike, without branches: those without load or friction get harmless
+    numbers in, and a traction bound of zero. Those that spin asks more of are then done again.
     """
-    seen, rigid = 0.0, 0.0
+    turned = 0
+    if spin != 0.0:
+        for i in range(line_load.shape[0]):
+            x, y = slip_x[i] + out.induced_x[i], slip_y + out.induced_y[i]
+            steep = friction[i] * steepness
+            turned += 1 if spin_turns(half_length[i], steep, x, y, spin, modulus_y) else 0
     for i in range(line_load.shape[0]):
-        if not line_load[i] > 0.0:
-            out.force_x[i], out.force_y[i], out.moment[i] = 0.0, 0.0, 0.0
-            out.work[i], out.adhesion_length[i] = 0.0, 0.0
-            continue
-        x, y = slip_x[i] + out.induced_x[i], slip_y + out.induced_y[i]
-        force_x, force_y, moment, adhering = strip_force(
-            half_length[i], line_load[i], friction[i], steepness, x, y, spin, modulus_x, modulus_y
+        loaded = 1.0 if line_load[i] > 0.0 else 0.0
+        force_x, force_y, moment, adhering = straight_force(
+            loaded * half_length[i] + (1.0 - loaded),
+            max(friction[i] * (loaded * line_load[i]), 0.0),
+            friction[i] * steepness + _LEAST,
+            slip_x[i] + out.induced_x[i],
+            slip_y + out.induced_y[i],
+            spin,
+            modulus_x,
+            modulus_y,
         )
         out.force_x[i], out.force_y[i], out.moment[i] = force_x, force_y, moment
-        out.adhesion_length[i] = adhering
-        out.work[i] = -(force_x * x + force_y * y + spin * moment)
+        out.adhesion_length[i] = loaded * adhering
+    for i in range(line_load.shape[0] if turned > 0 else 0):
+        if line_load[i] > 0.0:
+            x, y = slip_x[i] + out.induced_x[i], slip_y + out.induced_y[i]
+            a, q, mu = half_length[i], line_load[i], friction[i]
+            found = strip_force(a, q, mu, steepness, x, y, spin, modulus_x, modulus_y)
+            out.force_x[i], out.force_y[i], out.moment[i], out.adhesion_length[i] = found
+
+
+@kernel
+def _fill_work(slip_x: FloatArray, slip_y: float, spin: float, out: StripTractions) -> None:
+    """Fill the work on the slip that strips see, scaled to add up to that on the rigid slip."""
+    seen, rigid = 0.0, 0.0
+    for i in range(slip_x.shape[0]):
+        force_x, force_y = out.force_x[i], out.force_y[i]
+        own = -(force_x * slip_x[i] + force_y * slip_y + spin * out.moment[i])
+        out.work[i] = own - (force_x * out.induced_x[i] + force_y * out.induced_y[i])
         seen += out.work[i]
-        rigid -= force_x * slip_x[i] + force_y * slip_y + spin * moment
-    return seen, rigid
+        rigid += own
+    scale = rigid / seen if seen > 0.0 else 1.0
+    for i in range(slip_x.shape[0]):
+        out.work[i] *= scale
 
 
 @kernel
@@ -154,50 +182,36 @@ def solve_strips(
     ratio = equivalent_ratio(half_length, line_load, spacing)
     modulus_x, modulus_y = effective_moduli(ratio, elasticity)
     steepness = bound_steepness(half_length, line_load)
-    _fill(
-        half_length,
-        line_load,
-        friction,
-        slip_x,
-        slip_y,
-        spin,
-        steepness,
-        modulus_x,
-        modulus_y,
-        out,
-    )
-    if last < 0 or (slip_y == 0.0 and spin == 0.0):
-        return
-    adhering = 0.0
-    for i in range(first, last + 1):
-        if line_load[i] > 0.0:
-            adhering += line_load[i] * out.adhesion_length[i] / half_length[i]
-    induced_slip(
-        out.force_x,
-        out.force_y,
-        first,
-        last,
-        spacing,
-        coupling_length(mean / load, 0.5 * adhering / load),
-        elasticity,
-        out.induced_x,
-        out.induced_y,
-    )
-    seen, rigid = _fill(
-        half_length,
-        line_load,
-        friction,
-        slip_x,
-        slip_y,
-        spin,
-        steepness,
-        modulus_x,
-        modulus_y,
-        out,
-    )
-    if seen > 0.0:
-        for i in range(first, last + 1):
-            out.work[i] *= rigid / seen
+    coupled = last >= 0 and (slip_y != 0.0 or spin != 0.0)
+    for sweep in range(2 if coupled else 1):
+        if sweep > 0:
+            adhering = 0.0
+            for i in range(first, last + 1):
+                adhering += line_load[i] * out.adhesion_length[i]
+            induced_slip(
+                out.force_x,
+                out.force_y,
+                first,
+                last,
+                spacing,
+                coupling_length(mean / load, 0.5 * adhering / mean),
+                elasticity,
+                out.induced_x,
+                out.induced_y,
+            )
+        _fill_forces(
+            half_length,
+            line_load,
+            friction,
+            slip_x,
+            slip_y,
+            spin,
+            steepness,
+            modulus_x,
+            modulus_y,
+            out,
+        )
+    _fill_work(slip_x, slip_y, spin, out)
 
 
 @kernel

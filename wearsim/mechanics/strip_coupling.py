@@ -40,7 +40,8 @@ _LOWEST = math.log(2e-3)  # ln(a/b) below which a contact is as good as infinite
 _HIGHEST = math.log(20.0)
 
 _LADDER = math.log(4.0)  # step of ln k: the sum ripples about its integral by 4 %, far and near
-_PAIRS = 3  # of exponentials: enough for b/a up to 500
+_GROUPS = 2  # of four exponentials: enough for b/a up to 8000
+_FLAT = 0.1  # k times the contact's width below which exponentials add nothing: (k width)^2/4
 # k_0 = _HEAD / (length that W is rounded off over), as sum and integral hold the same logarithm
 _HEAD = 2.0 * math.exp(-float(np.euler_gamma) - 0.5 * _LADDER)
 
@@ -157,24 +158,52 @@ def induced_slip(
         induced_x[i], induced_y[i] = 0.0, 0.0
     shear = elasticity.shear_modulus
     poisson = 1.0 - shear / elasticity.contact_modulus
-    rate = _HEAD / length
-    one = math.exp(-rate * spacing)
+    rate, width = _HEAD / length, spacing * (last - first + 1)
+    decay = math.exp(-rate * spacing)
     weight = _LADDER * rate * rate * spacing * poisson / (math.pi * shear)
-    for _ in range(_PAIRS):
-        two = math.sqrt(math.sqrt(one))
-        quarter = weight / 16.0
-        # sums over the strips passed so far, for both rates, going up and going down
-        up_x1, up_y1, up_x2, up_y2 = 0.0, 0.0, 0.0, 0.0
-        down_x1, down_y1, down_x2, down_y2 = 0.0, 0.0, 0.0, 0.0
-        for k in range(last - first + 1):
-            i, j = first + k, last - k
-            induced_x[i] -= weight * up_y1 + quarter * up_y2
-            induced_y[i] -= weight * up_x1 + quarter * up_x2
-            induced_x[j] += weight * down_y1 + quarter * down_y2
-            induced_y[j] += weight * down_x1 + quarter * down_x2
-            up_x1, up_y1 = one * (up_x1 + force_x[i]), one * (up_y1 + force_y[i])
-            up_x2, up_y2 = two * (up_x2 + force_x[i]), two * (up_y2 + force_y[i])
-            down_x1, down_y1 = one * (down_x1 + force_x[j]), one * (down_y1 + force_y[j])
-            down_x2, down_y2 = two * (down_x2 + force_x[j]), two * (down_y2 + force_y[j])
-        weight = quarter / 16.0
-        one = math.sqrt(math.sqrt(two))
+    for group in range(_GROUPS):
+        if group > 0 and rate * width < _FLAT:
+            break
+        _add_group(force_x, force_y, first, last, decay, weight, induced_x, induced_y)
+        rate, weight = rate / 256.0, weight / 65536.0
+        decay = math.exp(-rate * spacing)
+
+
+@kernel
+def _add_group(
+    force_x: FloatArray,
+    force_y: FloatArray,
+    first: int,
+    last: int,
+    decay: float,
+    weight: float,
+    induced_x: FloatArray,
+    induced_y: FloatArray,
+) -> None:
+    """Add the slip of four exponentials, all in one sweep up and one down.
+
+    Parameters
+    ----------
+    force_x, force_y, first, last, induced_x, induced_y
+        As in `induced_slip`.
+    decay, weight : float
+        exp(-k spacing) of the greatest k, and what its sums weigh.
+    """
+    two = math.sqrt(math.sqrt(decay))
+    three = math.sqrt(math.sqrt(two))
+    four = math.sqrt(math.sqrt(three))
+    second, third, fourth = weight / 16.0, weight / 256.0, weight / 4096.0
+    x1, x2, x3, x4, y1, y2, y3, y4 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(first, last + 1):
+        induced_x[i] -= (weight * y1 + second * y2) + (third * y3 + fourth * y4)
+        induced_y[i] -= (weight * x1 + second * x2) + (third * x3 + fourth * x4)
+        x, y = force_x[i], force_y[i]
+        x1, x2, x3, x4 = decay * (x1 + x), two * (x2 + x), three * (x3 + x), four * (x4 + x)
+        y1, y2, y3, y4 = decay * (y1 + y), two * (y2 + y), three * (y3 + y), four * (y4 + y)
+    x1, x2, x3, x4, y1, y2, y3, y4 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(last, first - 1, -1):
+        induced_x[i] += (weight * y1 + second * y2) + (third * y3 + fourth * y4)
+        induced_y[i] += (weight * x1 + second * x2) + (third * x3 + fourth * x4)
+        x, y = force_x[i], force_y[i]
+        x1, x2, x3, x4 = decay * (x1 + x), two * (x2 + x), three * (x3 + x), four * (x4 + x)
+        y1, y2, y3, y4 = decay * (y1 + y), two * (y2 + y), three * (y3 + y), four * (y4 + y)

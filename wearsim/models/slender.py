@@ -13,10 +13,9 @@ from wearsim.errors import ContactError
 from wearsim.mechanics import slender as kernels
 from wearsim.mechanics.elasticity import ElasticPair, combine
 from wearsim.mechanics.influence import HIGHEST, curvature_table, influence_table, no_table
-from wearsim.mechanics.jit import own_array
-from wearsim.mechanics.strip import SUMS, strip_contacts
-from wearsim.mechanics.strip_coupling import strip_elasticity
-from wearsim.models.slender_normal import Medium, NormalContacts
+from wearsim.mechanics.strip import SUMS
+from wearsim.models.slender_normal import Medium, NormalContacts, start_of
+from wearsim.models.slender_tangential import Asked, first_not_finite, strip_tractions
 from wearsim.models.strip_grid import check_edges, grid_about_hertz
 from wearsim.models.strip_theory import StripTheory
 from wearsim.models.tangential import (
@@ -42,6 +41,7 @@ from wearsim.types import (
     FloatArray,
     Grid,
     Material,
+    Number,
     OperatingPoint,
     OperatingPoints,
 )
@@ -54,6 +54,9 @@ _REMEDY = {
     kernels.NO_CONVERGENCE: "Newton's method did not settle on the strips in contact",
     kernels.NOT_FINITE: "a value is not finite",
 }
+
+
+_ALONE = (1, 1, 1)  # leading axes of a contact by itself
 
 
 class SlenderOptions(TangentialOptions):
@@ -112,14 +115,28 @@ class Slender(ContactModel):
         warm: ContactSolution | None = None,
     ) -> ContactSolution:
         """Solve one contact."""
-        compliance = np.zeros_like(gap) if wear_compliance is None else wear_compliance
-        return self.solve_coupled(
-            gap[None, :],
-            longitudinal_curvature,
-            [point],
-            SharedWear.of_one(compliance),
-            None if warm is None else [warm],
-        )[0]
+        shape = (1, 1, len(gap))
+        own = np.zeros(shape) if wear_compliance is None else wear_compliance.reshape(shape)
+        start = None if warm is None else (warm.line_load, warm.approach)
+        normal = self._solve_normal(
+            gap.reshape(shape), longitudinal_curvature, point.normal_force, own, start, _ALONE
+        )
+        if not self._plain(point):
+            return self._complete(normal, (0, 0), longitudinal_curvature, point)
+        asked = Asked.of_one(point, self._grid)
+        dissipation, sums = strip_tractions(*normal.strips, asked, self._grid, self._pair)
+        if first_not_finite(sums) is not None:
+            raise power_not_finite(point, line_load=normal.line_load[0, 0])
+        return ContactSolution(
+            y=self._grid.y,
+            half_length=normal.half_length[0, 0],
+            line_load=normal.line_load[0, 0],
+            dissipation=dissipation[0],
+            approach=normal.approach.item(),
+            longitudinal_creepage=point.creepage.longitudinal,
+            iterations=normal.iterations.item(),
+            **dict(zip(SUMS, sums[:, 0].tolist(), strict=True)),
+        )
 
     def solve_coupled(
         self,
@@ -146,23 +163,30 @@ class Slender(ContactModel):
         if columns is not None:
             return self._solve(gap, longitudinal_curvature, columns, wear, warm, leading)
         loads = np.array([point.normal_force for point in points])
-        normal = self._solve_normal(gap, longitudinal_curvature, loads, wear, warm, leading)
+        start = start_of(warm)
+        normal = self._solve_normal(gap, longitudinal_curvature, loads, wear, start, leading)
         return [
-            complete(
-                self.theory,
-                semi_elliptic_strips(
-                    self._grid,
-                    normal.line_load[place],
-                    normal.half_length[place],
-                    longitudinal_curvature,
-                    float(normal.approach[place]),
-                    int(normal.iterations[place[0]]),
-                ),
-                self._pair,
-                point,
-            )
-            for place, point in zip(np.ndindex(gap.shape[:2]), points, strict=True)
+            self._complete(normal, (k, contact), longitudinal_curvature, point)
+            for (k, contact), point in zip(np.ndindex(gap.shape[:2]), points, strict=True)
         ]
+
+    def _complete(
+        self,
+        normal: NormalContacts,
+        place: tuple[int, int],
+        longitudinal_curvature: float,
+        point: OperatingPoint,
+    ) -> ContactSolution:
+        """Return the solution of the normal contact at `place`, set and contact, by any theory."""
+        strips = semi_elliptic_strips(
+            self._grid,
+            normal.line_load[place],
+            normal.half_length[place],
+            longitudinal_curvature,
+            float(normal.approach[place]),
+            int(normal.iterations[place[0]]),
+        )
+        return complete(self.theory, strips, self._pair, point)
 
     def solve_batch(
         self,
@@ -179,7 +203,7 @@ class Slender(ContactModel):
         alone = gap.reshape(-1, 1, gap.shape[-1])
         own = np.zeros(alone.shape)
         if wear_compliance is not None:
-            own[:] = wear_compliance.reshape(alone.shape)
+            own = wear_compliance.reshape(alone.shape)
         return self._solve(alone, longitudinal_curvature, columns, own, warm, gap.shape[:-1])
 
     def _solve(
@@ -195,20 +219,23 @@ class Slender(ContactModel):
 
         What they wear is shared, or each contact's own compliance.
         """
-        loads = points.normal_force
-        normal = self._solve_normal(gap, longitudinal_curvature, loads, wear, warm, leading)
+        loads, start = points.normal_force, start_of(warm)
+        normal = self._solve_normal(gap, longitudinal_curvature, loads, wear, start, leading)
         return self._completed(normal, points, leading)
 
     def _solve_normal(
         self,
         gap: FloatArray,
         longitudinal_curvature: float,
-        loads: FloatArray,
+        loads: Number,
         wear: SharedWear | FloatArray,
-        warm: Sequence[ContactSolution] | None,
+        start: tuple[FloatArray, Number] | None,
         leading: tuple[int, ...],
     ) -> NormalContacts:
-        """Solve the normal problem of sets of contacts; `leading` is for naming one that fails."""
+        """Solve the normal problem of sets of contacts.
+
+        `start` has line loads and approaches nearby; `leading` is for naming one that fails.
+        """
         medium = Medium(
             self._grid.spacing,
             self._pair.contact_modulus,
@@ -216,7 +243,7 @@ class Slender(ContactModel):
             self._table,
             self._bend,
         )
-        normal = NormalContacts.starting(gap, loads, warm)
+        normal = NormalContacts.starting(gap, loads, start)
         if isinstance(wear, SharedWear):
             normal.solve(wear, medium)
         else:
@@ -236,6 +263,17 @@ class Slender(ContactModel):
                 raise naming_contact(error, number, leading) from error
         return normal
 
+    def _plain(self, point: OperatingPoint) -> bool:
+        """Tell whether strip theory can take a point by its closed form."""
+        rank = 0 if isinstance(point.friction, float) else np.ndim(point.friction)
+        free = point.bearing_torque is not None
+        return (
+            isinstance(self.theory, StripTheory)
+            and rank < 2
+            and not free
+            and not point.friction_carried
+        )
+
     def _columns(self, points: Sequence[OperatingPoint]) -> OperatingPoints | None:
         """Return the points as columns where strip theory can take them all at once, or None."""
         if not isinstance(self.theory, StripTheory):
@@ -248,44 +286,24 @@ class Slender(ContactModel):
         self, normal: NormalContacts, points: OperatingPoints, leading: tuple[int, ...]
     ) -> BatchSolution:
         """Return the solutions of normal contacts by strip theory, all in one call."""
-        y, shape = self._grid.y, (len(points), self._grid.strips)
-        line_load, half_length = normal.line_load.reshape(shape), normal.half_length.reshape(shape)
-        variation = points.variation
-        if variation is None:
-            variation = -points.spin[:, None] * y
-        friction = points.friction if points.friction.ndim > 1 else points.friction[:, None]
-        dissipation, sums = np.empty(shape), np.empty((len(SUMS), len(points)))
-        strip_contacts(
-            line_load,
-            half_length,
-            y,
-            self._grid.spacing,
-            strip_elasticity(self._pair.contact_modulus, self._pair.shear_modulus),
-            points.rolling_speed,
-            own_array(points.longitudinal),
-            own_array(points.lateral),
-            own_array(points.spin),
-            own_array(variation),
-            own_array(np.broadcast_to(friction, shape)),
-            dissipation,
-            sums,
-        )
-        failed = np.flatnonzero(~np.isfinite(sums).all(axis=0))
-        if failed.size:
-            number = int(failed[0])
+        asked = Asked.of(points, self._grid)
+        dissipation, sums = strip_tractions(*normal.strips, asked, self._grid, self._pair)
+        number = first_not_finite(sums)
+        if number is not None:
+            line_load = normal.strips[0].reshape(dissipation.shape)
             error = power_not_finite(points[number], line_load=line_load[number])
             raise naming_contact(error, number, leading)
+        strips = (*leading, self._grid.strips)
         columns = {
-            "half_length": half_length,
-            "line_load": line_load,
-            "dissipation": dissipation,
-            "approach": normal.approach.ravel(),
-            "longitudinal_creepage": points.longitudinal,
-            "iterations": np.repeat(normal.iterations, normal.gap.shape[1]),
-            **dict(zip(SUMS, sums, strict=True)),
+            "half_length": normal.half_length.reshape(strips),
+            "line_load": normal.line_load.reshape(strips),
+            "dissipation": dissipation.reshape(strips),
+            "approach": normal.approach.reshape(leading),
+            "longitudinal_creepage": points.longitudinal.reshape(leading),
+            "iterations": normal.iterations.repeat(normal.gap.shape[1]).reshape(leading),
+            **dict(zip(SUMS, sums.reshape(-1, *leading), strict=True)),
         }
-        shaped = {name: a.reshape(leading + a.shape[1:]) for name, a in columns.items()}
-        return BatchSolution(leading, y, shaped)
+        return BatchSolution(leading, self._grid.y, columns)
 
     def _check(
         self,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from itertools import product
 
 import numpy as np
 
@@ -55,14 +54,21 @@ class SharedWear:
 
     def opening(self, line_load: FloatArray) -> FloatArray:
         """Return the gap that line loads, (contacts, strips), open at every contact [m]."""
+        if len(self.bodies) == 1:
+            alone: FloatArray = (self.compliance * line_load[..., None, :]).sum(axis=-2)
+            return alone
         gap = np.zeros_like(line_load)
         for side in (0, 1):
-            numbers = self.bodies[:, side]
             worn = self.compliance[..., side, :] * line_load
-            depth = np.zeros((*worn.shape[:-2], int(numbers.max()) + 1, worn.shape[-1]))
+            if not np.count_nonzero(worn):
+                continue
+            numbers: list[int] = self.bodies[:, side].tolist()
+            depth: dict[int, FloatArray] = {}
             for contact, number in enumerate(numbers):
-                depth[..., number, :] += worn[..., contact, :]
-            gap += depth[..., numbers, :]
+                own = worn[..., contact, :]
+                depth[number] = depth[number] + own if number in depth else own
+            for contact, number in enumerate(numbers):
+                gap[..., contact, :] += depth[number]
         return gap
 
     @property
@@ -101,14 +107,15 @@ class SharedWear:
             both = wear.sum(axis=2)
             wear = np.stack([both, np.zeros_like(both)], axis=2)
         idle = np.logical_not(wear.any(axis=(1, 3)))
+        kinds: list[tuple[bool, bool]] = [(left, right) for left, right in idle.tolist()]
         groups = []
-        for kind in product((False, True), repeat=2):
-            numbers = np.flatnonzero((idle == kind).all(axis=1))
-            if numbers.size:
-                members = _membership(bodies, contacts, kind)
-                alone = (members == NO_BODY)[:, :, None]
-                own = np.where(alone, wear[numbers], 0.0).sum(axis=2)
-                groups.append((numbers, own, members, np.where(alone, 0.0, wear[numbers])))
+        for kind in sorted(set(kinds)):
+            numbers = np.array([number for number, other in enumerate(kinds) if other == kind])
+            some = wear if len(numbers) == len(wear) else wear[numbers]
+            members = _membership(bodies, contacts, kind)
+            alone = (members == NO_BODY)[:, :, None]
+            own = np.where(alone, some, 0.0).sum(axis=2)
+            groups.append((numbers, own, members, np.where(alone, 0.0, some)))
         return groups
 
 

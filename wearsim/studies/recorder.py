@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from wearsim.evolution.advance import (
     present_loads,
     solve_present,
 )
+from wearsim.evolution.each import mean_along
 from wearsim.evolution.errors_of_steps import Step
 from wearsim.evolution.observables import depth, width, worn_volume
 from wearsim.evolution.scene import Scene
@@ -31,7 +31,7 @@ def history_row(
     scene: Scene, state: WearState, before: WearState | None, threshold: float, pass_by_pass: bool
 ) -> Row:
     """Return the observables of a state; `threshold` [m] bounds the groove's width."""
-    scene, state = present_contacts(scene, state, pass_by_pass)
+    scene, state, loads = present_contacts(scene, state, pass_by_pass)
     realisations = range(scene.shape[2])
     worn = state.cylinder_depth
     power = contact_values(scene, state.contacts, "power")
@@ -50,7 +50,7 @@ def history_row(
         ),
         "dissipated_energy": state.energy,
         "power": scene.total_power(power),
-        "normal_force": scene.per_roller(present_loads(scene, state)).mean(axis=0),
+        "normal_force": mean_along(scene.per_roller(loads), axis=0)[0],
         "depth_error": state.depth_error,
         "volume_error": state.volume_error,
         "rejected": state.rejected,
@@ -61,7 +61,7 @@ def history_row(
     row["peak_pressure"] = scene.per_roller(peak).max(axis=0)
     for name in ("approach", "longitudinal_creepage", "adhesion_fraction"):
         values = contact_values(scene, state.contacts, name)
-        row[name] = scene.per_roller(values).mean(axis=0)
+        row[name] = mean_along(scene.per_roller(values), axis=0)[0]
     return row
 
 
@@ -75,7 +75,7 @@ def at_record(scene: Scene, stepper: Stepper, start: WearState, passes: float) -
     def step(scene: Scene, state: WearState, passes: Number) -> WearState:
         return stepper.side_step(scene, state, float(passes))
 
-    return replace(stepped_aside(step, scene, start, passes - start.passes), passes=passes)
+    return stepped_aside(step, scene, start, passes - start.passes).but(passes=passes)
 
 
 def stepped_aside(step: Step, scene: Scene, state: WearState, passes: Number) -> WearState:
@@ -104,22 +104,24 @@ def stepped_aside(step: Step, scene: Scene, state: WearState, passes: Number) ->
     return stepped_aside(step, scene, stepped_aside(step, scene, state, half), half)
 
 
-def present_contacts(scene: Scene, state: WearState, pass_by_pass: bool) -> tuple[Scene, WearState]:
-    """Return `state` with its contacts at the loads of this moment, and the scene they are of.
+def present_contacts(
+    scene: Scene, state: WearState, pass_by_pass: bool
+) -> tuple[Scene, WearState, FloatArray]:
+    """Return `state` with its contacts at the loads of this moment, their scene, and the loads.
 
     Where every pass draws its inputs one contact says little: contacts that stand for many passes
     take its place, so that a record holds the same whatever the stepper.
     """
     if scene.expectation is not None:
-        scene, state = scene.expectation, replace(state, contacts=())
+        scene, state = scene.expectation, state.but(contacts=())
     loads = present_loads(scene, state)
     solve = solve_present if pass_by_pass else contacts_at
-    return scene, replace(state, contacts=solve(scene, state, loads))
+    return scene, state.but(contacts=solve(scene, state, loads)), loads
 
 
 def record_row(scene: Scene, state: WearState, pass_by_pass: bool) -> Row:
     """Return the profiles of a state and the contacts at the loads of this moment."""
-    scene, state = present_contacts(scene, state, pass_by_pass)
+    scene, state, _ = present_contacts(scene, state, pass_by_pass)
     row: Row = {
         "record_passes": state.passes,
         "record_time": scene.time(state.passes),
