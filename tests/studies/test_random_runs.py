@@ -248,6 +248,21 @@ def test_that_the_strips_hold_the_groove_of_the_roller_with_the_most_friction():
     assert deepest(state) > 0.0
 
 
+@pytest.mark.parametrize(
+    "law",
+    [
+        {**WANDERING, "marginal": {"distribution": "normal", "mean": 0.0, "std": 1e-3}},
+        {"distribution": "normal", "mean": 0.0, "std": 1e-3, "persistence": "per-pass"},
+    ],
+)
+def test_that_the_strips_hold_the_groove_of_a_creepage_about_zero(law):
+    changes = {"creepage__longitudinal": law, "evolution__tolerance": 1e-2}
+    scene, state = end_of(scenario_of(passes=20_000, **changes))
+    worn = scene.grid.y[state.cylinder_depth[0, 0, 0] > 0.0]
+    fresh = build_scene(scenario_of(passes=20_000, creepage__longitudinal=0.0))[0].grid.y[-1]
+    assert fresh < worn[-1] < scene.grid.y[-1]
+
+
 def test_that_nodes_are_refused_where_there_is_nothing_to_expect():
     for changes in ({}, {"evolution__stepper": "per-pass", **ALL_PER_PASS}):
         with pytest.raises(ScenarioError, match="no expectation over passes"):

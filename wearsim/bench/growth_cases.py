@@ -42,7 +42,7 @@ class Sizes:
     single_passes: tuple[int, ...] = (10**4, 3 * 10**4, 10**5, 3 * 10**5)
     records: tuple[int, ...] = (1, 10, 100, 1000)
     realisations: tuple[int, ...] = (10, 100, 1000)
-    tests: int = 400
+    tests: int = 1000
     workers: int = 256
     true_strips: int = 161
     true_passes: int = 3000

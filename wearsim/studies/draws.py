@@ -20,6 +20,7 @@ from wearsim.types import FloatArray
 
 LISTED = {"roller.offset", "creepage.yaw", "creepage.tilt"}  # may stand as one value per roller
 LONGEST_PATH = 5_000_000  # samples of a process
+_EVENLY = np.linspace(0.5, 63.5, 64) / 64.0  # probabilities that stand for a law
 RARE = 1e-7  # part of the passes that may lie beyond what the strips are laid out for
 
 
@@ -57,7 +58,9 @@ class Draws:
         return bool(self.rollers) or any(len(v.rollers) < count for v in self.varying)
 
     def lasting(self, name: str, mean: float) -> float:
-        """Return the greatest size that an input of a contact has over the whole test.
+        """Return the greatest mean size that an input of a contact has over the whole test.
+
+        What changes its sign wears either way, so that it counts by its size.
 
         Parameters
         ----------
@@ -66,10 +69,18 @@ class Draws:
         mean : float
             The value where nothing is drawn, which is also the mean of what every pass draws.
         """
+        sizes = [abs(float(value)) for value in (mean, *self.rollers.get(name, ()))]
         time = self.scenario.total_time
-        means = [item.path.mean(0.0, time) for item in self.varying if item.name == name]
-        values = [mean, *self.rollers.get(name, ()), *means]
-        return max(abs(float(value)) for value in values)
+        for item in self.varying:
+            if item.name == name:
+                signed = _changes_sign(item.path.value)
+                found = np.abs(item.path.value).mean() if signed else item.path.mean(0.0, time)
+                sizes.append(abs(float(found)))
+        for random in self.passes:
+            if len(random.keys) == 1 and CONTACT_FIELDS[random.keys[0]] == name:
+                values = random.scalar.quantile(_EVENLY)
+                sizes += [float(np.abs(values).mean())] * _changes_sign(values)
+        return max(sizes)
 
     def range_of(self, name: str, mean: float) -> tuple[float, float]:
         """Return about the least and greatest value that an input of a contact takes.
@@ -90,6 +101,10 @@ class Draws:
                 if CONTACT_FIELDS[key] == name:
                     values += spread
         return min(values), max(values)
+
+
+def _changes_sign(values: FloatArray) -> bool:
+    return bool(values.min() < 0.0 < values.max())
 
 
 def _spreads(item: RandomInput) -> list[list[float]]:
