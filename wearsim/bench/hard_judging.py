@@ -16,6 +16,7 @@ ROUND_OFF = 1e-9  # of sums over some hundred strips and steps, with room for th
 UNSTEADY = 0.05  # energy by the power at the ends of half steps, where the load changes meanwhile
 SMOOTH, ROUGH = 0.03, 0.1  # second difference of a smooth contact of 20 strips, and of waves
 NEAR, NEAR_ROUGH = 0.02, 0.05  # change from refinement, and where the profile itself jumps
+SIZE = 2.0  # times a tolerance: an estimate tells the size of an error, not the error itself
 NOISE_OF_STEPS, NOISE_OF_STRIPS = 2e-3, 3e-3  # below these changes no order is asked for
 
 
@@ -97,7 +98,7 @@ def _convergence(
 ) -> Iterator[Check]:
     if len(chosen) > 1:
         moved = measures.moved(*chosen)
-        yield Check("tolerance", moved, measures.promised(chosen[0]))
+        yield Check("tolerance", moved, SIZE * measures.promised(chosen[0]))
     # a jump of the profile falls anywhere in a strip, however narrow
     near, noise = (NEAR_ROUGH, NEAR_ROUGH) if case.rough else (NEAR, NOISE_OF_STRIPS)
     for name, runs, bound, floor in (

@@ -78,7 +78,7 @@ class Size:
         return found
 
 
-WHOLE = Size((16, 32, 64, 128, 256, 512), 10)
+WHOLE = Size((16, 32, 64, 128, 256, 512), 8)
 QUICK = Size((16, 32), 2, cheap_draws=100_000)
 
 
