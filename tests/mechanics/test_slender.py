@@ -26,7 +26,7 @@ PATCH = hertz(45.0, 1.0, 300.0, MODULUS)
 BY_LOAD = 4.0 / (np.pi * MODULUS * CURVATURE)  # a^2/q of a strip by itself
 # what is left of a solution once its steps are below 1e-7: next to nothing where Newton squares
 # them, a small part where s follows; in parts of the greatest line load
-LEFT = {"local": 1e-11, "coupled": 2e-8}
+LEFT = {"local": 2e-8, "coupled": 2e-8}
 
 
 def solve(grid, gaps, loads, wear=None, start=None, lengths="coupled", found=None):

@@ -19,7 +19,8 @@ from wearsim.types import BoolArray, FloatArray, Number
 
 DEPTH_EXPONENT, VOLUME_EXPONENT = 0.5, 0.75  # below those of any groove: 2/3 to 1, and about 1
 Step: TypeAlias = Callable[[Scene, WearState, Number], WearState]
-COVER = 1.5  # an estimate of first order is about the error itself; half as much for safety
+COVER = 1.5  # of what is estimated; half as much for safety
+FIRST_ORDER_COVER = 2.0  # the twin of a first-order scheme is off by little more than it tells
 DEEP = 0.5  # depths are compared where the groove is deeper than this part of its depth
 DEPTHS = ("cylinder_depth", "roller_depth")
 

@@ -11,6 +11,7 @@ from wearsim.errors import ContactError, StepError
 from wearsim.evolution.control import StepControl
 from wearsim.evolution.errors_of_steps import (
     COVER,
+    FIRST_ORDER_COVER,
     Step,
     apart,
     biased_twin,
@@ -131,14 +132,17 @@ class TwinStepper(Stepper):
         whole = biased_twin(end, whole, variation_bias(scene, end, state.now, step))
         now = np.where(step == stop - state.now, stop, end.now)
         end = end.moved(now, whole.solves_since(twin))
-        end, added = _with_errors(scene, (state, twin), (end, whole))
+        end, added = _with_errors(scene, (state, twin), (end, whole), self.order)
         reached = np.array([end.depth_error, end.volume_error]) - end.irreducible
         over = excess(self.control, scene, state, end, added, stop, reached)
         return Attempt(half, end, over)
 
 
 def _with_errors(
-    scene: Scene, before: tuple[WearState, WearState], after: tuple[WearState, WearState]
+    scene: Scene,
+    before: tuple[WearState, WearState],
+    after: tuple[WearState, WearState],
+    order: int,
 ) -> tuple[WearState, FloatArray]:
     """Return a test after a step, with its errors and its twin, and what the step adds to them.
 
@@ -147,6 +151,8 @@ def _with_errors(
     scene : Scene
     before, after : tuple of WearState
         The test and its twin at the step's ends.
+    order : int
+        Of the scheme.
 
     Returns
     -------
@@ -158,7 +164,8 @@ def _with_errors(
     (start, _), (end, whole) = before, after
     deep, first, last = grooves(end), apart(*before), apart(*after)
     moved = last[0] - first[0], last[1] - first[1]
-    added = COVER * np.array([greatest_in(deep, moved), np.abs(volume_of(scene, moved))])
+    cover = FIRST_ORDER_COVER if order == 1 else COVER
+    added = cover * np.array([greatest_in(deep, moved), np.abs(volume_of(scene, moved))])
     others = [state.irreducible for state in (start, end)]
     twins = {
         name: twin.moved(end.now, shadow=None, coarse=None)
@@ -166,7 +173,7 @@ def _with_errors(
         if twin is not None
     }
     end = end.but(
-        depth_error=COVER * greatest_in(deep, last) + others[1][0],
+        depth_error=cover * greatest_in(deep, last) + others[1][0],
         volume_error=start.volume_error - others[0][1] + added[1] + others[1][1],
         shadow=twins["shadow"],
         coarse=twins.get("coarse"),

@@ -31,20 +31,22 @@ from wearsim.types import FloatArray, IntArray
 SWEEPS = 2
 LOWEST_FACTOR = 0.1
 HIGHEST_FACTOR = 4.0
-REACH = 4  # strips on either side whose loads Newton's method knows to change s
+REACH = 4  # strips on either side whose loads are known to change s where contacts are followed
+NEWTON_REACH = 3  # the same in Newton's method, whose last steps then shrink a hundred times
 
 
 class Lengths(NamedTuple):
     """Half-lengths of several contacts, and the work space for them.
 
     From `curvature_table`, or `no_table` where every strip is taken by itself; ln(a/dy) of such a
-    strip at 1 N/m; s (contacts, strips); the derivative of ln s_j by ln q of the strip
-    c - REACH further (contacts, strips, c); work space.
+    strip at 1 N/m; s and ln(a/dy) as last found (contacts, strips); the derivative of ln s_j by
+    ln q of the strip c - reach further (contacts, strips, c); work space.
     """
 
     table: FloatArray
     log_scale: float
     factor: FloatArray
+    found: FloatArray
     slope: FloatArray
     fresh: FloatArray
     lengthening: FloatArray
@@ -52,16 +54,20 @@ class Lengths(NamedTuple):
 
 
 @kernel
-def new_lengths(contacts: int, table: FloatArray, log_scale: float) -> Lengths:
-    """Return the `Lengths` of contacts whose every strip is taken by itself so far."""
+def new_lengths(contacts: int, table: FloatArray, log_scale: float, reach: int) -> Lengths:
+    """Return the `Lengths` of contacts whose every strip is taken by itself so far.
+
+    `reach` is `REACH` or `NEWTON_REACH`.
+    """
     n = table.shape[2]
     return Lengths(
         table,
         log_scale,
         np.ones((contacts, n)),
-        np.zeros((contacts, n, 2 * REACH + 1)),
-        np.zeros((n, 4 * REACH + 1)),
-        np.zeros((n, 4 * REACH + 1)),
+        np.zeros((contacts, n)),
+        np.zeros((contacts, n, 2 * reach + 1)),
+        np.zeros((n, 4 * reach + 1)),
+        np.zeros((n, 4 * reach + 1)),
         np.empty((3, n)),
     )
 
@@ -86,15 +92,15 @@ def fill_half_lengths(
 
 
 @kernel
-def _add_curvature(
+def add_around(
     j: int, first: int, last: int, weight: float, value: FloatArray, total: FloatArray
 ) -> None:
-    """Add the curvature that strip `j` causes on all strips from `first` to `last`."""
-    total[j] += weight * value[0]
-    for d in range(1, last - j + 1):
-        total[j + d] += weight * value[d]
-    for d in range(1, j - first + 1):
-        total[j - d] += weight * value[d]
+    """Add what strip `j` does to all strips from `first` to `last`, `value` by distance."""
+    here = np.uint64(j)  # unsigned numbers let the loops be vectorised, see `linear`
+    for d in range(np.uint64(0), np.uint64(last - j + 1)):
+        total[here + d] += weight * value[d]
+    for d in range(np.uint64(1), np.uint64(j - first + 1)):
+        total[here - d] += weight * value[d]
 
 
 @kernel
@@ -111,25 +117,35 @@ def _add_slope(
 
     It follows ln q_j through a and, once s has a `slope`, ln s_j through a and 1/s.
     """
-    for i in range(max(0, j - REACH), min(slope.shape[0], j + REACH + 1)):
+    wide = slope.shape[1]
+    reach = wide // 2
+    for i in range(max(0, j - reach), min(slope.shape[0], j + reach + 1)):
         by_length = weight * (tangent[abs(i - j)] - value[abs(i - j)])
-        fresh[i, j - i + 2 * REACH] += by_length
+        fresh[i, j - i + 2 * reach] += by_length
         if chained:
-            by_factor, start = by_length - weight * value[abs(i - j)], j - i + REACH
-            for c in range(2 * REACH + 1):
+            by_factor, start = by_length - weight * value[abs(i - j)], j - i + reach
+            for c in range(wide):
                 fresh[i, start + c] += by_factor * slope[j, c]
 
 
 @kernel
 def _take_slope(
-    k: int, line_load: FloatArray, total: FloatArray, slope: FloatArray, fresh: FloatArray
+    k: int,
+    first: int,
+    last: int,
+    line_load: FloatArray,
+    total: FloatArray,
+    slope: FloatArray,
+    fresh: FloatArray,
 ) -> None:
-    """Add the slope of ln K to that of ln s, and empty it; what lies beyond REACH is let go."""
-    for j in range(slope.shape[0]):
+    """Add the slope of ln K to that of ln s, and empty it; what lies beyond reach is let go."""
+    wide = slope.shape[1]
+    for j in range(max(0, first - wide // 2), min(slope.shape[0], last + wide // 2 + 1)):
         if line_load[k, j] > 0.0:
-            for c in range(2 * REACH + 1):
-                slope[j, c] += fresh[j, c + REACH] / total[j]
-        for c in range(4 * REACH + 1):
+            scale = 1.0 / total[j]
+            for c in range(wide):
+                slope[j, c] += fresh[j, c + wide // 2] * scale
+        for c in range(2 * wide - 1):
             fresh[j, c] = 0.0
 
 
@@ -145,8 +161,24 @@ def _find_span(k: int, line_load: FloatArray) -> tuple[int, int]:
 
 
 @kernel
-def find_factors(k: int, line_load: FloatArray, lengths: Lengths) -> float:
-    """Fill s of contact `k` and its slope.
+def _take_sweep(
+    k: int, first: int, last: int, line_load: FloatArray, total: FloatArray, lengths: Lengths
+) -> float:
+    """Multiply s by the curvature found, between its bounds; return the greatest ln(a/dy)."""
+    widest, factor = -np.inf, lengths.factor
+    for j in range(first, last + 1):
+        if line_load[k, j] > 0.0:
+            before = factor[k, j]
+            after = min(max(before * total[j], LOWEST_FACTOR), HIGHEST_FACTOR)
+            factor[k, j] = after
+            lengths.found[k, j] += 0.5 * np.log(after / before)
+            widest = max(widest, lengths.found[k, j])
+    return widest
+
+
+@kernel
+def find_factors(k: int, line_load: FloatArray, sloped: bool, lengths: Lengths) -> float:
+    """Fill s and ln(a/dy) of contact `k`, and the slope of s if asked.
 
     Parameters
     ----------
@@ -154,6 +186,8 @@ def find_factors(k: int, line_load: FloatArray, lengths: Lengths) -> float:
         Which contact.
     line_load : ndarray, shape (contacts, strips)
         q [N/m]; strips without load take no part.
+    sloped : bool
+        Whether the slope is wanted as well.
     lengths : Lengths
 
     Returns
@@ -161,35 +195,38 @@ def find_factors(k: int, line_load: FloatArray, lengths: Lengths) -> float:
     float
         The greatest ln(a/dy) met; past HIGHEST nothing more is found.
     """
+    total, value, tangent = lengths.work[0], lengths.work[1], lengths.work[2]
+    slope, n = lengths.slope[k], line_load.shape[1]
+    first, last = _find_span(k, line_load)
     widest = -np.inf
+    for j in range(n):
+        lengths.factor[k, j] = 1.0
+        for c in range(slope.shape[1]):
+            slope[j, c] = 0.0
+        if line_load[k, j] > 0.0:
+            lengths.found[k, j] = log_length(k, j, line_load, lengths)
+            widest = max(widest, lengths.found[k, j])
     if lengths.table.shape[0] == 0:
         return widest
-    total, value, tangent = lengths.work[0], lengths.work[1], lengths.work[2]
-    factor, slope, n = lengths.factor[k], lengths.slope[k], line_load.shape[1]
-    first, last = _find_span(k, line_load)
-    for j in range(n):
-        factor[j] = 1.0
-        for c in range(2 * REACH + 1):
-            slope[j, c] = 0.0
     for sweep in range(SWEEPS):
-        for j in range(first, last + 1):
+        if widest > HIGHEST:
+            break
+        for j in range(n):
             total[j] = 0.0
         for j in range(first, last + 1):
             if not line_load[k, j] > 0.0:
                 continue
-            tau = log_length(k, j, line_load, lengths)
-            widest = max(widest, tau)
-            if widest > HIGHEST:
-                return widest
-            weight = 0.25 / factor[j]
-            read_values(lengths.table, tau, max(last - j, j - first) + 1, value)
-            _add_curvature(j, first, last, weight, value, total)
-            read_influence(lengths.table, tau, min(n, REACH + 1), value, tangent)
-            _add_slope(j, weight, value, tangent, sweep > 0, slope, lengths.fresh)
-        for j in range(first, last + 1):
-            if line_load[k, j] > 0.0:
-                factor[j] = min(max(factor[j] * total[j], LOWEST_FACTOR), HIGHEST_FACTOR)
-        _take_slope(k, line_load, total, slope, lengths.fresh)
+            far, weight = max(last - j, j - first) + 1, 0.25 / lengths.factor[k, j]
+            if sloped:
+                count = min(n, max(far, slope.shape[1]))
+                read_influence(lengths.table, lengths.found[k, j], count, value, tangent)
+                _add_slope(j, weight, value, tangent, sweep > 0, slope, lengths.fresh)
+            else:
+                read_values(lengths.table, lengths.found[k, j], far, value)
+            add_around(j, first, last, weight, value, total)
+        widest = max(widest, _take_sweep(k, first, last, line_load, total, lengths))
+        if sloped:
+            _take_slope(k, first, last, line_load, total, slope, lengths.fresh)
     return widest
 
 
@@ -203,9 +240,11 @@ def lengthen(
     that F_k = 1 stands for.
     """
     slope, lengthening = lengths.slope[k], lengths.lengthening
-    for i in range(max(0, j - REACH), min(slope.shape[0], j + REACH + 1)):
-        moved, start = push * (tangent[abs(i - j)] - value[abs(i - j)]), j - i + REACH
-        for c in range(2 * REACH + 1):
+    wide = slope.shape[1]
+    reach = wide // 2
+    for i in range(max(0, j - reach), min(slope.shape[0], j + reach + 1)):
+        moved, start = push * (tangent[abs(i - j)] - value[abs(i - j)]), j - i + reach
+        for c in range(wide):
             lengthening[i, start + c] += moved * slope[j, c]
 
 
@@ -213,17 +252,22 @@ def lengthen(
 def add_lengthening(
     k: int, line_load: FloatArray, index: IntArray, lengths: Lengths, matrix: FloatArray
 ) -> None:
-    """Add what `lengthen` has gathered to the Newton matrix of contact `k`, and empty it.
+    """Add what `lengthen` has gathered to the Jacobian of contact `k`, by columns, and empty it.
 
     `index` holds the row of each strip in contact, and -1 of the others, (contacts, strips).
     """
     lengthening = lengths.lengthening
     n, wide = lengthening.shape
-    for i in range(n):
-        row, start = index[k, i], i - 2 * REACH
-        for c in range(max(0, -start), min(wide, n - start)):
-            column = index[k, start + c]
-            if row >= 0 and column >= 0:
-                matrix[row, column] += lengthening[i, c] / line_load[k, start + c]
+    half = wide // 2
+    first, last = _find_span(k, line_load)
+    for j in range(first, last + 1):
+        column = index[k, j]
+        if column < 0:
+            continue
+        scale = 1.0 / line_load[k, j]
+        for i in range(max(0, j - half), min(n, j + half + 1)):
+            if index[k, i] >= 0:
+                matrix[column, index[k, i]] += lengthening[i, j - i + half] * scale
+    for i in range(max(0, first - half), min(n, last + half + 1)):
         for c in range(wide):
             lengthening[i, c] = 0.0

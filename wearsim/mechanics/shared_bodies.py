@@ -5,18 +5,36 @@ of the shared bodies then follow from
 
     D_b = sum over the contacts l of b of c_lb (r_l - S_l sum over its bodies b' of D_b'),
 
-a system as large as the bodies have strips under load, however many contacts there are.
+a system as large as the bodies have strips under load, however many contacts there are. It is
+factored once for as long as the S serve.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from wearsim.mechanics.jit import kernel
-from wearsim.mechanics.linear import solve_in_place
+from wearsim.mechanics.linear import factor_in_place, solve_factored
 from wearsim.types import FloatArray, IntArray
 
 SIDES = 2  # a contact touches a cylinder and a roller
+
+
+class Depths(NamedTuple):
+    """The factored system of the bodies' depths: number of every strip, -1 where it has no depth.
+
+    The number (bodies, strips); how many there are (1,); the system by columns and the order of its
+    equations; its right-hand side and its solution.
+    """
+
+    number: IntArray
+    unknowns: IntArray
+    matrix: FloatArray
+    order: IntArray
+    right: FloatArray
+    depth: FloatArray
 
 
 @kernel
@@ -27,6 +45,21 @@ def count_bodies(members: IntArray) -> int:
         for side in range(SIDES):
             count = max(count, members[k, side] + 1)
     return count
+
+
+@kernel
+def new_depths(members: IntArray, n: int) -> Depths:
+    """Return the `Depths` of bodies with `n` strips that have no system yet."""
+    bodies = count_bodies(members)
+    most = bodies * n
+    return Depths(
+        np.empty((bodies, n), np.int64),
+        np.zeros(1, np.int64),
+        np.empty((most, most)),
+        np.empty(most, np.int64),
+        np.empty(most),
+        np.empty(most),
+    )
 
 
 @kernel
@@ -86,16 +119,10 @@ def _number_unknowns(
 
 
 @kernel
-def solve_depths(
-    members: IntArray,
-    shared: FloatArray,
-    index: IntArray,
-    response: FloatArray,
-    step: FloatArray,
-    lift: FloatArray,
-    approach: FloatArray,
+def factor_depths(
+    members: IntArray, shared: FloatArray, index: IntArray, response: FloatArray, depths: Depths
 ) -> bool:
-    """Turn each contact's own step into the step of all together.
+    """Set up and factor the system of the bodies' depths.
 
     Parameters
     ----------
@@ -104,91 +131,118 @@ def solve_depths(
     index : ndarray of int, shape (contacts, strips)
         Row of every strip in its contact, -1 outside it.
     response : ndarray, shape (contacts, strips, strips)
-        S: fall of line load, by row, per rise of the gap, by row, at held load [N/m^2].
-    step : ndarray, shape (contacts, strips)
-        Change of line load by row, r before and with the bodies' wear after [N/m].
-    lift : ndarray, shape (contacts, strips)
-        Rise of the approach per rise of the gap, by row.
-    approach : ndarray, shape (contacts,)
-        Approach without and with the bodies' wear [m].
+        S by columns: fall of line load, by row, per rise of the gap, by row, at held load [N/m^2].
+    depths : Depths
+        Filled.
 
     Returns
     -------
     bool
         False if the system is singular.
     """
-    contacts, n = index.shape
-    number = np.empty((count_bodies(members), n), np.int64)
-    count = _number_unknowns(members, shared, index, number)
-    matrix = np.zeros((count, count + 1))
+    count, matrix = _number_unknowns(members, shared, index, depths.number), depths.matrix
+    depths.unknowns[0] = count
     for i in range(count):
+        for j in range(count):
+            matrix[i, j] = 0.0
         matrix[i, i] = 1.0
+    for k in range(members.shape[0]):
+        for side in range(SIDES):
+            for other in range(SIDES):
+                if members[k, side] >= 0 and members[k, other] >= 0:
+                    _add_contact(k, side, other, members, shared, index, response, depths)
+    return factor_in_place(matrix, count, depths.order)
+
+
+@kernel
+def solve_depths(
+    members: IntArray,
+    shared: FloatArray,
+    index: IntArray,
+    response: FloatArray,
+    lift: FloatArray,
+    depths: Depths,
+    step: FloatArray,
+    approach: FloatArray,
+) -> None:
+    """Turn each contact's own step into the step of all together.
+
+    Parameters
+    ----------
+    members, shared, index, response
+        As in `factor_depths`.
+    lift : ndarray, shape (contacts, strips)
+        Rise of the approach per rise of the gap, by row.
+    depths : Depths
+        From `factor_depths`.
+    step : ndarray, shape (contacts, strips)
+        Change of line load by row, r before and with the bodies' wear after [N/m].
+    approach : ndarray, shape (contacts,)
+        Approach without and with the bodies' wear [m].
+    """
+    contacts, n = index.shape
+    count, right, number = depths.unknowns[0], depths.right, depths.number
+    for place in range(count):
+        right[place] = 0.0
     for k in range(contacts):
         for side in range(SIDES):
-            if members[k, side] >= 0:
-                _add_contact(k, side, members, shared, index, number, response, step, matrix)
-    if not solve_in_place(matrix, count, count + 1):
-        return False
-    change = np.empty(n)
+            for i in range(n):
+                if members[k, side] >= 0 and index[k, i] >= 0 and shared[k, side, i] > 0.0:
+                    place = number[members[k, side], i]
+                    right[place] += shared[k, side, i] * step[k, index[k, i]]
+    solve_factored(depths.matrix, count, depths.order, right, depths.depth)
     for k in range(contacts):
-        size = _opened(k, members, index, number, matrix, change)
-        for column in range(size):
-            approach[k] += lift[k, column] * change[column]
-            for row in range(size):
-                step[k, row] -= response[k, column, row] * change[column]
-    return True
+        _open_contact(k, members, index, response, lift, depths, step, approach)
 
 
 @kernel
 def _add_contact(
     k: int,
     side: int,
+    other: int,
     members: IntArray,
     shared: FloatArray,
     index: IntArray,
-    number: IntArray,
     response: FloatArray,
-    step: FloatArray,
-    matrix: FloatArray,
+    depths: Depths,
 ) -> None:
-    """Add to the bodies' system what contact `k` wears off its body on one side."""
-    n, last = index.shape[1], matrix.shape[0]
-    b = members[k, side]
-    for i in range(n):
-        row, place = index[k, i], number[b, i]
-        wear = shared[k, side, i]
-        if row < 0 or place < 0 or wear == 0.0:
+    """Add how contact `k` wears its body on one side while that on a side opens its gap."""
+    n, number = index.shape[1], depths.number
+    worn, opening = members[k, side], members[k, other]
+    for j in range(n):
+        column, place = index[k, j], number[opening, j]
+        if column < 0 or place < 0:
             continue
-        matrix[place, last] += wear * step[k, row]
-        for other in range(SIDES):
-            b2 = members[k, other]
-            if b2 < 0:
-                continue
-            for j in range(n):
-                column = index[k, j]
-                if column >= 0 and number[b2, j] >= 0:
-                    matrix[place, number[b2, j]] += wear * response[k, column, row]
+        for i in range(n):
+            row = index[k, i]
+            if row >= 0 and shared[k, side, i] > 0.0:
+                change = shared[k, side, i] * response[k, column, row]
+                depths.matrix[place, number[worn, i]] += change
 
 
 @kernel
-def _opened(
+def _open_contact(
     k: int,
     members: IntArray,
     index: IntArray,
-    number: IntArray,
-    matrix: FloatArray,
-    change: FloatArray,
-) -> int:
-    """Fill the change of contact `k`'s gap by row; return the number of rows."""
-    n, last, size = index.shape[1], matrix.shape[0], 0
+    response: FloatArray,
+    lift: FloatArray,
+    depths: Depths,
+    step: FloatArray,
+    approach: FloatArray,
+) -> None:
+    """Take from contact `k`'s step and approach what the depths of its bodies change in them."""
+    n, size = index.shape[1], 0
     for i in range(n):
-        row = index[k, i]
-        if row < 0:
+        size = max(size, index[k, i] + 1)
+    for i in range(n):
+        column, opened = index[k, i], 0.0
+        if column < 0:
             continue
-        size += 1
-        change[row] = 0.0
         for side in range(SIDES):
             b = members[k, side]
-            if b >= 0 and number[b, i] >= 0:
-                change[row] += matrix[number[b, i], last]
-    return size
+            if b >= 0 and depths.number[b, i] >= 0:
+                opened += depths.depth[depths.number[b, i]]
+        approach[k] += lift[k, column] * opened
+        for row in range(size):
+            step[k, row] -= response[k, column, row] * opened

@@ -8,27 +8,26 @@ Strip i of contact k meets the gap z_i and is pressed down by every strip j (see
 kappa being the relative curvature along rolling, s what strips make of each other's half-lengths
 (see `half_length`) and c the contact's own wear compliance; contacts that wear bodies they share
 are in `slender_coupled`. Newton's method with an active set of strips in contact, and delta as one
-more unknown. The derivative of W is exact but for that of s, which knows only strips
-nearby: the last steps shrink fifty times or so, where with s = 1 they are squared.
+more unknown, takes the steps of `slender_step`.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from wearsim.mechanics.half_length import (
-    Lengths,
-    add_lengthening,
-    fill_half_lengths,
-    find_factors,
-    lengthen,
-    log_length,
-    new_lengths,
-)
-from wearsim.mechanics.influence import HIGHEST, read_influence
+from wearsim.mechanics.half_length import NEWTON_REACH, fill_half_lengths, new_lengths
+from wearsim.mechanics.influence import HIGHEST
 from wearsim.mechanics.jit import kernel
-from wearsim.mechanics.linear import solve_in_place
-from wearsim.types import FloatArray, IntArray
+from wearsim.mechanics.slender_step import (
+    Steps,
+    add_beyond,
+    displace,
+    factor_jacobian,
+    foresee,
+    new_steps,
+    take_step,
+)
+from wearsim.types import FloatArray
 
 CONVERGED = 0
 SINGULAR = 1
@@ -37,9 +36,15 @@ NO_CONVERGENCE = 3
 NOT_FINITE = 4
 GOING_ON = -1
 
-STEP_TOLERANCE = 1e-7  # of the greatest line load; the error left is a small part of it
+TOLERANCE = 1e-8  # of the greatest line load: what the next step would change
+REUSED = 0.05  # change of that up to which the Jacobian may serve again
+SHRINKING = 0.2  # least shrinkage of the steps with which it may
+FIRST = 0.1  # shrinkage that the step after the first is trusted to bring
+AT_BEST = 0.01  # shrinkage that no step is trusted to exceed, for what the Jacobian lacks
+MANIFOLD = 3.0  # change of a strip's load, as a ratio, up to which the Jacobian may serve again
 GAP_TOLERANCE = 1e-8  # of the approach
 MAX_ITERATIONS = 100
+CAUTIOUS = 12  # iterations after which strips leave and enter with care
 
 
 @kernel
@@ -77,174 +82,49 @@ def foundation_guess(
         lowest = min(lowest, gap[k, i])
         highest = max(highest, gap[k, i])
         softest = max(softest, compliance[k, i])
-    low, high = 0.0, load / spacing * (soft + softest) + highest - lowest
-    for _ in range(60):
-        depth = 0.5 * (low + high)
-        total = 0.0
+    approach: float = load / spacing * (soft + softest) + highest
+    for _ in range(60):  # from above Newton's method never passes the root of a convex function
+        total, stiffness = -load / spacing, 0.0
         for i in range(n):
-            total += max(0.0, depth + lowest - gap[k, i]) / (soft + compliance[k, i])
-        if total * spacing > load:
-            high = depth
-        else:
-            low = depth
+            if approach > gap[k, i]:
+                total += (approach - gap[k, i]) / (soft + compliance[k, i])
+                stiffness += 1.0 / (soft + compliance[k, i])
+        approach -= total / stiffness
+        if not total > 1e-9 * load / spacing:
+            break
     for i in range(n):
-        line_load[k, i] = max(0.0, high + lowest - gap[k, i]) / (soft + compliance[k, i])
-    approach: float = high + lowest
+        line_load[k, i] = max(0.0, approach - gap[k, i]) / (soft + compliance[k, i])
     return approach
 
 
 @kernel
-def _number_strips(k: int, line_load: FloatArray, index: IntArray) -> int:
-    """Give the strips of contact `k` that carry load their rows, the others -1; return how many."""
-    count = 0
-    for i in range(line_load.shape[1]):
-        if line_load[k, i] > 0.0:
-            index[k, i] = count
-            count += 1
-        else:
-            index[k, i] = -1
-    return count
+def update_loads(line_load: FloatArray, steps: Steps, cautious: bool) -> tuple[float, bool]:
+    """Take the step; strips that would pull leave the contact.
 
-
-@kernel
-def _press(
-    k: int,
-    line_load: FloatArray,
-    index: IntArray,
-    table: FloatArray,
-    unit: float,
-    lengths: Lengths,
-    work: FloatArray,
-    surface: FloatArray,
-    matrix: FloatArray,
-) -> float:
-    """Add contact `k`'s elastic displacement to `surface` and its derivative to `matrix`.
-
-    Returns the greatest ln(a/dy) met; past HIGHEST nothing more is added.
-    """
-    n = line_load.shape[1]
-    value, tangent = work[0], work[1]
-    widest: float = -np.inf
-    for j in range(n):
-        column = index[k, j]
-        if column < 0:
-            continue
-        q = line_load[k, j]
-        tau = log_length(k, j, line_load, lengths)
-        widest = max(widest, tau)
-        if widest > HIGHEST:
-            return widest
-        read_influence(table, tau, max(j + 1, n - j), value, tangent)
-        for i in range(n):
-            surface[k, i] += unit * q * value[abs(i - j)]
-        for i in range(n):
-            row = index[k, i]
-            if row >= 0:
-                matrix[row, column] += unit * tangent[abs(i - j)]
-        if lengths.table.shape[0] > 0:
-            lengthen(k, j, unit * q, value, tangent, lengths)
-    if lengths.table.shape[0] > 0:
-        add_lengthening(k, line_load, index, lengths, matrix)
-    return widest
-
-
-@kernel
-def newton_system(
-    k: int,
-    own: FloatArray,
-    table: FloatArray,
-    unit: float,
-    lengths: Lengths,
-    line_load: FloatArray,
-    index: IntArray,
-    work: FloatArray,
-    surface: FloatArray,
-    matrix: FloatArray,
-) -> tuple[int, float]:
-    """Fill `matrix` with contact `k`'s Newton system; return its size and the greatest ln(a/dy).
-
-    `surface` holds the gap and receives displacement and own wear; it equals delta in contact.
-    Two columns after those of the strips hold the residual and a unit approach. Past HIGHEST the
-    system is not complete.
-    """
-    n, size = line_load.shape[1], _number_strips(k, line_load, index)
-    for row in range(size):
-        for column in range(size):
-            matrix[row, column] = 0.0
-    for i in range(n):
-        surface[k, i] += own[k, i] * line_load[k, i]
-        row = index[k, i]
-        if row >= 0:
-            matrix[row, row] = own[k, i]
-    widest = find_factors(k, line_load, lengths)
-    if widest > HIGHEST:
-        return size, widest
-    widest = _press(k, line_load, index, table, unit, lengths, work, surface, matrix)
-    for i in range(n):
-        row = index[k, i]
-        if row >= 0:
-            matrix[row, size] = -surface[k, i]
-            matrix[row, size + 1] = 1.0
-    return size, widest
-
-
-@kernel
-def take_step(
-    k: int,
-    size: int,
-    load: float,
-    line_load: FloatArray,
-    matrix: FloatArray,
-    step: FloatArray,
-    approach: FloatArray,
-) -> float:
-    """Take contact `k`'s step and approach from its solved system; return the rise per approach.
-
-    The approach is chosen so that the strips carry `load` in all [N/m]. Where the rise is zero
-    there is none, and nothing is taken.
-    """
-    missing, risen = load, 0.0
-    for i in range(line_load.shape[1]):
-        missing -= line_load[k, i]
-    for row in range(size):
-        missing -= matrix[row, size]
-        risen += matrix[row, size + 1]
-    if abs(risen) > 0.0:
-        approach[k] = missing / risen
-        for row in range(size):
-            step[k, row] = matrix[row, size] + matrix[row, size + 1] * approach[k]
-        return risen
-    return 0.0
-
-
-@kernel
-def _update(
-    line_load: FloatArray, index: IntArray, step: FloatArray, cautious: bool
-) -> tuple[float, bool]:
-    """Take the Newton step; strips that would pull leave the contact.
-
-    Returns the greatest change relative to the greatest line load, and whether strips left.
+    Where strips leave or change much, the contact needs a new Jacobian. Returns the greatest change
+    relative to the greatest line load, and whether strips left.
     """
     contacts, n = line_load.shape
     change, left = 0.0, False
     for k in range(contacts):
         peak, greatest = 0.0, 0.0
         for i in range(n):
+            steps.change[k, i] = 0.0
             peak = max(peak, line_load[k, i])
-        for i in range(n):
-            row = index[k, i]
-            if row < 0:
-                continue
+        for row in range(steps.size[k]):
+            i = steps.place[k, row]
             old = line_load[k, i]
-            new = old + step[k, row]
+            new = old + steps.step[k, row]
             if not new > 0.0:
                 if np.isnan(new):
                     return np.inf, left
                 # a strip that Newton empties is dropped; while cautious it shrinks first
                 new = 0.1 * old if cautious and old > 1e-6 * peak else 0.0
                 left = True
+            if new * MANIFOLD < old or new > MANIFOLD * old:
+                steps.fresh[k] = True
             greatest = max(greatest, abs(new - old))
-            line_load[k, i] = new
+            line_load[k, i], steps.change[k, i] = new, new - old
         change = max(change, greatest / peak)
     return change, left
 
@@ -253,7 +133,7 @@ def _update(
 def _admit(
     surface: FloatArray,
     line_load: FloatArray,
-    index: IntArray,
+    steps: Steps,
     approach: FloatArray,
     unit: float,
     tolerance: float,
@@ -270,7 +150,7 @@ def _admit(
         lowest, deepest = surface[k, 0], 0.0
         for i in range(n):
             lowest = min(lowest, surface[k, i])
-            if index[k, i] < 0:
+            if steps.rows[k, i] < 0:
                 deepest = max(deepest, approach[k] - surface[k, i])
         scale = tolerance * max(abs(approach[k]), approach[k] - lowest)
         if deepest <= scale:
@@ -278,9 +158,10 @@ def _admit(
         limit = max(scale, 0.999 * deepest) if cautious else scale
         for i in range(n):
             inside = approach[k] - surface[k, i]
-            if index[k, i] < 0 and inside > limit:
+            if steps.rows[k, i] < 0 and inside > limit:
                 line_load[k, i] = 0.1 * inside / unit
                 entered = True
+                steps.fresh[k] = True
     return entered
 
 
@@ -306,27 +187,50 @@ def start_contact(
 def settle(
     iteration: int,
     unit: float,
+    before: float,
+    change: float,
+    left: bool,
     surface: FloatArray,
-    index: IntArray,
-    step: FloatArray,
+    steps: Steps,
     approach: FloatArray,
     line_load: FloatArray,
-) -> int:
-    """Take Newton's step, let strips leave and enter, and return CONVERGED, GOING_ON or NOT_FINITE.
+) -> tuple[int, float]:
+    """Let strips enter, say which contacts need a new Jacobian, and whether all is done.
 
     After some iterations it goes cautiously; a strip that comes and goes at the edge is let be
     where it hardly matters.
+
+    Parameters
+    ----------
+    before : float
+        Change of the step before, 0 if there was none on these strips.
+    change, left
+        From `update_loads`.
+    surface : ndarray, shape (contacts, strips)
+        Gap and displacement, after the step [m].
+
+    Returns
+    -------
+    status : int
+        CONVERGED, GOING_ON or NOT_FINITE.
+    change : float
+        Greatest change relative to the greatest line load, 0 if strips left or entered.
     """
-    cautious = iteration > 12
-    change, left = _update(line_load, index, step, cautious)
+    cautious = iteration > CAUTIOUS
     if not change < np.inf:
-        return NOT_FINITE
+        return NOT_FINITE, change
     ready = not cautious or (change < 1e-3 and not left)
     tolerance = GAP_TOLERANCE * 10.0 ** max(0, iteration // 20 - 1)
-    entered = ready and _admit(surface, line_load, index, approach, unit, tolerance, cautious)
-    if change < STEP_TOLERANCE and not left and not entered:
-        return CONVERGED
-    return GOING_ON
+    entered = ready and _admit(surface, line_load, steps, approach, unit, tolerance, cautious)
+    shrinking = FIRST
+    if before > 0.0:
+        shrinking = min(max(change / before, AT_BEST), 1.0)
+    if not (change < REUSED and shrinking < SHRINKING):
+        for k in range(line_load.shape[0]):
+            steps.fresh[k] = True
+    if left or entered:
+        return GOING_ON, 0.0
+    return CONVERGED if change * shrinking < TOLERANCE else GOING_ON, change
 
 
 @kernel
@@ -379,28 +283,31 @@ def solve_slender(
         CONVERGED, or what went wrong.
     """
     contacts, n = gap.shape
-    unit = 1.0 / (np.pi * contact_modulus)
-    index = np.empty((contacts, n), np.int64)
-    surface, step = np.empty((contacts, n)), np.empty((contacts, n))
-    work, matrix = np.empty((2, n)), np.empty((n, n + 2))
+    unit, before = 1.0 / (np.pi * contact_modulus), 0.0
+    surface, work = np.empty((contacts, n)), np.empty((2, n))
+    steps = new_steps(contacts, n)
     log_scale = log_scale_of(contact_modulus, longitudinal_curvature, spacing)
-    lengths = new_lengths(contacts, bend, log_scale)
+    lengths = new_lengths(contacts, bend, log_scale, NEWTON_REACH)
     for k in range(contacts):
         start_contact(k, gap, own, contact_modulus, loads[k], spacing, line_load, approach)
     for iteration in range(1, MAX_ITERATIONS + 1):
         for k in range(contacts):
             for i in range(n):  # an assignment of arrays takes seconds to compile
                 surface[k, i] = gap[k, i]
-            size, widest = newton_system(
-                k, own, table, unit, lengths, line_load, index, work, surface, matrix
-            )
+            widest = displace(k, own, table, unit, lengths, line_load, work, surface, steps)
             if widest > HIGHEST:
                 return TOO_FINE, iteration
-            if not solve_in_place(matrix, size, size + 2):
+            if steps.fresh[k] and not factor_jacobian(k, steps):
                 return SINGULAR, iteration
-            if take_step(k, size, loads[k] / spacing, line_load, matrix, step, approach) == 0.0:
-                return SINGULAR, iteration
-        status = settle(iteration, unit, surface, index, step, approach, line_load)
+            take_step(k, loads[k] / spacing, line_load, steps, approach)
+            add_beyond(k, table, unit, line_load, lengths, steps)
+            take_step(k, loads[k] / spacing, line_load, steps, approach)
+        change, left = update_loads(line_load, steps, iteration > CAUTIOUS)
+        for k in range(contacts):
+            foresee(k, surface, steps)
+        status, before = settle(
+            iteration, unit, before, change, left, surface, steps, approach, line_load
+        )
         if status == CONVERGED:
             fill_half_lengths(spacing, line_load, lengths, half_length)
         if status != GOING_ON:

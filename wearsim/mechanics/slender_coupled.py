@@ -13,12 +13,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from wearsim.mechanics.half_length import fill_half_lengths, new_lengths
+from wearsim.mechanics.half_length import NEWTON_REACH, fill_half_lengths, new_lengths
 from wearsim.mechanics.influence import HIGHEST
 from wearsim.mechanics.jit import kernel
-from wearsim.mechanics.linear import solve_many_in_place
-from wearsim.mechanics.shared_bodies import add_depths, solve_depths
+from wearsim.mechanics.linear import invert_factored
+from wearsim.mechanics.shared_bodies import add_depths, factor_depths, new_depths, solve_depths
 from wearsim.mechanics.slender import (
+    CAUTIOUS,
     CONVERGED,
     GOING_ON,
     MAX_ITERATIONS,
@@ -26,40 +27,35 @@ from wearsim.mechanics.slender import (
     SINGULAR,
     TOO_FINE,
     log_scale_of,
-    newton_system,
     settle,
     start_contact,
-    take_step,
+    update_loads,
 )
 from wearsim.mechanics.slender_each import attempts, forget_start
+from wearsim.mechanics.slender_step import (
+    Steps,
+    add_beyond,
+    displace,
+    factor_jacobian,
+    foresee,
+    new_steps,
+    take_step,
+)
 from wearsim.types import FloatArray, IntArray
 
 
 @kernel
-def _ask_for_responses(size: int, matrix: FloatArray) -> None:
-    """Append a unit rise of every strip's gap to the right-hand sides of a contact's system."""
-    for row in range(size):
-        for column in range(size):
-            matrix[row, size + 2 + column] = 0.0
-        matrix[row, size + 2 + row] = 1.0
-
-
-@kernel
-def _take_responses(
-    k: int, size: int, risen: float, matrix: FloatArray, response: FloatArray, lift: FloatArray
-) -> None:
-    """Take from contact `k`'s solved system how its step and its approach follow its gap.
-
-    `risen` is the rise of its load per approach, from `take_step`.
-    """
+def _fill_responses(k: int, steps: Steps, response: FloatArray, lift: FloatArray) -> None:
+    """Fill how contact `k`'s step and its approach follow its gap at held load."""
+    size, unit_load = steps.size[k], steps.unit_load
+    invert_factored(steps.matrix[k], size, steps.order[k], response[k])
     for column in range(size):
         total = 0.0
         for row in range(size):
-            total += matrix[row, size + 2 + column]
-        lift[k, column] = total / risen
+            total += response[k, column, row]
+        lift[k, column] = total / steps.risen[k]
         for row in range(size):
-            fall = matrix[row, size + 2 + column] - matrix[row, size + 1] * lift[k, column]
-            response[k, column, row] = fall
+            response[k, column, row] -= unit_load[k, row] * lift[k, column]
 
 
 @kernel
@@ -97,13 +93,12 @@ def solve_coupled(
         CONVERGED, or what went wrong.
     """
     contacts, n = gap.shape
-    unit = 1.0 / (np.pi * contact_modulus)
-    index = np.empty((contacts, n), np.int64)
-    surface, step = np.empty((contacts, n)), np.empty((contacts, n))
+    unit, before = 1.0 / (np.pi * contact_modulus), 0.0
+    surface, work = np.empty((contacts, n)), np.empty((2, n))
     response, lift = np.empty((contacts, n, n)), np.empty((contacts, n))
-    work, matrix = np.empty((2, n)), np.empty((n, 2 + 2 * n))
+    steps, depths = new_steps(contacts, n), new_depths(members, n)
     log_scale = log_scale_of(contact_modulus, longitudinal_curvature, spacing)
-    lengths = new_lengths(contacts, bend, log_scale)
+    lengths = new_lengths(contacts, bend, log_scale, NEWTON_REACH)
     for k in range(contacts):
         for i in range(n):
             surface[k, i] = own[k, i] + shared[k, 0, i] + shared[k, 1, i]
@@ -113,22 +108,31 @@ def solve_coupled(
             for i in range(n):
                 surface[k, i] = gap[k, i]
         add_depths(members, shared, line_load, surface)
+        renewed = False
         for k in range(contacts):
-            size, widest = newton_system(
-                k, own, table, unit, lengths, line_load, index, work, surface, matrix
-            )
+            widest = displace(k, own, table, unit, lengths, line_load, work, surface, steps)
             if widest > HIGHEST:
                 return TOO_FINE, iteration
-            _ask_for_responses(size, matrix)
-            if not solve_many_in_place(matrix, size, 2 + 2 * size):
-                return SINGULAR, iteration
-            risen = take_step(k, size, loads[k] / spacing, line_load, matrix, step, approach)
-            if risen == 0.0:
-                return SINGULAR, iteration
-            _take_responses(k, size, risen, matrix, response, lift)
-        if not solve_depths(members, shared, index, response, step, lift, approach):
+            if steps.fresh[k]:
+                if not factor_jacobian(k, steps):
+                    return SINGULAR, iteration
+                _fill_responses(k, steps, response, lift)
+                renewed = True
+        if renewed and not factor_depths(members, shared, steps.rows, response, depths):
             return SINGULAR, iteration
-        status = settle(iteration, unit, surface, index, step, approach, line_load)
+        for again in range(2):
+            for k in range(contacts):
+                if again:
+                    add_beyond(k, table, unit, line_load, lengths, steps)
+                take_step(k, loads[k] / spacing, line_load, steps, approach)
+            solve_depths(members, shared, steps.rows, response, lift, depths, steps.step, approach)
+        change, left = update_loads(line_load, steps, iteration > CAUTIOUS)
+        for k in range(contacts):
+            foresee(k, surface, steps)
+        add_depths(members, shared, steps.change, surface)
+        status, before = settle(
+            iteration, unit, before, change, left, surface, steps, approach, line_load
+        )
         if status == CONVERGED:
             fill_half_lengths(spacing, line_load, lengths, half_length)
         if status != GOING_ON:

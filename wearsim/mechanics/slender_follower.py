@@ -22,6 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wearsim.mechanics.half_length import (
+    REACH,
     Lengths,
     add_lengthening,
     find_factors,
@@ -31,7 +32,7 @@ from wearsim.mechanics.half_length import (
 )
 from wearsim.mechanics.influence import read_influence
 from wearsim.mechanics.jit import kernel
-from wearsim.mechanics.linear import solve_many_in_place
+from wearsim.mechanics.linear import factor_in_place, invert_factored
 from wearsim.mechanics.slender import (
     CONVERGED,
     GAP_TOLERANCE,
@@ -102,6 +103,7 @@ class Follower(NamedTuple):
     change: FloatArray
     work: FloatArray
     matrix: FloatArray
+    order: IntArray
     seen: FloatArray
     tractions: StripTractions
 
@@ -139,11 +141,12 @@ def empty_follower(m: Medium, contacts: int, n: int) -> Follower:
         np.empty((contacts, n, n)),
         np.empty((contacts, n)),
         np.zeros((contacts, n)),
-        new_lengths(contacts, m.bend, m.log_scale),
+        new_lengths(contacts, m.bend, m.log_scale, REACH),
         np.empty(n),
         np.empty(n),
         np.empty((6, max(n, BAND))),
-        np.empty((n, 2 * n)),
+        np.empty((n, n)),
+        np.empty(n, np.int64),
         np.zeros((3, n)),
         new_tractions(n),
     )
@@ -197,12 +200,11 @@ def set_anchor(g: int, line_load: FloatArray, m: Medium, f: Follower) -> bool:
     bool
         False if the Jacobian is singular.
     """
-    find_factors(g, line_load, f.lengths)
+    find_factors(g, line_load, True, f.lengths)
     n = line_load.shape[1]
     reach, small = min(BAND, n), 1e-3
     guards, count = _number_strips(g, line_load, f), f.loaded[g]
     matrix, work = f.matrix, f.work
-    matrix[:count, : 2 * count] = 0.0
     f.surface[g] = 0.0
     for c in range(count):
         j = f.active[g, c]
@@ -212,8 +214,7 @@ def set_anchor(g: int, line_load: FloatArray, m: Medium, f: Follower) -> bool:
         read_influence(m.table, tau + small, reach, work[2], work[3])
         read_influence(m.table, tau - small, reach, work[4], work[5])
         for r in range(count):
-            matrix[r, c] = m.unit * work[1, abs(f.active[g, r] - j)]
-        matrix[c, count + c] = 1.0
+            matrix[c, r] = m.unit * work[1, abs(f.active[g, r] - j)]
         for k in range(reach):
             f.near[g, c, 0, k] = m.unit * q * work[0, k]
             f.near[g, c, 1, k] = m.unit * work[1, k]
@@ -227,14 +228,13 @@ def set_anchor(g: int, line_load: FloatArray, m: Medium, f: Follower) -> bool:
             lengthen(g, j, m.unit * q, work[0], work[1], f.lengths)
     if m.bend.shape[0] > 0:
         _add_lengthening(g, line_load, f)
-    if not solve_many_in_place(matrix, count, 2 * count):
+    if not factor_in_place(matrix, count, f.order):
         return False
+    invert_factored(matrix, count, f.order, f.inverse[g])
     for r in range(count):
-        total = 0.0
+        f.unit_load[g, r] = 0.0
         for c in range(count):
-            f.inverse[g, c, r] = matrix[r, count + c]
-            total += matrix[r, count + c]
-        f.unit_load[g, r] = total
+            f.unit_load[g, r] += f.inverse[g, c, r]
     return True
 
 
@@ -380,7 +380,7 @@ def solve_fully(g: int, load: float, anchored: bool, loads: Loads, m: Medium, f:
         loads.line_load[g, i] = line_load[0, i]
     if not anchored:
         _number_strips(g, loads.line_load, f)
-        find_factors(g, loads.line_load, f.lengths)
+        find_factors(g, loads.line_load, True, f.lengths)
         return CONVERGED
     for i in range(n):
         loads.anchor[g, i], loads.anchor_gap[g, i] = line_load[0, i], f.gap[i]
