@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from tests.benchmarks.table import Effort, Row, part
+from wearsim.bench.contact_cases import Case, elliptic_cases
 from wearsim.bench.timing import best, best_short
 from wearsim.mechanics.elasticity import combine
 from wearsim.mechanics.hertz import HertzContact, hertz
+from wearsim.mechanics.strip import SUMS, strip_contacts
+from wearsim.mechanics.strip_coupling import strip_elasticity
 from wearsim.models.hertz_fastsim import HertzFastsim, HertzFastsimOptions
 from wearsim.plugins import ContactModelSpec, registry
 from wearsim.types import (
@@ -42,9 +46,10 @@ class Mean:
         self.model.prepare(grid, (STEEL, STEEL))
         self.gap = grid.y**2 / (2 * CROWN)
 
-    def solve(self, warm: ContactSolution | None = None) -> ContactSolution:
+    def solve(self, warm: ContactSolution | None = None, load: float = LOAD) -> ContactSolution:
         """Solve it, from nothing or from a solution nearby."""
-        return self.model.solve(self.gap, ALONG, POINT, None, warm)
+        point = POINT if load == LOAD else replace(POINT, normal_force=load)
+        return self.model.solve(self.gap, ALONG, point, None, warm)
 
 
 def rig_hertz() -> HertzContact:
@@ -94,42 +99,99 @@ def draws(contacts: int) -> OperatingPoints:
 
 
 def many_rows(effort: Effort) -> list[Row]:
-    """Time a thousand contacts with spin, solved together; their error is that of the mean."""
+    """Time a thousand contacts with spin, solved together; errors are against FASTSIM's limit."""
     points = draws(1000)
     steps = 400 if not effort.quick else 100
 
-    def case(elements: int, strips: int, form: str) -> tuple[float, float]:
+    def case(elements: int, strips: int, form: str) -> tuple[float, np.ndarray]:
         model = HertzFastsim(HertzFastsimOptions(mx=elements, closed_form=form))
         grid = Grid.spanning(-1.8e-3, 1.8e-3, strips)
         model.prepare(grid, (STEEL, STEEL))
         gap = np.broadcast_to(grid.y**2 / (2 * CROWN), (1, 1, len(points), strips))
-        power = float(model.solve_batch(gap, ALONG, points).stack("power").mean())
+        power = model.solve_batch(gap, ALONG, points).stack("power").ravel()
         return best(lambda: model.solve_batch(gap, ALONG, points), effort.repetitions), power
 
     truth = case(steps, steps, "never")[1]
     rows = []
     for what, elements, strips, form, asked in (
         ("50 x 50, FASTSIM", 50, 50, "never", "0.1 s, aim 0.02 s"),
+        ("12 x 16, FASTSIM", 12, 16, "never", "10 ms, aim 2 ms; 0.2 %"),
         ("24 strips, closed form", 50, 24, "always", ""),
     ):
         seconds, power = case(elements, strips, form)
-        error = f"{part(power / truth - 1)} in mean power, against {steps} x {steps}"
-        rows.append(Row(f"1000 contacts with spin at once, {what}", seconds, asked, error))
+        rms = np.sqrt(np.mean((power / truth - 1) ** 2))
+        error = f"{part(power.mean() / truth.mean() - 1)} in mean power, {100 * rms:.2g} % rms"
+        told = f"{error}, against {steps} x {steps}"
+        rows.append(Row(f"1000 contacts with spin at once, {what}", seconds, asked, told))
     return rows
+
+
+def tangential_rows(effort: Effort) -> list[Row]:
+    """Time the kernel of strip theory in partial slip with spin, one contact of a batch."""
+    rows, batch = [], 200
+    for strips, asked in ((64, "10 us, aim 1 us; 1.5 % rms"), (24, "")):
+        errors, seconds = [], []
+        for case in elliptic_cases("partial")[: 4 if effort.quick else None]:
+            arrays, sums = strip_problem(case, strips, 1)
+            strip_contacts(*arrays)
+            errors.append(sums[SUMS.index("power"), 0] / case.exact.power - 1.0)
+            many, _ = strip_problem(case, strips, batch)
+            seconds.append(best(lambda args=many: strip_contacts(*args), effort.repetitions))
+        rms = float(np.sqrt(np.mean(np.square(errors))))
+        what = f"strip theory, {strips} strips, partial slip with spin, kernel"
+        told = f"{100 * rms:.2g} % rms of the exact power"
+        rows.append(Row(what, float(np.mean(seconds)) / batch, asked, told))
+    return rows
+
+
+def strip_problem(case: Case, strips: int, contacts: int) -> tuple[tuple[Any, ...], np.ndarray]:
+    """Return the arguments of `strip_contacts` for copies of a Hertzian contact, and its sums."""
+    patch, point, elastic = case.patch, case.point, combine(STEEL, STEEL)
+    grid = Grid.spanning(-patch.b, patch.b, strips)
+    half = patch.a * np.sqrt(1.0 - (grid.y / patch.b) ** 2)
+    load = 0.5 * np.pi * patch.peak_pressure * half**2 / patch.a
+    load *= point.normal_force / (load.sum() * grid.spacing)
+    creepage, dissipation = point.creepage, np.empty((contacts, strips))
+    sums = np.empty((len(SUMS), contacts))
+
+    def each(values: object) -> np.ndarray:
+        return np.ascontiguousarray(np.broadcast_to(values, (contacts, strips)))
+
+    def own(value: float) -> np.ndarray:
+        return np.full(contacts, value)
+
+    arguments = (
+        each(load),
+        each(half),
+        grid.y,
+        grid.spacing,
+        strip_elasticity(elastic.contact_modulus, elastic.shear_modulus),
+        point.rolling_speed,
+        own(creepage.longitudinal),
+        own(creepage.lateral),
+        own(creepage.spin),
+        each(-creepage.spin * grid.y),
+        each(point.friction),
+        dissipation,
+        sums,
+    )
+    return arguments, sums
 
 
 def slender_rows(effort: Effort) -> list[Row]:
     """Time a slender solve on 81 strips, from nothing and from a neighbour."""
     mean = Mean("slender", strips=81)
-    warm = mean.solve()
-    error = f"{part(warm.power / EXACT_POWER - 1)} in power, of 0.0771 W"
-    peak = f"{part(warm.peak_pressure / PEAK_PRESSURE - 1)} in p0"
+    cold = mean.solve()
+    error = f"{part(cold.power / EXACT_POWER - 1)} in power, of 0.0771 W"
+    peak = f"{part(cold.peak_pressure / PEAK_PRESSURE - 1)} in p0"
+    near = mean.solve(load=0.99 * LOAD)
+
+    def row(what: str, asked: str, told: str, warm: ContactSolution | None) -> Row:
+        seconds = best_short(lambda: mean.solve(warm), effort.repetitions)
+        return Row(f"slender, 81 strips, {what}", seconds, asked, told)
+
     return [
-        Row("slender, 81 strips, cold", best_short(mean.solve, effort.repetitions), "", error),
-        Row(
-            "slender, 81 strips, warm",
-            best_short(lambda: mean.solve(warm), effort.repetitions),
-            "",
-            peak,
-        ),
+        row("cold", "", error, None),
+        row("from a solution under 1 % less load", "40 us, aim 10 us", peak, near),
+        row("from the solution itself", "", peak, cold),
     ]

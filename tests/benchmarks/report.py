@@ -15,7 +15,12 @@ from tests.benchmarks.table import Effort, Row, markdown
 from wearsim.bench.machine import this_machine
 
 TABLES: dict[str, list[Callable[[Effort], list[Row]]]] = {
-    "One contact": [contacts.hertz_rows, contacts.mean_rows, contacts.slender_rows],
+    "One contact": [
+        contacts.hertz_rows,
+        contacts.mean_rows,
+        contacts.tangential_rows,
+        contacts.slender_rows,
+    ],
     "Many contacts at once": [contacts.many_rows],
     "Random inputs": [studies.draw_rows, studies.dissipation_rows, studies.cheapest_rows],
     "Whole tests, in-process, once compiled": [

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wearsim.mechanics.jit import kernel
+from wearsim.mechanics.jit import inlined_kernel, kernel
 from wearsim.types import FloatArray
 
 _ROOT_CORNER = 0.2078862249773546  # -zeta(-1/2)
@@ -195,7 +195,7 @@ def march_into(
     _times_step(strips, sums, half_length, cell)
 
 
-@kernel
+@inlined_kernel
 def _step(
     j: int,
     place: float,
@@ -291,7 +291,7 @@ def bound_shape(place: float, elliptic: bool) -> float:
     return math.sqrt(shape) if elliptic else shape
 
 
-@kernel
+@inlined_kernel
 def hold(traction_x: float, traction_y: float, bound: float) -> tuple[bool, float]:
     """Return whether the traction keeps to the bound, and the factor that holds it there.
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar, cast
+from typing import Any, ParamSpec, TypeVar
 
 import numba
 import numpy as np
@@ -27,23 +27,38 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
     Every kernel is called with one signature only (C-contiguous float64 arrays, floats, ints), so
     that processes starting together write the same cache entries.
     """
-    compiled = _dispatcher(function)
+    compiled: Callable[P, R] = _cached(_dispatcher(function))
+    return compiled
+
+
+def inlined_kernel(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile `function` as `kernel` does, and put its code in the place of every call.
+
+    For the little that an inner loop calls: a loop with a call left in it is not vectorised.
+    """
+    compiled: Callable[P, R] = _cached(_dispatcher(function, forceinline=True))
+    return compiled
+
+
+def _cached(compiled: Any) -> Any:
+    """Return what compiles a function, cached on disk wherever a cache can be kept."""
     try:
         compiled.enable_caching()
     except RuntimeError:
         pass  # neither the source tree nor the user's cache folder can be written: compile afresh
     else:
         _renew_with_any_kernel(compiled)
-    return cast(Callable[P, R], compiled)
+    return compiled
 
 
-def _dispatcher(function: Callable[P, R]) -> Any:
+def _dispatcher(function: Callable[P, R], **options: bool) -> Any:
     """Return what compiles a function, in half the time where numba is built as it was."""
     try:
         from wearsim.mechanics.kernel_dispatcher import Whole  # noqa: PLC0415  (may not be there)
     except (ImportError, AttributeError):
-        return numba.njit(error_model="numpy")(function)
-    return Whole(function, targetoptions=_OPTIONS)
+        plain: Any = numba.njit
+        return plain(error_model="numpy", **options)(function)
+    return Whole(function, targetoptions=_OPTIONS | options)
 
 
 def own_array(array: FloatArray) -> FloatArray:
