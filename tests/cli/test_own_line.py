@@ -20,7 +20,7 @@ def test_that_a_run_ends_with_its_own_line(command, scenario):
     line = last_line(command("run", scenario, "-o", "short.h5", "-q"))
     result = wearsim.open_results("short.h5")
     used = f"slender, {len(result.y)} strips, implicit, tolerance 0.001"
-    assert line.startswith(f"{used}; depth within ")
+    assert line.startswith(f"{used}; by its steps depth within ")
     assert re.search(rf"volume within [\d.]+ % as estimated; {TIME}$", line)
     part = float(re.search(r"depth within ([\d.]+) %", line)[1])
     stated = float(result.depth_error[-1] / result.depth[-1])

@@ -9,6 +9,7 @@ import numba
 import numpy as np
 import pytest
 
+from wearsim.mechanics import kernel_dispatcher
 from wearsim.mechanics.jit import kernel
 
 
@@ -64,6 +65,25 @@ def test_that_a_numba_that_is_built_otherwise_compiles_kernels_all_the_same(monk
     plain = kernel(_root.py_func)
     assert not hasattr(plain, "part")
     assert plain(9.0) == _root(9.0)
+
+
+def test_that_a_numba_whose_compiler_has_changed_compiles_kernels_in_its_own_way(monkeypatch):
+    def changed(self):
+        raise AttributeError("no such pass")
+
+    monkeypatch.setattr(kernel_dispatcher._PartCompiler, "define_pipelines", changed)
+    monkeypatch.setattr(kernel_dispatcher.Whole, "plain", False)
+
+    @kernel
+    def third(x: float) -> float:
+        return x / 3.0
+
+    @kernel
+    def shifted(x: float) -> float:
+        return third(x) + 0.1
+
+    assert shifted(6.0) == 2.1
+    assert kernel_dispatcher.Whole.plain
 
 
 @pytest.mark.parametrize("collecting", [True, False])

@@ -45,7 +45,9 @@ def contact(
     from wearsim.studies.contact import study_contact
 
     has_fields = loaded.contact.spec.capabilities.fields
-    study = study_contact(loaded, _profile(profile), figure is not None and has_fields)
+    study = study_contact(
+        loaded, _profile(profile), figure is not None and has_fields, with_error=True
+    )
     notes = [*study.notes, *_means(loaded)]
     if figure is not None and not has_fields:
         notes.append(f"model '{study.model}' gives no fields; the figure shows its strips alone")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from wearsim.report.units import brief, count, lapse, shown
+from wearsim.report.units import NOTHING, brief, count, lapse, shown
 
 if TYPE_CHECKING:
     from wearsim.results import DissipationResult, EnsembleResult, Result
@@ -18,7 +18,7 @@ SURE = " (95 %)"
 
 
 def run_line(result: Result) -> str:
-    """Return the line of a wear test; errors are those of stepping, as the run estimates them."""
+    """Return the line of a wear test; errors are those of its steps, as the run estimates them."""
     raw = result.raw
     used = [result.described_model, f"{len(result.y)} strips", result.stepper]
     if result.stepper == "per-pass":
@@ -28,7 +28,7 @@ def run_line(result: Result) -> str:
         depth = max(np.max(result.depth[-1]), np.max(result.roller_depth[-1]))
         volume = np.max(result.worn_volume[-1])
         errors = [
-            _within("depth", np.max(result.depth_error[-1]), depth),
+            "by its steps " + _within("depth", np.max(result.depth_error[-1]), depth),
             _within("volume", np.max(result.volume_error[-1]), volume, " as estimated"),
         ]
     return _line(used, errors, lapse(raw.wall_seconds))
@@ -40,7 +40,7 @@ def contact_line(study: ContactStudy) -> str:
     error = []
     if study.grid_error is not None:
         error.append(f"power within {_part(study.grid_error)} as half of them tell")
-    return _line(used, error, brief(study.seconds))
+    return _line(used, error, NOTHING if study.seconds is None else brief(study.seconds))
 
 
 def dissipation_line(result: DissipationResult) -> str:

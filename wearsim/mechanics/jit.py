@@ -55,10 +55,11 @@ def _dispatcher(function: Callable[P, R], **options: bool) -> Any:
     """Return what compiles a function, in half the time where numba is built as it was."""
     try:
         from wearsim.mechanics.kernel_dispatcher import Whole  # noqa: PLC0415  (may not be there)
-    except (ImportError, AttributeError):
+
+        return Whole(function, targetoptions=_OPTIONS | options)
+    except (ImportError, AttributeError, TypeError):
         plain: Any = numba.njit
         return plain(error_model="numpy", **options)(function)
-    return Whole(function, targetoptions=_OPTIONS | options)
 
 
 def own_array(array: FloatArray) -> FloatArray:

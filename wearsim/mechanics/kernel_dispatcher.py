@@ -25,6 +25,9 @@ from numba.core.typed_passes import AnnotateTypes
 class Whole(CPUDispatcher):
     """A kernel as Python calls it: machine code of itself and of all kernels that it calls."""
 
+    #: whether numba is built otherwise than what follows, and compiles kernels in its own way
+    plain = False
+
     @cached_property
     def part(self) -> Part:
         """The same kernel as other kernels call it."""
@@ -34,11 +37,16 @@ class Whole(CPUDispatcher):
     @property
     def _numba_type_(self) -> Any:
         """What a kernel finds that names this one."""
-        return types.Dispatcher(self.part)
+        return types.Dispatcher(self if Whole.plain else self.part)
 
     def compile(self, sig: Any) -> Any:
         """Compile for the types of `sig`, or read what was compiled before."""
         with _no_collection():
+            if not Whole.plain:
+                try:
+                    return super().compile(sig)
+                except (AttributeError, TypeError, NotImplementedError):
+                    Whole.plain = True  # what a kernel lacks is a NumbaError
             return super().compile(sig)
 
 

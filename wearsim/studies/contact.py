@@ -45,9 +45,9 @@ class ContactStudy:
         The same with its options.
     grid_error : float, optional
         What half as many strips change of the power, as a part of it: more than these are off.
-        None where the model has no answer on those.
-    seconds : float
-        What the contact took, once compiled [s].
+        None where that was not asked for, or the model has no answer on those.
+    seconds : float, optional
+        What the contact took, once compiled [s]; None where that was not asked for.
     notes : tuple of str
         What a user should know.
     """
@@ -60,7 +60,7 @@ class ContactStudy:
     model: str
     described_model: str
     grid_error: float | None
-    seconds: float
+    seconds: float | None
     notes: tuple[str, ...]
 
 
@@ -83,7 +83,10 @@ def _grid(scenario: Scenario, model: ContactModel, load: float, profile: Profile
 
 
 def study_contact(
-    scenario: Scenario, profile: Profile | None = None, with_fields: bool = False
+    scenario: Scenario,
+    profile: Profile | None = None,
+    with_fields: bool = False,
+    with_error: bool = False,
 ) -> ContactStudy:
     """Solve the contact of the scenario's first roller at the start of its load.
 
@@ -95,6 +98,8 @@ def study_contact(
         The cylinder's profile, in place of the scenario's.
     with_fields : bool
         Also return tractions and slip inside the contact.
+    with_error : bool
+        Also solve it again, to time it, and on half as many strips.
 
     Returns
     -------
@@ -114,7 +119,6 @@ def study_contact(
     grid = _grid(scenario, model, force, profile)
     gap, curvature, point = _problem(scenario, model, grid, force, profile)
     solution = model.solve(gap, curvature, point)
-    seconds = _seconds(lambda: model.solve(gap, curvature, point))
     fields = model.fields(solution, gap, curvature, point) if with_fields else None
     name = scenario.contact.model
     return ContactStudy(
@@ -125,8 +129,8 @@ def study_contact(
         point,
         name,
         described_model(name, scenario.text),
-        _grid_error(scenario, grid, force, profile, solution.power),
-        seconds,
+        _grid_error(scenario, grid, force, profile, solution.power) if with_error else None,
+        _seconds(lambda: model.solve(gap, curvature, point)) if with_error else None,
         scenario.notes,
     )
 
