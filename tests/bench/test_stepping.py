@@ -14,7 +14,7 @@ from wearsim.bench.stepping import RIG, SPRING, stepping
 from wearsim.bench.stepping_groups import EVERY_PASS, Bench, of_model, of_steppers
 from wearsim.bench.stepping_solvers import SOLVERS, solved_by
 from wearsim.bench.stepping_tests import End, Ready, WearTest, errors_of
-from wearsim.errors import PluginError
+from wearsim.errors import PluginError, StepError
 from wearsim.plugins import ContactModelSpec, registry
 from wearsim.scenario.sections import EvolutionTable
 
@@ -114,8 +114,24 @@ def test_that_a_model_without_compiled_passes_has_a_truth_that_passes_agree_with
     strips = SHORT.grid().strips
     row, converged = test.exact(strips)
     assert row.method == "LSODA"
+    assert row.counts["truth"] == converged.own["profile"]
     ready = test.ready(strips, stepper=EVERY_PASS)
-    assert max(errors_of(converged, ready.stepped(ready.stop)).values()) < 2e-4
+    assert max(errors_of(converged.end, ready.stepped(ready.stop)).values()) < 2e-4
+
+
+def test_that_the_truth_of_a_model_without_compiled_passes_is_converged():
+    test = bench("hertz")
+    _, converged = test.exact(SHORT.grid().strips)
+    assert all(0.0 < error < 3e-6 for error in converged.own.values())
+    assert converged.errors_of(converged.end) == converged.own
+    with_error = list(of_model(test, (1e-2,)))
+    assert with_error[0].errors["profile"] > converged.own["profile"]
+
+
+def test_that_a_solver_that_asks_for_too_many_contacts_is_stopped():
+    ready = Ready(SHORT.asked({}))
+    with pytest.raises(StepError, match="more than 20 contacts"):
+        solved_by("LSODA", ready.scene, ready.stop, 1e-6, most=20)
 
 
 def test_that_errors_are_parts_of_the_exact_ones():

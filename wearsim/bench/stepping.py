@@ -8,7 +8,8 @@ from functools import partial
 
 from wearsim.bench.contact_methods import DEFAULT_MODEL, Method, methods
 from wearsim.bench.measured import Effort, Measurement, Tell, Topic
-from wearsim.bench.stepping_groups import Bench, of_model, of_steppers, of_strips
+from wearsim.bench.stepping_groups import CONVERGED, Bench, of_model, of_steppers, of_strips
+from wearsim.bench.stepping_solvers import MOST_SOLVES
 from wearsim.bench.stepping_tests import WearTest
 from wearsim.scenario.sections import DEFAULT_TOLERANCE
 
@@ -21,15 +22,19 @@ STRIPS, EARLY_STRIPS = (25, 41, 75), (15, 25, 41)
 QUICK = 0.005  # of every test
 QUICK_TOLERANCES = (1e-1, DEFAULT_TOLERANCE)
 ERRORS = {"depth": "depth", "profile": "profile, L2", "volume": "worn volume"}
-COUNTS = {"steps": "steps", "solves": "contact solves"}
+COUNTS = {"steps": "steps", "solves": "contact solves", "truth": "truth known to"}
 ABOUT = (
     "Time is that of a wear test from fresh bodies to its end, built already and with nothing"
     " recorded. Errors are those of stepping alone, at the end, against every pass by itself on the"
     " same strips, which has none of its own; where no compiled code takes every pass, against"
-    " what LSODA converges to with the same contact model. Strips are held against twice as many as"
-    " there are by default, and their errors hold those of stepping too. BDF and LSODA are scipy's,"
-    " given the wear per pass of the same contacts. A way that takes more than a second is timed"
-    " once."
+    f" LSODA of scipy's at a tolerance of {CONVERGED:g} with the same contact model. `truth known"
+    " to` is then its own error in the profile: how far it is from BDF at that tolerance or from"
+    " itself ten times as loose; an error below it is given as that. Strips are held against twice"
+    " as many as there are by default, and their errors hold those of stepping too. Tolerances of"
+    " wearsim's steppers are of the whole test, those of BDF and LSODA of each of their steps: equal"
+    " numbers are not equal errors. Both are given the wear per pass of the same contacts and its"
+    " Jacobian by differences, which LSODA asks for only while it finds the test stiff, and"
+    f" {MOST_SOLVES} contact solves at most. A way that takes more than a second is timed once."
 )
 
 

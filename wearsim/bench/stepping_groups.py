@@ -18,7 +18,10 @@ from wearsim.evolution.scene import Scene
 from wearsim.scenario.sections import DEFAULT_TOLERANCE, EvolutionTable
 
 EVERY_PASS = "per-pass"
-CONVERGED = 1e-5  # tolerance of a solver whose error no stepper comes near
+CONVERGED = 1e-7  # tolerance of the solver that is the truth where passes are not compiled
+#: what the truth is checked by: itself ten times as loose, and a solver that shares no code
+_CHECKS: tuple[tuple[Solver, float], ...] = (("LSODA", 1e-6), ("BDF", CONVERGED))
+CLOSE = 1e-5  # tolerance at which a solver's error is next to none beside that of the strips
 MOST_STEPS = 1500  # after which a stepper is not asked for still closer tolerances
 _FEW = 1e-4  # of the passes, stepped first so that nothing compiles while it is timed
 _STEPPERS = tuple(
@@ -28,6 +31,31 @@ _STEPPERS = tuple(
 )
 #: takes passes, and steps a test from fresh bodies over as many
 Steps = Callable[[float], End]
+
+
+@dataclass(frozen=True)
+class Truth:
+    """The end that others are held against.
+
+    Parameters
+    ----------
+    end : End
+    own : mapping of str to float
+        Its own errors as `errors_of` has them, by name; none of every pass by itself.
+    """
+
+    end: End
+    own: Mapping[str, float]
+
+    def errors_of(self, found: End) -> dict[str, float]:
+        """Return the errors of another end, none less than the truth's own."""
+        apart = errors_of(found, self.end)
+        return {name: max(error, self.own.get(name, 0.0)) for name, error in apart.items()}
+
+    @property
+    def known(self) -> dict[str, float]:
+        """To how much of the profile the truth is known, as a count; none if it is exact."""
+        return {"truth": self.own["profile"]} if self.own else {}
 
 
 @dataclass(frozen=True)
@@ -54,10 +82,12 @@ class Bench:
         contact = {"model": self.model.model, "strips": strips, **self.model.options}
         return Ready(self.test.asked({"contact": contact, "evolution": evolution}))
 
-    def exact(self, strips: int) -> tuple[Measurement, End]:
+    def exact(self, strips: int) -> tuple[Measurement, Truth]:
         """Return the end that the others are held against, and what it took.
 
-        Every pass by itself where there is compiled code for it, else what a solver converges to.
+        Every pass by itself where there is compiled code for it, else what LSODA converges to. Its
+        own errors are then how far it is from BDF of the same tolerance, which shares no code with
+        it, or from itself ten times as loose, whichever is more.
 
         Raises
         ------
@@ -68,17 +98,23 @@ class Bench:
         if is_compiled(ready.scene):
             ready.stepped(1.0)
             end, seconds = least(lambda: ready.stepped(ready.stop), 1)
-            return self._row(EVERY_PASS, "every pass", seconds, end), end
+            return self._row(EVERY_PASS, "every pass", seconds, end), Truth(end, {})
         steps = partial(by_solver, "LSODA", ready.scene, CONVERGED)
         end, seconds = least(lambda: steps(ready.stop), 1)
-        return self._row("LSODA", f"converged, {_power(CONVERGED)}", seconds, end), end
+        looser, other = (
+            errors_of(by_solver(solver, ready.scene, tolerance, ready.stop), end)
+            for solver, tolerance in _CHECKS
+        )
+        truth = Truth(end, {name: max(looser[name], other[name]) for name in looser})
+        setting = f"converged, {_power(CONVERGED)}"
+        return self._row("LSODA", setting, seconds, end, known=truth.known), truth
 
     def measured(
         self,
         method: str,
         setting: str,
         prepare: Callable[[], tuple[Steps, float]],
-        exact: End,
+        exact: Truth,
         default: bool = False,
     ) -> Measurement:
         """Return error and time of one way to step the test.
@@ -88,14 +124,15 @@ class Bench:
         method, setting : str
         prepare : callable
             Returns what steps the test, and its passes.
-        exact : End
+        exact : Truth
         default : bool
         """
         try:
             steps, stop = prepare()
             steps(max(_FEW * stop, 1.0))
             end, seconds = least(lambda: steps(stop), self.repetitions)
-            return self._row(method, setting, seconds, end, errors_of(end, exact), default)
+            errors = exact.errors_of(end)
+            return self._row(method, setting, seconds, end, errors, default, exact.known)
         except Exception as error:
             return Measurement(self.group, method, setting, failed=why(error))
 
@@ -107,6 +144,7 @@ class Bench:
         end: End,
         errors: Mapping[str, float] | None = None,
         default: bool = False,
+        known: Mapping[str, float] | None = None,
     ) -> Measurement:
         state = end.state
         counts = {"steps": state.steps} if state.steps else {}
@@ -116,7 +154,7 @@ class Bench:
             setting=setting,
             seconds=seconds,
             errors=errors or {},
-            counts={**counts, "solves": state.solves},
+            counts={**counts, "solves": state.solves, **(known or {})},
             default=default,
         )
 
@@ -207,9 +245,13 @@ def of_strips(bench: Bench, counts: Sequence[int]) -> Iterator[Measurement]:
         Numbers of strips, besides that of the default.
     """
     default = bench.test.grid().strips
-    finest = bench.ready(2 * default + 1)
-    exact = by_solver("LSODA", finest.scene, CONVERGED, finest.stop)
-    for method, tolerance in ((finest.name, DEFAULT_TOLERANCE), ("LSODA", CONVERGED)):
+    try:
+        finest = bench.ready(2 * default + 1)
+        exact = Truth(by_solver("LSODA", finest.scene, CLOSE, finest.stop), {})
+    except Exception as error:
+        yield Measurement(bench.group, "LSODA", f"{2 * default + 1} strips", failed=why(error))
+        return
+    for method, tolerance in ((finest.name, DEFAULT_TOLERANCE), ("LSODA", CLOSE)):
         for strips in sorted({*counts, default}):
             yield bench.measured(
                 f"{method}, {_power(tolerance)}",

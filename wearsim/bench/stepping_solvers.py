@@ -17,6 +17,7 @@ from wearsim.types import FloatArray
 
 Solver = Literal["BDF", "LSODA"]
 SOLVERS: tuple[Solver, ...] = ("BDF", "LSODA")
+MOST_SOLVES = 20_000  # of contacts, after which a solver is stopped: several times what any needs
 _SMALL = 1e-4  # of the approach: how much a profile is changed to see the wear change
 
 
@@ -29,10 +30,12 @@ class _Rates:
     ----------
     scene : Scene
         Without terms of the load, which have a state of their own.
+    most : int
+        Contacts that are solved at most.
     """
 
-    def __init__(self, scene: Scene) -> None:
-        self.scene, self.state = scene, fresh_state(scene)
+    def __init__(self, scene: Scene, most: int) -> None:
+        self.scene, self.state, self.most = scene, fresh_state(scene), most
         self.solves = self.state.solves
         self.length = float(contact_values(scene, self.state.contacts, "approach").max())
         rates = self._wear()
@@ -58,7 +61,17 @@ class _Rates:
         return self.state.moved(passes, **values)
 
     def __call__(self, passes: float, depths: FloatArray) -> FloatArray:
-        """Return the wear per pass at some depths, after some passes."""
+        """Return the wear per pass at some depths, after some passes.
+
+        Raises
+        ------
+        StepError
+            If it has been asked for too many times.
+        """
+        if self.solves >= self.most:
+            raise StepError(
+                f"the solver asked for more than {self.most} contacts", {"passes": passes}
+            )
         state = self.state_at(passes, depths)
         contacts = solve_present(self.scene, state, present_loads(self.scene, state))
         self.state = replace(state, contacts=contacts)
@@ -84,7 +97,9 @@ class _Rates:
         return joined / self.length
 
 
-def solved_by(solver: Solver, scene: Scene, passes: float, tolerance: float) -> WearState:
+def solved_by(
+    solver: Solver, scene: Scene, passes: float, tolerance: float, most: int = MOST_SOLVES
+) -> WearState:
     """Return the test after some passes, stepped by a solver of scipy's.
 
     Parameters
@@ -95,7 +110,9 @@ def solved_by(solver: Solver, scene: Scene, passes: float, tolerance: float) -> 
     passes : float
         From fresh bodies.
     tolerance : float
-        Of the solver, relative, and absolute as a part of the fresh approach.
+        Of each of the solver's steps, relative, and absolute as a part of the fresh approach.
+    most : int
+        Contacts that are solved at most.
 
     Returns
     -------
@@ -106,16 +123,15 @@ def solved_by(solver: Solver, scene: Scene, passes: float, tolerance: float) -> 
     Raises
     ------
     StepError
-        If the solver gives up.
+        If the solver gives up, or asks for too many contacts.
     ContactError
         If it asks for a contact that has no solution.
     """
     from scipy.integrate import solve_ivp  # noqa: PLC0415  (slow to import)
 
-    rates = _Rates(scene)
-    options: dict[str, Any] = {"rtol": tolerance, "atol": tolerance, "t_eval": [passes]}
-    if solver == "BDF":
-        options["jac"] = rates.jacobian
+    rates = _Rates(scene, most)
+    options: dict[str, Any] = {"rtol": tolerance, "atol": tolerance, "jac": rates.jacobian}
+    options["t_eval"] = [passes]
     found = solve_ivp(rates, (0.0, passes), rates.start(), solver, **options)
     if not found.success:
         raise StepError(f"{solver} gave up: {found.message}", {"passes": found.t})

@@ -11,17 +11,19 @@ from typing import TYPE_CHECKING, Any
 from wearsim.cli.output import console, note, plain, write_json
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from wearsim.bench.hard_verdict import Verdict
     from wearsim.bench.machine import Machine
     from wearsim.bench.measured import Effort, Topic
     from wearsim.report.bench_table import Line
 
 _WORDS = ("setting",)
-_LEADING = ("what", "setting", "time", "yardsticks")
+_NAMED = 2  # columns of words before the numbers
 _NAMES = 24  # letters that names have room for before all else
-_NUMBER = 10  # letters of a column of numbers, at most
-_MOST = 9  # columns of a table, its marks left aside
-_WIDE = 132  # columns of text, for tables that go into a file or a pipe
+_NUMBER = 12  # letters of a column of numbers, with what parts it from the next
+_FIXED = _NAMES + 2 + 17 + 11  # letters of names, settings and marks
+_WIDE = 150  # columns of text, for tables that go into a file or a pipe
 _SHOWN = ("volume", "load", "oscillation", "steps", "strips", "mirror")  # checks of a hard case
 
 
@@ -55,7 +57,7 @@ class Output:
 
         self.folder.mkdir(parents=True, exist_ok=True)
         if not self.as_json:
-            console().print(measured_on(self.machine))
+            console().print(measured_on(self.machine, self.effort))
 
     def topic(self, topic: Topic) -> None:
         """Write what was measured of a topic."""
@@ -64,9 +66,9 @@ class Output:
         from wearsim.report.saving import save_figure
 
         self._keep(topic.name, topic.as_json())
-        self._text(f"{topic.name}.md", markdown(topic, self.machine, whole=self.whole))
+        self._text(f"{topic.name}.md", markdown(topic, self.machine, self.effort, whole=self.whole))
         figure = self.folder / f"{topic.name}.png"
-        save_figure(bench_figure(topic, self.machine), figure)
+        save_figure(bench_figure(topic, self.machine, self.effort), figure)
         self._files.append(figure)
         if not self.as_json:
             self._show(topic)
@@ -106,23 +108,31 @@ class Output:
         self._files.append(path)
 
     def _show(self, topic: Topic) -> None:
-        """Print a table for each group of scenes."""
-        from wearsim.report.bench_table import heads, lines
+        """Print a table for each group of scenes, and what has no answer below it."""
+        from wearsim.report.bench_table import MARKS, has_front, heads, lines
 
-        screen, columns = console(), heads(topic)
-        # what does not fit beside the errors is in the files
-        kept = [place for place in range(len(columns)) if place not in _left_out(topic)]
+        screen, columns = _screen(), heads(topic)
         screen.print(f"\n{topic.title}\n{topic.about}")
+        screen.print(MARKS if has_front(topic) else "")
         for group in topic.groups:
             rows = lines(topic, group, self.machine.yardstick, whole=self.whole)
-            told = ([row.cells[place] for place in kept] for row in rows)
-            _print_table(group, [columns[place] for place in kept], told, [*map(_style, rows)])
+            answered = [row for row in rows if not row.failed]
+            if answered:
+                _print_measured(group, columns, answered)
+            for row in rows:
+                if row.failed:
+                    screen.print(f"{group}: {row.cells[0]}, {row.cells[1]}: {row.cells[-1]}")
 
 
-def _left_out(topic: Topic) -> range:
-    """Return the places of counts, where there are more columns than fit."""
-    first = len(_LEADING) + len(topic.errors)
-    return range(first, first + len(topic.counts) if first + len(topic.counts) > _MOST else first)
+def _print_measured(title: str, columns: Sequence[str], rows: Sequence[Line]) -> None:
+    """Print as many columns as there is room for, the marks always."""
+    numbers = range(_NAMED, len(columns) - 1)
+    room = _screen().width - _FIXED
+    kept = [0, 1, *list(numbers)[: max(3, room // _NUMBER)], len(columns) - 1]
+    # a column that is empty all the way down tells nothing
+    kept = [k for k in kept if k < _NAMED or any(row.cells[k] not in ("-", "") for row in rows)]
+    told = ([row.cells[k] for k in kept] for row in rows)
+    _print_table(title, [columns[k] for k in kept], told, [*map(_style, rows)])
 
 
 def _told(verdict: Verdict) -> list[str]:
@@ -153,12 +163,17 @@ def _print_table(
         if number == 0:
             table.add_column(head, min_width=_NAMES, overflow="fold")
         elif number == len(columns) - 1 or head in _WORDS:
-            table.add_column(head, overflow="fold")
+            table.add_column(head, min_width=len(head), overflow="fold")
         else:
-            table.add_column(head, justify="right", max_width=_NUMBER)
+            table.add_column(head, justify="right", max_width=_NUMBER - 2, overflow="fold")
     for number, row in enumerate(rows):
         table.add_row(*row, style=styles[number] if styles else "")
+    _screen().print(table)
+
+
+def _screen() -> Console:
+    """Return where tables go; wider than text where it is no terminal."""
     screen = console()
     if not screen.is_terminal:
         screen.width = _WIDE
-    screen.print(table)
+    return screen

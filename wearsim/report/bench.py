@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import ceil
+from textwrap import fill
 
 from matplotlib import colormaps
 from matplotlib.artist import Artist
@@ -11,11 +12,13 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from wearsim.bench.machine import Machine
-from wearsim.bench.measured import Measurement, Topic
+from wearsim.bench.measured import Effort, Measurement, Topic
+from wearsim.report.bench_sizes import growth_figure, savings_figure
 from wearsim.report.bench_table import measured_on
 from wearsim.report.style import GREY, figure_style, name_axes, say
 
 ACROSS = 2  # panels side by side
+_LETTERS = 120  # in a line under the title
 _FRONT, _DEFAULT = "none is better", "the default"
 _LEGEND = 2.6  # in
 _PANEL = (4.9, 3.9)  # in
@@ -23,7 +26,7 @@ _MARKERS = "osD^vP*X<>ph"
 _LEAST = 1e-8  # an error at which round-off is drawn
 
 
-def bench_figure(topic: Topic, machine: Machine) -> Figure:
+def bench_figure(topic: Topic, machine: Machine, effort: Effort) -> Figure:
     """Return the figure of a topic.
 
     Parameters
@@ -31,13 +34,21 @@ def bench_figure(topic: Topic, machine: Machine) -> Figure:
     topic : Topic
     machine : Machine
         What it was measured on.
+    effort : Effort
+        What was spent.
 
     Returns
     -------
     Figure
         A panel for each group of scenes: a line for each method, a point for each setting, the
-        front drawn through, the default ringed.
+        front drawn through, the default ringed; or how time and memory grow, or how many times as
+        fast a saving is.
     """
+    under = fill(measured_on(machine, effort), _LETTERS)
+    if "peak_bytes" in topic.counts:
+        return growth_figure(topic, under)
+    if "times" in topic.counts:
+        return savings_figure(topic, under)
     groups = topic.groups
     across = min(ACROSS, len(groups))
     down = ceil(len(groups) / across)
@@ -51,7 +62,7 @@ def bench_figure(topic: Topic, machine: Machine) -> Figure:
         for axes in panels[len(groups) :]:
             axes.set_axis_off()
         _write_legend(figure)
-        figure.suptitle(f"{topic.title}\n{measured_on(machine)}")
+        figure.suptitle(f"{topic.title}\n{under}")
     return figure
 
 

@@ -6,10 +6,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from wearsim.bench.machine import Machine
-from wearsim.bench.measured import Measurement, Topic
+from wearsim.bench.measured import Effort, Measurement, Topic
 from wearsim.report.units import NOTHING, brief, shown
 
-FRONT, DEFAULT = "front", "default"
+FRONT, DEFAULT = "*", "default"
+MARKS = f"{FRONT} none is better in time and error both; {DEFAULT}: what a scenario gets"
+FEW = 12  # measurements of a group that are all shown
 _ROUNDING = 1e-10
 
 
@@ -23,11 +25,19 @@ class Line:
         A text for each of `heads`.
     front, default : bool
         Whether none beats it, and whether it is what a scenario gets that asks for nothing.
+    failed : bool
+        Whether the last cell tells why there is no answer.
     """
 
     cells: tuple[str, ...]
     front: bool
     default: bool
+    failed: bool = False
+
+
+def has_front(topic: Topic) -> bool:
+    """Return whether a topic sets methods against each other, not sizes or ways of one."""
+    return not {"times", "peak_bytes"} & set(topic.counts)
 
 
 def heads(topic: Topic) -> list[str]:
@@ -49,7 +59,7 @@ def lines(topic: Topic, group: str, yardstick: float, *, whole: bool = False) ->
         All that was measured; otherwise those that none beats, the default, and of every other
         method the setting that comes nearest.
     """
-    front = {id(item) for item in topic.front(group)}
+    front = {id(item) for item in topic.front(group)} if has_front(topic) else set()
     items = topic.of(group) if whole else chosen(topic, group)
     return [_line(topic, item, yardstick, id(item) in front) for item in items]
 
@@ -57,6 +67,8 @@ def lines(topic: Topic, group: str, yardstick: float, *, whole: bool = False) ->
 def chosen(topic: Topic, group: str) -> list[Measurement]:
     """Return what is worth a line: front, default, and the nearest setting of every method."""
     items, kept = topic.of(group), {id(item) for item in topic.front(group)}
+    if len(items) <= FEW or not has_front(topic):
+        return items
     for method in dict.fromkeys(item.method for item in items):
         own = [item for item in items if item.method == method]
         if not any(id(item) in kept for item in own):
@@ -65,16 +77,17 @@ def chosen(topic: Topic, group: str) -> list[Measurement]:
 
 
 def _line(topic: Topic, item: Measurement, yardstick: float, front: bool) -> Line:
-    marks = ", ".join([FRONT] * front + [DEFAULT] * item.default)
+    marks = " ".join([FRONT] * front + [DEFAULT] * item.default)
     if item.failed:
         empty = (NOTHING,) * (1 + len(topic.errors) + len(topic.counts))
-        return Line((item.method, item.setting, NOTHING, *empty, item.failed), front, item.default)
+        cells = (item.method, item.setting, NOTHING, *empty, item.failed)
+        return Line(cells, front, item.default, failed=True)
     time = NOTHING if item.seconds is None else brief(item.seconds)
     lengths = NOTHING if item.seconds is None else f"{item.seconds / yardstick:.3g}"
     errors = [percent(item.errors.get(name)) for name in topic.errors]
     counts = [counted(name, item.counts.get(name)) for name in topic.counts]
-    cells = (item.method, item.setting, time, lengths, *errors, *counts, marks)
-    return Line(cells, front, item.default)
+    told = (item.method, item.setting, time, lengths, *errors, *counts, marks)
+    return Line(told, front, item.default)
 
 
 def percent(value: float | None) -> str:
@@ -95,26 +108,33 @@ def counted(name: str, value: float | None) -> str:
     return f"{value:,.0f}" if float(value).is_integer() else f"{value:.3g}"
 
 
-def markdown(topic: Topic, machine: Machine, *, whole: bool = False) -> str:
+def markdown(topic: Topic, machine: Machine, effort: Effort, *, whole: bool = False) -> str:
     """Return a topic's tables as Markdown, one for each group.
 
     Parameters
     ----------
     topic : Topic
     machine : Machine
+    effort : Effort
+        What was spent.
     whole : bool
         As of `lines`.
     """
-    parts = [f"## {topic.title}", topic.about, measured_on(machine)]
+    parts = [f"## {topic.title}", topic.about, measured_on(machine, effort)]
+    parts += [f"{MARKS}."] if has_front(topic) else []
     for group in topic.groups:
         rows = (line.cells for line in lines(topic, group, machine.yardstick, whole=whole))
         parts += [f"### {group[:1].upper()}{group[1:]}", markdown_table(heads(topic), rows)]
     return "\n\n".join(parts) + "\n"
 
 
-def measured_on(machine: Machine) -> str:
-    """Return a sentence on the machine and its yardstick."""
-    return f"Measured on {machine}; one yardstick is {brief(machine.yardstick)}."
+def measured_on(machine: Machine, effort: Effort) -> str:
+    """Return a sentence on the machine, its yardstick, and what was spent."""
+    times = "timed once" if effort.repetitions == 1 else f"best of {effort.repetitions}"
+    texts = [f"Measured on {machine}; one yardstick is {brief(machine.yardstick)}; {times}"]
+    texts += ["quick: few cases and short tests, which only show what there is"] * effort.quick
+    texts += [f"contact model {effort.plugin}"] * (effort.plugin is not None)
+    return "; ".join(texts) + "."
 
 
 def markdown_table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
