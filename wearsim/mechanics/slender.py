@@ -234,6 +234,19 @@ def settle(
 
 
 @kernel
+def least_gap(k: int, gap: FloatArray) -> float:
+    """Return the least gap of contact `k`.
+
+    Displacements are counted from there: under a vanishing load they would be lost in the rounding
+    of a deep groove.
+    """
+    least = gap[k, 0]
+    for i in range(gap.shape[1]):
+        least = min(least, gap[k, i])
+    return least
+
+
+@kernel
 def log_scale_of(contact_modulus: float, longitudinal_curvature: float, spacing: float) -> float:
     """Return ln(a/dy) of a strip by itself under 1 N/m."""
     scale = 4.0 / (np.pi * contact_modulus * longitudinal_curvature)
@@ -287,13 +300,15 @@ def solve_slender(
     surface, work = np.empty((contacts, n)), np.empty((2, n))
     steps = new_steps(contacts, n)
     log_scale = log_scale_of(contact_modulus, longitudinal_curvature, spacing)
-    lengths = new_lengths(contacts, bend, log_scale, NEWTON_REACH)
+    lengths, lowest = new_lengths(contacts, bend, log_scale, NEWTON_REACH), np.empty(contacts)
     for k in range(contacts):
         start_contact(k, gap, own, contact_modulus, loads[k], spacing, line_load, approach)
+        lowest[k] = least_gap(k, gap)
+        approach[k] -= lowest[k]
     for iteration in range(1, MAX_ITERATIONS + 1):
         for k in range(contacts):
             for i in range(n):  # an assignment of arrays takes seconds to compile
-                surface[k, i] = gap[k, i]
+                surface[k, i] = gap[k, i] - lowest[k]
             widest = displace(k, own, table, unit, lengths, line_load, work, surface, steps)
             if widest > HIGHEST:
                 return TOO_FINE, iteration
@@ -310,6 +325,8 @@ def solve_slender(
         )
         if status == CONVERGED:
             fill_half_lengths(spacing, line_load, lengths, half_length)
+            for k in range(contacts):
+                approach[k] += lowest[k]
         if status != GOING_ON:
             return status, iteration
     return NO_CONVERGENCE, MAX_ITERATIONS

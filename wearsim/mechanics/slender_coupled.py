@@ -26,6 +26,7 @@ from wearsim.mechanics.slender import (
     NO_CONVERGENCE,
     SINGULAR,
     TOO_FINE,
+    least_gap,
     log_scale_of,
     settle,
     start_contact,
@@ -98,15 +99,17 @@ def solve_coupled(
     response, lift = np.empty((contacts, n, n)), np.empty((contacts, n))
     steps, depths = new_steps(contacts, n), new_depths(members, n)
     log_scale = log_scale_of(contact_modulus, longitudinal_curvature, spacing)
-    lengths = new_lengths(contacts, bend, log_scale, NEWTON_REACH)
+    lengths, lowest = new_lengths(contacts, bend, log_scale, NEWTON_REACH), np.empty(contacts)
     for k in range(contacts):
         for i in range(n):
             surface[k, i] = own[k, i] + shared[k, 0, i] + shared[k, 1, i]
         start_contact(k, gap, surface, contact_modulus, loads[k], spacing, line_load, approach)
+        lowest[k] = least_gap(k, gap)
+        approach[k] -= lowest[k]
     for iteration in range(1, MAX_ITERATIONS + 1):
         for k in range(contacts):
             for i in range(n):
-                surface[k, i] = gap[k, i]
+                surface[k, i] = gap[k, i] - lowest[k]
         add_depths(members, shared, line_load, surface)
         renewed = False
         for k in range(contacts):
@@ -135,6 +138,8 @@ def solve_coupled(
         )
         if status == CONVERGED:
             fill_half_lengths(spacing, line_load, lengths, half_length)
+            for k in range(contacts):
+                approach[k] += lowest[k]
         if status != GOING_ON:
             return status, iteration
     return NO_CONVERGENCE, MAX_ITERATIONS
