@@ -89,6 +89,30 @@ def test_that_one_model_is_measured_where_models_are(command, monkeypatch):
     assert "sampling does not measure contact models" in wrong.stderr
 
 
+@pytest.mark.usefixtures("quick_topics")
+def test_that_what_stands_in_the_way_is_told_before_anything_is_measured(command, tmp_path):
+    (tmp_path / "taken").write_text("")
+    told = command("bench", "growth", "-q", "-o", "taken")
+    assert told.exit_code == 2
+    assert "taken is a file; name a folder" in " ".join(told.stderr.split())
+    (tmp_path / "bench" / "growth.png").mkdir(parents=True)
+    told = command("bench", "growth", "-q", "--force")
+    assert told.exit_code == 2
+    assert "growth.png is a folder" in " ".join(told.stderr.split())
+
+
+@pytest.mark.usefixtures("quick_topics")
+def test_that_what_was_finished_is_kept_when_the_rest_is_not(command, monkeypatch, tmp_path):
+    def interrupted(effort, tell):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(stepping, "stepping", interrupted)
+    told = command("bench", "growth", "stepping", "-q")
+    assert told.exit_code == 130
+    assert "written: bench/growth.png" in told.stderr
+    assert {path.stem for path in (tmp_path / "bench").iterdir()} == {"growth"}
+
+
 @pytest.mark.parametrize(("value", "code"), [(1e-12, 0), (1e-2, 1)])
 def test_that_hard_cases_are_judged_and_tell_by_the_exit_code(
     command, monkeypatch, tmp_path, value, code

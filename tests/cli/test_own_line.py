@@ -35,7 +35,9 @@ def test_that_single_passes_have_no_error_of_steps(command, scenario):
 
 def test_that_one_contact_tells_what_its_strips_leave(command, scenario):
     line = last_line(command("contact", scenario))
-    error = float(re.match(r"slender, 121 strips; power within ([\d.e-]+) % as half", line)[1])
+    error = float(
+        re.match(r"slender, 121 strips; by its strips power within ([\d.e-]+) %", line)[1]
+    )
     told = json.loads(command("contact", scenario, "--json").stdout)
     assert 100.0 * told["power_error_W"] / told["power_W"] == pytest.approx(error, rel=0.05)
     fine = json.loads(command("contact", scenario, "--json", "--set", "contact.strips=961").stdout)

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from wearsim.bench.machine import Machine
-from wearsim.bench.measured import Measurement, Topic
+from wearsim.bench.measured import Effort, Measurement, Topic
+from wearsim.report import bench_table
 from wearsim.report.bench import bench_figure
 from wearsim.report.bench_table import chosen, counted, heads, lines, markdown, percent
 from wearsim.report.saving import save_figure
@@ -30,7 +31,11 @@ def topic():
     return Topic("contact", "One contact", "About.", "one contact", "power", errors, counts, items)
 
 
-def test_that_a_table_holds_the_front_the_default_and_the_best_of_every_method(topic):
+def test_that_a_long_table_holds_the_front_the_default_and_the_best_of_every_method(
+    topic, monkeypatch
+):
+    assert len(chosen(topic, "hard cases")) == 5
+    monkeypatch.setattr(bench_table, "FEW", 4)
     names = [(item.method, item.setting) for item in chosen(topic, "hard cases")]
     kept = [("strip", "21 strips"), ("strip", "81 strips"), ("march", "81 strips")]
     assert names == [*kept, ("parabola", "81 strips")]
@@ -38,21 +43,25 @@ def test_that_a_table_holds_the_front_the_default_and_the_best_of_every_method(t
 
 
 def test_that_lines_tell_times_errors_counts_and_marks(topic):
-    first, second, third, failed = lines(topic, "hard cases", MACHINE.yardstick)
-    told = ("strip", "21 strips", "10 us", "0.1", "1.0 %", "3", "2 us", "front")
+    first, second, third, _, failed = lines(topic, "hard cases", MACHINE.yardstick)
+    told = ("strip", "21 strips", "10 us", "0.1", "1.0 %", "3", "2 us", "*")
     assert first.cells == told
-    assert second.cells[-1] == "front, default"
+    assert second.cells[-1] == "* default"
     assert third.cells[-1] == ""
     assert failed.cells == ("parabola", "81 strips", *["-"] * 5, "no | parabola fits")
+    assert failed.failed
+    assert not first.failed
     assert all(len(line.cells) == len(heads(topic)) for line in (first, failed))
 
 
 def test_that_markdown_survives_what_a_message_holds(topic):
-    text = markdown(topic, MACHINE)
+    text = markdown(topic, MACHINE, Effort(quick=True, plugin="sponge"))
     rows = [line for line in text.splitlines() if line.startswith("|")]
-    assert len(rows) == 6
+    assert len(rows) == 7
     assert {line.replace(r"\|", "").count("|") for line in rows} == {9}
-    assert "one yardstick is 100 us" in text
+    assert "one yardstick is 100 us; best of 5; quick" in text
+    assert "contact model sponge." in text
+    assert "* none is better" in text
 
 
 @pytest.mark.parametrize(
@@ -79,7 +88,7 @@ def test_that_errors_are_percentages():
 
 
 def test_that_the_figure_shows_every_method_that_has_a_time(topic, tmp_path):
-    figure = bench_figure(topic, MACHINE)
+    figure = bench_figure(topic, MACHINE, Effort())
     labels = figure.axes[0].get_legend_handles_labels()[1]
     assert labels == ["strip", "march", "none is better", "the default"]
     x, y = figure.axes[0].lines[0].get_data()
@@ -92,5 +101,30 @@ def test_that_the_figure_shows_every_method_that_has_a_time(topic, tmp_path):
 def test_that_a_group_without_any_time_says_so():
     failed = Measurement("hard cases", "parabola", "81 strips", failed="none")
     topic = Topic("contact", "T", "", "one", "power", {"power": "p"}, {}, (failed,))
-    text = bench_figure(topic, MACHINE).axes[0].texts[0].get_text()
+    text = bench_figure(topic, MACHINE, Effort()).axes[0].texts[0].get_text()
     assert "nothing could be measured" in text
+
+
+def test_that_growth_is_drawn_against_what_grows():
+    items = tuple(
+        Measurement("strips", "slender", f"{n} strips", 1e-3 * n, {}, {"peak_bytes": 1e8 + n})
+        for n in (41, 81, 161)
+    )
+    counts = {"peak_bytes": "memory"}
+    topic = Topic("growth", "Growth", "", "one study", "depth", {"depth": "depth"}, counts, items)
+    axes = bench_figure(topic, MACHINE, Effort()).axes[0]
+    np.testing.assert_allclose(axes.lines[0].get_data(), [[41, 81, 161], [0.041, 0.081, 0.161]])
+    assert axes.lines[1].get_ydata()[0] == pytest.approx(0.1)
+    assert "*" not in lines(topic, "strips", 1e-4)[0].cells
+
+
+def test_that_savings_are_bars():
+    items = (
+        Measurement("full slip", "strip", "all slides", 1e-3, {"result": 0.0}, {"times": 2.5}),
+        Measurement("full slip", "strip", "part adheres", 2.5e-3, {"result": 0.0}),
+    )
+    heads = {"times": "times as fast"}
+    topic = Topic("savings", "S", "", "one call", "result", {"result": "result"}, heads, items)
+    axes = bench_figure(topic, MACHINE, Effort()).axes[0]
+    assert [bar.get_width() for bar in axes.patches] == [2.5]
+    assert axes.get_yticklabels()[0].get_text() == "full slip: strip, all slides"

@@ -15,6 +15,7 @@ from wearsim.cli.output import note, refuse_existing
 
 if TYPE_CHECKING:
     from wearsim.bench.measured import Effort, Tell, Topic
+    from wearsim.cli.bench_output import Output
 
 
 class Name(StrEnum):
@@ -74,6 +75,7 @@ def bench(
     endings = (".json", ".md", ".png")
     wanted = [output / (topic.value + ending) for topic in asked for ending in endings]
     wanted += [output / f"hard{ending}" for ending in endings[:2] if hard]
+    _refuse_places(output, wanted)
     for path in wanted:
         refuse_existing(path, force)
     from wearsim.bench.machine import this_machine
@@ -81,22 +83,38 @@ def bench(
     from wearsim.cli.bench_output import Output
 
     effort = Effort(quick, 1 if quick else 5, plugin)
-    machine = this_machine(effort.repetitions)
+    machine = this_machine()
     shown = Output(output, machine, effort, show_all, json)
     shown.begin()
-    for topic in asked:
-        with telling(topic.value, quiet) as tell:
-            found = _function(topic)(effort, tell)
-        shown.topic(found)
-    if hard:
-        from wearsim.bench.hard import hard as run_hard_cases
-
-        with telling("hard cases", quiet) as tell:
-            verdicts = run_hard_cases(effort, tell)
-        shown.hard(verdicts)
-    shown.end()
-    if hard and not all(verdict.holds for verdict in verdicts):
+    try:
+        for topic in asked:
+            with telling(topic.value, quiet) as tell:
+                found = _function(topic)(effort, tell)
+            shown.topic(found)
+        holds = not hard or _hard_cases_hold(effort, shown, quiet)
+    finally:
+        shown.end()  # what was finished is told, whatever became of the rest
+    if not holds:
         raise typer.Exit(1)
+
+
+def _hard_cases_hold(effort: Effort, shown: Output, quiet: bool) -> bool:
+    """Run the hard cases, show them, and return whether all are as they should be."""
+    from wearsim.bench.hard import hard as run_hard_cases
+
+    with telling("hard cases", quiet) as tell:
+        verdicts = run_hard_cases(effort, tell)
+    shown.hard(verdicts)
+    return all(verdict.holds for verdict in verdicts)
+
+
+def _refuse_places(folder: Path, wanted: list[Path]) -> None:
+    """Raise where a folder or a file stands in the way that --force does not take out of it."""
+    if folder.exists() and not folder.is_dir():
+        raise typer.BadParameter(f"{folder} is a file; name a folder", param_hint="-o")
+    for path in wanted:
+        if path.is_dir():
+            raise typer.BadParameter(f"{path} is a folder; name another", param_hint="-o")
 
 
 def _with_a_model(asked: list[Name], topics: list[Name] | None, plugin: str) -> list[Name]:

@@ -75,7 +75,7 @@ class Output:
 
     def hard(self, verdicts: tuple[Verdict, ...]) -> None:
         """Write what became of the hard cases."""
-        from wearsim.bench.hard import hard_markdown
+        from wearsim.report.bench_hard import hard_markdown
 
         holding = sum(verdict.holds for verdict in verdicts)
         cases = [verdict.as_json() for verdict in verdicts]

@@ -39,7 +39,7 @@ def contact_line(study: ContactStudy) -> str:
     used = [study.described_model, f"{study.grid.strips} strips"]
     error = []
     if study.grid_error is not None:
-        error.append(f"power within {_part(study.grid_error)} as half of them tell")
+        error.append(f"by its strips power within {_part(study.grid_error)}, from half as many")
     return _line(used, error, NOTHING if study.seconds is None else brief(study.seconds))
 
 
@@ -62,7 +62,7 @@ def ensemble_line(result: EnsembleResult) -> str:
         found = result.estimate("depth", -1, (0.95,))
         errors = [
             _within(name, item.half_width, item.value, SURE)
-            for name, item in (("mean depth", found.mean), ("its 95 %", found.quantiles[0][1]))
+            for name, item in (("mean depth", found.mean), ("95 % quantile", found.quantiles[0][1]))
         ]
     return _line(used, errors, lapse(raw.wall_seconds))
 
@@ -73,6 +73,8 @@ def _line(used: list[str], errors: list[str], time: str) -> str:
 
 def _within(name: str, error: float, value: float, how: str = "") -> str:
     """Return how far off a value may be, as a part of it, and how that is known."""
+    if value == error == 0.0:
+        return f"{name} is 0"
     if value == 0.0 or not math.isfinite(error):
         return f"{name} of unknown error"
     return f"{name} within {_part(abs(error / value))}{how}"

@@ -121,6 +121,8 @@ def as_json(result: Result) -> dict[str, Any]:
         "title": result.title,
         "model": result.model,
         "stepper": result.stepper,
+        "tolerance": result.raw.tolerance,
+        "strips": len(result.y),
         "finished": bool(result.finished),
         "steps": _int(result.steps),
         "rejected": _int(result.rejected),

@@ -240,7 +240,7 @@ def least_gap(k: int, gap: FloatArray) -> float:
     Displacements are counted from there: under a vanishing load they would be lost in the rounding
     of a deep groove.
     """
-    least = gap[k, 0]
+    least: float = gap[k, 0]
     for i in range(gap.shape[1]):
         least = min(least, gap[k, i])
     return least
