@@ -1,6 +1,6 @@
 # make demo    replay the 450-minute wear test: a summary, results and a figure in out/
 # make test    everything that must hold: style, types, layers, tests
-# make bench   measure speed beside error, and every model; writes out/benchmarks.md, out/models.md
+# make bench   a quarter of an hour: speed against error, hard cases; writes out/bench/, out/benchmarks.md, out/models.md
 # make bench-ensembles   a quarter of an hour: why persistence matters, what ensembles cost
 # make clean   remove what these made, the environment included
 
@@ -27,6 +27,7 @@ lint: $(VENV)/.installed-dev
 
 bench: $(VENV)/.installed-dev
 	mkdir -p out
+	-$(BIN)/wearsim bench contact stepping sampling growth savings --hard -o out/bench --force
 	$(BIN)/python -m tests.benchmarks.report -o out/benchmarks.md
 	$(BIN)/python -m tests.benchmarks.models -o out/models.md
 

@@ -69,8 +69,8 @@ def cost(quick: bool) -> list[Row]:
         (", 241 strips", scenario(quick, strips[241]), few, CPUS, ""),
         (", tolerance 1e-3", scenario(quick, tight), few, CPUS, ""),
         (", 20 records", scenario(quick, records), few, CPUS, ""),
-        ("", scenario(quick), many, CPUS, "2 min, aim 15 s"),
-        (", rollers alike, one contact", alike, many, CPUS, "2 min, aim 15 s"),
+        ("", scenario(quick), many, CPUS, "60 s, aim 15 s"),
+        (", rollers alike, one contact", alike, many, CPUS, "60 s, aim 15 s"),
     ]
     rows = []
     for words, made, count, workers, asked in cases:

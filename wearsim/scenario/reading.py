@@ -137,7 +137,11 @@ def parse_scenario(
         seed=top.seed,
         text=text,
         files=files,
-        notes=(*_notes(sections["roller"], sections["cylinder"], random), *report.notes),
+        notes=(
+            *_notes(sections["roller"], sections["cylinder"], random),
+            *_idle_sampling(data, random),
+            *report.notes,
+        ),
         random=random,
         _tables=put_all(data, report.means),
         **sections,
@@ -210,6 +214,15 @@ def check_lists(data: Mapping[str, Any], report: Report) -> None:
             got = f"{len(value)} values" if len(value) != 1 else "1 value"
             expected = f"{rollers}, as operation.rollers says"
             report.add(table, key, "a list has one value per roller", got, expected)
+
+
+def _idle_sampling(data: Mapping[str, Any], random: tuple[RandomInput, ...]) -> tuple[str, ...]:
+    """Return a note if draws are asked for where there is nothing to draw."""
+    given = data.get("sampling")
+    if random or not given:
+        return ()
+    keys = ", ".join(f"sampling.{key}" for key in given)
+    return (f"{keys} {'has' if len(given) == 1 else 'have'} no effect: no input is random",)
 
 
 def _notes(roller: Roller, cylinder: Cylinder, random: tuple[RandomInput, ...]) -> tuple[str, ...]:
