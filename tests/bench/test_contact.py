@@ -2,6 +2,7 @@
 
 import json
 import sys
+from dataclasses import replace
 from types import ModuleType, SimpleNamespace
 from typing import Literal, get_args
 
@@ -21,6 +22,7 @@ from wearsim.bench.contact_methods import HOST, Method, methods, normal_methods
 from wearsim.bench.exact import rows
 from wearsim.bench.measured import Effort
 from wearsim.errors import ContactError, PluginError
+from wearsim.models import slender
 from wearsim.models.tangential_options import TangentialOptions
 from wearsim.plugins import ContactModelSpec, manager, registry
 from wearsim.studies.tracks import fresh_patch, run_grid
@@ -168,6 +170,20 @@ def test_that_all_others_have_times_and_errors(topic):
 def test_that_the_models_that_start_from_a_solution_nearby_are_timed_so(topic):
     warm = {item.method for item in topic.measurements if "warm_seconds" in item.counts}
     assert warm == {"slender, strip", "slender, strip, half length local"}
+
+
+def test_that_a_warm_start_that_comes_to_something_else_has_failed(monkeypatch):
+    right = slender.Slender.solve
+
+    def elsewhere(self, gap, longitudinal_curvature, point, wear_compliance=None, warm=None):
+        if warm is not None:
+            point = replace(point, friction=1.01 * point.friction)
+        return right(self, gap, longitudinal_curvature, point, wear_compliance, warm)
+
+    monkeypatch.setattr(slender.Slender, "solve", elsewhere)
+    found = measure("draws", elliptic_cases("paper")[:1], Method("slender"), 41, 1)
+    assert "warm-started it comes to something else by 1.0e-02 in power" in found.failed
+    assert found.seconds is None
 
 
 def test_that_the_defaults_are_the_strips_of_a_run_and_of_a_contact(topic):

@@ -1,12 +1,15 @@
 """How time and memory grow: points in processes of their own, and the orders between them."""
 
+import math
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from wearsim.bench import growth as growth_module
 from wearsim.bench import growth_point
 from wearsim.bench.growth import growth, measured, measurements
 from wearsim.bench.growth_cases import QUICK, RIG, STRIPS, Point, points, same_groove
@@ -64,6 +67,20 @@ def test_that_a_model_which_is_not_there_is_told():
     assert "no-such" in measured(Work(RIG, {"contact.model": "no-such"}))
 
 
+def test_that_a_process_that_gives_no_answer_has_failed(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(growth_module, "POINT", "point_of_a_plugin")
+    for script in ("", "import sys; open(sys.argv[2], 'w').write('{')", "print('{}')"):
+        (tmp_path / "point_of_a_plugin.py").write_text(script)
+        assert measured(Work(RIG, {})).startswith("ended without an answer")
+
+
+def test_that_a_depth_that_is_no_number_has_failed():
+    (row,) = measurements([point(10)], [cost(1.0, depth=math.nan)], {"slender": 1.0})
+    assert row.failed == "its error 'depth' is nan, not finite"
+    assert not row.errors
+
+
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="peaks are read from /proc")
 def test_that_a_peak_is_that_of_the_process_alone():
     script = (
@@ -87,8 +104,12 @@ def test_that_the_peak_of_a_family_holds_its_children():
     command = [sys.executable, "-c", f"print(flush=True); {script}"]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as child:
         child.stdout.readline()
+        deadline = time.monotonic() + 30.0
         while family_peak_bytes(1) - alone < 100 * MEGABYTES:
             assert child.poll() is None
+            if time.monotonic() > deadline:
+                child.kill()  # or the test would wait for it for ever
+                pytest.fail("the child's memory is not seen")
         child.communicate(b"\n")
 
 

@@ -8,7 +8,7 @@ import pytest
 
 import wearsim.bench.hard as hard_module
 from wearsim.bench import hard_measures as measures
-from wearsim.bench.hard import hard, hard_markdown
+from wearsim.bench.hard import hard
 from wearsim.bench.hard_cases import HardCase, crown_radius_of, hard_cases
 from wearsim.bench.hard_files import profile, roughness
 from wearsim.bench.hard_judging import judged
@@ -16,6 +16,7 @@ from wearsim.bench.hard_runs import Plan, is_symmetric, mirror_image
 from wearsim.bench.hard_verdict import CHECKS, Check, Verdict
 from wearsim.bench.measured import Effort
 from wearsim.mechanics.hertz import hertz
+from wearsim.report.bench_hard import hard_markdown
 from wearsim.results import Result
 from wearsim.scenario.shipped import shipped_scenario
 from wearsim.studies.replay import run

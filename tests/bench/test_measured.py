@@ -1,7 +1,9 @@
 """What none beats, and the machine that a benchmark names."""
 
 import itertools
+import math
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -35,6 +37,32 @@ def test_that_what_has_no_time_or_no_such_error_is_on_no_front():
     other = Measurement("scenes", "method", "setting", 1.0, {"width": 0.0})
     failed = Measurement("scenes", "method", "setting", failed="no answer")
     assert pareto([untimed, other, failed], "power") == []
+
+
+@pytest.mark.parametrize("error", [math.nan, math.inf, -1e-3])
+def test_that_an_error_that_is_none_beats_nobody(error):
+    with pytest.raises(ValueError, match="its error 'power' is"):
+        measured(1.0, error)
+    told = Measurement("scenes", "method", "setting").found(1.0, {"power": error})
+    assert told.failed.startswith("its error 'power' is")
+    assert (told.seconds, told.errors) == (None, {})
+    assert pareto([told, measured(2.0, 0.1)], "power") == [measured(2.0, 0.1)]
+
+
+@pytest.mark.parametrize("seconds", [math.nan, -1.0])
+def test_that_a_time_that_is_none_is_refused(seconds):
+    with pytest.raises(ValueError, match="its time is"):
+        measured(seconds, 0.1)
+
+
+def test_that_none_is_better_than_the_truth_is_known():
+    coarse, fine, finest = (measured(*point) for point in ((1.0, 0.002), (2.0, 1e-3), (3.0, 0.0)))
+    assert pareto([finest, fine, coarse], "power", floor=0.003) == [coarse]
+    assert pareto([finest, fine, coarse], "power", floor=1e-3) == [coarse, fine]
+    topic = Topic("t", "T", "", "one", "power", {"power": "power"}, {}, (coarse, fine), 0.003)
+    told = topic.as_json()
+    assert told["floor"] == 0.003
+    assert [row["front"] for row in told["measurements"]] == [True, False]
 
 
 def test_that_a_topic_tells_what_is_on_its_fronts():

@@ -126,6 +126,16 @@ def test_that_intervals_hold_the_truth_as_often_as_they_say(rows):
     assert row.counts["held"] == pytest.approx(0.95, abs=0.05)
 
 
+def test_that_it_is_said_how_well_an_error_is_known(rows):
+    found = [row.counts for row in rows if (row.group, row.method) == (MEAN, "Monte Carlo")]
+    for counts in found:
+        # the mean of n squares of a normal error is known to sqrt(2/n), its root to half of that
+        assert counts["known"] == pytest.approx(np.sqrt(0.5 / counts["studies"]), rel=0.7)
+    assert [counts["studies"] for counts in found] == [
+        SIZE.replicates * SIZE.tests[-1] / tests for tests in SIZE.tests
+    ]
+
+
 def test_that_every_block_of_a_sobol_study_is_spread_as_evenly_as_the_first():
     sampler = Sampler(3, [("load.normal_force", 1)], "sobol", replicates=REPLICATES)
     uniform = sampler.uniforms(0, 512)["load.normal_force"][:, 0]

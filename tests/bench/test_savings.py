@@ -8,10 +8,17 @@ import pytest
 from wearsim.bench.contact_methods import Method
 from wearsim.bench.measured import Effort
 from wearsim.bench.savings import savings
-from wearsim.bench.savings_contacts import Rig, closed_forms, strips_outside
-from wearsim.bench.savings_pairs import Pair
+from wearsim.bench.savings_contacts import (
+    Rig,
+    closed_forms,
+    fields,
+    strips_outside,
+    uniform_friction,
+)
+from wearsim.bench.savings_pairs import Pair, Ways
 from wearsim.bench.savings_tests import APART, RIG, STEPPERS
 from wearsim.bench.stepping_tests import Ready, WearTest
+from wearsim.models.semi_hertzian import SemiHertzian
 from wearsim.plugins import ContactModelSpec, registry
 
 QUICK = Effort(quick=True, repetitions=1)
@@ -107,5 +114,19 @@ def test_that_a_way_that_fails_is_told():
     def lost():
         raise RuntimeError("no way")
 
-    (row,) = Pair("scenes", "method", {"short": lambda: np.ones(3), "long": lost}).measured(1)
+    ways = Ways({"short": lambda: np.ones(3), "long": lost})
+    (row,) = Pair("scenes", "method", lambda: ways).measured(1)
     assert row.failed == "raised RuntimeError: no way"
+    assert row.setting == "short"
+
+
+@pytest.mark.parametrize("kind", [strips_outside, fields, uniform_friction])
+def test_that_a_model_that_cannot_be_prepared_stops_no_other(kind, monkeypatch):
+    def mistaken(self, grid, materials):
+        raise TypeError("no grid")
+
+    monkeypatch.setattr(SemiHertzian, "prepare", mistaken)
+    for pair in kind():
+        told = {row.failed for row in pair.measured(1)}
+        wrong = pair.method.startswith("semi-hertzian")
+        assert told == {"raised TypeError: no grid" if wrong else ""}, pair.method

@@ -120,18 +120,20 @@ def test_that_a_model_without_compiled_passes_has_a_truth_that_passes_agree_with
 
 
 def test_that_the_truth_of_a_model_without_compiled_passes_is_converged():
-    test = bench("hertz")
-    _, converged = test.exact(SHORT.grid().strips)
+    long = WearTest(RIG, 45.0)
+    test = bench("hertz", long)
+    _, converged = test.exact(long.grid().strips)
     assert all(0.0 < error < 3e-6 for error in converged.own.values())
+    # nearer to it than it is to the truth none can be told to be
     assert converged.errors_of(converged.end) == converged.own
-    with_error = list(of_model(test, (1e-2,)))
-    assert with_error[0].errors["profile"] > converged.own["profile"]
+    (row,) = of_model(test, (1e-2,))
+    assert row.errors["profile"] > converged.own["profile"] == row.counts["truth"]
 
 
 def test_that_a_solver_that_asks_for_too_many_contacts_is_stopped():
     ready = Ready(SHORT.asked({}))
-    with pytest.raises(StepError, match="more than 20 contacts"):
-        solved_by("LSODA", ready.scene, ready.stop, 1e-6, most=20)
+    with pytest.raises(StepError, match="more than 5 contacts"):
+        solved_by("LSODA", ready.scene, ready.stop, 1e-6, most=5)
 
 
 def test_that_errors_are_parts_of_the_exact_ones():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -117,7 +117,11 @@ def hard_errors(model: ContactModel, least_ratio: float) -> PowerErrors:
 
 
 def _over(model: ContactModel, cases: Iterable[Case]) -> PowerErrors:
-    found = [errors_of(*solved(model, case), case) for case in cases]
+    return summed([errors_of(*solved(model, case), case) for case in cases])
+
+
+def summed(found: Sequence[CaseErrors]) -> PowerErrors:
+    """Return the errors over many contacts from those of each."""
     powers = [errors.power for errors in found]
     strips = float(np.median([errors.dissipation for errors in found]))
     return PowerErrors(rms(powers), float(np.abs(powers).max()), strips)

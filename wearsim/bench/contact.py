@@ -10,6 +10,7 @@ from itertools import groupby
 from wearsim.bench.contact_cases import Case, all_worn_cases, elliptic_cases
 from wearsim.bench.contact_measured import measure, why
 from wearsim.bench.contact_methods import Method, methods, normal_methods
+from wearsim.bench.exact import POWER_ERRORS, PURE_SPIN_ERROR, STRIPS_ERROR
 from wearsim.bench.measured import Effort, Measurement, Tell, Topic
 from wearsim.scenario.sections import DEFAULT_TOLERANCE
 from wearsim.studies.tracks import strips_over
@@ -33,11 +34,13 @@ COUNTS = {"warm_seconds": "warm-started", "prepare_seconds": "first prepared"}
 ABOUT = (
     "Time is that of one solve from nothing, the mean over a group's contacts, strips being"
     " prepared; warm-started it begins at the solution under 1 % less load. Errors are against"
-    " CONTACT's half-space solutions, whose own is 0.1 to 0.4 % in power, 0.3 % in P_l(y) and up to"
-    " 0.8 % in the hard cases; peak pressure and width of ellipses are against Hertz. P_l(y) is the"
-    " median of L2 over the strips. Strips span what the model suggests (1.2 times the patch, or"
-    " the patch itself), or 8 mm with worn profiles; marches take as many steps. The two defaults"
-    " are the strips of a run and of a single contact."
+    " CONTACT's half-space solutions, whose own is"
+    f" {100.0 * POWER_ERRORS[0]:g} to {100.0 * POWER_ERRORS[1]:g} % in power, up to"
+    f" {100.0 * PURE_SPIN_ERROR:g} % with pure spin, and {100.0 * STRIPS_ERROR:g} % in P_l(y),"
+    " nearer to which none counts as better; peak pressure and width of ellipses are against Hertz."
+    " P_l(y) is the median of L2 over the strips. Strips span what the model suggests (1.2 times"
+    " the patch, or the patch itself), or 8 mm with worn profiles; marches take as many steps. The"
+    " two defaults are the strips of a run and of a single contact."
 )
 _NUMBERS = re.compile(r"[-+.\d]+")  # in which failures that are the same differ
 _EVERY = 10  # of the cases are enough to show that all works
@@ -85,6 +88,7 @@ def contact(effort: Effort, tell: Tell) -> Topic:
         errors=ERRORS,
         counts=COUNTS,
         measurements=tuple(found),
+        floor=STRIPS_ERROR,
     )
 
 

@@ -10,6 +10,8 @@ import sys
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from wearsim.bench.growth_cases import QUICK, REALISATIONS, WORKERS, Point, Sizes, points, truth
 from wearsim.bench.growth_point import Cost, Work
@@ -18,6 +20,7 @@ from wearsim.bench.measured import Effort, Measurement, Tell, Topic
 from wearsim.studies.worker_process import ONE_THREAD
 
 LIMIT = 120.0  # s, that a point may take
+POINT = "wearsim.bench.growth_point"  # what the process of a point runs
 ABOUT = (
     "Whole studies from a scenario to a file, each in a fresh process, after a short one that does"
     " not count. Single tests are those of the rig: passes come with a wear factor that leaves the"
@@ -81,18 +84,23 @@ def measured(work: Work) -> Cost | str:
     """
     path = os.pathsep.join(part for part in sys.path if part)
     environment = {**os.environ, **ONE_THREAD, "PYTHONPATH": path}
-    command = [sys.executable, "-m", "wearsim.bench.growth_point", json.dumps(asdict(work))]
-    try:
-        done = subprocess.run(
-            command, env=environment, capture_output=True, text=True, timeout=LIMIT, check=False
-        )
-    except subprocess.TimeoutExpired:
-        return f"took longer than {LIMIT:g} s"
-    if done.returncode:
+    with TemporaryDirectory() as folder:
+        answer = Path(folder) / "cost.json"
+        command = [sys.executable, "-m", POINT, json.dumps(asdict(work)), str(answer)]
+        try:
+            done = subprocess.run(
+                command, env=environment, capture_output=True, text=True, timeout=LIMIT, check=False
+            )
+        except subprocess.TimeoutExpired:
+            return f"took longer than {LIMIT:g} s"
         last = (done.stderr.strip().splitlines() or ["nothing was said"])[-1]
-        return f"ended with exit code {done.returncode}: {last}"
-    answer = json.loads(done.stdout.splitlines()[-1])
-    return answer["failed"] if "failed" in answer else Cost(**answer)
+        if done.returncode:
+            return f"ended with exit code {done.returncode}: {last}"
+        try:
+            told = json.loads(answer.read_text(encoding="utf-8"))
+            return str(told["failed"]) if "failed" in told else Cost(**told)
+        except (OSError, ValueError, TypeError) as error:
+            return f"ended without an answer ({type(error).__name__}): {last}"
 
 
 def measurements(
@@ -125,7 +133,7 @@ def measurements(
             counts["order"] = math.log(cost.seconds / seconds) / math.log(point.size / size)
         before[line] = point.size, cost.seconds
         errors = errors_of(point, cost, true.get(point.model))
-        rows.append(replace(row, seconds=cost.seconds, errors=errors, counts=counts))
+        rows.append(row.found(cost.seconds, errors, counts))
     return rows
 
 

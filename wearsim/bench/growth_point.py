@@ -1,7 +1,8 @@
 """One point of the growth of costs, in a process of its own, whose peak of memory is then its own.
 
-``python -m wearsim.bench.growth_point WORK`` takes a `Work` as JSON and prints a `Cost` as JSON. A
-short test goes before, which is not counted, so that nothing is compiled or loaded while time runs.
+``python -m wearsim.bench.growth_point WORK FILE`` takes a `Work` as JSON and writes a `Cost` as
+JSON to a file, since a plugin may print what it likes. A short test goes before, which is not
+counted, so that nothing is compiled or loaded while time runs.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import json
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -174,4 +176,4 @@ def main(arguments: list[str], write: Callable[[str], Any]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:], sys.stdout.write)
+    main(sys.argv[1:], partial(Path(sys.argv[2]).write_text, encoding="utf-8"))

@@ -130,15 +130,17 @@ def sampling(effort: Effort, tell: Tell) -> Topic:
     found = dict(zip(jobs, all_done(jobs, tell), strict=True))
     seconds = {(item.plan, item.total): float(found[item]) for item in timings}
     studies = studies_of(size, found)
-    known = truths([study for some in studies.values() for study in some])
+    every = [study for some in studies.values() for study in some]
+    known = truths(every)
+    sizes = [len(study.depths) for study in every]
     return Topic(
         name="sampling",
         title="Ensembles of wear tests: every sampling plan",
-        about=_about(known),
+        about=_about(known, max(sizes) / sum(sizes)),
         seconds="one study, one core",
         error="error",
         errors={"error": "error, rms", "claimed": "95 % claimed"},
-        counts={"held": "intervals that hold it", "studies": "studies"},
+        counts={"held": "intervals that hold it", "studies": "studies", "known": "rms known to"},
         measurements=tuple(measurements(size, studies, known, seconds)),
     )
 
@@ -182,15 +184,9 @@ def measurements(
     for group, (plan, method), tests in product(GROUPS, METHODS.items(), size.tests):
         found = plan_error(_of_size(size, studies, plan, tests), plan, group, known[group])
         claimed = {"claimed": found.claimed} if math.isfinite(found.claimed) else {}
-        yield Measurement(
-            group=group,
-            method=method,
-            setting=f"n = {tests}",
-            seconds=seconds.get((plan, tests)),
-            errors={"error": found.rms, **claimed},
-            counts={"held": found.held, "studies": float(found.studies)},
-            default=plan == DEFAULT,
-        )
+        row = Measurement(group, method, f"n = {tests}", default=plan == DEFAULT)
+        counts = {"held": found.held, "studies": float(found.studies), "known": found.known}
+        yield row.found(seconds.get((plan, tests)), {"error": found.rms, **claimed}, counts)
 
 
 def _of_size(size: Size, studies: Studies, plan: EnsemblePlan, tests: int) -> Sequence[Study]:
@@ -201,7 +197,8 @@ def _of_size(size: Size, studies: Studies, plan: EnsemblePlan, tests: int) -> Se
     return [block for study in studies[base, size.tests[-1]] for block in study.blocks(tests)]
 
 
-def _about(known: Mapping[str, Truth]) -> str:
+def _about(known: Mapping[str, Truth], share: float) -> str:
+    """Return what errors are against, and the greatest share that one study has in it."""
     told = "; ".join(
         f"{group} {1e6 * truth.value:.4g} um to {truth.error / truth.value:.2%}"
         for group, truth in known.items()
@@ -210,5 +207,7 @@ def _about(known: Mapping[str, Truth]) -> str:
         "Whole tests of the rig with all that scatters, its rollers alike. Time is the processor"
         " time of one study in one process, from its scenario to the statistics in its file, taken"
         " once. Errors are the rms of many studies, relative to what all their tests together tell"
-        f" with the closed form as a control: {told} (standard errors)."
+        f" with the closed form as a control: {told} (standard errors). No study is more than"
+        f" {share:.1%} of those tests, and by no more does that lessen its error. `rms known to` is"
+        " the standard error of the rms relative to it."
     )

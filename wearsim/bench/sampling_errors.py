@@ -128,12 +128,16 @@ class PlanError:
     held : float
         Part of the studies whose interval holds the truth.
     studies : int
+    known : float
+        Standard error of `rms`, relative to it: that of the mean of the replicates' squares, since
+        studies of one replicate may share draws.
     """
 
     rms: float
     claimed: float
     held: float
     studies: int
+    known: float
 
 
 def plan_error(studies: Sequence[Study], plan: EnsemblePlan, group: str, truth: Truth) -> PlanError:
@@ -142,6 +146,7 @@ def plan_error(studies: Sequence[Study], plan: EnsemblePlan, group: str, truth: 
     Parameters
     ----------
     studies : sequence of Study
+        Of two replicates or more.
     plan : str
     group : str
         `MEAN` or `QUANTILE`.
@@ -156,4 +161,13 @@ def plan_error(studies: Sequence[Study], plan: EnsemblePlan, group: str, truth: 
         claimed=float(np.median(widths)),
         held=float(np.mean(held)),
         studies=len(found),
+        known=_known(studies, apart**2),
     )
+
+
+def _known(studies: Sequence[Study], squares: FloatArray) -> float:
+    """Return the standard error of the root of the mean of squares, relative to it."""
+    replicates = np.array([study.replicate for study in studies])
+    numbers = np.unique(replicates)
+    means = np.array([squares[replicates == number].mean() for number in numbers])
+    return float(0.5 * means.std(ddof=1) / np.sqrt(len(numbers)) / means.mean())

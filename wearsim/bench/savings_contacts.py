@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from wearsim.bench.contact_methods import HOST, Method, methods
-from wearsim.bench.savings_pairs import Pair
+from wearsim.bench.savings_pairs import Pair, Ways
 from wearsim.models.strip_grid import grid_about_hertz
 from wearsim.plugins import ContactModelSpec, registry
 from wearsim.scenario.shipped import shipped_scenario
@@ -92,15 +92,19 @@ def _marched(method: Method) -> Method | None:
 def closed_forms() -> Iterator[Pair]:
     """Yield every theory without spin, and with next to none, where no closed form holds."""
     for method in _theories():
-        rig = Rig(method)
-        none, some = (
-            _slipping(rig.point, rig.point.creepage.longitudinal, spin) for spin in (0.0, _SLIGHT)
-        )
-        ways = {
-            "no spin": rig.many("dissipation", none),
-            "next to none": rig.many("dissipation", some),
-        }
-        yield Pair("no spin", method.name, ways, _limit(method, some))
+        yield Pair("no spin", method.name, partial(_closed_form, method))
+
+
+def _closed_form(method: Method) -> Ways:
+    rig = Rig(method)
+    none, some = (
+        _slipping(rig.point, rig.point.creepage.longitudinal, spin) for spin in (0.0, _SLIGHT)
+    )
+    ways = {
+        "no spin": rig.many("dissipation", none),
+        "next to none": rig.many("dissipation", some),
+    }
+    return Ways(ways, _limit(method, some))
 
 
 def _limit(method: Method, point: OperatingPoint) -> Callable[[], FloatArray] | None:
@@ -117,16 +121,18 @@ def full_slip() -> Iterator[Pair]:
     """Yield every theory that marches where all slides, and where part of the contact adheres."""
     for method in _theories():
         fine = _marched(method)
-        if fine is None:
-            continue
-        rig = Rig(method)
-        partly = rig.point.creepage.longitudinal
-        slips = {"all slides": _SLIDING, "part adheres": partly}
-        ways = {
-            name: _relative(rig, Rig(fine), _slipping(rig.point, slip, _SPIN))
-            for name, slip in slips.items()
-        }
-        yield Pair("full slip", method.name, ways, lambda: np.ones(CONTACTS))
+        if fine is not None:
+            yield Pair("full slip", method.name, partial(_slides, method, fine))
+
+
+def _slides(method: Method, fine: Method) -> Ways:
+    rig = Rig(method)
+    slips = {"all slides": _SLIDING, "part adheres": rig.point.creepage.longitudinal}
+    ways = {
+        name: _relative(rig, Rig(fine), _slipping(rig.point, slip, _SPIN))
+        for name, slip in slips.items()
+    }
+    return Ways(ways, lambda: np.ones(CONTACTS))
 
 
 def _relative(rig: Rig, fine: Rig, point: OperatingPoint) -> Callable[[], FloatArray]:
@@ -138,16 +144,19 @@ def _relative(rig: Rig, fine: Rig, point: OperatingPoint) -> Callable[[], FloatA
 def uniform_friction() -> Iterator[Pair]:
     """Yield every model under one coefficient of friction, and under one at every point."""
     for method in _models():
-        if not method.spec.capabilities.local_friction:
-            continue
-        rig = Rig(method)
-        mu = np.full(_friction_shape(method, rig), rig.point.friction)
-        place = "strip" if mu.ndim == 1 else "point"
-        ways = {
-            "one": rig.many("dissipation", rig.point),
-            f"one per {place}": rig.many("dissipation", replace(rig.point, friction=mu)),
-        }
-        yield Pair("uniform friction", method.name, ways, _limit(method, rig.point))
+        if method.spec.capabilities.local_friction:
+            yield Pair("uniform friction", method.name, partial(_one_friction, method))
+
+
+def _one_friction(method: Method) -> Ways:
+    rig = Rig(method)
+    mu = np.full(_friction_shape(method, rig), rig.point.friction)
+    place = "strip" if mu.ndim == 1 else "point"
+    ways = {
+        "one": rig.many("dissipation", rig.point),
+        f"one per {place}": rig.many("dissipation", replace(rig.point, friction=mu)),
+    }
+    return Ways(ways, _limit(method, rig.point))
 
 
 def _friction_shape(method: Method, rig: Rig) -> tuple[int, ...]:
@@ -159,22 +168,30 @@ def _friction_shape(method: Method, rig: Rig) -> tuple[int, ...]:
 def strips_outside() -> Iterator[Pair]:
     """Yield every model with strips outside the contact, without them, and with all in contact."""
     for method in _models():
-        wide, alone, fine = Rig(method, wide=TIMES), Rig(method), Rig(method, fine=TIMES)
-        ways = {
-            f"{TIMES} x as many, outside": wide.many("power", wide.point),
-            "strips about the patch": alone.many("power", alone.point),
-            f"{TIMES} x as many, finer": fine.many("power", fine.point),
-        }
-        yield Pair("strips outside", method.name, ways)
+        yield Pair("strips outside", method.name, partial(_outside, method))
+
+
+def _outside(method: Method) -> Ways:
+    wide, alone, fine = Rig(method, wide=TIMES), Rig(method), Rig(method, fine=TIMES)
+    ways = {
+        f"{TIMES} x as many, outside": wide.many("power", wide.point),
+        "strips about the patch": alone.many("power", alone.point),
+        f"{TIMES} x as many, finer": fine.many("power", fine.point),
+    }
+    return Ways(ways)
 
 
 def fields() -> Iterator[Pair]:
     """Yield every model that knows the inside of a contact, asked for it and not."""
     for method in _models():
         if method.spec.capabilities.fields:
-            rig = Rig(method)
-            ways = {
-                "strips": partial(rig.dissipation, rig.point),
-                "fields too": partial(rig.with_fields, rig.point),
-            }
-            yield Pair("fields", method.name, ways)
+            yield Pair("fields", method.name, partial(_inside, method))
+
+
+def _inside(method: Method) -> Ways:
+    rig = Rig(method)
+    ways = {
+        "strips": partial(rig.dissipation, rig.point),
+        "fields too": partial(rig.with_fields, rig.point),
+    }
+    return Ways(ways)

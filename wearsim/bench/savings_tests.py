@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from wearsim.bench.savings_pairs import Pair
+from wearsim.bench.savings_pairs import Pair, Ways
 from wearsim.bench.stepping_tests import Ready, WearTest
 from wearsim.randomness.sampler import Sampler
 from wearsim.scenario import Scenario
@@ -34,14 +34,17 @@ _WEAR = {
 def alike_rollers(quick: bool) -> Iterator[Pair]:
     """Yield every stepper with three rollers merged into one, and with the same three apart."""
     for stepper in STEPPERS:
-        test = WearTest(RIG, QUICK_MINUTES if quick else MINUTES)
-        changes: dict[str, object] = {"evolution.stepper": stepper}
-        merged, apart = (
-            _profile(Ready(test.asked({**changes, **further})))
-            for further in ({}, {"roller.offset": APART})
-        )
-        ways = {"merged": merged, "each by itself": apart}
-        yield Pair("alike rollers", stepper, ways)
+        yield Pair("alike rollers", stepper, partial(_rollers, quick, stepper))
+
+
+def _rollers(quick: bool, stepper: str) -> Ways:
+    test = WearTest(RIG, QUICK_MINUTES if quick else MINUTES)
+    changes: dict[str, object] = {"evolution.stepper": stepper}
+    merged, apart = (
+        _profile(Ready(test.asked({**changes, **further})))
+        for further in ({}, {"roller.offset": APART})
+    )
+    return Ways({"merged": merged, "each by itself": apart})
 
 
 def _profile(ready: Ready) -> Callable[[], FloatArray]:
@@ -59,7 +62,7 @@ def records(quick: bool) -> Iterator[Pair]:
         "at the end": partial(_recorded, test.asked({"outputs": {"records": 1}})),
         f"{RECORDS} times": partial(_recorded, test.asked({"outputs": {"records": RECORDS}})),
     }
-    yield Pair("records", "one test", ways)
+    yield Pair("records", "one test", lambda: Ways(ways))
 
 
 def _recorded(scenario: Scenario) -> FloatArray:
@@ -75,7 +78,7 @@ def idle_inputs(quick: bool) -> Iterator[Pair]:
         "not drawn": partial(_drawn, scenario, count),
         "drawn too": partial(_all_drawn, scenario, count),
     }
-    yield Pair("idle inputs", f"{count} draws", ways)
+    yield Pair("idle inputs", f"{count} draws", lambda: Ways(ways))
 
 
 def _drawn(scenario: Scenario, count: int) -> FloatArray:

@@ -30,10 +30,10 @@ ABOUT = (
     f" LSODA of scipy's at a tolerance of {CONVERGED:g} with the same contact model. `truth known"
     " to` is then its own error in the profile: how far it is from BDF at that tolerance or from"
     " itself ten times as loose; an error below it is given as that. Strips are held against twice"
-    " as many as there are by default, and their errors hold those of stepping too. Tolerances of"
-    " wearsim's steppers are of the whole test, those of BDF and LSODA of each of their steps: equal"
-    " numbers are not equal errors. Both are given the wear per pass of the same contacts and its"
-    " Jacobian by differences, which LSODA asks for only while it finds the test stiff, and"
+    " as many as there are by default, and their errors hold those of stepping too. A tolerance"
+    " of wearsim's steppers is of the whole test, one of BDF and LSODA of each of their steps: the"
+    " same number is not the same error. Both are given the wear per pass of the same contacts and"
+    " its Jacobian by differences, which LSODA asks for only while it finds the test stiff, and"
     f" {MOST_SOLVES} contact solves at most. A way that takes more than a second is timed once."
 )
 

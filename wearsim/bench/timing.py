@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TypeVar
 
 T = TypeVar("T")
@@ -42,6 +42,24 @@ def least(function: Callable[[], T], repetitions: int) -> tuple[T, float]:
 
 def best_short(function: Callable[[], object], repetitions: int) -> float:
     """Return the least mean wall time [s] of a function too short to be timed by itself."""
+    return best_of({"": function}, repetitions)[""]
+
+
+def best_of(functions: Mapping[str, Callable[[], object]], repetitions: int) -> dict[str, float]:
+    """Return the least mean wall times [s] of several functions, however short, by name.
+
+    They are timed in rounds: a disturbance then spoils one of each. Each is called once before.
+    """
+    many = {name: _as_long_as_counts(function) for name, function in functions.items()}
+    rounds = [
+        {name: timed(call) / calls for name, (call, calls) in many.items()}
+        for _ in range(repetitions)
+    ]
+    return {name: min(found[name] for found in rounds) for name in functions}
+
+
+def _as_long_as_counts(function: Callable[[], object]) -> tuple[Callable[[], None], int]:
+    """Return what calls a function so often that it can be timed, and how often that is."""
     function()
     calls = max(1, int(_LEAST / max(timed(function), 1e-7)))
 
@@ -49,4 +67,4 @@ def best_short(function: Callable[[], object], repetitions: int) -> float:
         for _ in range(calls):
             function()
 
-    return min(timed(many) for _ in range(repetitions)) / calls
+    return many, calls

@@ -76,11 +76,13 @@ class Output:
     def hard(self, verdicts: tuple[Verdict, ...]) -> None:
         """Write what became of the hard cases."""
         from wearsim.report.bench_hard import hard_markdown
+        from wearsim.report.bench_table import measured_on
 
         holding = sum(verdict.holds for verdict in verdicts)
         cases = [verdict.as_json() for verdict in verdicts]
         self._keep("hard", {"holding": holding, "cases": cases})
-        self._text("hard.md", hard_markdown(verdicts))
+        about = measured_on(self.machine, self.effort)
+        self._text("hard.md", f"{about}\n\n{hard_markdown(verdicts)}")
         if not self.as_json:
             title = f"Hard cases: {holding} of {len(verdicts)} hold; numbers are the largest found"
             told = [_told(verdict) for verdict in verdicts]

@@ -19,6 +19,11 @@ CREEPAGES = {
     "combined": (4e-4, 5e-4, 0.05),
 }
 
+#: errors of the data, relative, as `data/README.md` has them: of the strips' P_l(y), of the power
+STRIPS_ERROR = 3e-3
+POWER_ERRORS = (1e-3, 4e-3)
+PURE_SPIN_ERROR = 8e-3  # at most, of the hard cases
+
 
 @cache
 def table(name: str) -> dict[str, Any]:
