@@ -22,7 +22,7 @@ _WORDS = ("setting",)
 _NAMED = 2  # columns of words before the numbers
 _NAMES = 24  # letters that names have room for before all else
 _NUMBER = 12  # letters of a column of numbers, with what parts it from the next
-_FIXED = _NAMES + 2 + 17 + 11  # letters of names, settings and marks
+_FIXED = _NAMES + 2 + 19 + 17  # letters of names, settings and marks
 _WIDE = 150  # columns of text, for tables that go into a file or a pipe
 _SHOWN = ("volume", "load", "oscillation", "steps", "strips", "mirror")  # checks of a hard case
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+from itertools import cycle
 from math import ceil
+from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -13,7 +15,7 @@ from wearsim.report.style import BLUE, GREEN, ORANGE, figure_style, name_axes
 
 _NUMBER = re.compile(r"\d[\d.]*(?:e[+-]?\d+)?")
 _ACROSS, _PANEL = 3, (4.2, 3.4)  # panels side by side, and the size of one [in]
-_BAR, _WIDTH = 0.22, 9.0  # in
+_BAR, _WIDTH = 0.22, 12.0  # in
 
 
 def growth_figure(topic: Topic, under: str) -> Figure:
@@ -40,12 +42,17 @@ def growth_figure(topic: Topic, under: str) -> Figure:
 
 
 def _draw_growth(axes: Axes, items: list[Measurement], group: str) -> None:
-    """Draw time and memory against what grows."""
-    timed = [item for item in items if item.seconds is not None]
-    sizes = [_size(item) for item in timed]
-    axes.plot(sizes, [i.seconds or 0.0 for i in timed], "o-", color=BLUE, ms=4, label="time [s]")
-    memory = [item.counts.get("peak_bytes", float("nan")) / 1e9 for item in timed]
-    axes.plot(sizes, memory, "s--", color=ORANGE, ms=4, label="memory [GB]")
+    """Draw time and memory against what grows, for each method."""
+    methods = list(dict.fromkeys(item.method for item in items))
+    for method, marker in zip(methods, cycle("osD^v"), strict=False):
+        timed = [item for item in items if item.method == method and item.seconds is not None]
+        sizes = [_size(item) for item in timed]
+        name = f"{method}: " if len(methods) > 1 else ""
+        look: dict[str, Any] = {"marker": marker, "ms": 4}
+        seconds = [item.seconds or 0.0 for item in timed]
+        axes.plot(sizes, seconds, color=BLUE, label=f"{name}time [s]", **look)
+        memory = [item.counts.get("peak_bytes", float("nan")) / 1e9 for item in timed]
+        axes.plot(sizes, memory, ls="--", color=ORANGE, label=f"{name}memory [GB]", **look)
     axes.set_xscale("log")
     axes.set_yscale("log")
     name_axes(axes, group, group, "")
