@@ -102,7 +102,7 @@ class Plan:
 
     def _coarsest_step(self, case: HardCase) -> int:
         """Return the passes of the coarsest step, which must be halved twice."""
-        return max(case.passes(self.passes) // self.steps, 4)
+        return max(case.passes(self.passes) // (self.steps * case.steps), 4)
 
 
 def mirror_image(scenario: Scenario) -> Scenario:

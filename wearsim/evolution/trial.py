@@ -9,7 +9,7 @@ from wearsim.errors import ContactError, StepError
 from wearsim.evolution.control import StepControl
 from wearsim.evolution.stepper import fitted
 
-SMALLEST_STEP = 1e-3  # passes
+SMALLEST_STEP = 1e-6  # passes; a whole groove may be worn in ten
 _SMALLEST_PART = 1e-8  # of the passes done: with shorter steps a test would never end
 
 
