@@ -94,7 +94,8 @@ def test_that_a_peak_is_that_of_the_process_alone():
     told = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     before, after = (int(word) for word in told.split())
     assert before < 200 * MEGABYTES
-    assert 200 * MEGABYTES <= after - before < 210 * MEGABYTES
+    # what was freed before is filled again first
+    assert 190 * MEGABYTES < after - before < 210 * MEGABYTES
 
 
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="peaks are read from /proc")
