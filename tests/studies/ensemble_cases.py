@@ -30,7 +30,7 @@ def small(**changes: object) -> Scenario:
 
 def frail(**changes: object) -> Scenario:
     """Return tests of which a part fails: they may take no more steps than most of them need."""
-    return small(evolution__max_steps=12, **changes)
+    return small(evolution__max_steps=14, **changes)
 
 
 def contents(path: Path | EnsembleResult) -> dict[str, bytes]:
