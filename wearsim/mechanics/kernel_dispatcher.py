@@ -53,6 +53,11 @@ class Whole(CPUDispatcher):
 class Part(CPUDispatcher):
     """A kernel as other kernels call it: LLVM's code, to become a piece of theirs."""
 
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """Return how it is called: a number written into a call is no type of its own."""
+        plain = tuple(types.unliteral(arg) for arg in args)
+        return super().get_call_template(plain, {k: types.unliteral(v) for k, v in kws.items()})
+
     def add_overload(self, cres: Any) -> None:
         """Take in what was compiled; without machine code, a bare object stands for its address."""
         place = object()
