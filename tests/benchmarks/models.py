@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -33,6 +33,7 @@ from wearsim.bench.machine import this_machine
 from wearsim.bench.timing import best_short, timed
 from wearsim.errors import WearsimError
 from wearsim.plugins.template import template_folder
+from wearsim.report.bench_table import markdown_table
 from wearsim.report.units import brief
 
 #: what is drawn or prescribed, by contact model and options
@@ -76,7 +77,7 @@ def drawn_table(repetitions: int) -> str:
         *("partial slip with spin: power, rms / worst", "P_l(y), L2"),
         *(f"hard cases, b/a >= {LONG:g}: power, rms / worst", "one contact, prepared and solved"),
     )
-    return table(head, lines)
+    return markdown_table(head, lines) + "\n"
 
 
 def _spread(errors: PowerErrors) -> str:
@@ -102,7 +103,7 @@ def worn_table() -> str:
         *("profile", "contact model", "line load, L1", "half-length, L1", "approach"),
         *("peak pressure", "P_l(y), L2: full sliding", "partial slip", "with spin"),
     )
-    return table(head, lines)
+    return markdown_table(head, lines) + "\n"
 
 
 def _worn_cells(errors: WornErrors) -> list[str]:
@@ -124,7 +125,7 @@ def whole_table(share: float) -> str:
         *("contact model", "depth", "width", "worn volume", "estimated error of depth"),
         *("stepper", "steps", "contact solves", "time"),
     )
-    return table(head, lines)
+    return markdown_table(head, lines) + "\n"
 
 
 def _whole_cells(name: str, options: dict[str, Any], share: float) -> list[str]:
@@ -146,12 +147,6 @@ def _whole_cells(name: str, options: dict[str, Any], share: float) -> list[str]:
         str(result.solves[-1]),
         brief(seconds),
     ]
-
-
-def table(head: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
-    """Return a Markdown table."""
-    rule = ["---"] * len(head)
-    return "".join(f"| {' | '.join(line)} |\n" for line in (head, rule, *lines))
 
 
 def report(tell: Callable[[str], object], share: float = 1.0, repetitions: int = 5) -> str:
