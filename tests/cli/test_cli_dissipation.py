@@ -6,13 +6,13 @@ import json
 import re
 import signal
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from cli_examples import SCENARIOS, Command
 
+from tests.interruptible import interruptible
 from wearsim.cli.counting import CountedLines
 from wearsim.cli.progress import Clock
 from wearsim.results import open_dissipation
@@ -146,7 +146,7 @@ def test_that_a_study_is_no_wear_test(command: Command, studied: Path) -> None:
 
 def test_that_a_signal_ends_a_study_that_keeps_what_is_done(tmp_path: Path) -> None:
     slow = ["--set", "contact.mx=400", "--set", "contact.my=400", "-n", "200000", "-o", "a.h5"]
-    arguments = [sys.executable, "-m", "wearsim", "dissipation", str(PAPER), *slow]
+    arguments = interruptible("-m", "wearsim", "dissipation", PAPER, *slow)
     with subprocess.Popen(arguments, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as running:
         assert running.stderr is not None
         for line in running.stderr:

@@ -7,7 +7,6 @@ import json
 import re
 import signal
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +15,7 @@ from cli_examples import SCENARIOS, Command
 from rich.console import Console
 
 import wearsim
+from tests.interruptible import interruptible
 from tests.report.made_up_ensembles import made_up
 from tests.studies.ensemble_cases import frail, small
 from wearsim.cli import ensemble_progress
@@ -343,7 +343,7 @@ def test_that_a_signal_ends_an_ensemble_that_goes_on_from_its_file(
     tests: Path, tmp_path: Path
 ) -> None:
     options = ["-n", "100000", "-o", "a.h5", "--workers", "1"]
-    arguments = [sys.executable, "-m", "wearsim", "ensemble", str(tests), *options]
+    arguments = interruptible("-m", "wearsim", "ensemble", tests, *options)
     with subprocess.Popen(arguments, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as running:
         assert running.stderr is not None
         for line in running.stderr:

@@ -3,12 +3,12 @@
 import json
 import signal
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 from cli_examples import SCENARIOS, Command
 
+from tests.interruptible import interruptible
 from wearsim.errors import Interrupted
 from wearsim.results import open_results
 from wearsim.studies import replay
@@ -97,7 +97,7 @@ def test_that_a_signal_stops_a_run_at_a_checkpoint_that_resume_finishes(
     command: Command, scenario: Path, tmp_path: Path, number: signal.Signals
 ) -> None:
     per_pass = ["--set", "evolution.stepper=per-pass", "--set", "operation.duration=600 min"]
-    arguments = [sys.executable, "-m", "wearsim", "run", str(scenario), *per_pass]
+    arguments = interruptible("-m", "wearsim", "run", scenario, *per_pass)
     with subprocess.Popen(arguments, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as running:
         assert running.stderr is not None
         for line in running.stderr:
@@ -123,13 +123,13 @@ def test_that_a_second_signal_ends_a_run_at_once(tmp_path: Path) -> None:
         "    os.kill(os.getpid(), signal.SIGINT)\n"
         "    assert stop.requested()\n    print('asked', flush=True)\n    time.sleep(60)\n"
     )
-    arguments = [sys.executable, "-c", code]
+    arguments = interruptible("-c", code)
     quiet = {"stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
     with subprocess.Popen(arguments, **quiet) as running:
         assert running.stdout is not None
         assert running.stdout.readline() == b"asked\n"
         running.send_signal(signal.SIGINT)
-        assert running.wait(timeout=30) == -signal.SIGINT
+        assert running.wait() == -signal.SIGINT
 
 
 def test_that_signals_are_given_back_after_a_run(command: Command, scenario: Path) -> None:
