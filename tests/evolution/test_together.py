@@ -11,6 +11,7 @@ from wearsim.evolution.dividing import divided
 from wearsim.evolution.joining import alike, scene_of, state_of
 from wearsim.evolution.state import fresh_state
 from wearsim.evolution.together import Together, can_go_together
+from wearsim.models.slender import Slender
 from wearsim.scenario import load_scenario
 from wearsim.studies.build import build_scene, prepared_model
 
@@ -131,39 +132,43 @@ def test_that_a_test_is_given_up_after_its_own_steps():
     assert all(f"{most} steps have reached pass" in str(one) for one in failed)
 
 
-def test_that_nothing_is_solved_one_by_one_where_nothing_fails(monkeypatch):
+class Recording(Slender):
+    """A prepared model that keeps the sizes of the batches that it is handed."""
+
+    def __init__(self, model):
+        vars(self).update(vars(model))
+        self.sizes = []
+
+    def solve_batch(self, gap, *args, **kwargs):
+        self.sizes.append(gap.shape[2])
+        return super().solve_batch(gap, *args, **kwargs)
+
+
+@pytest.fixture
+def recorded():
+    """Scenes of a recording model, their stepper and length, and the sizes of its batches."""
     scenes, stepper, stop = scenes_of({})
-    model, calls = scenes[0].model, []
-    solve_batch = type(model).solve_batch
+    model = Recording(scenes[0].model)
+    return [replace(scene, model=model) for scene in scenes], stepper, stop, model.sizes
 
-    def counted(self, gap, *args, **kwargs):
-        calls.append(gap.shape[2])
-        return solve_batch(self, gap, *args, **kwargs)
 
-    monkeypatch.setattr(type(model), "solve_batch", counted)
+def test_tests_that_do_not_fail_are_solved_in_one_batch(recorded):
+    scenes, stepper, stop, sizes = recorded
     ends = ends_of(scenes, stepper, stop)
-    assert max(calls) == len(scenes)
+    assert max(sizes) == len(scenes)
     # a step, its halves and the whole, each begins with all that are under way
-    assert calls.count(len(scenes)) >= 3 * min(steps for _, steps, _ in ends)
-    assert len(calls) < sum(steps for _, steps, _ in ends) * 3
+    assert sizes.count(len(scenes)) >= 3 * min(steps for _, steps, _ in ends)
+    assert len(sizes) < sum(steps for _, steps, _ in ends) * 3
 
 
-def test_that_settled_realisations_are_not_solved_again(monkeypatch):
-    scenes, stepper, stop = scenes_of({})
-    model, calls = scenes[0].model, []
-    solve_batch = type(model).solve_batch
-
-    def counted(self, gap, *args, **kwargs):
-        calls.append(gap.shape[2])
-        return solve_batch(self, gap, *args, **kwargs)
-
-    monkeypatch.setattr(type(model), "solve_batch", counted)
+def test_settled_realisations_are_not_solved_again(recorded):
+    scenes, stepper, stop, sizes = recorded
     ends_of(scenes, stepper, stop)
-    together = sum(calls)
-    calls.clear()
+    together = sum(sizes)
+    sizes.clear()
     for scene in scenes:
         ends_of([scene], stepper, stop)
-    assert together == sum(calls)
+    assert together == sum(sizes)
 
 
 def test_that_a_plain_test_can_go_together():
