@@ -3,7 +3,6 @@
 import math
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -95,23 +94,20 @@ def test_that_a_peak_is_that_of_the_process_alone():
     before, after = (int(word) for word in told.split())
     assert before < 200 * MEGABYTES
     # what was freed before is filled again first
-    assert 190 * MEGABYTES < after - before < 210 * MEGABYTES
+    assert 150 * MEGABYTES < after - before < 250 * MEGABYTES
 
 
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="peaks are read from /proc")
 def test_that_the_peak_of_a_family_holds_its_children():
     alone = family_peak_bytes(1)
-    script = "import numpy as np; held = np.ones(100_000_000, dtype=np.int8); input()"
-    command = [sys.executable, "-c", f"print(flush=True); {script}"]
+    held = "held = np.ones(100_000_000, dtype=np.int8)"
+    script = f"import numpy as np; {held}; print(flush=True); input()"
+    command = [sys.executable, "-c", script]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as child:
         child.stdout.readline()
-        deadline = time.monotonic() + 30.0
-        while family_peak_bytes(1) - alone < 100 * MEGABYTES:
-            assert child.poll() is None
-            if time.monotonic() > deadline:
-                child.kill()  # or the test would wait for it for ever
-                pytest.fail("the child's memory is not seen")
+        together = family_peak_bytes(1)
         child.communicate(b"\n")
+    assert together - alone > 80 * MEGABYTES
 
 
 def test_that_any_number_of_passes_leaves_the_same_groove():
@@ -136,6 +132,7 @@ def test_that_a_plugin_is_measured_beside_the_default(monkeypatch):
     assert found.depth > 0.0
 
 
+@pytest.mark.slow
 def test_that_all_that_grows_is_measured():
     told = []
     topic = growth(Effort(quick=True, repetitions=1), lambda what, part: told.append(part))
