@@ -137,7 +137,8 @@ def test_that_what_is_known_is_met(law: Law, request: pytest.FixtureRequest) -> 
     if mean is not None:
         assert law.mean == pytest.approx(mean, abs=1e-12 * law.std)
     if std is not None:
-        assert law.std == pytest.approx(std, rel=1e-11)
+        # nearly uniform, a law's width hangs on the last digits of its multipliers
+        assert law.std == pytest.approx(std, rel=1e-10)
     if mean_log is not None:
         values = law.quantile((np.arange(200_000) + 0.5) / 200_000)
         assert np.log(values).mean() == pytest.approx(mean_log, abs=2e-5)
