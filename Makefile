@@ -1,5 +1,6 @@
 # make demo    replay the 450-minute wear test: a summary, results and a figure in out/
-# make test    everything that must hold: style, types, layers, tests
+# make test    what a change can break, in minutes: style, types, layers, tests
+# make test-slow   the other tests: kills at every write, hard cases, installs, Dask
 # make bench   a quarter of an hour: speed against error, hard cases; writes out/bench/, out/benchmarks.md, out/models.md
 # make bench-ensembles   a quarter of an hour: why persistence matters, what ensembles cost
 # make clean   remove what these made, the environment included
@@ -9,7 +10,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 JOBS ?= 2
 
-.PHONY: demo test lint bench bench-ensembles clean
+.PHONY: demo test test-slow lint bench bench-ensembles clean
 .DEFAULT_GOAL := demo
 
 demo: $(VENV)/.installed
@@ -18,7 +19,10 @@ demo: $(VENV)/.installed
 	$(BIN)/wearsim plot out/rig-450min.h5 -o out/rig-450min.png --force
 
 test: lint
-	$(BIN)/pytest -n $(JOBS) --dist worksteal
+	$(BIN)/pytest -n $(JOBS) --dist worksteal -m "not slow"
+
+test-slow: $(VENV)/.installed-dev
+	$(BIN)/pytest -n $(JOBS) --dist worksteal -m slow
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check

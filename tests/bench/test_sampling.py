@@ -162,6 +162,7 @@ def test_that_tests_are_those_of_an_ensemble(tmp_path):
     assert abs(mean - result.raw.control["mean"]) < 4.0 * error
 
 
+@pytest.mark.slow
 def test_that_every_plan_and_size_is_measured():
     told = []
     topic = sampling(Effort(quick=True, repetitions=1), lambda what, part: told.append(part))

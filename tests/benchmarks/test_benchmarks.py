@@ -49,6 +49,7 @@ def test_speed_of_the_papers_monte_carlo(benchmark):
     assert result.summaries["power"].mean == pytest.approx(studies.MEAN_POWER, rel=0.2)
 
 
+@pytest.mark.slow
 def test_that_the_in_process_rows_of_the_report_hold_numbers():
     functions = [
         *TABLES["One contact"],
@@ -68,6 +69,7 @@ def test_that_members_of_ensembles_are_held_against_single_passes():
     assert "nan" not in table.markdown("truth", rows)
 
 
+@pytest.mark.slow
 def test_that_the_spread_of_tests_is_told_by_how_long_draws_last(monkeypatch):
     monkeypatch.setattr(persistence, "SINGLE_PASSES", 200)
     monkeypatch.setattr(persistence, "SINGLE_TESTS", 3)

@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.slow  # an environment is made and installed into
+
 SCENARIO = Path(__file__).parents[2] / "scenarios" / "rig-450min.toml"
 
 

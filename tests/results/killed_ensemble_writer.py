@@ -68,10 +68,16 @@ def stages_of(work: Callable[[], None]) -> list[str]:
     return seen
 
 
-def kill_at_every_stage(kind: str, start: Path | None, work: Callable[[Path], None]) -> None:
-    """Kill the work on a copy of a file, or on none, at every stage, and say where and how."""
-    for at, name in enumerate(stages_of(lambda: work(whole))):
-        if name.startswith("before"):  # nothing is done between that and the "after" before it
+def kill_at_stages(kind: str, start: Path | None, work: Callable[[Path], None]) -> None:
+    """Kill the work on a copy of a file, or on none, and say where and how.
+
+    At every call of the seam, or at the first, the middle and the last of each stage.
+    """
+    stages = stages_of(lambda: work(whole))
+    for at, name in enumerate(stages):
+        calls = [number for number, stage in enumerate(stages) if stage == name]
+        chosen = every or at in {calls[0], calls[len(calls) // 2], calls[-1]}
+        if chosen and name.startswith("before"):  # after an "after" comes a "before" at once
             target = folder / f"{kind}-{at}.h5"
             if start:
                 shutil.copy(start, target)
@@ -80,10 +86,10 @@ def kill_at_every_stage(kind: str, start: Path | None, work: Callable[[Path], No
 
 
 if __name__ == "__main__":
-    folder = Path(sys.argv[1])
+    folder, every = Path(sys.argv[1]), sys.argv[2] == "all"
     fresh, whole = folder / "fresh.h5", folder / "whole.h5"
     create(fresh)
-    kill_at_every_stage("create", None, create)
+    kill_at_stages("create", None, create)
     writer._CHUNK = SMALL_CHUNK
-    kill_at_every_stage("rows", fresh, lambda path: go_on(path, BATCHES[:1]))
+    kill_at_stages("rows", fresh, lambda path: go_on(path, BATCHES[:1]))
     go_on(whole)

@@ -5,6 +5,7 @@ One process does all: it compiles and runs once, and forks for every ensemble th
 
 from __future__ import annotations
 
+import itertools
 import os
 import random
 import signal
@@ -12,7 +13,7 @@ import sys
 import time
 from pathlib import Path
 
-from killed_run import ended, forked, killing, stages_of, tell
+from killed_run import chosen_of, ended, forked, killing, stages_of, tell
 
 from tests.studies.ensemble_cases import small, unlike
 from wearsim.results import open_ensemble, writer
@@ -32,15 +33,25 @@ def go(scenario: Scenario, count: int, path: Path, scheduler: str = "serial") ->
     return done
 
 
-def kill_at_stages(scenario: Scenario, count: int, folder: Path) -> None:
-    """Kill an ensemble at every call of the seam, and every fifth once more as it goes on."""
+def kill_at_stages(scenario: Scenario, count: int, folder: Path, extent: str) -> None:
+    """Kill an ensemble at calls of the seam, all or a few per stage of each of its two writers.
+
+    Tells the names of all calls first. Every fifth is killed once more as it goes on.
+    """
     whole = ensemble(scenario, count, folder / "one.h5", scheduler="serial")
     stages = stages_of(lambda: go(scenario, count, folder / "whole.h5"))
-    for number, stage in enumerate(stages):
-        if stage == "after write":  # nothing happens between it and what comes before the next
+    tell(stages=stages)
+    created = stages.index("after fsync folder") + 1  # the rest is written in place
+    third = (len(stages) - created) // 3
+    bounds = [0, created, created + third, created + 2 * third, len(stages)]
+    numbers = []
+    for start, stop in itertools.pairwise(bounds):
+        numbers += [start + number for number in chosen_of(stages[start:stop], extent)]
+    for turn, number in enumerate(numbers):
+        if stages[number] == "after write":  # what comes next is killed before its own write
             continue
         path = folder / f"{number}.h5"
-        again = [7 * number % 30] if number % 5 == 0 else []
+        again = [7 * number % 30] if turn % 5 == 0 else []
         killed = []
         for at in (number, *again):
 
@@ -50,7 +61,7 @@ def kill_at_stages(scenario: Scenario, count: int, folder: Path) -> None:
 
             killed.append(ended(forked(work)))
         done = go(scenario, count, path)
-        tell(stage=stage, killed=killed, done=done, unlike=unlike(path, whole))
+        tell(number=number, killed=killed, done=done, unlike=unlike(path, whole))
 
 
 def kill_at_moments(scenario: Scenario, count: int, folder: Path, times: int) -> None:
@@ -76,6 +87,6 @@ if __name__ == "__main__":
     mode, where = sys.argv[1], Path(sys.argv[2])
     tests = small(passes=400, contact__strips=31)
     if mode == "stages":
-        kill_at_stages(tests, 2, where)
+        kill_at_stages(tests, 2, where, sys.argv[3])
     else:
         kill_at_moments(tests, 8, where, int(sys.argv[3]))

@@ -67,6 +67,11 @@ def stages_of(work: Callable[[], object]) -> list[str]:
     return seen
 
 
+def chosen_of(stages: list[str], extent: str) -> list[int]:
+    """Return the numbers of the calls of the seam at which to kill."""
+    return {"all": list(range(len(stages))), "each stage": one_of_each(stages)}[extent]
+
+
 def killing(at: int) -> Callable[[str], None]:
     """Return a seam that kills the process at one of its calls."""
     calls = iter(range(10**6))
@@ -78,14 +83,27 @@ def killing(at: int) -> Callable[[str], None]:
     return kill
 
 
-def kill_at_stages(scenario: Scenario, folder: Path) -> None:
-    """Kill a run at every call of the seam, and every fifth once more as it goes on."""
+def one_of_each(stages: list[str]) -> list[int]:
+    """Return the numbers of one call per stage: of the first, of the last, or of one between."""
+    chosen = []
+    for turn, name in enumerate(dict.fromkeys(stages)):
+        calls = [number for number, stage in enumerate(stages) if stage == name]
+        chosen.append(calls[(0, len(calls) // 2, -1)[turn % 3]])
+    return sorted(chosen)
+
+
+def kill_at_stages(scenario: Scenario, folder: Path, extent: str) -> None:
+    """Kill a run at calls of the seam, all or one per stage; every fifth once more as it goes on.
+
+    Tells the names of all calls first.
+    """
     whole = replay.run(scenario)
     writer._CHUNK = SMALL_CHUNK
     stages = stages_of(lambda: go(scenario, folder / "whole.h5"))
-    for number, stage in enumerate(stages):
+    tell(stages=stages)
+    for turn, number in enumerate(chosen_of(stages, extent)):
         path = folder / f"{number}.h5"
-        again = [7 * number % 50] if number % 5 == 0 else []
+        again = [7 * number % 50] if turn % 5 == 0 else []
         killed = []
         for at in (number, *again):
 
@@ -94,7 +112,7 @@ def kill_at_stages(scenario: Scenario, folder: Path) -> None:
                 go(scenario, path)  # noqa: B023  (done before the next turn)
 
             killed.append(ended(forked(work)))
-        tell(stage=stage, killed=killed, **finished(scenario, path, whole))
+        tell(number=number, killed=killed, **finished(scenario, path, whole))
         assert not path.with_name(f"{path.name}.part").exists()
 
 
@@ -132,7 +150,7 @@ if __name__ == "__main__":
     replay._Replay._last_write = property(lambda _: 0.0, lambda _, seconds: None)
     mode, where = sys.argv[1], Path(sys.argv[2])
     if mode == "stages":
-        kill_at_stages(short(**OFTEN, evolution__step=3000), where)
+        kill_at_stages(short(**OFTEN, evolution__step=3000), where, sys.argv[3])
     else:
         kinds = {**LOADS["spring"], **ROLLERS["wearing"], **OFTEN}
         kill_at_moments(short(**kinds, evolution__step=1500), where, int(sys.argv[3]))

@@ -12,17 +12,24 @@ from killed_scripts import rows_of
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork and SIGKILL")
 
 
-def test_that_a_kill_around_every_write_costs_nothing(tmp_path: Path) -> None:
-    rows = rows_of("killed_ensemble.py", "stages", tmp_path)
-    assert sum(row["stage"] == "before write" for row in rows) > 50
+@pytest.mark.parametrize("extent", ["each stage", pytest.param("all", marks=pytest.mark.slow)])
+def test_killed_ensemble_resumes_bit_for_bit(tmp_path: Path, extent: str) -> None:
+    head, *rows = rows_of("killed_ensemble.py", "stages", tmp_path, extent)
+    stages = head["stages"]
+    killed_at = {row["number"] for row in rows}
+    assert {stages[number] for number in killed_at} == set(stages) - {"after write"}
     for row in rows:
         assert row["killed"][0] == signal.SIGKILL
         assert row["unlike"] == []
+    if extent == "all":
+        assert stages.count("before write") > 50
+        assert killed_at == {n for n, stage in enumerate(stages) if stage != "after write"}
     # fresh, after the first batch, and after the last
     assert {-1, 0, 1, 2} <= {row["done"] for row in rows}
 
 
-def test_that_a_kill_at_any_moment_costs_nothing(tmp_path: Path) -> None:
+@pytest.mark.slow
+def test_ensemble_killed_at_any_moment_resumes_bit_for_bit(tmp_path: Path) -> None:
     rows = rows_of("killed_ensemble.py", "moments", tmp_path, 10)
     assert len(rows) == 10
     for row in rows:

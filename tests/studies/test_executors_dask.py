@@ -22,6 +22,8 @@ from wearsim.errors import Problem, ScenarioError, WorkerError
 from wearsim.studies import executors_cluster, executors_dask
 from wearsim.studies.executors import AHEAD, executor
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module", autouse=True)
 def hasty() -> Iterator[None]:

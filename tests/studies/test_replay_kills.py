@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -14,32 +13,36 @@ from killed_scripts import ROOT, rows_of
 from study_examples import RIG, unlike
 
 import wearsim
+from tests.interruptible import interruptible
 from wearsim.results import open_results, writer
 from wearsim.scenario import Scenario
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork and SIGKILL")
 
 
-def test_that_a_kill_around_every_write_flush_and_rename_costs_nothing(tmp_path: Path) -> None:
-    rows = rows_of("killed_run.py", "stages", tmp_path)
-    stages = [row["stage"] for row in rows]
+@pytest.mark.parametrize("extent", ["each stage", pytest.param("all", marks=pytest.mark.slow)])
+def test_run_killed_while_writing_resumes_bit_for_bit(tmp_path: Path, extent: str) -> None:
+    head, *rows = rows_of("killed_run.py", "stages", tmp_path, extent)
+    stages = head["stages"]
     # fresh bodies, two steps, and the end: four files, each written through all stages
     assert {stage.split(maxsplit=1)[1] for stage in stages} == set(writer.STAGES)
     assert stages.count("before rename") == stages.count("after rename") == 4
     assert stages.count("before write") > 4
+    killed_at = [row["number"] for row in rows]
+    assert {stages[number] for number in killed_at} == set(stages)
+    assert extent == "each stage" or killed_at == list(range(len(stages)))
     for row in rows:
         assert row["killed"][0] == signal.SIGKILL
         assert row["unlike"] == []
-    assert sum(row["killed"][1:] == [signal.SIGKILL] for row in rows) >= 5  # killed twice
-    once = [row for row in rows if len(row["killed"]) == 1]
-    renamed = 0
-    for row, stage in zip(rows, stages, strict=True):
-        renamed += stage == "after rename"
-        if row in once:  # the file is that of the last rename, neither older nor newer
+        if len(row["killed"]) == 1:  # the file is that of the last rename, neither older nor newer
+            renamed = stages[: row["number"] + 1].count("after rename")
             assert row["stood"] == [-1.0, 0.0, 3000.0, 6000.0, 6000.0][renamed]
+    twice = sum(row["killed"][1:] == [signal.SIGKILL] for row in rows)
+    assert twice >= (5 if extent == "all" else 2)
 
 
-def test_that_a_kill_at_any_moment_costs_nothing(tmp_path: Path) -> None:
+@pytest.mark.slow
+def test_run_killed_at_any_moment_resumes_bit_for_bit(tmp_path: Path) -> None:
     rows = rows_of("killed_run.py", "moments", tmp_path, 20)
     assert len(rows) == 20
     for row in rows:
@@ -61,18 +64,18 @@ def long_run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Scenario, 
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_that_a_signal_ends_wearsim_run_with_130_and_costs_nothing(
+def test_run_stopped_by_signal_resumes_bit_for_bit(
     number: signal.Signals,
     long_run: tuple[Path, Scenario, wearsim.Result],
     path: Path,
 ) -> None:
     source, _, unbroken = long_run
-    arguments = [sys.executable, "-m", "wearsim", "run", str(source), "-o", str(path), "-q"]
+    arguments = interruptible("-m", "wearsim", "run", source, "-o", path, "-q")
     with subprocess.Popen(arguments, cwd=ROOT, stderr=subprocess.PIPE, text=True) as running:
         while not path.exists() and running.poll() is None:
             time.sleep(0.005)
         running.send_signal(number)
-        said = running.communicate(timeout=60)[1]
+        said = running.communicate()[1]
     assert running.returncode == 130, said
     assert f"wearsim resume {path}" in said
     stopped = open_results(path)
