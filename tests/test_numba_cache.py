@@ -177,17 +177,15 @@ def test_that_a_read_only_install_runs_where_nothing_can_be_cached(copied: Path,
     assert solved["bits"] == run(CONTACT)["bits"]
 
 
-def test_that_the_cache_is_renewed_when_a_kernel_in_another_file_changes(
-    copied: Path, tmp_path: Path
-):
-    folder = copied / "wearsim" / "mechanics"
+def test_cache_is_renewed_when_a_callee_elsewhere_changes(copied: Path, tmp_path: Path):
+    callers, callees = copied / "wearsim" / "models", copied / "wearsim" / "mechanics"
     head = "from wearsim.mechanics.jit import kernel\n"
     body = "\n\n@kernel\ndef {name}(x: float) -> float:\n    return {value}\n"
     outer = body.format(name="outer", value="2.0 * inner(x)")
-    (folder / "outer.py").write_text(head + "from wearsim.mechanics.inner import inner\n" + outer)
+    (callers / "outer.py").write_text(head + "from wearsim.mechanics.inner import inner\n" + outer)
     found = []
     for value in ("x + 1.0", "x + 3.0"):
-        (folder / "inner.py").write_text(head + body.format(name="inner", value=value))
-        code = "from wearsim.mechanics.outer import outer; print(outer(1.0))"
+        (callees / "inner.py").write_text(head + body.format(name="inner", value=value))
+        code = "from wearsim.models.outer import outer; print(outer(1.0))"
         found.append(run(code, PYTHONPATH=copied, NUMBA_CACHE_DIR=tmp_path / "cache"))
     assert found == [4.0, 8.0]
