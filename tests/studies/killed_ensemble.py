@@ -6,14 +6,11 @@ One process does all: it compiles and runs once, and forks for every ensemble th
 from __future__ import annotations
 
 import itertools
-import os
 import random
-import signal
 import sys
-import time
 from pathlib import Path
 
-from killed_run import chosen_of, ended, forked, killing, stages_of, tell
+from killed_run import chosen_of, ended, ended_after, forked, killing, seconds_of, stages_of, tell
 
 from tests.studies.ensemble_cases import small, unlike
 from wearsim.results import open_ensemble, writer
@@ -67,16 +64,14 @@ def kill_at_stages(scenario: Scenario, count: int, folder: Path, extent: str) ->
 def kill_at_moments(scenario: Scenario, count: int, folder: Path, times: int) -> None:
     """Kill ensembles at random moments, half of them once more as they go on."""
     whole = ensemble(scenario, count, folder / "one.h5", scheduler="serial")
-    begun = time.perf_counter()
-    ended(forked(lambda: go(scenario, count, folder / "whole.h5")))
-    took, moments = time.perf_counter() - begun, random.Random(11)
+    go(scenario, count, folder / "first.h5")  # imports what children find in memory
+    took = seconds_of(lambda: go(scenario, count, folder / "whole.h5"))
+    moments = random.Random(11)
     for number in range(times):
         path, killed = folder / f"{number}.h5", []
         for _ in range(1 + number % 2):
-            child = forked(lambda path=path: go(scenario, count, path))
-            time.sleep(moments.uniform(0.0, 1.0) * took)
-            os.kill(child, signal.SIGKILL)
-            killed.append(ended(child))
+            seconds = moments.uniform(0.0, 1.0) * took
+            killed.append(ended_after(seconds, lambda path=path: go(scenario, count, path)))
         done = go(scenario, count, path)
         tell(killed=killed, done=done, unlike=unlike(path, whole))
 

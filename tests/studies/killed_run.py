@@ -10,7 +10,6 @@ import os
 import random
 import signal
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -56,6 +55,35 @@ def forked(work: Callable[[], object]) -> int:
 def ended(child: int) -> int:
     """Wait for a child; return the signal that killed it, or minus its exit code."""
     return -os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+
+
+def seconds_of(work: Callable[[], object]) -> float:
+    """Return the processor time that `work` takes in a child, by the timer of `ended_after` [s]."""
+    plenty = 1000.0
+    reading, writing = os.pipe()
+
+    def timed() -> None:
+        signal.setitimer(signal.ITIMER_PROF, plenty)
+        work()
+        os.write(writing, f"{plenty - signal.getitimer(signal.ITIMER_PROF)[0]}".encode())
+
+    assert ended(forked(timed)) == 0
+    os.close(writing)
+    with os.fdopen(reading) as told:
+        return float(told.read())
+
+
+def ended_after(seconds: float, work: Callable[[], object]) -> int:
+    """Do `work` in a child that SIGPROF ends when it has had so much processor time [s].
+
+    No wall clock: a busy machine moves no kill to before the work begins.
+    """
+
+    def limited() -> None:
+        signal.setitimer(signal.ITIMER_PROF, max(seconds, 1e-6))
+        work()
+
+    return ended(forked(limited))
 
 
 def stages_of(work: Callable[[], object]) -> list[str]:
@@ -119,19 +147,14 @@ def kill_at_stages(scenario: Scenario, folder: Path, extent: str) -> None:
 def kill_at_moments(scenario: Scenario, folder: Path, count: int) -> None:
     """Kill runs at random moments, half of them once more as they go on."""
     whole = replay.run(scenario)
-    times = []
-    for name in ("one.h5", "two.h5"):
-        begun = time.perf_counter()
-        ended(forked(lambda at=folder / name: go(scenario, at)))
-        times.append(time.perf_counter() - begun)
+    go(scenario, folder / "first.h5")  # imports what children find in memory
+    took = min(seconds_of(lambda at=folder / n: go(scenario, at)) for n in ("one.h5", "two.h5"))
     moments = random.Random(7)
     for number in range(count):
         path, killed = folder / f"{number}.h5", []
         for _ in range(1 + number % 2):
-            child = forked(lambda path=path: go(scenario, path))
-            time.sleep(moments.uniform(0.0, 1.0) * min(times))
-            os.kill(child, signal.SIGKILL)
-            killed.append(ended(child))
+            seconds = moments.uniform(0.0, 1.0) * took
+            killed.append(ended_after(seconds, lambda path=path: go(scenario, path)))
         tell(killed=killed, **finished(scenario, path, whole))
 
 

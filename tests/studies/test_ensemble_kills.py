@@ -34,6 +34,6 @@ def test_ensemble_killed_at_any_moment_resumes_bit_for_bit(tmp_path: Path) -> No
     assert len(rows) == 10
     for row in rows:
         assert row["unlike"] == []
-        assert set(row["killed"]) <= {signal.SIGKILL, 0}
-    assert sum(signal.SIGKILL in row["killed"] for row in rows) >= 5
+        assert set(row["killed"]) <= {signal.SIGPROF, 0}
+    assert sum(signal.SIGPROF in row["killed"] for row in rows) >= 5
     assert sum(0 <= row["done"] < 8 for row in rows) >= 2  # some in the midst of it

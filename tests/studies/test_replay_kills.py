@@ -47,8 +47,8 @@ def test_run_killed_at_any_moment_resumes_bit_for_bit(tmp_path: Path) -> None:
     assert len(rows) == 20
     for row in rows:
         assert row["unlike"] == []
-        assert set(row["killed"]) <= {signal.SIGKILL, 0}
-    assert sum(signal.SIGKILL in row["killed"] for row in rows) >= 10
+        assert set(row["killed"]) <= {signal.SIGPROF, 0}
+    assert sum(signal.SIGPROF in row["killed"] for row in rows) >= 10
     assert sum(0.0 <= row["stood"] < 6000.0 for row in rows) >= 3  # some in the midst of it
 
 
