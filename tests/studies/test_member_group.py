@@ -105,6 +105,9 @@ def test_that_a_plugin_that_breaks_ends_its_own_member_alone(monkeypatch):
     members = members_of(3, **ONE)
 
     class Broken(type(members[1].scene.load)):
+        def __init__(self):
+            pass
+
         def mean(self, start, stop):
             if start > 0.0:
                 raise ZeroDivisionError("broken")

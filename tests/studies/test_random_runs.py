@@ -269,7 +269,7 @@ def test_that_nodes_are_refused_where_there_is_nothing_to_expect():
             build_scene(scenario_of(evolution__nodes=16, **changes))
 
 
-def test_that_a_coarse_twin_that_fails_shortens_the_step(monkeypatch):
+def test_step_is_shortened_where_its_coarse_twin_fails(monkeypatch):
     friction = {**FRICTION, "persistence": "per-pass"}
     scene, stepper, _ = build_scene(scenario_of(passes=600, friction__coefficient=friction))
     fresh = fresh_state(scene)
@@ -283,5 +283,6 @@ def test_that_a_coarse_twin_that_fails_shortens_the_step(monkeypatch):
 
     monkeypatch.setattr(errors_of_steps, "coarse_start", fails_once)
     end = stepper.advance(scene, fresh, 600.0).end
-    assert end.rejected == plain.rejected + 1
-    assert end.passes < plain.passes
+    assert not failures
+    assert end.rejected >= 1
+    assert 0.0 < end.passes < plain.passes
