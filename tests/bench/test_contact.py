@@ -27,6 +27,8 @@ from wearsim.models.tangential_options import TangentialOptions
 from wearsim.plugins import ContactModelSpec, manager, registry
 from wearsim.studies.tracks import fresh_patch, run_grid
 
+pytestmark = pytest.mark.bench
+
 QUICK = Effort(quick=True, repetitions=1)
 GROUPS = ["fresh rig", "partial slip with spin", *HARD, "worn profiles"]
 

@@ -11,6 +11,8 @@ from wearsim.bench.exact import WORN, worn_profile
 from wearsim.mechanics.elasticity import combine
 from wearsim.mechanics.hertz import hertz
 
+pytestmark = pytest.mark.bench
+
 PATCH = hertz(22.5, 0.5, 300.0, combine(*MATERIALS).contact_modulus)
 STRIPS, SPACING = 61, 1.4e-4
 SHIFTS = st.floats(-0.5, 0.5)

@@ -18,6 +18,8 @@ from wearsim.bench.memory import family_peak_bytes, peak_bytes
 from wearsim.errors import ContactError
 from wearsim.plugins import manager
 
+pytestmark = pytest.mark.bench
+
 TINY = Path(__file__).parents[1] / "plugins" / "data" / "tiny"
 SHORT = {"operation.passes": 200, "contact.strips": 21, "outputs.records": 1}
 MEGABYTES = 1_000_000

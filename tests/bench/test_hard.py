@@ -21,6 +21,8 @@ from wearsim.results import Result
 from wearsim.scenario.shipped import shipped_scenario
 from wearsim.studies.replay import run
 
+pytestmark = pytest.mark.bench
+
 PASSES = 6000
 PLAN = Plan(PASSES, finer=1, steps=5, doublings=2, tighter=False, changes={})
 PLAIN = HardCase("plain", {})

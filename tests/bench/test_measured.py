@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 from wearsim.bench.machine import this_machine
 from wearsim.bench.measured import Measurement, Topic, pareto
 
+pytestmark = pytest.mark.bench
+
 POINTS = st.lists(st.tuples(st.floats(1e-6, 10.0), st.floats(0.0, 1.0)), max_size=30)
 
 

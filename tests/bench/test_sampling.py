@@ -17,6 +17,8 @@ from wearsim.studies.depth_control import closed_form_depths
 from wearsim.studies.draws import Drawer
 from wearsim.studies.ensemble import ensemble
 
+pytestmark = pytest.mark.bench
+
 LOW, HIGH, FACTOR = 0.08, 0.12, 1.5
 SIZE = Size((16, 64, 256), 16)
 

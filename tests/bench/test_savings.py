@@ -21,6 +21,8 @@ from wearsim.bench.stepping_tests import Ready, WearTest
 from wearsim.models.semi_hertzian import SemiHertzian
 from wearsim.plugins import ContactModelSpec, registry
 
+pytestmark = pytest.mark.bench
+
 QUICK = Effort(quick=True, repetitions=1)
 MARCHES = (
     "hertz, fastsim",

@@ -18,6 +18,8 @@ from wearsim.errors import PluginError, StepError
 from wearsim.plugins import ContactModelSpec, registry
 from wearsim.scenario.sections import EvolutionTable
 
+pytestmark = pytest.mark.bench
+
 QUICK = Effort(quick=True, repetitions=1)
 SHORT = WearTest(RIG, 0.2)  # 600 passes
 STEPPERS = set(get_args(EvolutionTable.model_fields["stepper"].annotation)) - {"auto"}

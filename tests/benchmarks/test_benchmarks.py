@@ -21,6 +21,8 @@ from tests.benchmarks import (
 from tests.benchmarks.report import QUICK, TABLES
 from wearsim.studies.dissipation import dissipation
 
+pytestmark = pytest.mark.bench
+
 
 def test_speed_of_hertz(benchmark):
     assert benchmark(contacts.rig_hertz).peak_pressure == pytest.approx(680.22e6, rel=1e-5)

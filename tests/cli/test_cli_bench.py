@@ -10,6 +10,8 @@ from wearsim.bench import hard, stepping
 from wearsim.bench.hard_verdict import Check, Verdict
 from wearsim.bench.measured import Measurement, Topic
 
+pytestmark = pytest.mark.bench
+
 
 def made_up(name):
     def measure(effort, tell):

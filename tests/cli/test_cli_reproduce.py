@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from cli_examples import Command
 
+pytestmark = pytest.mark.bench
+
 FEW = ("reproduce", "-n", "40", "--quiet")
 
 

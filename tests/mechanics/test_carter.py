@@ -32,6 +32,7 @@ def work(slip_x, slip_y, spin, found):
     return -(found[0] * slip_x + found[1] * slip_y + spin * A * found[2])
 
 
+@pytest.mark.bench
 def test_that_carters_law_is_met():
     for part in (0.1, 0.4, 0.9, 1.0, 1.5):
         expected = 1.0 - (1.0 - min(part, 1.0)) ** 2
@@ -42,6 +43,7 @@ def test_that_carters_law_is_met():
     assert force(*scaled(0.4, 0.0, 0.0))[0] == pytest.approx(-exact, rel=1e-12)
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("psi", [-0.3, 0.1, 0.3])
 def test_that_lateral_creepage_with_spin_is_carters_law_about_another_stiffness(psi):
     # where all traction is lateral, taking back (1 - psi) of it where the strip adheres is exact
@@ -52,6 +54,7 @@ def test_that_lateral_creepage_with_spin_is_carters_law_about_another_stiffness(
         assert found[2] == pytest.approx((1.0 - psi) * (1.0 - t) ** 2 * t, rel=1e-12)
 
 
+@pytest.mark.bench
 def test_that_small_creepage_meets_the_linear_theory():
     slip_x, slip_y, spin = 1e-9, -2e-9, 3e-5
     force_x, force_y, moment, adhering = strip_force(
@@ -72,6 +75,7 @@ CASES = [
 ]
 
 
+@pytest.mark.bench
 def test_that_a_numerical_solution_of_the_strip_is_met():
     errors = {0.0: [], 0.08: [], 0.2: []}
     for d, angle, psi in CASES:
@@ -86,6 +90,7 @@ def test_that_a_numerical_solution_of_the_strip_is_met():
     assert np.abs(errors[0.2]).max() < 5e-3
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("turn", [0.0, 0.3, 1.0, 3.0])
 def test_that_full_sliding_with_spin_follows_the_slip_along_the_strip(turn):
     slip_x, slip_y = 0.5, 0.3
@@ -120,6 +125,7 @@ def test_that_a_direction_that_turns_little_is_its_series():
 sizes = st.floats(-6.0, 6.0).map(lambda x: np.sign(x) * 10.0 ** (abs(x) - 4.0) if x else 0.0)
 
 
+@pytest.mark.bench
 @given(sizes, sizes, sizes, st.floats(0.01, 0.8))
 def test_that_traction_opposes_slip_within_the_traction_bound(d_x, d_y, psi, friction):
     slip = scaled(d_x, d_y, psi)
@@ -130,6 +136,7 @@ def test_that_traction_opposes_slip_within_the_traction_bound(d_x, d_y, psi, fri
     assert 0.0 <= strip_force(A, Q, friction, STEEPNESS, *slip, *MODULI)[3] <= 2.0 * A
 
 
+@pytest.mark.bench
 @given(sizes, sizes, sizes)
 def test_that_a_mirrored_strip_has_mirrored_forces(d_x, d_y, psi):
     slip_x, slip_y, spin = scaled(d_x, d_y, psi)
@@ -142,6 +149,7 @@ def test_that_a_mirrored_strip_has_mirrored_forces(d_x, d_y, psi):
     assert turned == (-force_x, force_y, moment, adhering)
 
 
+@pytest.mark.bench
 @given(sizes, sizes, sizes)
 def test_that_forces_change_no_faster_than_creepage(d_x, d_y, psi):
     here = force(*scaled(d_x, d_y, psi))
@@ -149,6 +157,7 @@ def test_that_forces_change_no_faster_than_creepage(d_x, d_y, psi):
     assert np.abs(near - here).max() < 1e-6
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("psi", [0.0, 0.3, SPIN_LIMIT, 2.0])
 @pytest.mark.parametrize("angle", [0.0, 0.3, 0.8, 1.5])
 def test_that_the_force_is_continuous_where_the_strip_begins_to_slide_fully(angle, psi):
@@ -166,6 +175,7 @@ def test_that_the_force_is_continuous_where_the_strip_begins_to_slide_fully(angl
     np.testing.assert_allclose(at(low * (1.0 - 1e-9)), at(high * (1.0 + 1e-9)), atol=1e-7)
 
 
+@pytest.mark.bench
 def test_that_no_creepage_adheres_and_no_friction_slides():
     assert strip_force(A, Q, MU, STEEPNESS, 0.0, 0.0, 0.0, *MODULI) == (0.0, 0.0, 0.0, 2.0 * A)
     assert strip_force(A, Q, 0.0, STEEPNESS, 1e-3, 1e-3, 1.0, *MODULI) == (0.0, 0.0, 0.0, 0.0)

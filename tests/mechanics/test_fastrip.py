@@ -58,6 +58,7 @@ class Ellipse:
         return fastrip_fields(self.half_length, self.bound_peak, self.motion, self.moduli, points)
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize(("a", "b"), [(A, B), (3e-4, 3e-4), (1e-3, 2e-4)])
 def test_that_small_creepage_meets_kalkers_coefficients(a, b):
     small = 1e-9
@@ -79,6 +80,7 @@ def test_that_a_long_contact_has_the_moduli_of_a_plane():
     assert found.spin_across == pytest.approx((1.0 + 0.3 * logarithm) / 0.7, rel=1e-5)
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("axis", ["longitudinal", "lateral"])
 def test_that_one_creepage_is_carters_closed_form_with_any_number_of_steps(axis):
     ellipse = Ellipse(5e-4) if axis == "longitudinal" else Ellipse(0.0, 5e-4)
@@ -111,6 +113,7 @@ def about_sliding_throughout(ellipse, number):
     return strip(low * (1.0 - 1e-9)), strip(high * (1.0 + 1e-9))
 
 
+@pytest.mark.bench
 def test_that_a_strip_goes_over_to_sliding_throughout_without_a_turn():
     rng, found = np.random.default_rng(2), []
     for xi, eta, phi in rng.normal(size=(30, 3)) * (5e-4, 5e-4, 1.0):
@@ -124,6 +127,7 @@ def test_that_a_strip_goes_over_to_sliding_throughout_without_a_turn():
         assert sliding.direction_y == pytest.approx(adhering.direction_y, abs=1e-5)
 
 
+@pytest.mark.bench
 def test_that_a_contact_that_slides_throughout_carries_all_that_friction_can():
     ellipse = Ellipse(0.03, -0.04)
     *force, _, power = ellipse.totals(1)
@@ -153,6 +157,7 @@ def from_contact(cases, *, published):
     return np.array(powers) / [case["fastrip_P_over_V_N"] for case in cases] - 1.0
 
 
+@pytest.mark.bench
 def test_that_contacts_own_fastrip_agrees_where_spin_is_weak():
     errors = from_contact(rows("rig_random", kind="paper"), published=False)
     assert np.sqrt(np.mean(errors**2)) < 0.003
@@ -165,6 +170,7 @@ def test_that_contacts_own_fastrip_agrees_where_spin_is_weak():
     assert from_contact(alone, published=False) == pytest.approx(0.0, abs=1e-3)
 
 
+@pytest.mark.bench
 def test_that_strong_spin_differs_from_contacts_own_by_its_amendment_alone():
     partial = rows("rig_random", kind="partial")
     errors = from_contact(partial, published=True)
@@ -173,6 +179,7 @@ def test_that_strong_spin_differs_from_contacts_own_by_its_amendment_alone():
     assert np.sqrt(np.mean(own**2)) > 5.0 * np.sqrt(np.mean(errors**2))
 
 
+@pytest.mark.bench
 def test_that_few_steps_are_enough():
     ellipses = [
         Ellipse(*case) for case in ((6e-4, 5e-4, 0.05), (3e-4, -2e-4, 0.6), (0.0, 0.0, 0.8))
@@ -186,6 +193,7 @@ def test_that_few_steps_are_enough():
 CREEPAGES = st.tuples(st.floats(-2e-3, 2e-3), st.floats(-2e-3, 2e-3), st.floats(-1.5, 1.5))
 
 
+@pytest.mark.bench
 @settings(deadline=None, max_examples=60)
 @given(CREEPAGES)
 def test_that_traction_keeps_to_the_bound_and_slip_opposes_it(creepage):
@@ -199,6 +207,7 @@ def test_that_traction_keeps_to_the_bound_and_slip_opposes_it(creepage):
     assert np.allclose(traction[slip > 0.0], bound[slip > 0.0], rtol=1e-9)
 
 
+@pytest.mark.bench
 @settings(deadline=None, max_examples=60)
 @given(CREEPAGES)
 def test_that_mirroring_the_contact_mirrors_it_and_power_is_positive(creepage):
@@ -211,6 +220,7 @@ def test_that_mirroring_the_contact_mirrors_it_and_power_is_positive(creepage):
     assert here.totals()[3] >= -1e-12 * LOAD * max(map(abs, creepage))
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("creepage", [(4e-4, 5e-4, 0.05), (2e-4, 0.0, 0.6), (5e-3, 5e-3, 0.1)])
 def test_that_the_fields_add_up_to_the_sums(creepage):
     ellipse = Ellipse(*creepage)
@@ -224,6 +234,7 @@ def test_that_the_fields_add_up_to_the_sums(creepage):
     assert found == pytest.approx(moment, abs=1e-3 * scale * ellipse.a)
 
 
+@pytest.mark.bench
 def test_that_spin_too_strong_for_strip_theory_is_left_to_fastsim():
     ellipse = Ellipse(1e-3, 5e-4, 20.0)
     share = 1.0 / ellipse.flexibility
@@ -240,6 +251,7 @@ def test_that_spin_too_strong_for_strip_theory_is_left_to_fastsim():
     assert not ellipse.fields().any()
 
 
+@pytest.mark.bench
 def test_that_strips_without_contact_friction_or_creepage_carry_nothing():
     still = Ellipse()
     assert not still.rows()[:3].any()

@@ -288,6 +288,7 @@ def test_that_50_by_50_points_meet_the_closed_form_within_a_thousandth():
     assert case.power(march(*case.arguments, 50)) == pytest.approx(0.073873, rel=1e-3)
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("bound", ["par", "ell"])
 @pytest.mark.parametrize("case", rows("mean_problem")[:2], ids=lambda case: case["case"])
 def test_that_contacts_quadrature_of_fastsim_is_met(case, bound):

@@ -42,6 +42,7 @@ def test_that_the_rig_has_the_patch_that_was_checked_by_hand(radii, two_a, two_b
         assert patch.approach == pytest.approx(approach, rel=2e-5)
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("case", rows("hertz"))
 def test_that_every_reference_case_is_met(case):
     patch = hertz(case["A_per_m"], case["B_per_m"], case["N_N"], MODULUS)

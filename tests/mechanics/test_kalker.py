@@ -26,6 +26,7 @@ def values(ratio, nu):
     return np.array([getattr(found, name) for name in NAMES])
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("case", rows("kalker_coefficients"))
 def test_that_the_exact_linear_theory_is_met_within_1_5_percent(case):
     found = values(case["a_over_b"], case["nu"])
@@ -36,6 +37,7 @@ def test_that_the_exact_linear_theory_is_met_within_1_5_percent(case):
         assert value == pytest.approx(case[name.upper()], rel=bound), name
 
 
+@pytest.mark.bench
 def test_that_the_interpolation_is_good_on_the_whole():
     errors = np.array(
         [

@@ -10,6 +10,8 @@ from wearsim.mechanics.elasticity import combine
 from wearsim.mechanics.strip import SUMS, new_tractions, solve_strips, strip_contacts
 from wearsim.mechanics.strip_coupling import strip_elasticity
 
+pytestmark = pytest.mark.bench
+
 PAIR = combine(STEEL, STEEL)
 ELASTICITY = strip_elasticity(PAIR.contact_modulus, PAIR.shear_modulus)
 MEAN = table("mean_problem")

@@ -40,6 +40,7 @@ def test_that_an_ellipse_of_strips_is_its_own_equivalent():
     assert equivalent_ratio(two, two, 2.0 * b / n) == pytest.approx(a / b, rel=1e-3)
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("ratio", [0.05, 0.1, 0.2])
 @pytest.mark.parametrize("nu", [0.0, 0.25, 0.5])
 def test_that_small_creepage_meets_kalkers_coefficients(nu, ratio):

@@ -40,6 +40,7 @@ def rms(values):
     return float(np.sqrt(np.mean(np.square(values))))
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize(
     ("kind", "bound", "worst"), [("paper", 2e-3, 3e-3), ("partial", 5e-3, 0.012)]
 )
@@ -49,6 +50,7 @@ def test_that_the_rigs_power_is_that_of_the_exact_theory(kind, bound, worst):
     assert np.abs(found).max() < worst
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("kind", ["paper", "partial"])
 def test_that_the_rigs_power_is_spread_over_the_strips_as_in_the_exact_theory(kind):
     y_over_b, exact = strips_of(kind)
@@ -66,6 +68,7 @@ def hard(case):
     return contact(case, (2.0 * case["A_per_m"], 2.0 * case["B_per_m"]))
 
 
+@pytest.mark.bench
 def test_that_hard_cases_stay_within_three_percent_rms():
     cases = rows("hard_cases")
     found = errors(cases, hard)
@@ -76,6 +79,7 @@ def test_that_hard_cases_stay_within_three_percent_rms():
     assert np.abs(found[long]).max() < 0.01
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("name", ["hertz", "flat", "bump_1um", "bump_10um", "parabola"])
 @pytest.mark.parametrize("creepage", ["mean", "partial", "combined"])
 def test_that_it_takes_the_strips_of_a_worn_profile(name, creepage):
@@ -91,6 +95,7 @@ def test_that_it_takes_the_strips_of_a_worn_profile(name, creepage):
     assert np.linalg.norm(found.dissipation - expected) < 0.065 * np.linalg.norm(expected)
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("creepage", [(4e-4, 5e-4, 0.05), (2e-4, -1e-4, 0.9), (1e-3, 5e-4, 30.0)])
 def test_that_power_is_the_work_of_the_rigid_slip(creepage):
     xi, eta, phi = creepage
@@ -101,6 +106,7 @@ def test_that_power_is_the_work_of_the_rigid_slip(creepage):
     assert found.dissipation.sum() * (found.y[1] - found.y[0]) == pytest.approx(work, rel=1e-12)
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("curvatures", [RIG, (20.0, 20.0), (2.0, 60.0)])
 def test_that_no_strip_grows(curvatures):
     rng, model = np.random.default_rng(11), HertzModel(FastripTheory(), 41)
@@ -131,6 +137,7 @@ def test_that_work_is_spread_without_negative_parts_and_keeps_its_sum():
     assert np.isnan(spread_work(np.array([1.0, np.nan]))).any()
 
 
+@pytest.mark.bench
 def test_that_creepage_that_varies_across_the_track_is_nearly_spins_longitudinal_part():
     case = {"N_N": 300.0, "mu": 0.1, "xi": 4e-4, "eta": 0.0, "phi_per_m": 0.2}
     model, gap, point, turning = contact(case)
@@ -141,6 +148,7 @@ def test_that_creepage_that_varies_across_the_track_is_nearly_spins_longitudinal
     )
 
 
+@pytest.mark.bench
 def test_that_a_bearing_torque_finds_its_creepage_and_skids_past_friction():
     case = {"N_N": 300.0, "mu": 0.1, "xi": 0.0, "eta": 2e-4, "phi_per_m": 0.1}
     model, gap, point, _ = contact(case)
@@ -151,6 +159,7 @@ def test_that_a_bearing_torque_finds_its_creepage_and_skids_past_friction():
         model.solve(gap, RIG[0], replace(torque, bearing_torque=1.0))
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("creepage", [(6e-4, 3e-4, 0.05), (2e-4, 0.0, 0.5), (1e-3, 5e-4, 8.0)])
 def test_that_the_fields_are_the_inside_of_the_solution(creepage):
     xi, eta, phi = creepage
@@ -171,6 +180,7 @@ def test_that_the_fields_are_the_inside_of_the_solution(creepage):
     assert share == pytest.approx(solution.adhesion_fraction, abs=0.02)
 
 
+@pytest.mark.bench
 def test_that_spin_too_strong_for_strip_theory_makes_no_great_jump_on_a_long_contact():
     peak = 1.5 * 300.0 / (math.pi * 1.363e-4 * 1.545e-3)
     limit = 2.0 * 0.1 * peak / (1.363e-4 * PAIR.shear_modulus * 1.517)
@@ -181,6 +191,7 @@ def test_that_spin_too_strong_for_strip_theory_makes_no_great_jump_on_a_long_con
     assert powers[1] == pytest.approx(powers[0], rel=0.015)
 
 
+@pytest.mark.bench
 def test_that_a_grid_of_any_width_gives_the_same():
     case = {"N_N": 300.0, "mu": 0.1, "xi": 4e-4, "eta": 3e-4, "phi_per_m": 0.1}
     exact = contact(case, strips=1000)[-1].power

@@ -47,27 +47,32 @@ def balance(point, solution):
     )
 
 
+@pytest.mark.bench
 def test_that_the_mean_problem_dissipates_0_073873_watts_in_closed_form():
     *_, solution = contact(kalker="line-limit", my=1000)
     assert solution.power == pytest.approx(0.073873, rel=1e-5)
 
 
+@pytest.mark.bench
 def test_that_50_by_50_fastsim_is_within_a_thousandth_of_it():
     *_, solution = contact(kalker="line-limit", closed_form="never")
     assert solution.power == pytest.approx(0.073873, rel=1e-3)
 
 
+@pytest.mark.bench
 def test_that_the_table_moves_the_mean_problem_by_less_than_two_thousandths():
     power = {name: contact(kalker=name)[-1].power for name in ("table", "line-limit")}
     assert 1e-4 < power["table"] / power["line-limit"] - 1.0 < 2e-3
 
 
+@pytest.mark.bench
 def test_that_given_coefficients_take_the_place_of_the_table():
     limit = {"c11": math.pi**2 / 2.8, "c22": math.pi**2 / 4.0, "c23": 0.471}
     given_power = contact(kalker_coefficients=limit)[-1].power
     assert given_power == pytest.approx(contact(kalker="line-limit")[-1].power, rel=1e-12)
 
 
+@pytest.mark.bench
 def test_that_the_element_sum_reads_low_and_says_so_by_its_order():
     exact = contact(kalker="line-limit", my=1000)[-1].power
     low = [
@@ -78,6 +83,7 @@ def test_that_the_element_sum_reads_low_and_says_so_by_its_order():
     assert np.log2(np.divide(low[:-1], low[1:])) == pytest.approx(1.0, abs=0.05)
 
 
+@pytest.mark.bench
 def test_that_the_patch_is_that_of_hertz():
     *_, solution = contact()
     patch = hertz(45.0, 1.0, 300.0, PAIR.contact_modulus)
@@ -90,6 +96,7 @@ GRIDS = st.builds(lambda half, strips: Grid.spanning(-half, half, strips),
                   st.floats(2.4e-3, 9e-3), st.integers(31, 300))  # fmt: skip
 
 
+@pytest.mark.bench
 @settings(deadline=None, max_examples=40)
 @given(GRIDS, st.floats(-0.8e-3, 0.8e-3), st.floats(-1e-3, 1e-3), st.floats(-0.5, 0.5))
 def test_that_any_grid_carries_the_whole_load_and_keeps_the_energy_balance(grid, yc, eta, phi):
@@ -100,6 +107,7 @@ def test_that_any_grid_carries_the_whole_load_and_keeps_the_energy_balance(grid,
     assert solution.approach == pytest.approx(2e-6 + 3.22274e-6, rel=1e-6)
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("bound", ["parabolic", "elliptic"])
 def test_that_strips_partly_covered_keep_the_power_smooth(bound):
     exact = contact(my=1000, bound=bound)[-1].power
@@ -108,6 +116,7 @@ def test_that_strips_partly_covered_keep_the_power_smooth(bound):
         assert power == pytest.approx(exact, rel=1e-3)
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("closed_form", ["exact", "always", "never"])
 def test_that_mirroring_the_contact_mirrors_the_solution(closed_form):
     grid = Grid.spanning(-3e-3, 3e-3, 60)
@@ -126,6 +135,7 @@ def test_that_mirroring_the_contact_mirrors_the_solution(closed_form):
     assert one.spin_moment == pytest.approx(-other.spin_moment, rel=1e-9, abs=1e-15)
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize(
     ("bound", "kind", "rms", "from_contact"),
     [
@@ -147,6 +157,7 @@ def test_that_its_error_against_the_exact_theory_is_the_one_we_know(bound, kind,
     assert np.sqrt(np.mean(np.square(other))) < from_contact
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize(("bound", "rms"), [("parabolic", 0.093), ("elliptic", 0.030)])
 def test_that_hard_cases_stay_as_far_off_as_kalker_is(bound, rms):
     errors = []
@@ -162,6 +173,7 @@ def test_that_hard_cases_stay_as_far_off_as_kalker_is(bound, rms):
     assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(rms, rel=0.03)
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("flexibility", ["three", "one"])
 @pytest.mark.parametrize(("bound", "rate"), [("parabolic", 0.12), ("elliptic", 0.25)])
 def test_that_steps_converge_on_the_quadrature_of_the_reference(bound, rate, flexibility):
@@ -184,6 +196,7 @@ def test_that_steps_converge_on_the_quadrature_of_the_reference(bound, rate, fle
             assert abs(error) < rate / mx**2
 
 
+@pytest.mark.bench
 def test_that_one_flexibility_is_the_weighted_mean_of_three_along_the_creepage():
     xi, eta = 3e-4, -4e-4
     *_, solution = contact(creepage=(xi, eta, 0.0), flexibility="one", my=400)
@@ -198,6 +211,7 @@ def test_that_one_flexibility_is_the_weighted_mean_of_three_along_the_creepage()
     assert solution.dissipation == pytest.approx(SPEED * 5e-4 * expected, rel=1e-9)
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("creepage", [(5e-4, 0.0, 0.0), (0.0, 5e-4, 0.0), (0.0, 0.0, 0.7)])
 def test_that_one_flexibility_is_kalkers_own_where_one_creepage_acts(creepage):
     one, three = (
@@ -207,6 +221,7 @@ def test_that_one_flexibility_is_kalkers_own_where_one_creepage_acts(creepage):
     assert one.dissipation == pytest.approx(three.dissipation, rel=1e-12)
 
 
+@pytest.mark.bench
 def test_that_one_flexibility_leaves_full_sliding_to_the_creepage():
     # with three the traction keeps to what would adhere
     creepage = (0.012, 0.016, 0.0)
@@ -221,6 +236,7 @@ def groove(depth, offset=0.0):
     return lambda y: y**2 + 0.95 * np.maximum(depth - (y - offset) ** 2, 0.0)
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("depth", [1e-6, 5e-6, 17e-6, 48e-6])
 def test_that_a_worn_profile_widens_the_patch_and_still_carries_the_load(depth):
     grid = Grid.spanning(-9e-3, 9e-3, 181)
@@ -231,6 +247,7 @@ def test_that_a_worn_profile_widens_the_patch_and_still_carries_the_load(depth):
     assert solution.power == pytest.approx(balance(point, solution), rel=1e-12)
 
 
+@pytest.mark.bench
 def test_that_a_solution_does_not_depend_on_where_it_started():
     grid = Grid.spanning(-9e-3, 9e-3, 181)
     model, gap, point, cold = contact(grid, shape=groove(17e-6))
@@ -238,6 +255,7 @@ def test_that_a_solution_does_not_depend_on_where_it_started():
     assert np.array_equal(warm.dissipation, cold.dissipation)
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize(
     ("shape", "match"),
     [
@@ -254,22 +272,26 @@ def test_that_what_hertz_cannot_solve_is_told_with_its_state(shape, match):
     assert {"gap", "normal_force"} <= set(caught.value.state)
 
 
+@pytest.mark.bench
 def test_that_an_input_that_is_not_a_number_is_an_error():
     with pytest.raises(ContactError, match="power is not finite"):
         contact(creepage=(math.nan, 0.0, 0.0))
 
 
+@pytest.mark.bench
 def test_that_a_lost_contact_is_an_error():
     with pytest.raises(ContactError, match="contact is lost"):
         contact(Grid.spanning(-3e-3, 3e-3, 61), load=0.0)
 
 
+@pytest.mark.bench
 def test_that_a_wear_compliance_is_refused():
     model, gap, point, _ = contact()
     with pytest.raises(CapabilityError, match="stepper = 'stabilised'"):
         model.solve(gap, RIG[0], point, np.zeros_like(gap))
 
 
+@pytest.mark.bench
 def test_that_a_prescribed_patch_sets_pressure_and_power():
     patch = {"a": "0.2 mm", "b": "2 mm"}
     _, _, point, solution = contact(patch=patch)
@@ -288,6 +310,7 @@ def test_that_a_prescribed_patch_sets_pressure_and_power():
         contact(Grid.spanning(-1.5e-3, 1.5e-3, 31), patch=patch)
 
 
+@pytest.mark.bench
 def test_that_a_bearing_torque_finds_its_creepage():
     model, gap, _, _ = contact()
     point = OperatingPoint(
@@ -307,6 +330,7 @@ def test_that_a_bearing_torque_finds_its_creepage():
         )  # fmt: skip
 
 
+@pytest.mark.bench
 def test_that_friction_may_differ_from_strip_to_strip():
     model, gap, _, whole = contact()
     friction = np.where(np.arange(50) < 25, 0.1, 0.05)
@@ -315,6 +339,7 @@ def test_that_friction_may_differ_from_strip_to_strip():
     assert np.all(half.dissipation[25:] < whole.dissipation[25:])
 
 
+@pytest.mark.bench
 def test_that_creepage_may_vary_from_strip_to_strip():
     model, gap, _, _ = contact()
     y = model.suggest_grid(RIG[1], RIG[0], 300.0, MATERIALS).y
@@ -331,6 +356,7 @@ def test_that_creepage_may_vary_from_strip_to_strip():
     assert powers == pytest.approx(model.solve(gap, RIG[0], point).power, rel=1e-4)
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("bound", ["parabolic", "elliptic"])
 def test_that_the_fields_are_the_inside_of_the_solution(bound):
     creepage = (6e-4, 3e-4, 0.0)
@@ -402,6 +428,7 @@ OPTIONS = [
 ]
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("spin", [True, False])
 @pytest.mark.parametrize("options", OPTIONS)
 def test_that_a_batch_is_solved_as_each_contact_alone(options, spin):
@@ -412,6 +439,7 @@ def test_that_a_batch_is_solved_as_each_contact_alone(options, spin):
         assert_same(found.solutions[k], model.solve(gap[0, 0, k], RIG[0], points[k]))
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("flexibility", ["three", "one"])
 def test_that_a_batch_takes_any_gaps_friction_per_strip_and_varied_creepage(flexibility):
     random = np.random.default_rng(1)
@@ -426,6 +454,7 @@ def test_that_a_batch_takes_any_gaps_friction_per_strip_and_varied_creepage(flex
         assert_same(found.solutions[k], model.solve(gap[0, 0, k], RIG[0], points[k]))
 
 
+@pytest.mark.bench
 def test_that_a_list_of_points_is_solved_as_their_columns():
     points = draws()
     model, gap, found = batch(points)
@@ -440,6 +469,7 @@ def test_that_columns_of_different_lengths_are_refused():
         replace(draws(), spin=np.zeros(2))
 
 
+@pytest.mark.bench
 def test_that_a_batch_under_bearing_torques_is_solved_too():
     model, gap, _, _ = contact()
     points = [
@@ -453,6 +483,7 @@ def test_that_a_batch_under_bearing_torques_is_solved_too():
     assert -found.stack("force_x") * 20e-3 == pytest.approx([0.1, 0.2], rel=1e-9)
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize(
     ("change", "match"),
     [
@@ -471,6 +502,7 @@ def test_that_a_batch_names_the_contact_that_fails(change, match):
     assert "gap" in caught.value.state
 
 
+@pytest.mark.bench
 def test_that_a_batch_needs_a_curvature_along_rolling_and_friction_of_a_shape_it_knows():
     points = draws()
     model, gap, _ = batch(points)
@@ -484,6 +516,7 @@ def test_that_a_batch_needs_a_curvature_along_rolling_and_friction_of_a_shape_it
         model.solve_batch(gap, RIG[0], points, np.zeros_like(gap))
 
 
+@pytest.mark.bench
 def test_that_leaving_out_the_spins_slip_along_rolling_costs_what_we_say():
     points = draws(300)
     powers = {
@@ -503,6 +536,7 @@ def test_that_leaving_out_the_spins_slip_along_rolling_costs_what_we_say():
         assert powers[name].std() == pytest.approx(truth.std(), rel=tolerance)
 
 
+@pytest.mark.bench
 def test_that_the_closed_form_with_spin_keeps_the_energy_balance():
     *_, point, solution = contact(creepage=(6e-4, 3e-4, 0.2), closed_form="always")
     assert solution.power == pytest.approx(balance(point, solution), rel=1e-12)
@@ -511,6 +545,7 @@ def test_that_the_closed_form_with_spin_keeps_the_energy_balance():
 FIELD_OPTIONS = [{}, {"bound": "elliptic"}, {"dissipation": "element-sum"}]
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("options", FIELD_OPTIONS)
 def test_that_a_uniform_field_of_friction_is_one_coefficient(options):
     options = options | {"closed_form": "never"}
@@ -523,6 +558,7 @@ def test_that_a_uniform_field_of_friction_is_one_coefficient(options):
         assert found.force_y == pytest.approx(expected.force_y, rel=1e-13)
 
 
+@pytest.mark.bench
 def test_that_carried_friction_gives_the_mean_over_its_particles():
     model, gap, point, _ = contact(creepage=(4e-4, 5e-4, 0.0), mx=6)
     friction = np.random.default_rng(3).uniform(0.05, 0.2, (6, 50))
@@ -552,6 +588,7 @@ def noise(points_along, strips, carried=False, contacts=12):
     return power.mean(), power.std() / math.sqrt(contacts)
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize(
     ("cells", "expected"),
     [(25, 0.0689), (50, 0.0653), (100, 0.0614), (200, 0.0569), (400, 0.0527), (800, 0.0487)],
@@ -562,6 +599,7 @@ def test_that_white_noise_falls_with_its_grid_as_we_know(cells, expected):
     assert mean == pytest.approx(expected, rel=0.02)
 
 
+@pytest.mark.bench
 def test_that_white_noise_carried_through_the_contact_has_a_limit():
     # that limit is the mean of the power over the coefficient's own distribution
     nodes, weights = np.polynomial.hermite_e.hermegauss(21)
@@ -573,6 +611,7 @@ def test_that_white_noise_carried_through_the_contact_has_a_limit():
     assert deviation < 1e-3 * limit
 
 
+@pytest.mark.bench
 def test_that_friction_is_asked_for_where_the_steps_of_the_march_end():
     model, gap, point, solution = contact(Grid.spanning(-3e-3, 3e-3, 60), mx=10)
     x, y = model.friction_points(gap, RIG[0], point)
@@ -591,6 +630,7 @@ def test_that_friction_is_asked_for_where_the_steps_of_the_march_end():
         model.friction_points_batch(gap, RIG[0], points)
 
 
+@pytest.mark.bench
 def test_that_the_fields_know_friction_that_differs_from_point_to_point():
     model, gap, point, _ = contact(creepage=(6e-4, 3e-4, 0.1), mx=200)
     friction = np.random.default_rng(4).uniform(0.05, 0.15, (200, 50))
@@ -623,6 +663,7 @@ def hertz_strips(strips=81):
     )
 
 
+@pytest.mark.bench
 def test_that_an_ellipse_cut_into_strips_has_nearly_its_own_equivalent():
     patch, strips = hertz_strips(401)
     a, b = equivalent_ellipse(strips)
@@ -630,6 +671,7 @@ def test_that_an_ellipse_cut_into_strips_has_nearly_its_own_equivalent():
     assert (a, b) == pytest.approx((patch.a, patch.b), rel=1e-2)
 
 
+@pytest.mark.bench
 def test_that_other_strips_give_nearly_the_power_of_the_ellipse():
     _, strips = hertz_strips(401)
     point = OperatingPoint(300.0, SPEED, Creepage(1e-3), 0.1)
@@ -641,6 +683,7 @@ def test_that_other_strips_give_nearly_the_power_of_the_ellipse():
         assert found.power == pytest.approx(balance(point, found), rel=1e-12)
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("name", ["flat", "bump_1um", "bump_10um", "parabola"])
 def test_that_fastsim_takes_the_strips_of_a_worn_profile(name):
     worn = worn_profile(name)

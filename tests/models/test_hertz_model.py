@@ -30,6 +30,7 @@ def contact(grid=None, creepage=(1e-3, 0.0, 0.0), load=300.0, mu=0.1, shape=None
     return model, gap, point, model.solve(gap, RIG[0], point)
 
 
+@pytest.mark.bench
 def test_that_the_patch_is_that_of_hertz():
     *_, solution = contact()
     patch = hertz(45.0, 1.0, 300.0, PAIR.contact_modulus)
@@ -39,6 +40,7 @@ def test_that_the_patch_is_that_of_hertz():
     assert solution.line_load.sum() * (solution.y[1] - solution.y[0]) == pytest.approx(300.0)
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("creepage", [(5e-4, 2e-4, 0.0), (5e-4, 2e-4, 0.3)])
 @pytest.mark.parametrize("bound", ["parabolic", "elliptic"])
 def test_that_with_fastsim_it_is_the_papers_model(bound, creepage):
@@ -51,6 +53,7 @@ def test_that_with_fastsim_it_is_the_papers_model(bound, creepage):
     assert np.array_equal(found.dissipation, expected.dissipation)
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("tangential", THEORIES)
 def test_that_strips_partly_covered_keep_forces_and_power_smooth(tangential):
     chosen = {"tangential": tangential, "creepage": (6e-4, 3e-4, 0.05)}
@@ -61,6 +64,7 @@ def test_that_strips_partly_covered_keep_forces_and_power_smooth(tangential):
         assert found.force_x == pytest.approx(exact.force_x, rel=2e-3)
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("tangential", THEORIES)
 def test_that_strips_may_end_anywhere_about_the_patchs_edge(tangential):
     rng, b = np.random.default_rng(5), 1.5e-3
@@ -80,6 +84,7 @@ def test_that_strips_may_end_anywhere_about_the_patchs_edge(tangential):
         assert power(Grid.spanning(-half, half, strips)) == pytest.approx(exact, rel=3e-3)
 
 
+@pytest.mark.bench
 def test_that_a_strip_that_carries_anything_has_a_half_length_whose_square_is_positive():
     ellipse = hertz(45.0, 1.0, 300.0, PAIR.contact_modulus)
     for covered in 10.0 ** np.arange(-30.0, 0.0):
@@ -103,6 +108,7 @@ def test_that_a_strip_that_carries_anything_has_a_half_length_whose_square_is_po
             assert strips.line_load[0] == 1e5
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("tangential", THEORIES)
 def test_that_all_slide_with_the_whole_of_friction_whatever_is_covered(tangential):
     grid = Grid.spanning(-2.05e-3, 2.05e-3, 23)
@@ -115,6 +121,7 @@ def test_that_all_slide_with_the_whole_of_friction_whatever_is_covered(tangentia
     assert sliding == pytest.approx(solution.line_load[touching], rel=tolerance)
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("tangential", THEORIES)
 def test_that_power_is_the_work_of_the_rigid_slip(tangential):
     _, _, point, found = contact(
@@ -124,6 +131,7 @@ def test_that_power_is_the_work_of_the_rigid_slip(tangential):
     assert found.power == pytest.approx(-point.rolling_speed * work, rel=1e-12)
 
 
+@pytest.mark.bench
 def test_that_strips_are_the_default_and_near_the_exact_theory():
     model, *_ = contact()
     assert isinstance(model.theory, StripTheory)
@@ -135,6 +143,7 @@ def test_that_strips_are_the_default_and_near_the_exact_theory():
     assert np.sqrt(np.mean(np.square(errors))) < 5e-3
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("tangential", THEORIES)
 def test_that_a_worn_profile_is_fitted_anew(tangential):
     def groove(y):
@@ -148,6 +157,7 @@ def test_that_a_worn_profile_is_fitted_anew(tangential):
     assert wide[1] > 1.2 * wide[0]
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("tangential", THEORIES)
 def test_that_friction_torque_and_creepage_may_be_local(tangential):
     model, gap, _, whole = contact(tangential=tangential)
@@ -163,6 +173,7 @@ def test_that_friction_torque_and_creepage_may_be_local(tangential):
     assert np.isfinite(model.solve(gap, RIG[0], OperatingPoint(300.0, 1.0, varied, 0.1)).power)
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("tangential", THEORIES)
 def test_that_fields_hold_the_load_and_the_traction(tangential):
     grid = Grid.spanning(-2.2e-3, 2.2e-3, 60)
@@ -179,12 +190,14 @@ def test_that_fields_hold_the_load_and_the_traction(tangential):
     assert force == pytest.approx(solution.force_x, rel=1e-2)
 
 
+@pytest.mark.bench
 def test_that_a_batch_is_solved_as_each_contact_alone():
     model, gap, point, alone = contact(creepage=(4e-4, 3e-4, 0.1), tangential="fastrip")
     found = model.solve_batch(np.array([gap, gap]), RIG[0], [point, point])
     assert found.stack("dissipation")[1] == pytest.approx(alone.dissipation, rel=1e-14)
 
 
+@pytest.mark.bench
 def test_that_what_it_cannot_do_is_told():
     model, gap, point, _ = contact()
     with pytest.raises(CapabilityError, match="hertz takes no wear compliance"):

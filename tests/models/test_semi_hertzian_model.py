@@ -59,6 +59,7 @@ def difference(exact, solution, name, attribute, power=1):
     return (missed.sum() / (exact[name] ** power).sum()) ** (1.0 / power)
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("variant", VARIANTS)
 @pytest.mark.parametrize("name", WORN)
 def test_that_worn_profiles_carry_nearly_the_line_load_of_the_exact_theory(variant, name):
@@ -72,6 +73,7 @@ def test_that_worn_profiles_carry_nearly_the_line_load_of_the_exact_theory(varia
         assert difference(exact, solution, "a", "half_length") < 0.07
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("variant", VARIANTS)
 @pytest.mark.parametrize("case", list(CREEPAGES))
 def test_that_worn_profiles_dissipate_nearly_like_the_exact_theory(variant, case):
@@ -86,6 +88,7 @@ def test_that_worn_profiles_dissipate_nearly_like_the_exact_theory(variant, case
         assert difference(scaled, solution, "rows", "dissipation", 2) < (0.32 if kik else 0.21)
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("variant", VARIANTS)
 @pytest.mark.parametrize("tangential", ["strip", "fastrip", "fastsim"])
 def test_that_power_is_the_work_of_the_rigid_slip(variant, tangential):
@@ -100,6 +103,7 @@ def test_that_power_is_the_work_of_the_rigid_slip(variant, tangential):
     assert solution.power > 0.0
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_that_the_fields_add_up_to_the_strips(variant):
     model, gap, point, solution = contact(variant, creepage={"longitudinal": 2e-4})
@@ -115,12 +119,14 @@ def test_that_the_fields_add_up_to_the_strips(variant):
     assert total(fields.power_density) == pytest.approx(solution.power, rel=2e-3)
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_that_a_free_roller_carries_its_bearing_torque(variant):
     *_, solution = contact(variant, creepage={"longitudinal": 0.0, "bearing_torque": 0.3})
     assert -0.02 * solution.force_x == pytest.approx(0.3, rel=1e-9)
 
 
+@pytest.mark.bench
 def test_that_the_variants_promise_what_they_keep():
     model, gap, point, hard = contact()
     assert SPEC.capabilities == model.capabilities
@@ -131,6 +137,7 @@ def test_that_the_variants_promise_what_they_keep():
     assert soft.line_load.sum() == pytest.approx(hard.line_load.sum(), rel=1e-12)
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_that_a_solution_does_not_depend_on_where_it_starts(variant):
     model, gap, point, solution = contact(variant)
@@ -139,6 +146,7 @@ def test_that_a_solution_does_not_depend_on_where_it_starts(variant):
     np.testing.assert_array_equal(again.line_load, solution.line_load)
 
 
+@pytest.mark.bench
 def test_that_a_contact_at_the_edge_of_its_strips_is_an_error():
     with pytest.raises(
         ContactError, match=r"raise contact\.width or move contact\.centre"
@@ -147,11 +155,13 @@ def test_that_a_contact_at_the_edge_of_its_strips_is_an_error():
     assert set(caught.value.state) >= {"gap", "line_load", "approach"}
 
 
+@pytest.mark.bench
 def test_that_strips_too_narrow_are_an_error():
     with pytest.raises(ContactError, match=r"lower contact\.strips"):
         contact(grid=Grid.spanning(-1.8e-5, 1.8e-5, 51))
 
 
+@pytest.mark.bench
 def test_that_what_is_not_finite_is_an_error():
     with pytest.raises(ContactError, match="not finite"):
         contact(gap=lambda y: np.where(y > 0.0, np.nan, y**2))

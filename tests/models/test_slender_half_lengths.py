@@ -13,6 +13,8 @@ from wearsim.mechanics.hertz import hertz
 from wearsim.models.slender import SPEC, SlenderOptions
 from wearsim.types import Creepage, Grid, OperatingPoint
 
+pytestmark = pytest.mark.bench
+
 MATERIALS = (STEEL, STEEL)
 MODULUS = combine(*MATERIALS).contact_modulus
 RIG, LOAD = 90.0, 300.0

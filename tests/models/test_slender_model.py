@@ -30,12 +30,14 @@ def contact(grid=None, gap=None, creepage=None, load=300.0, curvature=RIG, mu=0.
     return model, gap, point, model.solve(gap, curvature, point)
 
 
+@pytest.mark.bench
 def test_that_the_rigs_power_is_within_a_hundredth_of_the_exact_theory():
     *_, solution = contact()
     assert solution.power == pytest.approx(0.0771, rel=1e-2)
     assert solution.line_load.sum() * np.diff(solution.y)[0] == pytest.approx(300.0, rel=1e-10)
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("tangential", ["strip", "fastsim"])
 @pytest.mark.parametrize(
     "creepage",
@@ -61,6 +63,7 @@ def test_that_power_is_the_work_of_the_rigid_slip(creepage, tangential):
     )
 
 
+@pytest.mark.bench
 def test_that_forces_and_slip_have_the_signs_of_the_exact_theory():
     for row in rows("mean_problem", case="combined"):
         *_, solution = contact(
@@ -80,6 +83,7 @@ def test_that_forces_and_slip_have_the_signs_of_the_exact_theory():
         assert solution.power / SPEED == pytest.approx(row["P_over_V_N"], rel=3e-3)
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("name", WORN)
 def test_that_worn_profiles_carry_the_line_load_of_the_exact_theory(name):
     exact = worn_profile(name)
@@ -93,6 +97,7 @@ def test_that_worn_profiles_carry_the_line_load_of_the_exact_theory(name):
     assert solution.approach == pytest.approx(exact["approach"], rel=0.01)
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("name", WORN)
 @pytest.mark.parametrize("case", list(CREEPAGES))
 def test_that_worn_profiles_dissipate_like_the_exact_theory(name, case):
@@ -112,6 +117,7 @@ def test_that_worn_profiles_dissipate_like_the_exact_theory(name, case):
     assert np.linalg.norm(ours - rows_exact) < limit * np.linalg.norm(rows_exact)
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize(
     "creepage",
     [
@@ -147,6 +153,7 @@ def test_that_the_fields_add_up_to_the_strips(creepage):
     assert not slip[fields.adhesion].any()
 
 
+@pytest.mark.bench
 def test_that_spin_and_its_slip_profile_are_the_same_thing():
     grid = Grid.spanning(-1.9e-3, 1.9e-3, 101)
     spin = {"longitudinal": 3e-4, "spin": 0.5}
@@ -156,6 +163,7 @@ def test_that_spin_and_its_slip_profile_are_the_same_thing():
     np.testing.assert_allclose(second.dissipation, first.dissipation, rtol=1e-7)
 
 
+@pytest.mark.bench
 def test_that_a_mirrored_contact_has_mirrored_dissipation_and_opposite_moment():
     grid = Grid.spanning(-3e-3, 3e-3, 100)
     one = {"longitudinal": 3e-4, "lateral": 1e-4, "spin": 0.5}
@@ -167,6 +175,7 @@ def test_that_a_mirrored_contact_has_mirrored_dissipation_and_opposite_moment():
     assert second.spin_moment == pytest.approx(-first.spin_moment, rel=1e-9)
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("torque", [0.0, 1e-3, 0.1, 0.5, -0.3])
 def test_that_a_free_roller_carries_its_bearing_torque(torque):
     *_, solution = contact(creepage={"longitudinal": 0.0, "bearing_torque": torque, "spin": 0.2})
@@ -175,11 +184,13 @@ def test_that_a_free_roller_carries_its_bearing_torque(torque):
         assert abs(solution.longitudinal_creepage) < 1e-12
 
 
+@pytest.mark.bench
 def test_that_a_roller_that_must_skid_is_an_error():
     with pytest.raises(ContactError, match=r"the roller skids: its bearing torque of 0\.7 N m"):
         contact(creepage={"longitudinal": 0.0, "bearing_torque": 0.7})
 
 
+@pytest.mark.bench
 def test_that_a_contact_at_the_edge_of_its_strips_is_an_error():
     with pytest.raises(
         ContactError, match=r"raise contact\.width or move contact\.centre"
@@ -188,11 +199,13 @@ def test_that_a_contact_at_the_edge_of_its_strips_is_an_error():
     assert set(caught.value.state) >= {"gap", "line_load", "approach"}
 
 
+@pytest.mark.bench
 def test_that_strips_too_narrow_are_an_error():
     with pytest.raises(ContactError, match=r"lower contact\.strips"):
         contact(grid=Grid.spanning(-1.8e-5, 1.8e-5, 51))
 
 
+@pytest.mark.bench
 def test_that_friction_may_be_given_per_strip():
     grid = Grid.spanning(-1.9e-3, 1.9e-3, 101)
     local = np.where(grid.y > 0.0, 0.2, 0.1)
@@ -201,6 +214,7 @@ def test_that_friction_may_be_given_per_strip():
     np.testing.assert_allclose(mixed.dissipation, low.dissipation * local / 0.1, rtol=1e-10)
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("warm", [False, True])
 @pytest.mark.parametrize(
     "creepage",
@@ -228,6 +242,7 @@ def test_that_a_contact_alone_is_that_of_a_batch_to_the_bit(creepage, warm):
         assert np.array_equal(getattr(alone, item.name), getattr(batch[0], item.name))
 
 
+@pytest.mark.bench
 def test_that_power_that_is_not_finite_is_an_error_naming_its_contact():
     model, gap, point, _ = contact()
     bad = replace(point, creepage=Creepage(np.nan))
@@ -237,6 +252,7 @@ def test_that_power_that_is_not_finite_is_an_error_naming_its_contact():
         model.solve_batch(np.stack([gap, gap]), RIG, [point, bad])
 
 
+@pytest.mark.bench
 def test_that_wear_compliance_makes_the_contact_softer_and_conserves_the_load():
     model, gap, point, hard = contact(grid=Grid.spanning(-4e-3, 4e-3, 81))
     soft = model.solve(gap, RIG, point, np.full(81, 5e-11), hard)

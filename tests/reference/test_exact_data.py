@@ -5,6 +5,8 @@ import pytest
 
 from wearsim.bench.exact import CREEPAGES, WORN, rows, strips_of, table, worn_profile
 
+pytestmark = pytest.mark.bench
+
 
 @pytest.mark.parametrize("name", WORN)
 def test_that_a_worn_profile_carries_its_load_and_its_power(name):

@@ -40,6 +40,7 @@ def test_that_an_ellipse_is_hertz(across):
     assert found.peak_pressure == pytest.approx(patch.peak_pressure, rel=1e-3)
 
 
+@pytest.mark.bench
 @pytest.mark.parametrize("name", WORN)
 def test_that_a_worn_profile_is_that_of_contact(name):
     exact = worn_profile(name)

@@ -8,6 +8,8 @@ from wearsim.bench.accuracy import built, drawn_errors, hard_errors, worn_errors
 from wearsim.bench.exact import WORN
 from wearsim.errors import ContactError
 
+pytestmark = pytest.mark.bench
+
 VARIANTS = ("kik-piotrowski", "ayasse-chollet", "analyn")
 #: rms and worst error of the power, and the median L2 error of P_l(y)
 DRAWN = {

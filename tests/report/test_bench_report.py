@@ -10,6 +10,8 @@ from wearsim.report.bench import bench_figure
 from wearsim.report.bench_table import chosen, counted, heads, lines, markdown, percent
 from wearsim.report.saving import save_figure
 
+pytestmark = pytest.mark.bench
+
 MACHINE = Machine("a processor", 2, "3.12.1", {"numpy": "2.0"}, 1e-4)
 
 

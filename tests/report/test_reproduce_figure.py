@@ -15,6 +15,8 @@ from wearsim.report.reproduce_spread import normal, smoothed
 from wearsim.report.style import RED
 from wearsim.studies.reproduce import Reproduction, reproduce
 
+pytestmark = pytest.mark.bench
+
 FIGURES = {
     *("7a", "7b", "7c", "8a", "8b", "9a", "9b", "11a", "11b"),
     *("12a", "12b", "13", "14", "15a", "15b", "16", "17a", "17b"),

@@ -7,6 +7,8 @@ from wearsim.bench.hard_field import friction_field
 from wearsim.bench.hard_judging import judged
 from wearsim.bench.hard_runs import Plan
 
+pytestmark = pytest.mark.bench
+
 CASES = {case.name: case for case in hard_cases(SHORT)}
 PLAN = Plan.of(quick=True, changes={})
 

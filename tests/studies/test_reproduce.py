@@ -26,6 +26,8 @@ from wearsim.studies.reproduce import (
     white_friction,
 )
 
+pytestmark = pytest.mark.bench
+
 ROOT = Path(__file__).parents[2]
 COUNT = 1000
 GRID = 5e-4  # error of the paper's grid in the power of full slip
