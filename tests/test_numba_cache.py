@@ -19,7 +19,7 @@ CONTACT = f"""
 import hashlib, json, sys
 import wearsim
 solution = wearsim.solve_contact(wearsim.load_scenario(r"{SCENARIOS / "rig-450min.toml"}"))
-from wearsim.mechanics.slender_each import solve_each as kernel
+from wearsim.mechanics.slender.batch import solve_each as kernel
 stats = getattr(kernel, "stats")
 print(json.dumps({{
     "bits": hashlib.sha256(solution.dissipation.tobytes()).hexdigest(),
@@ -33,7 +33,7 @@ print(json.dumps({{
 STRIP = """
 import json
 import wearsim
-from wearsim.mechanics.carter import strip_force as kernel
+from wearsim.mechanics.tangential.carter import strip_force as kernel
 kernel(1e-4, 1e5, 0.1, 1e13, 1e-3, 0.0, 0.0, 1.15e11, 8e10)
 stats = kernel.stats
 print(json.dumps({"hits": sum(stats.cache_hits.values()), "path": stats.cache_path,
@@ -44,8 +44,8 @@ EVERYTHING = f"""
 import importlib, json, pkgutil
 import wearsim, wearsim.mechanics
 from pathlib import Path
-from wearsim.mechanics.kernel_dispatcher import Whole
-from wearsim.models.hertz_fastsim import HertzFastsim
+from wearsim.mechanics.numerics.kernel_dispatcher import Whole
+from wearsim.models.contact.hertz_fastsim import HertzFastsim
 from wearsim.types import Creepage, Grid, Material, OperatingPoint
 
 def scenario(name, **overrides):
@@ -82,13 +82,14 @@ model, grid = HertzFastsim(), Grid.spanning(-3e-3, 3e-3, 61)
 model.prepare(grid, (Material(200e9, 0.3), Material(200e9, 0.3)))
 model.friction_points(grid.y**2, 90.0, OperatingPoint(300.0, 2.6, Creepage(1e-3), 0.1))
 counts = {{}}
-for module in pkgutil.iter_modules(wearsim.mechanics.__path__):
-    held = importlib.import_module(f"wearsim.mechanics.{{module.name}}")
+prefix = "wearsim.mechanics."
+for module in pkgutil.walk_packages(wearsim.mechanics.__path__, prefix):
+    held = importlib.import_module(module.name)
     for name, value in vars(held).items():
         if isinstance(value, Whole) and value.__module__ == held.__name__:
             # as Python calls it and as other kernels do
             called = {{str(types) for form in (value, value.part) for types in form.signatures}}
-            counts[f"{{module.name}}.{{name}}"] = sorted(called)
+            counts[f"{{module.name.removeprefix(prefix)}}.{{name}}"] = sorted(called)
 print(json.dumps(counts))
 """
 
@@ -124,7 +125,8 @@ def copied(tmp_path: Path) -> Path:
 
 def make_read_only(site: Path) -> None:
     """Deny numba its folder beside the kernels, to root as well: a file stands in its place."""
-    (site / "wearsim" / "mechanics" / "__pycache__").write_text("not a folder")
+    for package in (site / "wearsim" / "mechanics").rglob("__init__.py"):
+        (package.parent / "__pycache__").write_text("not a folder")
 
 
 @pytest.mark.slow
@@ -142,7 +144,7 @@ def test_that_processes_starting_together_share_an_empty_cache(copied: Path, tmp
 @pytest.mark.slow
 def test_that_every_kernel_is_compiled_for_one_signature_only(tmp_path: Path):
     counts = run(EVERYTHING, NUMBA_CACHE_DIR=tmp_path)
-    assert "slender.solve_slender" in counts
+    assert "slender.newton.solve_slender" in counts
     unused = [name for name, signatures in counts.items() if not signatures]
     assert not unused, f"not reached by this test's runs: {unused}"
     several = {name: signatures for name, signatures in counts.items() if len(signatures) > 1}
@@ -152,7 +154,7 @@ def test_that_every_kernel_is_compiled_for_one_signature_only(tmp_path: Path):
 def test_that_a_writable_install_keeps_its_cache_beside_the_kernels(copied: Path):
     first, second = (run(STRIP, PYTHONPATH=copied) for _ in range(2))
     assert Path(first["file"]).is_relative_to(copied)
-    assert Path(first["path"]) == copied / "wearsim" / "mechanics" / "__pycache__"
+    assert Path(first["path"]) == copied / "wearsim" / "mechanics" / "tangential" / "__pycache__"
     assert (first["hits"], second["hits"]) == (0, 1)
 
 
@@ -178,14 +180,15 @@ def test_that_a_read_only_install_runs_where_nothing_can_be_cached(copied: Path,
 
 
 def test_cache_is_renewed_when_a_callee_elsewhere_changes(copied: Path, tmp_path: Path):
-    callers, callees = copied / "wearsim" / "models", copied / "wearsim" / "mechanics"
-    head = "from wearsim.mechanics.jit import kernel\n"
+    mechanics = copied / "wearsim" / "mechanics"
+    callers, callees = mechanics / "slender", mechanics / "hertz"
+    head = "from wearsim.mechanics.numerics.jit import kernel\n"
     body = "\n\n@kernel\ndef {name}(x: float) -> float:\n    return {value}\n"
     outer = body.format(name="outer", value="2.0 * inner(x)")
-    (callers / "outer.py").write_text(head + "from wearsim.mechanics.inner import inner\n" + outer)
+    (callers / "outer.py").write_text(head + "from wearsim.mechanics.hertz.inner import inner\n" + outer)
     found = []
     for value in ("x + 1.0", "x + 3.0"):
         (callees / "inner.py").write_text(head + body.format(name="inner", value=value))
-        code = "from wearsim.models.outer import outer; print(outer(1.0))"
+        code = "from wearsim.mechanics.slender.outer import outer; print(outer(1.0))"
         found.append(run(code, PYTHONPATH=copied, NUMBA_CACHE_DIR=tmp_path / "cache"))
     assert found == [4.0, 8.0]

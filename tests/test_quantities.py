@@ -23,17 +23,14 @@ from wearsim.quantities import (
     PositiveDuration,
     PositiveLength,
     Pressure,
-    QuantityError,
     RotationSpeed,
     Speed,
     Stiffness,
     Torque,
     WearFactor,
-    conversion,
-    in_engineers_unit,
     quantity,
-    shown,
 )
+from wearsim.units import QuantityError, conversion, in_engineers_unit, shown
 
 LENGTH = 'expected a length such as "20 mm"'
 
@@ -260,7 +257,7 @@ def test_that_long_values_are_cut_short_in_messages() -> None:
 
 
 def test_that_importing_costs_no_pint() -> None:
-    code = "import sys, wearsim.quantities, wearsim.tables; print('pint' in sys.modules)"
+    code = "import sys, wearsim.quantities, wearsim.csv_tables; print('pint' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
 

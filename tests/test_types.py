@@ -5,7 +5,8 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from wearsim.types import BatchSolution, ContactSolution, OperatingPoints, rows_of
+from wearsim.contact_batch import BatchSolution, OperatingPoints, rows_of
+from wearsim.types import ContactSolution
 
 Y = np.linspace(-1.0, 1.0, 5)
 

@@ -18,11 +18,11 @@ if TYPE_CHECKING:
         open_results,
     )
     from wearsim.scenario import Scenario, load_scenario
-    from wearsim.studies.compare import compare
-    from wearsim.studies.contact import ContactStudy, solve_contact, study_contact
-    from wearsim.studies.dissipation import dissipation
-    from wearsim.studies.ensemble import ensemble, resume_ensemble
-    from wearsim.studies.replay import resume, run
+    from wearsim.studies.contact.monte_carlo import dissipation
+    from wearsim.studies.contact.single import ContactStudy, solve_contact, study_contact
+    from wearsim.studies.ensemble.api import ensemble, resume_ensemble
+    from wearsim.studies.ensemble.compare import compare
+    from wearsim.studies.run.run import resume, run
     from wearsim.types import ContactSolution, Profile
 
 __all__ = [
@@ -49,24 +49,24 @@ __all__ = [
 
 _HOMES = {
     "ContactSolution": "wearsim.types",
-    "ContactStudy": "wearsim.studies.contact",
+    "ContactStudy": "wearsim.studies.contact.single",
     "DissipationResult": "wearsim.results",
     "EnsembleResult": "wearsim.results",
     "Profile": "wearsim.types",
     "Result": "wearsim.results",
     "Scenario": "wearsim.scenario",
-    "compare": "wearsim.studies.compare",
-    "dissipation": "wearsim.studies.dissipation",
-    "ensemble": "wearsim.studies.ensemble",
+    "compare": "wearsim.studies.ensemble.compare",
+    "dissipation": "wearsim.studies.contact.monte_carlo",
+    "ensemble": "wearsim.studies.ensemble.api",
     "load_scenario": "wearsim.scenario",
     "open_dissipation": "wearsim.results",
     "open_ensemble": "wearsim.results",
     "open_results": "wearsim.results",
-    "resume": "wearsim.studies.replay",
-    "resume_ensemble": "wearsim.studies.ensemble",
-    "run": "wearsim.studies.replay",
-    "solve_contact": "wearsim.studies.contact",
-    "study_contact": "wearsim.studies.contact",
+    "resume": "wearsim.studies.run.run",
+    "resume_ensemble": "wearsim.studies.ensemble.api",
+    "run": "wearsim.studies.run.run",
+    "solve_contact": "wearsim.studies.contact.single",
+    "study_contact": "wearsim.studies.contact.single",
 }
 
 

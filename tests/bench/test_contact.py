@@ -22,10 +22,10 @@ from wearsim.bench.contact_methods import HOST, Method, methods, normal_methods
 from wearsim.bench.exact import rows
 from wearsim.bench.measured import Effort
 from wearsim.errors import ContactError, PluginError
-from wearsim.models import slender
-from wearsim.models.tangential_options import TangentialOptions
+from wearsim.models.contact import slender
+from wearsim.models.tangential.options import TangentialOptions
 from wearsim.plugins import ContactModelSpec, manager, registry
-from wearsim.studies.tracks import fresh_patch, run_grid
+from wearsim.studies.run.grid import fresh_patch, run_grid
 
 pytestmark = pytest.mark.bench
 

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from wearsim.bench.accuracy import MATERIALS
 from wearsim.bench.contact_width import contact_width
 from wearsim.bench.exact import WORN, worn_profile
-from wearsim.mechanics.elasticity import combine
-from wearsim.mechanics.hertz import hertz
+from wearsim.mechanics.hertz.elasticity import combine
+from wearsim.mechanics.hertz.ellipse import hertz
 
 pytestmark = pytest.mark.bench
 

@@ -15,11 +15,11 @@ from wearsim.bench.hard_judging import judged
 from wearsim.bench.hard_runs import Plan, is_symmetric, mirror_image
 from wearsim.bench.hard_verdict import CHECKS, Check, Verdict
 from wearsim.bench.measured import Effort
-from wearsim.mechanics.hertz import hertz
+from wearsim.mechanics.hertz.ellipse import hertz
 from wearsim.report.bench_hard import hard_markdown
 from wearsim.results import Result
-from wearsim.scenario.shipped import shipped_scenario
-from wearsim.studies.replay import run
+from wearsim.scenario.examples import shipped_scenario
+from wearsim.studies.run.run import run
 
 pytestmark = pytest.mark.bench
 

@@ -10,12 +10,12 @@ from wearsim.bench.measured import Effort
 from wearsim.bench.sampling import DEFAULT, METHODS, QUICK, Size, measurements, sampling, studies_of
 from wearsim.bench.sampling_errors import MEAN, PROBABILITY, QUANTILE, Study, Truth, truths
 from wearsim.bench.sampling_jobs import CheapDraws, Part, rig
-from wearsim.randomness.plans import PLANS, REPLICATES
-from wearsim.randomness.sampler import Sampler
-from wearsim.scenario.shipped import shipped_scenario
-from wearsim.studies.depth_control import closed_form_depths
-from wearsim.studies.draws import Drawer
-from wearsim.studies.ensemble import ensemble
+from wearsim.scenario.examples import shipped_scenario
+from wearsim.studies.ensemble.api import ensemble
+from wearsim.studies.ensemble.control_variate import closed_form_depths
+from wearsim.studies.run.draws import Drawer
+from wearsim.uq.sampling.plans import PLANS, REPLICATES
+from wearsim.uq.sampling.sampler import Sampler
 
 pytestmark = pytest.mark.bench
 

@@ -18,7 +18,7 @@ from wearsim.bench.savings_contacts import (
 from wearsim.bench.savings_pairs import Pair, Ways
 from wearsim.bench.savings_tests import APART, RIG, STEPPERS
 from wearsim.bench.stepping_tests import Ready, WearTest
-from wearsim.models.semi_hertzian import SemiHertzian
+from wearsim.models.contact.semi_hertzian import SemiHertzian
 from wearsim.plugins import ContactModelSpec, registry
 
 pytestmark = pytest.mark.bench

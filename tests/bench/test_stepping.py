@@ -16,7 +16,7 @@ from wearsim.bench.stepping_solvers import SOLVERS, solved_by
 from wearsim.bench.stepping_tests import End, Ready, WearTest, errors_of
 from wearsim.errors import PluginError, StepError
 from wearsim.plugins import ContactModelSpec, registry
-from wearsim.scenario.sections import EvolutionTable
+from wearsim.scenario.tables.plain import EvolutionTable
 
 pytestmark = pytest.mark.bench
 

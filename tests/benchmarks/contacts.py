@@ -10,20 +10,14 @@ import numpy as np
 from tests.benchmarks.table import Effort, Row, part
 from wearsim.bench.contact_cases import Case, elliptic_cases
 from wearsim.bench.timing import best, best_short
-from wearsim.mechanics.elasticity import combine
-from wearsim.mechanics.hertz import HertzContact, hertz
-from wearsim.mechanics.strip import SUMS, strip_contacts
-from wearsim.mechanics.strip_coupling import strip_elasticity
-from wearsim.models.hertz_fastsim import HertzFastsim, HertzFastsimOptions
+from wearsim.contact_batch import OperatingPoints
+from wearsim.mechanics.hertz.elasticity import combine
+from wearsim.mechanics.hertz.ellipse import HertzContact, hertz
+from wearsim.mechanics.tangential.strip_interaction import strip_elasticity
+from wearsim.mechanics.tangential.strip_theory import SUMS, strip_contacts
+from wearsim.models.contact.hertz_fastsim import HertzFastsim, HertzFastsimOptions
 from wearsim.plugins import ContactModelSpec, registry
-from wearsim.types import (
-    ContactSolution,
-    Creepage,
-    Grid,
-    Material,
-    OperatingPoint,
-    OperatingPoints,
-)
+from wearsim.types import ContactSolution, Creepage, Grid, Material, OperatingPoint
 
 STEEL = Material(youngs_modulus=200e9, poisson_ratio=0.3)
 ALONG, CROWN, LOAD = 1 / 0.020 + 1 / 0.025, 0.5, 300.0

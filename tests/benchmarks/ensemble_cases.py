@@ -13,7 +13,7 @@ import numpy as np
 
 import wearsim
 from wearsim.scenario import Scenario
-from wearsim.studies.ensemble import ensemble
+from wearsim.studies.ensemble.api import ensemble
 from wearsim.types import FloatArray
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"

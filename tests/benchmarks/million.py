@@ -18,10 +18,10 @@ import numpy as np
 
 from tests.benchmarks.ensemble_cases import Size, drawn
 from wearsim.results import Outcome
-from wearsim.results.ensemble_layout import OBSERVABLES
-from wearsim.studies import ensemble as study
-from wearsim.studies.depth_control import closed_form_depths
-from wearsim.studies.member import Members
+from wearsim.results.ensemble.schema import OBSERVABLES
+from wearsim.studies.ensemble import api as study
+from wearsim.studies.ensemble.control_variate import closed_form_depths
+from wearsim.studies.ensemble.realisation import Members
 
 
 class ClosedForm(Members):

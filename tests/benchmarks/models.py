@@ -34,7 +34,7 @@ from wearsim.bench.timing import best_short, timed
 from wearsim.errors import WearsimError
 from wearsim.plugins.template import template_folder
 from wearsim.report.bench_table import markdown_table
-from wearsim.report.units import brief
+from wearsim.report.text.units import brief
 
 #: what is drawn or prescribed, by contact model and options
 TANGENTIAL: dict[str, tuple[str, dict[str, Any]]] = {

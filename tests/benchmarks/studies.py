@@ -8,10 +8,10 @@ import numpy as np
 
 from tests.benchmarks.table import Effort, Row, part
 from wearsim.bench.timing import best
-from wearsim.randomness.maxent import maximum_entropy
-from wearsim.randomness.streams import Stream
 from wearsim.scenario import Scenario, load_scenario
-from wearsim.studies.dissipation import dissipation
+from wearsim.studies.contact.monte_carlo import dissipation
+from wearsim.uq.distributions.maxent import maximum_entropy
+from wearsim.uq.sampling.philox import Stream
 
 PAPER = Path(__file__).parents[2] / "scenarios" / "paper-monte-carlo.toml"
 MEAN_POWER = 0.1058  # W, of the paper's inputs

@@ -19,7 +19,7 @@ from tests.benchmarks import (
     table,
 )
 from tests.benchmarks.report import QUICK, TABLES
-from wearsim.studies.dissipation import dissipation
+from wearsim.studies.contact.monte_carlo import dissipation
 
 pytestmark = pytest.mark.bench
 

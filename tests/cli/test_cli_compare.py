@@ -13,10 +13,10 @@ from tests.studies.ensemble_cases import frail, small
 from wearsim.errors import Interrupted
 from wearsim.results import open_ensemble, open_results
 from wearsim.scenario import load_scenario
-from wearsim.studies.compare import compare
-from wearsim.studies.dissipation import dissipation
-from wearsim.studies.ensemble import ensemble
-from wearsim.studies.replay import run
+from wearsim.studies.contact.monte_carlo import dissipation
+from wearsim.studies.ensemble.api import ensemble
+from wearsim.studies.ensemble.compare import compare
+from wearsim.studies.run.run import run
 
 
 @pytest.fixture(scope="module", autouse=True)

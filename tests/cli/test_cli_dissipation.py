@@ -13,10 +13,10 @@ import pytest
 from cli_examples import SCENARIOS, Command
 
 from tests.interruptible import interruptible
-from wearsim.cli.counting import CountedLines
-from wearsim.cli.progress import Clock
+from wearsim.cli.progress.count import CountedLines
+from wearsim.cli.progress.run import Clock
 from wearsim.results import open_dissipation
-from wearsim.studies.study_size import MOST_BYTES
+from wearsim.studies.limits import MOST_BYTES
 
 PAPER = SCENARIOS / "paper-monte-carlo.toml"
 SMALL = ("--set", "contact.mx=8", "--set", "contact.my=12", "-n", 50)
@@ -25,7 +25,7 @@ SMALL = ("--set", "contact.mx=8", "--set", "contact.my=12", "-n", 50)
 @pytest.fixture(scope="session")
 def studied_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from wearsim.scenario import load_scenario
-    from wearsim.studies.dissipation import dissipation
+    from wearsim.studies.contact.monte_carlo import dissipation
 
     path = tmp_path_factory.mktemp("studied") / "a.h5"
     dissipation(load_scenario(PAPER, {"contact.mx": 8, "contact.my": 12}), 50, path)

@@ -18,17 +18,17 @@ import wearsim
 from tests.interruptible import interruptible
 from tests.report.made_up_ensembles import made_up
 from tests.studies.ensemble_cases import frail, small
-from wearsim.cli import ensemble_progress
-from wearsim.cli.ensemble_progress import EnsembleLines, LiveEnsemble, told, watching_ensemble
-from wearsim.cli.ensemble_table import write_ensemble
-from wearsim.cli.progress import Clock
+from wearsim.cli.progress import ensemble as ensemble_progress
+from wearsim.cli.progress.ensemble import EnsembleLines, LiveEnsemble, told, watching_ensemble
+from wearsim.cli.progress.run import Clock
+from wearsim.cli.render.ensemble_table import write_ensemble
 from wearsim.errors import Interrupted, ResultsFileError
-from wearsim.randomness.intervals import UNKNOWN, Interval
-from wearsim.randomness.targets import Target
 from wearsim.results import EnsembleResult, open_ensemble
-from wearsim.studies.checkpoints import checkpoints
-from wearsim.studies.ensemble import ensemble
-from wearsim.studies.ensemble_events import EnsembleProgress
+from wearsim.studies.ensemble.api import ensemble
+from wearsim.studies.ensemble.interim_analyses import checkpoints
+from wearsim.studies.ensemble.progress import EnsembleProgress
+from wearsim.uq.estimation.intervals import UNKNOWN, Interval
+from wearsim.uq.estimation.stopping_rule import Target
 
 HERE = ("--scheduler", "serial", "-q")
 

@@ -3,10 +3,10 @@ import io
 import pytest
 from rich.console import Console
 
-from wearsim.cli import progress
 from wearsim.cli.output import plain
-from wearsim.cli.progress import Clock, LiveLine, PlainLines
-from wearsim.studies.events import Event, Finished, Started, Stepped, Warned
+from wearsim.cli.progress import run as progress
+from wearsim.cli.progress.run import Clock, LiveLine, PlainLines
+from wearsim.studies.run.events import Event, Finished, Started, Stepped, Warned
 
 STARTED = Started(1000.0, 60.0, 0.0, "implicit", "slender")
 

@@ -11,7 +11,7 @@ from cli_examples import SCENARIOS, Command
 from tests.interruptible import interruptible
 from wearsim.errors import Interrupted
 from wearsim.results import open_results
-from wearsim.studies import replay
+from wearsim.studies.run import run as replay
 
 
 def test_that_run_writes_a_file_named_after_the_scenario(command: Command, scenario: Path) -> None:
@@ -118,7 +118,7 @@ def test_that_a_signal_stops_a_run_at_a_checkpoint_that_resume_finishes(
 
 def test_that_a_second_signal_ends_a_run_at_once(tmp_path: Path) -> None:
     code = (
-        "import os, signal, time\nfrom wearsim.cli.stop import stop_on_signals\n"
+        "import os, signal, time\nfrom wearsim.cli.signals import stop_on_signals\n"
         "with stop_on_signals() as stop:\n"
         "    os.kill(os.getpid(), signal.SIGINT)\n"
         "    assert stop.requested()\n    print('asked', flush=True)\n    time.sleep(60)\n"

@@ -4,9 +4,9 @@ import sys
 from importlib.metadata import version
 
 import pytest
+import wearsim.cli.check
 from cli_examples import Command
 
-import wearsim.cli.check
 from wearsim.errors import CapabilityError, PluginError, ResultsFileError, SolverError
 
 VERBS = [
@@ -101,7 +101,7 @@ def test_that_errors_are_told_in_a_line_and_set_the_exit_code(
     def fail(*_: object) -> None:
         raise error
 
-    monkeypatch.setattr(wearsim.cli.check, "read_scenario", fail)
+    monkeypatch.setattr(wearsim.cli.commands.check, "read_scenario", fail)
     result = command("check", "a.toml")
     assert result.exit_code == code
     assert result.stderr.startswith(words)
@@ -116,7 +116,7 @@ def test_that_a_traceback_is_shown_when_asked_for(
     def fail(*_: object) -> None:
         raise CapabilityError("cannot")
 
-    monkeypatch.setattr(wearsim.cli.check, "read_scenario", fail)
+    monkeypatch.setattr(wearsim.cli.commands.check, "read_scenario", fail)
     monkeypatch.setenv("WEARSIM_TRACEBACK", "1" if by == "environment" else "0")
     result = command(*(["--traceback"] if by == "option" else []), "check", "a.toml")
     assert result.exit_code == 2

@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from wearsim.evolution.loop import evolve
+from wearsim.evolution.integrate import evolve
 from wearsim.evolution.state import fresh_state
 from wearsim.scenario import load_scenario
-from wearsim.studies.build import build_scene
+from wearsim.studies.run.assemble import build_scene
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 

@@ -7,13 +7,13 @@ import pytest
 
 from tests.evolution import built, stepped
 from wearsim.errors import SolverError, StepError
-from wearsim.evolution.advance import cylinder_depth_of, cylinder_volume_of
-from wearsim.evolution.control import StepControl
-from wearsim.evolution.explicit import ExplicitStepper, stability_limit
-from wearsim.evolution.implicit import ImplicitStepper
+from wearsim.evolution.error_control.step_size import StepControl
 from wearsim.evolution.observables import centroid, oscillation
-from wearsim.evolution.per_pass import PerPassStepper, _run_compiled, _run_in_python
 from wearsim.evolution.state import fresh_state
+from wearsim.evolution.steppers.backward_euler import ImplicitStepper
+from wearsim.evolution.steppers.forward_euler import ExplicitStepper, stability_limit
+from wearsim.evolution.steppers.per_pass import PerPassStepper, _run_compiled, _run_in_python
+from wearsim.evolution.steppers.single_step import cylinder_depth_of, cylinder_volume_of
 
 THREE = {"roller__offset": ["-1 mm", "0.3 mm", "1 mm"]}
 THERMAL = {"gain": "0.1 N/W", "time_constant": "1 min"}

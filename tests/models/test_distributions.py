@@ -13,8 +13,9 @@ from scipy import stats
 
 from wearsim.errors import ScenarioError
 from wearsim.plugins import Distribution, JointDistribution, RandomInputSpec, registry
-from wearsim.quantities import FORCE, Quantity
+from wearsim.quantities import Quantity
 from wearsim.types import FloatArray
+from wearsim.units import FORCE
 
 NAMES = ("maxent", "normal", "lognormal", "uniform", "truncated-normal", "constant", "table")
 NEWTON = {"quantity": Quantity(FORCE)}

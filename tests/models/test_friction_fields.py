@@ -5,14 +5,14 @@ import pytest
 from pydantic import ValidationError
 from scipy.special import ndtri
 
-from wearsim.models.friction_fields import (
+from wearsim.models.random.friction_fields import (
     GaussianField,
     GaussianFieldOptions,
     White,
     WhiteOptions,
 )
 from wearsim.plugins import Distribution, RandomInputSpec, registry
-from wearsim.randomness.streams import Stream
+from wearsim.uq.sampling.philox import Stream
 
 MEAN, STD, LENGTH = 0.1, 0.02, 50e-6
 

@@ -10,16 +10,17 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from wearsim.bench.exact import STEEL, rows, table, worn_profile
+from wearsim.contact_batch import OperatingPoints
 from wearsim.errors import CapabilityError, ContactError
-from wearsim.mechanics.elasticity import combine
-from wearsim.mechanics.fastsim_closed_form import closed_form_parabolic
-from wearsim.mechanics.hertz import hertz
-from wearsim.mechanics.kalker import creepage_coefficients, flexibilities
-from wearsim.models.equivalent_ellipse import equivalent_ellipse
-from wearsim.models.fastsim_theory import FastsimTheory
-from wearsim.models.hertz_fastsim import SPEC, HertzFastsim, HertzFastsimOptions
-from wearsim.models.tangential import Strips, complete
-from wearsim.types import Creepage, Grid, OperatingPoint, OperatingPoints
+from wearsim.mechanics.hertz.elasticity import combine
+from wearsim.mechanics.hertz.ellipse import hertz
+from wearsim.mechanics.tangential.fastsim_closed_form import closed_form_parabolic
+from wearsim.mechanics.tangential.kalker_coefficients import creepage_coefficients, flexibilities
+from wearsim.models.contact.equivalent_ellipse import equivalent_ellipse
+from wearsim.models.contact.hertz_fastsim import SPEC, HertzFastsim, HertzFastsimOptions
+from wearsim.models.tangential.base import Strips, complete
+from wearsim.models.tangential.fastsim import FastsimTheory
+from wearsim.types import Creepage, Grid, OperatingPoint
 
 MATERIALS = (STEEL, STEEL)
 PAIR = combine(*MATERIALS)

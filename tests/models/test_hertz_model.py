@@ -5,12 +5,12 @@ import pytest
 
 from wearsim.bench.exact import STEEL, rows
 from wearsim.errors import CapabilityError, ContactError
-from wearsim.mechanics.elasticity import combine
-from wearsim.mechanics.hertz import hertz
-from wearsim.models.equivalent_ellipse import EllipseStrips
-from wearsim.models.hertz_fastsim import HertzFastsim, HertzFastsimOptions
-from wearsim.models.hertz_model import SPEC, HertzModel, Patch
-from wearsim.models.strip_theory import StripTheory
+from wearsim.mechanics.hertz.elasticity import combine
+from wearsim.mechanics.hertz.ellipse import hertz
+from wearsim.models.contact.equivalent_ellipse import EllipseStrips
+from wearsim.models.contact.hertz import SPEC, HertzModel, Patch
+from wearsim.models.contact.hertz_fastsim import HertzFastsim, HertzFastsimOptions
+from wearsim.models.tangential.strip_theory import StripTheory
 from wearsim.types import Creepage, Grid, OperatingPoint
 
 MATERIALS = (STEEL, STEEL)

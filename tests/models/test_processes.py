@@ -6,9 +6,9 @@ from pydantic import ValidationError
 from scipy import stats
 from scipy.special import ndtr
 
-from wearsim.models.processes import OrnsteinUhlenbeck, OrnsteinUhlenbeckOptions
+from wearsim.models.random.processes import OrnsteinUhlenbeck, OrnsteinUhlenbeckOptions
 from wearsim.plugins import Distribution, RandomInputSpec, registry
-from wearsim.randomness.streams import Stream
+from wearsim.uq.sampling.philox import Stream
 
 
 class Gumbel(Distribution):

@@ -6,8 +6,8 @@ import pytest
 from tests.studies.study_examples import short
 from wearsim.bench.exact import CREEPAGES, STEEL, WORN, worn_profile
 from wearsim.errors import ContactError
-from wearsim.models.semi_hertzian import SPEC, SemiHertzianOptions
-from wearsim.studies import replay
+from wearsim.models.contact.semi_hertzian import SPEC, SemiHertzianOptions
+from wearsim.studies.run import run as replay
 from wearsim.types import Creepage, Grid, OperatingPoint
 
 MATERIALS = (STEEL, STEEL)

@@ -8,9 +8,9 @@ import pytest
 
 from tests.reference import half_space
 from wearsim.bench.exact import STEEL, WORN, worn_profile
-from wearsim.mechanics.elasticity import combine
-from wearsim.mechanics.hertz import hertz
-from wearsim.models.slender import SPEC, SlenderOptions
+from wearsim.mechanics.hertz.elasticity import combine
+from wearsim.mechanics.hertz.ellipse import hertz
+from wearsim.models.contact.slender import SPEC, SlenderOptions
 from wearsim.types import Creepage, Grid, OperatingPoint
 
 pytestmark = pytest.mark.bench

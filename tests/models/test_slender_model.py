@@ -8,8 +8,8 @@ import pytest
 
 from wearsim.bench.exact import CREEPAGES, STEEL, WORN, rows, worn_profile
 from wearsim.errors import ContactError
-from wearsim.models.slender import SPEC, Slender, SlenderOptions
-from wearsim.models.strip_theory import StripTheory
+from wearsim.models.contact.slender import SPEC, Slender, SlenderOptions
+from wearsim.models.tangential.strip_theory import StripTheory
 from wearsim.types import ContactSolution, Creepage, Grid, OperatingPoint
 
 MATERIALS = (STEEL, STEEL)

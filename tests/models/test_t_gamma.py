@@ -5,8 +5,8 @@ import pytest
 from pydantic import ValidationError
 
 from tests.evolution import built, stepped, worn
-from wearsim.evolution.per_pass import PerPassStepper
-from wearsim.models.t_gamma import Regimes, TGamma, TGammaOptions
+from wearsim.evolution.steppers.per_pass import PerPassStepper
+from wearsim.models.wear.t_gamma import Regimes, TGamma, TGammaOptions
 from wearsim.types import ContactSolution
 
 SPEED = 2.0

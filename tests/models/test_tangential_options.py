@@ -4,10 +4,10 @@ import pytest
 from pydantic import ValidationError
 
 from wearsim.errors import ScenarioError
-from wearsim.models.fastrip_theory import FastripTheory
-from wearsim.models.fastsim_theory import FastsimTheory
-from wearsim.models.strip_theory import StripTheory
-from wearsim.models.tangential_options import TangentialOptions, tangential_theory
+from wearsim.models.tangential.fastrip import FastripTheory
+from wearsim.models.tangential.fastsim import FastsimTheory
+from wearsim.models.tangential.options import TangentialOptions, tangential_theory
+from wearsim.models.tangential.strip_theory import StripTheory
 from wearsim.scenario import parse_scenario
 
 RIG = """

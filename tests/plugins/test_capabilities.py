@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from wearsim.contact_batch import OperatingPoints
 from wearsim.errors import CapabilityError, ContactError
 from wearsim.plugins import ContactModelSpec, SharedWear, registry
-from wearsim.types import Creepage, Grid, Material, OperatingPoint, OperatingPoints
+from wearsim.types import Creepage, Grid, Material, OperatingPoint
 
 STEEL = Material(youngs_modulus=210e9, poisson_ratio=0.3)
 CURVATURE = 1 / 0.025 + 1 / 0.020

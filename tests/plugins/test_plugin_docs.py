@@ -22,7 +22,6 @@ from wearsim.plugins import (
     hookspecs,
     registry,
 )
-from wearsim.quantities import ANGLE, FORCE
 from wearsim.testing import loads, random_inputs
 from wearsim.testing.contact_bench import ContactBench
 from wearsim.testing.kit import CONTACT_MODEL
@@ -30,6 +29,7 @@ from wearsim.testing.loads import LoadBench
 from wearsim.testing.random_bench import RandomBench
 from wearsim.testing.specs import Chosen
 from wearsim.testing.wear_laws import WEAR_LAW, WearLawBench
+from wearsim.units import ANGLE, FORCE
 
 PAGE = (Path(__file__).parents[2] / "docs" / "plugins.md").read_text(encoding="utf-8")
 LOAD = 'kind = "constant"\nnormal_force = "300 N"'

@@ -5,7 +5,7 @@ import pytest
 
 from tests.reference import half_space
 from wearsim.bench.exact import WORN, worn_profile
-from wearsim.mechanics.hertz import hertz
+from wearsim.mechanics.hertz.ellipse import hertz
 
 MODULUS = 200e9 / (2.0 * (1.0 - 0.3**2))
 

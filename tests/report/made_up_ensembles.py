@@ -6,7 +6,7 @@ import numpy as np
 
 from tests.rig_text import BODIES
 from wearsim.results import EnsembleData, EnsembleResult
-from wearsim.results.ensemble_layout import DONE, FAILED, OBSERVABLES, PENDING
+from wearsim.results.ensemble.schema import DONE, FAILED, OBSERVABLES, PENDING
 
 TITLE = "made up"
 DEPTH = 20e-6  # of the mean inputs [m]

@@ -8,7 +8,7 @@ from wearsim.bench.measured import Effort, Measurement, Topic
 from wearsim.report import bench_table
 from wearsim.report.bench import bench_figure
 from wearsim.report.bench_table import chosen, counted, heads, lines, markdown, percent
-from wearsim.report.saving import save_figure
+from wearsim.report.parts.saving import save_figure
 
 pytestmark = pytest.mark.bench
 

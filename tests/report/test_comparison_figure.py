@@ -9,12 +9,12 @@ import pytest
 
 from tests.report.made_up_ensembles import made_up
 from tests.studies.study_examples import short
-from wearsim.randomness.intervals import UNKNOWN, Interval
-from wearsim.report.ensemble_comparison import MOST_POINTS, comparison_figure
-from wearsim.report.intervals import cells, part_with_interval, with_interval
-from wearsim.report.saving import save_figure
-from wearsim.studies import replay
-from wearsim.studies.compare import compare
+from wearsim.report.figures.ensemble_comparison import MOST_POINTS, comparison_figure
+from wearsim.report.parts.saving import save_figure
+from wearsim.report.text.intervals import cells, part_with_interval, with_interval
+from wearsim.studies.ensemble.compare import compare
+from wearsim.studies.run import run as replay
+from wearsim.uq.estimation.intervals import UNKNOWN, Interval
 
 
 @pytest.fixture(scope="module")

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from wearsim.report.dissipation import CLASSES, MOST_LINES, dissipation_figure
-from wearsim.report.saving import save_figure
+from wearsim.report.figures.dissipation import CLASSES, MOST_LINES, dissipation_figure
+from wearsim.report.parts.saving import save_figure
 from wearsim.results import DissipationResult
 from wearsim.scenario import load_scenario
-from wearsim.studies.dissipation import dissipation
+from wearsim.studies.contact.monte_carlo import dissipation
 
 PAPER = Path(__file__).parents[2] / "scenarios" / "paper-monte-carlo.toml"
 

@@ -10,12 +10,12 @@ import pytest
 from matplotlib.colors import to_hex
 
 from tests.report.made_up_ensembles import INPUTS, made_up
-from wearsim.randomness.targets import Target
-from wearsim.report.ensemble import FEW, ensemble_figure
-from wearsim.report.saving import save_figure
-from wearsim.report.settling import settling
-from wearsim.report.style import GREY
+from wearsim.report.figures.ensemble import FEW, ensemble_figure
+from wearsim.report.parts.convergence import settling
+from wearsim.report.parts.saving import save_figure
+from wearsim.report.parts.style import GREY
 from wearsim.results import EnsembleResult
+from wearsim.uq.estimation.stopping_rule import Target
 
 
 @pytest.fixture(scope="module")

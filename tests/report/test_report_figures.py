@@ -8,14 +8,14 @@ import pytest
 from matplotlib.figure import Figure
 
 from wearsim.errors import PluginError
-from wearsim.report.contact import contact_figure
-from wearsim.report.measured import Measured
-from wearsim.report.replay import replay_figure
-from wearsim.report.saving import save_figure
+from wearsim.report.figures.contact import contact_figure
+from wearsim.report.figures.run import replay_figure
+from wearsim.report.parts.measured_profiles import Measured
+from wearsim.report.parts.saving import save_figure
 from wearsim.results import Result
 from wearsim.scenario import load_scenario
-from wearsim.studies import replay
-from wearsim.studies.contact import ContactStudy, study_contact
+from wearsim.studies.contact.single import ContactStudy, study_contact
+from wearsim.studies.run import run as replay
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 SHORT = {"operation.duration": "3 min", "outputs.records": 4}

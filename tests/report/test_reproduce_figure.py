@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
+from wearsim.report.parts.style import RED
 from wearsim.report.reproduce import reproduction_figure
 from wearsim.report.reproduce_spread import normal, smoothed
-from wearsim.report.style import RED
 from wearsim.studies.reproduce import Reproduction, reproduce
 
 pytestmark = pytest.mark.bench

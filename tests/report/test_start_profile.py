@@ -4,7 +4,7 @@ import numpy as np
 
 import wearsim
 from tests.evolution import SCENARIOS
-from wearsim.report.replay import _draw_profiles
+from wearsim.report.figures.run import _draw_profiles
 
 
 class Lines:

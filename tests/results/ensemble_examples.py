@@ -9,7 +9,7 @@ from run_examples import LOG, SCENARIO
 
 from wearsim.results import EnsembleData, EnsembleFile, Outcome
 from wearsim.results.content import Arrays
-from wearsim.results.ensemble_layout import OBSERVABLES, STATISTICS
+from wearsim.results.ensemble.schema import OBSERVABLES, STATISTICS
 
 RECORDS, ROLLERS, STRIPS = 4, 3, 9
 SCALARS = ("steps", "solves", "depth_error", "volume_error")

@@ -11,8 +11,9 @@ from pathlib import Path
 
 from ensemble_examples import some_header, some_outcome, some_static
 
-from wearsim.results import EnsembleFile, Outcome, writer
-from wearsim.results.ensemble_layout import DONE
+from wearsim.results import EnsembleFile, Outcome
+from wearsim.results.ensemble.schema import DONE
+from wearsim.results.io import writer
 
 ASKED, STRIPS = 5, 60
 BATCHES = ([3, 0, 1], [4, 2])

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from run_examples import some_run
 
-from wearsim.results import writer
+from wearsim.results.io import writer
 
 
 def stages_of_a_write(path: Path) -> list[str]:

@@ -23,8 +23,8 @@ from wearsim.results import (
     read_dissipation,
     write_results,
 )
-from wearsim.results.dissipation_layout import VARIABLES, with_inputs
-from wearsim.results.dissipation_result import as_numbers, summaries
+from wearsim.results.dissipation.result import as_numbers, summaries
+from wearsim.results.dissipation.schema import VARIABLES, with_inputs
 
 INPUTS = [{"key": "load.normal_force", "unit": "N"}, {"key": "friction.coefficient", "unit": "1"}]
 

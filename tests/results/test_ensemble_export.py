@@ -9,7 +9,8 @@ import pytest
 
 from tests.report.made_up_ensembles import made_up
 from wearsim.errors import ResultsFileError
-from wearsim.results import ensemble_export, export_csv
+from wearsim.results import csv_export as ensemble_export
+from wearsim.results import export_csv
 
 
 def read(path):

@@ -34,8 +34,8 @@ from wearsim.results import (
     read_results,
     write_results,
 )
-from wearsim.results.ensemble_layout import DONE, FAILED, OBSERVABLES, PENDING, QUANTILES
-from wearsim.results.ensemble_state import PLACES
+from wearsim.results.ensemble.schema import DONE, FAILED, OBSERVABLES, PENDING, QUANTILES
+from wearsim.results.ensemble.state_slots import PLACES
 
 ERROR = "lost contact at 1.2e6 passes: µ = 0.3"
 
@@ -90,7 +90,7 @@ def test_that_a_column_is_one_record_of_every_realisation(ensemble_file, monkeyp
     depth = data.variables["depth"]
     for record in (0, RECORDS - 1, -1):
         np.testing.assert_array_equal(data.column("depth", record), depth[:, record])
-    monkeypatch.setattr("wearsim.results.ensemble_rows._BLOCK", 7 * depth[0].nbytes)
+    monkeypatch.setattr("wearsim.results.ensemble.stored_arrays._BLOCK", 7 * depth[0].nbytes)
     np.testing.assert_array_equal(data.column("depth", -1), depth[:, -1])  # in several blocks
     np.testing.assert_array_equal(data.variables.rows("depth", 3, 6), depth[3:6])
 

@@ -27,8 +27,9 @@ from ensemble_examples import (
 from run_examples import some_run
 
 from wearsim.errors import ResultsFileError
-from wearsim.results import EnsembleFile, check_output, read_ensemble, write_results, writer
-from wearsim.results.ensemble_layout import DONE, OBSERVABLES, PENDING
+from wearsim.results import EnsembleFile, check_output, read_ensemble, write_results
+from wearsim.results.ensemble.schema import DONE, OBSERVABLES, PENDING
+from wearsim.results.io import writer
 
 HERE = Path(__file__).parent
 ASKED = 12
@@ -245,8 +246,8 @@ def test_that_a_file_that_may_not_be_written_is_told(tmp_path, monkeypatch):
     def refuse(self, *args, **kwargs):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("wearsim.results.in_place.Path.open", refuse)
-    monkeypatch.setattr("wearsim.results.ensemble_file.kind_of", lambda path: "ensemble")
+    monkeypatch.setattr("wearsim.results.ensemble.writer.Path.open", refuse)
+    monkeypatch.setattr("wearsim.results.ensemble.writer.kind_of", lambda path: "ensemble")
     with pytest.raises(ResultsFileError, match=r"a\.h5: cannot be written \(Permission denied\)"):
         EnsembleFile.open(path)
 
@@ -299,7 +300,7 @@ def test_that_a_realisation_is_put_once(tmp_path):
 
 
 def test_that_profiles_beyond_those_kept_are_left_out(tmp_path, monkeypatch):
-    monkeypatch.setattr("wearsim.results.ensemble_layout.MOST_KEPT", 27)
+    monkeypatch.setattr("wearsim.results.ensemble.schema.MOST_KEPT", 27)
     path = tmp_path / "a.h5"
     bare = replace(some_outcome(5), profile=None)
     with _new(path) as file:

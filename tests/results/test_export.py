@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from run_examples import LOG, SCENARIO, some_run
 
+from wearsim.csv_tables import read_columns
 from wearsim.errors import ResultsFileError
 from wearsim.results import Result, export_csv
-from wearsim.tables import read_columns
 
 
 def _header(path: Path) -> list[str]:

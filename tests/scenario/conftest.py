@@ -5,13 +5,13 @@ from __future__ import annotations
 import textwrap
 
 import pytest
-from random_examples import SmallRandomInputs
-from scenario_examples import GOOD, Parse, SmallPlugins
-
 import wearsim.scenario.choices
 import wearsim.scenario.known
 import wearsim.scenario.random_reading
 import wearsim.scenario.random_schema
+from random_examples import SmallRandomInputs
+from scenario_examples import GOOD, Parse, SmallPlugins
+
 import wearsim.scenario.schema
 from wearsim.plugins.manager import Registry
 from wearsim.scenario import Scenario, parse_scenario
@@ -21,11 +21,11 @@ from wearsim.scenario import Scenario, parse_scenario
 def small_registry(monkeypatch: pytest.MonkeyPatch) -> Registry:
     registry = Registry([SmallPlugins(), SmallRandomInputs()])
     for module in (
-        wearsim.scenario.choices,
-        wearsim.scenario.known,
-        wearsim.scenario.random_reading,
-        wearsim.scenario.random_schema,
-        wearsim.scenario.schema,
+        wearsim.scenario.tables.plugin,
+        wearsim.scenario.parse.key_index,
+        wearsim.scenario.random.parse,
+        wearsim.scenario.schema.random_inputs,
+        wearsim.scenario.schema.document,
     ):
         monkeypatch.setattr(module, "registry", lambda: registry)
     return registry

@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 from scipy.special import ndtri
 
+from wearsim.csv_tables import read_columns
 from wearsim.plugins import (
     Distribution,
     FrictionField,
@@ -24,10 +25,9 @@ from wearsim.quantities import (
     PositiveDuration,
     PositiveLength,
     PositiveValue,
-    QuantityError,
     Value,
 )
-from wearsim.tables import read_columns
+from wearsim.units import QuantityError
 
 
 class FlatOptions(Options):

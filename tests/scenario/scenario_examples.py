@@ -7,6 +7,7 @@ from types import ModuleType
 
 from pydantic import Field, model_validator
 
+from wearsim.csv_tables import read_columns
 from wearsim.plugins import ContactModelSpec, LoadSpec, Options, WearLawSpec, hookimpl
 from wearsim.quantities import (
     Duration,
@@ -17,7 +18,6 @@ from wearsim.quantities import (
     PositiveStiffness,
 )
 from wearsim.scenario import Scenario
-from wearsim.tables import read_columns
 
 GOOD = """\
 title = "a rig"

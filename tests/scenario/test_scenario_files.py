@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from wearsim.csv_tables import read_columns
 from wearsim.scenario import Scenario, load_scenario, require_run
-from wearsim.tables import read_columns
 
 FOLDER = Path(__file__).parents[2] / "scenarios"
 

@@ -12,8 +12,8 @@ import pytest
 from scenario_examples import Parse
 
 from wearsim.errors import ScenarioError
-from wearsim.quantities import ANGLE, FORCE
 from wearsim.scenario import Scenario, load_scenario, parse_override, parse_scenario, realise
+from wearsim.units import ANGLE, FORCE
 
 RIG = Path(__file__).parents[2] / "scenarios" / "rig-450min.toml"
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from wearsim.evolution import per_pass
-from wearsim.studies.replay import _Replay
+from wearsim.evolution.steppers import per_pass
+from wearsim.studies.run.run import _Replay
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import sys
 
 from batch_works import Squares
 
-from wearsim.studies.executors import executor
+from wearsim.studies.execution.factory import executor
 
 
 def main(scheduler: str) -> None:

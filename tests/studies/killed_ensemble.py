@@ -13,11 +13,12 @@ from pathlib import Path
 from killed_run import chosen_of, ended, ended_after, forked, killing, seconds_of, stages_of, tell
 
 from tests.studies.ensemble_cases import small, unlike
-from wearsim.results import open_ensemble, writer
+from wearsim.results import open_ensemble
+from wearsim.results.io import writer
 from wearsim.scenario import Scenario
-from wearsim.studies import ensemble_grid
-from wearsim.studies.ensemble import ensemble, resume_ensemble
-from wearsim.studies.ensemble_work import EnsembleWork
+from wearsim.studies.ensemble import grid as ensemble_grid
+from wearsim.studies.ensemble.api import ensemble, resume_ensemble
+from wearsim.studies.ensemble.driver import EnsembleWork
 
 
 def go(scenario: Scenario, count: int, path: Path, scheduler: str = "serial") -> int:

@@ -15,10 +15,11 @@ from pathlib import Path
 
 from study_examples import LOADS, ROLLERS, short, unlike
 
-from wearsim.results import Result, open_results, writer
+from wearsim.results import Result, open_results
+from wearsim.results.io import writer
 from wearsim.scenario import Scenario
-from wearsim.studies import replay
-from wearsim.studies.events import Event, Started
+from wearsim.studies.run import run as replay
+from wearsim.studies.run.events import Event, Started
 
 OFTEN = {"outputs.checkpoint_every": "1e-9 s"}
 SMALL_CHUNK = 1 << 15  # several writes to a file

@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from wearsim.evolution.loop import evolve
+from wearsim.evolution.integrate import evolve
 from wearsim.evolution.state import fresh_state
 from wearsim.scenario import load_scenario
-from wearsim.studies.build import build_scene
+from wearsim.studies.run.assemble import build_scene
 
 RIG = Path(__file__).parents[2] / "scenarios" / "rig-450min.toml"
 LOAD = {"distribution": "maxent", "support": ["0 N", "inf"], "mean": "307 N", "std": "32 N"}

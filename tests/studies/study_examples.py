@@ -8,9 +8,9 @@ from pathlib import Path
 from tests.rig_text import BODIES, RUBBING
 from wearsim.errors import Interrupted
 from wearsim.results import Result, RunData
-from wearsim.results.data import differences
+from wearsim.results.run.data import differences
 from wearsim.scenario import Scenario, parse_scenario
-from wearsim.studies import replay
+from wearsim.studies.run import run as replay
 
 RIG = (
     'title = "a rig"\n\n'

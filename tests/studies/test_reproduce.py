@@ -12,7 +12,8 @@ import pytest
 from scipy import integrate
 
 from wearsim.results import DissipationResult
-from wearsim.scenario import load_scenario, shipped
+from wearsim.scenario import examples as shipped
+from wearsim.scenario import load_scenario
 from wearsim.studies import paper
 from wearsim.studies.comparison import compare
 from wearsim.studies.comparison_inputs import EXACT_POWER, law_of, printed_area

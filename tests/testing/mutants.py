@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from wearsim.errors import ContactError
-from wearsim.models.hertz_fastsim import HertzFastsim
-from wearsim.models.slender import Slender
-from wearsim.models.strip_theory import StripTheory
+from wearsim.models.contact.hertz_fastsim import HertzFastsim
+from wearsim.models.contact.slender import Slender
+from wearsim.models.tangential.strip_theory import StripTheory
 from wearsim.plugins import ContactModelSpec, Options
 from wearsim.types import Creepage, Grid, OperatingPoint
 

@@ -7,15 +7,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from wearsim.models.disc import Disc, DiscOptions
-from wearsim.models.friction_fields import White, WhiteOptions
-from wearsim.models.processes import OrnsteinUhlenbeck, OrnsteinUhlenbeckOptions
+from wearsim.models.random.distributions import Disc, DiscOptions
+from wearsim.models.random.friction_fields import White, WhiteOptions
+from wearsim.models.random.processes import OrnsteinUhlenbeck, OrnsteinUhlenbeckOptions
 from wearsim.plugins import Distribution, Options, RandomInputSpec, registry
-from wearsim.quantities import ANGLE, FORCE
 from wearsim.testing import PromiseBroken, random_input_tests
 from wearsim.testing.random_bench import RandomBench
 from wearsim.testing.random_inputs import BY_ROLE
 from wearsim.testing.specs import Chosen
+from wearsim.units import ANGLE, FORCE
 
 FILES = {"loads.csv": "value [N]\n280\n300\n300\n340\n", "table.csv":
          "probability, value [N]\n0, 250\n0.3, 290\n1, 350\n"}  # fmt: skip

@@ -12,8 +12,8 @@ from wearsim.bench.contact_measured import measure, why
 from wearsim.bench.contact_methods import Method, methods, normal_methods
 from wearsim.bench.exact import POWER_ERRORS, PURE_SPIN_ERROR, STRIPS_ERROR
 from wearsim.bench.measured import Effort, Measurement, Tell, Topic
-from wearsim.scenario.sections import DEFAULT_TOLERANCE
-from wearsim.studies.tracks import strips_over
+from wearsim.scenario.tables.plain import DEFAULT_TOLERANCE
+from wearsim.studies.run.grid import strips_over
 
 ELLIPTIC_STRIPS = (11, 21, 41, 81, 161)
 WORN_STRIPS = (21, 41, 81, 161, 321)

@@ -11,11 +11,11 @@ import numpy as np
 
 from wearsim.bench.contact_width import contact_width
 from wearsim.bench.exact import CREEPAGES, STEEL, WORN, rows, strips_of, worn_profile
-from wearsim.mechanics.elasticity import combine
-from wearsim.mechanics.hertz import HertzContact, hertz
-from wearsim.models.strip_grid import grid_about_hertz
+from wearsim.mechanics.hertz.elasticity import combine
+from wearsim.mechanics.hertz.ellipse import HertzContact, hertz
+from wearsim.models.contact.default_grid import grid_about_hertz
 from wearsim.plugins import ContactModel
-from wearsim.studies.tracks import profile_grid
+from wearsim.studies.run.grid import profile_grid
 from wearsim.types import Creepage, FloatArray, Grid, OperatingPoint, Profile
 
 MATERIALS = (STEEL, STEEL)

@@ -14,7 +14,7 @@ from wearsim.bench.exact import POWER_ERRORS
 from wearsim.bench.measured import Measurement
 from wearsim.bench.timing import timed
 from wearsim.errors import ContactError, WearsimError
-from wearsim.mechanics.influence import curvature_table, influence_table
+from wearsim.mechanics.slender.influence import curvature_table, influence_table
 from wearsim.types import ContactSolution
 
 _LESS = 0.99  # of the load, under which a warm start was solved

@@ -11,9 +11,9 @@ import numpy as np
 
 from wearsim.bench.accuracy import solved
 from wearsim.bench.contact_cases import worn_cases
-from wearsim.models.tangential_options import TangentialOptions
+from wearsim.models.tangential.options import TangentialOptions
 from wearsim.plugins import ContactModel, ContactModelSpec, Options, registry
-from wearsim.scenario.choices import ContactTable
+from wearsim.scenario.tables.plugin import ContactTable
 from wearsim.types import ContactSolution
 
 DEFAULT_MODEL = str(ContactTable.model_fields["model"].default)

@@ -17,7 +17,7 @@ from wearsim.bench.growth_cases import QUICK, REALISATIONS, WORKERS, Point, Size
 from wearsim.bench.growth_point import Cost, Work
 from wearsim.bench.machine import cores
 from wearsim.bench.measured import Effort, Measurement, Tell, Topic
-from wearsim.studies.worker_process import ONE_THREAD
+from wearsim.studies.execution.processes import ONE_THREAD
 
 LIMIT = 120.0  # s, that a point may take
 POINT = "wearsim.bench.growth_point"  # what the process of a point runs

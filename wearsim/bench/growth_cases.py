@@ -11,10 +11,10 @@ from wearsim.bench.machine import cores
 from wearsim.bench.measured import Effort
 from wearsim.bench.sampling_jobs import CHEAP
 from wearsim.bench.sampling_jobs import RIG as SCATTERED
-from wearsim.scenario.sections import DEFAULT_RECORDS
-from wearsim.scenario.shipped import shipped_scenario
-from wearsim.studies.build import strips_of_run
-from wearsim.studies.draws import draw
+from wearsim.scenario.examples import shipped_scenario
+from wearsim.scenario.tables.plain import DEFAULT_RECORDS
+from wearsim.studies.run.assemble import strips_of_run
+from wearsim.studies.run.draws import draw
 
 RIG = "rig-450min"
 STRIPS, PASSES, RECORDS = "strips", "passes", "recorded profiles"

@@ -22,9 +22,9 @@ from wearsim.bench.memory import family_peak_bytes, peak_bytes
 from wearsim.bench.timing import timed
 from wearsim.errors import WearsimError
 from wearsim.scenario import Scenario
-from wearsim.scenario.shipped import shipped_scenario
-from wearsim.studies.ensemble import ensemble
-from wearsim.studies.replay import run
+from wearsim.scenario.examples import shipped_scenario
+from wearsim.studies.ensemble.api import ensemble
+from wearsim.studies.run.run import run
 
 LONG = 1.0  # s, from which on it is timed once
 SHORT = 100  # passes of the test that goes before

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 from functools import cache
 
 from wearsim.bench import hard_files as files
-from wearsim.mechanics.elasticity import combine
-from wearsim.mechanics.hertz import hertz
+from wearsim.mechanics.hertz.elasticity import combine
+from wearsim.mechanics.hertz.ellipse import hertz
 from wearsim.scenario import Scenario, parse_scenario
-from wearsim.scenario.shipped import shipped_scenario
+from wearsim.scenario.examples import shipped_scenario
 
 BASE = "rig-450min"
 LONG, SHORT = 1_350_000, 60_000  # roller passes

@@ -8,8 +8,8 @@ from wearsim.bench.hard_measures import changes_of, order
 from wearsim.bench.hard_verdict import Check, Verdict
 from wearsim.errors import WearsimError
 from wearsim.results import DissipationResult
-from wearsim.scenario.shipped import shipped_scenario
-from wearsim.studies.dissipation import dissipation
+from wearsim.scenario.examples import shipped_scenario
+from wearsim.studies.contact.monte_carlo import dissipation
 
 NAME = "friction field, 50 % scatter"
 _BASE = "mean-contact"

@@ -10,8 +10,8 @@ import numpy as np
 from wearsim.evolution.observables import centroid, oscillation
 from wearsim.results import Result
 from wearsim.scenario import Scenario
-from wearsim.studies.build import merged_rollers
-from wearsim.studies.draws import draw
+from wearsim.studies.run.assemble import merged_rollers
+from wearsim.studies.run.draws import draw
 from wearsim.types import FloatArray
 
 PROFILES = ("cylinder_profile", "roller_profile")

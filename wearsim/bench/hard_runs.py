@@ -10,7 +10,7 @@ import numpy as np
 from wearsim.bench.hard_cases import LONG, SHORT, HardCase
 from wearsim.results import Result
 from wearsim.scenario import Drawn, Scenario, parse_scenario
-from wearsim.studies.replay import run
+from wearsim.studies.run.run import run
 from wearsim.types import Profile
 
 TIGHTER = 10.0  # times lower a tolerance, for steps a third as long

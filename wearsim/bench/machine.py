@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from wearsim.bench.timing import best_short
-from wearsim.mechanics.jit import kernel
+from wearsim.mechanics.numerics.jit import kernel
 from wearsim.types import FloatArray
 
 LIBRARIES = ("wearsim", "numba", "numpy", "scipy")

@@ -20,11 +20,11 @@ from wearsim.bench.sampling_errors import (
     truths,
 )
 from wearsim.bench.sampling_jobs import CheapDraws, Job, Part, Timing, all_done, parts
-from wearsim.randomness.plans import PLANS, PlanName
-from wearsim.scenario.sampling import SamplingTable
-from wearsim.studies.depth_control import DRAWS
-from wearsim.studies.ensemble_plan import BASE_PLANS, EnsemblePlan
+from wearsim.scenario.tables.sampling import SamplingTable
+from wearsim.studies.ensemble.control_variate import DRAWS
+from wearsim.studies.ensemble.designs import BASE_PLANS, EnsemblePlan
 from wearsim.types import FloatArray
+from wearsim.uq.sampling.plans import PLANS, PlanName
 
 METHODS: Mapping[EnsemblePlan, str] = {
     "monte-carlo": "Monte Carlo",

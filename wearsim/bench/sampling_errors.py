@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wearsim.randomness.control_variate import Control, Controlled
-from wearsim.randomness.estimates import Estimate, estimate
-from wearsim.randomness.intervals import Interval
-from wearsim.randomness.plans import REPLICATES
-from wearsim.randomness.quantiles import WeightedLaw
-from wearsim.studies.ensemble_plan import EnsemblePlan
+from wearsim.studies.ensemble.designs import EnsemblePlan
 from wearsim.types import FloatArray
+from wearsim.uq.estimation.control_variate import Control, Controlled
+from wearsim.uq.estimation.estimates import Estimate, estimate
+from wearsim.uq.estimation.intervals import Interval
+from wearsim.uq.estimation.quantiles import WeightedLaw
+from wearsim.uq.sampling.plans import REPLICATES
 
 PROBABILITY = 0.95
 MEAN, QUANTILE = "mean of depth", "95 % quantile of depth"

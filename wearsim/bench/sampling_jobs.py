@@ -15,18 +15,18 @@ import numpy as np
 
 from wearsim.bench.measured import Tell
 from wearsim.errors import SolverError
-from wearsim.randomness.plans import PlanName
 from wearsim.scenario import Scenario
-from wearsim.scenario.shipped import shipped_scenario
-from wearsim.studies.depth_control import DRAWS, closed_form_depths, control_of
-from wearsim.studies.draws import Drawer
-from wearsim.studies.ensemble import ensemble
-from wearsim.studies.ensemble_grid import shared_grid
-from wearsim.studies.ensemble_plan import EnsemblePlan
-from wearsim.studies.executors import executor
-from wearsim.studies.member import Members
-from wearsim.studies.member_runs import MOST_TOGETHER
+from wearsim.scenario.examples import shipped_scenario
+from wearsim.studies.ensemble.api import ensemble
+from wearsim.studies.ensemble.batch import MOST_TOGETHER
+from wearsim.studies.ensemble.control_variate import DRAWS, closed_form_depths, control_of
+from wearsim.studies.ensemble.designs import EnsemblePlan
+from wearsim.studies.ensemble.grid import shared_grid
+from wearsim.studies.ensemble.realisation import Members
+from wearsim.studies.execution.factory import executor
+from wearsim.studies.run.draws import Drawer
 from wearsim.types import FloatArray, Grid
+from wearsim.uq.sampling.plans import PlanName
 
 RIG = "rig-ensemble"
 CHEAP: Mapping[str, object] = {
@@ -203,7 +203,7 @@ def all_done(jobs: Sequence[Job], tell: Tell, scheduler: str = "processes") -> l
     tell : callable
         Gets what is being measured, and which part is done.
     scheduler : str
-        Who does them, as of `wearsim.studies.executors.executor`.
+        Who does them, as of `wearsim.studies.execution.factory.executor`.
     """
     order = sorted(range(len(jobs)), key=lambda number: -jobs[number].cost)
     total, so_far = sum(job.cost for job in jobs), 0.0

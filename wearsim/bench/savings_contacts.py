@@ -10,11 +10,12 @@ import numpy as np
 
 from wearsim.bench.contact_methods import HOST, Method, methods
 from wearsim.bench.savings_pairs import Pair, Ways
-from wearsim.models.strip_grid import grid_about_hertz
+from wearsim.contact_batch import OperatingPoints, rows_of
+from wearsim.models.contact.default_grid import grid_about_hertz
 from wearsim.plugins import ContactModelSpec, registry
-from wearsim.scenario.shipped import shipped_scenario
-from wearsim.studies.contact import study_contact
-from wearsim.types import Creepage, FloatArray, Grid, OperatingPoint, OperatingPoints, rows_of
+from wearsim.scenario.examples import shipped_scenario
+from wearsim.studies.contact.single import study_contact
+from wearsim.types import Creepage, FloatArray, Grid, OperatingPoint
 
 FINE = 1000  # steps of the march that the others are held against
 TIMES = 3  # as many strips

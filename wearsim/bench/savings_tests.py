@@ -9,13 +9,13 @@ import numpy as np
 
 from wearsim.bench.savings_pairs import Pair, Ways
 from wearsim.bench.stepping_tests import Ready, WearTest
-from wearsim.randomness.sampler import Sampler
 from wearsim.scenario import Scenario
-from wearsim.scenario.sections import DEFAULT_RECORDS
-from wearsim.scenario.shipped import shipped_scenario
-from wearsim.studies.contact_draws import draw_contacts
-from wearsim.studies.replay import run
+from wearsim.scenario.examples import shipped_scenario
+from wearsim.scenario.tables.plain import DEFAULT_RECORDS
+from wearsim.studies.contact.draws import draw_contacts
+from wearsim.studies.run.run import run
 from wearsim.types import FloatArray
+from wearsim.uq.sampling.sampler import Sampler
 
 RIG, MINUTES, QUICK_MINUTES = "rig-450min", 22.5, 0.5
 STEPPERS = ("implicit", "stabilised", "per-pass")

@@ -11,7 +11,7 @@ from wearsim.bench.measured import Effort, Measurement, Tell, Topic
 from wearsim.bench.stepping_groups import CONVERGED, Bench, of_model, of_steppers, of_strips
 from wearsim.bench.stepping_solvers import MOST_SOLVES
 from wearsim.bench.stepping_tests import WearTest
-from wearsim.scenario.sections import DEFAULT_TOLERANCE
+from wearsim.scenario.tables.plain import DEFAULT_TOLERANCE
 
 RIG = "rig-450min"
 SPRING = {"load.kind": "spring", "load.stiffness": "690 N/mm"}

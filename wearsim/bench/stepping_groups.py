@@ -13,9 +13,9 @@ from wearsim.bench.measured import Measurement
 from wearsim.bench.stepping_solvers import SOLVERS, Solver, solved_by
 from wearsim.bench.stepping_tests import End, Ready, WearTest, errors_of
 from wearsim.bench.timing import least
-from wearsim.evolution.per_pass import is_compiled
-from wearsim.evolution.scene import Scene
-from wearsim.scenario.sections import DEFAULT_TOLERANCE, EvolutionTable
+from wearsim.evolution.problem import Scene
+from wearsim.evolution.steppers.per_pass import is_compiled
+from wearsim.scenario.tables.plain import DEFAULT_TOLERANCE, EvolutionTable
 
 EVERY_PASS = "per-pass"
 CONVERGED = 1e-7  # tolerance of the solver that is the truth where passes are not compiled

@@ -8,11 +8,11 @@ from typing import Any, Literal
 import numpy as np
 
 from wearsim.errors import StepError
-from wearsim.evolution.advance import present_loads, present_scene, solve_present
-from wearsim.evolution.errors_of_steps import DEPTHS
-from wearsim.evolution.scene import Scene
+from wearsim.evolution.error_control.error_estimates import DEPTHS
+from wearsim.evolution.problem import Scene
 from wearsim.evolution.state import WearState, contact_values, fresh_state
-from wearsim.evolution.wearing import Wearing
+from wearsim.evolution.steppers.single_step import present_loads, present_scene, solve_present
+from wearsim.evolution.steppers.wear_increment import Wearing
 from wearsim.types import FloatArray
 
 Solver = Literal["BDF", "LSODA"]

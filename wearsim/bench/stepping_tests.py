@@ -8,15 +8,15 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from wearsim.bench.accuracy import l2
-from wearsim.evolution.errors_of_steps import DEPTHS, deepest, whole_volume
-from wearsim.evolution.loop import evolve
-from wearsim.evolution.scene import Scene
+from wearsim.evolution.error_control.error_estimates import DEPTHS, deepest, whole_volume
+from wearsim.evolution.integrate import evolve
+from wearsim.evolution.problem import Scene
 from wearsim.evolution.state import WearState, fresh_state
-from wearsim.evolution.stepper import Stepper
+from wearsim.evolution.steppers.base import Stepper
 from wearsim.scenario import Scenario
-from wearsim.scenario.shipped import shipped_scenario
-from wearsim.studies.build import build_scene, strips_of_run
-from wearsim.studies.draws import draw
+from wearsim.scenario.examples import shipped_scenario
+from wearsim.studies.run.assemble import build_scene, strips_of_run
+from wearsim.studies.run.draws import draw
 from wearsim.types import FloatArray, Grid
 
 

@@ -7,23 +7,23 @@ from typing import Annotated
 
 import typer
 
-from wearsim.cli.bench import bench
-from wearsim.cli.check import check
-from wearsim.cli.compare import compare
-from wearsim.cli.contact import contact
-from wearsim.cli.dissipation import dissipation
-from wearsim.cli.ensemble import ensemble
-from wearsim.cli.export import export
-from wearsim.cli.maxent import maxent
-from wearsim.cli.new import new
-from wearsim.cli.plot import plot
-from wearsim.cli.plugins import plugins
-from wearsim.cli.reproduce import reproduce
-from wearsim.cli.resume import resume
-from wearsim.cli.run import run
-from wearsim.cli.schema import schema
-from wearsim.cli.shell import TRACEBACK, Shell
-from wearsim.cli.show import show
+from wearsim.cli.commands.bench import bench
+from wearsim.cli.commands.check import check
+from wearsim.cli.commands.compare import compare
+from wearsim.cli.commands.contact import contact
+from wearsim.cli.commands.dissipation import dissipation
+from wearsim.cli.commands.ensemble import ensemble
+from wearsim.cli.commands.export import export
+from wearsim.cli.commands.maxent import maxent
+from wearsim.cli.commands.new import new
+from wearsim.cli.commands.plot import plot
+from wearsim.cli.commands.plugins import plugins
+from wearsim.cli.commands.reproduce import reproduce
+from wearsim.cli.commands.resume import resume
+from wearsim.cli.commands.run import run
+from wearsim.cli.commands.schema import schema
+from wearsim.cli.commands.show import show
+from wearsim.cli.errors import TRACEBACK, Shell
 
 app = typer.Typer(
     name="wearsim",

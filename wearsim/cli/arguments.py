@@ -173,7 +173,7 @@ def check_workforce(scheduler: str | None, workers: int | None) -> str:
     typer.BadParameter
         If there is no such scheduler, or it cannot have so many workers.
     """
-    from wearsim.studies.executors import check_scheduler
+    from wearsim.studies.execution.factory import check_scheduler
 
     chosen = scheduler or "processes"
     try:

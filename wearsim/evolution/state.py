@@ -9,8 +9,9 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from wearsim.evolution.scene import Scene
-from wearsim.types import BatchSolution, ContactSolution, FloatArray, IntArray, Number, rows_of
+from wearsim.contact_batch import BatchSolution, rows_of
+from wearsim.evolution.problem import Scene
+from wearsim.types import ContactSolution, FloatArray, IntArray, Number
 
 SIGMAS = 2.0  # of the scatter that draws at every pass leave, counted as error
 Contacts: TypeAlias = Sequence[ContactSolution]

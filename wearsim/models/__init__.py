@@ -4,18 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from wearsim.models import (
-    archard,
-    distributions,
-    friction_fields,
-    hertz_fastsim,
-    hertz_model,
-    loads,
-    processes,
-    semi_hertzian,
-    slender,
-    t_gamma,
-)
+from wearsim.models import loads
+from wearsim.models.contact import hertz as hertz_model
+from wearsim.models.contact import hertz_fastsim, semi_hertzian, slender
+from wearsim.models.random import distributions, friction_fields, processes
+from wearsim.models.wear import archard, t_gamma
 from wearsim.plugins import ContactModelSpec, LoadSpec, RandomInputSpec, WearLawSpec, hookimpl
 
 

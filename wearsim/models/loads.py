@@ -7,7 +7,8 @@ import math
 import numpy as np
 from pydantic import Field
 
-from wearsim.mechanics.piecewise import PiecewiseLinear
+from wearsim.csv_tables import read_columns
+from wearsim.mechanics.numerics.piecewise_linear import PiecewiseLinear
 from wearsim.plugins import Load, LoadSpec, LoadTerm, Options
 from wearsim.quantities import (
     InputFile,
@@ -16,7 +17,6 @@ from wearsim.quantities import (
     PositiveDuration,
     PositiveForce,
 )
-from wearsim.tables import read_columns
 from wearsim.types import FloatArray
 
 

@@ -3,18 +3,11 @@
 from pydantic import Field
 
 from wearsim.errors import CapabilityError, ContactError
+from wearsim.plugins.capabilities import Capabilities, PassLoop
+from wearsim.plugins.contact_model import ContactModel
 from wearsim.plugins.hookspecs import hookimpl
 from wearsim.plugins.manager import registry
-from wearsim.plugins.protocols import (
-    BODIES,
-    Body,
-    Capabilities,
-    ContactModel,
-    Load,
-    LoadTerm,
-    PassLoop,
-    WearLaw,
-)
+from wearsim.plugins.protocols import BODIES, Body, Load, LoadTerm, WearLaw
 from wearsim.plugins.random_inputs import (
     Distribution,
     Frame,
@@ -35,7 +28,6 @@ from wearsim.plugins.specs import (
 )
 from wearsim.quantities import (
     InputFile,
-    Kind,
     Limit,
     NonNegativeStiffness,
     NonNegativeWearFactor,
@@ -48,6 +40,7 @@ from wearsim.quantities import (
     Quantity,
     Value,
 )
+from wearsim.units import Kind
 
 __all__ = [
     "BODIES",

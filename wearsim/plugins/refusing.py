@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wearsim.errors import CapabilityError
-from wearsim.plugins.protocols import ContactModel
+from wearsim.plugins.contact_model import ContactModel
 from wearsim.types import FloatArray, OperatingPoint
 
 

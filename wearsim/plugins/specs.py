@@ -8,7 +8,9 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import BaseModel, ConfigDict
 
-from wearsim.plugins.protocols import Capabilities, ContactModel, Load, LoadTerm, WearLaw
+from wearsim.plugins.capabilities import Capabilities
+from wearsim.plugins.contact_model import ContactModel
+from wearsim.plugins.protocols import Load, LoadTerm, WearLaw
 from wearsim.plugins.random_inputs import Distribution, FrictionField, JointDistribution, Process
 
 

@@ -15,7 +15,7 @@ from wearsim.bench.machine import Machine
 from wearsim.bench.measured import Effort, Measurement, Topic
 from wearsim.report.bench_sizes import growth_figure, savings_figure
 from wearsim.report.bench_table import measured_on
-from wearsim.report.style import GREY, figure_style, name_axes, say
+from wearsim.report.parts.style import GREY, figure_style, name_axes, say
 
 ACROSS = 2  # panels side by side
 _LETTERS = 120  # in a line under the title

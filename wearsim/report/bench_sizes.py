@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from wearsim.bench.measured import Measurement, Topic
-from wearsim.report.style import BLUE, GREEN, ORANGE, figure_style, name_axes
+from wearsim.report.parts.style import BLUE, GREEN, ORANGE, figure_style, name_axes
 
 _NUMBER = re.compile(r"\d[\d.]*(?:e[+-]?\d+)?")
 _ACROSS, _PANEL = 3, (4.2, 3.4)  # panels side by side, and the size of one [in]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from wearsim.bench.machine import Machine
 from wearsim.bench.measured import Effort, Measurement, Topic
-from wearsim.report.units import NOTHING, brief, shown
+from wearsim.report.text.units import NOTHING, brief, shown
 
 FRONT, DEFAULT = "*", "default"
 MARKS = f"{FRONT} none is better in time and error both; {DEFAULT}: what a scenario gets"

@@ -16,14 +16,23 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from wearsim.report import reproduce_spread as spread
-from wearsim.report.contact import SLIDE, STICK
-from wearsim.report.style import BLUE, GREEN, GREY, ORANGE, PRESSURE, RED, figure_style, name_axes
-from wearsim.report.units import PER_SI, count, shown
+from wearsim.report.figures.contact import SLIDE, STICK
+from wearsim.report.parts.style import (
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PRESSURE,
+    RED,
+    figure_style,
+    name_axes,
+)
+from wearsim.report.text.units import PER_SI, count, shown
 from wearsim.studies import paper
 from wearsim.types import FloatArray
 
 if TYPE_CHECKING:
-    from wearsim.studies.contact import ContactStudy
+    from wearsim.studies.contact.single import ContactStudy
     from wearsim.studies.reproduce import Reproduction
 
 MM, MPA, W_MM, W_MM2 = (PER_SI[unit] for unit in ("mm", "MPa", "W/mm", "W/mm^2"))

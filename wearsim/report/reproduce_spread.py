@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from matplotlib.axes import Axes
 
-from wearsim.report.style import BLUE, GREEN, ORANGE, RED, name_axes
-from wearsim.report.units import PER_SI
+from wearsim.report.parts.style import BLUE, GREEN, ORANGE, RED, name_axes
+from wearsim.report.text.units import PER_SI
 from wearsim.studies import paper
 from wearsim.studies.comparison_inputs import law_of
-from wearsim.studies.contact_draws import LOAD, TILT, YAW
+from wearsim.studies.contact.draws import LOAD, TILT, YAW
 from wearsim.types import FloatArray
 
 if TYPE_CHECKING:

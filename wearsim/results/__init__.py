@@ -1,17 +1,17 @@
 """The results: one HDF5 file per run or study, which opens after a kill at any moment."""
 
-from wearsim.results.data import RunData
-from wearsim.results.dissipation_data import DissipationData
-from wearsim.results.dissipation_result import DissipationResult, open_dissipation
-from wearsim.results.ensemble_data import EnsembleData, Outcome
-from wearsim.results.ensemble_file import EnsembleFile
-from wearsim.results.ensemble_reader import read_ensemble
-from wearsim.results.ensemble_result import EnsembleResult, open_ensemble
-from wearsim.results.export import export_csv
-from wearsim.results.inputs import refuse_inputs, same_file
-from wearsim.results.reader import is_dissipation, kind_of, read_dissipation, read_results
-from wearsim.results.result import Result, open_results
-from wearsim.results.writer import check_output, write_results
+from wearsim.results.csv_export import export_csv
+from wearsim.results.dissipation.data import DissipationData
+from wearsim.results.dissipation.result import DissipationResult, open_dissipation
+from wearsim.results.ensemble.data import EnsembleData, Outcome
+from wearsim.results.ensemble.reader import read_ensemble
+from wearsim.results.ensemble.result import EnsembleResult, open_ensemble
+from wearsim.results.ensemble.writer import EnsembleFile
+from wearsim.results.io.overwrite_guard import check_output, refuse_inputs, same_file
+from wearsim.results.io.reader import is_dissipation, kind_of, read_dissipation, read_results
+from wearsim.results.io.writer import write_results
+from wearsim.results.run.data import RunData
+from wearsim.results.run.result import Result, open_results
 
 __all__ = [
     "DissipationData",

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from wearsim.results.layout import Layout
+from wearsim.results.schema import Layout
 
 Arrays = dict[str, npt.NDArray[Any]]
 

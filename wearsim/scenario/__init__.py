@@ -1,22 +1,22 @@
 """A scenario: TOML with units, validated as a whole, frozen, in SI."""
 
-from wearsim.scenario.bodies import Cylinder, Roller, read_profile
-from wearsim.scenario.choices import ContactChoice, LoadChoice, TermChoice, WearChoice
-from wearsim.scenario.describing import described_model
-from wearsim.scenario.overrides import parse_override
-from wearsim.scenario.random_inputs import Persistence, RandomInput
-from wearsim.scenario.reading import load_scenario, parse_scenario
-from wearsim.scenario.realising import realise
-from wearsim.scenario.sampling import SamplingTable
+from wearsim.scenario.model_label import described_model
+from wearsim.scenario.parse.overrides import parse_override
+from wearsim.scenario.parse.toml import load_scenario, parse_scenario
+from wearsim.scenario.random.model import Persistence, RandomInput
+from wearsim.scenario.random.substitute import realise
 from wearsim.scenario.scenario import Drawn, Scenario, require_run
-from wearsim.scenario.schema import scenario_schema
-from wearsim.scenario.sections import (
+from wearsim.scenario.schema.document import scenario_schema
+from wearsim.scenario.tables.bodies import Cylinder, Roller, read_profile
+from wearsim.scenario.tables.plain import (
     CreepageTable,
     EvolutionTable,
     FrictionTable,
     OperationTable,
     OutputsTable,
 )
+from wearsim.scenario.tables.plugin import ContactChoice, LoadChoice, TermChoice, WearChoice
+from wearsim.scenario.tables.sampling import SamplingTable
 
 __all__ = [
     "ContactChoice",

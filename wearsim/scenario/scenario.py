@@ -10,17 +10,17 @@ from pathlib import Path, PurePath
 from typing import Any, TypeAlias
 
 from wearsim.errors import Problem, ScenarioError
-from wearsim.scenario.bodies import Cylinder, Roller
-from wearsim.scenario.choices import ContactChoice, LoadChoice, WearChoice
-from wearsim.scenario.random_inputs import RandomInput
-from wearsim.scenario.sampling import SamplingTable
-from wearsim.scenario.sections import (
+from wearsim.scenario.random.model import RandomInput
+from wearsim.scenario.tables.bodies import Cylinder, Roller
+from wearsim.scenario.tables.plain import (
     CreepageTable,
     EvolutionTable,
     FrictionTable,
     OperationTable,
     OutputsTable,
 )
+from wearsim.scenario.tables.plugin import ContactChoice, LoadChoice, WearChoice
+from wearsim.scenario.tables.sampling import SamplingTable
 
 Drawn: TypeAlias = float | tuple[float, ...]
 

@@ -6,15 +6,15 @@ import math
 
 import numpy as np
 
-from wearsim.models.maxent_distribution import LawDistribution
-from wearsim.randomness.laws import Law
-from wearsim.randomness.statistics import summarise
+from wearsim.models.random.maxent import LawDistribution
 from wearsim.scenario import Scenario
 from wearsim.studies import paper
 from wearsim.studies.comparison_row import Row, beside, percent
-from wearsim.studies.contact_draws import LOAD, LONGITUDINAL, TILT, YAW
+from wearsim.studies.contact.draws import LOAD, LONGITUDINAL, TILT, YAW
 from wearsim.studies.reproduce import Reproduction
-from wearsim.studies.tracks import fresh_patch
+from wearsim.studies.run.grid import fresh_patch
+from wearsim.uq.distributions.base import Law
+from wearsim.uq.estimation.moments import summarise
 
 EXACT_POWER = 0.0771  # W, the mean problem by CONTACT (Vollebregt and Kalker), a half-space code
 

@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
-from wearsim.randomness.statistics import Quantile, Summary, converge, summarise
-from wearsim.results.dissipation_result import BAND, PAPER_BAND
+from wearsim.results.dissipation.result import BAND, PAPER_BAND
 from wearsim.studies import paper
 from wearsim.studies.comparison_row import Row, beside, percent
 from wearsim.studies.reproduce import VARIANTS, Reproduction, Variant
+from wearsim.uq.estimation.moments import Quantile, Summary, converge, summarise
 
 _NORMAL_95 = 1.959964  # standard errors to either end of a 95 % interval
 _SURE = 4.0  # standard errors that no chance makes up

@@ -8,16 +8,17 @@ from functools import cached_property
 
 import numpy as np
 
+from wearsim.contact_batch import OperatingPoints
 from wearsim.results import DissipationResult
 from wearsim.scenario import Scenario
-from wearsim.scenario.shipped import shipped_scenario
+from wearsim.scenario.examples import shipped_scenario
 from wearsim.studies import paper
-from wearsim.studies.contact import ContactStudy, study_contact
-from wearsim.studies.contact_draws import FRICTION, LONGITUDINAL, TILT, YAW
-from wearsim.studies.dissipation import dissipation
-from wearsim.studies.local_friction import LocalFriction
-from wearsim.studies.tracks import fresh_patch
-from wearsim.types import FloatArray, OperatingPoints
+from wearsim.studies.contact.draws import FRICTION, LONGITUDINAL, TILT, YAW
+from wearsim.studies.contact.friction_field import LocalFriction
+from wearsim.studies.contact.monte_carlo import dissipation
+from wearsim.studies.contact.single import ContactStudy, study_contact
+from wearsim.studies.run.grid import fresh_patch
+from wearsim.types import FloatArray
 
 MEAN_PROBLEM, MONTE_CARLO = "mean-contact", "paper-monte-carlo"
 _ALIGNED = {YAW: "0 mrad", TILT: "0 mrad"}

@@ -7,17 +7,11 @@ from dataclasses import asdict, replace
 
 import numpy as np
 
+from wearsim.contact_batch import BatchSolution, OperatingPoints
 from wearsim.errors import ContactError
 from wearsim.testing.checks import Checks, PromiseBroken, agree, require
 from wearsim.testing.contact_bench import NUMBERS, STRIPS, ContactBench
-from wearsim.types import (
-    BatchSolution,
-    ContactSolution,
-    Creepage,
-    FloatArray,
-    Grid,
-    OperatingPoints,
-)
+from wearsim.types import ContactSolution, Creepage, FloatArray, Grid
 
 MANNERS: Checks[ContactBench] = Checks()
 _SOLVE = "wearsim.plugins.ContactModel.solve"

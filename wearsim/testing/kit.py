@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from wearsim.plugins import ContactModelSpec, LoadSpec, RandomInputSpec, WearLawSpec
-from wearsim.quantities import Kind
 from wearsim.testing import loads, random_inputs
 from wearsim.testing.checks import Checks
 from wearsim.testing.contact_bench import ContactBench, ContactCase
@@ -18,6 +17,7 @@ from wearsim.testing.loads import LoadBench
 from wearsim.testing.random_bench import RandomBench
 from wearsim.testing.specs import Chosen, found, spec_checks
 from wearsim.testing.wear_laws import WEAR_LAW, WearLawBench
+from wearsim.units import Kind
 
 CONTACT_MODEL: Checks[ContactBench] = Checks(spec_checks(), SUMS, MANNERS, CAPABILITIES, PASS_LOOP)
 NOTHING: Mapping[str, str] = {}

@@ -7,8 +7,8 @@ from functools import cached_property, partial
 from typing import Any
 
 from wearsim.plugins import RandomInputSpec, Uniforms
-from wearsim.randomness.streams import Stream
 from wearsim.testing.specs import Chosen
+from wearsim.uq.sampling.philox import Stream
 
 
 @dataclass(frozen=True)

@@ -10,11 +10,11 @@ from wearsim.plugins import (
     JointDistribution,
     Process,
 )
-from wearsim.randomness.streams import Stream
 from wearsim.testing.checks import Checks, agree, require
 from wearsim.testing.random_bench import RandomBench
 from wearsim.testing.specs import spec_checks
 from wearsim.types import FloatArray
+from wearsim.uq.sampling.philox import Stream
 
 _ROLES: dict[str, type] = {
     "scalar": Distribution,

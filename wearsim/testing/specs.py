@@ -11,7 +11,7 @@ from wearsim.plugins import Options, Quantity, Spec, registry
 from wearsim.testing.checks import Checks, require
 
 if TYPE_CHECKING:
-    from wearsim.quantities import Kind
+    from wearsim.units import Kind
 
 S = TypeVar("S", bound=Spec)
 

@@ -1,0 +1,49 @@
+"""The weights of the Runge-Kutta-Legendre scheme, by its stability polynomial."""
+
+import numpy as np
+import pytest
+
+from wearsim.evolution.steppers.rkl2 import FEWEST, legendre_stages, reach, stages_for
+
+COUNTS = (2, 3, 4, 5, 8, 17, 60)
+
+
+def stability(z, count):
+    """Return what a step of u' = z u makes of u = 1."""
+    stages = legendre_stages(count)
+    before, last = np.ones_like(z), 1.0 + stages[0].start_rate * z
+    for stage in stages[1:]:
+        start = 1.0 - stage.last - stage.before_last + stage.start_rate * z
+        new = start + (stage.last + stage.rate * z) * last + stage.before_last * before
+        before, last = last, new
+    return last
+
+
+@pytest.mark.parametrize("count", COUNTS)
+def test_that_a_step_is_of_second_order(count):
+    z = np.array([-1e-2, -5e-3])
+    errors = np.abs(stability(z, count) - np.exp(z))
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(3.0, abs=0.02)
+
+
+@pytest.mark.parametrize("count", COUNTS)
+def test_that_it_is_the_shifted_legendre_polynomial(count):
+    z = np.linspace(-reach(count), 0.0, 101)
+    b = (count * count + count - 2) / (2.0 * count * (count + 1))
+    polynomial = np.polynomial.legendre.Legendre.basis(count)(1.0 + 2.0 * z / reach(count))
+    np.testing.assert_allclose(stability(z, count), 1.0 - b + b * polynomial, atol=1e-10)
+
+
+@pytest.mark.parametrize("count", COUNTS)
+def test_that_all_that_decays_within_reach_falls_without_a_change_of_sign(count):
+    z = -np.linspace(0.01, 1.0 / 1.2, 2001) * reach(count)
+    found = stability(z, count)
+    assert found.min() > 0.0
+    assert found.max() < 1.0
+
+
+@pytest.mark.parametrize("count", COUNTS)
+def test_that_no_stage_is_wasted(count):
+    assert stages_for(0.999 * reach(count)) == max(count, FEWEST)
+    assert stages_for(1.001 * reach(count)) == count + 1
+    assert stages_for(0.0) == FEWEST

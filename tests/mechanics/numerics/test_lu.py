@@ -1,0 +1,52 @@
+"""The dense solver against LAPACK; systems are stored by columns."""
+
+import numpy as np
+import pytest
+
+from wearsim.mechanics.numerics.lu import factor_in_place, invert_factored, solve_factored
+
+
+def solved(system, size, right):
+    """Return the solution of the leading block, or None if it is singular."""
+    order, solution = np.zeros(len(system), dtype=np.int64), np.zeros(len(system))
+    if not factor_in_place(system, size, order):
+        return None
+    solve_factored(system, size, order, np.array(right, dtype=float), solution)
+    return solution[:size]
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 4, 5, 7, 8, 16, 61])
+def test_that_systems_of_every_size_are_solved_like_lapack_does(size):
+    random = np.random.default_rng(size)
+    matrix, right = random.normal(size=(size, size)), random.normal(size=size)
+    solution = solved(matrix.T.copy(), size, right)
+    np.testing.assert_allclose(solution, np.linalg.solve(matrix, right), rtol=1e-9)
+
+
+@pytest.mark.parametrize("size", [1, 4, 5, 18])
+def test_that_systems_are_inverted_like_lapack_does(size):
+    matrix = np.random.default_rng(size).normal(size=(size, size))
+    system, order = matrix.T.copy(), np.zeros(size, dtype=np.int64)
+    inverse = np.empty((size, size))
+    assert factor_in_place(system, size, order)
+    invert_factored(system, size, order, inverse)
+    np.testing.assert_allclose(inverse.T @ matrix, np.eye(size), atol=1e-12)
+
+
+def test_that_a_zero_on_the_diagonal_is_pivoted_away():
+    system = np.array([[0.0, 1.0], [1.0, 0.0]])
+    np.testing.assert_array_equal(solved(system, 2, [2.0, 3.0]), [3.0, 2.0])
+
+
+@pytest.mark.parametrize("bad", [0.0, np.nan])
+def test_that_a_singular_or_undefined_system_is_told(bad):
+    assert solved(np.full((5, 5), bad), 5, np.ones(5)) is None
+
+
+def test_that_only_the_leading_block_is_touched():
+    system = np.arange(25.0).reshape(5, 5) + np.diag(np.full(5, 50.0))
+    before = system.copy()
+    solution = solved(system, 3, np.ones(5))
+    np.testing.assert_array_equal(system[3:], before[3:])
+    np.testing.assert_array_equal(system[:3, 3:], before[:3, 3:])
+    np.testing.assert_allclose(solution, np.linalg.solve(before[:3, :3].T, np.ones(3)), rtol=1e-12)

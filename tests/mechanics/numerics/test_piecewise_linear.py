@@ -1,0 +1,36 @@
+"""Integrals of a quantity that is linear between samples."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from wearsim.mechanics.numerics.piecewise_linear import PiecewiseLinear
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.integers(0, 10**6), st.floats(0.0, 5.0), st.floats(0.0, 5.0))
+def test_that_mean_and_deviation_are_the_integrals(seed, one, other):
+    random = np.random.default_rng(seed)
+    path = PiecewiseLinear(np.arange(6.0), random.uniform(-2.0, 3.0, 6))
+    start, stop = min(one, other), max(one, other) + 1e-3
+    stop = min(stop, 5.0)
+    # corners as nodes, so that the trapezoidal rule and Simpson's are exact in every piece
+    inner = np.arange(6.0)
+    nodes = np.unique([start, stop, *inner[(inner > start) & (inner < stop)]])
+    if len(nodes) < 2 or stop - start < 1e-6:
+        return
+    ends, middle = path.at(nodes), path.at(0.5 * (nodes[1:] + nodes[:-1]))
+    width = np.diff(nodes)
+    mean = np.dot(width, 0.5 * (ends[1:] + ends[:-1])) / (stop - start)
+    square = np.dot(width, (ends[1:] ** 2 + 4.0 * middle**2 + ends[:-1] ** 2) / 6.0)
+    assert path.mean(start, stop) == pytest.approx(mean, abs=1e-9)
+    spread = max(square / (stop - start) - mean**2, 0.0)
+    assert path.deviation(start, stop) == pytest.approx(np.sqrt(spread), abs=1e-5)
+
+
+def test_that_a_moment_has_its_value_and_no_deviation():
+    path = PiecewiseLinear(np.array([0.0, 2.0]), np.array([1.0, 5.0]))
+    assert path.mean(0.5, 0.5) == 2.0
+    assert path.deviation(0.5, 0.5) == 0.0
+    assert path.extremes(0.5, 1.5) == (2.0, 4.0)

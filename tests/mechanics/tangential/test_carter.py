@@ -1,0 +1,183 @@
+"""One strip in rolling contact against Carter, the linear theory and a numerical solution."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tests.mechanics.tangential.line_contact import rolling_strip
+from wearsim.bench.exact import STEEL, rows
+from wearsim.mechanics.hertz.elasticity import combine
+from wearsim.mechanics.tangential.carter import SPIN_LIMIT, TURNED, mean_direction, strip_force
+
+PAIR = combine(STEEL, STEEL)
+MODULI = PAIR.contact_modulus, PAIR.shear_modulus
+A, Q, MU = 1e-4, 1e5, 0.1
+STEEPNESS = 4.0 * Q / (np.pi * A**2)
+RATE = MU * STEEPNESS * A  # E* times the creepage at which a strip slides fully
+
+
+def scaled(d_x, d_y, psi, moduli=MODULI):
+    """Return creepage and spin of given d_x/a, d_y/a and psi."""
+    return d_x * RATE / moduli[0], d_y * RATE / moduli[1], psi * RATE / (A * moduli[1])
+
+
+def force(slip_x, slip_y, spin, moduli=MODULI, friction=MU):
+    """Return forces over mu q, and moment over mu q a."""
+    found = np.array(strip_force(A, Q, friction, STEEPNESS, slip_x, slip_y, spin, *moduli)[:3])
+    return found / (friction * Q * np.array([1.0, 1.0, A]))
+
+
+def work(slip_x, slip_y, spin, found):
+    return -(found[0] * slip_x + found[1] * slip_y + spin * A * found[2])
+
+
+@pytest.mark.bench
+def test_that_carters_law_is_met():
+    for part in (0.1, 0.4, 0.9, 1.0, 1.5):
+        expected = 1.0 - (1.0 - min(part, 1.0)) ** 2
+        for d_x, d_y in ((part, 0.0), (0.0, part)):
+            found = force(*scaled(d_x, d_y, 0.0))
+            assert found[:2] == pytest.approx([-expected * (d_x > 0), -expected * (d_y > 0)])
+    exact = rows("carter")[0]["exact"]
+    assert force(*scaled(0.4, 0.0, 0.0))[0] == pytest.approx(-exact, rel=1e-12)
+
+
+@pytest.mark.bench
+@pytest.mark.parametrize("psi", [-0.3, 0.1, 0.3])
+def test_that_lateral_creepage_with_spin_is_carters_law_about_another_stiffness(psi):
+    # where all traction is lateral, taking back (1 - psi) of it where the strip adheres is exact
+    for d_y in (0.1, 0.5):
+        t = d_y / (1.0 - psi)
+        found = force(*scaled(0.0, d_y, psi))
+        assert found[1] == pytest.approx(-(1.0 - (1.0 - psi) * (1.0 - t) ** 2), rel=1e-12)
+        assert found[2] == pytest.approx((1.0 - psi) * (1.0 - t) ** 2 * t, rel=1e-12)
+
+
+@pytest.mark.bench
+def test_that_small_creepage_meets_the_linear_theory():
+    slip_x, slip_y, spin = 1e-9, -2e-9, 3e-5
+    force_x, force_y, moment, adhering = strip_force(
+        A, Q, MU, STEEPNESS, slip_x, slip_y, spin, *MODULI
+    )
+    stiff_x, stiff_y = 0.5 * np.pi * A * MODULI[0], 0.5 * np.pi * A * MODULI[1]
+    assert force_x == pytest.approx(-stiff_x * slip_x, rel=1e-4)
+    assert force_y == pytest.approx(-stiff_y * (slip_y + 0.5 * spin * A), rel=1e-4)
+    assert moment == pytest.approx(0.5 * stiff_y * A * slip_y, rel=1e-4)
+    assert adhering == pytest.approx(2.0 * A, rel=1e-4)
+
+
+CASES = [
+    (d, angle, psi)
+    for d in (0.15, 0.7, 1.3)
+    for angle in (25.0, 155.0)
+    for psi in (0.0, 0.08, -0.08, 0.2)
+]
+
+
+@pytest.mark.bench
+def test_that_a_numerical_solution_of_the_strip_is_met():
+    errors = {0.0: [], 0.08: [], 0.2: []}
+    for d, angle, psi in CASES:
+        d_x, d_y = d * np.cos(np.radians(angle)), d * np.sin(np.radians(angle))
+        exact = rolling_strip(d_x, d_y, psi, MODULI[0] / MODULI[1])
+        slip = scaled(d_x, d_y, psi)
+        found = force(*slip)
+        assert np.abs(found - exact).max() < (0.02 if abs(psi) > 0.1 else 0.012)
+        errors[abs(psi)].append(work(*slip, found) / work(*slip, exact) - 1.0)
+    assert np.abs(errors[0.0]).max() < 1.2e-3
+    assert np.abs(errors[0.08]).max() < 2.5e-3
+    assert np.abs(errors[0.2]).max() < 5e-3
+
+
+@pytest.mark.bench
+@pytest.mark.parametrize("turn", [0.0, 0.3, 1.0, 3.0])
+def test_that_full_sliding_with_spin_follows_the_slip_along_the_strip(turn):
+    slip_x, slip_y = 0.5, 0.3
+    place = np.cos((np.arange(400) + 0.5) * np.pi / 400)
+    weight = (1.0 - place**2) / (1.0 - place**2).sum()
+    local = np.hypot(slip_x, slip_y + turn * place)
+    exact = (
+        (weight * slip_x / local).sum(),
+        (weight * (slip_y + turn * place) / local).sum(),
+        (weight * place * (slip_y + turn * place) / local).sum(),
+    )
+    # elasticity counts for nothing at a hundred times the creepage of saturation
+    size = 100.0 * RATE / MODULI[1]
+    found = force(size * slip_x, size * slip_y, size * turn / A)
+    # below TURNED the turning is left out to its second order
+    tolerance = 0.01 + 0.5 * TURNED**2
+    np.testing.assert_allclose(found, np.negative(exact), atol=tolerance)
+    own = work(size * slip_x, size * slip_y, size * turn / A, found)
+    assert own == pytest.approx(size * (weight * local).sum(), rel=2e-3)
+
+
+def test_that_a_direction_that_turns_little_is_its_series():
+    assert mean_direction(3.0, 4.0, 0.0) == pytest.approx((0.6, 0.8, 0.0))
+    # the mean of s^2 and of s^4 are 1/4 and 1/8
+    turn = 0.2
+    expected = 1.0 - 0.5 * turn**2 / 4.0 + 0.375 * turn**4 / 8.0
+    assert mean_direction(1.0, 0.0, turn)[0] == pytest.approx(expected, abs=turn**6)
+    expected = turn / 4.0 - 0.5 * turn**3 / 8.0
+    assert mean_direction(1.0, 0.0, turn)[2] == pytest.approx(expected, abs=turn**5)
+
+
+sizes = st.floats(-6.0, 6.0).map(lambda x: np.sign(x) * 10.0 ** (abs(x) - 4.0) if x else 0.0)
+
+
+@pytest.mark.bench
+@given(sizes, sizes, sizes, st.floats(0.01, 0.8))
+def test_that_traction_opposes_slip_within_the_traction_bound(d_x, d_y, psi, friction):
+    slip = scaled(d_x, d_y, psi)
+    found = force(*slip, friction=friction)
+    scale = np.hypot(slip[0], slip[1]) + abs(slip[2]) * A
+    assert work(*slip, found) >= -1e-14 * scale
+    assert np.hypot(*found[:2]) <= 1.0 + 1e-12
+    assert 0.0 <= strip_force(A, Q, friction, STEEPNESS, *slip, *MODULI)[3] <= 2.0 * A
+
+
+@pytest.mark.bench
+@given(sizes, sizes, sizes)
+def test_that_a_mirrored_strip_has_mirrored_forces(d_x, d_y, psi):
+    slip_x, slip_y, spin = scaled(d_x, d_y, psi)
+    force_x, force_y, moment, adhering = strip_force(
+        A, Q, MU, STEEPNESS, slip_x, slip_y, spin, *MODULI
+    )
+    mirrored = strip_force(A, Q, MU, STEEPNESS, slip_x, -slip_y, -spin, *MODULI)
+    assert mirrored == (force_x, -force_y, -moment, adhering)
+    turned = strip_force(A, Q, MU, STEEPNESS, -slip_x, slip_y, spin, *MODULI)
+    assert turned == (-force_x, force_y, moment, adhering)
+
+
+@pytest.mark.bench
+@given(sizes, sizes, sizes)
+def test_that_forces_change_no_faster_than_creepage(d_x, d_y, psi):
+    here = force(*scaled(d_x, d_y, psi))
+    near = force(*scaled(d_x * (1.0 + 1e-9), d_y * (1.0 - 1e-9), psi * (1.0 + 1e-9)))
+    assert np.abs(near - here).max() < 1e-6
+
+
+@pytest.mark.bench
+@pytest.mark.parametrize("psi", [0.0, 0.3, SPIN_LIMIT, 2.0])
+@pytest.mark.parametrize("angle", [0.0, 0.3, 0.8, 1.5])
+def test_that_the_force_is_continuous_where_the_strip_begins_to_slide_fully(angle, psi):
+    def at(d):
+        return force(*scaled(d * np.cos(angle), d * np.sin(angle), psi))
+
+    def adhering(d):
+        slip = scaled(d * np.cos(angle), d * np.sin(angle), psi)
+        return strip_force(A, Q, MU, STEEPNESS, *slip, *MODULI)[3]
+
+    low, high = 0.01, 2.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if adhering(middle) > 0.0 else (low, middle)
+    np.testing.assert_allclose(at(low * (1.0 - 1e-9)), at(high * (1.0 + 1e-9)), atol=1e-7)
+
+
+@pytest.mark.bench
+def test_that_no_creepage_adheres_and_no_friction_slides():
+    assert strip_force(A, Q, MU, STEEPNESS, 0.0, 0.0, 0.0, *MODULI) == (0.0, 0.0, 0.0, 2.0 * A)
+    assert strip_force(A, Q, 0.0, STEEPNESS, 1e-3, 1e-3, 1.0, *MODULI) == (0.0, 0.0, 0.0, 0.0)
+    slight = strip_force(A, Q, 1e-9, STEEPNESS, 1e-3, 0.0, 0.0, *MODULI)
+    assert slight == pytest.approx((-1e-9 * Q, 0.0, 0.0, 0.0), rel=1e-9)

@@ -1,0 +1,377 @@
+"""FASTSIM's kernels against a readable twin, closed forms, the energy balance and their orders."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+import scipy.special
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from wearsim.bench.exact import rows, table
+from wearsim.mechanics.hertz.ellipse import hertz
+from wearsim.mechanics.tangential.fastsim import (
+    bound_shape,
+    end_weights,
+    march,
+    march_local,
+    new_sums,
+    place_of,
+)
+from wearsim.mechanics.tangential.fastsim_closed_form import closed_form, closed_form_parabolic
+from wearsim.mechanics.tangential.fastsim_fields import (
+    element_sum,
+    march_fields,
+    march_local_fields,
+)
+from wearsim.mechanics.tangential.kalker_coefficients import flexibilities, line_limit_coefficients
+
+SHEAR = 200e9 / 2.6
+SPEED = 1000.0 * 2.0 * math.pi / 60.0 * 25e-3
+
+
+class Case(NamedTuple):
+    """Kalker's ellipse cut into strips, under one creepage."""
+
+    y: np.ndarray
+    half_length: np.ndarray
+    bound_peak: np.ndarray
+    elliptic: bool
+    slip_x: np.ndarray
+    eta: float
+    phi: float
+    flex: object
+    spacing: float
+
+    @property
+    def arguments(self):
+        spin_part = -self.phi * self.y
+        mean = self.slip_x - spin_part
+        return (
+            self.half_length,
+            self.bound_peak,
+            self.elliptic,
+            mean / self.flex.longitudinal + spin_part / self.flex.spin,
+            self.eta / self.flex.lateral,
+            self.phi / self.flex.spin,
+        )
+
+    def power(self, sums):
+        work = self.slip_x * sums[0] + self.eta * sums[1] + self.phi * sums[2]
+        return -SPEED * work.sum() * self.spacing
+
+
+def rig(strips=50, xi=1e-3, eta=0.0, phi=0.0, elliptic=False, curvatures=(45.0, 1.0)):
+    patch = hertz(*curvatures, 300.0, SHEAR / 0.7)
+    y = patch.b * ((np.arange(strips) + 0.5) * 2.0 / strips - 1.0)
+    section = 1.0 - (y / patch.b) ** 2
+    peak = 2.0 * 300.0 / (math.pi * patch.a * patch.b) * section
+    if elliptic:
+        peak = patch.peak_pressure * np.sqrt(section)
+    return Case(
+        y=y,
+        half_length=patch.a * np.sqrt(section),
+        bound_peak=0.1 * peak,
+        elliptic=elliptic,
+        slip_x=xi - phi * y,
+        eta=eta,
+        phi=phi,
+        flex=flexibilities(
+            line_limit_coefficients(patch.a / patch.b, 0.3), patch.a, patch.b, SHEAR
+        ),
+        spacing=2.0 * patch.b / strips,
+    )
+
+
+def edge(points, elliptic):
+    """Return what the last inner point weighs: by this a parabola is integrated exactly."""
+    place = 1.0 - 2.0 * np.arange(1, points) / points
+    if elliptic:
+        return 1.0 - scipy.special.zeta(-0.5) * math.sqrt(points / (points - 1.0))
+    missing = 4.0 / 3.0 - 2.0 / points * (1.0 - place**2).sum()
+    return 1.0 + 0.25 * points * missing / (1.0 - place[0] ** 2)
+
+
+def weights(sticks, elliptic):
+    """Return the weights of a march's points, (points, strips), for where it sticks."""
+    points = len(sticks)
+    found = [end_weights(k, points, elliptic) for k in range(1, points + 1)]
+    sticking, sliding = np.array(found).T[:, :, None]
+    return np.where(sticks, sticking, sliding)
+
+
+def twin(half_length, bound_peak, elliptic, gradient_x, gradient_y, gradient_spin, points):
+    """March one strip after another, as a textbook would write it."""
+    sums = np.zeros((4, len(half_length)))
+    for j, a in enumerate(half_length):
+        traction = np.zeros(2)
+        dx = 2.0 * a / points
+        for k in range(points):
+            x = a - (k + 1) * dx
+            middle = x + 0.5 * dx
+            rise = np.array([gradient_x[j], gradient_y + gradient_spin * middle])
+            traction = traction - rise * dx
+            shape = max(1.0 - (x / a) ** 2, 0.0) if k + 1 < points else 0.0
+            bound = bound_peak[j] * (math.sqrt(shape) if elliptic else shape)
+            size = math.hypot(*traction)
+            if size > bound:
+                traction = traction * (bound / size)
+            else:
+                sums[3, j] += dx
+            weight = dx
+            if k == 0:
+                weight *= edge(points, elliptic) if size > bound else 13.0 / 12.0
+            elif k == points - 2:
+                weight *= edge(points, elliptic)
+            sums[:3, j] += np.array([traction[0], traction[1], x * traction[1]]) * weight
+    return sums
+
+
+def local(case, friction, first=0):
+    """March under a field of friction; `case` was cut with a coefficient of 0.1."""
+    sums = new_sums(len(case.half_length))
+    half_length, bound_peak, elliptic, *gradients = case.arguments
+    flexible = case.flex.longitudinal, case.flex.lateral
+    march_local(
+        len(half_length),
+        half_length,
+        bound_peak / 0.1,
+        friction,
+        first,
+        elliptic,
+        *gradients,
+        *flexible,
+        sums,
+    )
+    return sums
+
+
+SCENES = [
+    {"xi": 1e-3},
+    {"xi": -4e-4, "eta": 5e-4, "phi": 0.5},
+    {"xi": 0.0, "eta": 0.0, "phi": 2.0},
+    {"xi": 1e-4, "eta": -2e-3, "phi": 20.0},
+]
+
+
+@pytest.mark.parametrize("elliptic", [False, True])
+@pytest.mark.parametrize("scene", SCENES)
+def test_that_the_march_equals_its_readable_twin(scene, elliptic):
+    case = rig(strips=11, elliptic=elliptic, **scene)
+    found, expected = march(*case.arguments, 24), twin(*case.arguments, 24)
+    scale = np.abs(expected).max(axis=1, keepdims=True) + 1e-300
+    assert found / scale == pytest.approx(expected / scale, abs=1e-10)
+
+
+@pytest.mark.parametrize("elliptic", [False, True])
+@pytest.mark.parametrize("scene", SCENES)
+def test_that_the_fields_add_up_to_the_sums_of_the_march(scene, elliptic):
+    case = rig(strips=11, elliptic=elliptic, **scene)
+    sums = march(*case.arguments, 40)
+    traction_x, traction_y, cut_x, cut_y = march_fields(*case.arguments, 40)
+    place = np.linspace(1.0, -1.0, 41)[:, None] * case.half_length
+    dx = case.half_length / 20.0
+    sticks = (cut_x == 0.0) & (cut_y == 0.0)
+    counted = weights(sticks[1:], elliptic)
+    for found, whole in (
+        (sums[0], traction_x),
+        (sums[1], traction_y),
+        (sums[2], place * traction_y),
+    ):
+        expected = (counted * whole[1:]).sum(axis=0) * dx
+        assert found == pytest.approx(expected, rel=1e-9, abs=1e-10 * np.abs(whole).max() * dx[5])
+    assert sums[3] == pytest.approx(sticks[1:].sum(axis=0) * dx, rel=1e-12)
+
+
+@pytest.mark.parametrize("elliptic", [False, True])
+@pytest.mark.parametrize("scene", SCENES)
+def test_that_a_uniform_field_of_friction_is_a_coefficient(scene, elliptic):
+    case = rig(strips=11, elliptic=elliptic, **scene)
+    found, expected = local(case, np.full((24, 11), 0.1)), march(*case.arguments, 24)
+    scale = np.abs(expected).max(axis=1)
+    for row, name in enumerate(("force_x", "force_y", "moment", "adhesion")):
+        assert getattr(found, name) == pytest.approx(expected[row], abs=1e-14 * scale[row])
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_that_a_field_of_friction_adds_up_as_its_inside_does(scene):
+    case = rig(strips=11, **scene)
+    friction = np.random.default_rng(0).uniform(0.02, 0.2, (30, 14))
+    half_length, bound_peak, elliptic, *gradients = case.arguments
+    own = np.ascontiguousarray(friction[:, 2:13])
+    inside = march_local_fields(half_length, bound_peak / 0.1, own, elliptic, *gradients)
+    size = np.hypot(inside[0], inside[1])[1:]
+    place = np.linspace(1.0, -1.0, 31)[1:, None]
+    bound = own * (1.0 - place**2) * bound_peak / 0.1
+    assert np.all(size <= bound * (1.0 + 1e-12) + 1e-3)
+    found, dx = local(case, friction, first=2), half_length / 15.0
+    scale = size.max() * dx.max()
+    counted = weights(((inside[2] == 0.0) & (inside[3] == 0.0))[1:], elliptic)
+    for force, traction in zip((found.force_x, found.force_y), inside[:2, 1:], strict=True):
+        assert force == pytest.approx((counted * traction).sum(axis=0) * dx, abs=1e-12 * scale)
+    expected = element_sum(inside, case.flex.longitudinal, case.flex.lateral, 1.0)
+    assert found.work == pytest.approx(expected, rel=1e-10, abs=1e-12 * expected.max())
+
+
+@pytest.mark.parametrize("elliptic", [False, True])
+@pytest.mark.parametrize("points", [2, 3, 8, 13, 50])
+def test_that_the_weights_at_the_edges_integrate_the_bound(points, elliptic):
+    counted = [end_weights(k, points, elliptic)[1] for k in range(1, points + 1)]
+    shapes = [bound_shape(place_of(k, points), elliptic) for k in range(1, points + 1)]
+    whole = math.pi / 2.0 if elliptic else 4.0 / 3.0
+    # the root's next correction is left out
+    missing = 0.07 * points**-2.5 if elliptic else 1e-14
+    assert 2.0 / points * np.dot(counted, shapes) == pytest.approx(whole, rel=missing)
+
+
+def test_that_full_sliding_integrates_friction_times_pressure():
+    # mu = 0.1 (1 + s^2) with s = x/a: the integral of (1 - s^2)(1 + s^2) is 8/5
+    case = rig(strips=11, xi=0.5)
+    place = np.linspace(1.0, -1.0, 401)[1:, None]
+    sums = local(case, 0.1 * (1.0 + place**2) + np.zeros(11))
+    assert sums.force_x == pytest.approx(-1.6 * case.bound_peak * case.half_length, rel=1e-4)
+
+
+def test_that_no_traction_exceeds_the_bound_and_all_vanish_at_both_edges():
+    case = rig(strips=11, eta=5e-4, phi=3.0)
+    traction_x, traction_y, _, _ = march_fields(*case.arguments, 40)
+    shape = 1.0 - np.linspace(1.0, -1.0, 41)[:, None] ** 2
+    size = np.hypot(traction_x, traction_y)
+    assert np.all(size <= shape * case.bound_peak * (1.0 + 1e-12))
+    assert np.all(size[[0, -1]] == 0.0)
+
+
+@pytest.mark.parametrize("elliptic", [False, True])
+@pytest.mark.parametrize("creepage", [(1e-5, 0.0), (3e-4, 2e-4), (1e-3, 0.0), (0.0, 5e-3)])
+def test_that_the_march_tends_to_the_closed_form_without_spin(creepage, elliptic):
+    case = rig(strips=7, xi=creepage[0], eta=creepage[1], elliptic=elliptic)
+    found, expected = march(*case.arguments, 20000), closed_form(*case.arguments[:5])
+    force = np.hypot(expected[0], expected[1]).max()
+    lengths = 2.0 * case.half_length
+    scales = (force, force, force * case.half_length.max(), lengths)
+    for one, other, scale in zip(found, expected, scales, strict=True):
+        assert np.max(np.abs(one - other) / scale) < 2e-4
+
+
+def test_that_strips_outside_and_strips_without_creepage_carry_nothing():
+    half_length, peak = np.array([0.0, 1e-4]), np.array([0.0, 1e8])
+    none = np.zeros(2)
+    for found in (
+        march(half_length, peak, False, none, 0.0, 0.0, 10),
+        closed_form(half_length, peak, False, none, 0.0),
+    ):
+        assert np.all(found[:3] == 0.0)
+        assert found[3] == pytest.approx([0.0, 2e-4])
+
+
+@pytest.mark.parametrize("strip", [0.1, 0.5, 0.9])
+def test_that_the_closed_form_is_kalkers(strip):
+    patch = hertz(45.0, 1.0, 300.0, SHEAR / 0.7)
+    flex = 8.0 * patch.a / (3.0 * math.pi**2 / 2.8 * SHEAR)
+    half = patch.a * math.sqrt(1.0 - strip**2)
+    peak = 2.0 * 300.0 / (math.pi * patch.a * patch.b)
+    kappa = 1e-3 * patch.a**2 / (flex * 0.1 * peak)
+    assert kappa == pytest.approx(0.15281e-3, rel=1e-4)
+    expected = 1e-3 / flex * (2.0 * half**2 - half * kappa + kappa**2 / 6.0)
+    if kappa > 2.0 * half:
+        expected = 4.0 / 3.0 * 0.1 * peak * half**3 / patch.a**2
+    found = closed_form_parabolic(patch.a, patch.b, 300.0, 0.1, 1e-3, flex, np.array([half]))
+    assert found[0] == pytest.approx(expected, rel=1e-12)
+
+
+def test_that_the_mean_problem_dissipates_what_its_closed_form_says():
+    case = rig(strips=2000)
+    sums = closed_form(*case.arguments[:5])
+    assert case.power(sums) == pytest.approx(0.073873, rel=1e-5)
+    assert -sums[0].sum() * case.spacing / 30.0 == pytest.approx(0.94057, rel=1e-5)
+
+
+def test_that_50_by_50_points_meet_the_closed_form_within_a_thousandth():
+    case = rig(strips=50)
+    assert case.power(march(*case.arguments, 50)) == pytest.approx(0.073873, rel=1e-3)
+
+
+@pytest.mark.bench
+@pytest.mark.parametrize("bound", ["par", "ell"])
+@pytest.mark.parametrize("case", rows("mean_problem")[:2], ids=lambda case: case["case"])
+def test_that_contacts_quadrature_of_fastsim_is_met(case, bound):
+    mean = table("mean_problem")
+    here = rig(
+        strips=4000,
+        xi=case["xi"],
+        elliptic=bound == "ell",
+        curvatures=(mean["A_per_m"], mean["B_per_m"]),
+    )
+    found = here.power(closed_form(*here.arguments[:5])) / SPEED
+    assert found == pytest.approx(case[f"fastsim_{bound}_exact_P_over_V_N"], rel=2e-6)
+
+
+def errors(points, **scene):
+    """Return the relative errors of the rigid slip's work and of the element sum."""
+    fine = rig(strips=800, **scene)
+    exact = fine.power(march(*fine.arguments, 3200))
+    work, textbook = [], []
+    for n in points:
+        case = rig(strips=n, **scene)
+        work.append(case.power(march(*case.arguments, n)) / exact - 1.0)
+        fields = march_fields(*case.arguments, n)
+        flex = case.flex
+        total = element_sum(fields, flex.longitudinal, flex.lateral, SPEED).sum() * case.spacing
+        textbook.append(total / exact - 1.0)
+    return np.array(work), np.array(textbook)
+
+
+def order(points, values):
+    return -np.polyfit(np.log(points), np.log(np.abs(values)), 1)[0]
+
+
+@pytest.mark.parametrize(
+    "scene", [{}, {"eta": 5e-4}, {"eta": 5e-4, "phi": 0.05}], ids=["one-way", "lateral", "spin"]
+)
+def test_that_the_rigid_slips_work_is_second_order_and_the_element_sum_first(scene):
+    points = np.array([10, 20, 50, 100, 200])
+    work, textbook = errors(points, **scene)
+    # where a strip begins to slide a corner is cut, of either sign: together they do better
+    assert np.all(np.abs(work) * points**2 < 0.25)
+    assert order(points, textbook) == pytest.approx(1.0, abs=0.1)
+    assert np.all(textbook < 0.0)
+
+
+def test_that_few_steps_do_where_spin_turns_the_slip():
+    for count, worst in ((6, 1e-2), (10, 3.5e-3), (16, 1.2e-3), (40, 3e-4)):
+        work, _ = errors(np.array([count]), xi=-4e-4, eta=5e-4, phi=0.5)
+        assert abs(work[0]) < worst
+
+
+def test_that_the_errors_of_the_grids_are_those_measured_before():
+    work, textbook = errors(np.array([10, 20, 50, 200]))
+    assert textbook == pytest.approx([-0.165, -0.082, -0.032, -0.008], abs=5e-4)
+    assert np.all(np.abs(work) < [2e-3, 3e-4, 5e-5, 2e-6])
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.floats(-2e-3, 2e-3), st.floats(-2e-3, 2e-3), st.floats(-5.0, 5.0), st.booleans())
+def test_that_mirroring_the_contact_mirrors_its_tractions(xi, eta, phi, elliptic):
+    # y to -y: lateral creepage, spin, lateral force and moment change sign
+    one, other = (
+        rig(strips=9, xi=xi, eta=sign * eta, phi=sign * phi, elliptic=elliptic) for sign in (1, -1)
+    )
+    found, mirrored = march(*one.arguments, 20), march(*other.arguments, 20)[:, ::-1]
+    signs = np.array([1.0, -1.0, -1.0, 1.0])[:, None]
+    scale = np.abs(found).max(axis=1, keepdims=True) + 1e-30
+    assert found[:3] / scale[:3] == pytest.approx(signs[:3] * mirrored[:3] / scale[:3], abs=1e-9)
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.floats(-2e-3, 2e-3), st.floats(-2e-3, 2e-3), st.floats(-5.0, 5.0), st.booleans())
+def test_that_power_stays_between_nothing_and_full_sliding(xi, eta, phi, elliptic):
+    case = rig(strips=9, xi=xi, eta=eta, phi=phi, elliptic=elliptic)
+    power = case.power(march(*case.arguments, 60))
+    # every point of the bound sliding at the rigid slip there
+    place = np.linspace(-1.0, 1.0, 601)[:, None]
+    shape = 1.0 - place**2
+    slip = np.hypot(case.slip_x, eta + phi * place * case.half_length)
+    bound = case.bound_peak * (np.sqrt(shape) if elliptic else shape)
+    most = SPEED * (bound * slip).sum(axis=0) @ case.half_length / 300.0 * case.spacing
+    assert -1e-3 * most - 1e-18 <= power <= most * (1.0 + 1e-3) + 1e-18

@@ -1,0 +1,81 @@
+"""The smoothing of lattice noise: against the plain sum, and its variance and correlation."""
+
+import numpy as np
+import pytest
+
+from wearsim.mechanics.tangential.friction_field import CELLS, REACH, smooth
+
+LENGTH = 50e-6
+SPACING = LENGTH / 2.0
+
+
+def weights(x, y, rows, columns):
+    """Return what every node weighs at one point, normalised: the plain formula."""
+    node_y, node_x = SPACING * rows[:, None], SPACING * columns
+    weight = np.exp(-2.0 * ((x - node_x) ** 2 + (y - node_y) ** 2) / LENGTH**2)
+    for nodes, place, axis in ((rows, y, 0), (columns, x, 1)):
+        low = np.floor(place / SPACING) - REACH + 1
+        inside = (nodes >= low) & (nodes < low + CELLS)
+        weight = weight * np.expand_dims(inside, 1 - axis)
+    return weight / np.sqrt(np.sum(weight**2))
+
+
+@pytest.fixture
+def lattice():
+    """Return rows and columns of a lattice on both sides of the origin."""
+    return np.arange(-12, 16), np.arange(-14, 13)
+
+
+def test_that_it_is_the_normalised_sum_over_the_cells_in_reach(lattice):
+    rows, columns = lattice
+    random = np.random.default_rng(1)
+    noise = random.normal(size=(len(rows), len(columns)))
+    y = SPACING * random.uniform(-7.0, 9.0, size=5)
+    x = SPACING * random.uniform(-9.0, 7.0, size=(4, 5))
+    y[0], x[0, 0] = 0.0, -3.0 * SPACING  # on a node
+    field = smooth(x, y, noise, rows[0], columns[0], SPACING)
+    expected = [
+        [np.sum(weights(x[p, i], y[i], rows, columns) * noise) for i in range(5)] for p in range(4)
+    ]
+    np.testing.assert_allclose(field, expected, rtol=0.0, atol=1e-12)
+
+
+def responses(x, y, lattice):
+    """Return what a unit of noise in each cell makes of the field, shape (points, cells)."""
+    rows, columns = lattice
+    made = []
+    for cell in range(len(rows) * len(columns)):
+        noise = np.zeros(len(rows) * len(columns))
+        noise[cell] = 1.0
+        grid = noise.reshape(len(rows), len(columns))
+        made.append(np.diag(smooth(x, y, grid, rows[0], columns[0], SPACING)))
+    return np.array(made).T
+
+
+@pytest.mark.parametrize("direction", [(1.0, 0.0), (0.0, 1.0), (0.6, 0.8)])
+def test_that_variance_is_one_and_correlation_falls_as_the_bell_curve(lattice, direction):
+    distance = LENGTH * np.array([0.0, 0.25, 0.5, 1.0, 1.5, 2.0])
+    for start in (0.0, 0.17, 0.5):
+        # strip i holds point i, so that the diagonal walks along the direction
+        y = LENGTH * start - 0.5 * LENGTH + direction[1] * distance
+        x = np.tile((LENGTH * start - LENGTH + direction[0] * distance)[:, None], (1, 6))
+        response = responses(x, y, lattice)
+        np.testing.assert_allclose(np.sum(response**2, axis=1), 1.0, rtol=1e-12)
+        np.testing.assert_allclose(
+            response @ response[0], np.exp(-((distance / LENGTH) ** 2)), atol=3e-4
+        )
+
+
+def test_that_a_point_of_the_field_has_one_value_in_any_grid(lattice):
+    rows, columns = lattice
+    noise = np.random.default_rng(2).normal(size=(len(rows), len(columns)))
+    y = SPACING * np.linspace(-5.0, 5.0, 7)
+    x = SPACING * np.repeat(np.linspace(-8.0, 6.0, 9)[:, None], 7, axis=1)
+    whole = smooth(x, y, noise, rows[0], columns[0], SPACING)
+    fewer = smooth(
+        np.ascontiguousarray(x[::3, 2:5]), y[2:5].copy(), noise, rows[0], columns[0], SPACING
+    )
+    np.testing.assert_array_equal(fewer, whole[::3, 2:5])
+    # nor does it matter where the rectangle of noise begins
+    cut = smooth(x, y, np.ascontiguousarray(noise[2:, 1:]), rows[2], columns[1], SPACING)
+    np.testing.assert_array_equal(cut, whole)

@@ -1,0 +1,192 @@
+"""Contacts solved together are those solved alone: their order, company and gaps change nothing."""
+
+import math
+
+import numpy as np
+import pytest
+
+from wearsim.mechanics.hertz.ellipse import given_ellipse, hertz
+from wearsim.mechanics.hertz.parabola_fit import (
+    CONVERGED,
+    LEAVES_STRIPS,
+    NO_CURVATURE,
+    TOO_FEW_STRIPS,
+    hertz_on_profile,
+)
+from wearsim.mechanics.hertz.patches import (
+    NO_GAP,
+    NO_LOAD,
+    Bodies,
+    Patches,
+    find_patches,
+    half_lengths,
+)
+from wearsim.mechanics.tangential.hertz_fastsim_batch import (
+    ALWAYS,
+    EXACT,
+    LINE_LIMIT,
+    NEVER,
+    NO_LIMIT,
+    NOT_FINITE,
+    TABLE,
+    Asked,
+    Found,
+    Theory,
+    solve_contacts,
+)
+from wearsim.mechanics.tangential.kalker_coefficients import spline
+from wearsim.types import Grid
+
+SHEAR, NU = 200e9 / 2.6, 0.3
+MODULUS = SHEAR / (1.0 - NU)
+GRID = Grid.spanning(-4e-3, 4e-3, 81)
+Y = GRID.y
+CONTACTS = 40
+RANDOM = np.random.default_rng(2)
+LOADS = RANDOM.uniform(150.0, 450.0, CONTACTS)
+GROOVE = Y**2 + 0.6 * np.maximum(3e-6 - (Y - 2e-4) ** 2, 0.0)
+GAPS = np.array([Y**2, 2e-6 + 1.3 * (Y - 4e-4) ** 2, GROOVE])
+ROW = RANDOM.integers(0, 3, CONTACTS)
+
+
+def bodies(a=0.0, b=0.0, curvature_x=45.0):
+    return Bodies(Y, GRID.spacing, curvature_x, MODULUS, a, b, 1e-10, 200)
+
+
+def patches_of(contacts):
+    return Patches(*np.zeros((6, contacts)), *np.zeros((2, contacts), dtype=np.int64))
+
+
+def find(gaps=GAPS, row=ROW, loads=LOADS, **given):
+    patches = patches_of(len(row))
+    find_patches(bodies(**given), gaps, row, loads, patches)
+    return patches
+
+
+def test_that_every_patch_is_the_one_hertz_finds_for_its_gap():
+    patches = find()
+    assert np.all(patches.status == CONVERGED)
+    for k, load in enumerate(LOADS):
+        gap = GAPS[ROW[k]]
+        curvature, b, centre, height, iterations, _ = hertz_on_profile(
+            Y, gap, 45.0, load, MODULUS, 1e-10, 200
+        )
+        patch = hertz(45.0, curvature, load, MODULUS)
+        assert (patches.a[k], patches.b[k]) == (patch.a, patch.b)
+        assert patches.b[k] == pytest.approx(b, rel=1e-9)
+        assert patches.ratio[k] == pytest.approx(patch.a / patch.b, rel=1e-14)
+        assert patches.peak_pressure[k] == patch.peak_pressure
+        assert patches.approach[k] == patch.approach + height
+        assert (patches.centre[k], patches.iterations[k]) == (centre, iterations)
+
+
+@pytest.mark.parametrize("curvatures", [(45.0, 1.0), (1.0, 1.0), (1.0, 8.0)])
+def test_that_a_parabola_gives_the_patch_of_its_own_curvature(curvatures):
+    gap = (3e-6 + curvatures[1] * (Y - 1e-4) ** 2)[None, :]
+    load = np.array([300.0])
+    patches = find(gap, np.zeros(1, dtype=np.int64), load, curvature_x=curvatures[0])
+    patch = hertz(*curvatures, 300.0, MODULUS)
+    assert patches.iterations[0] == 1
+    assert (patches.a[0], patches.b[0]) == pytest.approx((patch.a, patch.b), rel=1e-13)
+    assert patches.ratio[0] == pytest.approx(patch.a / patch.b, rel=1e-13)
+    assert patches.approach[0] == pytest.approx(patch.approach + 3e-6, rel=1e-13)
+    assert patches.centre[0] == pytest.approx(1e-4, rel=1e-11)
+
+
+def test_that_a_prescribed_patch_keeps_its_axes_under_any_load():
+    patches = find(a=2e-4, b=2e-3)
+    assert np.all(patches.a == 2e-4)
+    assert np.all(patches.b == 2e-3)
+    for k, load in enumerate(LOADS):
+        expected = given_ellipse(2e-4, 2e-3, load, MODULUS)
+        assert patches.peak_pressure[k] == expected.peak_pressure
+
+
+@pytest.mark.parametrize(
+    ("gap", "load", "status"),
+    [
+        (-(Y**2), 300.0, NO_CURVATURE),
+        (1e-2 * Y**2, 300.0, LEAVES_STRIPS),
+        ((Y - 3.5e-3) ** 2, 300.0, LEAVES_STRIPS),
+        (1e6 * Y**2, 300.0, TOO_FEW_STRIPS),
+        (np.where(Y > 1e-3, np.inf, Y**2), 300.0, NO_GAP),
+        (Y**2, 0.0, NO_LOAD),
+        (Y**2, math.nan, NO_LOAD),
+    ],
+)
+def test_that_a_contact_that_fails_says_why_and_harms_no_other(gap, load, status):
+    gaps, row = np.array([Y**2, gap]), np.array([0, 1, 0])
+    patches = find(gaps, row, np.array([300.0, load, 300.0]))
+    assert patches.status.tolist() == [CONVERGED, status, CONVERGED]
+    assert patches.b[0] == patches.b[2] > 0.0
+    halves = half_lengths(bodies(), patches, np.array([300.0, load, 300.0]))
+    assert not halves[1].any()
+    assert np.array_equal(halves[0], halves[2])
+
+
+def theory(closed_form=NEVER, kalker=TABLE, element_sum=False, points=24, single=False):
+    tables = spline(0), spline(1), spline(2)
+    return Theory(
+        SHEAR, NU, False, closed_form, element_sum, points, single, kalker, np.zeros(3), tables
+    )  # fmt: skip
+
+
+def asked(chosen=slice(None)):
+    random = np.random.default_rng(5)
+    numbers = random.normal(size=(3, CONTACTS)) * [[4e-4], [5e-4], [0.1]]
+    friction = random.uniform(0.05, 0.15, (CONTACTS, 1, 1))
+    columns = [LOADS, 1e-3 + numbers[0], numbers[1], numbers[2], friction]
+    return Asked(*(column[chosen] for column in columns), False, np.zeros((0, len(Y))), 2.6)
+
+
+def solve(rules, wanted, row=ROW, gaps=GAPS, **given):
+    found = Found(*np.zeros((3, len(row), len(Y))), *np.zeros((5, len(row))))
+    patches = patches_of(len(row))
+    failed = solve_contacts(bodies(**given), rules, gaps, row, wanted, patches, found)
+    return failed, found, patches
+
+
+RULES = [
+    {},
+    {"closed_form": EXACT},
+    {"closed_form": ALWAYS},
+    {"kalker": LINE_LIMIT},
+    {"element_sum": True},
+]
+
+
+@pytest.mark.parametrize("rules", RULES)
+def test_that_order_and_company_change_no_bit(rules):
+    rules = theory(**rules)
+    failed, found, _ = solve(rules, asked())
+    assert failed == CONTACTS
+    order = np.random.default_rng(1).permutation(CONTACTS)[:25]
+    _, other, _ = solve(rules, asked(order), ROW[order])
+    copied = GAPS[ROW]
+    _, apart, _ = solve(rules, asked(), np.arange(CONTACTS), copied)
+    for name in Found._fields:
+        assert np.array_equal(getattr(found, name)[order], getattr(other, name)), name
+        assert np.array_equal(getattr(found, name), getattr(apart, name)), name
+
+
+@pytest.mark.parametrize("closed_form", [NEVER, EXACT])
+def test_that_power_is_the_work_of_forces_and_moment(closed_form):
+    wanted = asked()
+    _, found, _ = solve(theory(closed_form), wanted)
+    work = wanted.longitudinal * found.force_x + wanted.lateral * found.force_y
+    expected = -2.6 * (work + wanted.spin * found.spin_moment)
+    assert found.power == pytest.approx(expected, rel=1e-12)
+    assert found.dissipation.sum(axis=1) * GRID.spacing == pytest.approx(found.power, rel=1e-12)
+    assert found.line_load.sum(axis=1) * GRID.spacing == pytest.approx(LOADS, rel=1e-12)
+
+
+def test_that_the_first_contact_that_fails_is_named():
+    wanted = asked()
+    wanted.lateral[[7, 9]] = math.nan
+    failed, _, patches = solve(theory(), wanted)
+    assert (failed, patches.status[7]) == (7, NOT_FINITE)
+    gap = 8.0 * Y[None, :] ** 2
+    failed, _, patches = solve(
+        theory(kalker=LINE_LIMIT), asked(), np.zeros(CONTACTS, np.int64), gap, curvature_x=1.0
+    )
+    assert (failed, patches.status[0]) == (0, NO_LIMIT)

@@ -1,0 +1,160 @@
+"""Kalker's creepage coefficients against the exact linear theory, and their continuity."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from wearsim.bench.exact import rows
+from wearsim.mechanics.tangential.kalker_coefficients import (
+    creepage_coefficients,
+    flexibilities,
+    line_limit_coefficients,
+    long_limit,
+    one_flexibility,
+    short_limit,
+    spline,
+)
+
+NAMES = ("c11", "c22", "c23", "c33")
+
+
+def values(ratio, nu):
+    found = creepage_coefficients(ratio, nu)
+    return np.array([getattr(found, name) for name in NAMES])
+
+
+@pytest.mark.bench
+@pytest.mark.parametrize("case", rows("kalker_coefficients"))
+def test_that_the_exact_linear_theory_is_met_within_1_5_percent(case):
+    found = values(case["a_over_b"], case["nu"])
+    for name, value in zip(NAMES, found, strict=True):
+        bound = 0.015
+        if name == "c33":  # the reference's own error; README of the data for a/b >= 5
+            bound = max(bound, case["rel_err"]["C33"])
+        assert value == pytest.approx(case[name.upper()], rel=bound), name
+
+
+@pytest.mark.bench
+def test_that_the_interpolation_is_good_on_the_whole():
+    errors = np.array(
+        [
+            [value / case[name.upper()] - 1.0 for name, value in zip(NAMES, found, strict=True)]
+            for case in rows("kalker_coefficients")
+            for found in [values(case["a_over_b"], case["nu"])]
+        ]
+    )
+    assert np.sqrt((errors**2).mean(axis=0)) == pytest.approx(0.0, abs=0.008)
+
+
+@pytest.mark.parametrize(
+    ("ratio", "nu", "expected"),
+    [
+        (0.1, 0.25, (3.31, 2.52, 0.473, 8.28)),
+        (1.0, 0.0, (3.40, 3.40, 1.33, 1.21)),
+        (1.0 / 0.3, 0.5, (7.34, 7.51, 5.01, 0.446)),
+        (10.0, 0.25, (11.7, 12.8, 14.6, 0.526)),
+    ],
+)
+def test_that_the_printed_table_is_met_at_its_knots(ratio, nu, expected):
+    assert values(ratio, nu) == pytest.approx(expected, rel=1e-12)
+
+
+@settings(deadline=None)
+@given(st.floats(-6.0, 6.0), st.floats(0.0, 0.5))
+def test_that_coefficients_are_positive_everywhere(exponent, nu):
+    assert np.all(values(10.0**exponent, nu) > 0.0)
+
+
+@settings(deadline=None)
+@given(st.floats(-3.0, 3.0), st.floats(0.0, 0.499))
+def test_that_coefficients_are_continuous_in_both_arguments(exponent, nu):
+    ratio = 10.0**exponent
+    here = values(ratio, nu)
+    assert values(ratio * (1.0 + 1e-7), nu) == pytest.approx(here, rel=1e-6)
+    assert values(ratio, nu + 1e-7) == pytest.approx(here, rel=1e-5)
+
+
+KNOTS = sorted({round(math.exp(place), 12) for which in range(4) for place in spline(which).knots})
+
+
+@pytest.mark.parametrize("nu", [0.0, 0.1, 0.25, 0.3, 0.42, 0.5])
+def test_that_no_knot_and_neither_end_of_the_table_makes_a_jump_or_a_kink(nu):
+    assert len(KNOTS) == 20
+    assert (KNOTS[0], KNOTS[-1]) == (0.1, 20.0)
+    step = 1e-4
+    for knot in KNOTS:
+        below, here, above = (np.log(values(knot * math.exp(k * step), nu)) for k in (-1, 0, 1))
+        near = np.log(values(knot * (1.0 + 1e-12), nu)), np.log(values(knot * (1.0 - 1e-12), nu))
+        assert near[0] == pytest.approx(near[1], abs=1e-10)
+        # twice the curvature's share: a kink would add its change of slope times the step
+        assert above - here == pytest.approx(here - below, abs=5e-7)
+
+
+@pytest.mark.parametrize("ratio", [0.05, 0.3, 1.0, 4.0, 15.0])
+def test_that_the_tables_columns_of_poissons_ratio_make_no_jump_or_kink(ratio):
+    step = 1e-4
+    below, here, above = (values(ratio, 0.25 + k * step) for k in (-1, 0, 1))
+    assert above - here == pytest.approx(here - below, rel=5e-3, abs=1e-6)
+    assert values(ratio, 0.25 + 1e-12) == pytest.approx(values(ratio, 0.25 - 1e-12), rel=1e-10)
+
+
+@pytest.mark.parametrize(("edge", "limit"), [(0.1, short_limit), (10.0, long_limit)])
+def test_that_between_its_columns_it_follows_poissons_ratio_as_the_limits_do(edge, limit):
+    # what the table has beyond its limit varies slowly, and lies between that of its columns
+    def beyond(nu):
+        return values(edge, nu) / np.array(limit(min(edge, 1.0 / edge), nu))
+
+    columns = np.array([beyond(nu) for nu in (0.0, 0.25, 0.5)])
+    allowed = np.array([1e-3, 1e-3, 4e-3, 1.5e-2])
+    for nu in np.linspace(0.0, 0.5, 21):
+        found = beyond(nu)
+        assert np.all(found <= columns.max(axis=0) * (1.0 + allowed))
+        assert np.all(found >= columns.min(axis=0) * (1.0 - allowed))
+
+
+@pytest.mark.parametrize("nu", [0.0, 0.3, 0.5])
+def test_that_the_limits_are_reached(nu):
+    assert values(1e-7, nu) == pytest.approx(short_limit(1e-7, nu), rel=1e-6)
+    assert values(1e9, nu)[2] == pytest.approx(long_limit(1e-9, nu)[2], rel=3e-3)
+    assert values(1e9, nu)[0] == pytest.approx(long_limit(1e-9, nu)[0], rel=3e-3)
+
+
+def test_that_a_long_contact_has_the_line_limit():
+    found = line_limit_coefficients(0.088, 0.3)
+    assert found.c11 == pytest.approx(3.5249, rel=2e-5)
+    assert found.c22 == pytest.approx(math.pi**2 / 4.0, rel=1e-14)
+    with pytest.raises(ValueError, match="too large"):
+        line_limit_coefficients(50.0, 0.5)
+
+
+@pytest.mark.parametrize(("ratio", "nu"), [(0.0, 0.3), (math.nan, 0.3), (1.0, -0.1), (1.0, 0.6)])
+def test_that_arguments_out_of_range_are_refused(ratio, nu):
+    with pytest.raises(ValueError, match=r"must"):
+        creepage_coefficients(ratio, nu)
+
+
+def test_that_flexibilities_follow_from_coefficients():
+    # L1 and L2 of the reference run of the mean problem
+    found = flexibilities(
+        line_limit_coefficients(0.17173473898160382 / 1.9464336537534505, 0.3),
+        0.17173473898160382e-3,
+        1.9464336537534505e-3,
+        200e9 / 2.6,
+    )
+    assert found.longitudinal == pytest.approx(1.6889956260024387e-15, rel=1e-12)
+    assert found.lateral == pytest.approx(2.4128508942891984e-15, rel=1e-12)
+    assert found.spin == pytest.approx(1.1056223217325914e-15, rel=2e-4)
+
+
+def test_that_one_flexibility_stands_for_three():
+    three = (2.0, 3.0, 5.0)
+    for k in range(3):
+        alone = [0.0, 0.0, 0.0]
+        alone[k] = -7e-4
+        assert one_flexibility(*three, *alone) == pytest.approx(three[k], rel=1e-15)
+    assert one_flexibility(*three, 0.0, 0.0, 0.0) == three[0]
+    found = one_flexibility(*three, 3e-300, -4e-300, 12e-300)
+    assert found == pytest.approx((3.0 * 2.0 + 4.0 * 3.0 + 12.0 * 5.0) / 13.0, rel=1e-14)

@@ -1,0 +1,113 @@
+"""What strips owe to one another, against the half-space and the exact linear theory."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wearsim.bench.exact import rows
+from wearsim.mechanics.tangential.strip_interaction import (
+    coupling_length,
+    effective_moduli,
+    equivalent_ratio,
+    induced_slip,
+    strip_elasticity,
+)
+from wearsim.mechanics.tangential.strip_theory import new_tractions, solve_strips
+
+STEEL = strip_elasticity(110e9, 77e9)
+POISSON = 0.3
+
+
+def induced(force_x, force_y, spacing, length):
+    out = np.zeros((2, len(force_x)))
+    induced_slip(force_x, force_y, 0, len(force_x) - 1, spacing, length, STEEL, out[0], out[1])
+    return out
+
+
+def test_that_an_infinitely_wide_contact_has_the_materials_moduli():
+    assert effective_moduli(1e-6, STEEL) == pytest.approx((110e9, 77e9), rel=1e-4)
+    assert effective_moduli(1e3, STEEL) == effective_moduli(50.0, STEEL)
+
+
+def test_that_an_ellipse_of_strips_is_its_own_equivalent():
+    n, a, b = 400, 1e-4, 1.3e-3
+    y = (np.arange(n) - 0.5 * (n - 1)) * 2.0 * b / n
+    half_length = a * np.sqrt(1.0 - (y / b) ** 2)
+    assert equivalent_ratio(half_length, half_length, 2.0 * b / n) == pytest.approx(a / b, rel=1e-3)
+    assert equivalent_ratio(half_length, np.zeros(n), 2.0 * b / n) == 1.0
+    two = np.concatenate([half_length, np.zeros(50), half_length])
+    assert equivalent_ratio(two, two, 2.0 * b / n) == pytest.approx(a / b, rel=1e-3)
+
+
+@pytest.mark.bench
+@pytest.mark.parametrize("ratio", [0.05, 0.1, 0.2])
+@pytest.mark.parametrize("nu", [0.0, 0.25, 0.5])
+def test_that_small_creepage_meets_kalkers_coefficients(nu, ratio):
+    exact = rows("kalker_coefficients", nu=nu, a_over_b=ratio)[0]
+    n, a, shear = 256, 1e-4, 80e9
+    b = a / ratio
+    spacing = 2.0 * b / n
+    y = (np.arange(n) - 0.5 * (n - 1)) * spacing
+    part = 1.0 - (y / b) ** 2
+    half_length, line_load, friction = a * np.sqrt(part), 1e5 * part, np.full(n, 1e4)
+    elasticity = strip_elasticity(shear / (1.0 - nu), shear)
+
+    def found(longitudinal, lateral, spin):
+        out = new_tractions(n)
+        slip_x = longitudinal - spin * y
+        solve_strips(
+            half_length, line_load, friction, slip_x, lateral, spin, spacing, elasticity, out
+        )
+        moment = (out.moment - y * out.force_x).sum()
+        return -np.array([out.force_x.sum(), out.force_y.sum(), moment]) * spacing / shear
+
+    size, spin = 1e-3, 1.0
+    # moving along and across at once, so that strips couple
+    both = found(size, size, 0.0) / (a * b * size)
+    assert both[0] == pytest.approx(exact["C11"], rel=0.02)
+    assert both[1] == pytest.approx(exact["C22"], rel=0.02)
+    assert -both[2] * a * b / (a * b) ** 1.5 == pytest.approx(exact["C23"], rel=0.05)
+    turning = found(0.0, 0.0, spin)
+    assert turning[1] / ((a * b) ** 1.5 * spin) == pytest.approx(exact["C23"], rel=0.05)
+    assert turning[2] / ((a * b) ** 2 * spin) == pytest.approx(exact["C33"], rel=0.07)
+
+
+@pytest.mark.parametrize(("adhering", "source", "target"), [(0.0, 0, 0), (1.0, -1, 1)])
+def test_that_induced_slip_is_that_of_the_half_space(adhering, source, target):
+    # forces 1 - (y/b)^2, spread along x elliptically, or as in adhesion: sqrt((1 - s)/(1 + s)),
+    # and (1 + s) for the weight of slip in the force of a strip that adheres
+    a, b, n = 1.0, 12.0, 480
+    spacing = 2.0 * b / n
+    y = (np.arange(n) - 0.5 * (n - 1)) * spacing
+    forces = 1.0 - (y / b) ** 2
+
+    def points(kind, count):
+        angle = (np.arange(count) + 0.5) * np.pi / count
+        weight = np.sin(angle) ** 2 if kind == 0 else 1.0 + kind * np.cos(angle)
+        return np.cos(angle), weight / weight.sum()
+
+    (to, gain), (origin, share) = points(target, 40), points(source, 41)
+    apart_x, weight = to[:, None] - origin, gain[:, None] * share
+    exact, at = [], [60, 120, 180]
+    for i in at:
+        apart_y = (y[i] - y)[:, None, None]
+        strain = apart_y * (apart_y**2 - 2.0 * apart_x**2) / (apart_x**2 + apart_y**2) ** 2.5
+        exact.append((strain * weight * forces[:, None, None]).sum() * spacing)
+    exact = -POISSON / (np.pi * 77e9) * np.array(exact)
+    found = induced(np.zeros(n), forces, spacing, coupling_length(a, adhering))
+    np.testing.assert_allclose(found[0][at], exact, rtol=0.04)
+    assert not found[1].any()
+
+
+arrays = st.lists(st.floats(-1e5, 1e5), min_size=60, max_size=60).map(np.array)
+
+
+@given(arrays, st.floats(0.05, 5.0))
+def test_that_induced_slip_moves_power_and_adds_none(forces, length):
+    force_x, force_y = np.ascontiguousarray(forces[::2]), np.ascontiguousarray(forces[1::2])
+    found = induced(force_x, force_y, 1.0, length)
+    passed = force_x * found[0] + force_y * found[1]
+    assert abs(passed.sum()) <= 1e-12 * np.abs(passed).sum() + 1e-30
+    turned = induced(force_x[::-1].copy(), force_y[::-1].copy(), 1.0, length)
+    np.testing.assert_allclose(turned[:, ::-1], -found, rtol=1e-9, atol=1e-13 * np.abs(found).max())

@@ -1,0 +1,235 @@
+"""Strip theory against the exact theory on Hertzian patches, and its balances."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wearsim.bench.exact import STEEL, rows, strips_of, table
+from wearsim.mechanics.hertz.elasticity import combine
+from wearsim.mechanics.tangential.strip_interaction import strip_elasticity
+from wearsim.mechanics.tangential.strip_theory import (
+    SUMS,
+    new_tractions,
+    solve_strips,
+    strip_contacts,
+)
+
+pytestmark = pytest.mark.bench
+
+PAIR = combine(STEEL, STEEL)
+ELASTICITY = strip_elasticity(PAIR.contact_modulus, PAIR.shear_modulus)
+MEAN = table("mean_problem")
+
+
+def ellipse(a, b, load, strips=200):
+    """Return place, half-length and line load of the strips of a Hertzian patch."""
+    y = (np.arange(strips) - 0.5 * (strips - 1)) * 2.0 * b / strips
+    part = 1.0 - (y / b) ** 2
+    line_load = part * load / (part.sum() * 2.0 * b / strips)
+    return y, a * np.sqrt(part), line_load
+
+
+def solve(half_length, line_load, friction, slip_x, slip_y, spin, spacing):
+    out = new_tractions(len(slip_x))
+    friction = np.full(len(slip_x), friction) if np.ndim(friction) == 0 else friction
+    solve_strips(half_length, line_load, friction, slip_x, slip_y, spin, spacing, ELASTICITY, out)
+    return out
+
+
+def solve_row(a, b, load, friction, row):
+    """Return the place of the strips and their tractions for a row of the reference."""
+    y, half_length, line_load = ellipse(a, b, load)
+    slip_x, spacing = row["xi"] - row["phi_per_m"] * y, y[1] - y[0]
+    spin = row["phi_per_m"]
+    return y, solve(half_length, line_load, friction, slip_x, row["eta"], spin, spacing)
+
+
+def errors(found):
+    """Return rms and worst of the relative errors of pairs (ours, exact)."""
+    relative = np.array([ours / exact - 1.0 for ours, exact in found])
+    return np.sqrt((relative**2).mean()), np.abs(relative).max()
+
+
+@pytest.mark.parametrize(
+    ("kind", "rms", "worst", "row_error"),
+    [("paper", 5e-4, 1.2e-3, 3e-3), ("partial", 2.2e-3, 6.5e-3, 5e-3)],
+)
+def test_that_random_inputs_dissipate_like_the_exact_theory(kind, rms, worst, row_error):
+    powers, distances = [], []
+    y_over_b, dissipation = strips_of(kind)
+    for row, exact in zip(rows("rig_random", kind=kind), dissipation, strict=True):
+        y, found = solve_row(row["a_m"], row["b_m"], row["N_N"], row["mu"], row)
+        powers.append((found.work.sum() * (y[1] - y[0]), row["P_over_V_N"]))
+        ours = np.interp(y_over_b * row["b_m"], y, found.work, left=0.0, right=0.0)
+        distances.append(np.linalg.norm(ours - exact) / np.linalg.norm(exact))
+    assert len(powers) == 40
+    found_rms, found_worst = errors(powers)
+    assert found_rms < rms
+    assert found_worst < worst
+    assert np.median(distances) < row_error
+    assert np.max(distances) < 0.03
+
+
+def test_that_hard_cases_on_wide_patches_dissipate_like_the_exact_theory():
+    powers = []
+    for row in rows("hard_cases"):
+        if row["b_m"] >= 2.99 * row["a_m"]:
+            y, found = solve_row(row["a_m"], row["b_m"], row["N_N"], row["mu"], row)
+            powers.append((found.work.sum() * (y[1] - y[0]), row["P_over_V_N"]))
+    assert len(powers) == 7
+    rms, worst = errors(powers)
+    assert rms < 5e-3
+    assert worst < 1.2e-2
+
+
+@pytest.mark.parametrize("row", rows("mean_problem"), ids=lambda row: row["case"])
+def test_that_forces_and_power_of_the_rig_are_those_of_the_exact_theory(row):
+    patch = [MEAN[key] for key in ("a_m", "b_m", "N_N", "mu")]
+    y, found = solve_row(*patch, row)
+    spacing = y[1] - y[0]
+    assert found.force_x.sum() * spacing == pytest.approx(row["Fx_N"], rel=4e-3)
+    assert found.force_y.sum() * spacing == pytest.approx(row["Fy_N"], rel=4e-3, abs=1e-6)
+    assert found.work.sum() * spacing == pytest.approx(row["P_over_V_N"], rel=2e-3)
+
+
+creepages = st.floats(-4.0, 4.0).map(lambda x: np.sign(x) * 1e-3 * 10.0 ** (abs(x) - 3.0))
+noise = st.lists(st.floats(-1.0, 1.0), min_size=40, max_size=40).map(np.array)
+
+
+@given(creepages, creepages, creepages, noise, st.floats(1.0, 50.0), st.booleans())
+def test_that_work_is_that_of_the_rigid_slip_and_never_negative(
+    longitudinal, lateral, spin, uneven, width, apart
+):
+    a, friction = 1.4e-4, 0.2 + 0.15 * uneven[::-1].copy()
+    y, half_length, line_load = ellipse(a, a * width, 300.0, strips=40)
+    if apart:
+        line_load[17:22] = 0.0
+    spin /= a * width
+    slip_x = longitudinal * (1.0 + 0.5 * uneven) - spin * y
+    found = solve(half_length, line_load, friction, slip_x, lateral, spin, y[1] - y[0])
+    assert (found.work >= 0.0).all()
+    rigid = -(found.force_x * slip_x + found.force_y * lateral + found.moment * spin)
+    assert found.work.sum() == pytest.approx(rigid.sum(), rel=1e-12, abs=1e-300)
+    assert (np.hypot(found.force_x, found.force_y) <= friction * line_load * (1 + 1e-12)).all()
+    assert not found.work[line_load == 0.0].any()
+
+
+@given(creepages, creepages, creepages)
+def test_that_a_mirrored_contact_has_mirrored_strips(longitudinal, lateral, spin):
+    y, half_length, line_load = ellipse(1.4e-4, 1.5e-3, 300.0, strips=40)
+    line_load, spin = line_load * (1.0 + 300.0 * y), spin / 1.5e-3
+    first = solve(half_length, line_load, 0.2, longitudinal - spin * y, lateral, spin, y[1] - y[0])
+    second = solve(
+        half_length,
+        line_load[::-1].copy(),
+        0.2,
+        longitudinal + spin * y,
+        -lateral,
+        -spin,
+        y[1] - y[0],
+    )
+    size = np.abs(first.force_x).max() + np.abs(first.force_y).max()
+    np.testing.assert_allclose(second.force_x[::-1], first.force_x, rtol=1e-9, atol=1e-9 * size)
+    np.testing.assert_allclose(second.force_y[::-1], -first.force_y, rtol=1e-9, atol=1e-9 * size)
+    np.testing.assert_allclose(
+        second.work[::-1], first.work, rtol=1e-9, atol=1e-9 * first.work.max()
+    )
+
+
+@pytest.mark.parametrize("longitudinal", [1e-4, 4e-4, 8e-4, 2e-3])
+def test_that_leaving_out_what_longitudinal_creepage_alone_induces_changes_little(longitudinal):
+    y, half_length, line_load = ellipse(1.4e-4, 1.5e-3, 300.0)
+    slip_x = np.full(len(y), longitudinal)
+    alone, slight = (
+        solve(half_length, line_load, 0.1, slip_x, lateral, 0.0, y[1] - y[0])
+        for lateral in (0.0, 1e-12)
+    )
+    assert not alone.force_y.any()
+    assert slight.work.sum() == pytest.approx(alone.work.sum(), rel=6e-4)
+    assert np.linalg.norm(slight.work - alone.work) < 2e-3 * np.linalg.norm(alone.work)
+
+
+def test_that_patches_far_apart_know_nothing_of_one_another():
+    y, half_length, line_load = ellipse(1e-4, 1e-3, 200.0, strips=50)
+    gap = np.zeros(600)
+    both = [np.concatenate([values, gap, values]) for values in (half_length, line_load)]
+    slip_x = np.full(700, 5e-4)
+    found = solve(*both, 0.2, slip_x, 4e-4, 0.0, y[1] - y[0])
+    alone = solve(half_length, line_load, 0.2, slip_x[:50].copy(), 4e-4, 0.0, y[1] - y[0])
+    np.testing.assert_allclose(found.work[:50], alone.work, rtol=2e-3)
+
+
+def test_that_no_friction_and_no_creepage_dissipate_nothing():
+    y, half_length, line_load = ellipse(1e-4, 1e-3, 200.0, strips=50)
+    slip_x = np.full(50, 5e-4)
+    slippery = solve(half_length, line_load, 0.0, slip_x, 1e-4, 0.3, y[1] - y[0])
+    assert not np.array(slippery).any()
+    slight = solve(half_length, line_load, 1e-9, slip_x, 0.0, 0.0, y[1] - y[0])
+    np.testing.assert_allclose(slight.work, 1e-9 * line_load * 5e-4, rtol=1e-9)
+    still = solve(half_length, line_load, 0.1, 0.0 * slip_x, 0.0, 0.0, y[1] - y[0])
+    assert not still.work.any()
+    np.testing.assert_array_equal(still.adhesion_length, 2.0 * half_length)
+
+
+@pytest.mark.parametrize(("lateral", "spin"), [(0.0, 0.0), (3e-4, 0.5), (1e-4, 20.0)])
+def test_that_strips_without_friction_or_load_carry_nothing_and_harm_no_other(lateral, spin):
+    y, half_length, line_load = ellipse(1e-4, 1e-3, 200.0, strips=50)
+    slip_x, friction = 3e-4 - spin * y, np.full(50, 0.1)
+    friction[20:30] = 0.0
+    found = solve(half_length, line_load, friction, slip_x, lateral, spin, y[1] - y[0])
+    assert not np.array(found)[:5, 20:30].any()
+    assert np.all(found.work[:20] > 0.0)
+    # what strips beside the contact hold of an earlier one counts for nothing
+    room, rest = np.zeros(3), np.full(3, 7e-5)
+    wider = solve(
+        np.concatenate([rest, half_length, rest]),
+        np.concatenate([room, line_load, room]),
+        np.concatenate([room, friction, room]),
+        np.concatenate([rest, slip_x, rest]),
+        lateral,
+        spin,
+        y[1] - y[0],
+    )
+    np.testing.assert_array_equal(np.array(wider)[:5, 3:-3], np.array(found)[:5])
+    assert not np.array(wider)[:5, [0, 1, 2, -3, -2, -1]].any()
+
+
+def test_that_contacts_are_the_sums_of_their_strips():
+    y, half_length, line_load = ellipse(1.4e-4, 1.5e-3, 300.0, strips=60)
+    spacing, speed, friction = y[1] - y[0], 2.6, np.full(60, 0.2)
+    longitudinal, lateral, spin = 3e-4, 4e-4, 0.6
+    variation = 7.0 - spin * y
+    dissipation, sums = np.empty((2, 60)), np.empty((6, 2))
+
+    def twice(value):
+        return np.array([value, value])
+
+    strip_contacts(
+        twice(line_load),
+        twice(half_length),
+        y,
+        spacing,
+        ELASTICITY,
+        speed,
+        twice(longitudinal),
+        twice(lateral),
+        twice(spin),
+        twice(variation),
+        twice(friction),
+        dissipation,
+        sums,
+    )
+    found = solve(half_length, line_load, friction, longitudinal - spin * y, lateral, spin, spacing)
+    np.testing.assert_allclose(dissipation, twice(speed * found.work), rtol=1e-9)
+    totals = dict(zip(SUMS, sums[:, 1] / spacing, strict=True))
+    assert totals["force_x"] == pytest.approx(found.force_x.sum(), rel=1e-9)
+    assert totals["force_y"] == pytest.approx(found.force_y.sum(), rel=1e-9)
+    moment = (found.moment - y * found.force_x).sum()
+    assert totals["spin_moment"] == pytest.approx(moment, rel=1e-9)
+    work = longitudinal * sums[0, 1] + lateral * sums[1, 1] + spin * sums[2, 1]
+    assert sums[3, 1] == pytest.approx(-speed * work, rel=1e-11)
+    peak = 2.0 * (line_load / half_length).max() / np.pi
+    assert sums[4, 1] == pytest.approx(peak, rel=1e-9)
+    adhering = found.adhesion_length.sum() / (2.0 * half_length.sum())
+    assert sums[5, 1] == pytest.approx(adhering, rel=1e-9)

@@ -1,0 +1,203 @@
+"""FaStrip as a tangential theory, against the exact theory and on the strips of any contact."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from wearsim.bench.exact import CREEPAGES, STEEL, rows, strips_of, worn_profile
+from wearsim.errors import ContactError
+from wearsim.mechanics.hertz.elasticity import combine
+from wearsim.models.contact.hertz import HertzModel
+from wearsim.models.tangential.base import Strips, complete, spread_work
+from wearsim.models.tangential.fastrip import FastripTheory
+from wearsim.types import Creepage, Grid, OperatingPoint
+
+MATERIALS = (STEEL, STEEL)
+PAIR = combine(*MATERIALS)
+RIG = (90.0, 2.0)  # relative curvatures along and across
+
+
+def contact(case, curvatures=RIG, strips=60, mx=50):
+    """Solve a case of the reference with exact Hertz."""
+    model = HertzModel(FastripTheory(mx), strips)
+    grid = model.suggest_grid(curvatures[1], curvatures[0], case["N_N"], MATERIALS)
+    model.prepare(grid, MATERIALS)
+    creepage = Creepage(case["xi"], case["eta"], case["phi_per_m"])
+    point = OperatingPoint(case["N_N"], 1.0, creepage, case["mu"])
+    gap = 0.5 * curvatures[1] * grid.y**2
+    return model, gap, point, model.solve(gap, curvatures[0], point)
+
+
+def errors(cases, solve):
+    """Return the error of the power against the exact theory."""
+    powers = np.array([solve(case)[-1].power for case in cases])
+    return powers / [case["P_over_V_N"] for case in cases] - 1.0
+
+
+def rms(values):
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+@pytest.mark.bench
+@pytest.mark.parametrize(
+    ("kind", "bound", "worst"), [("paper", 2e-3, 3e-3), ("partial", 5e-3, 0.012)]
+)
+def test_that_the_rigs_power_is_that_of_the_exact_theory(kind, bound, worst):
+    found = errors(rows("rig_random", kind=kind), contact)
+    assert rms(found) < bound
+    assert np.abs(found).max() < worst
+
+
+@pytest.mark.bench
+@pytest.mark.parametrize("kind", ["paper", "partial"])
+def test_that_the_rigs_power_is_spread_over_the_strips_as_in_the_exact_theory(kind):
+    y_over_b, exact = strips_of(kind)
+    distances = []
+    for number, case in enumerate(rows("rig_random", kind=kind)):
+        *_, solution = contact(case)
+        place = solution.y / (solution.y[-1] + 0.5 * (solution.y[1] - solution.y[0]))
+        expected = np.interp(place, y_over_b, exact[number])
+        off = np.linalg.norm(solution.dissipation - expected)
+        distances.append(off / np.linalg.norm(expected))
+    assert np.median(distances) < 0.022
+
+
+def hard(case):
+    return contact(case, (2.0 * case["A_per_m"], 2.0 * case["B_per_m"]))
+
+
+@pytest.mark.bench
+def test_that_hard_cases_stay_within_three_percent_rms():
+    cases = rows("hard_cases")
+    found = errors(cases, hard)
+    assert rms(found) < 0.02
+    assert np.abs(found).max() < 0.055
+    # strip theory's own ground: long across rolling, or creepage that outweighs spin
+    long = np.array([case["b_m"] >= 4.9 * case["a_m"] for case in cases])
+    assert np.abs(found[long]).max() < 0.01
+
+
+@pytest.mark.bench
+@pytest.mark.parametrize("name", ["hertz", "flat", "bump_1um", "bump_10um", "parabola"])
+@pytest.mark.parametrize("creepage", ["mean", "partial", "combined"])
+def test_that_it_takes_the_strips_of_a_worn_profile(name, creepage):
+    worn = worn_profile(name)
+    y = worn["y"]
+    strips = Strips(
+        y, worn["a"], worn["q"], y[1] - y[0], 45.0, worn["approach"], worn["peak_pressure"], 0
+    )
+    point = OperatingPoint(300.0, 1.0, Creepage(*CREEPAGES[creepage]), 0.1)
+    found = complete(FastripTheory(), strips, PAIR, point)
+    assert found.power == pytest.approx(worn[f"P_over_V_{creepage}"], rel=0.02)
+    expected = worn[f"P_l_over_V_{creepage}"]
+    assert np.linalg.norm(found.dissipation - expected) < 0.065 * np.linalg.norm(expected)
+
+
+@pytest.mark.bench
+@pytest.mark.parametrize("creepage", [(4e-4, 5e-4, 0.05), (2e-4, -1e-4, 0.9), (1e-3, 5e-4, 30.0)])
+def test_that_power_is_the_work_of_the_rigid_slip(creepage):
+    xi, eta, phi = creepage
+    case = {"N_N": 300.0, "mu": 0.1, "xi": xi, "eta": eta, "phi_per_m": phi}
+    *_, found = contact(case)
+    work = -(xi * found.force_x + eta * found.force_y + phi * found.spin_moment)
+    assert found.power == pytest.approx(work, rel=1e-12)
+    assert found.dissipation.sum() * (found.y[1] - found.y[0]) == pytest.approx(work, rel=1e-12)
+
+
+@pytest.mark.bench
+@pytest.mark.parametrize("curvatures", [RIG, (20.0, 20.0), (2.0, 60.0)])
+def test_that_no_strip_grows(curvatures):
+    rng, model = np.random.default_rng(11), HertzModel(FastripTheory(), 41)
+    grid = model.suggest_grid(curvatures[1], curvatures[0], 300.0, MATERIALS)
+    model.prepare(grid, MATERIALS)
+    gap = 0.5 * curvatures[1] * grid.y**2
+    resting = 0
+    for _ in range(250):
+        xi, eta = rng.normal(size=2) * 10.0 ** rng.uniform(-5.0, -2.5, 2)
+        phi = rng.normal() * 10.0 ** rng.uniform(-2.0, 1.0)
+        point = OperatingPoint(300.0, 1.0, Creepage(xi, eta, phi), 0.1)
+        found = model.solve(gap, curvatures[0], point)
+        work = -(xi * found.force_x + eta * found.force_y + phi * found.spin_moment)
+        assert found.dissipation.min() >= 0.0
+        assert found.power == pytest.approx(work, rel=1e-9)
+        resting += np.count_nonzero(found.dissipation == 0.0)
+    assert resting > 0  # such as would have grown
+
+
+def test_that_work_is_spread_without_negative_parts_and_keeps_its_sum():
+    rng = np.random.default_rng(3)
+    for shift in (3.0, 1.0, 0.1, -0.5):
+        work = rng.normal(size=50) + shift
+        found = spread_work(work)
+        assert found.min() >= 0.0
+        assert found.sum() == pytest.approx(max(work.sum(), 0.0), rel=1e-12)
+    assert np.array_equal(spread_work(np.arange(5.0)), np.arange(5.0))
+    assert np.isnan(spread_work(np.array([1.0, np.nan]))).any()
+
+
+@pytest.mark.bench
+def test_that_creepage_that_varies_across_the_track_is_nearly_spins_longitudinal_part():
+    case = {"N_N": 300.0, "mu": 0.1, "xi": 4e-4, "eta": 0.0, "phi_per_m": 0.2}
+    model, gap, point, turning = contact(case)
+    varied = replace(point, creepage=Creepage(4e-4, variation=-0.2 * turning.y))
+    found = model.solve(gap, RIG[0], varied)
+    assert found.dissipation == pytest.approx(
+        turning.dissipation, abs=0.02 * turning.dissipation.max()
+    )
+
+
+@pytest.mark.bench
+def test_that_a_bearing_torque_finds_its_creepage_and_skids_past_friction():
+    case = {"N_N": 300.0, "mu": 0.1, "xi": 0.0, "eta": 2e-4, "phi_per_m": 0.1}
+    model, gap, point, _ = contact(case)
+    torque = replace(point, bearing_torque=0.1, rolling_radius=np.full(60, 20e-3))
+    found = model.solve(gap, RIG[0], torque)
+    assert -found.force_x * 20e-3 == pytest.approx(0.1, rel=1e-9)
+    with pytest.raises(ContactError, match="skids"):
+        model.solve(gap, RIG[0], replace(torque, bearing_torque=1.0))
+
+
+@pytest.mark.bench
+@pytest.mark.parametrize("creepage", [(6e-4, 3e-4, 0.05), (2e-4, 0.0, 0.5), (1e-3, 5e-4, 8.0)])
+def test_that_the_fields_are_the_inside_of_the_solution(creepage):
+    xi, eta, phi = creepage
+    case = {"N_N": 300.0, "mu": 0.1, "xi": xi, "eta": eta, "phi_per_m": phi}
+    model, gap, point, solution = contact(case, mx=400)
+    fields = model.fields(solution, gap, RIG[0], point, points_along=801)
+    spacing = solution.y[1] - solution.y[0]
+    load = np.trapezoid(fields.pressure, fields.x, axis=0).sum() * spacing
+    assert load == pytest.approx(300.0, rel=2e-3)
+    for traction, force in ((fields.traction_x, "force_x"), (fields.traction_y, "force_y")):
+        found = np.trapezoid(traction, fields.x, axis=0).sum() * spacing
+        assert found == pytest.approx(getattr(solution, force), abs=3e-3 * 30.0)
+    traction = np.hypot(fields.traction_x, fields.traction_y)
+    assert np.all(traction <= 0.1 * fields.pressure + 1.0)
+    assert np.all(fields.power_density[fields.adhesion] == 0.0)
+    assert np.all(fields.power_density >= -1e-9 * fields.power_density.max())
+    share = np.average(fields.adhesion.mean(axis=0), weights=solution.half_length)
+    assert share == pytest.approx(solution.adhesion_fraction, abs=0.02)
+
+
+@pytest.mark.bench
+def test_that_spin_too_strong_for_strip_theory_makes_no_great_jump_on_a_long_contact():
+    peak = 1.5 * 300.0 / (math.pi * 1.363e-4 * 1.545e-3)
+    limit = 2.0 * 0.1 * peak / (1.363e-4 * PAIR.shear_modulus * 1.517)
+    powers = []
+    for factor in (0.999, 1.001):
+        case = {"N_N": 300.0, "mu": 0.1, "xi": 4e-4, "eta": 2e-4, "phi_per_m": factor * limit}
+        powers.append(contact(case, mx=400)[-1].power)
+    assert powers[1] == pytest.approx(powers[0], rel=0.015)
+
+
+@pytest.mark.bench
+def test_that_a_grid_of_any_width_gives_the_same():
+    case = {"N_N": 300.0, "mu": 0.1, "xi": 4e-4, "eta": 3e-4, "phi_per_m": 0.1}
+    exact = contact(case, strips=1000)[-1].power
+    model = HertzModel(FastripTheory(), 60)
+    for half in np.linspace(1.6e-3, 1.8e-3, 7):
+        grid = Grid.spanning(-half, half, 61)
+        model.prepare(grid, MATERIALS)
+        point = OperatingPoint(300.0, 1.0, Creepage(4e-4, 3e-4, 0.1), 0.1)
+        assert model.solve(grid.y**2, RIG[0], point).power == pytest.approx(exact, rel=1e-3)

@@ -1,0 +1,205 @@
+"""Batches done by Dask: by processes of a real cluster, which come, go and are killed."""
+
+from __future__ import annotations
+
+import itertools
+import re
+import socket
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import dask
+import distributed  # noqa: F401  (gives dask.config its defaults)
+import pytest
+from batch_works import Deadly, Raising, Squares
+from dask_cluster import scheduler, worker
+
+from wearsim.errors import Problem, ScenarioError, WorkerError
+from wearsim.studies.execution import dask as executors_cluster
+from wearsim.studies.execution import dask as executors_dask
+from wearsim.studies.execution.base import AHEAD
+from wearsim.studies.execution.factory import executor
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module", autouse=True)
+def hasty() -> Iterator[None]:
+    """Look at clusters more often than users need."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(executors_cluster, "LOOKING", 0.1)
+        yield
+
+
+@pytest.fixture(scope="module")
+def address(hasty: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """A scheduler with two workers."""
+    folder = tmp_path_factory.mktemp("cluster")
+    with ExitStack() as stack:
+        where, _ = stack.enter_context(scheduler(folder))
+        for _ in range(2):
+            stack.enter_context(worker(where, folder))
+        with executor(where) as crew:
+            _wait_for(crew, 2)
+        yield where
+
+
+def _wait_for(crew: executors_cluster.Cluster, workers: int) -> None:
+    while crew.workers != workers:
+        time.sleep(0.1)
+
+
+def test_that_a_cluster_does_every_batch_once(address: str) -> None:
+    batches = [list(range(first, first + 3)) for first in range(0, 90, 3)]
+    with executor(address) as crew:
+        assert crew.describe == f"dask {address}, 2 workers"
+        found = list(crew.results(Squares(0.01), iter(batches)))
+    assert sorted(numbers for numbers, _ in found) == batches
+    for numbers, results in found:
+        assert [square for square, _ in results] == [number * number for number in numbers]
+    assert len({pid for _, results in found for _, pid in results}) == 2
+
+
+def test_that_no_more_batches_are_taken_than_a_cluster_needs(address: str) -> None:
+    taken: list[int] = []
+    with executor(address) as crew:
+        endless = (taken.append(number) or [number] for number in itertools.count())
+        found = crew.results(Squares(), endless)
+        for received in range(1, 20):
+            next(found)
+            assert len(taken) - received <= AHEAD * 2
+        found.close()
+
+
+def test_that_a_work_on_a_cluster_raises_its_own_error(address: str) -> None:
+    problems = [Problem("load", "normal_force", "must be above zero")]
+    with executor(address) as crew, pytest.raises(ScenarioError) as caught:
+        list(crew.results(Raising(ScenarioError, "rig.toml", problems), iter([[1]])))
+    assert caught.value.problems == problems
+
+
+def test_that_a_killed_worker_costs_nothing(tmp_path: Path) -> None:
+    with (
+        scheduler(tmp_path) as (where, _),
+        worker(where, tmp_path),
+        worker(where, tmp_path),
+        executor(where) as crew,
+    ):
+        _wait_for(crew, 2)
+        work = Deadly(tmp_path, at=13, times=1)
+        found = dict(crew.results(work, iter([(number,) for number in range(40)])))
+        _wait_for(crew, 1)
+    assert (tmp_path / "killed 0").exists()
+    assert found == {(number,): [number * number] for number in range(40)}
+
+
+def test_that_a_study_goes_on_when_new_workers_take_over(tmp_path: Path) -> None:
+    told: list[str] = []
+    with scheduler(tmp_path) as (where, _), ExitStack() as stack:
+
+        def join(message: str) -> None:
+            told.append(message)
+            stack.enter_context(worker(where, tmp_path))
+
+        # the only worker dies, and with it the only copy of the work; another comes
+        with executor(where, tell=join) as crew:
+            work = Deadly(tmp_path, at=5, times=1)
+            found = dict(crew.results(work, iter([(number,) for number in range(12)])))
+    assert found == {(number,): [number * number] for number in range(12)}
+    assert told == [f"waiting for workers: there are none at {where}"] * 2
+
+
+def test_that_a_cluster_without_workers_is_not_waited_for_in_silence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(executors_cluster, "PATIENCE", 0.3)
+    with scheduler(tmp_path) as (where, _):
+        said = f"the scheduler at {where} has had no workers for 0.3 s; start some with: dask"
+        with pytest.raises(WorkerError, match=re.escape(said)), executor(where):
+            pass
+
+
+def test_that_a_scheduler_that_is_killed_is_named(tmp_path: Path) -> None:
+    with (
+        dask.config.set({"distributed.comm.timeouts.connect": "0.5s"}),
+        scheduler(tmp_path) as (where, process),
+        worker(where, tmp_path),
+        executor(where) as crew,
+    ):
+        found = crew.results(Squares(0.01), ([number] for number in itertools.count()))
+        next(found)
+        process.kill()
+        with pytest.raises(WorkerError, match=f"the scheduler at {where} is gone"):
+            list(found)
+
+
+def test_that_another_wearsim_on_a_worker_is_told(tmp_path: Path) -> None:
+    other = tmp_path / "site" / "wearsim-99.9.dist-info"
+    other.mkdir(parents=True)
+    (other / "METADATA").write_text("Metadata-Version: 2.1\nName: wearsim\nVersion: 99.9\n")
+    with (
+        scheduler(tmp_path) as (where, _),
+        worker(where, tmp_path, str(other.parent)),
+        pytest.raises(WorkerError, match=r"is here, and 99\.9 on the worker tcp://127"),
+        executor(where),
+    ):
+        pass
+
+
+def test_that_another_wearsim_on_a_worker_that_joins_late_is_told(
+    address: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with executor(address) as crew:
+        monkeypatch.setattr(executors_cluster, "version", lambda name: "99.9")
+        with pytest.raises(WorkerError, match=r"wearsim 99\.9 is here, and "):
+            list(crew.results(Squares(), iter([[1]])))
+
+
+@contextmanager
+def _mute_server() -> Iterator[str]:
+    """Provide the address of a server that is no scheduler: it never says a word."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        held = []
+        threading.Thread(target=lambda: held.append(server.accept()[0]), daemon=True).start()
+        yield f"tcp://127.0.0.1:{server.getsockname()[1]}"
+        for connection in held:
+            connection.close()
+
+
+def test_that_an_address_without_scheduler_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(executors_dask, "CONNECTING", 0.5)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        free = f"tcp://127.0.0.1:{server.getsockname()[1]}"
+    with _mute_server() as mute:
+        for nobody in (free, mute, "tcp://no-such-host.invalid:8786"):
+            with pytest.raises(WorkerError) as caught, executor(nobody):
+                pass
+            assert str(caught.value).startswith(f"no Dask scheduler answers at {nobody} within")
+            assert "\n" not in str(caught.value)
+
+
+def test_that_missing_dask_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    said = r'pip install "wearsim\[cluster\]"'
+    for chosen in ("dask", "tcp://127.0.0.1:8786"):
+        with pytest.raises(WorkerError, match=said), executor(chosen):
+            pass
+
+
+def test_that_a_cluster_of_our_own_does_every_batch_and_names_what_kills_it(
+    tmp_path: Path,
+) -> None:
+    with (
+        dask.config.set({"distributed.scheduler.allowed-failures": 0}),
+        executor("dask", 2) as crew,
+    ):
+        assert crew.workers == 2
+        found = dict(crew.results(Squares(), iter([(number,) for number in range(20)])))
+        with pytest.raises(WorkerError, match="died of realisation 3 again") as caught:
+            list(crew.results(Deadly(tmp_path, at=3, times=9), iter([(3,)])))
+    assert {n: rows[0][0] for (n,), rows in found.items()} == {n: n * n for n in range(20)}
+    assert caught.value.realisations == (3,)

@@ -1,0 +1,81 @@
+"""The contact a user looks at is the one that a run begins with."""
+
+import numpy as np
+import pytest
+
+import wearsim
+from tests.evolution import SCENARIOS
+from wearsim.errors import ScenarioError
+from wearsim.studies.run.assemble import build_scene
+from wearsim.studies.run.dry_run import plan
+
+
+def groove(folder):
+    """Write a groove that fits the roller, 48 um deep, and return its path."""
+    y = np.linspace(-12.0, 12.0, 961)
+    height = -np.maximum(0.0, 48.0 - y**2)  # um; y^2/(2 R_crown) is y^2 um at R_crown = 500 mm
+    path = folder / "groove.csv"
+    rows = "\n".join(f"{a:.6f}, {b:.6f}" for a, b in zip(y, height, strict=True))
+    path.write_text("y [mm], height [um]\n" + rows)
+    return str(path)
+
+
+@pytest.mark.parametrize(
+    "creepage",
+    [
+        {"longitudinal": 1e-3},
+        {"longitudinal": 1e-3, "differential_slip": True},
+        {"drive": "free", "bearing_torque": "50 N mm", "differential_slip": True},
+    ],
+)
+def test_that_a_run_begins_with_the_contact_that_the_user_was_shown(tmp_path, creepage):
+    overrides = {
+        "cylinder.profile": groove(tmp_path),
+        "creepage": creepage,
+        "operation.passes": 1000,
+        "contact.strips": 201,
+        "contact.width": "22 mm",
+    }
+    scenario = wearsim.load_scenario(SCENARIOS / "rig-450min.toml", overrides=overrides)
+    shown = wearsim.solve_contact(scenario)
+    result = wearsim.run(scenario)
+    assert result.power[0] == pytest.approx(3.0 * shown.power, rel=1e-9)
+    assert result.longitudinal_creepage[0] == pytest.approx(shown.longitudinal_creepage, rel=1e-9)
+
+
+def test_that_the_end_of_a_logged_run_is_told_at_one_load():
+    scenario = wearsim.load_scenario(
+        SCENARIOS / "rig-logged-load.toml", overrides={"operation.duration": "30 min"}
+    )
+    result = wearsim.run(scenario)
+    spacing = float(np.diff(result.y)[0])
+    assert result.line_load[-1].sum() * spacing == pytest.approx(result.normal_force[-1], rel=1e-8)
+    assert 3.0 * result.dissipation[-1].sum() * spacing == pytest.approx(result.power[-1], rel=1e-8)
+
+
+def test_that_a_log_that_falls_to_nothing_is_refused_before_the_run(tmp_path):
+    log = tmp_path / "log.csv"
+    log.write_text("time [min], load [N]\n0, 300\n100, 300\n101, -5\n102, 300\n450, 300\n")
+    scenario = wearsim.load_scenario(
+        SCENARIOS / "rig-450min.toml", overrides={"load": {"kind": "recorded", "file": str(log)}}
+    )
+    with pytest.raises(ScenarioError, match="the load falls to nothing"):
+        plan(scenario)
+
+
+def test_that_options_without_meaning_are_told():
+    for changes, key in (
+        ({"evolution.stepper": "per-pass", "evolution.step": 100}, "step"),
+        ({"evolution.stepper": "implicit", "evolution.allow_unstable": True}, "allow_unstable"),
+    ):
+        scenario = wearsim.load_scenario(SCENARIOS / "rig-450min.toml", overrides=changes)
+        with pytest.raises(ScenarioError, match=rf"\[evolution\] {key}: has no meaning"):
+            build_scene(scenario)
+
+
+def test_that_the_strips_of_a_contact_can_be_moved():
+    scenario = wearsim.load_scenario(
+        SCENARIOS / "rig-450min.toml", overrides={"contact.centre": "0.2 mm"}
+    )
+    solution = wearsim.solve_contact(scenario)
+    assert solution.y.mean() == pytest.approx(0.2e-3)

@@ -1,0 +1,125 @@
+"""The cadence of records by itself."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from study_examples import short
+
+from wearsim.studies.run.output_schedule import RecordSchedule
+
+
+def _all(schedule: RecordSchedule, stop: float) -> list[float]:
+    """Return every record up to the end of the test, which is one whatever the cadence."""
+    found = [0.0]
+    while True:
+        due = schedule.next_record(found[-1])
+        assert due > found[-1]
+        if due >= stop:
+            return [*found, stop]
+        found.append(due)
+
+
+@given(stop=st.integers(2, 10**8), count=st.integers(1, 400), log=st.booleans())
+@settings(deadline=None, max_examples=100)
+def test_that_a_number_of_records_is_kept_to_and_the_last_ends_the_test(
+    stop: int, count: int, log: bool
+) -> None:
+    schedule = RecordSchedule(0.0 if log else stop / count, float(stop), count)
+    found = _all(schedule, stop)
+    assert len(found) == count + 1
+    for number, passes in enumerate(found[1:], start=1):
+        exact = stop ** (number / count) if log else stop * number / count
+        assert passes == pytest.approx(exact, rel=1e-12)
+    assert found[-2] < stop * (1.0 - 1e-9)
+
+
+@given(
+    interval=st.floats(0.5, 1e6),
+    start=st.floats(0.0, 1e6),
+    base=st.floats(2.0, 1e8),
+    count=st.integers(1, 1000),
+    log=st.booleans(),
+)
+@settings(deadline=None, max_examples=100)
+def test_that_the_next_record_is_later_and_near(
+    interval: float, start: float, base: float, count: int, log: bool
+) -> None:
+    schedule = RecordSchedule(0.0 if log else interval, base, count)
+    passes = start
+    for _ in range(12):
+        due = schedule.next_record(passes)
+        assert due > passes
+        if log:
+            ratio = base ** (1.0 / count)
+            assert due <= max(passes, 1.0) * ratio * (1.0 + 1e-8)
+        else:
+            assert due <= passes + interval * (1.0 + 1e-8)
+        passes = due
+
+
+@given(interval=st.floats(0.1, 1e5), skipped=st.integers(1, 10**6))
+@settings(deadline=None)
+def test_that_equal_intervals_do_not_drift(interval: float, skipped: int) -> None:
+    schedule = RecordSchedule(interval, 1.0, 1)
+    passes = skipped * interval
+    for number in range(skipped + 1, skipped + 30):
+        passes = schedule.next_record(passes)
+        assert passes == pytest.approx(number * interval, rel=1e-12)
+
+
+@given(interval=st.floats(1.0, 1e5), places=st.lists(st.floats(0.0, 1e5), min_size=1))
+@settings(deadline=None)
+def test_that_a_record_is_the_same_from_wherever_it_is_foreseen(
+    interval: float, places: list[float]
+) -> None:
+    schedule = RecordSchedule(interval, 1.0, 1)
+    for place in places:
+        due = schedule.next_record(place)
+        before = place + 0.5 * (due - place)
+        assert schedule.next_record(before) == due
+
+
+@pytest.mark.parametrize(
+    ("outputs", "first"),
+    [
+        ({}, [1500.0, 3000.0]),
+        ({"outputs.records": 3}, [2000.0, 4000.0]),
+        ({"outputs.records": 2, "outputs.spacing": "log"}, [math.sqrt(6000.0), 6000.0]),
+        ({"outputs.every_passes": 700}, [700.0, 1400.0]),
+        ({"outputs.every": "2 s"}, [100.0, 200.0]),
+        ({"outputs.every": "0.1 min"}, [300.0, 600.0]),
+    ],
+)
+def test_that_a_scenario_sets_the_cadence(outputs: dict[str, object], first: list[float]) -> None:
+    schedule = RecordSchedule.of(short(**outputs), 6000.0)
+    found = [schedule.next_record(0.0)]
+    found.append(schedule.next_record(found[0]))
+    assert found == pytest.approx(first, rel=1e-14)
+
+
+def test_that_twenty_records_are_made_where_none_are_asked_for() -> None:
+    from wearsim.scenario import parse_scenario
+
+    text = short().text.replace("records = 4", "")
+    scenario = parse_scenario(text, "rig.toml", {}.__getitem__)
+    assert RecordSchedule.of(scenario, 6000.0).next_record(0.0) == 300.0
+
+
+def test_that_a_test_of_one_pass_has_a_cadence() -> None:
+    schedule = RecordSchedule.of(short(outputs__spacing="log"), 1.0)
+    assert schedule.next_record(0.0) > 0.0
+
+
+@pytest.mark.parametrize("speed", ["1000 rpm", "990 rpm", "333 rpm", "1234.5 rpm"])
+@pytest.mark.parametrize("every", ["1 s", "1 min", "7.5 s"])
+def test_that_whole_passes_are_recorded_as_such(speed: str, every: str) -> None:
+    schedule = RecordSchedule.of(short(operation__speed=speed, outputs__every=every), 1.0)
+    passes = 0.0
+    for _ in itertools.repeat(None, 2000):
+        passes = schedule.next_record(passes)
+        assert passes == round(passes) or abs(passes - round(passes)) > 1e-9

@@ -1,0 +1,290 @@
+"""Runs with random inputs: what is drawn when, expectations over passes, processes, restart."""
+
+import numpy as np
+import pytest
+
+import wearsim
+from tests.studies.random_examples import (
+    CREEPAGE,
+    FRICTION,
+    LOAD,
+    SLACK,
+    WANDERING,
+    end_of,
+    scenario_of,
+)
+from wearsim.errors import CapabilityError, Interrupted, ScenarioError, StepError
+from wearsim.evolution.error_control import error_estimates as errors_of_steps
+from wearsim.evolution.error_control.error_estimates import whole_volume
+from wearsim.evolution.state import fresh_state
+from wearsim.evolution.steppers.forward_euler import stability_limit
+from wearsim.results import open_results
+from wearsim.results.run.data import differences
+from wearsim.studies.run.assemble import build_scene
+from wearsim.studies.run.draws import draw
+
+ALL_PER_PASS = {
+    "load__normal_force": {**LOAD, "persistence": "per-pass"},
+    "friction__coefficient": {**FRICTION, "persistence": "per-pass"},
+    "creepage__longitudinal": {**CREEPAGE, "persistence": "per-pass"},
+    "creepage__misalignment": {**SLACK, "persistence": "per-pass"},
+}
+
+
+def deepest(state):
+    """Return the depth of the groove [m]."""
+    return float(state.cylinder_depth.max())
+
+
+def test_that_a_test_runs_with_what_was_drawn_for_it():
+    random = scenario_of(
+        load__normal_force=LOAD, friction__coefficient=FRICTION, contact__strips=61
+    )
+    drawn = draw(random).scenario.drawn
+    plain = scenario_of(
+        load__normal_force=f"{drawn['load.normal_force']!r} N",
+        friction__coefficient=drawn["friction.coefficient"],
+        contact__strips=61,
+    )
+    assert drawn["load.normal_force"] != pytest.approx(307.0, abs=1e-6)
+    assert deepest(end_of(random)[1]) == deepest(end_of(plain)[1])
+
+
+def test_that_a_wear_factor_or_a_spring_can_be_drawn_too():
+    factor = {"distribution": "lognormal", "median": "2e-9 1/Pa", "factor": 1.5}
+    stiffness = {"distribution": "uniform", "low": "600 N/mm", "high": "800 N/mm"}
+    scenario = scenario_of(
+        wear__cylinder__k_over_h=factor, load__kind="spring", load__stiffness=stiffness
+    )
+    result = wearsim.run(scenario)
+    drawn = result.raw.drawn
+    assert 600e3 < drawn["load.stiffness"]["values"][0] < 800e3
+    assert drawn["wear.cylinder.k_over_h"]["unit"] == "1/Pa"
+    balance = drawn["wear.cylinder.k_over_h"]["values"][0] * result.dissipated_energy[-1]
+    assert result.worn_volume[-1] == pytest.approx(balance, rel=1e-12)
+
+
+def test_that_another_realisation_or_seed_is_another_test():
+    def force(**changes):
+        drawn = draw(scenario_of(load__normal_force=LOAD, **changes)).scenario.drawn
+        return drawn["load.normal_force"]
+
+    assert len({force(), force(sampling__realisation=1), force(seed=2)}) == 3
+    assert force() == force(friction__coefficient=FRICTION)
+
+
+def test_that_every_roller_has_its_own_slack():
+    slack = {**SLACK, "persistence": "per-roller"}
+    friction = {**FRICTION, "persistence": "per-roller"}
+    scenario = scenario_of(creepage__misalignment=slack, friction__coefficient=friction)
+    scene, state = end_of(scenario)
+    assert scene.shape[1] == 3
+    for name in ("yaw", "tilt", "friction"):
+        assert len(np.unique(getattr(scene.inputs, name))) == 3
+    assert np.hypot(scene.inputs.yaw, scene.inputs.tilt).max() < 2e-3
+    # each roller touches where its tilt has moved it: R_crown x tilt, to the other side
+    forces = [contact.line_load for contact in fresh_state(scene).contacts]
+    centres = [float(np.dot(scene.grid.y, q) / q.sum()) for q in forces]
+    assert centres == pytest.approx(-0.5 * scene.inputs.tilt[:, 0], abs=2e-5)
+    assert deepest(state) > 0.0
+
+
+@pytest.mark.parametrize("drawn", [("creepage__misalignment",), tuple(ALL_PER_PASS)])
+def test_that_the_expectation_over_passes_agrees_with_drawing_every_pass(drawn):
+    inputs = {name: ALL_PER_PASS[name] for name in drawn}
+    _, truth = end_of(scenario_of(evolution__stepper="per-pass", contact__strips=91, **inputs))
+    fresh, _, _ = build_scene(scenario_of(contact__strips=91, **inputs))
+    step = round(10.0 * stability_limit(fresh, fresh_state(fresh)))
+    scene, state = end_of(scenario_of(evolution__step=step, contact__strips=91, **inputs))
+    assert state.steps < 20
+    assert abs(deepest(state) - deepest(truth)) <= state.depth_error[0]
+    volumes = whole_volume(scene, state), whole_volume(scene, truth)
+    assert abs(volumes[0] - volumes[1])[0] <= state.volume_error[0]
+    assert state.depth_error[0] < 0.02 * deepest(state)
+
+
+def test_that_the_step_hardly_matters_to_an_expectation_however_long_it_is():
+    inputs = {"creepage__misalignment": ALL_PER_PASS["creepage__misalignment"]}
+    depths = [
+        deepest(end_of(scenario_of(evolution__step=step, contact__strips=91, **inputs))[1])
+        for step in (250, 1000, 3000)
+    ]
+    assert depths == pytest.approx([depths[0]] * 3, rel=3e-3)
+
+
+def test_that_an_explicit_expectation_of_that_length_is_unstable():
+    inputs = {
+        "evolution__stepper": "explicit",
+        "evolution__step": 400,
+        "evolution__nodes": 16,
+        "creepage__misalignment": ALL_PER_PASS["creepage__misalignment"],
+    }
+    with pytest.raises(StepError, match="exceeds the limit of stability"):
+        end_of(scenario_of(**inputs))
+    result = wearsim.run(scenario_of(evolution__allow_unstable=True, **inputs))
+    assert any(text.startswith("unstable") for text in result.warnings)
+
+
+def test_that_more_nodes_bring_the_error_of_the_quadrature_down():
+    errors = []
+    for nodes in (8, 128):
+        _, state = end_of(
+            scenario_of(passes=2000, evolution__nodes=nodes, evolution__step=1000, **ALL_PER_PASS)
+        )
+        errors.append(state.quadrature[0, 0] / deepest(state))
+    assert errors[1] < 0.2 * errors[0]
+
+
+def test_that_a_wandering_load_agrees_with_its_per_pass_truth():
+    load = {**WANDERING, "marginal": LOAD}
+    friction = {**WANDERING, "marginal": FRICTION, "persistence": "per-roller"}
+    inputs = {"load__normal_force": load, "friction__coefficient": friction, "contact__strips": 61}
+    _, truth = end_of(scenario_of(evolution__stepper="per-pass", **inputs))
+    scene, state = end_of(scenario_of(**inputs))
+    assert len(scene.varying) == 4
+    assert abs(deepest(state) - deepest(truth)) <= state.depth_error[0]
+    assert deepest(state) == pytest.approx(deepest(truth), rel=2e-3)
+
+
+def test_that_passes_draw_the_same_however_often_they_are_recorded():
+    inputs = {**ALL_PER_PASS, "evolution__stepper": "per-pass", "passes": 900}
+    few = wearsim.run(scenario_of(outputs__records=1, **inputs))
+    many = wearsim.run(scenario_of(outputs__records=9, **inputs))
+    assert few.depth[-1] == many.depth[-1]
+    profiles = [result.raw.records["cylinder_profile"][-1] for result in (few, many)]
+    assert (profiles[0] == profiles[1]).all()
+
+
+@pytest.mark.parametrize("stepper", ["implicit", "per-pass"])
+def test_that_a_stopped_test_with_random_inputs_goes_on_as_if_unbroken(tmp_path, stepper):
+    scenario = scenario_of(
+        passes=1500,
+        evolution__stepper=stepper,
+        contact__strips=61,
+        outputs__records=5,
+        load__normal_force={**WANDERING, "marginal": LOAD},
+        friction__coefficient={**FRICTION, "persistence": "per-pass"},
+        creepage__misalignment={**SLACK, "persistence": "per-roller"},
+    )
+    whole = wearsim.run(scenario, tmp_path / "whole.h5")
+    asked = iter([False, False, True])
+    with pytest.raises(Interrupted):
+        wearsim.run(scenario, tmp_path / "part.h5", stop_requested=lambda: next(asked, True))
+    assert not open_results(tmp_path / "part.h5").finished
+    resumed = wearsim.resume(tmp_path / "part.h5")
+    apart = set(differences(whole.raw, resumed.raw)) - {"wall_seconds", "created"}
+    assert not apart
+
+
+def test_that_a_field_is_refused_by_a_run():
+    field = {"distribution": "white", "marginal": FRICTION}
+    with pytest.raises(CapabilityError, match="resolved within one contact"):
+        build_scene(scenario_of(friction__coefficient=field))
+
+
+def test_that_a_latin_hypercube_is_refused_by_a_run():
+    with pytest.raises(ScenarioError, match="a study of many realisations"):
+        build_scene(scenario_of(load__normal_force=LOAD, sampling__plan="latin-hypercube"))
+
+
+def test_that_a_process_far_too_fast_is_refused():
+    load = {**WANDERING, "correlation_time": "1 us", "marginal": LOAD}
+    with pytest.raises(ScenarioError, match="a longer correlation_time"):
+        build_scene(scenario_of(passes=100_000, load__normal_force=load))
+
+
+@pytest.mark.parametrize("key", ["load__normal_force", "friction__coefficient"])
+def test_that_a_wandering_input_is_part_of_the_estimated_error(key, monkeypatch):
+    marginal = LOAD if "load" in key else FRICTION
+    inputs = {"contact__strips": 61, key: {**WANDERING, "marginal": marginal}}
+    # in full slip wear is linear in friction, and its mean is all there is to it
+    scenario = scenario_of(evolution__step=1500, creepage__longitudinal=3e-4, **inputs)
+    _, state = end_of(scenario)
+    monkeypatch.setattr(
+        "wearsim.evolution.error_control.step_doubling.variation_bias", lambda *_: None
+    )
+    _, blind = end_of(scenario)
+    # what the input does within a step moves the twin, and leaves the test as it is
+    assert (blind.cylinder_depth == state.cylinder_depth).all()
+    assert blind.depth_error[0] < state.depth_error[0] < 0.05 * deepest(state)
+
+
+@pytest.mark.parametrize("rollers", ["alike", "apart"])
+def test_that_a_wandering_load_stays_within_the_stated_error(rollers):
+    slack = {"creepage__misalignment": {**SLACK, "persistence": "per-roller"}}
+    inputs = {"load__normal_force": {**WANDERING, "marginal": LOAD}, "contact__strips": 61}
+    inputs |= slack if rollers == "apart" else {}
+    scene, fine = end_of(scenario_of(evolution__tolerance=1e-4, **inputs))
+    for tolerance in (3e-3, 3e-2):
+        _, state = end_of(scenario_of(evolution__tolerance=tolerance, **inputs))
+        apart = abs(deepest(state) - deepest(fine))
+        assert apart <= state.depth_error[0] + fine.depth_error[0]
+        assert state.depth_error[0] <= tolerance * deepest(state)
+        volumes = [whole_volume(scene, one) for one in (state, fine)]
+        assert abs(volumes[0] - volumes[1]) <= state.volume_error[0] + fine.volume_error[0]
+
+
+def test_that_a_record_means_the_same_whatever_the_stepper():
+    slack = {"creepage__misalignment": ALL_PER_PASS["creepage__misalignment"]}
+    inputs = {**slack, "passes": 3000, "contact__strips": 91}
+    expected = wearsim.run(scenario_of(**inputs))
+    drawn = wearsim.run(scenario_of(evolution__stepper="per-pass", **inputs))
+    power = drawn.dissipated_energy[-1] / drawn.time[-1]
+    assert drawn.power[-1] == pytest.approx(power, rel=0.05)
+    assert drawn.power[-1] == pytest.approx(expected.power[-1], rel=0.02)
+    # how wide the load lies over many passes; each pass by itself leaves the profile rough
+    widths = []
+    for result in (expected, drawn):
+        load = result.raw.records["line_load"][-1, 0, 0, 0]
+        widths.append(np.sqrt(np.dot(load, result.y**2) / load.sum()))
+    assert widths[1] == pytest.approx(widths[0], rel=0.03)
+
+
+def test_that_the_strips_hold_the_groove_of_the_roller_with_the_most_friction():
+    friction = {"distribution": "uniform", "low": 0.05, "high": 1.0, "persistence": "per-roller"}
+    scenario = scenario_of(friction__coefficient=friction, seed=3)
+    plain, _, _ = build_scene(scenario_of())
+    scene, state = end_of(scenario)
+    assert scene.inputs.friction.max() > 0.5
+    assert np.ptp(scene.grid.y) > 1.3 * np.ptp(plain.grid.y)
+    assert deepest(state) > 0.0
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        {**WANDERING, "marginal": {"distribution": "normal", "mean": 0.0, "std": 1e-3}},
+        {"distribution": "normal", "mean": 0.0, "std": 1e-3, "persistence": "per-pass"},
+    ],
+)
+def test_that_the_strips_hold_the_groove_of_a_creepage_about_zero(law):
+    changes = {"creepage__longitudinal": law, "evolution__tolerance": 1e-2}
+    scene, state = end_of(scenario_of(passes=20_000, **changes))
+    worn = scene.grid.y[state.cylinder_depth[0, 0, 0] > 0.0]
+    fresh = build_scene(scenario_of(passes=20_000, creepage__longitudinal=0.0))[0].grid.y[-1]
+    assert fresh < worn[-1] < scene.grid.y[-1]
+
+
+def test_that_nodes_are_refused_where_there_is_nothing_to_expect():
+    for changes in ({}, {"evolution__stepper": "per-pass", **ALL_PER_PASS}):
+        with pytest.raises(ScenarioError, match="no expectation over passes"):
+            build_scene(scenario_of(evolution__nodes=16, **changes))
+
+
+def test_step_is_shortened_where_its_coarse_twin_fails(monkeypatch):
+    friction = {**FRICTION, "persistence": "per-pass"}
+    scene, stepper, _ = build_scene(scenario_of(passes=600, friction__coefficient=friction))
+    fresh = fresh_state(scene)
+    plain = stepper.advance(scene, fresh, 600.0).end
+    original, failures = errors_of_steps.coarse_start, [StepError("the twin did not settle", {})]
+
+    def fails_once(*arguments):
+        if failures:
+            raise failures.pop()
+        return original(*arguments)
+
+    monkeypatch.setattr(errors_of_steps, "coarse_start", fails_once)
+    end = stepper.advance(scene, fresh, 600.0).end
+    assert not failures
+    assert end.rejected >= 1
+    assert 0.0 < end.passes < plain.passes

@@ -1,0 +1,173 @@
+"""Records: where the cadence says, and never in the way of a step."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from study_examples import LOADS, ROLLERS, STEPPERS, short, unlike
+
+from wearsim.errors import StepError
+from wearsim.evolution.error_control.step_doubling import TwinStepper
+from wearsim.evolution.steppers.per_pass import PerPassStepper
+from wearsim.results import Result
+from wearsim.studies.run import run as replay
+
+pytestmark = pytest.mark.usefixtures("small_chunks")
+
+PASSES = 6000
+CADENCES: dict[str, dict[str, object]] = {
+    "five": {"outputs.records": 5},
+    "fifty": {"outputs.records": 50},
+    "log": {"outputs.records": 12, "outputs.spacing": "log"},
+    "passes": {"outputs.every_passes": 1700},
+    "time": {"outputs.every": "36 s"},  # 1800 passes, but for the round-off
+    "default": {},
+}
+EXPECTED = {
+    "five": np.arange(0, 6001, 1200),
+    "fifty": np.arange(0, 6001, 120),
+    "log": np.array([0.0, *PASSES ** (np.arange(1, 13) / 12)]),
+    "passes": np.array([0, 1700, 3400, 5100, 6000]),
+    "time": np.array([0, 1800, 3600, 5400, 6000]),
+    "default": np.arange(0, 6001, 1500),
+}
+# what a cadence is seen in; everything else must be the same bits
+OWN = {"sha256", "scenario_text"}
+
+
+def _runs(**overrides: object) -> dict[str, Result]:
+    return {
+        name: replay.run(short(**{**overrides, **cadence})) for name, cadence in CADENCES.items()
+    }
+
+
+@pytest.mark.parametrize("load", LOADS)
+@pytest.mark.parametrize("stepper", ["implicit", "stabilised", "explicit"])
+def test_that_records_never_move_a_step(stepper: str, load: str) -> None:
+    runs = _runs(**{**ROLLERS["wearing"], **LOADS[load], **STEPPERS[stepper]})
+    first = runs["five"]
+    for name, run in runs.items():
+        apart = [item for item in unlike(run, first) if not item.startswith("records.")]
+        assert set(apart) <= OWN, name
+        np.testing.assert_allclose(run.record_passes, EXPECTED[name], rtol=1e-12)
+        # records of the same moment are the same bits, whoever asked for them
+        for here, there in zip(*_shared(run, first), strict=True):
+            for variable in run.raw.records:
+                np.testing.assert_array_equal(
+                    run.raw.records[variable][here], first.raw.records[variable][there]
+                )
+
+
+def _shared(one: Result, other: Result) -> tuple[list[int], list[int]]:
+    """Return which records two runs made after the same passes."""
+    _, here, there = np.intersect1d(one.record_passes, other.record_passes, return_indices=True)
+    assert len(here) >= 2
+    return here.tolist(), there.tolist()
+
+
+def _short_side_steps(monkeypatch: pytest.MonkeyPatch, longest: float) -> None:
+    """Let side steps longer than `longest` passes fail."""
+    side_step = TwinStepper.side_step
+
+    def step(self, scene, state, passes):
+        if passes > longest:
+            raise StepError(f"{passes} passes are too many")
+        return side_step(self, scene, state, passes)
+
+    monkeypatch.setattr(TwinStepper, "side_step", step)
+
+
+def test_that_a_record_out_of_reach_of_one_step_is_reached_in_halves(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    scenario = short(**{"outputs.records": 12, "outputs.spacing": "log"})
+    whole = replay.run(scenario)
+    _short_side_steps(monkeypatch, 40.0)
+    halves = replay.run(scenario)
+    assert {name.partition(".")[0] for name in unlike(halves, whole)} <= {"records"}
+    np.testing.assert_array_equal(halves.record_passes, whole.record_passes)
+    apart = np.abs(halves.profiles - whole.profiles).max()
+    assert 0.0 < apart < 1e-3 * whole.depth[-1]
+
+
+def test_that_a_record_out_of_reach_of_any_step_ends_the_run(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    _short_side_steps(monkeypatch, 0.0)
+    with pytest.raises(StepError, match="too many"):
+        replay.run(short(**{"outputs.records": 12, "outputs.spacing": "log"}))
+
+
+@pytest.mark.parametrize("stepper", ["compiled passes", "passes in Python"])
+def test_that_records_never_move_a_pass(stepper: str) -> None:
+    cadences = {"outputs.records": 7}, {"outputs.every_passes": 13}, {"outputs.spacing": "log"}
+    common = {**ROLLERS["wearing"], **LOADS["spring"], **STEPPERS[stepper]}
+    common["operation.passes"] = 100
+    first, *others = [replay.run(short(**{**common, **cadence})) for cadence in cadences]
+    for other in others:
+        state, expected = other.raw.checkpoint, first.raw.checkpoint
+        for name in ("cylinder_depth", "roller_depth", "terms", "passes", "steps", "energy"):
+            np.testing.assert_array_equal(state[name], expected[name], err_msg=name)
+        for name, array in first.raw.records.items():
+            exact = name.endswith("profile") or name.startswith("record")
+            found, last = other.raw.records[name][-1], array[-1]
+            # a contact solved anew from another start is the same to the end of Newton's steps
+            tolerance = 0.0 if exact else 2e-8 * np.abs(last).max()
+            np.testing.assert_allclose(found, last, rtol=0.0, atol=tolerance, err_msg=name)
+
+
+@pytest.mark.parametrize("stepper", ["compiled passes", "passes in Python"])
+def test_that_passes_one_by_one_are_recorded_whole_and_done_once(
+    stepper: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> None:
+        raise AssertionError("a record needs no step of its own where the run pauses for it")
+
+    monkeypatch.setattr(PerPassStepper, "side_step", refuse)
+    common = {**STEPPERS[stepper], "operation.passes": 100}
+    for cadence in ({"outputs.records": 7}, {"outputs.records": 30, "outputs.spacing": "log"}):
+        run = replay.run(short(**{**common, **cadence}))
+        due = [100 * k / 7 for k in range(8)]
+        if "outputs.spacing" in cadence:
+            due = [0.0, *(100 ** (k / 30) for k in range(1, 31))]
+        expected = sorted({math.ceil(round(passes, 9)) for passes in due})
+        assert run.record_passes.tolist() == expected
+        assert run.steps == 100
+        assert set(expected) <= set(run.passes)
+
+
+@pytest.mark.parametrize("rollers", ROLLERS)
+@pytest.mark.parametrize("stepper", STEPPERS)
+def test_that_records_begin_fresh_and_end_with_the_end(stepper: str, rollers: str) -> None:
+    run = replay.run(short(**{**ROLLERS[rollers], **LOADS["spring"], **STEPPERS[stepper]}))
+    records, checkpoint = run.raw.records, run.raw.checkpoint
+    assert records["record_passes"][0] == 0.0
+    assert not records["cylinder_profile"][0].any()
+    assert not records["roller_profile"][0].any()
+    assert records["record_passes"][-1] == run.passes[-1] == run.raw.total_passes
+    assert records["record_time"][-1] == run.time[-1]
+    np.testing.assert_array_equal(
+        records["cylinder_profile"][-1], checkpoint["cylinder_depth"][:, 0]
+    )
+    np.testing.assert_array_equal(records["roller_profile"][-1], checkpoint["roller_depth"][0])
+    assert records["cylinder_profile"][-1].max() == run.depth[-1]
+    assert (np.diff(records["record_passes"]) > 0.0).all()
+
+
+@pytest.mark.parametrize("every", ["10 s", "7.5 s", "1 s"])
+def test_that_an_interval_of_time_makes_no_second_last_record(every: str) -> None:
+    # 1000 rpm is 50 passes a second, less a round-off, as is then the last record's place
+    run = replay.run(short(operation__duration="30 s", outputs__every=every))
+    seconds = float(every.split(maxsplit=1)[0])
+    np.testing.assert_allclose(run.record_time, np.arange(0.0, 30.1, seconds), atol=1e-9)
+    assert run.record_passes[-2] < run.raw.total_passes - 1.0
+
+
+def test_that_records_lie_on_the_way_of_the_steps() -> None:
+    run = replay.run(short(evolution__tolerance=1e-4, outputs__records=23))
+    between = np.interp(run.record_passes, run.passes, run.depth)
+    np.testing.assert_allclose(run.profiles.max(axis=1), between, rtol=2e-3)
+    loads = run.line_load.sum(axis=1) * (run.y[1] - run.y[0])
+    np.testing.assert_allclose(loads, 300.0, rtol=1e-9)

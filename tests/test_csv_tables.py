@@ -1,0 +1,162 @@
+"""CSV with units in its headers: SI columns, or every mistake of the file."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wearsim.csv_tables import read_columns
+from wearsim.errors import ScenarioError
+from wearsim.types import FloatArray
+
+LOG = {"time": "s", "load": "N"}
+
+
+def _read(text: str) -> dict[str, FloatArray]:
+    return read_columns(text, "log.csv", LOG, rising="time")
+
+
+def _mistakes(text: str) -> list[str]:
+    with pytest.raises(ScenarioError) as caught:
+        _read(text)
+    return [str(problem) for problem in caught.value.problems]
+
+
+@pytest.mark.parametrize("mark", [",", ";", "\t", " ; "])
+def test_that_columns_come_in_si_whatever_separates_them(mark: str) -> None:
+    rows = [["time [min]", "note", '"load [kN]"'], ["0", "a", "0.3"], ["1.5", "", "-1e-1"]]
+    text = "\ufeff# a log\n\n" + "\n# more\n".join(mark.join(row) for row in rows) + "\n\n"
+    columns = _read(text)
+    assert columns["time"].tolist() == [0.0, 90.0]
+    assert columns["load"].tolist() == [300.0, -100.0]
+
+
+def test_that_a_column_may_stand_under_an_alias() -> None:
+    text = "y [mm],z [um]\n0,1\n1,-2\n"
+    columns = {"y": "m", "height": "m"}
+    found = read_columns(text, "p.csv", columns, aliases={"height": ["z"]})
+    np.testing.assert_allclose(found["height"], [1e-6, -2e-6], rtol=1e-15)
+
+
+def test_that_plain_numbers_need_no_unit() -> None:
+    columns = read_columns("n,mu [-]\n1,0.1\n2,0.2\n", "mu.csv", {"n": "1", "mu": "1"})
+    assert columns["mu"].tolist() == [0.1, 0.2]
+    with pytest.raises(ScenarioError) as caught:
+        read_columns("mu [mm]\n1\n2\n", "mu.csv", {"mu": "1"})
+    assert str(caught.value) == (
+        "mu.csv: line 1: column 'mu': a plain number has no unit, got [mm], expected mu"
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "mistakes"),
+    [
+        ("", ["the file is empty, expected a header line such as time [s], load [N]"]),
+        (
+            "# only words\n",
+            ["the file is empty, expected a header line such as time [s], load [N]"],
+        ),
+        (
+            "tim [s],load [N]\n0,1\n1,2\n",
+            [
+                (
+                    "line 1: column 'time' is missing (is it 'tim'?), got tim [s], load [N],"
+                    " expected time [s]"
+                )
+            ],
+        ),
+        (
+            "time [s],force [N]\n0,1\n1,2\n",
+            ["line 1: column 'load' is missing, got time [s], force [N], expected load [N]"],
+        ),
+        (
+            "time,load []\n0,1\n1,2\n",
+            [
+                "line 1: column 'time' has no unit, got time, expected time [s]",
+                "line 1: column 'load' has no unit, got load, expected load [N]",
+            ],
+        ),
+        (
+            "time [mm],load [Newton]\n0,1\n1,2\n",
+            [
+                (
+                    "line 1: column 'time': wrong dimension, got mm (a length),"
+                    " expected a unit of time such as s"
+                ),
+                "line 1: column 'load': unknown unit 'Newton', expected a unit of force such as N",
+            ],
+        ),
+        (
+            "time [s],load [N],load [kN]\n0,1,2\n1,2,3\n",
+            ["line 1: column 'load' stands 2 times"],
+        ),
+        (
+            "time [s];load [N]\n0;1,5\n1;x\n2;\n3\n4;nan\n5;-inf\n6;1_0\n7;1e999\n",
+            [
+                "line 2: column 'load': needs a decimal point, got '1,5', expected a number",
+                "line 3: column 'load': is not a number, got 'x', expected a number",
+                "line 4: column 'load': is missing, expected a number",
+                "line 5: column 'load': is missing, expected a number",
+                "line 6: column 'load': must be finite, got nan, expected a number",
+                "line 7: column 'load': must be finite, got -inf, expected a number",
+                "line 8: column 'load': is not a number, got '1_0', expected a number",
+                "line 9: column 'load': must be finite, got 1e999, expected a number",
+            ],
+        ),
+        (
+            "time [s],load [N]\n# then\n0,5,1,5\n1,2\n2,3\n",
+            [
+                (
+                    "line 3: too many cells (is a comma meant as decimal point?), got 4 cells,"
+                    " expected 2, as in the header"
+                )
+            ],
+        ),
+        (
+            "time [s],load [N]\n0,1\n2,1\n2,1\n1,1\n",
+            [
+                "line 4: column 'time' must rise, got 2, expected more than 2",
+                "line 5: column 'time' must rise, got 1, expected more than 2",
+            ],
+        ),
+        ("time [s],load [N]\n0,1\n", ["too few rows of numbers, got 1, expected at least 2"]),
+    ],
+)
+def test_that_every_mistake_is_told_with_its_line(text: str, mistakes: list[str]) -> None:
+    assert _mistakes(text) == mistakes
+
+
+def test_that_the_list_of_mistakes_is_capped() -> None:
+    mistakes = _mistakes("time [s],load [N]\n" + "".join(f"{k},x\n" for k in range(50)))
+    assert len(mistakes) == 21
+    assert mistakes[-1] == "and 30 more"
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.floats(allow_nan=False, allow_infinity=False),
+            st.floats(allow_nan=False, allow_infinity=False),
+        ),
+        min_size=2,
+    ),
+    st.sampled_from([",", ";", "\t"]),
+)
+def test_that_numbers_come_back_as_they_were_written(
+    rows: list[tuple[float, float]], mark: str
+) -> None:
+    text = f"a [m]{mark}b [s]\n" + "".join(f"{a!r}{mark}{b!r}\n" for a, b in rows)
+    columns = read_columns(text, "t.csv", {"b": "s", "a": "m"})
+    assert list(zip(columns["a"], columns["b"], strict=True)) == rows
+
+
+@given(st.text(alphabet='time load[]sN,;\t\n"#0123456789.e-', max_size=200) | st.text())
+def test_that_any_text_gives_columns_or_a_scenario_error(text: str) -> None:
+    try:
+        columns = _read(text)
+    except ScenarioError as error:
+        assert error.problems  # noqa: PT017
+    else:
+        assert np.all(np.diff(columns["time"]) > 0.0)

@@ -1,0 +1,79 @@
+"""Rank correlations by a Gaussian copula."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from wearsim.uq.sampling.gaussian_copula import GaussianCopula
+from wearsim.uq.sampling.sampler import Sampler
+
+NAMES = ("a", "b", "c", "d")
+COUNT = 20_000
+
+
+def sampled(correlations, names=NAMES, plan="monte-carlo"):
+    inputs = [(name, 1) for name in names]
+    drawn = Sampler(8, inputs, plan, COUNT, correlations).uniforms(0, COUNT)
+    return {name: array[:, 0] for name, array in drawn.items()}
+
+
+@pytest.mark.parametrize(
+    "wanted",
+    [
+        {("a", "b"): 0.5},
+        {("b", "a"): -0.95},
+        {("a", "b"): 0.9, ("c", "b"): -0.5, ("a", "c"): -0.3},
+        {("a", "c"): 0.7, ("d", "b"): -0.2},
+    ],
+)
+def test_that_ranks_are_correlated_as_asked_and_laws_kept(wanted):
+    drawn = sampled([(*pair, rank) for pair, rank in wanted.items()])
+    for i, first in enumerate(NAMES):
+        assert stats.kstest(drawn[first], "uniform").pvalue > 1e-4
+        for second in NAMES[i + 1 :]:
+            rank = wanted.get((first, second), wanted.get((second, first), 0.0))
+            found = stats.spearmanr(drawn[first], drawn[second]).statistic
+            assert found == pytest.approx(rank, abs=4.0 / np.sqrt(COUNT))
+
+
+@pytest.mark.parametrize("plan", ["monte-carlo", "latin-hypercube", "sobol"])
+def test_that_only_what_takes_part_changes(plan):
+    free, tied = sampled([], plan=plan), sampled([("d", "b", 0.4)], plan=plan)
+    for name in ("a", "b", "c"):  # b comes before d by name, and so keeps its numbers
+        np.testing.assert_array_equal(free[name], tied[name])
+    assert (free["d"] != tied["d"]).all()
+
+
+def test_that_groups_do_not_touch_each_other():
+    alone = sampled([("a", "b", 0.4)])
+    beside = sampled([("c", "d", 0.7), ("a", "b", 0.4)])
+    for name in ("a", "b"):
+        np.testing.assert_array_equal(alone[name], beside[name])
+
+
+def test_that_tied_numbers_stay_strictly_between_0_and_1():
+    copula = GaussianCopula([("a", "b", 0.7)], {"a": 1, "b": 1})
+    ends = np.array([[2.0**-53], [1.0 - 2.0**-53]])
+    tied = copula.tie({"a": ends, "b": ends})["b"]
+    assert ((tied > 0.0) & (tied < 1.0)).all()
+
+
+@pytest.mark.parametrize(
+    ("correlations", "told"),
+    [
+        ([("a", "z", 0.1)], 'cannot correlate "z": no such input, the inputs are a, b, c, two'),
+        ([("a", "two", 0.1)], "cannot correlate two: a draw of it takes 2 numbers"),
+        ([("a", "a", 0.1)], "cannot correlate a with itself"),
+        ([("a", "b", 1.2)], "of a with b must lie in -1 to 1, got 1.2"),
+        ([("a", "b", float("nan"))], "must lie in -1 to 1, got nan"),
+        ([("a", "b", 0.1), ("b", "a", 0.1)], "of b with a stands twice"),
+        ([("a", "b", 1.0)], r"not positive definite \(a with b: 1\)"),
+        (
+            [("a", "b", 0.9), ("b", "c", 0.9), ("a", "c", -0.9)],
+            r"not positive definite \(a with b: 0.9, b with c: 0.9, a with c: -0.9\)",
+        ),
+    ],
+)
+def test_that_correlations_that_cannot_be_are_refused(correlations, told):
+    with pytest.raises(ValueError, match=told):
+        GaussianCopula(correlations, {"a": 1, "b": 1, "c": 1, "two": 2})

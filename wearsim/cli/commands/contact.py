@@ -1,0 +1,185 @@
+"""`wearsim contact`: one contact, its numbers and its figure."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from wearsim.cli.arguments import Figure, Force, Json, ScenarioFile, Settings, check_figure
+from wearsim.cli.arguments import read_scenario as load
+from wearsim.cli.output import note, refuse_existing, write_json, write_line, write_table
+
+if TYPE_CHECKING:
+    from wearsim.scenario import Scenario
+    from wearsim.studies.contact.single import ContactStudy
+    from wearsim.types import Profile
+
+ProfileFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--profile",
+        metavar="CSV",
+        help="Profile of the cylinder: columns 'y [mm]' and 'height [um]', worn is negative.",
+        show_default=False,
+    ),
+]
+
+
+def contact(
+    scenario: ScenarioFile,
+    profile: ProfileFile = None,
+    settings: Settings = None,
+    figure: Figure = None,
+    json: Json = False,
+    force: Force = False,
+) -> None:
+    """Solve one contact: the first roller at the start of its load."""
+    if figure is not None:
+        check_figure(figure)
+        refuse_existing(figure, force)
+    loaded = load(scenario, settings)
+    if figure is not None:
+        _keep_inputs(figure, loaded, profile)
+    from wearsim.studies.contact.single import study_contact
+
+    has_fields = loaded.contact.spec.capabilities.fields
+    study = study_contact(
+        loaded, _profile(profile), figure is not None and has_fields, with_error=True
+    )
+    notes = [*study.notes, *_means(loaded)]
+    if figure is not None and not has_fields:
+        notes.append(f"model '{study.model}' gives no fields; the figure shows its strips alone")
+    if json:
+        write_json(_data(loaded, study, notes, figure))
+    else:
+        from wearsim.cli.render.run_footer import contact_line
+
+        write_table(loaded.title, _rows(study))
+        write_line(contact_line(study))
+    if figure is not None:
+        _draw(loaded, study, figure)
+    if not json:
+        for text in [*notes, *([f"figure: {figure}"] if figure else [])]:
+            note(text)
+
+
+def _keep_inputs(figure: Path, scenario: Scenario, profile: Path | None) -> None:
+    from wearsim.results import refuse_inputs
+
+    refuse_inputs(figure, scenario.paths)
+    if profile is not None:
+        refuse_inputs(figure, [profile], "the profile")
+
+
+def _means(scenario: Scenario) -> list[str]:
+    """Return a note that names the random inputs, which one contact takes at their means."""
+    fields = [item.name for item in scenario.random if item.role == "field"]
+    others = [item.name for item in scenario.random if item.role != "field"]
+    notes = []
+    if others:
+        notes.append(f"random inputs stand at their means: {', '.join(others)}")
+    if fields:
+        notes.append(f"{', '.join(fields)}, a field, stands at the mean of its marginal")
+    return notes
+
+
+def _profile(path: Path | None) -> Profile | None:
+    """Return the profile in a CSV, or None where no file is given."""
+    if path is None:
+        return None
+    from wearsim.cli.arguments import read_text
+    from wearsim.quantities import InputFile
+    from wearsim.scenario import read_profile
+
+    return read_profile(InputFile(str(path), read_text(path)))
+
+
+def _draw(scenario: Scenario, study: ContactStudy, path: Path) -> None:
+    from wearsim.report.figures.contact import contact_figure
+    from wearsim.report.parts.saving import save_figure
+
+    save_figure(contact_figure(study, scenario.title), path)
+
+
+def _rows(study: ContactStudy) -> list[tuple[str, str]]:
+    """Return the numbers of a contact, in engineers' units."""
+    from wearsim.report.parts.patch_size import patch_edges
+    from wearsim.report.text.units import NOTHING, shown
+
+    point, solution = study.point, study.solution
+    edges = patch_edges(solution.y, solution.half_length)
+    return [
+        ("contact model", study.described_model),
+        ("strips", f"{study.grid.strips} of {shown(study.grid.spacing, 'um')}"),
+        ("normal force", shown(point.normal_force, "N")),
+        ("rolling speed", shown(point.rolling_speed, "m/s")),
+        ("friction coefficient", shown(_mean_friction(study), "1")),
+        ("longitudinal creepage", shown(solution.longitudinal_creepage, "1")),
+        ("lateral creepage", shown(point.creepage.lateral, "1")),
+        ("spin", f"{shown(point.creepage.spin, '1')} 1/m" if point.creepage.spin else "0"),
+        ("patch length 2a", shown(2.0 * float(solution.half_length.max()), "mm")),
+        ("patch width", shown(edges[1] - edges[0], "mm") if edges else NOTHING),
+        ("peak pressure", shown(solution.peak_pressure, "MPa")),
+        ("approach", shown(solution.approach, "um")),
+        ("longitudinal force", shown(solution.force_x, "N")),
+        ("lateral force", shown(solution.force_y, "N")),
+        ("spin moment", shown(_moment(study), "N mm")),
+        ("dissipated power", shown(solution.power, "W")),
+        ("area in adhesion", shown(solution.adhesion_fraction, "%")),
+    ]
+
+
+def _mean_friction(study: ContactStudy) -> float:
+    import numpy as np
+
+    return float(np.mean(study.point.friction))
+
+
+def _moment(study: ContactStudy) -> float:
+    """Return the spin moment, or zero where there is nothing but rounding."""
+    moment = study.solution.spin_moment
+    noise = 1e-12 * study.point.normal_force * study.grid.spacing * study.grid.strips
+    return moment if abs(moment) > noise else 0.0
+
+
+def _data(
+    scenario: Scenario, study: ContactStudy, notes: list[str], figure: Path | None
+) -> dict[str, Any]:
+    """Return the contact in SI, its strips included."""
+    from wearsim.report.parts.patch_size import patch_edges
+
+    point, solution = study.point, study.solution
+    edges = patch_edges(solution.y, solution.half_length)
+    return {
+        "title": scenario.title,
+        "model": study.model,
+        "described_model": study.described_model,
+        "normal_force_N": point.normal_force,
+        "rolling_speed_m_per_s": point.rolling_speed,
+        "friction": point.friction,
+        "longitudinal_creepage": solution.longitudinal_creepage,
+        "lateral_creepage": point.creepage.lateral,
+        "spin_per_m": point.creepage.spin,
+        "patch_length_m": 2.0 * float(solution.half_length.max()),
+        "patch_width_m": edges[1] - edges[0] if edges else 0.0,
+        "peak_pressure_Pa": solution.peak_pressure,
+        "approach_m": solution.approach,
+        "force_x_N": solution.force_x,
+        "force_y_N": solution.force_y,
+        "spin_moment_N_m": solution.spin_moment,
+        "power_W": solution.power,
+        "adhesion_fraction": solution.adhesion_fraction,
+        "iterations": solution.iterations,
+        "power_error_W": None if study.grid_error is None else study.grid_error * solution.power,
+        "solve_seconds": study.seconds,
+        "strips": {
+            "y_m": solution.y,
+            "half_length_m": solution.half_length,
+            "line_load_N_per_m": solution.line_load,
+            "dissipation_W_per_m": solution.dissipation,
+        },
+        "notes": notes,
+        "figure": figure,
+    }

@@ -1,0 +1,62 @@
+"""`wearsim run`: a wear test from its scenario to its results file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from wearsim.cli.arguments import Force, Json, Quiet, ScenarioFile, Settings, read_scenario
+from wearsim.cli.output import note, write_json, write_line, write_table
+
+if TYPE_CHECKING:
+    from wearsim.results import Result
+
+Output = Annotated[
+    Path | None,
+    typer.Option(
+        "--output",
+        "-o",
+        metavar="FILE.h5",
+        help="Results file; by default the scenario's name with .h5, in the current folder.",
+        show_default=False,
+    ),
+]
+
+
+def run(
+    scenario: ScenarioFile,
+    output: Output = None,
+    settings: Settings = None,
+    force: Force = False,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Run a wear test and write its results file."""
+    loaded = read_scenario(scenario, settings)
+    path = output if output is not None else Path(f"{scenario.stem}.h5")
+    from wearsim.cli.progress.run import watching
+    from wearsim.cli.signals import stop_on_signals
+    from wearsim.studies.run import run as replay
+
+    for text in loaded.notes:
+        note(f"note: {text}")
+    with stop_on_signals() as stop, watching(quiet) as watch:
+        result = replay.run(
+            loaded, path, force=force, on_event=watch, stop_requested=stop.requested
+        )
+    report(result, json)
+
+
+def report(result: Result, json: bool) -> None:
+    """Write how a run ended to stdout."""
+    from wearsim.cli.render.run_footer import run_line
+    from wearsim.cli.render.summary import as_json, draws, effort, end_state, standing
+
+    if json:
+        write_json(as_json(result))
+        return
+    rows = [("test", standing(result)), *draws(result), *end_state(result), *effort(result)]
+    write_table(result.title, [*rows, ("results file", str(result.path))])
+    write_line(run_line(result))

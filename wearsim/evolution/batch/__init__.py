@@ -1,0 +1,1 @@
+"""Wear tests that are stepped together."""

@@ -1,0 +1,79 @@
+"""What may differ from contact to contact: the inputs of one contact, as columns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, replace
+from typing import TypeAlias
+
+import numpy as np
+
+from wearsim.mechanics.numerics.piecewise_linear import PiecewiseLinear
+from wearsim.types import FloatArray, IntArray
+
+
+@dataclass(frozen=True)
+class ContactInputs:
+    """The inputs of the contacts of a scene.
+
+    Every array has shape (contacts, realisations).
+
+    Parameters
+    ----------
+    normal_force : ndarray
+        What is added to the load of the scene [N].
+    friction : ndarray
+        Friction coefficient mu.
+    longitudinal : ndarray
+        Mean longitudinal creepage.
+    yaw, tilt : ndarray
+        Angles of the roller about the contact normal and the rolling direction [rad].
+    bearing_torque : ndarray
+        Torque of the roller's bearing where the roller is free [N m].
+    """
+
+    normal_force: FloatArray
+    friction: FloatArray
+    longitudinal: FloatArray
+    yaw: FloatArray
+    tilt: FloatArray
+    bearing_torque: FloatArray
+
+    @classmethod
+    def alike(cls, contacts: int, realisations: int = 1, **values: float) -> ContactInputs:
+        """Return inputs that are the same everywhere; those that are not named are zero."""
+        shape = (contacts, realisations)
+        return cls(*(np.full(shape, values.get(item.name, 0.0)) for item in fields(cls)))
+
+    def at(self, contacts: IntArray) -> ContactInputs:
+        """Return the inputs of some contacts, by number."""
+        return ContactInputs(*(getattr(self, item.name)[contacts] for item in fields(self)))
+
+    def with_values(self, values: Mapping[str, FloatArray]) -> ContactInputs:
+        """Return these inputs with some of them replaced; arrays broadcast to the shape."""
+        shape = self.friction.shape
+        filled = {name: np.array(np.broadcast_to(array, shape)) for name, array in values.items()}
+        return replace(self, **filled)
+
+
+Redraw: TypeAlias = Callable[[ContactInputs, int], ContactInputs]
+"""Draws the inputs of single passes: from those of each pass's roller, and the first pass."""
+
+
+@dataclass(frozen=True)
+class Varying:
+    """An input that follows a process in time.
+
+    Parameters
+    ----------
+    name : str
+        Field of `ContactInputs`.
+    rollers : tuple of int
+        Rollers of the scene that it acts on.
+    path : PiecewiseLinear
+        Its value over time [s].
+    """
+
+    name: str
+    rollers: tuple[int, ...]
+    path: PiecewiseLinear

@@ -1,0 +1,1 @@
+"""Error estimates of steps, and the step size."""

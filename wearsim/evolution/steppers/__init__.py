@@ -1,0 +1,1 @@
+"""Schemes that advance a wear test by one step."""

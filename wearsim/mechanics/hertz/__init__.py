@@ -1,0 +1,1 @@
+"""Hertzian contact: ellipses, patches and fitted parabolas."""

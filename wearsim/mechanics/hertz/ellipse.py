@@ -1,0 +1,253 @@
+"""Hertz contact of two bodies with paraboloidal gap, exact, for any ratio of curvatures."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from wearsim.mechanics.numerics.jit import kernel
+from wearsim.types import FloatArray
+
+
+@dataclass(frozen=True)
+class HertzContact:
+    """An elliptic contact patch and its pressure ``p0 sqrt(1 - x^2/a^2 - y^2/b^2)``.
+
+    Parameters
+    ----------
+    a, b : float
+        Half-lengths along rolling and across it [m].
+    peak_pressure : float
+        Greatest pressure p0 [Pa].
+    approach : float
+        Approach of the bodies [m].
+    normal_force : float
+        Load N [N].
+    """
+
+    a: float
+    b: float
+    peak_pressure: float
+    approach: float
+    normal_force: float
+
+    def half_length(self, y: FloatArray) -> FloatArray:
+        """Return the half-length a(y) [m] at `y` [m] from the centre, 0 outside the patch."""
+        t = np.asarray(y) / self.b
+        return self.a * np.sqrt(np.maximum((1.0 - t) * (1.0 + t), 0.0))
+
+    def line_load(self, y: FloatArray) -> FloatArray:
+        """Return the load per unit of axial length q(y) [N/m] at `y` [m] from the centre."""
+        t = np.asarray(y) / self.b
+        peak = 0.75 * self.normal_force / self.b
+        return peak * np.maximum((1.0 - t) * (1.0 + t), 0.0)
+
+    def load_below(self, y: FloatArray) -> FloatArray:
+        """Return the load [N] carried from the patch's lower end up to `y` [m]: q integrated."""
+        t = np.clip(np.asarray(y) / self.b, -1.0, 1.0)
+        return 0.25 * self.normal_force * (1.0 + t) ** 2 * (2.0 - t)
+
+
+@kernel
+def elliptic_integrals(complement: float) -> tuple[float, float]:
+    """Return K(e) and D(e) = (K(e) - E(e))/e^2 by the arithmetic-geometric mean.
+
+    Parameters
+    ----------
+    complement : float
+        Complementary modulus k' = sqrt(1 - e^2), 0 < k' <= 1.
+
+    Returns
+    -------
+    first, d_integral : float
+        K and D; E follows as K - e^2 D. Neither loses digits towards the circle, where e = 0.
+
+    Notes
+    -----
+    Abramowitz and Stegun, 17.6; D is Jahnke and Emde's.
+    """
+    mean, root = 1.0, complement
+    # sum of 2^(n-1) c_n^2/e^2 with c_0 = e and c_1 = (1 - k')/2, where e^2 = (1 - k')(1 + k')
+    total = 0.5
+    weight = 1.0
+    half_difference_squared = 0.25 * (1.0 - complement) / (1.0 + complement)  # over e^2
+    for _ in range(40):
+        total += weight * half_difference_squared
+        mean, root = 0.5 * (mean + root), math.sqrt(mean * root)
+        # the two may stay one rounding apart for ever
+        if abs(mean - root) <= 4e-16 * mean:
+            break
+        weight *= 2.0
+        squared_modulus = (1.0 - complement) * (1.0 + complement)
+        half_difference_squared = (0.5 * (mean - root)) ** 2 / squared_modulus
+    first = 0.5 * math.pi / (0.5 * (mean + root))
+    return first, first * total
+
+
+@kernel
+def axis_ratio(curvature_ratio: float) -> float:
+    """Return b/a of the patch, major axis below, from the ratio of the greater curvature to it.
+
+    Parameters
+    ----------
+    curvature_ratio : float
+        Curvature along the minor axis over curvature along the major axis, at least 1.
+
+    Returns
+    -------
+    float
+        Minor over major semi-axis k', solving (K - D)/(k'^2 D) = `curvature_ratio` by secants.
+
+    Notes
+    -----
+    Johnson, Contact Mechanics (1985), eq. 4.26, DOI 10.1017/CBO9781139171731.
+    """
+    target = math.log(curvature_ratio)
+    if target <= 0.0:
+        return 1.0
+    old, new = 0.0, -0.6 * target  # logarithms of k'; the slope is -1.5 at the circle, -2 far off
+    old_value = -target
+    for _ in range(60):
+        first, d_integral = elliptic_integrals(math.exp(new))
+        value = math.log(first / d_integral - 1.0) - 2.0 * new - target
+        if value == old_value:
+            break
+        step = -value * (new - old) / (value - old_value)
+        old, old_value = new, value
+        new = min(new + step, 0.0)
+        if abs(step) <= 1e-15 * max(1.0, abs(new)):
+            break
+    return math.exp(new)
+
+
+@kernel
+def hertz_ellipse(
+    curvature_x: float, curvature_y: float, normal_force: float, contact_modulus: float
+) -> tuple[float, float, float, float]:
+    """Return a, b [m], p0 [Pa] and approach [m] of the gap ``A x^2 + B y^2``, as `hertz` does.
+
+    Parameters
+    ----------
+    curvature_x, curvature_y, normal_force, contact_modulus : float
+        As for `hertz`.
+
+    Returns
+    -------
+    a, b, peak_pressure, approach : float
+    """
+    shape = ellipse_shape(curvature_x, curvature_y)
+    return ellipse_under(curvature_x, curvature_y, shape, normal_force, contact_modulus)
+
+
+@kernel
+def ellipse_shape(curvature_x: float, curvature_y: float) -> tuple[float, float, float]:
+    """Return what the curvatures alone decide: b/a with the major axis below, and its K and D.
+
+    Parameters
+    ----------
+    curvature_x, curvature_y : float
+        As for `hertz`.
+
+    Returns
+    -------
+    ratio, first, d_integral : float
+    """
+    ratio = axis_ratio(max(curvature_x, curvature_y) / min(curvature_x, curvature_y))
+    first, d_integral = elliptic_integrals(ratio)
+    return ratio, first, d_integral
+
+
+@kernel
+def ellipse_under(
+    curvature_x: float,
+    curvature_y: float,
+    shape: tuple[float, float, float],
+    normal_force: float,
+    contact_modulus: float,
+) -> tuple[float, float, float, float]:
+    """Return a, b [m], p0 [Pa] and approach [m] of an ellipse whose shape is known.
+
+    Parameters
+    ----------
+    curvature_x, curvature_y, normal_force, contact_modulus : float
+        As for `hertz`.
+    shape : tuple of float
+        As `ellipse_shape` returns it.
+
+    Returns
+    -------
+    a, b, peak_pressure, approach : float
+    """
+    ratio, first, d_integral = shape
+    scale = 1.5 * normal_force / (math.pi * contact_modulus)
+    major = (scale * d_integral / min(curvature_x, curvature_y)) ** (1.0 / 3.0)
+    minor = ratio * major
+    peak = 1.5 * normal_force / (math.pi * major * minor)
+    approach = scale * first / major
+    if curvature_x <= curvature_y:
+        return major, minor, peak, approach
+    return minor, major, peak, approach
+
+
+def hertz(
+    curvature_x: float, curvature_y: float, normal_force: float, contact_modulus: float
+) -> HertzContact:
+    """Solve the Hertz problem of the gap ``A x^2 + B y^2`` exactly.
+
+    Parameters
+    ----------
+    curvature_x, curvature_y : float
+        A and B [1/m], both positive: half the relative curvatures along and across rolling.
+    normal_force : float
+        Load N [N].
+    contact_modulus : float
+        E* [Pa], 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2.
+
+    Returns
+    -------
+    HertzContact
+
+    Raises
+    ------
+    ValueError
+        If a curvature, the load or the modulus is not positive and finite.
+
+    Notes
+    -----
+    Johnson, Contact Mechanics (1985), eqs. 4.24-4.26, DOI 10.1017/CBO9781139171731.
+    """
+    for name, value in (
+        ("curvature_x", curvature_x),
+        ("curvature_y", curvature_y),
+        ("normal_force", normal_force),
+        ("contact_modulus", contact_modulus),
+    ):
+        if not (value > 0.0 and math.isfinite(value)):
+            raise ValueError(f"{name} must be positive and finite, got {value!r}")
+    a, b, peak, approach = hertz_ellipse(
+        float(curvature_x), float(curvature_y), float(normal_force), float(contact_modulus)
+    )
+    return HertzContact(a, b, peak, approach, float(normal_force))
+
+
+def given_ellipse(a: float, b: float, normal_force: float, contact_modulus: float) -> HertzContact:
+    """Return the Hertz pressure and approach of a patch whose semi-axes are prescribed.
+
+    Parameters
+    ----------
+    a, b : float
+        Half-lengths along rolling and across it [m].
+    normal_force, contact_modulus : float
+        N [N] and E* [Pa].
+
+    Returns
+    -------
+    HertzContact
+    """
+    major, minor = max(a, b), min(a, b)
+    first, _ = elliptic_integrals(minor / major)
+    peak = 1.5 * normal_force / (math.pi * major * minor)
+    approach = 1.5 * normal_force * first / (math.pi * contact_modulus * major)
+    return HertzContact(a, b, peak, approach, normal_force)

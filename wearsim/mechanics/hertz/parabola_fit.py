@@ -1,0 +1,226 @@
+"""Parabolas fitted to a measured gap, and the Hertzian contact on them."""
+
+from __future__ import annotations
+
+import math
+
+from wearsim.mechanics.hertz.ellipse import hertz_ellipse
+from wearsim.mechanics.numerics.jit import kernel
+from wearsim.types import FloatArray
+
+CONVERGED, NOT_CONVERGED, NO_CURVATURE, TOO_FEW_STRIPS, LEAVES_STRIPS = range(5)
+
+ROUND_OFF = 4e-15  # of the gap's greatest height: how far a parabola may lie from its own fit
+
+HOLLOW = 1.0  # what ln(b'/b) counts for at most, and in the hollow of a groove
+
+
+@kernel
+def fit_parabola(
+    y: FloatArray, gap: FloatArray, centre: float, half_width: float
+) -> tuple[float, float, float, int]:
+    """Fit ``gap = w0 + B (y - yc)^2`` by least squares weighted with ``1 - ((y - centre)/b)^2``.
+
+    Parameters
+    ----------
+    y, gap : ndarray, shape (strips,)
+        Position and gap [m].
+    centre, half_width : float
+        Centre and half-width b [m] of the stretch that counts.
+
+    Returns
+    -------
+    curvature, vertex, height : float
+        B [1/m], yc [m] and w0 [m]; the last two are nan where B is not positive.
+    used : int
+        Strips with weight; fewer than three fix no parabola.
+    """
+    m0 = m1 = m2 = m3 = m4 = 0.0
+    s0 = s1 = s2 = 0.0
+    used = 0
+    nearest = 0
+    for i in range(1, len(y)):
+        if abs(y[i] - centre) < abs(y[nearest] - centre):
+            nearest = i
+    shift = gap[nearest]  # the heights' common part would only cost digits
+    for i in range(len(y)):
+        t = (y[i] - centre) / half_width
+        weight = 1.0 - t * t
+        if weight <= 1e-12:
+            continue
+        used += 1
+        first, second = weight * t, weight * t * t
+        height = gap[i] - shift
+        m0 += weight
+        m1 += first
+        m2 += second
+        m3 += second * t
+        m4 += second * t * t
+        s0 += weight * height
+        s1 += first * height
+        s2 += second * height
+    if used < 3:
+        return math.nan, math.nan, math.nan, used
+    det = m0 * (m2 * m4 - m3 * m3) - m1 * (m1 * m4 - m2 * m3) + m2 * (m1 * m3 - m2 * m2)
+    constant = s0 * (m2 * m4 - m3 * m3) - m1 * (s1 * m4 - s2 * m3) + m2 * (s1 * m3 - s2 * m2)
+    slope = m0 * (s1 * m4 - s2 * m3) - s0 * (m1 * m4 - m2 * m3) + m2 * (m1 * s2 - m2 * s1)
+    square = m0 * (m2 * s2 - m3 * s1) - m1 * (m1 * s2 - m2 * s1) + s0 * (m1 * m3 - m2 * m2)
+    constant, slope, square = constant / det, slope / det, square / det
+    if not square > 0.0:
+        return square / half_width**2, math.nan, math.nan, used
+    vertex = -0.5 * slope / square
+    height = shift + constant + 0.5 * slope * vertex
+    return square / half_width**2, centre + vertex * half_width, height, used
+
+
+@kernel
+def fit_centred(
+    y: FloatArray, gap: FloatArray, centre: float, half_width: float, tolerance: float
+) -> tuple[float, float, float, int]:
+    """Move the stretch of `fit_parabola` until it is centred on the vertex it finds.
+
+    Parameters and returns are those of `fit_parabola`, with a status in place of the count.
+    """
+    last, last_shift = centre, 0.0
+    for _ in range(100):
+        curvature, vertex, height, used = fit_parabola(y, gap, centre, half_width)
+        if used < 3:
+            return curvature, centre, height, TOO_FEW_STRIPS
+        if not curvature > 0.0:
+            return curvature, centre, height, NO_CURVATURE
+        shift = (vertex - centre) / half_width
+        if abs(shift) <= tolerance:
+            return curvature, vertex, height, CONVERGED
+        # the secant rule: in a hollow groove the vertex moves faster than the stretch, and going
+        # after it would run away from the middle
+        moved = (centre - last) / half_width
+        step = shift if moved == 0.0 else -shift * moved / (shift - last_shift)
+        last, last_shift = centre, shift
+        centre += min(max(step, -0.5), 0.5) * half_width
+    return curvature, centre, height, NOT_CONVERGED
+
+
+@kernel
+def is_parabola(
+    y: FloatArray, gap: FloatArray, curvature: float, centre: float, height: float
+) -> bool:
+    """Return whether the gap is ``height + curvature (y - centre)^2`` to round-off.
+
+    Then any stretch of it fits the same parabola, and one fit serves every patch.
+
+    Parameters
+    ----------
+    y, gap : ndarray, shape (strips,)
+        Position and gap [m].
+    curvature, centre, height : float
+        B [1/m], yc [m] and w0 [m].
+    """
+    worst, most = 0.0, 0.0
+    for i in range(len(y)):
+        rise = curvature * (y[i] - centre) ** 2
+        worst = max(worst, abs(gap[i] - height - rise))
+        most = max(most, rise)
+    return worst <= ROUND_OFF * most
+
+
+@kernel
+def strips_within(y: FloatArray, centre: float, half_width: float) -> int:
+    """Return how many strips lie within `half_width` [m] of `centre` [m].
+
+    Parameters
+    ----------
+    y : ndarray, shape (strips,)
+        Position [m].
+    centre, half_width : float
+        The stretch [m].
+    """
+    count = 0
+    for i in range(len(y)):
+        count += 1 if abs(y[i] - centre) < half_width else 0
+    return count
+
+
+@kernel
+def hertz_on_profile(
+    y: FloatArray,
+    gap: FloatArray,
+    curvature_x: float,
+    normal_force: float,
+    contact_modulus: float,
+    tolerance: float,
+    limit: int,
+) -> tuple[float, float, float, float, int, int]:
+    """Find the Hertz patch whose fitted parabola is the one that makes it.
+
+    The parabola fitted over a patch of half-width b, centred on the parabola's own vertex, makes
+    a Hertz patch of half-width b'. The b that equals b' is approached from the widest patch inside
+    the strips, at most to 0.6 b, and then by regula falsi (Illinois) on ln(b'/b). A gap that is a
+    parabola already gives its patch at once.
+
+    Parameters
+    ----------
+    y, gap : ndarray, shape (strips,)
+        Position and gap [m].
+    curvature_x : float
+        A [1/m].
+    normal_force, contact_modulus : float
+        N [N] and E* [Pa].
+    tolerance : float
+        Greatest ln(b'/b), and a tenth of the greatest shift of the centre over b, at which the
+        patch is consistent; a shift is felt in second order only.
+    limit : int
+        Greatest number of patches tried.
+
+    Returns
+    -------
+    curvature, half_width, centre, height : float
+        B [1/m], b [m], yc [m] and the fitted gap at yc [m].
+    iterations, status : int
+        Status is one of `CONVERGED`, `NOT_CONVERGED`, `NO_CURVATURE`, `TOO_FEW_STRIPS` and
+        `LEAVES_STRIPS`.
+
+    Notes
+    -----
+    Dowell and Jarratt (1971), DOI 10.1007/BF01934364, for the Illinois rule.
+    """
+    centre = 0.5 * (y[0] + y[-1])
+    width = 0.5 * (y[-1] - y[0]) * len(y) / max(len(y) - 1, 1)
+    low, low_value = 0.0, 0.0  # ln b, ln(b'/b) where b is too small; value 0 while unknown
+    high, high_value = 0.0, 0.0
+    side = 0  # the end that moved last
+    curvature, height = math.nan, math.nan
+    for iteration in range(1, limit + 1):
+        curvature, vertex, height, status = fit_centred(y, gap, centre, width, 10.0 * tolerance)
+        here = math.log(width)
+        if status == CONVERGED:
+            centre = vertex
+            found = hertz_ellipse(curvature_x, curvature, normal_force, contact_modulus)[1]
+            enough = found <= width and strips_within(y, centre, found) >= 3
+            if iteration == 1 and enough and is_parabola(y, gap, curvature, centre, height):
+                return curvature, found, centre, height, iteration, CONVERGED
+            value = min(math.log(found / width), HOLLOW)
+        elif status != TOO_FEW_STRIPS and high_value != 0.0:
+            # the stretch lies in the hollow of a groove, where no patch would end: it is too narrow
+            found, value = math.inf, HOLLOW
+        else:
+            return curvature, width, vertex, height, iteration, status
+        if abs(value) <= tolerance:
+            return curvature, found, centre, height, iteration, CONVERGED
+        if value > 0.0:
+            if high_value == 0.0:
+                return curvature, found, centre, height, iteration, LEAVES_STRIPS
+            high_value *= 0.5 if side > 0 else 1.0
+            low, low_value, side = here, value, 1
+        else:
+            low_value *= 0.5 if side < 0 else 1.0
+            high, high_value, side = here, value, -1
+        if low_value != 0.0 and high - low <= tolerance:
+            # either b' answers b steeply here, or it jumps and no patch agrees with its parabola
+            agrees = status == CONVERGED and abs(value) < 1e4 * tolerance
+            status = CONVERGED if agrees else NO_CURVATURE
+            return curvature, found, centre, height, iteration, status
+        if low_value == 0.0:
+            width = max(found, 0.6 * width)
+        else:
+            width = math.exp(high - high_value * (high - low) / (high_value - low_value))
+    return curvature, width, centre, height, limit, NOT_CONVERGED

@@ -1,0 +1,1 @@
+"""Compilation of kernels, and the numerical methods that they share."""

@@ -1,0 +1,34 @@
+"""The recursion of a first-order process in discrete time."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from wearsim.mechanics.numerics.jit import kernel
+from wearsim.types import FloatArray
+
+
+@kernel
+def follow(noise: FloatArray, memory: float) -> FloatArray:
+    """Return z_0 = w_0, z_k+1 = r z_k + sqrt(1 - r^2) w_k+1: unit variance at every step.
+
+    Parameters
+    ----------
+    noise : ndarray, shape (points,)
+        Independent normal scores w.
+    memory : float
+        Correlation r of neighbouring values.
+
+    Returns
+    -------
+    ndarray, shape (points,)
+    """
+    path = np.empty(noise.shape[0])
+    fresh = math.sqrt((1.0 - memory) * (1.0 + memory))
+    value = 0.0
+    for k in range(noise.shape[0]):
+        value = noise[k] if k == 0 else memory * value + fresh * noise[k]
+        path[k] = value
+    return path

@@ -1,0 +1,1 @@
+"""Semi-Hertzian normal contact: Kik-Piotrowski, STRIPES and ANALYN."""

@@ -1,0 +1,366 @@
+"""Semi-Hertzian contact of strips: Kik-Piotrowski, Ayasse-Chollet (STRIPES) and ANALYN.
+
+Each is a foundation of springs. Strip i carries ``q_i = k_i (H_i - z_i)``, where z is the gap and
+H_i the level below which the strip is in contact (`contact_levels`), over the half-length
+``a_i = sqrt(l_i (H_i - z_i))``. They differ in stiffness k, in l, and in the part of the bodies'
+overlap that deformation leaves to contact:
+
+=============== ======================== ====== =====================
+                k                        l      part of the overlap
+=============== ======================== ====== =====================
+Kik-Piotrowski  one for all strips       2/kx   0.55
+Ayasse-Chollet  Hertz, local curvature   Hertz  Hertz, first contact
+ANALYN          Hertz, local curvature   Hertz  Hertz, strip by strip
+=============== ======================== ====== =====================
+
+With Hertz's ellipse of the curvatures A and B, of semi-axes a and b, approach d and pressure p0,
+these are ``k = pi p0 a/(2 B b^2)``, ``l = a^2/(B b^2)`` and ``B b^2/d``, functions of B/A alone
+but for their scales E* and 1/A.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from math import pi
+
+import numpy as np
+
+from wearsim.mechanics.hertz.ellipse import hertz
+from wearsim.mechanics.numerics.jit import kernel
+from wearsim.mechanics.semi_hertzian.contact_level import first_contacts, solve_foundation
+from wearsim.mechanics.semi_hertzian.kik_piotrowski import (
+    CONVERGED,
+    NO_CONVERGENCE,
+    NOT_FINITE,
+    solve_virtual_penetration,
+)
+from wearsim.types import FloatArray
+
+KIK_PIOTROWSKI, AYASSE_CHOLLET, ANALYN = range(3)
+
+FLATTEST, SHARPEST = -20.0, 10.0  # ln(B/A) between which the table serves
+
+STEP = 1.0 / 32.0
+
+LIMIT, PLAIN = 200, 12  # repetitions, and how many of them go the whole way
+
+TOLERANCE = 1e-11  # of the approach: how well the gap that wear opens agrees with its contact
+
+
+@cache
+def local_hertz_table() -> FloatArray:
+    """Tabulate Hertz's foundation by ln(B/A) = FLATTEST, FLATTEST + STEP, ..., SHARPEST.
+
+    Returns
+    -------
+    ndarray, shape (nodes, 3)
+        ln of k/E*, ln of l A, and the part of the overlap B b^2/d.
+    """
+    rows = []
+    for ratio in np.exp(np.arange(FLATTEST, SHARPEST + 0.5 * STEP, STEP)):
+        patch = hertz(1.0, float(ratio), 1.0, 1.0)
+        rise = ratio * patch.b**2
+        stiffness = 0.5 * pi * patch.peak_pressure * patch.a / rise
+        rows.append((np.log(stiffness), np.log(patch.a**2 / rise), rise / patch.approach))
+    table = np.array(rows)
+    table.setflags(write=False)
+    return table
+
+
+@kernel
+def read_local_hertz(table: FloatArray, ratio: float) -> tuple[float, float, float]:
+    """Return k/E*, l A and the part of the overlap where B/A is `ratio`, by cubic interpolation.
+
+    Parameters
+    ----------
+    table : ndarray, shape (nodes, 3)
+        From `local_hertz_table`.
+    ratio : float
+        B/A; beyond the table its end counts.
+    """
+    end = table.shape[0] - 1.0
+    position = min(max((np.log(ratio) - FLATTEST) / STEP, 0.0), end)
+    node = min(max(int(position), 1), table.shape[0] - 3)
+    s = position - node
+    before = -s * (s - 1.0) * (s - 2.0) / 6.0
+    here = (s + 1.0) * (s - 1.0) * (s - 2.0) / 2.0
+    after = -(s + 1.0) * s * (s - 2.0) / 2.0
+    beyond = (s + 1.0) * s * (s - 1.0) / 6.0
+    one, two, three, four = table[node - 1], table[node], table[node + 1], table[node + 2]
+    stiffness = before * one[0] + here * two[0] + after * three[0] + beyond * four[0]
+    length = before * one[1] + here * two[1] + after * three[1] + beyond * four[1]
+    part = before * one[2] + here * two[2] + after * three[2] + beyond * four[2]
+    return np.exp(stiffness), np.exp(length), part
+
+
+@kernel
+def hertz_springs(
+    curvature: FloatArray,
+    longitudinal_curvature: float,
+    contact_modulus: float,
+    local_hertz: FloatArray,
+    stiffness: FloatArray,
+    length: FloatArray,
+    reach: FloatArray,
+) -> None:
+    """Fill what Hertz's ellipse of the local curvatures says of every strip.
+
+    Parameters
+    ----------
+    curvature : ndarray, shape (strips,)
+        B [1/m].
+    longitudinal_curvature, contact_modulus : float
+        2 A [1/m], E* [Pa].
+    local_hertz : ndarray, shape (nodes, 3)
+        From `local_hertz_table`.
+    stiffness, length, reach : ndarray, shape (strips,)
+        Filled: k [N/m^2], l [m], and the part of the overlap that deformation leaves.
+    """
+    for i in range(len(curvature)):
+        ratio = 2.0 * curvature[i] / longitudinal_curvature
+        spring, square, reach[i] = read_local_hertz(local_hertz, ratio)
+        stiffness[i] = contact_modulus * spring
+        length[i] = 2.0 * square / longitudinal_curvature
+
+
+@kernel
+def solve_semi_hertzian(
+    variant: int,
+    gap: FloatArray,
+    compliance: FloatArray,
+    normal_force: float,
+    spacing: float,
+    contact_modulus: float,
+    longitudinal_curvature: float,
+    influence: FloatArray,
+    local_hertz: FloatArray,
+    line_load: FloatArray,
+    half_length: FloatArray,
+) -> tuple[int, int, float]:
+    """Solve a normal contact, with the gap that wear opens while the contact carries its load.
+
+    Everything, curvatures and first contact points too, is taken from the gap in contact,
+    `gap + compliance line_load`, which is found by repetition; each repetition carries the load.
+    Where it has not settled soon, it goes half the way each time.
+
+    Parameters
+    ----------
+    variant : int
+        `KIK_PIOTROWSKI`, `AYASSE_CHOLLET` or `ANALYN`.
+    gap, compliance : ndarray, shape (strips,)
+        Gap [m], and wear compliance [m/(N/m)].
+    normal_force, spacing, contact_modulus, longitudinal_curvature : float
+        N [N], strip width [m], E* [Pa], relative curvature along rolling [1/m].
+    influence : ndarray, shape (nodes, 2, strips)
+        From `influence_table`.
+    local_hertz : ndarray, shape (nodes, 3)
+        From `local_hertz_table`.
+    line_load, half_length : ndarray, shape (strips,)
+        Filled: q [N/m], a [m].
+
+    Returns
+    -------
+    status, iterations : int
+        `CONVERGED`, `TOO_FINE`, `NO_CONVERGENCE` or `NOT_FINITE`; repetitions.
+    approach : float
+        Approach from gap zero [m].
+
+    Notes
+    -----
+    Piotrowski and Kik (2008), DOI 10.1080/00423110701586444; Ayasse and Chollet (2005),
+    DOI 10.1080/00423110412331327193; Sichani, Enblom and Berg (2014),
+    DOI 10.1080/00423114.2014.961932.
+    """
+    n = len(gap)
+    places = np.empty((n, 2), dtype=np.int64)
+    opened, depth, curvature = gap.copy(), np.empty(n), np.empty(n)
+    stiffness, length, reach = np.empty(n), np.empty(n), np.empty(n)
+    level, slope = np.empty(n), np.empty(n)
+    load, wears, total = normal_force / spacing, False, 0.0
+    for i in range(n):
+        wears = wears or compliance[i] != 0.0
+        total += abs(gap[i]) + abs(compliance[i])
+    if not (total < np.inf and 0.0 < load < np.inf):
+        return NOT_FINITE, 0, np.nan
+    approach, rigid = 0.0, np.nan
+    for iteration in range(1, LIMIT + 1):
+        count = first_contacts(opened, places)
+        status, approach, scale = solve_virtual_penetration(
+            opened,
+            places,
+            count,
+            load,
+            approach,
+            spacing,
+            contact_modulus,
+            longitudinal_curvature,
+            influence,
+            reach,
+            level,
+            slope,
+            depth,
+        )
+        if status != CONVERGED:
+            return status, iteration, rigid
+        if variant == KIK_PIOTROWSKI:
+            stiffness[:] = scale
+            length[:] = 2.0 / longitudinal_curvature
+        else:
+            smoothed_curvature(opened, depth, approach, spacing, curvature)
+            hertz_springs(
+                curvature,
+                longitudinal_curvature,
+                contact_modulus,
+                local_hertz,
+                stiffness,
+                length,
+                reach,
+            )
+        if not rigid > opened.min():
+            rigid = opened.min() + approach
+        rigid = solve_foundation(
+            gap,
+            opened,
+            compliance,
+            stiffness,
+            reach,
+            variant == ANALYN,
+            places,
+            count,
+            load,
+            rigid,
+            level,
+            slope,
+            line_load,
+        )
+        change = 0.0
+        for i in range(n):
+            worn = gap[i] + compliance[i] * line_load[i]
+            change = max(change, abs(worn - opened[i]))
+            opened[i] += (1.0 if iteration <= PLAIN else 0.5) * (worn - opened[i])
+        if not change < np.inf or not rigid < np.inf:
+            return NOT_FINITE, iteration, rigid
+        if not wears or change <= TOLERANCE * approach:
+            for i in range(n):
+                half_length[i] = np.sqrt(length[i] * line_load[i] / stiffness[i])
+            return CONVERGED, iteration, rigid
+    return NO_CONVERGENCE, LIMIT, rigid
+
+
+SEEN = 1.5  # approaches: how deep into the gap the curvature is taken from
+
+LEAST, GREATEST = 0.125, 100.0  # of the curvature that is as deep at the patch's half-width as it
+
+SINGULAR = 1e-9  # of the determinant's first term: too few strips to tell a parabola
+
+
+@kernel
+def patch_curvature(depth: FloatArray, spacing: float) -> tuple[float, float]:
+    """Return half-width and curvature of the parabola that is as deep and wide as a contact.
+
+    The half-width b is that of the parabolic depth whose mean square, weighted by depth, is the
+    contact's: 0.6 (sum of depth)^2/(sum of depth^2) in strips. It knows no edges and changes
+    smoothly, and two patches alike have the half-width of one of them, twice.
+
+    Parameters
+    ----------
+    depth : ndarray, shape (strips,)
+        Depth of penetration [m].
+    spacing : float
+        Width of a strip [m].
+
+    Returns
+    -------
+    half_width, curvature : float
+        b [m] and (greatest depth)/b^2 [1/m].
+    """
+    total, square, deepest = 0.0, 0.0, 0.0
+    for i in range(len(depth)):
+        total += depth[i]
+        square += depth[i] * depth[i]
+        deepest = max(deepest, depth[i])
+    half_width = 0.6 * spacing * total * total / square
+    return half_width, deepest / half_width**2
+
+
+@kernel
+def curvature_at(
+    gap: FloatArray, i: int, bottom: float, seen: float, window: float, spacing: float
+) -> float:
+    """Return B at strip i by least squares; nan where there are too few strips for a parabola.
+
+    Each strip of the window counts by 1 - (distance/window)^2, and by how far the highest gap on
+    the way to it lies below `bottom + seen`.
+
+    Parameters
+    ----------
+    gap : ndarray, shape (strips,)
+        Gap [m].
+    i : int
+        The strip.
+    bottom, seen : float
+        Lowest gap, and how far above it the gap counts [m].
+    window, spacing : float
+        Half-width of the window, and width of a strip [m].
+    """
+    n = len(gap)
+    m0 = m1 = m2 = m3 = m4 = 0.0
+    s0 = s1 = s2 = 0.0
+    share = spacing / window
+    for side in range(2):
+        step = 2 * side - 1
+        ridge, t, j = gap[i] - bottom, 0.0, i
+        while 0 <= j < n and ridge < seen and t * t < 1.0:
+            height = gap[j] - bottom
+            ridge = max(ridge, height)
+            weight = (1.0 - t * t) * max(seen - ridge, 0.0)
+            if j == i:
+                weight *= 0.5  # comes from either side
+            first, second = weight * t, weight * t * t
+            m0 += weight
+            m1 += first
+            m2 += second
+            m3 += second * t
+            m4 += second * t * t
+            s0 += weight * height
+            s1 += first * height
+            s2 += second * height
+            t += step * share
+            j += step
+    whole = m0 * m2 * m4
+    det = m0 * (m2 * m4 - m3 * m3) - m1 * (m1 * m4 - m2 * m3) + m2 * (m1 * m3 - m2 * m2)
+    if not det > SINGULAR * whole:
+        return np.nan
+    square = m0 * (m2 * s2 - m3 * s1) - m1 * (m1 * s2 - m2 * s1) + s0 * (m1 * m3 - m2 * m2)
+    return square / det / window**2
+
+
+@kernel
+def smoothed_curvature(
+    gap: FloatArray, depth: FloatArray, approach: float, spacing: float, curvature: FloatArray
+) -> None:
+    """Fill the lateral curvature B [1/m] that a gap has, as contact feels it.
+
+    At every strip a parabola is fitted to the gap over the half-width of the contact to either
+    side (`patch_curvature`), as deep as 1.5 approaches and no further than ridges let one see.
+    With B_p the curvature of a parabola as deep at its edge as the contact, B is held between
+    B_p/8, below which a stretch is as flat as the patch can tell, and 100 B_p.
+
+    Parameters
+    ----------
+    gap, depth : ndarray, shape (strips,)
+        Gap, and depth of a virtual penetration [m].
+    approach, spacing : float
+        Its approach, and width of a strip [m].
+    curvature : ndarray, shape (strips,)
+        Filled: B [1/m].
+    """
+    window, typical = patch_curvature(depth, spacing)
+    bottom, seen = gap.min(), SEEN * approach
+    for i in range(len(gap)):
+        found = typical
+        if gap[i] - bottom < seen:
+            found = curvature_at(gap, i, bottom, seen, window, spacing)
+            if np.isnan(found):
+                found = typical
+        curvature[i] = min(max(found, LEAST * typical), GREATEST * typical)

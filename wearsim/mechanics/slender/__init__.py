@@ -1,0 +1,1 @@
+"""Normal contact of slender patches: line loads on strips."""

@@ -1,0 +1,1 @@
+"""Rolling contact with friction: strip theory, FASTSIM and FaStrip."""

@@ -1,0 +1,238 @@
+"""FaStrip: strip theory where a strip adheres, a march of the traction's direction where it slides.
+
+Sichani, Enblom and Berg (2016), DOI 10.1080/00423114.2016.1156135. They take the direction from
+FASTSIM; here the march knows the strip's own elasticity. Where the strip slides its traction lies
+on the bound and only its direction e may turn. With x = a cos(q), a change of traction strains the
+surface of a plane by (2a sin(q)/G) d/dx, which has to undo what of strip theory's slip S lies
+across the traction, in the direction n:
+
+    n . de/dq = -(n . S) / (2 B a sin(q) (nx^2/Gx + ny^2/Gy)).
+
+Where spin leaves nothing adhering in strip theory, FASTSIM's march with its one flexibility takes
+its place.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from wearsim.mechanics.numerics.jit import kernel
+from wearsim.mechanics.tangential.fastsim import Sums, march_into, new_sums, part_of, stacked
+from wearsim.mechanics.tangential.strip_with_spin import (
+    Moduli,
+    Motion,
+    Strip,
+    beyond_strip_theory,
+    slip_at,
+    strip_of,
+)
+from wearsim.types import FloatArray
+
+# a direction alone turns smoothly: a fifth of the steps that a march of tractions takes will do
+_FEWER = 5
+
+
+@kernel
+def fastrip(
+    half_length: FloatArray,
+    bound_peak: FloatArray,
+    motion: Motion,
+    moduli: Moduli,
+    flexibility: float,
+    points: int,
+) -> FloatArray:
+    """Return the forces of every strip.
+
+    Parameters
+    ----------
+    half_length : ndarray, shape (strips,)
+        a(y) [m]; strips with a = 0 get zeros.
+    bound_peak : ndarray, shape (strips,)
+        Friction times the greatest pressure of the strip [Pa].
+    motion : Motion
+        The rigid slip.
+    moduli : Moduli
+        The amended moduli.
+    flexibility : float
+        L [m/Pa] of the march where strip theory has nothing adhering.
+    points : int
+        Steps along a strip that is left to FASTSIM; a fifth of them along the part that slides.
+
+    Returns
+    -------
+    ndarray, shape (4, strips)
+        As `fastsim.march` returns; adhesion is exact but in strips that FASTSIM takes over.
+    """
+    sums = new_sums(len(half_length))
+    gradient = np.empty(len(half_length))
+    elliptic = points > 0  # always, but a literal would be compiled for by itself
+    for j in range(len(half_length)):
+        gradient[j] = motion.longitudinal[j] / flexibility
+        if not (half_length[j] > 0.0 and bound_peak[j] > 0.0):
+            continue
+        if beyond_strip_theory(j, half_length, bound_peak, motion, moduli):
+            march_into(
+                1,
+                half_length[j : j + 1],
+                bound_peak[j : j + 1],
+                elliptic,
+                gradient[j : j + 1],
+                motion.lateral / flexibility,
+                motion.spin / flexibility,
+                points,
+                part_of(sums, j, j + 1),
+            )
+        else:
+            strip = strip_of(j, half_length, bound_peak, motion, moduli)
+            one_way = motion.lateral == 0.0 or motion.longitudinal[j] == 0.0
+            # what slides one way does not turn, and one step is exact
+            steps = 1 if motion.spin == 0.0 and one_way else 1 + points // _FEWER
+            _adhere(j, strip, sums)
+            _slide(j, strip, steps, sums)
+    return stacked(sums)
+
+
+@kernel
+def _adhere(j: int, strip: Strip, sums: Sums) -> None:
+    """Integrate the traction where strip `j` adheres."""
+    a, radius = strip.half_length, strip.half_length - strip.shift
+    if not radius > 0.0:
+        return
+    d = strip.shift
+    cosine = (2.0 * d - a) / a  # x/a where slip begins
+    sine = 2.0 * math.sqrt(d * radius) / a
+    slides = 2.0 * math.asin(math.sqrt(d / a))
+    # bound less what adhesion takes back, in terms that are small where little slides
+    area = 0.5 * math.pi * d * (2.0 * a - d) - 0.5 * a * a * (slides + sine * cosine)
+    lever = (a * sine) ** 3 / 3.0
+    back = 0.5 * math.pi * radius * radius
+    across, rest = strip.direction_y, strip.direction_y + strip.twist
+    sums.force_x[j] += strip.rise * strip.direction_x * area
+    sums.force_y[j] += strip.rise * (across * area - strip.twist * back)
+    sums.moment[j] += strip.rise * (across * lever - rest * back * d)
+    sums.adhesion[j] += 2.0 * radius
+
+
+@kernel
+def _slide(j: int, strip: Strip, steps: int, sums: Sums) -> None:
+    """March the traction's direction through the part of strip `j` that slides."""
+    if not strip.shift > 0.0:
+        return
+    a = strip.half_length
+    arc = 2.0 * math.asin(math.sqrt(min(strip.shift / a, 1.0))) / steps
+    step_cos, step_sin = math.cos(arc), math.sin(arc)
+    half_cos, half_sin = math.cos(0.5 * arc), math.sin(0.5 * arc)
+    cosine = (2.0 * strip.shift - a) / a
+    sine = 2.0 * math.sqrt(strip.shift * (a - strip.shift)) / a
+    e_x, e_y = strip.direction_x, strip.direction_y
+    for k in range(steps):
+        x = a * (cosine * half_cos - sine * half_sin)
+        way = arc / (sine * half_cos + cosine * half_sin)
+        next_cos = cosine * step_cos - sine * step_sin if k < steps - 1 else -1.0
+        next_sin = sine * step_cos + cosine * step_sin if k < steps - 1 else 0.0
+        slip_x, slip_y = slip_at(strip, x, e_x, e_y)
+        n_x, n_y = turned(strip, slip_x, slip_y, way, e_x, e_y)
+        bound = 0.5 * a * a * (arc - next_sin * next_cos + sine * cosine)
+        lever = a**3 * (next_sin**3 - sine**3) / 3.0
+        along, across = 0.5 * strip.rise * (e_x + n_x), 0.5 * strip.rise * (e_y + n_y)
+        sums.force_x[j] += along * bound
+        sums.force_y[j] += across * bound
+        sums.moment[j] += across * lever
+        cosine, sine, e_x, e_y = next_cos, next_sin, n_x, n_y
+
+
+@kernel
+def turned(
+    strip: Strip, slip_x: float, slip_y: float, way: float, e_x: float, e_y: float
+) -> tuple[float, float]:
+    """Return the traction's direction e after a step.
+
+    Against a constant slip the tangent of half the angle between them fades exponentially.
+
+    Parameters
+    ----------
+    strip : Strip
+        The strip.
+    slip_x, slip_y : float
+        Strip theory's slip over the step.
+    way : float
+        Step of q over sin(q) in its middle.
+    e_x, e_y : float
+        The direction before.
+    """
+    size = math.sqrt(slip_x * slip_x + slip_y * slip_y)
+    if not size > 0.0:
+        return e_x, e_y
+    u_x, u_y = -slip_x / size, -slip_y / size
+    give = e_y * e_y / strip.modulus_x + e_x * e_x / strip.modulus_y
+    rate = size / (2.0 * strip.rise * strip.half_length * give)
+    tangent = (u_x * e_y - u_y * e_x) / max(1.0 + u_x * e_x + u_y * e_y, 1e-12)
+    tangent *= math.exp(-rate * way)
+    square = tangent * tangent
+    cosine, sine = (1.0 - square) / (1.0 + square), 2.0 * tangent / (1.0 + square)
+    return u_x * cosine - u_y * sine, u_x * sine + u_y * cosine
+
+
+@kernel
+def fastrip_fields(
+    half_length: FloatArray,
+    bound_peak: FloatArray,
+    motion: Motion,
+    moduli: Moduli,
+    points: int,
+) -> FloatArray:
+    """Return the inside of every strip that strip theory holds for; zeros in others.
+
+    Parameters
+    ----------
+    half_length, bound_peak, motion, moduli
+        As in `fastrip`.
+    points : int
+        Points along a strip, evenly spaced from x = a to x = -a; the march steps over them.
+
+    Returns
+    -------
+    ndarray, shape (4, points, strips)
+        Longitudinal and lateral traction [Pa] and slip over the rolling velocity, which opposes the
+        traction and is zero where the strip adheres; from the leading edge on.
+    """
+    out = np.zeros((4, points, len(half_length)))
+    for j in range(len(half_length)):
+        if not (half_length[j] > 0.0 and bound_peak[j] > 0.0):
+            continue
+        if beyond_strip_theory(j, half_length, bound_peak, motion, moduli):
+            continue
+        strip = strip_of(j, half_length, bound_peak, motion, moduli)
+        _put_fields(j, strip, out)
+    return out
+
+
+@kernel
+def _put_fields(j: int, strip: Strip, out: FloatArray) -> None:
+    """Put traction and slip of strip `j`, point by point from the leading edge."""
+    a, d, rise = strip.half_length, strip.shift, strip.rise
+    points = out.shape[1]
+    before = math.acos((2.0 * d - a) / a)
+    e_x, e_y = strip.direction_x, strip.direction_y
+    for k in range(points):
+        cosine = 1.0 - 2.0 * k / (points - 1)
+        sine = math.sqrt((1.0 - cosine) * (1.0 + cosine))
+        x, bound = a * cosine, rise * a * sine
+        if d < a and x >= 2.0 * d - a:
+            back = rise * math.sqrt(max((a - x) * (x - 2.0 * d + a), 0.0))
+            out[0, k, j] = e_x * (bound - back)
+            out[1, k, j] = e_y * bound - (e_y + strip.twist) * back
+            continue
+        arc = math.acos(cosine)
+        middle = 0.5 * (before + arc)
+        if arc > before:
+            slip_x, slip_y = slip_at(strip, a * math.cos(middle), e_x, e_y)
+            way = (arc - before) / math.sin(middle)
+            e_x, e_y = turned(strip, slip_x, slip_y, way, e_x, e_y)
+        before = arc
+        slip_x, slip_y = slip_at(strip, x, e_x, e_y)
+        against = max(-(slip_x * e_x + slip_y * e_y), 0.0)
+        out[0, k, j], out[1, k, j] = e_x * bound, e_y * bound
+        out[2, k, j], out[3, k, j] = -against * e_x, -against * e_y

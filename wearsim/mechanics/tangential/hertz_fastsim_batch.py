@@ -1,0 +1,367 @@
+"""Thousands of contacts with Hertz patches and FASTSIM, one after another in compiled code."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from wearsim.mechanics.hertz.parabola_fit import CONVERGED
+from wearsim.mechanics.hertz.patches import Bodies, Patches, cut_into_strips, find_patches
+from wearsim.mechanics.numerics.jit import kernel
+from wearsim.mechanics.tangential.fastsim import Sums, clear, march_into, march_local, new_sums
+from wearsim.mechanics.tangential.fastsim_closed_form import closed_form_into
+from wearsim.mechanics.tangential.kalker_coefficients import (
+    Spline,
+    coefficient,
+    one_flexibility,
+    short_limit,
+)
+from wearsim.types import FloatArray, IntArray
+
+NEVER, EXACT, ALWAYS = range(3)  # where the closed form takes the march's place
+TABLE, LINE_LIMIT, GIVEN = range(3)  # where Kalker's coefficients come from
+NO_LIMIT, NOT_FINITE = 30, 31  # statuses beside those of `hertz_patches`
+_LANES = 4  # strips that a march takes at a time; each one left over costs as much as they
+
+
+class Theory(NamedTuple):
+    """How tractions are found; `models.fastsim_theory.FastsimTheory` has the words.
+
+    G [Pa], nu, the bound, the closed form, the dissipation, the steps along a strip, whether one
+    flexibility stands for three, where the creepage coefficients come from, (3,) given ones and the
+    tables of C11, C22 and C23.
+    """
+
+    shear_modulus: float
+    poisson_ratio: float
+    elliptic: bool
+    closed_form: int
+    element_sum: bool
+    points: int
+    single: bool
+    kalker: int
+    given: FloatArray
+    tables: tuple[Spline, Spline, Spline]
+
+
+class Asked(NamedTuple):
+    """What is asked of every contact.
+
+    Loads [N], creepages and spins [1/m], all (contacts,); friction (contacts, points, strips), with
+    one point where it is the same along a strip, and one strip where it is the same in all; whether
+    particles carry it; the creepage's variation (contacts, strips), or (0, strips) for none; V.
+    """
+
+    normal_force: FloatArray
+    longitudinal: FloatArray
+    lateral: FloatArray
+    spin: FloatArray
+    friction: FloatArray
+    carried: bool
+    variation: FloatArray
+    rolling_speed: float
+
+
+class Found(NamedTuple):
+    """What comes out: a(y) [m], q(y) [N/m] and P_l [W/m] (contacts, strips), the rest (contacts,).
+
+    Forces [N] and spin moment [N m] on body 1, adhering part of the area and power [W].
+    """
+
+    half_length: FloatArray
+    line_load: FloatArray
+    dissipation: FloatArray
+    force_x: FloatArray
+    force_y: FloatArray
+    spin_moment: FloatArray
+    adhesion_fraction: FloatArray
+    power: FloatArray
+
+
+class Work(NamedTuple):
+    """Room for one contact: coverage and slip of all strips, and what the march takes.
+
+    Half-lengths, gradients and bounds begin at the first strip in contact, and have room for as
+    many strips as make up whole lanes.
+    """
+
+    middle: FloatArray
+    coverage: FloatArray
+    longitudinal: FloatArray
+    spin_part: FloatArray
+    peak: FloatArray
+    half_length: FloatArray
+    gradient_x: FloatArray
+    bound: FloatArray
+
+
+@kernel
+def solve_contacts(
+    bodies: Bodies,
+    theory: Theory,
+    gaps: FloatArray,
+    row: IntArray,
+    asked: Asked,
+    patches: Patches,
+    found: Found,
+) -> int:
+    """Solve every contact; their order and company change nothing.
+
+    Parameters
+    ----------
+    bodies, theory : Bodies, Theory
+        What the contacts share.
+    gaps : ndarray, shape (rows, strips)
+        Gaps [m].
+    row : ndarray of int, shape (contacts,)
+        The row of each contact's gap.
+    asked : Asked
+        Loads, creepage and friction.
+    patches, found : Patches, Found
+        Overwritten; of a contact that failed only `patches.status` means anything.
+
+    Returns
+    -------
+    int
+        The first contact that failed, or their number.
+    """
+    strips = len(bodies.y)
+    room, lanes = np.empty((5, strips)), np.empty((3, _whole_lanes(strips)))
+    work = Work(room[0], room[1], room[2], room[3], room[4], lanes[0], lanes[1], lanes[2])
+    total, sums = new_sums(strips), new_sums(_whole_lanes(strips))
+    alike = np.ones((theory.points, strips))
+    given = theory.given
+    find_patches(bodies, gaps, row, asked.normal_force, patches)
+    last_ratio, last = math.nan, (math.nan, math.nan, math.nan)
+    for k in range(len(row)):
+        if patches.status[k] != CONVERGED:
+            return k
+        a, b, ratio = patches.a[k], patches.b[k], patches.ratio[k]
+        if theory.kalker == GIVEN:
+            last = given[0], given[1], given[2]
+        elif ratio != last_ratio:
+            last_ratio, last = ratio, _coefficients(theory, ratio)
+        if not last[2] > 0.0:
+            patches.status[k] = NO_LIMIT
+            return k
+        first, stop = cut_into_strips(
+            bodies,
+            a,
+            b,
+            patches.centre[k],
+            asked.normal_force[k],
+            found.half_length[k],
+            found.line_load[k],
+            work.middle,
+            work.coverage,
+        )
+        _spread(k, bodies, asked, found.line_load[k], work)
+        _solve_tractions(
+            k, first, stop, last, theory, asked, patches, found, work, alike, sums, total
+        )
+        _sum_up(k, bodies, theory, asked, found, work, total)
+        if not math.isfinite(found.power[k]):
+            patches.status[k] = NOT_FINITE
+            return k
+    return len(row)
+
+
+@kernel
+def _coefficients(theory: Theory, ratio: float) -> tuple[float, float, float]:
+    """Return C11, C22 and C23 at a/b = `ratio`."""
+    nu = theory.poisson_ratio
+    if theory.kalker == LINE_LIMIT:
+        limits = short_limit(ratio, nu)
+        return limits[0], limits[1], limits[2]
+    found = (math.nan, math.nan, math.nan)
+    for which in range(3):
+        found = found[1], found[2], coefficient(which, ratio, nu, theory.tables[which])
+    return found
+
+
+@kernel
+def _load_weighted_mean(values: FloatArray, line_load: FloatArray) -> float:
+    product, load = 0.0, 0.0
+    for j in range(len(values)):
+        product += values[j] * line_load[j]
+        load += line_load[j]
+    return product / load
+
+
+@kernel
+def _spread(k: int, bodies: Bodies, asked: Asked, line_load: FloatArray, work: Work) -> None:
+    """Spread the mean creepage over the strips, as `Creepage` says."""
+    strips, mean = len(bodies.y), asked.longitudinal[k]
+    varied = len(asked.variation) > 0
+    for j in range(strips):
+        work.longitudinal[j] = mean
+        work.spin_part[j] = 0.0
+    if varied:
+        shift = _load_weighted_mean(asked.variation[k], line_load)
+        for j in range(strips):
+            work.longitudinal[j] = mean + (asked.variation[k, j] - shift)
+    elif asked.spin[k] != 0.0:
+        for j in range(strips):
+            work.spin_part[j] = -asked.spin[k] * bodies.y[j]
+        shift = _load_weighted_mean(work.spin_part, line_load)
+        for j in range(strips):
+            work.spin_part[j] -= shift
+            work.longitudinal[j] = mean + work.spin_part[j]
+
+
+@kernel
+def _solve_tractions(
+    k: int,
+    first: int,
+    stop: int,
+    coefficients: tuple[float, float, float],
+    theory: Theory,
+    asked: Asked,
+    patches: Patches,
+    found: Found,
+    work: Work,
+    alike: FloatArray,
+    sums: Sums,
+    total: Sums,
+) -> None:
+    """Sum the tractions of contact `k` along its strips into `total`."""
+    a, b = patches.a[k], patches.b[k]
+    longitudinal, lateral, turning = _flexibilities(a, b, coefficients, theory.shear_modulus)
+    if theory.single:
+        along = _mean_of_magnitudes(found.line_load[k], work)
+        spinning = asked.spin[k] * math.sqrt(a * b)
+        longitudinal = one_flexibility(
+            longitudinal, lateral, turning, along, asked.lateral[k], spinning
+        )
+        lateral, turning = longitudinal, longitudinal
+    parabola = 2.0 * asked.normal_force[k] / (math.pi * a * b)
+    _put_bounds(b, patches.peak_pressure[k], parabola, theory.elliptic, work)
+    count, whole = stop - first, _whole_lanes(stop - first)
+    for j in range(count):
+        here = first + j
+        mean = work.longitudinal[here] - work.spin_part[here]
+        work.gradient_x[j] = mean / longitudinal + work.spin_part[here] / turning
+        work.half_length[j] = found.half_length[k, here]
+        work.bound[j] = work.peak[here]
+    for j in range(count, whole):  # strips of no length and no traction
+        work.gradient_x[j] = work.half_length[j] = work.bound[j] = 0.0
+    gradient_y, gradient_spin = asked.lateral[k] / lateral, asked.spin[k] / turning
+    slopes = gradient_y, gradient_spin, longitudinal, lateral
+    half_length, gradient_x, bound = work.half_length, work.gradient_x, work.bound
+    friction = asked.friction[k]
+    lanes, columns = friction.shape
+    clear(len(total.force_x), total)
+    if lanes > 1 and not asked.carried:
+        march_local(
+            count, half_length, bound, friction, first, theory.elliptic, gradient_x, *slopes, sums
+        )
+        _add(count, sums, 1.0, first, total)
+        return
+    closed = theory.closed_form == ALWAYS
+    closed = closed or (theory.closed_form == EXACT and asked.spin[k] == 0.0)
+    for lane in range(lanes):  # the particles of a pattern that rolls through, or one for all
+        for j in range(count):
+            bound[j] = friction[lane, first + j if columns > 1 else 0] * work.peak[first + j]
+        if theory.element_sum:
+            march_local(
+                count, half_length, bound, alike, first, theory.elliptic, gradient_x, *slopes, sums
+            )
+        elif closed:
+            closed_form_into(
+                count, half_length, bound, theory.elliptic, gradient_x, gradient_y, sums
+            )
+            if asked.spin[k] != 0.0:
+                for j in range(count):
+                    sums.moment[j] = 0.0  # phi x is left out, of the work as of the traction
+        else:
+            march_into(
+                whole,
+                half_length,
+                bound,
+                theory.elliptic,
+                gradient_x,
+                gradient_y,
+                gradient_spin,
+                theory.points,
+                sums,
+            )
+        _add(count, sums, 1.0 / lanes, first, total)
+
+
+@kernel
+def _whole_lanes(strips: int) -> int:
+    """Return as many strips, or a few more, as are marched through without one left over."""
+    return (strips + _LANES - 1) // _LANES * _LANES
+
+
+@kernel
+def _flexibilities(
+    a: float, b: float, coefficients: tuple[float, float, float], shear_modulus: float
+) -> tuple[float, float, float]:
+    """Return L1, L2 and L3 [m/Pa], as `kalker.flexibilities` does."""
+    c11, c22, c23 = coefficients
+    longitudinal = 8.0 * a / (3.0 * c11 * shear_modulus)
+    lateral = 8.0 * a / (3.0 * c22 * shear_modulus)
+    turning = math.pi * a * math.sqrt(a / b) / (4.0 * c23 * shear_modulus)
+    return longitudinal, lateral, turning
+
+
+@kernel
+def _mean_of_magnitudes(line_load: FloatArray, work: Work) -> float:
+    """Return the mean size of the longitudinal creepage without spin, weighted by the load."""
+    product, load = 0.0, 0.0
+    for j in range(len(line_load)):
+        product += abs(work.longitudinal[j] - work.spin_part[j]) * line_load[j]
+        load += line_load[j]
+    return product / load
+
+
+@kernel
+def _put_bounds(
+    b: float, peak_pressure: float, parabola: float, elliptic: bool, work: Work
+) -> None:
+    """Put the traction bound's pressure at x = 0 of every strip, elliptic or parabolic."""
+    for j in range(len(work.peak)):
+        t = work.middle[j] / b
+        section = max((1.0 - t) * (1.0 + t), 0.0) if work.coverage[j] > 0.0 else 0.0
+        work.peak[j] = peak_pressure * math.sqrt(section) if elliptic else parabola * section
+
+
+@kernel
+def _add(count: int, part: Sums, weight: float, first: int, total: Sums) -> None:
+    """Add the weighted sums of the strips from `first` on to those of all."""
+    for j in range(count):
+        total.force_x[first + j] += weight * part.force_x[j]
+        total.force_y[first + j] += weight * part.force_y[j]
+        total.moment[first + j] += weight * part.moment[j]
+        total.adhesion[first + j] += weight * part.adhesion[j]
+        total.work[first + j] += weight * part.work[j]
+
+
+@kernel
+def _sum_up(
+    k: int, bodies: Bodies, theory: Theory, asked: Asked, found: Found, work: Work, total: Sums
+) -> None:
+    """Turn the sums along the strips into the solution of contact `k`."""
+    eta, phi, speed = asked.lateral[k], asked.spin[k], asked.rolling_speed
+    centre = _load_weighted_mean(bodies.y, found.line_load[k])
+    force_x, force_y, moment, power, sticking, length = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for j in range(len(bodies.y)):
+        part = work.coverage[j]
+        tx, ty, turning = total.force_x[j], total.force_y[j], total.moment[j]
+        if theory.element_sum:
+            dissipation = part * (speed * total.work[j])
+        else:
+            dissipation = part * (-speed * (work.longitudinal[j] * tx + eta * ty + phi * turning))
+        found.dissipation[k, j] = dissipation
+        power += dissipation
+        force_x += part * tx
+        force_y += part * ty
+        moment += part * turning - (bodies.y[j] - centre) * (part * tx)
+        sticking += total.adhesion[j]
+        length += found.half_length[k, j]
+    found.force_x[k], found.force_y[k] = force_x * bodies.spacing, force_y * bodies.spacing
+    found.spin_moment[k], found.power[k] = moment * bodies.spacing, power * bodies.spacing
+    found.adhesion_fraction[k] = sticking / (2.0 * length)

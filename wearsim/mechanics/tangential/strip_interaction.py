@@ -1,0 +1,209 @@
+"""What strips of a finite contact owe to one another: effective moduli, and slip they induce.
+
+Strip theory treats a strip as one of infinitely many alike. Two things are missing of order
+(a/b)^2 ln(b/a) and (a/b) ln(b/a).
+
+**Moduli.** A patch of finite width answers slip a little more stiffly. E* and G are multiplied by
+the ratio of Kalker's C11 and C22 for equivalent ellipses to their limits for a long contact, so
+that small creepage meets the linear theory.
+
+**Induced slip.** Traction in y that varies along y strains the surface along x, and the other way
+round: with T the strips' forces and the half-space's displacement nu x y / (pi G R^3),
+
+    d u_x / d x = -(nu / (pi G)) d/dy int T_y(y') W(y - y') dy',    W -> 1/|y - y'|,
+
+and likewise d u_y / d x from T_x. Near a strip W is rounded off over a length that follows from
+averaging ln|x - x'| over the tractions: 0.5 e^(3/4) a where strips slide (elliptic traction), 0.5
+e^(3/2) a where they adhere (the linear theory's traction on the slip's weight in the force).
+With a geometric sum of exponentials in place of W,
+
+    1 / |y| = int e^(-k |y|) dk,  k = k_0, k_0/4, k_0/16, ...,
+
+the sum over all pairs of strips takes a forward and a backward sweep. The operator is
+antisymmetric: it moves power from strip to strip and leaves the total.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from wearsim.mechanics.numerics.jit import kernel
+from wearsim.mechanics.tangential.kalker_coefficients import creepage_coefficients, short_limit
+from wearsim.types import FloatArray
+
+_STEP = 0.05  # of ln(a/b) in the table; its chords err by less than 1e-4
+_LOWEST = math.log(2e-3)  # ln(a/b) below which a contact is as good as infinitely wide
+_HIGHEST = math.log(20.0)
+
+_LADDER = math.log(4.0)  # step of ln k: the sum ripples about its integral by 4 %, far and near
+_GROUPS = 2  # of four exponentials: enough for b/a up to 8000
+_FLAT = 0.1  # k times the contact's width below which exponentials add nothing: (k width)^2/4
+# k_0 = _HEAD / (length that W is rounded off over), as sum and integral hold the same logarithm
+_HEAD = 2.0 * math.exp(-float(np.euler_gamma) - 0.5 * _LADDER)
+
+
+class StripElasticity(NamedTuple):
+    """E* and G [Pa]; and the factors of both in a contact of finite width, a row per ln(a/b)."""
+
+    contact_modulus: float
+    shear_modulus: float
+    widening: FloatArray
+
+
+@lru_cache(maxsize=16)
+def strip_elasticity(contact_modulus: float, shear_modulus: float) -> StripElasticity:
+    """Return the `StripElasticity` of two bodies.
+
+    Parameters
+    ----------
+    contact_modulus, shear_modulus : float
+        E* and G [Pa].
+    """
+    nu = min(max(1.0 - shear_modulus / contact_modulus, 0.0), 0.5)
+    ratios = np.exp(np.arange(_LOWEST, _HIGHEST + _STEP, _STEP))
+    limit_x, limit_y, *_ = short_limit(float(ratios[0]), nu)
+    found = [creepage_coefficients(float(ratio), nu) for ratio in ratios]
+    widening = np.array([(c.c11 / limit_x, c.c22 / limit_y) for c in found])
+    return StripElasticity(float(contact_modulus), float(shear_modulus), widening)
+
+
+@kernel
+def equivalent_ratio(half_length: FloatArray, line_load: FloatArray, spacing: float) -> float:
+    """Return a/b of the ellipses equivalent to a contact.
+
+    They have its greatest half-length and together its area, and are as many as all rises of a(y)
+    make up that half-length: one patch or several, and smoothly in between as patches merge.
+
+    Parameters
+    ----------
+    half_length, line_load : ndarray, shape (strips,)
+        a [m] and q [N/m].
+    spacing : float
+        Width of a strip [m].
+    """
+    widest, length, rises, before = 0.0, 0.0, 0.0, 0.0
+    for i in range(line_load.shape[0]):
+        here = half_length[i] if line_load[i] > 0.0 else 0.0
+        widest = max(widest, here)
+        length += here
+        rises += max(0.0, here - before)
+        before = here
+    return 0.5 * math.pi * widest * rises / (length * spacing) if length > 0.0 else 1.0
+
+
+@kernel
+def effective_moduli(ratio: float, elasticity: StripElasticity) -> tuple[float, float]:
+    """Return E_x and G_y [Pa] of the strips of a contact.
+
+    Parameters
+    ----------
+    ratio : float
+        a/b of the equivalent ellipse.
+    elasticity : StripElasticity
+    """
+    factors = elasticity.widening
+    place = max(0.0, (math.log(ratio) - _LOWEST) / _STEP)
+    k = min(int(place), factors.shape[0] - 2)
+    part = min(place - k, 1.0)
+    factor_x = factors[k, 0] + part * (factors[k + 1, 0] - factors[k, 0])
+    factor_y = factors[k, 1] + part * (factors[k + 1, 1] - factors[k, 1])
+    return elasticity.contact_modulus * factor_x, elasticity.shear_modulus * factor_y
+
+
+@kernel
+def coupling_length(half_length: float, adhering: float) -> float:
+    """Return the length [m] over which W is rounded off.
+
+    Parameters
+    ----------
+    half_length : float
+        Mean half-length of the strips [m].
+    adhering : float
+        Part of the contact that adheres, 0 to 1.
+    """
+    return 0.5 * half_length * math.exp(0.75 * (1.0 + adhering))
+
+
+@kernel
+def induced_slip(
+    force_x: FloatArray,
+    force_y: FloatArray,
+    first: int,
+    last: int,
+    spacing: float,
+    length: float,
+    elasticity: StripElasticity,
+    induced_x: FloatArray,
+    induced_y: FloatArray,
+) -> None:
+    """Fill the slip that strips induce in one another, to be added to their own.
+
+    Parameters
+    ----------
+    force_x, force_y : ndarray, shape (strips,)
+        Forces of the strips [N/m], zero where unloaded.
+    first, last : int
+        The first and the last loaded strip.
+    spacing, length : float
+        Width of a strip, and `coupling_length` [m].
+    elasticity : StripElasticity
+    induced_x, induced_y : ndarray, shape (strips,)
+        Filled from `first` to `last`: slip per unit of rolling velocity.
+    """
+    for i in range(first, last + 1):
+        induced_x[i], induced_y[i] = 0.0, 0.0
+    shear = elasticity.shear_modulus
+    poisson = 1.0 - shear / elasticity.contact_modulus
+    rate, width = _HEAD / length, spacing * (last - first + 1)
+    decay = math.exp(-rate * spacing)
+    weight = _LADDER * rate * rate * spacing * poisson / (math.pi * shear)
+    for group in range(_GROUPS):
+        if group > 0 and rate * width < _FLAT:
+            break
+        _add_group(force_x, force_y, first, last, decay, weight, induced_x, induced_y)
+        rate, weight = rate / 256.0, weight / 65536.0
+        decay = math.exp(-rate * spacing)
+
+
+@kernel
+def _add_group(
+    force_x: FloatArray,
+    force_y: FloatArray,
+    first: int,
+    last: int,
+    decay: float,
+    weight: float,
+    induced_x: FloatArray,
+    induced_y: FloatArray,
+) -> None:
+    """Add the slip of four exponentials, all in one sweep up and one down.
+
+    Parameters
+    ----------
+    force_x, force_y, first, last, induced_x, induced_y
+        As in `induced_slip`.
+    decay, weight : float
+        exp(-k spacing) of the greatest k, and what its sums weigh.
+    """
+    two = math.sqrt(math.sqrt(decay))
+    three = math.sqrt(math.sqrt(two))
+    four = math.sqrt(math.sqrt(three))
+    second, third, fourth = weight / 16.0, weight / 256.0, weight / 4096.0
+    x1, x2, x3, x4, y1, y2, y3, y4 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(first, last + 1):
+        induced_x[i] -= (weight * y1 + second * y2) + (third * y3 + fourth * y4)
+        induced_y[i] -= (weight * x1 + second * x2) + (third * x3 + fourth * x4)
+        x, y = force_x[i], force_y[i]
+        x1, x2, x3, x4 = decay * (x1 + x), two * (x2 + x), three * (x3 + x), four * (x4 + x)
+        y1, y2, y3, y4 = decay * (y1 + y), two * (y2 + y), three * (y3 + y), four * (y4 + y)
+    x1, x2, x3, x4, y1, y2, y3, y4 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(last, first - 1, -1):
+        induced_x[i] += (weight * y1 + second * y2) + (third * y3 + fourth * y4)
+        induced_y[i] += (weight * x1 + second * x2) + (third * x3 + fourth * x4)
+        x, y = force_x[i], force_y[i]
+        x1, x2, x3, x4 = decay * (x1 + x), two * (x2 + x), three * (x3 + x), four * (x4 + x)
+        y1, y2, y3, y4 = decay * (y1 + y), two * (y2 + y), three * (y3 + y), four * (y4 + y)

@@ -1,0 +1,296 @@
+"""The contact model `hertz`, and the normal contact that it shares with `hertz-fastsim`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from wearsim.errors import CapabilityError, ContactError
+from wearsim.mechanics.hertz import parabola_fit
+from wearsim.mechanics.hertz.elasticity import ElasticPair, combine
+from wearsim.mechanics.hertz.ellipse import HertzContact, given_ellipse, hertz
+from wearsim.mechanics.hertz.patches import fit_within
+from wearsim.models.contact.equivalent_ellipse import EllipseStrips
+from wearsim.models.tangential.base import (
+    Strips,
+    TangentialTheory,
+    complete,
+    friction_per_strip,
+    inside,
+    power_not_finite,
+)
+from wearsim.models.tangential.options import TangentialOptions, tangential_theory
+from wearsim.plugins import Capabilities, ContactModel, ContactModelSpec, Options
+from wearsim.quantities import PositiveLength
+from wearsim.types import (
+    ContactFields,
+    ContactSolution,
+    FloatArray,
+    Grid,
+    Material,
+    OperatingPoint,
+)
+
+TOLERANCE = 1e-10
+LIMIT = 200
+
+
+class Patch(Options):
+    """A prescribed contact ellipse."""
+
+    a: PositiveLength = Field(description="half-length along rolling")
+    b: PositiveLength = Field(description="half-length across rolling")
+
+
+class HertzOptions(TangentialOptions):
+    """Options of the contact model `hertz`."""
+
+    my: int = Field(50, ge=3, description="strips across the patch of a single contact")
+
+
+class HertzModel(ContactModel):
+    """Exact Hertz on the grid's strips, with any theory for the tractions.
+
+    On a worn profile the lateral curvature and the centre are those of the parabola fitted to the
+    gap over the patch by least squares, weighted with ``1 - ((y - yc)/b)^2``; patch and fit are
+    repeated until they agree to 1e-10. A prescribed patch is centred on the vertex of the parabola
+    fitted in the same way to as much of the gap as lies evenly about that vertex.
+
+    Parameters
+    ----------
+    theory : TangentialTheory
+        Finds the tractions.
+    my : int
+        Strips across the patch of a single contact.
+    patch : Patch, optional
+        Contact ellipse to use instead of Hertz's.
+    """
+
+    name: ClassVar[str] = "hertz"
+    capabilities = Capabilities(
+        creepage_variation=True, bearing_torque=True, local_friction=True, fields=True
+    )
+
+    def __init__(self, theory: TangentialTheory, my: int, patch: Patch | None = None) -> None:
+        self.theory = theory
+        self.my = my
+        self.patch = patch
+
+    def prepare(self, grid: Grid, materials: tuple[Material, Material]) -> None:
+        """Take the strips and the two bodies' materials."""
+        self._grid = grid
+        self._pair: ElasticPair = combine(*materials)
+
+    def suggest_grid(
+        self,
+        gap_curvature: float,
+        longitudinal_curvature: float,
+        normal_force: float,
+        materials: tuple[Material, Material],
+    ) -> Grid | None:
+        """Return `my` strips that span the patch exactly."""
+        if self.patch is not None:
+            b = self.patch.b
+        else:
+            modulus = combine(*materials).contact_modulus
+            b = hertz(0.5 * longitudinal_curvature, 0.5 * gap_curvature, normal_force, modulus).b
+        return Grid.spanning(-b, b, self.my)
+
+    def solve(
+        self,
+        gap: FloatArray,
+        longitudinal_curvature: float,
+        point: OperatingPoint,
+        wear_compliance: FloatArray | None = None,
+        warm: ContactSolution | None = None,
+    ) -> ContactSolution:
+        """Solve one contact; `warm` is of no use to it, so that a solution has one value only.
+
+        Raises
+        ------
+        ContactError
+            If the gap's curvature over the patch is not positive, the patch leaves the strips or
+            holds too few of them, the fit does not settle, or a value is not finite.
+        CapabilityError
+            If a wear compliance is given, or friction that the model does not take.
+        """
+        self._refuse(wear_compliance)
+        if not np.isfinite(point.friction).all():  # a closed form would take it for none
+            raise power_not_finite(point, gap=gap)
+        strips = self._theory_strips(gap, longitudinal_curvature, point)
+        return complete(self.theory, strips, self._pair, point)
+
+    def fields(
+        self,
+        solution: ContactSolution,
+        gap: FloatArray,
+        longitudinal_curvature: float,
+        point: OperatingPoint,
+        points_along: int = 101,
+    ) -> ContactFields:
+        """Return tractions and slip inside a solved contact."""
+        strips = self._theory_strips(gap, longitudinal_curvature, point)
+        friction = self._friction(strips, point)
+        creepage = solution.longitudinal_creepage
+        return inside(self.theory, strips, self._pair, point, creepage, points_along, friction)
+
+    def _friction(self, strips: Strips, point: OperatingPoint) -> FloatArray:
+        """Return friction as the fields of the theory take it."""
+        return friction_per_strip(strips, point)
+
+    def _refuse(self, wear_compliance: FloatArray | None) -> None:
+        if wear_compliance is not None:
+            raise CapabilityError(
+                f"{self.name} takes no wear compliance; use evolution.stepper = 'stabilised' or"
+                " 'per-pass', or contact.model = 'slender'"
+            )
+
+    def _theory_strips(
+        self, gap: FloatArray, longitudinal_curvature: float, point: OperatingPoint
+    ) -> Strips:
+        """Return the strips of the patch as the tangential theory takes them."""
+        strips = self._strips(gap, longitudinal_curvature, point)
+        return strips if self.theory.knows_ellipses else strips.whole()
+
+    def _strips(
+        self, gap: FloatArray, longitudinal_curvature: float, point: OperatingPoint
+    ) -> EllipseStrips:
+        """Solve the normal problem and cut its patch into the grid's strips."""
+        gap = np.require(gap, np.float64, ["C", "W"])
+        _check(gap, longitudinal_curvature, point.normal_force)
+        if self.patch is None:
+            patch, centre, height, iterations = self._fitted(
+                gap, longitudinal_curvature, point.normal_force
+            )
+        else:
+            patch, centre, height = self._prescribed(self.patch, gap, point.normal_force)
+            iterations = 0
+        y, spacing = self._grid.y, self._grid.spacing
+        reach = (1.0 - 1e-9) * patch.b  # a grid cut to the patch holds it
+        first, last = float(y[0]) - 0.5 * spacing, float(y[-1]) + 0.5 * spacing
+        if centre - reach < first or centre + reach > last:
+            raise self._leaves(centre, patch.b, {"gap": gap, "normal_force": point.normal_force})
+        edges = np.append(y - 0.5 * spacing, last) - centre
+        inner = np.clip(edges, -patch.b, patch.b)
+        middle = 0.5 * (inner[1:] + inner[:-1])
+        coverage = np.minimum(np.diff(inner) / spacing, 1.0)
+        return EllipseStrips(
+            y=y,
+            half_length=np.where(coverage > 0.0, patch.half_length(middle), 0.0),
+            line_load=np.diff(patch.load_below(edges)) / spacing,
+            spacing=spacing,
+            longitudinal_curvature=longitudinal_curvature,
+            approach=patch.approach + height,
+            peak_pressure=patch.peak_pressure,
+            iterations=iterations,
+            ellipse=patch,
+            from_centre=middle,
+            coverage=coverage,
+        )
+
+    def _fitted(
+        self, gap: FloatArray, longitudinal_curvature: float, normal_force: float
+    ) -> tuple[HertzContact, float, float, int]:
+        """Return the patch that its own fit makes, its centre, the gap there and the iterations."""
+        y = self._grid.y
+        curvature, b, centre, height, iterations, status = parabola_fit.hertz_on_profile(
+            y,
+            gap,
+            0.5 * longitudinal_curvature,
+            float(normal_force),
+            self._pair.contact_modulus,
+            TOLERANCE,
+            LIMIT,
+        )
+        state = {
+            "gap": gap,
+            "normal_force": normal_force,
+            "curvature": curvature,
+            "half_width": b,
+            "centre": centre,
+            "iterations": iterations,
+        }
+        if status == parabola_fit.LEAVES_STRIPS:
+            raise self._leaves(centre, b, state)
+        if status != parabola_fit.CONVERGED:
+            raise _failure(status, state, self._grid.spacing)
+        modulus = self._pair.contact_modulus
+        patch = hertz(0.5 * longitudinal_curvature, curvature, normal_force, modulus)
+        return patch, centre, height, iterations
+
+    def _prescribed(
+        self, patch: Patch, gap: FloatArray, normal_force: float
+    ) -> tuple[HertzContact, float, float]:
+        """Return the prescribed patch, its centre and the fitted gap there."""
+        curvature, centre, height, span, status = fit_within(
+            self._grid.y, gap, self._grid.spacing, TOLERANCE
+        )
+        if status != parabola_fit.CONVERGED:
+            state = {"gap": gap, "normal_force": normal_force, "half_width": span}
+            raise _failure(status, state | {"curvature": curvature}, self._grid.spacing)
+        ellipse = given_ellipse(patch.a, patch.b, normal_force, self._pair.contact_modulus)
+        return ellipse, centre, height
+
+    def _leaves(self, centre: float, b: float, state: Mapping[str, Any]) -> ContactError:
+        y, half = self._grid.y, 0.5 * self._grid.spacing
+        return ContactError(
+            f"the Hertz patch, {(centre - b) * 1e3:.4g} to {(centre + b) * 1e3:.4g} mm, leaves its"
+            f" strips, which span {(y[0] - half) * 1e3:.4g} to {(y[-1] + half) * 1e3:.4g} mm;"
+            " raise contact.width or move contact.centre",
+            dict(state),
+        )
+
+
+def _check(gap: FloatArray, longitudinal_curvature: float, normal_force: float) -> None:
+    state = {"gap": gap, "normal_force": normal_force}
+    if not np.isfinite(gap).all():
+        raise ContactError("the gap holds a value that is not finite", state)
+    if not (normal_force > 0.0 and math.isfinite(normal_force)):
+        raise ContactError(
+            f"the contact is lost: its load is {normal_force:.4g} N; raise the load", state
+        )
+    if not (longitudinal_curvature > 0.0 and math.isfinite(longitudinal_curvature)):
+        raise ContactError(
+            f"the relative curvature along rolling is {longitudinal_curvature:.4g} 1/m and must be"
+            " positive; check the radii",
+            state,
+        )
+
+
+def _failure(status: int, state: Mapping[str, Any], spacing: float) -> ContactError:
+    width = 2e3 * state["half_width"]
+    if status == parabola_fit.NO_CURVATURE:
+        text = (
+            f"the gap's fitted curvature over {width:.4g} mm is {state['curvature']:.4g} 1/m, and"
+            " Hertz needs it positive: the profile is worn past what one parabola can stand for;"
+            " use contact.model = 'slender'"
+        )
+    elif status == parabola_fit.TOO_FEW_STRIPS:
+        text = (
+            f"the patch, {width:.4g} mm wide, holds fewer than three strips of"
+            f" {spacing * 1e3:.4g} mm, and no parabola can be fitted; raise contact.strips"
+        )
+    else:
+        text = (
+            f"the patch and the parabola fitted over it did not agree after {LIMIT} tries;"
+            " use contact.model = 'slender'"
+        )
+    return ContactError(text, dict(state))
+
+
+def _build(options: HertzOptions) -> HertzModel:
+    return HertzModel(tangential_theory(options), options.my)
+
+
+SPEC = ContactModelSpec(
+    name="hertz",
+    factory=_build,
+    options=HertzOptions,
+    capabilities=HertzModel.capabilities,
+    summary="exact Hertz, refitted as the profile wears, with any tangential theory",
+    references=("Johnson (1985), Contact Mechanics, DOI 10.1017/CBO9781139171731",),
+)

@@ -1,0 +1,165 @@
+"""The built-in friction fields `white` and `gaussian-field`."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from pydantic import Field
+
+from wearsim.mechanics.tangential.friction_field import REACH, smooth
+from wearsim.plugins import (
+    Distribution,
+    Frame,
+    FrictionField,
+    Options,
+    RandomInputSpec,
+    Uniforms,
+)
+from wearsim.quantities import PositiveLength
+from wearsim.types import FloatArray
+
+_CELLS = 2  # lattice spacings per correlation length
+# Cells are drawn in tiles, long across the track as a contact is, so that few draws cover it.
+_TILE_ROWS, _TILE_COLUMNS = 64, 16
+_TILES = 2**26  # to either side of the origin; two such numbers and a tile's cells make 64 bits
+
+
+class WhiteOptions(Options):
+    """Options of the friction field `white`."""
+
+    frame: Frame = Field(
+        "contact", description="what the pattern is fixed to: contact, cylinder or roller"
+    )
+
+
+class GaussianFieldOptions(WhiteOptions):
+    """Options of the friction field `gaussian-field`."""
+
+    correlation_length: PositiveLength = Field(
+        description="distance at which the correlation has fallen to 1/e, e.g. '50 um'"
+    )
+
+
+class White(FrictionField):
+    """Every point of the grid draws by itself, as in the paper.
+
+    Point p of strip s takes the number at position p x strips + s, so that another grid is
+    another realisation. Traction rides the lower envelope of the noise: the finer the grid, the
+    less of it there is.
+    """
+
+    def __init__(self, options: WhiteOptions, marginal: Distribution) -> None:
+        self.frame = options.frame
+        self.marginal = marginal
+
+    def values(self, x: FloatArray, y: FloatArray, uniforms: Uniforms) -> FloatArray:
+        """Return one realisation at the points of a grid, shape (points, strips)."""
+        return self.marginal.quantile(uniforms(0, x.size).reshape(x.shape))
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a user should know before trusting it."""
+        grid = (
+            "white friction has no continuum limit: the dissipation depends on the grid, and falls"
+            " as it is refined; use gaussian-field"
+        )
+        return (*self.marginal.warnings, grid)
+
+
+class GaussianField(FrictionField):
+    """A field with the correlation exp(-r^2/l^2) in normal scores and any marginal distribution.
+
+    White noise on an endless square lattice of spacing l/2, smoothed (process convolution: Higdon
+    2002, DOI 10.1007/978-1-4471-0657-9_2). A cell has its number for ever, so that neither the
+    solver's grid nor the extent of the contact changes the field.
+    """
+
+    def __init__(self, options: GaussianFieldOptions, marginal: Distribution) -> None:
+        self.frame = options.frame
+        self.marginal = marginal
+        self.correlation_length = options.correlation_length
+
+    def values(self, x: FloatArray, y: FloatArray, uniforms: Uniforms) -> FloatArray:
+        """Return one realisation at given points, shape (points, strips)."""
+        from scipy.special import ndtr  # noqa: PLC0415  (slow to import)
+
+        spacing = self.correlation_length / _CELLS
+        rows, columns = _cells(y, spacing), _cells(x, spacing)
+        scores = smooth(
+            np.ascontiguousarray(x),
+            np.ascontiguousarray(y),
+            _noise(rows, columns, uniforms),
+            rows.start,
+            columns.start,
+            spacing,
+        )
+        return self.marginal.quantile(ndtr(scores))
+
+    def unresolved(self, along: float, across: float) -> str | None:
+        """Return what is wrong with a grid of these spacings [m], or None where it resolves it."""
+        greatest = self.correlation_length / 2.0
+        allowed = greatest * (1.0 + 1e-9)  # a spacing meant to be just that is not refused
+        told = [
+            f"{spacing * 1e6:.3g} um {direction} (take at least {spacing / greatest:.3g} times as"
+            f" many {what})"
+            for spacing, direction, what in (
+                (along, "along rolling", "points"),
+                (across, "across the track", "strips"),
+            )
+            if spacing > allowed
+        ]
+        if not told:
+            return None
+        return (
+            f"the grid does not resolve a correlation length of {self.correlation_length * 1e6:.3g}"
+            f" um, which needs spacings of half of it: they are {' and '.join(told)}"
+        )
+
+
+def _cells(position: FloatArray, spacing: float) -> range:
+    """Return the lattice's indices that points at these positions take in."""
+    low, high = float(position.min()), float(position.max())
+    return range(math.floor(low / spacing) - REACH + 1, math.floor(high / spacing) + REACH + 1)
+
+
+def _noise(rows: range, columns: range, uniforms: Uniforms) -> FloatArray:
+    """Return the lattice's normal scores in a rectangle of cells."""
+    from scipy.special import ndtri  # noqa: PLC0415  (slow to import)
+
+    across = range(rows.start // _TILE_ROWS, (rows.stop - 1) // _TILE_ROWS + 1)
+    along = range(columns.start // _TILE_COLUMNS, (columns.stop - 1) // _TILE_COLUMNS + 1)
+    cells = _TILE_ROWS * _TILE_COLUMNS
+    drawn = np.block(
+        [
+            [
+                uniforms(((row + _TILES) * 2 * _TILES + column + _TILES) * cells, cells).reshape(
+                    _TILE_ROWS, _TILE_COLUMNS
+                )
+                for column in along
+            ]
+            for row in across
+        ]
+    )
+    top, left = rows.start % _TILE_ROWS, columns.start % _TILE_COLUMNS
+    return np.asarray(ndtri(drawn[top : top + len(rows), left : left + len(columns)]))
+
+
+SPECS = (
+    RandomInputSpec(
+        name="white",
+        factory=White,
+        options=WhiteOptions,
+        role="field",
+        summary="friction that every point of the grid draws by itself: depends on the grid",
+        references=("Chevalier, Cloupet, Soize, Wear 258 (2005), DOI 10.1016/j.wear.2004.11.012",),
+    ),
+    RandomInputSpec(
+        name="gaussian-field",
+        factory=GaussianField,
+        options=GaussianFieldOptions,
+        role="field",
+        summary="friction with a correlation length, the same whatever the grid",
+        references=("Higdon, process convolutions (2002), DOI 10.1007/978-1-4471-0657-9_2",),
+    ),
+)

@@ -1,0 +1,1 @@
+"""Built-in theories of the tangential contact."""

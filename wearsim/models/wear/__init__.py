@@ -1,0 +1,1 @@
+"""Built-in wear laws."""

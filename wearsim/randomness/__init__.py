@@ -1,1 +1,0 @@
-"""Uncertainty itself: keyed draws, sampling plans, maximum entropy; plain arrays in and out."""

@@ -1,0 +1,224 @@
+"""The figure of a wear test: profiles, depth, dissipation and load."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LogNorm, Normalize
+from matplotlib.figure import Figure
+
+from wearsim.errors import WearsimError
+from wearsim.report.parts.depth_axes import set_depth_axes
+from wearsim.report.parts.measured_profiles import Measured
+from wearsim.report.parts.style import (
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    RECORDS,
+    RED,
+    figure_style,
+    name_axes,
+)
+from wearsim.report.text.units import PER_SI, count, pass_unit, shown
+from wearsim.types import FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from wearsim.results import Result
+
+UM, MM, MIN, W_MM = PER_SI["um"], PER_SI["mm"], PER_SI["min"], PER_SI["W/mm"]
+MOST_RECORDS = 24
+ROLLERS = (BLUE, ORANGE, GREEN, RED)
+STYLES = ("-", "--", ":", "-.")
+MARKS = ("o", "s", "^", "D", "v")
+
+
+def replay_figure(result: Result, measured: Sequence[Measured] = ()) -> Figure:
+    """Return the figure of a wear test.
+
+    Parameters
+    ----------
+    result : Result
+    measured : sequence of Measured
+        Profiles drawn over the computed ones.
+
+    Returns
+    -------
+    Figure
+        Four panels: profiles and dissipation at records, depth against passes, load against time.
+    """
+    with figure_style():
+        figure = Figure(figsize=(11.0, 7.6), layout="constrained")
+        panels = figure.subplot_mosaic(
+            [["profiles", "depth"], ["dissipation", "load"]], width_ratios=[1.15, 1.0]
+        )
+        colours = _Colours(result.record_passes)
+        _draw_profiles(panels["profiles"], result, colours, measured)
+        _draw_dissipation(panels["dissipation"], result, colours)
+        extent = _extent(result, [profile.y for profile in measured])
+        for name in ("profiles", "dissipation"):
+            panels[name].set_xlim(*extent)
+        colours.draw_bar(figure, [panels["profiles"], panels["dissipation"]])
+        _draw_depth(panels["depth"], result)
+        _draw_load(panels["load"], result)
+        figure.suptitle(f"{result.title}\n{_caption(result)}", fontsize=10.5)
+    return figure
+
+
+def _caption(result: Result) -> str:
+    depth = shown(float(np.max(result.depth[-1])), "um")
+    return (
+        f"{count(float(result.passes[-1]))} roller passes in"
+        f" {shown(float(result.time[-1]), 'min')}: {depth} deep,"
+        f" {shown(float(np.max(result.width[-1])), 'mm')} wide"
+        f" ({result.described_model}, {result.stepper}{'' if result.finished else ', unfinished'})"
+    )
+
+
+class _Colours:
+    """Which records are drawn, each in the colour of its passes; the fresh state is black."""
+
+    def __init__(self, passes: FloatArray) -> None:
+        picks = np.linspace(0, len(passes) - 1, min(len(passes), MOST_RECORDS))
+        self.records: IntArray = np.unique(picks.round().astype(np.int64))
+        worn = passes[passes > 0.0]
+        last = float(worn[-1]) if len(worn) else 1.0
+        crowded = len(worn) > 2 and float(np.median(worn)) < 0.15 * last
+        unit, self.name = (1.0, "roller passes") if crowded else pass_unit(last)
+        self._passes = passes / unit
+        self._norm = LogNorm(float(worn[0]), last) if crowded else Normalize(0.0, last / unit)
+        self._map = colormaps[RECORDS].reversed()
+
+    def few(self, number: int) -> IntArray:
+        """Return at most so many of the records, the first and the last among them."""
+        picks = np.linspace(0, len(self.records) - 1, min(len(self.records), number))
+        return self.records[np.unique(picks.round().astype(np.int64))]
+
+    def of(self, record: int) -> tuple[float, float, float, float] | str:
+        passes = float(self._passes[record])
+        return self._map(self._norm(passes)) if passes > 0.0 else "black"
+
+    def draw_bar(self, figure: Figure, panels: list[Axes]) -> None:
+        mapped = ScalarMappable(self._norm, self._map)
+        figure.colorbar(mapped, ax=panels, label=self.name, aspect=45, pad=0.02)
+
+
+def _per_roller(values: FloatArray) -> FloatArray:
+    """Return records or steps by roller, (row, roller, ...), where rollers may be left out."""
+    return values if values.ndim == 3 else values[:, None]
+
+
+def _draw_profiles(
+    axes: Axes, result: Result, colours: _Colours, measured: Sequence[Measured]
+) -> None:
+    y = result.y * MM
+    worn = np.asarray(result.profiles)
+    start = result.start_height
+    for record in colours.records:
+        axes.plot(y, (start - worn[record]) * UM, color=colours.of(record), lw=1.1)
+    _draw_rollers(axes, y, _per_roller(np.asarray(result.roller_profiles))[-1])
+    for number, profile in enumerate(measured):
+        axes.plot(
+            profile.y * MM, profile.height * UM, MARKS[number % len(MARKS)], ms=3.2, mew=0.7,
+            mfc="white", mec=RED, label=f"measured: {profile.label}", zorder=5,
+        )  # fmt: skip
+    name_axes(axes, "Worn profile of the cylinder", "y [mm]", "height above nominal [um]")
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(loc="lower right")
+
+
+def _draw_rollers(axes: Axes, y: FloatArray, worn: FloatArray) -> None:
+    """Draw the rollers' own worn profiles at the last record, where there is any wear."""
+    for number, roller in enumerate(worn):
+        if roller.max() > 0.0:
+            label = "roller" if len(worn) == 1 else f"roller {number + 1}"
+            style = (0, (4 + 2 * number, 2))
+            axes.plot(
+                y, -roller * UM, color="black", ls=style, lw=1.0, label=f"{label}, at the end"
+            )
+
+
+def _extent(result: Result, others: Sequence[FloatArray]) -> tuple[float, float]:
+    """Return the part of the track that matters [mm]: where power fell, a margin, and `others`."""
+    power = np.asarray(result.dissipation).reshape(-1, len(result.y)).max(axis=0)
+    touched = result.y[power > 1e-3 * power.max()] if power.max() > 0.0 else result.y
+    first, last = float(touched[0]), float(touched[-1])
+    margin = 0.08 * (last - first)
+    ends = [first - margin, last + margin, *(float(e) for o in others for e in (o.min(), o.max()))]
+    return min(ends) * MM, max(ends) * MM
+
+
+def _draw_depth(axes: Axes, result: Result) -> None:
+    """Draw depth against passes: on logarithmic scales where the steps cover two decades."""
+    passes, depth = np.asarray(result.passes), np.asarray(result.depth)
+    error = np.asarray(result.depth_error)
+    drawn, unit, name = set_depth_axes(axes, passes, depth)
+    passes, depth, error = passes[drawn], depth[drawn], error[drawn]
+    logarithmic = axes.get_yscale() == "log"
+    visible = bool((error > 0.05 * depth).any())
+    said = f"estimated error {shown(float(error[-1]), 'um', 2)} at the end"
+    if visible:
+        low = np.maximum(depth - error, 0.05 * depth) if logarithmic else depth - error
+        band = (low * UM, (depth + error) * UM)
+        axes.fill_between(passes / unit, *band, color=ORANGE, alpha=0.35, lw=0, label=said)
+    style = "-o" if len(passes) <= 80 else "-"
+    label = "depth, a dot for each step" if len(passes) <= 80 else "depth"
+    label += "" if visible else f"\n({said})"
+    axes.plot(passes / unit, depth * UM, style, color=BLUE, ms=2.6, label=label)
+    name_axes(axes, "Depth of the groove", name, "greatest worn depth [um]")
+    axes.legend(loc="upper left")
+
+
+def _draw_dissipation(axes: Axes, result: Result, colours: _Colours) -> None:
+    y = result.y * MM
+    power = _per_roller(np.asarray(result.dissipation)) * W_MM
+    rollers = power.shape[1]
+    for record in colours.few(10 if rollers == 1 else 5):
+        for roller in range(rollers):
+            style = STYLES[roller % len(STYLES)]
+            axes.plot(y, power[record, roller], style, color=colours.of(record), lw=1.1)
+    if rollers > 1:
+        for roller in range(rollers):
+            style = STYLES[roller % len(STYLES)]
+            axes.plot([], [], style, color="black", label=f"roller {roller + 1}")
+        axes.legend(loc="upper right")
+    title = "Dissipated power per axial length (black: fresh)"
+    name_axes(axes, title, "y [mm]", r"$P_l$ [W/mm]")
+    axes.set_ylim(bottom=0.0)
+
+
+def _draw_load(axes: Axes, result: Result) -> None:
+    force = np.asarray(result.normal_force)
+    force = force if force.ndim == 2 else force[:, None]
+    if np.ptp(force, axis=1).max() < 1e-6 * force.max():
+        force = force[:, :1]  # rollers that carry the same
+    rollers, time = force.shape[1], np.asarray(result.time)
+    base = _base_load(result)
+    if base is not None:
+        axes.plot(base[0] * MIN, base[1], color=GREY, lw=0.8, label="before feedback")
+    style = "o-" if base is not None else "-"
+    for roller in range(rollers):
+        label = "at the steps" if rollers == 1 else f"roller {roller + 1}"
+        colour = ROLLERS[roller % len(ROLLERS)]
+        axes.plot(time * MIN, force[:, roller], style, color=colour, ms=2.6, label=label)
+    if rollers > 1 or base is not None:
+        axes.legend(loc="best")
+    name_axes(axes, "Load on a roller", "time [min]", "N [N]")
+    if np.ptp(force) < 0.02 * force.max() and base is None:  # a constant must look like one
+        axes.set_ylim(0.0, 1.25 * float(force.max()))
+    axes.margins(x=0.02)
+
+
+def _base_load(result: Result) -> tuple[FloatArray, FloatArray] | None:
+    """Return times [s] and the load before any feedback [N], where it varies and can be known."""
+    times = np.linspace(0.0, float(result.time[-1]), 2001)
+    try:
+        force = result.scenario.load.build().force(times)
+    except WearsimError:  # written with a plugin that is not here
+        return None
+    return (times, force) if np.ptp(force) > 1e-3 * force.max() else None

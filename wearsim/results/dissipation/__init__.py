@@ -1,0 +1,1 @@
+"""Results of a Monte Carlo study of one contact."""

@@ -1,0 +1,1 @@
+"""Results of an ensemble of wear tests."""

@@ -1,0 +1,297 @@
+"""The image of a file that is mostly holes, in memory."""
+
+from __future__ import annotations
+
+import io
+import itertools
+import json
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from h5py import h5a, h5d, h5ds, h5f, h5fd, h5g, h5p, h5s, h5t
+
+from wearsim.results.content import Content, as_plain
+from wearsim.results.schema import axis_lengths
+
+_PAGE = 1 << 16
+
+
+class SparseImage:
+    """What is written to a file, holes left out, with the calls that HDF5 makes of a file.
+
+    The disk is then written by our own calls, which fail as writing does: HDF5 itself is left in
+    disorder by a disk that is full.
+    """
+
+    def __init__(self) -> None:
+        self._pages: dict[int, bytearray] = {}
+        self._place = 0
+        self.size = 0
+        """Bytes of the file, holes included."""
+
+    def pieces(self) -> Iterator[tuple[int, bytes]]:
+        """Yield what was written, and how many bytes stand before it."""
+        for number in sorted(self._pages):
+            start = number * _PAGE
+            yield start, bytes(self._pages[number][: self.size - start])
+
+    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
+        """Go to a place, as files do."""
+        start = {io.SEEK_SET: 0, io.SEEK_CUR: self._place, io.SEEK_END: self.size}[whence]
+        self._place = start + offset
+        return self._place
+
+    def tell(self) -> int:
+        """Return the place, as files do."""
+        return self._place
+
+    def truncate(self, size: int) -> int:
+        """Set the size, as files do; only the last is cut off."""
+        self.size = size
+        return size
+
+    def flush(self) -> None:
+        """Do nothing: there is no disk."""
+
+    def write(self, content: bytes | memoryview) -> int:
+        """Write at the place, as files do."""
+        view = memoryview(content).cast("B")
+        for page, inside, done in self._spans(len(view)):
+            piece = view[done : done + _PAGE - inside]
+            self._pages.setdefault(page, bytearray(_PAGE))[inside : inside + len(piece)] = piece
+        self._place += len(view)
+        self.size = max(self.size, self._place)
+        return len(view)
+
+    def readinto(self, target: memoryview) -> int:
+        """Read at the place, as files do."""
+        view = memoryview(target).cast("B")
+        for page, inside, done in self._spans(len(view)):
+            piece = self._pages.get(page, bytes(_PAGE))[inside : inside + len(view) - done]
+            view[done : done + len(piece)] = piece
+        self._place += len(view)
+        return len(view)
+
+    def _spans(self, count: int) -> Iterator[tuple[int, int, int]]:
+        """Yield the pages of the bytes at the place: which, where in it, how many before."""
+        done = 0
+        while done < count:
+            page, inside = divmod(self._place + done, _PAGE)
+            yield page, inside, done
+            done += _PAGE - inside
+
+
+SIGNATURE = b"\x89HDF\r\n\x1a\n"
+
+CHECKPOINT, INPUTS, ABOUT, SCENARIO, FILES = "checkpoint", "inputs", "about", "scenario", "files"
+
+ERRORS = "surrogatepass"  # so that every Python string comes back as it was
+
+_LABEL_LENGTH = 1000  # an attribute holds 64 kB at most
+
+_SCALAR = h5s.create(h5s.SCALAR)
+
+_ORDERED = h5p.CRT_ORDER_TRACKED | h5p.CRT_ORDER_INDEXED
+
+_number = itertools.count()
+
+
+def file_image(content: Content) -> bytes:
+    """Return the bytes of a results file.
+
+    Parameters
+    ----------
+    content : Content
+        What it shall hold.
+
+    Returns
+    -------
+    bytes
+
+    Raises
+    ------
+    ValueError
+        If the variables are not those of the layout, or do not fit together.
+    """
+    access = h5p.create(h5p.FILE_ACCESS)
+    access.set_fapl_core(1 << 20, False)
+    name = f"wearsim-{os.getpid()}-{next(_number)}"  # of no file: the image stays in memory
+    with _new_file(name.encode(), access) as file:
+        _put_content(file, content)
+        h5f.flush(file)
+        image: bytes = file.get_file_image()
+    return image
+
+
+def sparse_image(content: Content) -> SparseImage:
+    """Return a file whose reserved variables are holes, so that it may be of any size.
+
+    Every variable stands in one piece. Where it stands is told by `hdf5_reading.extents`, so that
+    rows can be written there later by plain writes, which leave the structure alone.
+
+    Parameters
+    ----------
+    content : Content
+        What it shall hold.
+
+    Returns
+    -------
+    SparseImage
+
+    Raises
+    ------
+    ValueError
+        If the variables are not those of the layout, or do not fit together.
+    """
+    image = SparseImage()
+    access = h5p.create(h5p.FILE_ACCESS)
+    access.set_fileobj_driver(h5fd.fileobj_driver, image)
+    with _new_file(b"sparse", access) as file:
+        _put_content(file, content)
+    return image
+
+
+@contextmanager
+def _new_file(name: bytes, access: Any) -> Iterator[Any]:
+    access.set_fclose_degree(h5f.CLOSE_STRONG)
+    creation = h5p.create(h5p.FILE_CREATE)
+    creation.set_link_creation_order(_ORDERED)
+    creation.set_obj_track_times(False)
+    file = h5f.create(name, h5f.ACC_TRUNC, creation, access)
+    try:
+        yield file
+    finally:
+        file.close()
+
+
+def _put_content(file: Any, content: Content) -> None:
+    lengths = axis_lengths(content.variables, content.layout.variables)
+    _put_labels(file, content)
+    _put_variables(file, content, lengths)
+    _put_inputs(_group(file, INPUTS), content)
+    checkpoint = _group(file, CHECKPOINT)
+    for name, array in content.checkpoint.items():
+        _put_array(checkpoint, name, array)
+
+
+def _put_labels(file: Any, content: Content) -> None:
+    """Write what a person, or xarray, should see first; it is read back from the texts."""
+    _put_attribute(file, "format", content.layout.format)
+    _put_attribute(file, "format_version", content.layout.version)
+    for name, value in content.about.items():
+        if isinstance(value, str):
+            _put_attribute(file, name, value[:_LABEL_LENGTH])
+        elif isinstance(value, bool | np.bool_):
+            _put_attribute(file, name, int(value))  # netCDF has no booleans
+        elif isinstance(value, int | float | np.number):
+            _put_attribute(file, name, value)
+
+
+def _put_variables(file: Any, content: Content, lengths: Mapping[str, int]) -> None:
+    layout = content.layout
+    scales: dict[str, Any] = {}
+    datasets: dict[str, Any] = {}
+    for axis in layout.axes.values():
+        numbers = np.arange(axis.first, axis.first + lengths[axis.name])
+        scales[axis.name] = _put_array(file, axis.name, numbers)
+        _describe(scales[axis.name], "1", axis.long_name)
+    for name, variable in layout.variables.items():
+        put = _reserve if name in content.reserved else _put_array
+        dataset = put(file, name, content.variables[name])
+        _describe(dataset, variable.unit, variable.long_name)
+        (scales if variable.dims == (name,) else datasets)[name] = dataset
+    for name, scale in scales.items():
+        h5ds.set_scale(scale, name.encode())
+    for name, dataset in datasets.items():
+        for position, dim in enumerate(layout.variables[name].dims):
+            h5ds.attach_scale(dataset, scales[dim], position)
+
+
+def _put_inputs(group: Any, content: Content) -> None:
+    _put_text(group, SCENARIO, content.scenario_text)
+    _put_text(group, ABOUT, json.dumps(content.about, default=as_plain))
+    files = _group(group, FILES)
+    for number, (path, text) in enumerate(content.files.items()):
+        _put_attribute(_put_text(files, str(number), text), "path", path)
+
+
+def _group(group: Any, name: str) -> Any:
+    creation = h5p.create(h5p.GROUP_CREATE)
+    creation.set_obj_track_times(False)
+    return h5g.create(group, name.encode(), gcpl=creation)
+
+
+def _describe(dataset: Any, unit: str, what: str) -> None:
+    _put_attribute(dataset, "units", unit)
+    _put_attribute(dataset, "long_name", what)
+
+
+def _put_array(group: Any, name: str, array: npt.NDArray[Any]) -> Any:
+    array = np.asarray(array, order="C")
+    space = h5s.create_simple(array.shape) if array.ndim else _SCALAR
+    dataset = h5d.create(group, name.encode(), _type_of(array.dtype), space, _creation())
+    if array.size:
+        dataset.write(h5s.ALL, h5s.ALL, array)
+    return dataset
+
+
+def _reserve(group: Any, name: str, array: npt.NDArray[Any]) -> Any:
+    """Give an array its place, all of it at once, and write nothing: the file has holes."""
+    creation = _creation().copy()
+    creation.set_alloc_time(h5d.ALLOC_TIME_EARLY)
+    creation.set_fill_time(h5d.FILL_TIME_NEVER)
+    space = h5s.create_simple(array.shape)
+    return h5d.create(group, name.encode(), _type_of(array.dtype), space, creation)
+
+
+def _put_text(group: Any, name: str, text: str) -> Any:
+    content, kind = _text(text)
+    dataset = h5d.create(group, name.encode(), kind, _SCALAR, _creation())
+    dataset.write(h5s.ALL, h5s.ALL, content, kind)
+    return dataset
+
+
+def _put_attribute(target: Any, name: str, value: object) -> None:
+    if isinstance(value, str):
+        content, kind = _text(value)
+    else:
+        content = np.asarray(value)
+        kind = _type_of(content.dtype)
+    h5a.create(target, name.encode(), kind, _SCALAR).write(content, kind)
+
+
+def _text(text: str) -> tuple[npt.NDArray[Any], Any]:
+    """Return a text as an array and its HDF5 type, of fixed length: no heap, no limit but 4 GB."""
+    content = text.encode("utf-8", ERRORS)
+    size = len(content) + 1
+    return np.array(content, f"S{size}"), _text_type(size)
+
+
+@lru_cache(maxsize=256)
+def _text_type(size: int) -> Any:
+    kind = h5t.C_S1.copy()
+    kind.set_size(size)
+    kind.set_cset(h5t.CSET_UTF8)
+    kind.set_strpad(h5t.STR_NULLTERM)
+    return kind
+
+
+@lru_cache(maxsize=256)
+def _type_of(dtype: np.dtype[Any]) -> Any:
+    if dtype.kind == "S":
+        return _text_type(dtype.itemsize)
+    if dtype.kind not in "biuf":
+        raise ValueError(f"an array of {dtype} cannot be stored")
+    return h5t.py_create(dtype, logical=True)
+
+
+@lru_cache(maxsize=1)
+def _creation() -> Any:
+    creation = h5p.create(h5p.DATASET_CREATE)
+    creation.set_obj_track_times(False)
+    return creation

@@ -1,0 +1,1 @@
+"""Random inputs in the place of values."""

@@ -1,0 +1,1 @@
+"""One contact, and Monte Carlo studies of one contact."""

@@ -1,0 +1,1 @@
+"""A wear test: assembled from a scenario, stepped, recorded and resumed."""

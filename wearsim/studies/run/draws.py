@@ -1,0 +1,370 @@
+"""The random inputs of one run: what holds for the test and its rollers, and paths in time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from wearsim.errors import CapabilityError, Problem, ScenarioError
+from wearsim.evolution.contact_inputs import Varying
+from wearsim.mechanics.numerics.piecewise_linear import PiecewiseLinear
+from wearsim.plugins import JointDistribution, Process, Uniforms
+from wearsim.scenario import RandomInput, Scenario, realise
+from wearsim.scenario.random.model import CONTACT_FIELDS
+from wearsim.types import FloatArray
+from wearsim.uq.sampling.philox import Stream
+from wearsim.uq.sampling.plans import REPLICATES, PlanName
+from wearsim.uq.sampling.sampler import Sampler
+
+LISTED = {"roller.offset", "creepage.yaw", "creepage.tilt"}  # may stand as one value per roller
+LONGEST_PATH = 5_000_000  # samples of a process
+_EVENLY = np.linspace(0.5, 63.5, 64) / 64.0  # probabilities that stand for a law
+RARE = 1e-7  # part of the passes that may lie beyond what the strips are laid out for
+
+
+@dataclass(frozen=True)
+class Draws:
+    """One realisation of a scenario's random inputs.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        With what is drawn for a test as a whole in place; the rest at its mean.
+    rollers : mapping of str to ndarray, shape (rollers,)
+        What is drawn for each roller and has no place in the scenario, by field of `ContactInputs`.
+    varying : tuple of Varying
+        Processes; their rollers are the scenario's.
+    passes : tuple of RandomInput
+        What is drawn anew at every pass.
+    values : mapping of str to ndarray, shape () or (rollers,)
+        All that is drawn for the test and for its rollers, by the scenario's key [SI].
+    time_means : mapping of str to ndarray, shape () or (rollers,)
+        Mean over the test of what follows a process, by the scenario's key [SI].
+    """
+
+    scenario: Scenario
+    rollers: Mapping[str, FloatArray] = field(default_factory=dict)
+    varying: tuple[Varying, ...] = ()
+    passes: tuple[RandomInput, ...] = ()
+    values: Mapping[str, FloatArray] = field(default_factory=dict)
+    time_means: Mapping[str, FloatArray] = field(default_factory=dict)
+
+    @property
+    def tells_rollers_apart(self) -> bool:
+        """Whether rollers that the scenario calls alike have inputs of their own."""
+        count = self.scenario.operation.rollers
+        return bool(self.rollers) or any(len(v.rollers) < count for v in self.varying)
+
+    def lasting(self, name: str, mean: float) -> float:
+        """Return the greatest mean size that an input of a contact has over the whole test.
+
+        What changes its sign wears either way, so that it counts by its size.
+
+        Parameters
+        ----------
+        name : str
+            Field of `ContactInputs`.
+        mean : float
+            The value where nothing is drawn, which is also the mean of what every pass draws.
+        """
+        sizes = [abs(float(value)) for value in (mean, *self.rollers.get(name, ()))]
+        time = self.scenario.total_time
+        for item in self.varying:
+            if item.name == name:
+                signed = _changes_sign(item.path.value)
+                found = np.abs(item.path.value).mean() if signed else item.path.mean(0.0, time)
+                sizes.append(abs(float(found)))
+        for random in self.passes:
+            if len(random.keys) == 1 and CONTACT_FIELDS[random.keys[0]] == name:
+                values = random.scalar.quantile(_EVENLY)
+                sizes += [float(np.abs(values).mean())] * _changes_sign(values)
+        return max(sizes)
+
+    def range_of(self, name: str, mean: float) -> tuple[float, float]:
+        """Return about the least and greatest value that an input of a contact takes.
+
+        Parameters
+        ----------
+        name : str
+            Field of `ContactInputs`.
+        mean : float
+            The value where nothing is drawn.
+        """
+        values = [mean, *self.rollers.get(name, ())]
+        for item in self.varying:
+            if item.name == name:
+                values += [float(item.path.value.min()), float(item.path.value.max())]
+        for random in self.passes:
+            for key, spread in zip(random.keys, _spreads(random), strict=True):
+                if CONTACT_FIELDS[key] == name:
+                    values += spread
+        return min(values), max(values)
+
+
+def _changes_sign(values: FloatArray) -> bool:
+    return bool(values.min() < 0.0 < values.max())
+
+
+def _spreads(item: RandomInput) -> list[list[float]]:
+    """Return the range of each value that an input sets; a load's is counted from its mean."""
+    if isinstance(item.distribution, JointDistribution):
+        return [[-reach, reach] for reach in item.distribution.reach]
+    low, high = item.scalar.quantile(np.array([RARE, 1.0 - RARE]))
+    mean = origin(item.name, item.mean[0])
+    return [[float(low) - mean, float(high) - mean]]
+
+
+def origin(key: str, mean: float) -> float:
+    """Return what values of a key are counted from: a load adds to the scene's own, at its mean."""
+    return mean if key == "load.normal_force" else 0.0
+
+
+def draw(scenario: Scenario) -> Draws:
+    """Draw the random inputs of the realisation that a scenario asks for.
+
+    Parameters
+    ----------
+    scenario : Scenario
+
+    Returns
+    -------
+    Draws
+
+    Raises
+    ------
+    ScenarioError
+        If the plan has no single realisation, or a process is far too fast.
+    CapabilityError
+        If there is a friction field, which is a matter of one contact.
+    """
+    if scenario.sampling.plan == "latin-hypercube" and scenario.random:
+        problem = Problem(
+            "sampling",
+            "plan",
+            "a Latin hypercube belongs to a study of many realisations, and a run takes one",
+            '"latin-hypercube"',
+            '"monte-carlo" or "sobol"',
+        )
+        raise ScenarioError(scenario.file, [problem])
+    return Drawer(scenario, scenario.sampling.plan).draw(scenario.sampling.realisation)
+
+
+class Drawer:
+    """Draws the random inputs of a scenario, realisation by realisation.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    plan : str
+        Name of a plan of `wearsim.uq.sampling.plans`.
+    total : int, optional
+        Realisations of the whole plan, where it needs to know.
+
+    Raises
+    ------
+    CapabilityError
+        If there is a friction field, which is a matter of one contact.
+    """
+
+    def __init__(self, scenario: Scenario, plan: PlanName, total: int | None = None) -> None:
+        _refuse_fields(scenario)
+        self.scenario = scenario
+        self.items = [
+            item
+            for item in scenario.random
+            if item.role in {"scalar", "joint"} and item.persistence != "per-pass"
+        ]
+        self._processes = [item for item in scenario.random if item.role == "process"]
+        self._names = {item: _names(item, scenario.operation.rollers) for item in self.items}
+        kinds = {item.name: item for item in self.items}
+        correlations = [
+            (one, other, rank)
+            for first, second, rank in scenario.sampling.correlation
+            if first in kinds and second in kinds
+            for one, other in zip(
+                self._names[kinds[first]], self._names[kinds[second]], strict=True
+            )
+        ]
+        inputs = [(name, item.dimension) for item in self.items for name in self._names[item]]
+        self._sampler = Sampler(
+            scenario.seed,
+            inputs,
+            plan,
+            total,
+            correlations=correlations,
+            replicates=REPLICATES if plan == "sobol" else 1,
+        )
+
+    @property
+    def groups(self) -> list[str]:
+        """Names of the inputs whose draws tell realisations apart; per-pass ones do not."""
+        lasting = {item.name for item in (*self.items, *self._processes)}
+        return [item.name for item in self.scenario.random if item.name in lasting]
+
+    def draw(
+        self,
+        realisation: int,
+        sources: Mapping[str, int] | None = None,
+        passes: int | None = None,
+    ) -> Draws:
+        """Return the draws of one realisation.
+
+        Parameters
+        ----------
+        realisation : int
+        sources : mapping of str to int, optional
+            Number of the realisation whose draw an input takes, where it is another.
+        passes : int, optional
+            Number of the realisation whose draws at every pass it takes, where it is another.
+
+        Returns
+        -------
+        Draws
+
+        Raises
+        ------
+        ScenarioError
+            If a value is out of its bounds, or a process is far too fast.
+        """
+        of_passes = realisation if passes is None else passes
+        table = self.scenario.sampling.model_copy(update={"realisation": of_passes})
+        scenario = replace(self.scenario, sampling=table)
+        if not scenario.random:
+            return Draws(scenario)
+        sources = sources or {}
+        numbers = {item.name: sources.get(item.name, realisation) for item in scenario.random}
+        columns = {n: self.columns(n, 1) for n in sorted({numbers[i.name] for i in self.items})}
+        values = {
+            key: np.asarray(columns[numbers[item.name]][key][0])
+            for item in self.items
+            for key in item.keys
+        }
+        listed = {
+            key: tuple(float(number) for number in array) if array.ndim else float(array)
+            for key, array in values.items()
+            if array.ndim == 0 or key in LISTED
+        }
+        means = {item.name: item.mean[0] for item in self.items}
+        paths = {item: _paths(scenario, item, numbers) for item in self._processes}
+        return Draws(
+            scenario=realise(scenario, listed) if listed else scenario,
+            rollers={
+                CONTACT_FIELDS[key]: array - origin(key, means[key])
+                for key, array in values.items()
+                if key not in listed
+            },
+            varying=tuple(one for found in paths.values() for one in found),
+            passes=tuple(item for item in scenario.random if item.persistence == "per-pass"),
+            values=values,
+            time_means={item.name: _means(scenario, item, found) for item, found in paths.items()},
+        )
+
+    def columns(self, first: int, count: int) -> dict[str, FloatArray]:
+        """Return what is drawn for whole tests and rollers, in realisations on end.
+
+        Parameters
+        ----------
+        first, count : int
+            The first realisation, and how many.
+
+        Returns
+        -------
+        dict of str to ndarray, shape (count,) or (count, rollers)
+            By the scenario's key, in SI.
+        """
+        uniforms = self._sampler.uniforms(first, count)
+        columns = {}
+        for item in self.items:
+            found = np.stack([item.values(uniforms[name]) for name in self._names[item]], axis=1)
+            for number, key in enumerate(item.keys):
+                whole = item.persistence == "per-test"
+                columns[key] = found[:, 0, number] if whole else found[:, :, number]
+        return columns
+
+
+def drawn_values(scenario: Scenario, draws: Draws) -> dict[str, dict[str, object]]:
+    """Return what is drawn for the test and its rollers, as plain values for a results file.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The one that was drawn from.
+    draws : Draws
+
+    Returns
+    -------
+    dict of str to dict
+        By the scenario's key: `values`, one for the test or one per roller, and their SI `unit`.
+    """
+    units = units_of(scenario)
+    return {
+        key: {"values": np.atleast_1d(value).tolist(), "unit": units[key]}
+        for key, value in draws.values.items()
+    }
+
+
+def units_of(scenario: Scenario) -> dict[str, str]:
+    """Return the SI unit of every value that random inputs set, by the scenario's key."""
+    return {
+        key: item.quantity.kind.unit if item.quantity else "1"
+        for item in scenario.random
+        for key in item.keys
+    }
+
+
+def _names(item: RandomInput, rollers: int) -> list[str]:
+    """Return under which names an input is drawn: its own, or one for each roller."""
+    if item.persistence == "per-test":
+        return [item.name]
+    return [f"{item.name}@{number}" for number in range(rollers)]
+
+
+def _refuse_fields(scenario: Scenario) -> None:
+    for item in scenario.random:
+        if item.role == "field":
+            raise CapabilityError(
+                f"{scenario.file}: {item.name} is a field, {item.kind}, which is resolved within"
+                " one contact by `wearsim dissipation`; a run takes a distribution with a"
+                " persistence, such as its marginal"
+            )
+
+
+def _paths(scenario: Scenario, item: RandomInput, numbers: Mapping[str, int]) -> list[Varying]:
+    """Return the paths of a process over the whole test, one or one for each roller."""
+    process = item.distribution
+    if not isinstance(process, Process):
+        raise TypeError(f"{item.name} is no process")
+    points = int(np.ceil(scenario.total_time / process.spacing)) + 2
+    if points > LONGEST_PATH:
+        table, key = item.name.rsplit(".", 1)
+        problem = Problem(
+            table,
+            key,
+            f"the process would take {points:,} steps of {process.spacing:.3g} s over the test",
+            None,
+            'a longer correlation_time, or persistence = "per-pass" in place of a process',
+        )
+        raise ScenarioError(scenario.file, [problem])
+    everyone = tuple(range(scenario.operation.rollers))
+    groups = [everyone] if item.persistence == "per-test" else [(r,) for r in everyone]
+    times = process.spacing * np.arange(points, dtype=np.float64)
+    stream = Stream(scenario.seed, item.name, "process")
+    found = []
+    for block, group in enumerate(groups):
+        path = process.path(points, _uniforms(stream, numbers[item.name], block))
+        value = path - origin(item.name, item.mean[0])
+        found.append(Varying(CONTACT_FIELDS[item.name], group, PiecewiseLinear(times, value)))
+    return found
+
+
+def _means(scenario: Scenario, item: RandomInput, paths: list[Varying]) -> FloatArray:
+    """Return the mean of a process over the test, one or one for each roller [SI]."""
+    start = origin(item.name, item.mean[0])
+    found = np.array([one.path.mean(0.0, scenario.total_time) + start for one in paths])
+    return found if item.persistence == "per-roller" else found[0]
+
+
+def _uniforms(stream: Stream, realisation: int, block: int) -> Uniforms:
+    return lambda first, count: stream.uniforms(first, count, realisation, block)

@@ -1,0 +1,135 @@
+"""What a scenario will run, in words and engineers' units, before it runs."""
+
+from __future__ import annotations
+
+from wearsim.mechanics.hertz.elasticity import combine
+from wearsim.scenario import Scenario, described_model
+from wearsim.studies.contact.single import study_contact
+from wearsim.studies.run.assemble import build_scene, load_range
+from wearsim.studies.run.choose_stepper import check_model
+from wearsim.studies.run.grid import fresh_patch
+
+Rows = list[tuple[str, str]]
+
+
+def is_run(scenario: Scenario) -> bool:
+    """Tell whether a scenario describes a whole test and not just one contact."""
+    long = scenario.operation.duration is not None or scenario.operation.passes is not None
+    return long and scenario.wear is not None
+
+
+def _bodies(scenario: Scenario) -> Rows:
+    roller, cylinder = scenario.roller, scenario.cylinder
+    pair = combine(cylinder.material, roller.material)
+    elasticity = (
+        f"contact modulus {pair.contact_modulus / 1e9:.4g} GPa,"
+        f" shear modulus {pair.shear_modulus / 1e9:.4g} GPa"
+    )
+    return [
+        (
+            "roller",
+            f"radius {roller.radius * 1e3:.6g} mm, crown radius {roller.crown_radius * 1e3:.6g} mm",
+        ),
+        ("cylinder", f"radius {cylinder.radius * 1e3:.6g} mm"),
+        ("elasticity", elasticity),
+        ("rolling speed", f"{scenario.rolling_speed:.4g} m/s"),
+    ]
+
+
+def _creepage(scenario: Scenario) -> str:
+    creepage = scenario.creepage
+    if creepage.drive == "free":
+        text = f"free, bearing torque {(creepage.bearing_torque or 0.0) * 1e3:.4g} N mm"
+    else:
+        text = f"longitudinal {creepage.longitudinal:.4g}"
+    for name, value in (("yaw", creepage.yaw), ("tilt", creepage.tilt)):
+        angles = scenario.per_roller(value)
+        if any(angles):
+            text += f", {name} " + " / ".join(f"{angle * 1e3:.4g}" for angle in angles) + " mrad"
+    return text + (", differential slip" if creepage.differential_slip else "")
+
+
+def _random(scenario: Scenario) -> Rows:
+    """Return a row per random input and, where there are any, one for how they are drawn."""
+    if not scenario.random:
+        return []
+    table = scenario.sampling
+    ties = [f"{first} with {second} {rank:g}" for first, second, rank in table.correlation]
+    words = [table.plan, f"realisation {table.realisation}"]
+    words += [f"rank correlation of {', '.join(ties)}"] if ties else []
+    rows = [(f"random {item.name}", item.describe()) for item in scenario.random]
+    return [*rows, ("sampling", ", ".join(words))]
+
+
+def _contact(scenario: Scenario, load: float) -> Rows:
+    patch = fresh_patch(scenario, load)
+    size = (
+        f"{2e3 * patch.a:.4g} x {2e3 * patch.b:.4g} mm,"
+        f" peak pressure {patch.peak_pressure / 1e6:.4g} MPa"
+    )
+    return [
+        ("friction", f"{scenario.friction.coefficient:.4g}"),
+        ("creepage", _creepage(scenario)),
+        *_random(scenario),
+        ("contact model", _contact_model(scenario)),
+        ("fresh patch (Hertz)", size),
+    ]
+
+
+def _test(scenario: Scenario) -> Rows:
+    scene, _, stepper = build_scene(scenario)
+    grid, law = scene.grid, scenario.wear
+    counts = scene.kinematics.multiplicity
+    alike = ", all alike" if len(counts) == 1 and counts[0] > 1 else ""
+    solved = f"{len(counts)} solved{alike}" if counts.sum() > 1 else "1"
+    strips = (
+        f"{grid.strips} of {grid.spacing * 1e3:.4g} mm,"
+        f" {grid.y[0] * 1e3:.4g} to {grid.y[-1] * 1e3:.4g} mm"
+    )
+    return [
+        ("rollers", f"{counts.sum():.0f} ({solved})" if counts.sum() > 1 else "1"),
+        (
+            "duration",
+            f"{scenario.total_time / 60.0:.6g} min, {scenario.total_passes:,} roller passes",
+        ),
+        ("wear law", "" if law is None else f"{law.law} ({law.spec.summary})"),
+        ("strips", strips),
+        ("stepper", f"{stepper}, tolerance {scenario.evolution.tolerance:.1e}"),
+    ]
+
+
+def plan(scenario: Scenario) -> Rows:
+    """Return what a scenario will run as rows of name and value.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        A run's, or a single contact's.
+
+    Returns
+    -------
+    list of (str, str)
+
+    Raises
+    ------
+    ScenarioError, CapabilityError
+        If it cannot run.
+    """
+    load, whole = scenario.load.build(), is_run(scenario)
+    low, high = load_range(scenario, load, scenario.total_time if whole else 0.0)
+    values = f"{low:.4g} N" if low == high else f"{low:.4g} to {high:.4g} N"
+    if load.stiffness > 0.0:
+        values += f", less {load.stiffness / 1e3:.4g} N/mm of descent"
+    values += "".join(f", plus {term.name}" for term in scenario.load.terms)
+    rows = [*_bodies(scenario), ("load", f"{scenario.load.kind}, {values}")]
+    rows += _contact(scenario, high)
+    if whole:
+        return rows + _test(scenario)
+    check_model(scenario, scenario.contact.build())
+    strips = study_contact(scenario).grid.strips
+    return [*rows, ("runs as", f"one contact, {strips} strips (no duration or no wear law)")]
+
+
+def _contact_model(scenario: Scenario) -> str:
+    choice = scenario.contact
+    return f"{described_model(choice.model, scenario.text)}: {choice.spec.summary}"

@@ -1,0 +1,259 @@
+"""Units: their sizes, dimensions and kinds, and values written in engineering units."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache, lru_cache
+from typing import TYPE_CHECKING, Literal, TypeAlias
+
+if TYPE_CHECKING:
+    import pint
+
+
+# Exact values, so that a quantity becomes the float nearest to what was written. The radian is a
+# dimension of its own: 1/s is neither rad/s nor turn/s.
+_DEFINITIONS = """
+m = [length]; km = 1000 * m; cm = 1/100 * m; mm = 1/1000 * m; um = 1/1000 * mm; nm = 1/1000 * um
+micrometer = um; micrometre = um
+s = [time]; ms = 1/1000 * s; us = 1/1000 * ms; min = 60 * s; h = 60 * min; d = 24 * h
+minute = min; minutes = min; hour = h; hours = h; day = d; days = d
+rad = [angle]; mrad = 1/1000 * rad; urad = 1/1000 * mrad
+turn = 6.283185307179586476925286766559 * rad; turns = turn; rev = turn; deg = 1/360 * turn
+rpm = turn / min
+kg = [mass]; g = 1/1000 * kg; mg = 1/1000 * g; ug = 1/1000 * mg
+N = kg * m / s**2; mN = 1/1000 * N; kN = 1000 * N; MN = 1000 * kN
+Pa = N / m**2; kPa = 1000 * Pa; MPa = 1000 * kPa; GPa = 1000 * MPa
+J = N * m; mJ = 1/1000 * J; kJ = 1000 * J; MJ = 1000 * kJ; Nm = N * m; Nmm = N * mm; kNm = kN * m
+W = J / s; mW = 1/1000 * W; uW = 1/1000 * mW; kW = 1000 * W
+"""
+
+_UNITS = dict(
+    definition.strip().split(" = ") for definition in re.split("[;\n]", _DEFINITIONS.strip())
+)
+
+_SPELLINGS = str.maketrans(
+    {"µ": "u", "μ": "u", "°": "deg", "²": "^2", "³": "^3", "·": "*", "×": "*"}
+)
+
+_UNIT_TEXT = re.compile(r"(?:[A-Za-z]+(?:\^[+-]?[0-9])?|1|[*/() ])+")
+
+_LONGEST = 100  # characters of a quantity that are looked at
+
+
+class QuantityError(ValueError):
+    """A value that cannot be used, told as what is wrong, what was got and what was expected.
+
+    Parameters
+    ----------
+    what : str
+        What is wrong.
+    got : str, optional
+        The value as it was written.
+    expected : str, optional
+        The right form.
+    """
+
+    def __init__(self, what: str, got: str | None = None, expected: str | None = None) -> None:
+        self.what, self.got, self.expected = what, got, expected
+        parts = [what, got and f"got {got}", expected and f"expected {expected}"]
+        super().__init__(", ".join(part for part in parts if part))
+
+
+def shown(value: object) -> str:
+    """Return `value` as it would stand in a TOML file, cut short where it is long."""
+    if isinstance(value, dict):
+        return "a table"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, list | tuple):
+        text = f"[{', '.join(shown(item) for item in value)}]"
+    elif isinstance(value, str):
+        text = f'"{value}"'
+    else:
+        text = str(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of quantity: its name with an article, its SI unit and how one is written."""
+
+    name: str
+    unit: str
+    example: str
+
+    def expected(self, bound: Bound = "any") -> str:
+        """Return the form that is expected, for messages."""
+        limit = {"any": "", "positive": " above zero", "not negative": " of zero or more"}[bound]
+        return f'{self.name}{limit} such as "{self.example}"'
+
+
+Bound: TypeAlias = Literal["any", "positive", "not negative"]
+
+LENGTH = Kind("a length", "m", "20 mm")
+
+FORCE = Kind("a force", "N", "300 N")
+
+STIFFNESS = Kind("a stiffness", "N/m", "690 N/mm")
+
+PRESSURE = Kind("a pressure", "Pa", "200 GPa")
+
+WEAR_FACTOR = Kind("a wear factor", "1/Pa", "1.1e-11 1/Pa")
+
+ROTATION_SPEED = Kind("a rotation speed", "rad/s", "1000 rpm")
+
+DURATION = Kind("a time", "s", "450 min")
+
+ANGLE = Kind("an angle", "rad", "1 mrad")
+
+TORQUE = Kind("a torque", "N m", "0.5 N mm")
+
+SPEED = Kind("a speed", "m/s", "2.6 m/s")
+
+PER_POWER = Kind("a force per power", "N/W", "20 N/W")
+
+DENSITY = Kind("a density", "kg/m^3", "7850 kg/m^3")
+
+MASS_PER_ENERGY = Kind("a mass per energy", "kg/J", "5.3 ug/J")
+
+_KINDS = (
+    *(LENGTH, FORCE, STIFFNESS, PRESSURE, WEAR_FACTOR, ROTATION_SPEED, DURATION, ANGLE, TORQUE),
+    *(SPEED, PER_POWER, DENSITY, MASS_PER_ENERGY),
+    Kind("an area", "m^2", "10 mm^2"),
+    Kind("a volume", "m^3", "10 mm^3"),
+    Kind("a power", "W", "0.07 W"),
+    Kind("a mass", "kg", "2 kg"),
+    Kind("a frequency", "1/s", "16 turn/s"),
+    Kind("a curvature", "1/m", "40 1/m"),
+)
+
+
+@cache
+def _registry() -> pint.UnitRegistry[Fraction]:
+    import pint  # noqa: PLC0415  (0.15 s to import)
+
+    units: pint.UnitRegistry[Fraction] = pint.UnitRegistry(None, non_int_type=Fraction)
+    for name, definition in _UNITS.items():
+        units.define(f"{name} = {definition}")
+    return units
+
+
+def _spelt(unit: str) -> str:
+    unit = unit.replace("**", "^").translate(_SPELLINGS)
+    unit = " ".join(unit.split())
+    return f"1{unit}" if unit.startswith("/") else unit
+
+
+def _unknown_name(name: str) -> str:
+    if name.lower().endswith(("hz", "hertz")):
+        return f"unknown unit '{name}' (turns or radians? write rpm, turn/s or rad/s)"
+    by_lower = {known.lower(): known for known in reversed(_UNITS)}
+    near = difflib.get_close_matches(name.lower(), by_lower, n=1)
+    hint = f" (did you mean '{by_lower[near[0]]}'?)" if near else ""
+    return f"unknown unit '{name}'{hint}"
+
+
+Dimensions: TypeAlias = frozenset[tuple[str, str]]
+
+
+@lru_cache(maxsize=1024)
+def _measure(unit: str) -> tuple[Fraction, Dimensions]:
+    """Return the size of `unit` in SI and its dimensions; ValueError says what is wrong."""
+    text = _spelt(unit)
+    if not text or len(text) > _LONGEST or not _UNIT_TEXT.fullmatch(text) or ")^" in text:
+        raise ValueError(f"'{unit}' is not a unit")
+    for name in re.findall(r"[A-Za-z]+", text):
+        if name not in _UNITS:
+            raise ValueError(_unknown_name(name))
+    units = _registry()
+    try:
+        one = units.Quantity(Fraction(1), units.parse_units(text)).to_root_units()
+        dimensions = frozenset((name, str(power)) for name, power in one.dimensionality.items())
+    except Exception as error:  # the parser fails in many ways on unbalanced text
+        raise ValueError(f"'{unit}' is not a unit") from error
+    return Fraction(one.magnitude), dimensions
+
+
+def _kind_of(unit: str) -> Kind:
+    """Return the kind of quantity that `unit` measures; a nameless one is named by its unit."""
+    dimensions = _measure(unit)[1]
+    for kind in _KINDS:
+        if _measure(kind.unit)[1] == dimensions:
+            return kind
+    name = f"a quantity in {_spelt(unit)}" if dimensions else "a plain number"
+    return Kind(name, unit, f"1 {_spelt(unit)}")
+
+
+def conversion(unit: str, target: str) -> Fraction:
+    """Return how many `target` one `unit` is, exactly.
+
+    Parameters
+    ----------
+    unit : str
+        A unit as a user writes it, "mm".
+    target : str
+        The unit wanted, "m".
+
+    Returns
+    -------
+    Fraction
+
+    Raises
+    ------
+    QuantityError
+        If `unit` is unknown or measures something else than `target`.
+    """
+    wanted = _kind_of(target)
+    expected = f"a unit of {wanted.name.split(maxsplit=1)[1]} such as {target}"
+    try:
+        size, dimensions = _measure(unit)
+    except ValueError as error:
+        raise QuantityError(str(error), None, expected) from error
+    if dimensions != _measure(target)[1]:
+        raise QuantityError("wrong dimension", f"{unit} ({_kind_of(unit).name})", expected)
+    return size / _measure(target)[0]
+
+
+def engineers_unit(unit: str) -> tuple[str, float]:
+    """Return the unit that engineers use for what an SI unit measures, and its size in SI.
+
+    Parameters
+    ----------
+    unit : str
+        In SI; "1" for a plain number.
+
+    Returns
+    -------
+    (str, float)
+        "mm" and 1e-3 for "m"; "1" and 1 for a plain number.
+    """
+    if unit == "1":
+        return unit, 1.0
+    engineers = _kind_of(unit).example.split(maxsplit=1)[1]
+    return engineers, float(conversion(engineers, unit))
+
+
+def in_engineers_unit(value: float, unit: str, digits: int = 6) -> str:
+    """Return an SI value in the unit that engineers use, with that unit.
+
+    Parameters
+    ----------
+    value : float
+        In SI.
+    unit : str
+        Its SI unit; "1" for a plain number.
+    digits : int
+        Significant digits.
+
+    Returns
+    -------
+    str
+        "12.5 mm" for 0.0125 and "m"; zero and infinity stand without a unit.
+    """
+    if unit == "1" or value in {0.0, float("inf"), -float("inf")}:
+        return f"{value:.{digits}g}"
+    engineers, size = engineers_unit(unit)
+    return f"{value / size:.{digits}g} {engineers}"

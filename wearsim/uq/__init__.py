@@ -1,0 +1,1 @@
+"""Uncertainty quantification: distributions, sampling, estimation and sensitivity."""

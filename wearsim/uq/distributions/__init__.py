@@ -1,0 +1,1 @@
+"""Distributions with closed or tabulated quantile functions."""

@@ -1,0 +1,244 @@
+"""The law of maximum entropy: what is known, and nothing else (Shannon 1948, Jaynes 1957)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from wearsim.errors import WearsimError
+from wearsim.uq.distributions import maxent_solver
+from wearsim.uq.distributions.base import (
+    Exponential,
+    Law,
+    Mirrored,
+    Uniform,
+    exponential_fall,
+    exponential_std,
+)
+from wearsim.uq.distributions.gamma import Gamma
+from wearsim.uq.distributions.truncated_normal import QuadraticExponent, TruncatedNormal, has_parent
+
+_ROUNDING = 1e-12
+_RAREST = 1e-12  # probability of a far end
+_SMALLEST, _LARGEST = 1e-150, 1e150  # sizes whose squares, and their inverses, are numbers
+_OTHER_UNIT = "choose a unit in which it lies between 1e-150 and 1e150"
+
+
+class Infeasible(WearsimError, ValueError):  # noqa: N818  (it is what the knowledge is)
+    """No law has the mean and the spread that are asked for, or too little is known."""
+
+    exit_code = 2
+
+
+def maximum_entropy(
+    support: tuple[float, float],
+    mean: float | None = None,
+    std: float | None = None,
+    mean_log: float | None = None,
+) -> Law:
+    """Return the law of maximum entropy: the least certain one that agrees with what is known.
+
+    Parameters
+    ----------
+    support : tuple of float
+        Least and greatest value that is possible; either may be infinite.
+    mean : float, optional
+        Mean.
+    std : float, optional
+        Standard deviation; needs the mean.
+    mean_log : float, optional
+        Mean of the natural logarithm; needs the support [0, inf) and the mean, and takes the
+        place of the standard deviation.
+
+    Returns
+    -------
+    Law
+        Uniform, exponential, normal, truncated normal, exponential of a quadratic, or gamma.
+
+    Raises
+    ------
+    Infeasible
+        A ValueError that names the limit that is broken.
+    """
+    low, high = (float(end) for end in support)
+    _check(low, high, mean, std, mean_log)
+    if mean is None:
+        return Uniform(low, high)
+    if mean_log is not None:
+        return Gamma(mean, mean_log)
+    if high - mean < mean - low:
+        return Mirrored(_towards_lower(-high, -low, -mean, std))
+    return _towards_lower(low, high, mean, std)
+
+
+def _check(
+    low: float, high: float, mean: float | None, std: float | None, mean_log: float | None
+) -> None:
+    """Raise unless a law of maximum entropy exists."""
+    if not low < high:
+        raise Infeasible(f"the support must rise, got {low:g} to {high:g}")
+    if math.isfinite(low) and math.isfinite(high) and math.isinf(high - low):
+        raise Infeasible(f"the support {_interval(low, high)} is too wide for numbers")
+    for name, value in (("mean", mean), ("std", std), ("mean_log", mean_log)):
+        if value is not None and not math.isfinite(value):
+            raise Infeasible(f"{name} must be finite, got {value:g}")
+    _check_sizes(low, high, mean, std)
+    if mean_log is not None:
+        _check_logarithm(low, high, mean, std, mean_log)
+        return
+    if mean is None:
+        if std is not None:
+            raise Infeasible(f"a std alone gives no law, got std {std:g}; give the mean too")
+        if math.isinf(high - low):
+            raise Infeasible(
+                f"the support {_interval(low, high)} alone gives no law, since it is unbounded;"
+                " give a mean, or finite limits"
+            )
+        return
+    if not low < mean < high:
+        raise Infeasible(f"mean {mean:g} does not lie inside the support {_interval(low, high)}")
+    if std is None:
+        if math.isinf(low) and math.isinf(high):
+            raise Infeasible(
+                f"mean {mean:g} alone gives no law on (-inf, inf); give the std too, or a limit"
+            )
+    else:
+        _check_spread(low, high, mean, std)
+
+
+def _check_sizes(low: float, high: float, mean: float | None, std: float | None) -> None:
+    """Raise where a square or its inverse would be no number."""
+    sizes = {"std": std, "the width of the support": high - low}
+    if mean is not None:
+        sizes |= {"the distance of the mean from the support's end": min(mean - low, high - mean)}
+    for name, size in sizes.items():
+        if size is not None and 0.0 < size < _SMALLEST:
+            raise Infeasible(f"{name} {size:g} is too small to be squared; {_OTHER_UNIT}")
+    places = {"low": low, "high": high, "mean": mean, "std": std}
+    for name, place in places.items():
+        if place is not None and _LARGEST < abs(place) < math.inf:
+            raise Infeasible(f"{name} {place:g} is too large to be squared; {_OTHER_UNIT}")
+
+
+def _check_spread(low: float, high: float, mean: float, std: float) -> None:
+    """Raise unless some law on the support has this mean and this standard deviation."""
+    if std <= 0.0:
+        raise Infeasible(f"std {std:g} is not above zero")
+    below, above = mean - low, high - mean
+    least = min(below, above)
+    if math.isinf(least):
+        return
+    name = "mean - low" if below < above else "high - mean"
+    more = f"std {std:g} is more than {name} = {least:g}"
+    if math.isinf(max(below, above)):
+        if std > least * (1.0 + _ROUNDING):
+            support = _interval(low, high)
+            raise Infeasible(
+                f"{more}, the most that a law of maximum entropy on {support} can have"
+            )
+        return
+    limit = math.sqrt(below) * math.sqrt(above)
+    if std >= limit * (1.0 - _ROUNDING):
+        raise Infeasible(
+            f"std {std:g} is not less than sqrt((mean - low) (high - mean)) = {limit:g}, which no"
+            f" law on {_interval(low, high)} with mean {mean:g} can exceed"
+        )
+    weight = _spike(least / (high - low), std / (high - low))[1]
+    if std > least * (1.0 + _ROUNDING) and least < 0.02 * (high - low) and weight < _RAREST:
+        raise Infeasible(
+            f"{more}, which takes a probability of {weight:.0e} at the far end of"
+            f" {_interval(low, high)}, and no test would meet that; lower the std"
+        )
+
+
+def _check_logarithm(
+    low: float, high: float, mean: float | None, std: float | None, mean_log: float
+) -> None:
+    if mean is None:
+        raise Infeasible(f"mean_log {mean_log:g} needs the mean too")
+    if std is not None:
+        raise Infeasible(
+            f"mean_log {mean_log:g} takes the place of the std, got std {std:g}; leave one out"
+        )
+    if (low, high) != (0.0, math.inf):
+        raise Infeasible(f"mean_log needs the support [0, inf), got {_interval(low, high)}")
+    if not mean > 0.0:
+        raise Infeasible(f"mean {mean:g} does not lie inside the support [0, inf)")
+    if not mean_log < math.log(mean):
+        raise Infeasible(f"mean_log {mean_log:g} is not less than log(mean) = {math.log(mean):g}")
+
+
+def _interval(low: float, high: float) -> str:
+    start = f"[{low:g}" if math.isfinite(low) else f"({low:g}"
+    return f"{start}, {high:g}]" if math.isfinite(high) else f"{start}, {high:g})"
+
+
+def _towards_lower(low: float, high: float, mean: float, std: float | None) -> Law:
+    """Return the law whose mean lies nearer the lower end, or in the middle."""
+    if math.isinf(low):
+        assert std is not None
+        return TruncatedNormal(low, high, mean, std)
+    part = (mean - low) / (high - low)
+    fall = math.inf if math.isinf(high) else exponential_fall(part)
+    reach = mean - low if part < 0.02 else (high - low) / (fall or 1.0)
+    widest = reach * exponential_std(fall) if fall > 0.0 else (high - low) / math.sqrt(12.0)
+    if std is None or abs(std - widest) <= _ROUNDING * widest:
+        if fall == 0.0:
+            return Uniform(low, high)
+        return Exponential(low, high, 1.0 / reach, mean)
+    if std < widest:
+        return _one_peak(low, high, mean, std)
+    return _two_ends(low, high, mean, std, fall)
+
+
+def _one_peak(low: float, high: float, mean: float, std: float) -> Law:
+    """Return the law that spreads less than the exponential one: cut from a normal parent."""
+    start = (low - mean) / std
+    z, weights = maxent_solver.even_quadrature(
+        max(start, -maxent_solver.FAR), min((high - mean) / std, maxent_solver.FAR)
+    )
+    basis = maxent_solver.Basis(np.stack([z, z * z]), np.array([0.0, 1.0]), np.eye(2))
+    slope, bend = maxent_solver.multipliers(weights, [basis], [(0.0, 0.5)])
+    if bend <= 0.0:  # by rounding alone
+        return Exponential(low, high, slope / std, mean)
+    parent = mean - 0.5 * std * slope / bend, std / math.sqrt(2.0 * bend)
+    if has_parent(low, high, *parent):
+        return TruncatedNormal(low, high, *parent)
+    return QuadraticExponent(low, high, std, slope + 2.0 * bend * start, bend)
+
+
+def _two_ends(low: float, high: float, mean: float, std: float, fall: float) -> Law:
+    """Return the law that spreads more than the exponential one: dented, with l2 < 0.
+
+    Its exponent is told by ``t (1 - t)`` and t, t going from 0 to 1 over the support, because
+    both its ends are then exact.
+    """
+    width = high - low
+    part, spread = (mean - low) / width, std / width
+    dent = part * ((high - mean) / width) - spread * spread
+    guess, _ = _spike(part, spread)
+    t, rest, weights = maxent_solver.graded_quadrature(min(part, dent))
+    bases = [
+        maxent_solver.Basis(np.stack([t * rest, t]), np.array([dent, part]), np.eye(2)),
+        maxent_solver.Basis(
+            np.stack([t * t, t]),
+            np.array([spread * spread + part * part, part]),
+            np.array([[-1.0, 1.0], [0.0, 1.0]]),
+        ),
+    ]
+    bend, top = maxent_solver.multipliers(weights, bases, [(0.0, fall), guess])
+    return QuadraticExponent(low, high, width, bend + top, -bend, bend - top, top)
+
+
+def _spike(part: float, spread: float) -> tuple[tuple[float, float], float]:
+    """Return a guess of the multipliers where a spike at the far end makes up the spread.
+
+    And the probability of that spike.
+    """
+    weight = 0.5 * part
+    for _ in range(30):  # an exponential law and a point, with the right first two moments
+        point = spread**2 + part**2 - 2.0 * (part - weight) ** 2 / (1.0 - weight)
+        weight = min(max(point, 1e-300), 0.999 * part)
+    top = math.log((1.0 - weight) / weight)
+    return ((1.0 - weight) / (part - weight) - top, top), weight

@@ -1,0 +1,1 @@
+"""Estimates of moments and quantiles, with their intervals."""

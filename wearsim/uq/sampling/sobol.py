@@ -1,0 +1,192 @@
+"""Scrambled Sobol points by name: what an input gets depends on its own name alone.
+
+Well-known inputs have fixed dimensions of one Sobol sequence, `SLOTS` for the whole rig and as
+many again for each roller ("creepage.yaw@2"), so that they fill the space together. Any other
+input has the first two dimensions in an order of its own: it is stratified as well, and by chance
+alone against the others. Names hashed into dimensions would meet, and then no choice between
+them could be independent of which other inputs there are.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from wearsim.types import FloatArray
+from wearsim.uq.sampling.philox import Stream
+
+Words: TypeAlias = npt.NDArray[np.uint32]
+
+SLOTS = 16
+SLOT_OF = {
+    "load.normal_force": (0, 1),
+    "friction.coefficient": (1, 1),
+    "creepage.longitudinal": (2, 1),
+    "creepage.misalignment": (3, 2),
+    "creepage.yaw": (3, 1),
+    "creepage.tilt": (4, 1),
+    "wear.cylinder.k_over_h": (5, 1),
+    "wear.roller.k_over_h": (6, 1),
+    "load.stiffness": (7, 1),
+    "creepage.bearing_torque": (8, 1),
+    "load.thermal.gain": (9, 1),
+    "load.thermal.time_constant": (10, 1),
+    "roller.offset": (11, 1),
+}
+"""First slot of every well-known input, and how many it has."""
+
+_ROLLERS = 1000  # scipy knows 21201 dimensions
+_BITS = 32
+_ROUNDS = 4
+_VALUES, _ORDER = 0, 1  # what the words of a key are for
+
+
+def slots(name: str, dimension: int) -> range | None:
+    """Return the Sobol dimensions of an input, counted from 0, or None where it has none fixed.
+
+    Parameters
+    ----------
+    name : str
+        Name of the input, for one roller with its number: "creepage.yaw@2".
+    dimension : int
+        How many uniform numbers it takes.
+    """
+    base, _, roller = name.partition("@")
+    slot, width = SLOT_OF.get(base, (0, 0))
+    if dimension > width:
+        return None
+    if not roller:
+        return None if "@" in name else range(slot, slot + dimension)
+    if not (roller.isascii() and roller.isdecimal() and str(int(roller)) == roller):
+        return None
+    shift = SLOTS * (1 + int(roller))
+    return range(shift + slot, shift + slot + dimension) if int(roller) < _ROLLERS else None
+
+
+def scrambled(
+    seed: int, name: str, dimension: int, first: int, count: int, replicate: int = 0
+) -> FloatArray:
+    """Return the scrambled Sobol points of one input, strictly between 0 and 1.
+
+    Every component is scrambled by itself (Owen 1995, DOI 10.1007/978-1-4612-2552-2_19), so that
+    each point is uniform over the seeds and the points stay a digital net.
+
+    Parameters
+    ----------
+    seed : int
+        Seed of the scenario.
+    name : str
+        Name of the input.
+    dimension : int
+        How many uniform numbers it takes.
+    first, count : int
+        The first realisation, and how many.
+    replicate : int
+        Which of the independent scrambles of the sequence.
+
+    Returns
+    -------
+    ndarray, shape (count, dimension)
+    """
+    stop = first + count
+    if stop > 2**_BITS:
+        raise ValueError(
+            f"a Sobol plan has {2**_BITS} realisations, {stop} were asked for; take monte-carlo"
+        )
+    fixed = slots(name, dimension)
+    words = (
+        _padded(seed, name, dimension, first, count, replicate)
+        if fixed is None
+        else _sequence(fixed.stop, first, count)[:, fixed.start :]
+    )
+    for k in range(dimension):
+        words[:, k] = nested_scramble(words[:, k], _key(seed, name, _VALUES, k, replicate))
+    return np.asarray((words + 0.5) * 2.0**-_BITS, dtype=np.float64)
+
+
+def _sequence(dimensions: int, first: int, count: int) -> Words:
+    """Return the plain Sobol sequence, shape (count, dimensions)."""
+    from scipy.stats.qmc import Sobol  # noqa: PLC0415  (a second to import)
+
+    engine = Sobol(dimensions, scramble=False, bits=_BITS)
+    if first > 0:
+        engine.fast_forward(first)
+        points = engine.random(count)
+    else:
+        # the first point by itself: scipy warns of a first batch that is no power of two
+        points = np.concatenate([engine.random(1), engine.random(max(count - 1, 0))])[:count]
+    return np.asarray(points * 2.0**_BITS).astype(np.uint32)
+
+
+def _padded(seed: int, name: str, dimension: int, first: int, count: int, replicate: int) -> Words:
+    """Return the first two dimensions of the sequence in a random order for each two components.
+
+    The order is a nested scramble of the index: 2^m realisations on end from a multiple of 2^m
+    are as many of the sequence's, and thus a net (Burley 2020, JCGT 9(4)).
+    """
+    index = np.arange(first, first + count, dtype=np.uint64).astype(np.uint32)
+    words = np.empty((count, dimension), dtype=np.uint32)
+    for k in range(0, dimension, 2):
+        order = nested_scramble(index, _key(seed, name, _ORDER, k, replicate))
+        words[:, k] = reverse_bits(order)
+        if k + 1 < dimension:
+            words[:, k + 1] = _second_dimension(order)
+    return words
+
+
+def _second_dimension(index: Words) -> Words:
+    """Return the words of Sobol's second dimension: Pascal's triangle modulo 2 by the index."""
+    words = np.zeros_like(index)
+    direction = 2 ** (_BITS - 1)
+    for bit in range(_BITS):
+        words ^= (index >> np.uint32(bit) & np.uint32(1)) * np.uint32(direction)
+        direction ^= direction >> 1
+    return words
+
+
+def reverse_bits(words: Words) -> Words:
+    """Return 32-bit words with their bits in the opposite order."""
+    for width, low in ((1, 0x55555555), (2, 0x33333333), (4, 0x0F0F0F0F), (8, 0x00FF00FF)):
+        mask, shift = np.uint32(low), np.uint32(width)
+        words = (words >> shift & mask) | (words & mask) << shift
+    return (words >> np.uint32(16)) | (words << np.uint32(16))
+
+
+def nested_scramble(words: Words, key: Words) -> Words:
+    """Flip every bit of `words` by a hash of the bits above it: a nested uniform scramble.
+
+    Sums and products let no bit change those below it, so that on reversed bits they keep the
+    intervals nested (Laine and Karras 2011; Burley 2020, JCGT 9(4)). The first sum alone makes
+    every word uniform over the keys; the rounds make different branches flip independently.
+
+    Parameters
+    ----------
+    words : ndarray of uint32
+        Numbers in units of 2^-32, or indices.
+    key : ndarray of uint32, shape (rounds, 3)
+        What is added, the even factor and the odd factor of every round.
+
+    Returns
+    -------
+    ndarray of uint32, shape as `words`
+    """
+    mixed = reverse_bits(words)
+    for added, even, odd in key:
+        mixed = (mixed + added) * odd
+        mixed = mixed ^ mixed * even
+    return reverse_bits(mixed)
+
+
+@lru_cache(maxsize=2048)
+def _key(seed: int, name: str, use: int, component: int, replicate: int = 0) -> Words:
+    """Return the random constants of one scramble."""
+    needed = 3 * _ROUNDS
+    words = Stream(seed, name, "plan").words(replicate * needed, needed, use, component)
+    key = (words >> np.uint64(32)).astype(np.uint32).reshape(_ROUNDS, 3)
+    key[:, 1] &= ~np.uint32(1)
+    key[:, 2] |= np.uint32(1)
+    key.flags.writeable = False
+    return key
