@@ -185,7 +185,9 @@ def test_cache_is_renewed_when_a_callee_elsewhere_changes(copied: Path, tmp_path
     head = "from wearsim.mechanics.numerics.jit import kernel\n"
     body = "\n\n@kernel\ndef {name}(x: float) -> float:\n    return {value}\n"
     outer = body.format(name="outer", value="2.0 * inner(x)")
-    (callers / "outer.py").write_text(head + "from wearsim.mechanics.hertz.inner import inner\n" + outer)
+    (callers / "outer.py").write_text(
+        head + "from wearsim.mechanics.hertz.inner import inner\n" + outer
+    )
     found = []
     for value in ("x + 1.0", "x + 3.0"):
         (callees / "inner.py").write_text(head + body.format(name="inner", value=value))

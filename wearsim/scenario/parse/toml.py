@@ -13,6 +13,7 @@ from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.scenario.parse.key_index import REQUIRED, TABLES, all_names
 from wearsim.scenario.parse.mistakes import Report
 from wearsim.scenario.parse.overrides import apply_overrides
+from wearsim.scenario.parse.validate import validate
 from wearsim.scenario.random.model import RandomInput
 from wearsim.scenario.random.placeholders import put_all
 from wearsim.scenario.scenario import Scenario
@@ -180,7 +181,7 @@ def _read_top(data: Mapping[str, object], report: Report) -> TopTable:
             report.add(key, "", f"unknown table{report.names.near(key, TABLES)}")
         else:
             report.add("", key, f"unknown key{report.names.hint(key, TopTable.model_fields)}")
-    return report.validate(TopTable, own, "") or TopTable()
+    return validate(report, TopTable, own, "") or TopTable()
 
 
 def _read_table(table: str, data: Mapping[str, object], report: Report) -> Any:

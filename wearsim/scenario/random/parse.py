@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from wearsim.errors import PluginError, ScenarioError
 from wearsim.plugins import Distribution, JointDistribution, RandomInputSpec, registry
 from wearsim.quantities import Quantity
+from wearsim.scenario.parse.pydantic_errors import validate_options
 from wearsim.scenario.random.model import (
     CONTACT_FIELDS,
     FRICTION,
@@ -50,7 +51,7 @@ def read_random_input(
     """
     before = len(report.problems)
     ours, options = _split(raw)
-    table = report.validate_options(RandomInputTable, ours, name)
+    table = validate_options(report, RandomInputTable, ours, name)
     spec = _find(raw["distribution"], name, report)
     if spec is None or not _suits(spec, name, joint, report):
         return None
@@ -170,7 +171,7 @@ def _build(
     report: Report,
 ) -> Any:
     """Build what the distribution's options ask for, or note what is wrong with them."""
-    options = report.validate_options(spec.options, raw, place, quantity, RandomInputTable)
+    options = validate_options(report, spec.options, raw, place, RandomInputTable, quantity)
     lacks_marginal = spec.role in _WITH_MARGINAL and marginal is None
     if options is None or lacks_marginal:
         return None

@@ -13,6 +13,7 @@ from wearsim.csv_tables import read_columns
 from wearsim.errors import ScenarioError
 from wearsim.quantities import InputFile, Length, PerRoller, PositiveLength, PositivePressure
 from wearsim.scenario.parse.mistakes import Report, Table
+from wearsim.scenario.parse.validate import validate
 from wearsim.types import Material, Profile
 from wearsim.units import QuantityError, shown
 
@@ -133,7 +134,7 @@ def read_roller(raw: Mapping[str, object], report: Report) -> Roller | None:
     """Return the table [roller], or None after noting its mistakes."""
     report.exactly_one(raw, "roller", ("radius", "diameter"))
     report.exactly_one(raw, "roller", ("crown_radius", "crown_diameter"))
-    table = report.validate(RollerTable, raw, "roller")
+    table = validate(report, RollerTable, raw, "roller")
     if table is None:
         return None
     radius = _radius(table.radius, table.diameter)
@@ -146,7 +147,7 @@ def read_roller(raw: Mapping[str, object], report: Report) -> Roller | None:
 def read_cylinder(raw: Mapping[str, object], report: Report) -> Cylinder | None:
     """Return the table [cylinder], or None after noting its mistakes."""
     report.exactly_one(raw, "cylinder", ("radius", "diameter"))
-    table = report.validate(CylinderTable, raw, "cylinder")
+    table = validate(report, CylinderTable, raw, "cylinder")
     if table is None:
         return None
     radius = _radius(table.radius, table.diameter)

@@ -18,6 +18,7 @@ from wearsim.quantities import (
     Quantity,
 )
 from wearsim.scenario.parse.mistakes import Report, Table
+from wearsim.scenario.parse.validate import validate
 from wearsim.scenario.random.targets import Joint
 from wearsim.units import ANGLE
 
@@ -145,12 +146,12 @@ def read_operation(raw: Mapping[str, object], report: Report) -> OperationTable 
     """Return the table [operation], or None after noting its mistakes."""
     if "duration" in raw and "passes" in raw:
         report.exactly_one(raw, "operation", ("duration", "passes"))
-    return report.validate(OperationTable, raw, "operation")
+    return validate(report, OperationTable, raw, "operation")
 
 
 def read_friction(raw: Mapping[str, object], report: Report) -> FrictionTable | None:
     """Return the table [friction], or None after noting its mistakes."""
-    return report.validate(FrictionTable, raw, "friction")
+    return validate(report, FrictionTable, raw, "friction")
 
 
 def read_creepage(raw: Mapping[str, object], report: Report) -> CreepageTable | None:
@@ -164,7 +165,7 @@ def read_creepage(raw: Mapping[str, object], report: Report) -> CreepageTable | 
             report.add("creepage", needed, f'is needed with drive = "{drive}"', "none")
         if refused in raw:
             report.add("creepage", refused, f'has no meaning with drive = "{drive}"')
-    table = report.validate(CreepageTable, raw, "creepage")
+    table = validate(report, CreepageTable, raw, "creepage")
     if table is not None:
         _check_angles(table, report)
     return table
@@ -188,7 +189,7 @@ def _check_angles(table: CreepageTable, report: Report) -> None:
 
 def read_evolution(raw: Mapping[str, object], report: Report) -> EvolutionTable | None:
     """Return the table [evolution], or None after noting its mistakes."""
-    return report.validate(EvolutionTable, raw, "evolution")
+    return validate(report, EvolutionTable, raw, "evolution")
 
 
 def read_outputs(raw: Mapping[str, object], report: Report) -> OutputsTable | None:
@@ -200,4 +201,4 @@ def read_outputs(raw: Mapping[str, object], report: Report) -> OutputsTable | No
         report.exactly_one(raw, "outputs", CADENCES)
     elif "spacing" in raw and given != ["records"]:
         report.add("outputs", "spacing", f"goes with records, not with {given[0]}")
-    return report.validate(OutputsTable, raw, "outputs")
+    return validate(report, OutputsTable, raw, "outputs")

@@ -22,7 +22,9 @@ from wearsim.plugins import (
     registry,
 )
 from wearsim.quantities import Length, PositiveLength
-from wearsim.scenario.parse.mistakes import Report, Table, key_of_file
+from wearsim.scenario.parse.mistakes import Report, Table
+from wearsim.scenario.parse.pydantic_errors import key_of_file
+from wearsim.scenario.parse.validate import validate
 from wearsim.units import shown
 
 S = TypeVar("S", bound=Spec)
@@ -188,11 +190,11 @@ def read_contact(raw: Mapping[str, object], report: Report) -> ContactChoice | N
     if "model" not in ours:
         ours["model"] = _default_model(report)
     name = ours["model"]
-    table = report.validate(ContactTable, ours, "contact")
+    table = validate(report, ContactTable, ours, "contact")
     spec = None
     if isinstance(name, str):
         spec = _find(ContactModelSpec, name, "contact", "model", report)
-    options = report.validate(spec.options, rest, "contact", ContactTable) if spec else None
+    options = validate(report, spec.options, rest, "contact", ContactTable) if spec else None
     if table is None or options is None:
         return None
     return ContactChoice(table.model, options, table.strips, table.width, table.centre)
@@ -201,18 +203,18 @@ def read_contact(raw: Mapping[str, object], report: Report) -> ContactChoice | N
 def read_wear(raw: Mapping[str, object], report: Report) -> WearChoice | None:
     """Return the table [wear], or None after noting its mistakes."""
     ours, rest = _split(raw, WearTable)
-    table = report.validate(WearTable, ours, "wear")
+    table = validate(report, WearTable, ours, "wear")
     if table is None:
         return None
     spec = _find(WearLawSpec, table.law, "wear", "law", report)
-    options = report.validate(spec.options, rest, "wear", WearTable) if spec else None
+    options = validate(report, spec.options, rest, "wear", WearTable) if spec else None
     return WearChoice(table.law, options) if options is not None else None
 
 
 def read_load(raw: Mapping[str, object], report: Report) -> LoadChoice | None:
     """Return the table [load] with its terms, or None after noting its mistakes."""
     ours, rest = _split(raw, LoadTable)
-    table = report.validate(LoadTable, ours, "load")
+    table = validate(report, LoadTable, ours, "load")
     spec = _find(LoadSpec, table.kind, "load", "kind", report) if table else None
     tables = {
         key: value
@@ -233,7 +235,7 @@ def read_load(raw: Mapping[str, object], report: Report) -> LoadChoice | None:
     for name in [key for key in rest if key not in spec.options.model_fields and _is_term(key)]:
         expected = f"a table [load.{name}]"
         report.add("load", name, "is a term of the load", shown(rest.pop(name)), expected)
-    options = report.validate(spec.options, rest, "load", LoadTable)
+    options = validate(report, spec.options, rest, "load", LoadTable)
     if options is None or not _builds(spec, options, rest, report) or None in terms:
         return None
     return LoadChoice(table.kind, options, tuple(term for term in terms if term is not None))
@@ -261,5 +263,5 @@ def _read_term(name: str, raw: dict[str, object], report: Report) -> TermChoice 
     if spec.role == "base":
         report.add(table, "", f"'{name}' is no term but a load of its own, chosen by load.kind")
         return None
-    options = report.validate(spec.options, raw, table)
+    options = validate(report, spec.options, raw, table)
     return TermChoice(name, options) if options is not None else None

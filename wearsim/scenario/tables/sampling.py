@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from wearsim.scenario.parse.mistakes import Report, Table
+from wearsim.scenario.parse.validate import validate
 from wearsim.scenario.random.model import RandomInput
 from wearsim.units import shown
 from wearsim.uq.sampling.gaussian_copula import GaussianCopula
@@ -32,7 +33,7 @@ class SamplingTable(Table):
 
 def read_sampling(raw: Mapping[str, object], report: Report) -> SamplingTable | None:
     """Return the table [sampling], or None after noting its mistakes."""
-    return report.validate(SamplingTable, raw, "sampling")
+    return validate(report, SamplingTable, raw, "sampling")
 
 
 def check_correlation(table: SamplingTable | None, report: Report) -> None:
