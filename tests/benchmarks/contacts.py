@@ -8,8 +8,6 @@ from typing import Any
 import numpy as np
 
 from tests.benchmarks.table import Effort, Row, part
-from wearsim.bench.contact_cases import Case, elliptic_cases
-from wearsim.bench.timing import best, best_short
 from wearsim.contact_batch import OperatingPoints
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.mechanics.hertz.ellipse import HertzContact, hertz
@@ -18,6 +16,8 @@ from wearsim.mechanics.tangential.strip_theory import SUMS, strip_contacts
 from wearsim.models.contact.hertz_fastsim import HertzFastsim, HertzFastsimOptions
 from wearsim.plugins import ContactModelSpec, registry
 from wearsim.types import ContactSolution, Creepage, Grid, Material, OperatingPoint
+from wearsim_bench.contact.cases import Case, elliptic_cases
+from wearsim_bench.measure.timing import best, best_short
 
 STEEL = Material(youngs_modulus=200e9, poisson_ratio=0.3)
 ALONG, CROWN, LOAD = 1 / 0.020 + 1 / 0.025, 0.5, 300.0

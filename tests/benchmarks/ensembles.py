@@ -16,9 +16,9 @@ from pathlib import Path
 import wearsim
 from tests.benchmarks.ensemble_cases import ALL, Size, drawn, end_values
 from tests.benchmarks.table import Row, markdown, part
-from wearsim.bench.machine import this_machine
-from wearsim.bench.timing import timed
 from wearsim.scenario import Scenario
+from wearsim_bench.measure.machine import this_machine
+from wearsim_bench.measure.timing import timed
 
 MEMBERS = 5
 SHORT = 6000  # passes of a shortened test

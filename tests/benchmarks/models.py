@@ -17,7 +17,10 @@ from typing import Any
 from tests.benchmarks.replays import SCENARIOS
 from tests.benchmarks.table import part
 from wearsim import load_scenario, run
-from wearsim.bench.accuracy import (
+from wearsim.errors import WearsimError
+from wearsim.plugins.template import template_folder
+from wearsim.report.text.units import brief
+from wearsim_bench.contact.accuracy import (
     PowerErrors,
     WornErrors,
     built,
@@ -26,15 +29,12 @@ from wearsim.bench.accuracy import (
     solved,
     worn_errors,
 )
-from wearsim.bench.contact_cases import elliptic_cases
-from wearsim.bench.contact_methods import normal_methods
-from wearsim.bench.exact import WORN
-from wearsim.bench.machine import this_machine
-from wearsim.bench.timing import best_short, timed
-from wearsim.errors import WearsimError
-from wearsim.plugins.template import template_folder
-from wearsim.report.bench_table import markdown_table
-from wearsim.report.text.units import brief
+from wearsim_bench.contact.cases import elliptic_cases
+from wearsim_bench.contact.methods import normal_methods
+from wearsim_bench.exact_solutions import WORN
+from wearsim_bench.figures.table import markdown_table
+from wearsim_bench.measure.machine import this_machine
+from wearsim_bench.measure.timing import best_short, timed
 
 #: what is drawn or prescribed, by contact model and options
 TANGENTIAL: dict[str, tuple[str, dict[str, Any]]] = {

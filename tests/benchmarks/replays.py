@@ -7,9 +7,9 @@ from tempfile import TemporaryDirectory
 
 import wearsim
 from tests.benchmarks.table import Effort, Row, part
-from wearsim.bench.timing import best, timed
 from wearsim.results import Result, open_results, write_results
 from wearsim.scenario import Scenario
+from wearsim_bench.measure.timing import best, timed
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 SPRING = {"load.kind": "spring", "load.stiffness": "690 N/mm"}

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from tests.benchmarks import contacts, replays, starts, studies
 from tests.benchmarks.table import Effort, Row, markdown
-from wearsim.bench.machine import this_machine
+from wearsim_bench.measure.machine import this_machine
 
 TABLES: dict[str, list[Callable[[Effort], list[Row]]]] = {
     "One contact": [

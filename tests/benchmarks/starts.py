@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 
 from tests.benchmarks.replays import SCENARIOS
 from tests.benchmarks.table import Effort, Row
-from wearsim.bench.timing import best, timed
+from wearsim_bench.measure.timing import best, timed
 
 WEARSIM = [sys.executable, "-m", "wearsim"]
 

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from tests.benchmarks.table import Effort, Row, part
-from wearsim.bench.timing import best
 from wearsim.scenario import Scenario, load_scenario
 from wearsim.studies.contact.monte_carlo import dissipation
 from wearsim.uq.distributions.maxent import maximum_entropy
 from wearsim.uq.sampling.philox import Stream
+from wearsim_bench.measure.timing import best
 
 PAPER = Path(__file__).parents[2] / "scenarios" / "paper-monte-carlo.toml"
 MEAN_POWER = 0.1058  # W, of the paper's inputs

@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wearsim.bench.exact import CREEPAGES, STEEL, rows, strips_of, worn_profile
 from wearsim.errors import ContactError
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.models.contact.hertz import HertzModel
 from wearsim.models.tangential.base import Strips, complete, spread_work
 from wearsim.models.tangential.fastrip import FastripTheory
 from wearsim.types import Creepage, Grid, OperatingPoint
+from wearsim_bench.exact_solutions import CREEPAGES, STEEL, rows, strips_of, worn_profile
 
 MATERIALS = (STEEL, STEEL)
 PAIR = combine(*MATERIALS)

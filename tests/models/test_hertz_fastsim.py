@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from wearsim.bench.exact import STEEL, rows, table, worn_profile
 from wearsim.contact_batch import OperatingPoints
 from wearsim.errors import CapabilityError, ContactError
 from wearsim.mechanics.hertz.elasticity import combine
@@ -21,6 +20,7 @@ from wearsim.models.contact.hertz_fastsim import SPEC, HertzFastsim, HertzFastsi
 from wearsim.models.tangential.base import Strips, complete
 from wearsim.models.tangential.fastsim import FastsimTheory
 from wearsim.types import Creepage, Grid, OperatingPoint
+from wearsim_bench.exact_solutions import STEEL, rows, table, worn_profile
 
 MATERIALS = (STEEL, STEEL)
 PAIR = combine(*MATERIALS)

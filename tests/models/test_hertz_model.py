@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from wearsim.bench.exact import STEEL, rows
 from wearsim.errors import CapabilityError, ContactError
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.mechanics.hertz.ellipse import hertz
@@ -12,6 +11,7 @@ from wearsim.models.contact.hertz import SPEC, HertzModel, Patch
 from wearsim.models.contact.hertz_fastsim import HertzFastsim, HertzFastsimOptions
 from wearsim.models.tangential.strip_theory import StripTheory
 from wearsim.types import Creepage, Grid, OperatingPoint
+from wearsim_bench.exact_solutions import STEEL, rows
 
 MATERIALS = (STEEL, STEEL)
 PAIR = combine(*MATERIALS)

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from tests.studies.study_examples import short
-from wearsim.bench.exact import CREEPAGES, STEEL, WORN, worn_profile
 from wearsim.errors import ContactError
 from wearsim.models.contact.semi_hertzian import SPEC, SemiHertzianOptions
 from wearsim.studies.run import run as replay
 from wearsim.types import Creepage, Grid, OperatingPoint
+from wearsim_bench.exact_solutions import CREEPAGES, STEEL, WORN, worn_profile
 
 MATERIALS = (STEEL, STEEL)
 RIG = 90.0

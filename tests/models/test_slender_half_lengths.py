@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from tests.reference import half_space
-from wearsim.bench.exact import STEEL, WORN, worn_profile
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.mechanics.hertz.ellipse import hertz
 from wearsim.models.contact.slender import SPEC, SlenderOptions
 from wearsim.types import Creepage, Grid, OperatingPoint
+from wearsim_bench.exact_solutions import STEEL, WORN, worn_profile
 
 pytestmark = pytest.mark.bench
 

@@ -6,11 +6,11 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from wearsim.bench.exact import CREEPAGES, STEEL, WORN, rows, worn_profile
 from wearsim.errors import ContactError
 from wearsim.models.contact.slender import SPEC, Slender, SlenderOptions
 from wearsim.models.tangential.strip_theory import StripTheory
 from wearsim.types import ContactSolution, Creepage, Grid, OperatingPoint
+from wearsim_bench.exact_solutions import CREEPAGES, STEEL, WORN, rows, worn_profile
 
 MATERIALS = (STEEL, STEEL)
 SPEED = 1000.0 * 2.0 * math.pi / 60.0 * 25e-3

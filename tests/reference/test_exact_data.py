@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wearsim.bench.exact import CREEPAGES, WORN, rows, strips_of, table, worn_profile
+from wearsim_bench.exact_solutions import CREEPAGES, WORN, rows, strips_of, table, worn_profile
 
 pytestmark = pytest.mark.bench
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tests.reference import half_space
-from wearsim.bench.exact import WORN, worn_profile
 from wearsim.mechanics.hertz.ellipse import hertz
+from wearsim_bench.exact_solutions import WORN, worn_profile
 
 MODULUS = 200e9 / (2.0 * (1.0 - 0.3**2))
 

@@ -4,9 +4,9 @@ from functools import cache
 
 import pytest
 
-from wearsim.bench.accuracy import built, drawn_errors, hard_errors, worn_errors
-from wearsim.bench.exact import WORN
 from wearsim.errors import ContactError
+from wearsim_bench.contact.accuracy import built, drawn_errors, hard_errors, worn_errors
+from wearsim_bench.exact_solutions import WORN
 
 pytestmark = pytest.mark.bench
 

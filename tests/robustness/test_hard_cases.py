@@ -2,10 +2,10 @@
 
 import pytest
 
-from wearsim.bench.hard_cases import SHORT, hard_cases
-from wearsim.bench.hard_field import friction_field
-from wearsim.bench.hard_judging import judged
-from wearsim.bench.hard_runs import Plan
+from wearsim_bench.hard_cases.cases import SHORT, hard_cases
+from wearsim_bench.hard_cases.friction_field import friction_field
+from wearsim_bench.hard_cases.judgement import judged
+from wearsim_bench.hard_cases.runs import Plan
 
 pytestmark = pytest.mark.bench
 

@@ -7,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from wearsim.cli.commands.bench import bench
 from wearsim.cli.commands.check import check
 from wearsim.cli.commands.compare import compare
 from wearsim.cli.commands.contact import contact
@@ -18,7 +17,6 @@ from wearsim.cli.commands.maxent import maxent
 from wearsim.cli.commands.new import new
 from wearsim.cli.commands.plot import plot
 from wearsim.cli.commands.plugins import plugins
-from wearsim.cli.commands.reproduce import reproduce
 from wearsim.cli.commands.resume import resume
 from wearsim.cli.commands.run import run
 from wearsim.cli.commands.schema import schema
@@ -38,7 +36,7 @@ app = typer.Typer(
 )
 for verb in (
     check, contact, dissipation, run, ensemble, resume, show, plot, compare, export, maxent,
-    reproduce, bench, plugins, schema,
+    plugins, schema,
 ):  # fmt: skip
     app.command()(verb)
 app.add_typer(new)

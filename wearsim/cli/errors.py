@@ -9,6 +9,7 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
+from wearsim.cli.installed_verbs import InstalledVerb, installed_verbs, missing_verb
 from wearsim.errors import Interrupted, ScenarioError, SolverError, WearsimError
 
 FAILED = 1
@@ -18,7 +19,26 @@ TRACEBACK = "WEARSIM_TRACEBACK"
 
 
 class Shell(TyperGroup):
-    """The group of verbs: whatever a verb raises becomes a message and an exit code."""
+    """The group of verbs, built-in and installed, which turns errors into exit codes."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Return the names of all verbs, built-in ones first."""
+        built_in = super().list_commands(ctx)
+        return [*built_in, *(name for name in installed_verbs() if name not in built_in)]
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Return a verb; an installed one is not imported."""
+        return super().get_command(ctx, cmd_name) or installed_verbs().get(cmd_name)
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Return the verb that is called, imported, and its arguments."""
+        hint = missing_verb(args[0]) if self.get_command(ctx, args[0]) is None else None
+        if hint:
+            ctx.fail(hint)
+        name, command, rest = super().resolve_command(ctx, args)
+        if isinstance(command, InstalledVerb):
+            command = command.load()
+        return name, command, rest
 
     def invoke(self, ctx: Any) -> Any:
         """Run a verb.

@@ -8,7 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.special import ellipe, ellipkm1
 
-from wearsim.bench.exact import rows
 from wearsim.mechanics.hertz.ellipse import axis_ratio, elliptic_integrals, given_ellipse, hertz
 from wearsim.mechanics.hertz.parabola_fit import (
     CONVERGED,
@@ -18,6 +17,7 @@ from wearsim.mechanics.hertz.parabola_fit import (
     fit_parabola,
     hertz_on_profile,
 )
+from wearsim_bench.exact_solutions import rows
 
 MODULUS = 200e9 / (2.0 * (1.0 - 0.3**2))
 

@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.mechanics.tangential.line_contact import rolling_strip
-from wearsim.bench.exact import STEEL, rows
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.mechanics.tangential.carter import SPIN_LIMIT, TURNED, mean_direction, strip_force
+from wearsim_bench.exact_solutions import STEEL, rows
 
 PAIR = combine(STEEL, STEEL)
 MODULI = PAIR.contact_modulus, PAIR.shear_modulus

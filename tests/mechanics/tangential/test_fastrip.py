@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wearsim.bench.exact import STEEL, rows, table
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.mechanics.tangential.fastrip import fastrip, fastrip_fields
 from wearsim.mechanics.tangential.fastsim import march
@@ -17,6 +16,7 @@ from wearsim.mechanics.tangential.kalker_coefficients import (
     one_flexibility,
 )
 from wearsim.mechanics.tangential.strip_with_spin import Motion, amended_moduli, strip_of
+from wearsim_bench.exact_solutions import STEEL, rows, table
 
 PAIR = combine(STEEL, STEEL)
 SHEAR, NU = PAIR.shear_modulus, PAIR.poisson_ratio

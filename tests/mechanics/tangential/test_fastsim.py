@@ -9,7 +9,6 @@ import scipy.special
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wearsim.bench.exact import rows, table
 from wearsim.mechanics.hertz.ellipse import hertz
 from wearsim.mechanics.tangential.fastsim import (
     bound_shape,
@@ -26,6 +25,7 @@ from wearsim.mechanics.tangential.fastsim_fields import (
     march_local_fields,
 )
 from wearsim.mechanics.tangential.kalker_coefficients import flexibilities, line_limit_coefficients
+from wearsim_bench.exact_solutions import rows, table
 
 SHEAR = 200e9 / 2.6
 SPEED = 1000.0 * 2.0 * math.pi / 60.0 * 25e-3

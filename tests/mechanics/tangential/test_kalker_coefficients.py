@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wearsim.bench.exact import rows
 from wearsim.mechanics.tangential.kalker_coefficients import (
     creepage_coefficients,
     flexibilities,
@@ -17,6 +16,7 @@ from wearsim.mechanics.tangential.kalker_coefficients import (
     short_limit,
     spline,
 )
+from wearsim_bench.exact_solutions import rows
 
 NAMES = ("c11", "c22", "c23", "c33")
 

@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wearsim.bench.exact import rows
 from wearsim.mechanics.tangential.strip_interaction import (
     coupling_length,
     effective_moduli,
@@ -14,6 +13,7 @@ from wearsim.mechanics.tangential.strip_interaction import (
     strip_elasticity,
 )
 from wearsim.mechanics.tangential.strip_theory import new_tractions, solve_strips
+from wearsim_bench.exact_solutions import rows
 
 STEEL = strip_elasticity(110e9, 77e9)
 POISSON = 0.3

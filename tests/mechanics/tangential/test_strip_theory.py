@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wearsim.bench.exact import STEEL, rows, strips_of, table
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.mechanics.tangential.strip_interaction import strip_elasticity
 from wearsim.mechanics.tangential.strip_theory import (
@@ -14,6 +13,7 @@ from wearsim.mechanics.tangential.strip_theory import (
     solve_strips,
     strip_contacts,
 )
+from wearsim_bench.exact_solutions import STEEL, rows, strips_of, table
 
 pytestmark = pytest.mark.bench
 

@@ -1,0 +1,1 @@
+"""Measurements of speed against error, and the hard cases."""

@@ -1,0 +1,1 @@
+"""Contact models against exact solutions."""

@@ -1,0 +1,153 @@
+"""How near contact models come to the exact theory: the errors that tests and tables hold."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from wearsim.errors import ContactError
+from wearsim.plugins import ContactModel, ContactModelSpec, registry
+from wearsim.types import ContactSolution, FloatArray, Grid
+from wearsim_bench.contact.cases import MATERIALS, Case, contact_width, elliptic_cases, worn_cases
+from wearsim_bench.exact_solutions import worn_profile
+
+WORN_STRIPS = 321
+
+
+@dataclass(frozen=True)
+class CaseErrors:
+    """Errors of one contact, relative to the exact theory; all but that of P_l(y) have a sign.
+
+    Power, P_l(y) (L2 over the strips), width and greatest pressure.
+    """
+
+    power: float
+    dissipation: float
+    width: float
+    peak_pressure: float
+
+
+@dataclass(frozen=True)
+class PowerErrors:
+    """Errors over many contacts: of the power, rms and worst, and L2 of P_l(y), median."""
+
+    rms: float
+    worst: float
+    strips: float
+
+
+@dataclass(frozen=True)
+class WornErrors:
+    """Errors on a worn profile, relative to the exact theory.
+
+    L1 of the line load, mean of the half-length's error over its mean, errors of approach and peak
+    pressure, and for every creepage the L2 error of P_l(y) and that of the power.
+    """
+
+    line_load: float
+    half_length: float
+    approach: float
+    peak_pressure: float
+    dissipation: dict[str, float]
+    power: dict[str, float]
+
+
+def built(name: str, **options: Any) -> ContactModel:
+    """Return a contact model by its registered name, not yet prepared."""
+    spec = registry().get(ContactModelSpec, name)
+    return spec.factory(spec.options(**options))
+
+
+def solved(
+    model: ContactModel, case: Case, strips: int | None = None
+) -> tuple[ContactSolution, Grid]:
+    """Prepare a model and solve a case, by default on strips of the model's choice."""
+    grid = case.grid(model, strips)
+    model.prepare(grid, MATERIALS)
+    return model.solve(case.gap_at(grid.y), case.longitudinal_curvature, case.point), grid
+
+
+def errors_of(solution: ContactSolution, grid: Grid, case: Case) -> CaseErrors:
+    """Return the errors of a solution.
+
+    Raises
+    ------
+    ContactError
+        If one is not finite.
+    """
+    exact = case.exact
+    errors = CaseErrors(
+        power=solution.power / exact.power - 1.0,
+        dissipation=l2(
+            solution.dissipation,
+            np.interp(solution.y, exact.y, exact.dissipation, left=0.0, right=0.0),
+        ),
+        width=contact_width(solution.line_load, grid.spacing) / exact.width - 1.0,
+        peak_pressure=solution.peak_pressure / exact.peak_pressure - 1.0,
+    )
+    wrong = [name for name, error in vars(errors).items() if not np.isfinite(error)]
+    if wrong:
+        raise ContactError(f"what it gives for {', '.join(wrong)} is not finite", vars(errors))
+    return errors
+
+
+def l2(found: FloatArray, exact: FloatArray) -> float:
+    """Return the L2 norm of the error over that of the exact values."""
+    return float(np.sqrt(((found - exact) ** 2).sum() / (exact**2).sum()))
+
+
+def rms(errors: Iterable[float]) -> float:
+    """Return the root of the mean square of errors."""
+    return float(np.sqrt(np.mean(np.square(list(errors)))))
+
+
+def drawn_errors(model: ContactModel, kind: str) -> PowerErrors:
+    """Return the errors over the 40 draws of `rig_random` of a kind, `paper` or `partial`."""
+    return _over(model, elliptic_cases(kind))
+
+
+def hard_errors(model: ContactModel, least_ratio: float) -> PowerErrors:
+    """Return the errors over the hard cases whose b/a is at least so much."""
+    cases = elliptic_cases("hard")
+    return _over(model, [c for c in cases if c.patch.b >= least_ratio * c.patch.a])
+
+
+def _over(model: ContactModel, cases: Iterable[Case]) -> PowerErrors:
+    return summed([errors_of(*solved(model, case), case) for case in cases])
+
+
+def summed(found: Sequence[CaseErrors]) -> PowerErrors:
+    """Return the errors over many contacts from those of each."""
+    powers = [errors.power for errors in found]
+    strips = float(np.median([errors.dissipation for errors in found]))
+    return PowerErrors(rms(powers), float(np.abs(powers).max()), strips)
+
+
+def worn_errors(model: ContactModel, name: str) -> WornErrors:
+    """Return the errors on a worn profile of the reference data.
+
+    Raises
+    ------
+    ContactError
+        If the model has no answer on it.
+    """
+    exact, cases = worn_profile(name), worn_cases(name)
+    found = {slip: solved(model, case, WORN_STRIPS) for slip, case in cases.items()}
+    errors = {slip: errors_of(*found[slip], case) for slip, case in cases.items()}
+    solution, grid = found["mean"]
+
+    def l1(values: FloatArray, key: str) -> float:
+        true = np.interp(grid.y, exact["y"], exact[key], left=0.0, right=0.0)
+        return float(np.abs(values - true).sum() / true.sum())
+
+    return WornErrors(
+        line_load=l1(solution.line_load, "q"),
+        half_length=l1(solution.half_length, "a"),
+        approach=solution.approach / exact["approach"] - 1.0,
+        peak_pressure=errors["mean"].peak_pressure,
+        dissipation={slip: error.dissipation for slip, error in errors.items()},
+        power={slip: error.power for slip, error in errors.items()},
+    )

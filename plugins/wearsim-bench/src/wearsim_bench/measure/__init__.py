@@ -1,0 +1,1 @@
+"""Timings, memory, the machine, and measured points."""

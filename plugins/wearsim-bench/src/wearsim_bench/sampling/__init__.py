@@ -1,0 +1,1 @@
+"""Sampling designs against their limit."""

@@ -1,0 +1,1 @@
+"""Cost saved where a problem needs less."""

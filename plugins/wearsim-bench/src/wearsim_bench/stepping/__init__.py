@@ -1,0 +1,1 @@
+"""Steppers against converged runs."""

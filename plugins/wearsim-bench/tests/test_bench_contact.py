@@ -1,0 +1,257 @@
+"""Contact models measured against the exact theory: who is measured, and what their errors are."""
+
+import json
+import sys
+from dataclasses import replace
+from types import ModuleType, SimpleNamespace
+from typing import Literal, get_args
+
+import numpy as np
+import pytest
+from pydantic import field_validator
+
+import wearsim.plugins as ws
+from tests.benchmarks.models import install_template
+from tests.benchmarks.replays import SCENARIOS
+from wearsim import load_scenario
+from wearsim.errors import ContactError, PluginError
+from wearsim.models.contact import slender
+from wearsim.models.tangential.options import TangentialOptions
+from wearsim.plugins import ContactModelSpec, manager, registry
+from wearsim.studies.run.grid import fresh_patch, run_grid
+from wearsim_bench.contact.accuracy import built, drawn_errors, errors_of, solved
+from wearsim_bench.contact.cases import elliptic_cases, worn_cases
+from wearsim_bench.contact.methods import HOST, Method, methods, normal_methods
+from wearsim_bench.contact.topic import HARD, contact
+from wearsim_bench.contact.worn_profiles import measure
+from wearsim_bench.exact_solutions import rows
+from wearsim_bench.measure.measurement import Effort
+
+pytestmark = pytest.mark.bench
+
+QUICK = Effort(quick=True, repetitions=1)
+GROUPS = ["fresh rig", "partial slip with spin", *HARD, "worn profiles"]
+
+
+class ChoosyOptions(ws.Options):
+    """Choices of all kinds, and one that means nothing without another."""
+
+    shape: Literal["round", "flat"] = "round"
+    fine: bool = False
+    size: float = 1.0
+
+    @field_validator("fine")
+    @classmethod
+    def _flat_only(cls, value, info):
+        if value and info.data["shape"] != "flat":
+            raise ValueError("fine means nothing unless flat")
+        return value
+
+
+class Mistaken(ws.ContactModel):
+    """A model whose author has made a mistake."""
+
+    def __init__(self, options):
+        self.options = options
+
+    def prepare(self, grid, materials):
+        """Take nothing."""
+
+    def solve(self, gap, longitudinal_curvature, point, wear_compliance=None, warm=None):
+        """Fail."""
+        return len(None)
+
+
+def made_up():
+    made = ModuleType("made_up")
+    spec = ContactModelSpec("choosy", ChoosyOptions, "a mistake", factory=Mistaken)
+    made.wearsim_contact_models = ws.hookimpl(lambda: [spec], specname="wearsim_contact_models")
+    return made
+
+
+@pytest.fixture(scope="module")
+def plugins(tmp_path_factory):
+    """Install the template's model, and one with a mistake."""
+    real = manager.entry_points
+    made = SimpleNamespace(name="made-up", value="made-up", load=made_up, dist=None)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "path", sys.path.copy())
+        install_template(tmp_path_factory.mktemp("site"))
+        patch.setattr(manager, "entry_points", lambda group: [*real(group=group), made])
+        registry.cache_clear()
+        yield
+    sys.modules.pop("wearsim_template", None)
+    registry.cache_clear()
+
+
+@pytest.fixture(scope="module")
+def told():
+    return []
+
+
+@pytest.fixture(scope="module")
+def topic(plugins, told):
+    return contact(QUICK, lambda what, part: told.append((what, part)))
+
+
+@pytest.mark.usefixtures("topic")
+def test_that_every_model_stands_in_every_group_and_is_told_of(topic, told):
+    assert topic.groups == GROUPS
+    for group in GROUPS:
+        named = {item.method.split(",")[0] for item in topic.of(group)}
+        assert named == set(registry().names(ContactModelSpec)) >= {"slender", "winkler"}
+    parts = [part for _, part in told]
+    assert parts == sorted(parts)
+    assert parts[0] == 0.0
+    assert parts[-1] < 1.0
+
+
+@pytest.mark.usefixtures("plugins")
+def test_that_every_choice_of_every_option_is_measured():
+    found = methods()
+    assert len({method.name for method in found}) == len(found)
+    for name in registry().names(ContactModelSpec):
+        own = [method for method in found if method.model == name]
+        options = own[0].spec.options
+        theories = issubclass(options, TangentialOptions) and name != HOST
+        for key, info in options.model_fields.items():
+            values = {info.default, *get_args(info.annotation)}
+            if get_args(info.annotation) and not (
+                theories and key in TangentialOptions.model_fields
+            ):
+                chosen = {getattr(options(**method.options), key) for method in own}
+                assert chosen >= {value for value in values if isinstance(value, str)}, (name, key)
+
+
+@pytest.mark.usefixtures("plugins")
+def test_that_a_choice_stands_beside_the_one_that_gives_it_a_meaning():
+    names = [method.name for method in methods("choosy")]
+    assert names == [
+        "choosy",
+        "choosy, shape flat",
+        "choosy, shape flat, fine on",
+        "slender, strip",
+    ]
+
+
+def test_that_choices_of_tractions_alone_are_left_out_with_worn_profiles():
+    names = {method.name for method in normal_methods()}
+    assert "slender, strip, half length local" in names
+    assert "semi-hertzian, kik-piotrowski, strip" in names
+    assert {name for name in names if name.startswith("hertz")} == {"hertz, strip", "hertz-fastsim"}
+
+
+def test_that_a_mistake_is_told_and_stops_nothing(topic):
+    for item in topic.measurements:
+        mistaken = item.method.startswith("choosy")
+        assert ("raised TypeError: object of type 'NoneType'" in item.failed) == mistaken
+
+
+def test_that_a_method_that_refuses_a_case_says_why_and_has_no_figures(topic):
+    refused = [item for item in topic.of("worn profiles") if item.method == "hertz, strip"]
+    assert len(refused) == 1
+    assert (
+        "no answer to 1 of 2; bump 10um, partial: the gap's fitted curvature" in refused[0].failed
+    )
+    assert refused[0].seconds is None
+    assert not refused[0].errors
+    assert "51 to 161 strips" in refused[0].setting
+
+
+def test_that_all_others_have_times_and_errors(topic):
+    whole = [item for item in topic.measurements if not item.failed]
+    assert len(whole) > len(topic.measurements) / 2
+    for item in whole:
+        assert item.seconds > 0.0
+        assert item.counts["prepare_seconds"] > 0.0
+        assert set(item.errors) == set(topic.errors)
+        assert min(item.errors.values()) >= 0.0
+    json.dumps(topic.as_json(), allow_nan=False)
+
+
+def test_that_the_models_that_start_from_a_solution_nearby_are_timed_so(topic):
+    warm = {item.method for item in topic.measurements if "warm_seconds" in item.counts}
+    assert warm == {"slender, strip", "slender, strip, half length local"}
+
+
+def test_that_a_warm_start_that_comes_to_something_else_has_failed(monkeypatch):
+    right = slender.Slender.solve
+
+    def elsewhere(self, gap, longitudinal_curvature, point, wear_compliance=None, warm=None):
+        if warm is not None:
+            point = replace(point, friction=1.01 * point.friction)
+        return right(self, gap, longitudinal_curvature, point, wear_compliance, warm)
+
+    monkeypatch.setattr(slender.Slender, "solve", elsewhere)
+    found = measure("draws", elliptic_cases("paper")[:1], Method("slender"), 41, 1)
+    assert "warm-started it comes to something else by 1.0e-02 in power" in found.failed
+    assert found.seconds is None
+
+
+def test_that_the_defaults_are_the_strips_of_a_run_and_of_a_contact(topic):
+    scenario = load_scenario(SCENARIOS / "rig-450min.toml")
+    of_run = fresh_patch(scenario, 300.0).b / run_grid(scenario, 300.0).spacing
+    for group in GROUPS[:2]:
+        default = [item for item in topic.of(group) if item.default]
+        assert {item.method for item in default} == {"slender, strip"}
+        case, strips = (
+            elliptic_cases("paper")[0],
+            [int(item.setting.split()[0]) for item in default],
+        )
+        usual, fewer = case.grid(built("slender")), case.grid(built("slender"), strips[0])
+        assert [fewer.strips, usual.strips] == strips
+        assert case.patch.b / fewer.spacing == pytest.approx(of_run, rel=0.05)
+
+
+def test_that_errors_of_a_group_are_those_of_its_contacts():
+    cases = elliptic_cases("paper")
+    found = measure("draws", cases, Method("hertz"), 50, 1).errors
+    whole = drawn_errors(built("hertz", my=50), "paper")
+    assert found["power"] == whole.rms
+    assert found["worst_power"] == whole.worst
+    assert found["dissipation"] == whole.strips
+    powers = [solved(built("hertz"), case)[0].power for case in cases]
+    exact = [row["P_over_V_N"] for row in rows("rig_random", kind="paper")]
+    assert found["worst_power"] == np.abs(np.array(powers) / exact - 1.0).max()
+
+
+def test_that_hertz_has_hertzs_pressure_and_width():
+    for kind in ("paper", "hard"):
+        errors = measure("ellipses", elliptic_cases(kind), Method("hertz"), 81, 1).errors
+        assert errors["peak_pressure"] < 1e-12
+        assert errors["width"] < 1e-4
+
+
+def test_that_marches_take_as_many_steps_as_there_are_strips():
+    march = Method("hertz", {"tangential": "fastsim"})
+    assert march.setting(41) == "41 x 41"
+    assert march.build(41).theory.mx == 41
+    assert Method("hertz").setting(41) == "41 strips"
+
+
+def test_that_more_strips_are_nearer_to_the_exact_theory():
+    coarse, fine = (
+        measure("worn", list(worn_cases("flat").values()), Method("slender"), strips, 1).errors
+        for strips in (41, 321)
+    )
+    assert fine["dissipation"] < 0.5 * coarse["dissipation"]
+    assert fine["width"] < coarse["width"]
+
+
+def test_that_a_value_that_is_not_finite_is_an_error():
+    case = elliptic_cases("paper")[0]
+    solution, grid = solved(built("hertz"), case)
+    solution.dissipation[3] = np.nan
+    with pytest.raises(ContactError, match="dissipation is not finite"):
+        errors_of(solution, grid, case)
+
+
+@pytest.mark.usefixtures("plugins")
+def test_that_one_model_alone_is_measured_beside_the_default():
+    found = contact(Effort(quick=True, repetitions=1, plugin="winkler"), lambda what, part: None)
+    assert {item.method for item in found.measurements} == {"winkler", "slender, strip"}
+
+
+def test_that_a_model_that_is_not_there_is_missed():
+    with pytest.raises(PluginError, match="'winklerr'"):
+        contact(Effort(quick=True, plugin="winklerr"), lambda what, part: None)

@@ -1,0 +1,247 @@
+"""The verdicts on hard cases: that they see what is wrong, and what they are made of."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import wearsim_bench.hard_cases.topic as hard_module
+from wearsim.mechanics.hertz.ellipse import hertz
+from wearsim.results import Result
+from wearsim.scenario.examples import shipped_scenario
+from wearsim.studies.run.run import run
+from wearsim_bench.figures.hard_cases import hard_markdown
+from wearsim_bench.hard_cases import measures
+from wearsim_bench.hard_cases.cases import HardCase, crown_radius_of, hard_cases, profile, roughness
+from wearsim_bench.hard_cases.judgement import judged
+from wearsim_bench.hard_cases.runs import Plan, is_symmetric, mirror_image
+from wearsim_bench.hard_cases.topic import hard
+from wearsim_bench.hard_cases.verdict import CHECKS, Check, Verdict
+from wearsim_bench.measure.measurement import Effort
+
+pytestmark = pytest.mark.bench
+
+PASSES = 6000
+PLAN = Plan(PASSES, finer=1, steps=5, doublings=2, tighter=False, changes={})
+PLAIN = HardCase("plain", {})
+ASKEW = HardCase(
+    "askew",
+    {
+        "roller.offset": ["-1 mm", "0 mm", "0.3 mm"],
+        "creepage.tilt": ["1 mrad", "-2 mrad", "0.5 mrad"],
+        "creepage.yaw": ["0.3 mrad", "0 mrad", "-1 mrad"],
+        "contact.centre": "0.1 mm",
+    },
+)
+
+
+@pytest.fixture(scope="module")
+def plain():
+    scenario = PLAN.scenario(PLAIN, evolution__step=1200, outputs__every_passes=600)
+    return scenario, run(scenario)
+
+
+def doctored(result, kind, name, change):
+    """Return a result of which one array is another."""
+    raw = result.raw
+    arrays = {**getattr(raw, kind), name: change(getattr(raw, kind)[name].copy())}
+    return Result(replace(raw, **{kind: arrays}), None)
+
+
+def test_that_a_sound_run_keeps_its_balances(plain):
+    scenario, result = plain
+    assert measures.is_finite(result)
+    assert measures.volume_balance(result, scenario) < 1e-12
+    assert measures.records_half_steps(result)
+    assert measures.energy_balance(result) < 1e-12
+    assert measures.work_balance(result, scenario) < 1e-12
+    assert measures.load_balance(result) < 1e-12
+
+
+def test_that_volume_which_no_energy_wore_off_is_seen(plain):
+    scenario, result = plain
+    wrong = doctored(result, "history", "worn_volume", lambda v: 1.001 * v)
+    assert measures.volume_balance(wrong, scenario) == pytest.approx(1e-3, rel=1e-2)
+
+
+def test_that_energy_which_no_strip_dissipated_is_seen(plain):
+    wrong = doctored(plain[1], "records", "dissipation", lambda p: 1.001 * p)
+    assert measures.energy_balance(wrong) == pytest.approx(1e-3, rel=1e-6)
+
+
+def test_that_load_which_no_strip_carries_is_seen(plain):
+    wrong = doctored(plain[1], "records", "line_load", lambda q: 1.001 * q)
+    assert measures.load_balance(wrong) == pytest.approx(1e-3, rel=1e-6)
+
+
+def test_that_power_which_no_force_does_is_seen(plain):
+    scenario, result = plain
+    wrong = doctored(result, "checkpoint", "contact_force_x", lambda force: 1.001 * force)
+    assert measures.work_balance(wrong, scenario) == pytest.approx(1e-3, rel=1e-6)
+
+
+def test_that_a_sawtooth_is_seen(plain):
+    fine = run(PLAN.scenario(PLAIN, evolution__step=6000, contact__strips=80))
+    assert measures.roughest(fine) < 0.02
+
+    def jagged(q):
+        q[..., ::2] *= 0.9
+        return q
+
+    assert measures.roughest(doctored(fine, "records", "line_load", jagged)) > 0.1
+
+
+def test_that_a_groove_that_wanders_is_seen(plain):
+    def shifted(worn):
+        return np.roll(worn, 1, axis=-1)
+
+    assert measures.drift(plain[1]) < 1e-12
+    wrong = doctored(plain[1], "records", "cylinder_profile", shifted)
+    assert measures.drift(wrong) > 1e-3
+    assert measures.asymmetry(wrong, plain[1]) > 1e-3
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf, -1e-9])
+def test_that_a_depth_that_is_none_is_seen(plain, wrong):
+    def spoilt(worn):
+        worn[-1, ..., 3] = wrong
+        return worn
+
+    assert not measures.is_finite(doctored(plain[1], "records", "cylinder_profile", spoilt))
+
+
+def test_that_patches_are_counted_in_turn(plain):
+    def split(q):
+        q[3:5, ..., q.shape[-1] // 2] = 0.0
+        return q
+
+    assert measures.patches(plain[1]) == (1,)
+    assert measures.patches(doctored(plain[1], "records", "line_load", split)) == (1, 2, 1)
+
+
+def test_that_means_over_wider_strips_are_compared(plain):
+    fine = run(PLAN.scenario(PLAIN, evolution__step=1200, contact__strips=80))
+    coarse = plain[1].profiles[-1]
+    means = fine.profiles[-1].reshape(-1, 2).mean(axis=1)
+    expected = np.abs(coarse - means).sum() / means.sum()
+    assert measures.change(plain[1], fine) == pytest.approx(expected, rel=1e-12)
+    assert 0.0 < expected < 0.05
+
+
+def test_that_the_order_is_that_of_a_power_of_the_step():
+    assert measures.order([4e-3, 1e-3, 2.5e-4]) == pytest.approx(2.0)
+    assert measures.order([1e-3, 0.0]) is None
+
+
+def test_that_a_mirror_image_of_the_mirror_image_is_the_scene():
+    scenario = PLAN.scenario(ASKEW)
+    image = mirror_image(scenario)
+    assert image.roller.offset == (0.001, 0.0, -0.0003)
+    assert image.contact.centre == -scenario.contact.centre
+    again = mirror_image(image)
+    assert again.roller == scenario.roller
+    assert again.creepage == scenario.creepage
+    assert not is_symmetric(scenario)
+    assert is_symmetric(PLAN.scenario(PLAIN))
+
+
+def test_that_a_profile_is_mirrored_to_the_bit():
+    rough = profile(roughness, finer=4)
+    case = HardCase("rough", {"cylinder.profile": "r.csv"}, {"r.csv": rough})
+    scenario = PLAN.scenario(case)
+    image = mirror_image(scenario).cylinder.profile
+    np.testing.assert_array_equal(image.y, -scenario.cylinder.profile.y[::-1])
+    np.testing.assert_array_equal(image.height, scenario.cylinder.profile.height[::-1])
+    assert not is_symmetric(scenario)
+
+
+def test_that_roughness_has_the_height_and_the_correlation_of_measured_ones():
+    y = np.linspace(-16.0, 16.0, 6401)
+    heights = roughness(y)
+    assert heights.std() == pytest.approx(0.5, rel=0.02)
+    at = np.searchsorted(y, y[0] + 0.1)
+    correlation = (heights[at:] * heights[:-at]).mean() / heights.var()
+    assert correlation == pytest.approx(np.exp(-1.0), abs=0.05)
+
+
+@pytest.mark.parametrize("ratio", [200.0, 1.0, 0.3])
+def test_that_a_crown_radius_gives_the_patch_that_is_asked_for(ratio):
+    along = 0.5 * (1.0 / 0.025 + 1.0 / 0.020)
+    patch = hertz(along, 0.5 / crown_radius_of(ratio), 300.0, 1e11)
+    assert patch.b / patch.a == pytest.approx(ratio, rel=1e-9)
+
+
+def test_that_a_scene_that_ends_with_an_error_does_not_hold():
+    narrow = HardCase("narrow", {"contact.width": "1 mm"})
+    verdict = judged(narrow, PLAN)
+    assert not verdict.holds
+    assert "does not fit" in verdict.said
+    assert verdict.trouble.startswith("stopped: ")
+
+
+def test_that_an_error_without_the_cause_does_not_hold():
+    narrow = HardCase("narrow", {"contact.width": "1 mm"}, refused=("[contact] width", "moon"))
+    assert judged(narrow, PLAN).failures == ("the error does not name moon",)
+
+
+def test_that_running_on_where_an_error_is_due_does_not_hold():
+    assert "ran to its end" in judged(HardCase("plain", {}, refused=("width",)), PLAN).trouble
+
+
+def test_that_patches_that_never_were_do_not_hold():
+    verdict = judged(HardCase("plain", {}, patches=(1, 2, 1)), PLAN)
+    assert verdict.failures == ("patches (1,), expected (1, 2, 1)",)
+
+
+@pytest.mark.parametrize(
+    ("check", "failure"),
+    [
+        (Check("load", 2e-9, 1e-9), "load 2.0e-09 > 1e-09"),
+        (Check("load", np.nan, 1e-9), "load nan > 1e-09"),
+        (Check("steps", 1e-3, 2e-2, -0.5), "steps 1.0e-03 does not fall (order -0.5)"),
+        (Check("steps", 1e-3, 2e-2, -0.5, floor=2e-3), ""),
+        (Check("steps", 1e-3, 2e-2, 1.0), ""),
+    ],
+)
+def test_that_a_check_tells_what_does_not_hold(check, failure):
+    assert check.failure == failure
+    assert check.holds == (not failure)
+
+
+def test_that_cases_have_names_of_their_own():
+    names = [case.name for case in hard_cases(PASSES)]
+    assert len(set(names)) == len(names)
+
+
+def test_that_all_verdicts_stand_in_json_and_in_markdown(monkeypatch):
+    refused = HardCase("narrow", {"contact.width": "1 mm"}, refused=("[contact] width",))
+    monkeypatch.setattr(hard_module, "hard_cases", lambda passes: (PLAIN, refused))
+    told = []
+    verdicts = hard(Effort(quick=True), lambda name, part: told.append((name, part)))
+    assert [name for name, _ in told[:2]] == ["plain", "narrow"]
+    assert told[-1][1] == 1.0
+    assert all(verdict.holds for verdict in verdicts)
+    kept = json.loads(json.dumps([verdict.as_json() for verdict in verdicts]))
+    assert [item["case"] for item in kept] == [verdict.case for verdict in verdicts]
+    checks = {check["name"] for check in kept[0]["checks"]}
+    assert checks == set(CHECKS) - {"tolerance"}  # which only the whole looks at
+    text = hard_markdown(verdicts)
+    assert text.startswith(f"{len(verdicts)} of {len(verdicts)} hold.")
+    assert all(f"| {verdict.case} |" in text for verdict in verdicts)
+
+
+def test_that_a_case_that_does_not_hold_stands_out_in_markdown():
+    wrong = Verdict("wrong", checks=(Check("load", 1.0, 1e-9),))
+    assert "**does not hold**: load 1.0e+00 > 1e-09" in hard_markdown((wrong,))
+
+
+def test_that_hard_cases_run_with_a_model_of_choice(monkeypatch):
+    monkeypatch.setattr(hard_module, "hard_cases", lambda passes: (PLAIN,))
+    effort = Effort(quick=True, plugin="semi-hertzian")
+    (verdict,) = hard(effort, lambda name, part: None)
+    assert verdict.check("volume").holds
+    assert verdict.figures["depth_m"] > 0.0
+    slender = judged(PLAIN, Plan.of(quick=True, changes={}))
+    assert verdict.figures["depth_m"] != slender.figures["depth_m"]
+    assert shipped_scenario("rig-450min").contact.model == "slender"

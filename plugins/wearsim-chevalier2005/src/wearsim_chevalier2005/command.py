@@ -1,0 +1,159 @@
+"""`wearsim reproduce`: the paper's numbers and figures beside those found here."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from wearsim.cli.arguments import Figure, Force, Json, Quiet, check_figure
+from wearsim.cli.output import console, note, refuse_existing, write_json
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from wearsim_chevalier2005.comparison_row import Number, Row
+    from wearsim_chevalier2005.study import Reproduction
+
+Count = Annotated[
+    int,
+    typer.Option(
+        "--realisations", "-n", min=2, metavar="N", help="Realisations of every Monte Carlo."
+    ),
+]
+Seed = Annotated[
+    int | None,
+    typer.Option(min=0, metavar="SEED", help="Seed of the Monte Carlo.", show_default=False),
+]
+_COLUMNS = {"": 28, "paper": 15, "here": 23, "why they differ": None}
+_SI = {"mm": "m", "%": "1"}
+
+
+app = typer.Typer(
+    add_completion=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+@app.command()
+def reproduce(
+    realisations: Count = 1000,
+    figure: Figure = None,
+    seed: Seed = None,
+    json: Json = False,
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Compute the paper's numbers anew; -o draws its figures too."""
+    if figure is not None:
+        check_figure(figure)
+        refuse_existing(figure, force)
+    from wearsim.cli.progress.count import counting
+    from wearsim_chevalier2005.comparison import compare
+    from wearsim_chevalier2005.study import reproduce as study
+
+    with counting(quiet, "realisations") as counted:
+        found = study(realisations, seed, on_progress=counted)
+    rows = compare(found)
+    if figure is not None:
+        _draw(found, figure)
+    if json:
+        write_json(_data(found, rows, figure))
+        return
+    _write(found, rows)
+    if figure is not None:
+        note(f"figure: {figure}")
+
+
+def _draw(found: Reproduction, path: Path) -> None:
+    from wearsim.report.parts.saving import save_figure
+    from wearsim_chevalier2005.figures import reproduction_figure
+
+    save_figure(reproduction_figure(found), path)
+
+
+def _write(found: Reproduction, rows: tuple[Row, ...]) -> None:
+    """Write the rows to stdout, a table for each part."""
+    from itertools import groupby
+
+    from rich import box
+    from rich.table import Table
+
+    from wearsim.report.text.units import count
+    from wearsim_chevalier2005.paper import REFERENCE
+
+    screen = console()
+    screen.print(REFERENCE)
+    screen.print(
+        f"{count(found.all_inputs.count)} realisations, seed {found.scenario.seed}; ± is the"
+        " standard error of what comes from them\n"
+    )
+    for number, (part, those) in enumerate(groupby(rows, lambda row: row.part)):
+        table = Table(
+            title=part, title_justify="left", show_header=number == 0, box=box.SIMPLE_HEAD
+        )
+        for head, width in _COLUMNS.items():
+            table.add_column(head, width=width)
+        for row in those:
+            printed = "-" if row.paper is None else _as_printed(row)
+            table.add_row(row.name, printed, _found(row), row.why)
+        screen.print(table)
+
+
+def _ends(value: Number) -> tuple[float, ...]:
+    return value if isinstance(value, tuple) else (value,)
+
+
+def _with_unit(numbers: str, unit: str) -> str:
+    return numbers if unit == "1" else f"{numbers} {unit}"
+
+
+def _as_printed(row: Row) -> str:
+    """Return what the paper prints, with the digits it has there."""
+    from wearsim.report.text.units import PER_SI
+
+    factor = PER_SI.get(row.unit, 1.0)
+    numbers = (f"{value * factor:.10g}" for value in _ends(row.paper if row.paper else 0.0))
+    return _with_unit(" to ".join(numbers), row.unit)
+
+
+def _found(row: Row) -> str:
+    """Return what was found here, and how sure it is."""
+    digits = 5 if row.part == "inputs" and row.standard_error is None else 4
+    text = " to ".join(_shown(value, row.unit, digits) for value in _ends(row.here))
+    if row.standard_error is not None:
+        errors = " and ".join(_shown(value, row.unit, 2) for value in _ends(row.standard_error))
+        text += f" ± {errors}" if isinstance(row.here, float) else f"\n± {errors}"
+    return _with_unit(text, row.unit)
+
+
+def _shown(value: float, unit: str, digits: int) -> str:
+    """Return a number in a unit, without the unit."""
+    from wearsim.report.text.units import PER_SI, shown
+
+    return shown(value, unit if unit in PER_SI else "1", digits).removesuffix(f" {unit}")
+
+
+def _data(found: Reproduction, rows: tuple[Row, ...], figure: Path | None) -> dict[str, Any]:
+    """Return the rows in SI."""
+    from wearsim_chevalier2005.paper import REFERENCE
+
+    return {
+        "reference": REFERENCE,
+        "realisations": found.all_inputs.count,
+        "seed": found.scenario.seed,
+        "rows": [
+            {
+                "name": f"{row.part}: {row.name}",
+                "paper": row.paper,
+                "printed_in": row.place,
+                "here": row.here,
+                "standard_error": row.standard_error,
+                "unit": _SI.get(row.unit, row.unit),
+                "why": row.why,
+            }
+            for row in rows
+        ],
+        "figure": figure,
+    }

@@ -1,0 +1,145 @@
+"""The paper's contact, inputs and mean problem beside what is found here."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from wearsim.models.random.maxent import LawDistribution
+from wearsim.scenario import Scenario
+from wearsim.studies.contact.draws import LOAD, LONGITUDINAL, TILT, YAW
+from wearsim.studies.run.grid import fresh_patch
+from wearsim.uq.distributions.base import Law
+from wearsim.uq.estimation.moments import summarise
+from wearsim_chevalier2005 import paper
+from wearsim_chevalier2005.comparison_row import Row, beside, percent
+from wearsim_chevalier2005.study import Reproduction
+
+EXACT_POWER = 0.0771  # W, the mean problem by CONTACT (Vollebregt and Kalker), a half-space code
+
+
+def contact_rows(found: Reproduction) -> list[Row]:
+    """Return size and speed of the contact, and its traction bound."""
+    part, load = "contact", found.mean.point.normal_force
+    scenes = {"": found.mean_scenario, ", printed radii": found.printed_scenario}
+    patches = {name: fresh_patch(scene, load) for name, scene in scenes.items()}
+    halved, literal = patches[""], patches[", printed radii"]
+    diameters = f"with {_radii(found.mean_scenario)}: the paper's radii are diameters"
+    bound = 2.0 * load / (math.pi * halved.a * halved.b)
+    return [
+        beside(part, "length 2a", "mm", paper.CONTACT_LENGTH, 2.0 * halved.a, diameters),
+        beside(part, "width 2b", "mm", paper.CONTACT_WIDTH, 2.0 * halved.b, "as above"),
+        beside(
+            part, "length 2a, printed radii", "mm", paper.CONTACT_LENGTH, 2.0 * literal.a,
+            f"with {_radii(found.printed_scenario)} taken as radii, as they are called",
+        ),
+        beside(
+            part, "width 2b, printed radii", "mm", paper.CONTACT_WIDTH, 2.0 * literal.b, "as above"
+        ),
+        beside(
+            part, "rolling speed V", "m/s", paper.SPEED, found.mean.point.rolling_speed,
+            "1000 rpm of the cylinder; section 3.3 leaves its number out",
+        ),
+        beside(
+            part, "rolling speed V, printed radii", "m/s", paper.SPEED,
+            found.as_printed.point.rolling_speed, "outside what is printed: diameters again",
+        ),
+        beside(
+            part, "rise of p0 under the parabolic bound", "%", paper.BOUND_RISE,
+            bound / halved.peak_pressure - 1.0,
+            "the same load is 2 N/(pi a b) instead of 3 N/(2 pi a b): a third more",
+        ),
+    ]  # fmt: skip
+
+
+def _radii(scenario: Scenario) -> str:
+    lengths = scenario.roller.radius, scenario.roller.crown_radius, scenario.cylinder.radius
+    return "/".join(f"{1e3 * length:g}" for length in lengths) + " mm"
+
+
+def law_of(scenario: Scenario, key: str) -> Law:
+    """Return the law of maximum entropy that a scenario's random input draws from."""
+    (item,) = (item for item in scenario.random if item.name == key)
+    if not isinstance(item.distribution, LawDistribution):
+        raise TypeError(f"{key} has no law: its distribution is {item.kind}")
+    return item.distribution.law
+
+
+def printed_area(printed: paper.PrintedMultipliers, law: Law) -> float:
+    """Return what the density with the printed multipliers integrates to; 1 for a density."""
+    low, high = law.bulk
+    x = np.linspace(low - (high - low), high + (high - low), 20001)
+    x = x[(x >= law.support[0]) & (x <= law.support[1])]
+    density = np.exp(-(printed.l0 + printed.l1 * x + printed.l2 * x * x))
+    return float(np.trapezoid(density, x))
+
+
+def input_rows(found: Reproduction) -> list[Row]:
+    """Return the laws of maximum entropy and the spread of the misalignment."""
+    load, creepage = law_of(found.scenario, LOAD), law_of(found.scenario, LONGITUDINAL)
+    area = printed_area(paper.LOAD_MULTIPLIERS, load)
+    radius, printed_radius = found.scenario.roller.radius, paper.ROLLER_RADIUS.value
+    drawn = found.all_inputs.inputs
+    lateral, tilt = summarise(drawn[YAW]), summarise(drawn[TILT])
+    return [
+        *_multipliers(
+            "load N", "N", paper.LOAD_MULTIPLIERS, load,
+            (
+                "agrees",
+                "cut after three digits, not rounded",
+                f"agrees; with the printed digits the density integrates to {area:.2f}",
+            ),
+        ),
+        *_multipliers(
+            "creepage xi", "", paper.CREEPAGE_MULTIPLIERS, creepage,
+            ("the last printed digit is one off", "agrees", "cut, not rounded"),
+        ),
+        beside(
+            "inputs", "std of lateral creepage", "1", paper.LATERAL_STD, lateral.std,
+            "half the radius of the disc", lateral.std_error,
+        ),
+        beside(
+            "inputs", "std of spin", "1/m", paper.SPIN_STD, tilt.std / radius,
+            f"tilt over {1e3 * radius:g} mm; over the printed {1e3 * printed_radius:g} mm it"
+            f" would be {tilt.std / printed_radius:.3f}",
+            tilt.std_error / radius,
+        ),
+    ]  # fmt: skip
+
+
+def _multipliers(
+    what: str, unit: str, printed: paper.PrintedMultipliers, law: Law, why: tuple[str, str, str]
+) -> list[Row]:
+    units = ("1", f"1/{unit}", f"1/{unit}^2") if unit else ("1", "1", "1")
+    values = zip((printed.l0, printed.l1, printed.l2), law.multipliers, units, why, strict=True)
+    return [
+        Row("inputs", f"lambda{power} of {what}", own, value, printed.place, here, None, reason)
+        for power, (value, here, own, reason) in enumerate(values)
+    ]
+
+
+def mean_problem_rows(found: Reproduction) -> list[Row]:
+    """Return the power of the mean problem by several routes."""
+    part, printed = "mean problem", paper.MEAN_PROBLEM_POWER
+    fastsim, summed = found.mean.solution.power, found.element_sum.solution.power
+    literal = found.as_printed.solution.power
+    return [
+        beside(
+            part, "P_d, FASTSIM, converged", "W", printed, fastsim,
+            "integrated exactly along every strip; the paper sums over its elements",
+        ),
+        beside(
+            part, "P_d, FASTSIM, element sum 50 x 50", "W", printed, summed,
+            "first order: depends on where in an element traction, slip and bound are taken",
+        ),
+        beside(
+            part, "P_d, slender", "W", printed, found.slender.solution.power,
+            f"exact half-space theory (CONTACT): {EXACT_POWER} W; FASTSIM is"
+            f" {percent(1.0 - fastsim / EXACT_POWER)} below it",
+        ),
+        beside(
+            part, "P_d, FASTSIM, printed radii", "W", printed, literal,
+            f"{literal / fastsim:.1f} times as much, mostly by twice the speed",
+        ),
+    ]  # fmt: skip

@@ -1,0 +1,213 @@
+"""The paper's problems solved anew: its mean problem and its Monte Carlo, in several variants."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from wearsim.contact_batch import OperatingPoints
+from wearsim.results import DissipationResult
+from wearsim.scenario import Scenario
+from wearsim.scenario.examples import shipped_scenario
+from wearsim.studies.contact.draws import FRICTION, LONGITUDINAL, TILT, YAW
+from wearsim.studies.contact.friction_field import LocalFriction
+from wearsim.studies.contact.monte_carlo import dissipation
+from wearsim.studies.contact.single import ContactStudy, study_contact
+from wearsim.studies.run.grid import fresh_patch
+from wearsim.types import FloatArray
+from wearsim_chevalier2005 import paper
+
+MEAN_PROBLEM, MONTE_CARLO = "mean-contact", "paper-monte-carlo"
+_ALIGNED = {YAW: "0 mrad", TILT: "0 mrad"}
+_ELEMENT_SUM = {"contact.dissipation": "element-sum"}
+_AS_PRINTED = {
+    "roller.radius": f"{paper.ROLLER_RADIUS.value!r} m",
+    "roller.crown_radius": f"{paper.CROWN_RADIUS.value!r} m",
+    "cylinder.radius": f"{paper.CYLINDER_RADIUS.value!r} m",
+}
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One way of doing the paper's Monte Carlo.
+
+    Parameters
+    ----------
+    aligned : bool
+        Without lateral creepage and spin.
+    white : bool
+        Every cell of the grid draws its own friction, as in the paper; else a contact has one.
+    element_sum : bool
+        Power as the textbook's sum over elements; else the work of the rigid slip.
+    """
+
+    aligned: bool
+    white: bool
+    element_sum: bool
+
+
+VARIANTS = tuple(
+    Variant(aligned, white, element_sum)
+    for aligned in (True, False)
+    for white in (False, True)
+    for element_sum in (False, True)
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Reproduction:
+    """The paper's problems, solved.
+
+    Parameters
+    ----------
+    mean : ContactStudy
+        The mean problem with its fields.
+    element_sum, slender : ContactStudy
+        The same by the textbook's element sum, and by another contact model.
+    as_printed : ContactStudy
+        The same with the dimensions that the paper calls radii.
+    chaotic : ContactStudy
+        The mean problem with one realisation of white friction, and its fields.
+    mean_scenario, printed_scenario, scenario : Scenario
+        Of the mean problem, of the one with the printed radii, and of the Monte Carlo.
+    spread : mapping of Variant to DissipationResult
+        The Monte Carlo, each variant from the same draws.
+    """
+
+    mean: ContactStudy
+    element_sum: ContactStudy
+    slender: ContactStudy
+    as_printed: ContactStudy
+    chaotic: ContactStudy
+    mean_scenario: Scenario
+    printed_scenario: Scenario
+    scenario: Scenario
+    spread: Mapping[Variant, DissipationResult]
+
+    @property
+    def all_inputs(self) -> DissipationResult:
+        """The Monte Carlo of all inputs, with one friction coefficient per contact."""
+        return self.spread[Variant(aligned=False, white=False, element_sum=False)]
+
+    @property
+    def aligned(self) -> DissipationResult:
+        """The same without lateral creepage and spin."""
+        return self.spread[Variant(aligned=True, white=False, element_sum=False)]
+
+    @cached_property
+    def most_power(self) -> FloatArray:
+        """Power that no realisation of all inputs can exceed, shape (realisations,) [W]."""
+        return most_power(self.scenario, self.all_inputs)
+
+
+def reproduce(
+    realisations: int = 1000,
+    seed: int | None = None,
+    *,
+    on_progress: Callable[[int, int], None] | None = None,
+) -> Reproduction:
+    """Solve the paper's problems.
+
+    Parameters
+    ----------
+    realisations : int
+        Of every Monte Carlo, two or more.
+    seed : int, optional
+        In place of the scenario's.
+    on_progress : callable, optional
+        Told how many realisations are done, and of how many.
+
+    Returns
+    -------
+    Reproduction
+
+    Raises
+    ------
+    ValueError
+        If there are too few realisations for a spread.
+    """
+    if realisations < 2:
+        raise ValueError(f"realisations must be 2 or more to have a spread, got {realisations}")
+    seeded = {} if seed is None else {"seed": seed}
+    scenario = shipped_scenario(MONTE_CARLO, seeded)
+    white = {FRICTION: white_friction(scenario)}
+    mean = shipped_scenario(MEAN_PROBLEM)
+    printed = shipped_scenario(MEAN_PROBLEM, _AS_PRINTED)
+    spread = {}
+    tell = on_progress or (lambda done, total: None)
+    for number, variant in enumerate(VARIANTS):
+
+        def told(done: int, _: int, before: int = number * realisations) -> None:
+            tell(before + done, len(VARIANTS) * realisations)
+
+        changes = {
+            **(_ALIGNED if variant.aligned else {}),
+            **(white if variant.white else {}),
+            **(_ELEMENT_SUM if variant.element_sum else {}),
+        }
+        varied = shipped_scenario(MONTE_CARLO, {**seeded, **changes})
+        spread[variant] = dissipation(varied, realisations, on_progress=told)
+    return Reproduction(
+        mean=study_contact(mean, with_fields=True),
+        element_sum=study_contact(shipped_scenario(MEAN_PROBLEM, _ELEMENT_SUM)),
+        slender=study_contact(shipped_scenario(MEAN_PROBLEM, {"contact": {"model": "slender"}})),
+        as_printed=study_contact(printed),
+        chaotic=_chaotic(shipped_scenario(MEAN_PROBLEM, {**seeded, **white})),
+        mean_scenario=mean,
+        printed_scenario=printed,
+        scenario=scenario,
+        spread=spread,
+    )
+
+
+def white_friction(scenario: Scenario) -> dict[str, object]:
+    """Return the scenario's friction as a table that lets every cell draw it by itself."""
+    item = next(item for item in scenario.random if item.name == FRICTION)
+    return {"distribution": "white", "marginal": {"distribution": item.kind, **item.options}}
+
+
+def _chaotic(scenario: Scenario) -> ContactStudy:
+    """Return the contact with every input at its mean but friction, which is white."""
+    study = study_contact(scenario)
+    model = scenario.contact.build()
+    model.prepare(study.grid, (scenario.cylinder.material, scenario.roller.material))
+    curvature = 1.0 / scenario.cylinder.radius + 1.0 / scenario.roller.radius
+    points = OperatingPoints.of([study.point])
+    assert points is not None
+    x, y = model.friction_points_batch(study.gap[None, None, None], curvature, points)
+    item = next(item for item in scenario.random if item.name == FRICTION)
+    point = LocalFriction(scenario, model, item).put(points, x, y, 0)[0]
+    solution = model.solve(study.gap, curvature, point)
+    fields = model.fields(solution, study.gap, curvature, point)
+    return replace(study, solution=solution, fields=fields, point=point)
+
+
+def most_power(scenario: Scenario, result: DissipationResult) -> FloatArray:
+    """Return the power that no contact model which keeps its energy balance can exceed.
+
+    Traction nowhere exceeds mu p, so that P <= mu V int p |w| dA with the rigid slip
+    w = (xi - phi y, eta + phi x). The mean of |w| is at most its root mean square, which for
+    Hertz's pressure on the half-axes a, b is sqrt(xi^2 + eta^2 + phi^2 (a^2 + b^2)/5).
+
+    Parameters
+    ----------
+    scenario : Scenario
+    result : DissipationResult
+        Its realisations, with one friction coefficient per contact.
+
+    Returns
+    -------
+    ndarray, shape (realisations,)
+        In W.
+    """
+    load, drawn = result.values("normal_force"), result.inputs
+    spin = drawn[TILT] / scenario.roller.radius
+    reference = float(load.mean())
+    patch = fresh_patch(scenario, reference)
+    axes = (patch.a**2 + patch.b**2) * np.cbrt(load / reference) ** 2  # a, b as N^(1/3)
+    slip = np.sqrt(drawn[LONGITUDINAL] ** 2 + drawn[YAW] ** 2 + spin**2 * axes / 5.0)
+    limit: FloatArray = drawn[FRICTION] * load * scenario.rolling_speed * slip
+    return limit
