@@ -21,7 +21,7 @@ def _read(text: str) -> dict[str, FloatArray]:
 def _mistakes(text: str) -> list[str]:
     with pytest.raises(ScenarioError) as caught:
         _read(text)
-    return [str(problem) for problem in caught.value.problems]
+    return [str(problem) for problem in caught.value.mistakes]
 
 
 @pytest.mark.parametrize("mark", [",", ";", "\t", " ; "])

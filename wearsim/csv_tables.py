@@ -8,7 +8,7 @@ import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from wearsim.errors import Problem, ScenarioError
+from wearsim.errors import Mistake, ScenarioError
 from wearsim.quantities import DECIMAL_COMMA, NOT_FINITE, NUMBER
 from wearsim.units import QuantityError, conversion
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from wearsim.types import FloatArray
 
-MOST_PROBLEMS = 20
+MOST_MISTAKES = 20
 _HEADER = re.compile(r"(?P<name>[^\[\]]*?)\s*(?:\[(?P<unit>[^\[\]]*)\])?")
 _PLAIN_NUMBER = {"", "-", "1"}  # how the unit of a plain number may be written
 
@@ -42,19 +42,19 @@ class _Column:
 class _Mistakes:
     """The mistakes of one file, in the order they were met."""
 
-    found: list[Problem] = field(default_factory=list)
+    found: list[Mistake] = field(default_factory=list)
 
     def add(
         self, line: int | None, what: str, got: str | None = None, expected: str | None = None
     ) -> None:
         key = "" if line is None else f"line {line}"
-        self.found.append(Problem("", key, what, got, expected))
+        self.found.append(Mistake("", key, what, got, expected))
 
-    def capped(self) -> list[Problem]:
-        rest = len(self.found) - MOST_PROBLEMS
+    def capped(self) -> list[Mistake]:
+        rest = len(self.found) - MOST_MISTAKES
         if rest <= 0:
             return self.found
-        return [*self.found[:MOST_PROBLEMS], Problem("", "", f"and {rest} more")]
+        return [*self.found[:MOST_MISTAKES], Mistake("", "", f"and {rest} more")]
 
 
 def read_columns(

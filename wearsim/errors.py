@@ -14,7 +14,7 @@ class WearsimError(Exception):
 
 
 @dataclass(frozen=True)
-class Problem:
+class Mistake:
     """One mistake in an input file: where it stands, what it is, what was got and expected."""
 
     table: str
@@ -42,19 +42,19 @@ class ScenarioError(WearsimError):
     ----------
     file : str
         The file the mistakes are in.
-    problems : list of Problem
+    mistakes : list of Mistake
         Every mistake found.
     """
 
     exit_code = 2
 
-    def __init__(self, file: str, problems: list[Problem]) -> None:
+    def __init__(self, file: str, mistakes: list[Mistake]) -> None:
         self.file = file
-        self.problems = problems
-        super().__init__("\n".join(f"{file}: {problem}" for problem in problems))
+        self.mistakes = mistakes
+        super().__init__("\n".join(f"{file}: {mistake}" for mistake in mistakes))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self.file, self.problems)
+        return type(self), (self.file, self.mistakes)
 
 
 class PluginError(WearsimError):
@@ -92,7 +92,7 @@ class SolverError(WearsimError):
 
 
 class ContactError(SolverError):
-    """A contact problem has no solution, or its solver did not find it."""
+    """A contact mistake has no solution, or its solver did not find it."""
 
 
 class StepError(SolverError):

@@ -21,11 +21,11 @@ from wearsim.results import Outcome
 from wearsim.results.ensemble.schema import OBSERVABLES
 from wearsim.studies.ensemble import api as study
 from wearsim.studies.ensemble.control_variate import closed_form_depths
-from wearsim.studies.ensemble.realisation import Members
+from wearsim.studies.ensemble.realisation import RealisationFactory
 
 
-class ClosedForm(Members):
-    """Members whose depth is that of full slip of rigid bodies, and nothing else is known."""
+class ClosedForm(RealisationFactory):
+    """RealisationFactory whose depth is that of full slip of rigid bodies, and nothing else is known."""
 
     def __call__(self, numbers: Sequence[int]) -> list[Outcome]:
         """Return what realisations on end would wear, in closed form."""
@@ -46,7 +46,7 @@ class ClosedForm(Members):
 
 def main(count: int) -> None:
     """Run an ensemble of `count` and print its peak memory, time and size."""
-    study.Members = ClosedForm  # type: ignore[misc]
+    study.RealisationFactory = ClosedForm  # type: ignore[misc]
     begun = time.perf_counter()
     with TemporaryDirectory() as folder:
         path = Path(folder) / "many.h5"

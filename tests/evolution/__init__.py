@@ -1,11 +1,11 @@
-"""Tests of the evolution, and the scenes they run on."""
+"""Tests of the evolution, and the problems they run on."""
 
 from pathlib import Path
 
 from wearsim.evolution.integrate import evolve
 from wearsim.evolution.state import fresh_state
 from wearsim.scenario import load_scenario
-from wearsim.studies.run.assemble import build_scene
+from wearsim.studies.run.assemble import assemble_problem
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 
@@ -16,24 +16,24 @@ def never(passes):
 
 
 def built(name="rig-450min", **changes):
-    """Return scene, stepper and passes of a scenario; a key's dots are written as `__`."""
+    """Return problem, stepper and passes of a scenario; a key's dots are written as `__`."""
     overrides = {key.replace("__", "."): value for key, value in changes.items()}
     scenario = load_scenario(SCENARIOS / f"{name}.toml", overrides=overrides)
-    scene, stepper, _ = build_scene(scenario)
-    return scene, stepper, float(scenario.total_passes)
+    problem, stepper, _ = assemble_problem(scenario)
+    return problem, stepper, float(scenario.total_passes)
 
 
-def stepped(scene, stepper, stop, state=None):
+def stepped(problem, stepper, stop, state=None):
     """Return the state at `stop` passes, and the advances that led there."""
-    state = state if state is not None else fresh_state(scene)
+    state = state if state is not None else fresh_state(problem)
     advances = []
-    for advance in evolve(scene, state, stepper, stop, never, 10**6):
+    for advance in evolve(problem, state, stepper, stop, never, 10**6):
         state = advance.end
         advances.append(advance)
     return state, advances
 
 
 def worn(name="rig-450min", **changes):
-    """Run a scenario and return its scene and end state."""
-    scene, stepper, stop = built(name, **changes)
-    return scene, stepped(scene, stepper, stop)[0]
+    """Run a scenario and return its problem and end state."""
+    problem, stepper, stop = built(name, **changes)
+    return problem, stepped(problem, stepper, stop)[0]

@@ -39,10 +39,10 @@ def winkler(grid):
 
 
 def boxed(foundation=False, box=BlackBox, **changes):
-    """Return scene, stepper and passes of the rig with a model that claims nothing.
+    """Return problem, stepper and passes of the rig with a model that claims nothing.
 
     It is the built-in one of slender contacts, or an elastic foundation.
     """
-    scene, stepper, stop = built(evolution__stepper="stabilised", **changes)
-    model = winkler(scene.grid) if foundation else scene.model
-    return replace(scene, model=box(model)), stepper, stop
+    problem, stepper, stop = built(evolution__stepper="stabilised", **changes)
+    model = winkler(problem.grid) if foundation else problem.model
+    return replace(problem, model=box(model)), stepper, stop

@@ -42,16 +42,16 @@ def test_that_the_depth_is_that_of_the_closed_form(rig):
 
 
 def test_that_the_width_is_that_of_the_closed_form(rig):
-    scene, state = rig
-    found = width(scene.grid.y, state.cylinder_depth[0, 0, 0], 1e-6)
+    problem, state = rig
+    found = width(problem.grid.y, state.cylinder_depth[0, 0, 0], 1e-6)
     depth = closed_depth(PASSES)
     assert found == pytest.approx(2.0 * np.sqrt(2.0 * CROWN * (depth - 1e-6)), rel=1e-2)
 
 
 def test_that_the_profile_is_a_parabola(rig):
-    scene, state = rig
+    problem, state = rig
     depth = cylinder_depth_of(state)[0]
-    parabola = np.maximum(0.0, depth - scene.grid.y**2 / (2.0 * CROWN))
+    parabola = np.maximum(0.0, depth - problem.grid.y**2 / (2.0 * CROWN))
     assert np.abs(state.cylinder_depth[0, 0, 0] - parabola).max() < 0.5e-6
 
 
@@ -76,12 +76,12 @@ def test_that_the_depth_with_a_spring_is_that_of_its_closed_form():
     ],
 )
 def test_that_worn_volume_is_wear_factor_times_dissipated_energy(changes):
-    scene, state = worn(**{"operation__passes": 20_000, **changes})
-    volume = cylinder_volume_of(scene, state)[0]
+    problem, state = worn(**{"operation__passes": 20_000, **changes})
+    volume = cylinder_volume_of(problem, state)[0]
     assert volume == pytest.approx(K_OVER_H * state.energy[0], rel=1e-10)
-    rollers = worn_volume(state.roller_depth[0, :, 0], scene.grid.spacing, 0.02)
+    rollers = worn_volume(state.roller_depth[0, :, 0], problem.grid.spacing, 0.02)
     factor = float(str(changes.get("wear__roller__k_over_h", "0 1/Pa")).split()[0])
-    total = (rollers * scene.kinematics.multiplicity).sum()
+    total = (rollers * problem.kinematics.multiplicity).sum()
     assert total == pytest.approx(factor * state.energy[0], rel=1e-10)
 
 
@@ -97,8 +97,8 @@ def test_that_a_groove_of_alike_rollers_is_symmetric_to_round_off(rig):
 
 
 def test_that_nothing_wears_where_both_wear_factors_are_zero():
-    scene, stepper, stop = built(wear__cylinder__k_over_h="0 1/Pa")
-    state, advances = stepped(scene, stepper, stop)
+    problem, stepper, stop = built(wear__cylinder__k_over_h="0 1/Pa")
+    state, advances = stepped(problem, stepper, stop)
     assert state.cylinder_depth.max() == 0.0
     assert state.energy[0] > 0.0
     assert len(advances) <= 2

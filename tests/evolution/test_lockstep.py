@@ -7,13 +7,13 @@ import pytest
 
 from tests.evolution import SCENARIOS, built, stepped
 from wearsim.errors import ContactError, StepError
-from wearsim.evolution.batch.bisect_failures import divided
-from wearsim.evolution.batch.lockstep import Together, can_go_together
-from wearsim.evolution.batch.stack import alike, scene_of, state_of
+from wearsim.evolution.batch.bisect_failures import bisect_failures
+from wearsim.evolution.batch.lockstep import Lockstep, can_step_together
+from wearsim.evolution.batch.stack import alike, problem_of, state_of
 from wearsim.evolution.state import fresh_state
 from wearsim.models.contact.slender import Slender
 from wearsim.scenario import load_scenario
-from wearsim.studies.run.assemble import build_scene, prepared_model
+from wearsim.studies.run.assemble import assemble_problem, prepared_model
 
 PASSES = 45_000
 LOG = "time [min], load [N]\n0, 300\n5, 340\n6, 280\n15.5, 320\n"
@@ -37,26 +37,26 @@ CASES = {
 
 
 def scenes_of(changes, each=EACH):
-    """Return the scenes of tests that share strips and model, their stepper and their length."""
+    """Return the problems of tests that share strips and model, their stepper and their length."""
     common = {"operation__passes": PASSES, "contact__strips": 61}
     common |= {"contact__width": "22 mm", "evolution__tolerance": 1e-2}
-    scenes, grid, model = [], None, None
+    problems, grid, model = [], None, None
     for own in each:
         overrides = {k.replace("__", "."): v for k, v in {**common, **changes, **own}.items()}
         scenario = load_scenario(SCENARIOS / "rig-450min.toml", overrides=overrides)
         if model is None:
-            grid = build_scene(scenario)[0].grid
+            grid = assemble_problem(scenario)[0].grid
             model = prepared_model(scenario, grid)
-        scene, stepper, _ = build_scene(scenario, grid, None, model)
-        scenes.append(scene)
-    return scenes, stepper, float(scenario.total_passes)
+        problem, stepper, _ = assemble_problem(scenario, grid, None, model)
+        problems.append(problem)
+    return problems, stepper, float(scenario.total_passes)
 
 
-def ends_of(scenes, stepper, stop, max_steps=10**6):
+def ends_of(problems, stepper, stop, max_steps=10**6):
     """Step tests together; return the end of each and the steps it took, or its error."""
-    tests = Together(scenes, stepper, stop, max_steps)
+    tests = Lockstep(problems, stepper, stop, max_steps)
     ends = {}
-    while tests.flock is not None:
+    while tests.stack is not None:
         path = tests.sweep()
         for place, (number, passes) in enumerate(path[-1].progress if path else ()):
             if passes >= stop:
@@ -76,59 +76,61 @@ def bits(found):
 
 @pytest.mark.parametrize("case", list(CASES))
 def test_that_a_test_is_the_same_to_the_bit_in_any_company(case):
-    scenes, stepper, stop = scenes_of(CASES[case])
-    alone = [bits(ends_of([scene], stepper, stop)[0]) for scene in scenes]
+    problems, stepper, stop = scenes_of(CASES[case])
+    alone = [bits(ends_of([problem], stepper, stop)[0]) for problem in problems]
     for company in ([0, 1, 2, 3, 4], [4, 2], [3, 1, 0], [1, 1, 1, 4, 0, 2, 3, 3]):
-        found = ends_of([scenes[k] for k in company], stepper, stop)
+        found = ends_of([problems[k] for k in company], stepper, stop)
         assert [bits(one) for one in found] == [alone[k] for k in company]
 
 
 @pytest.mark.parametrize("case", list(CASES))
 def test_that_a_test_in_company_is_the_run_of_itself(case):
-    scenes, stepper, stop = scenes_of(CASES[case])
-    for scene, (end, steps, rejected) in zip(scenes, ends_of(scenes, stepper, stop), strict=True):
-        run, _ = stepped(scene, stepper, stop)
+    problems, stepper, stop = scenes_of(CASES[case])
+    for problem, (end, steps, rejected) in zip(
+        problems, ends_of(problems, stepper, stop), strict=True
+    ):
+        run, _ = stepped(problem, stepper, stop)
         assert (steps, rejected, int(end.each.solves[0])) == (run.steps, run.rejected, run.solves)
         for name in ("cylinder_depth", "roller_depth", "energy", "depth_error", "volume_error"):
             assert getattr(end, name) == pytest.approx(getattr(run, name), rel=1e-12, abs=1e-300)
 
 
 def test_that_tests_take_steps_of_their_own():
-    scenes, stepper, stop = scenes_of({})
-    assert len({steps for _, steps, _ in ends_of(scenes, stepper, stop)}) > 1
+    problems, stepper, stop = scenes_of({})
+    assert len({steps for _, steps, _ in ends_of(problems, stepper, stop)}) > 1
 
 
 def test_that_a_log_is_followed_at_the_times_of_each_test(tmp_path):
     path = tmp_path / "log.csv"
     path.write_text(LOG)
-    scenes, stepper, stop = scenes_of({"load": {"kind": "recorded", "file": str(path)}})
-    together = ends_of(scenes, stepper, stop)
-    for scene, found in zip(scenes, together, strict=True):
-        assert bits(found) == bits(ends_of([scene], stepper, stop)[0])
-        run, _ = stepped(scene, stepper, stop)
+    problems, stepper, stop = scenes_of({"load": {"kind": "recorded", "file": str(path)}})
+    together = ends_of(problems, stepper, stop)
+    for problem, found in zip(problems, together, strict=True):
+        assert bits(found) == bits(ends_of([problem], stepper, stop)[0])
+        run, _ = stepped(problem, stepper, stop)
         assert found[0].cylinder_depth == pytest.approx(run.cylinder_depth, rel=1e-12)
 
 
 def test_that_what_fails_fails_alone_with_its_own_words():
     fails = [{"wear__cylinder__k_over_h": "4e-9 1/Pa"}, {"load__normal_force": "90 kN"}]
     each = [EACH[0], fails[0], EACH[3], fails[1], EACH[1]]
-    scenes, stepper, stop = scenes_of({}, each)
-    found = ends_of(scenes, stepper, stop)
+    problems, stepper, stop = scenes_of({}, each)
+    found = ends_of(problems, stepper, stop)
     assert [isinstance(one, Exception) for one in found] == [False, True, False, True, False]
-    for scene, one in zip(scenes, found, strict=True):
-        assert bits(one) == bits(ends_of([scene], stepper, stop)[0])
+    for problem, one in zip(problems, found, strict=True):
+        assert bits(one) == bits(ends_of([problem], stepper, stop)[0])
         if isinstance(one, Exception):
             with pytest.raises((StepError, ContactError)) as failure:
-                stepped(scene, stepper, stop)
+                stepped(problem, stepper, stop)
             assert str(failure.value) == str(one)
 
 
 def test_that_a_test_is_given_up_after_its_own_steps():
-    scenes, stepper, stop = scenes_of({})
-    most = sorted(steps for _, steps, _ in ends_of(scenes, stepper, stop))[2]
-    found = ends_of(scenes, stepper, stop, most)
+    problems, stepper, stop = scenes_of({})
+    most = sorted(steps for _, steps, _ in ends_of(problems, stepper, stop))[2]
+    found = ends_of(problems, stepper, stop, most)
     failed = [one for one in found if isinstance(one, Exception)]
-    assert 0 < len(failed) < len(scenes)
+    assert 0 < len(failed) < len(problems)
     assert all(f"{most} steps have reached pass" in str(one) for one in failed)
 
 
@@ -147,33 +149,33 @@ class Recording(Slender):
 @pytest.fixture
 def recorded():
     """Scenes of a recording model, their stepper and length, and the sizes of its batches."""
-    scenes, stepper, stop = scenes_of({})
-    model = Recording(scenes[0].model)
-    return [replace(scene, model=model) for scene in scenes], stepper, stop, model.sizes
+    problems, stepper, stop = scenes_of({})
+    model = Recording(problems[0].model)
+    return [replace(problem, model=model) for problem in problems], stepper, stop, model.sizes
 
 
 def test_tests_that_do_not_fail_are_solved_in_one_batch(recorded):
-    scenes, stepper, stop, sizes = recorded
-    ends = ends_of(scenes, stepper, stop)
-    assert max(sizes) == len(scenes)
+    problems, stepper, stop, sizes = recorded
+    ends = ends_of(problems, stepper, stop)
+    assert max(sizes) == len(problems)
     # a step, its halves and the whole, each begins with all that are under way
-    assert sizes.count(len(scenes)) >= 3 * min(steps for _, steps, _ in ends)
+    assert sizes.count(len(problems)) >= 3 * min(steps for _, steps, _ in ends)
     assert len(sizes) < sum(steps for _, steps, _ in ends) * 3
 
 
 def test_settled_realisations_are_not_solved_again(recorded):
-    scenes, stepper, stop, sizes = recorded
-    ends_of(scenes, stepper, stop)
+    problems, stepper, stop, sizes = recorded
+    ends_of(problems, stepper, stop)
     together = sum(sizes)
     sizes.clear()
-    for scene in scenes:
-        ends_of([scene], stepper, stop)
+    for problem in problems:
+        ends_of([problem], stepper, stop)
     assert together == sum(sizes)
 
 
 def test_that_a_plain_test_can_go_together():
-    scene, stepper, _ = built()
-    assert can_go_together(scene, stepper)
+    problem, stepper, _ = built()
+    assert can_step_together(problem, stepper)
 
 
 @pytest.mark.parametrize(
@@ -186,8 +188,8 @@ def test_that_a_plain_test_can_go_together():
     ids=["stabilised", "per-pass", "load term"],
 )
 def test_that_what_is_not_vectorised_goes_alone(changes):
-    scene, stepper, _ = built(**changes)
-    assert not can_go_together(scene, stepper)
+    problem, stepper, _ = built(**changes)
+    assert not can_step_together(problem, stepper)
 
 
 def test_that_only_alike_tests_go_with_each_other():
@@ -208,7 +210,7 @@ def test_that_work_is_divided_until_what_fails_stands_alone():
         done.append(places.tolist())
         return places * 10
 
-    parts, failed = divided(work, np.arange(8))
+    parts, failed = bisect_failures(work, np.arange(8))
     assert {place: str(error) for place, error in failed.items()} == {
         3: "fails: [3]",
         6: "fails: [6]",
@@ -219,13 +221,13 @@ def test_that_work_is_divided_until_what_fails_stands_alone():
 
 
 def test_that_a_joined_scene_can_be_taken_apart():
-    scenes, stepper, stop = scenes_of(CASES["three rollers"])
-    tests = Together(scenes, stepper, stop, 10**6)
-    for k, scene in enumerate(scenes):
-        one = scene_of(tests.flock.scene, np.array([k]))
-        assert one.members == (scene,)
-        assert (one.flat_gap == scene.flat_gap).all()
-        assert (one.inputs.friction == scene.inputs.friction).all()
-        state = state_of(tests.flock.state, np.array([k]))
-        fresh = fresh_state(scene)
+    problems, stepper, stop = scenes_of(CASES["three rollers"])
+    tests = Lockstep(problems, stepper, stop, 10**6)
+    for k, problem in enumerate(problems):
+        one = problem_of(tests.stack.problem, np.array([k]))
+        assert one.members == (problem,)
+        assert (one.flat_gap == problem.flat_gap).all()
+        assert (one.inputs.friction == problem.inputs.friction).all()
+        state = state_of(tests.stack.state, np.array([k]))
+        fresh = fresh_state(problem)
         assert (state.batch.stack("line_load") == fresh.batch.stack("line_load")).all()

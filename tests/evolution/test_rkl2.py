@@ -28,22 +28,22 @@ SPRING = {"load__kind": "spring", "load__stiffness": "20 kN/mm"}
 THERMAL = {"load.thermal": {"gain": "300 N/W", "time_constant": "3 min"}}
 
 
-def assert_covered(scene, truth, found):
+def assert_covered(problem, truth, found):
     """Hold the stated errors of depth and volume against the actual ones."""
     assert abs(deepest(found) - deepest(truth))[0] <= found.depth_error[0]
-    volumes = whole_volume(scene, found)[0], whole_volume(scene, truth)[0]
+    volumes = whole_volume(problem, found)[0], whole_volume(problem, truth)[0]
     assert abs(volumes[0] - volumes[1]) <= found.volume_error[0] + 1e-7 * volumes[1]
 
 
 @pytest.fixture(scope="module")
 def foundation():
-    scene, stepper, stop = boxed(foundation=True)
-    return scene, *stepped(scene, stepper, stop)
+    problem, stepper, stop = boxed(foundation=True)
+    return problem, *stepped(problem, stepper, stop)
 
 
 def test_that_the_rig_on_a_foundation_takes_fewer_than_300_contacts(foundation):
-    scene, state, advances = foundation
-    assert scene.model.solved < 300
+    problem, state, advances = foundation
+    assert problem.model.solved < 300
     assert state.depth_error[0] < 1e-3 * deepest(state)[0]
     assert max(oscillation(a.end.contacts[0].line_load) for a in advances) < 0.01
 
@@ -53,17 +53,17 @@ def test_that_the_depth_on_a_foundation_is_that_of_the_closed_form(foundation):
 
 
 def test_that_the_depth_with_a_spring_is_that_of_its_closed_form():
-    scene, stepper, stop = boxed(foundation=True, load__kind="spring", load__stiffness="690 N/mm")
-    depth = cylinder_depth_of(stepped(scene, stepper, stop)[0])[0]
+    problem, stepper, stop = boxed(foundation=True, load__kind="spring", load__stiffness="690 N/mm")
+    depth = cylinder_depth_of(stepped(problem, stepper, stop)[0])[0]
     assert depth == pytest.approx(closed_depth_with_spring(PASSES, 690e3), rel=5e-3)
 
 
 def test_that_a_tighter_tolerance_gives_a_smaller_error(foundation):
-    scene, _, stop = boxed(foundation=True)
-    exact = stepped(scene, StabilisedStepper(StepControl(3e-5)), stop)[0]
-    loose = stepped(scene, StabilisedStepper(StepControl(1e-2)), stop)[0]
-    assert_covered(scene, exact, foundation[1])
-    assert_covered(scene, exact, loose)
+    problem, _, stop = boxed(foundation=True)
+    exact = stepped(problem, StabilisedStepper(StepControl(3e-5)), stop)[0]
+    loose = stepped(problem, StabilisedStepper(StepControl(1e-2)), stop)[0]
+    assert_covered(problem, exact, foundation[1])
+    assert_covered(problem, exact, loose)
     errors = [abs(deepest(s) - deepest(exact))[0] for s in (foundation[1], loose)]
     assert errors[0] < 0.5 * errors[1]
 
@@ -73,11 +73,11 @@ def test_that_a_tighter_tolerance_gives_a_smaller_error(foundation):
 )
 def test_that_steps_are_of_second_order(changes):
     passes = 30_000
-    scene, _, _ = boxed(foundation=True, contact__strips=41, **changes)
+    problem, _, _ = boxed(foundation=True, contact__strips=41, **changes)
     profiles = []
     for steps in (6, 12, 24, 96):
         stepper = StabilisedStepper(StepControl(1.0), forced_step=passes / steps)
-        state, _ = stepped(scene, stepper, passes)
+        state, _ = stepped(problem, stepper, passes)
         profiles.append(state.cylinder_depth)
     errors = np.array([np.abs(p - profiles[-1]).max() for p in profiles[:-1]])
     orders = np.log2(errors[:-1] / errors[1:])
@@ -90,13 +90,13 @@ def test_that_steps_are_of_second_order(changes):
 @pytest.mark.parametrize("tolerance", [1e-2, 3e-4])
 def test_that_slender_contacts_meet_per_pass_truth_and_their_own_estimate(case, tolerance):
     common = {"operation__passes": 30_000, "contact__strips": 71, **CASES[case]}
-    scene, stepper, stop = built(evolution__stepper="per-pass", **common)
-    truth, _ = stepped(scene, stepper, stop)
-    scene, stepper, stop = boxed(evolution__tolerance=tolerance, **common)
-    found, _ = stepped(scene, stepper, stop)
-    assert_covered(scene, truth, found)
+    problem, stepper, stop = built(evolution__stepper="per-pass", **common)
+    truth, _ = stepped(problem, stepper, stop)
+    problem, stepper, stop = boxed(evolution__tolerance=tolerance, **common)
+    found, _ = stepped(problem, stepper, stop)
+    assert_covered(problem, truth, found)
     assert found.depth_error[0] < tolerance * deepest(found)[0]
-    assert found.volume_error[0] < tolerance * whole_volume(scene, found)[0]
+    assert found.volume_error[0] < tolerance * whole_volume(problem, found)[0]
 
 
 def test_that_no_step_skips_over_a_log(tmp_path):
@@ -107,11 +107,11 @@ def test_that_no_step_skips_over_a_log(tmp_path):
         "operation__passes": 45_000,
         "contact__strips": 71,
     }
-    scene, stepper, stop = built(evolution__stepper="per-pass", **common)
-    truth, _ = stepped(scene, stepper, stop)
-    scene, stepper, stop = boxed(evolution__tolerance=3e-3, **common)
-    found, _ = stepped(scene, stepper, stop)
-    assert_covered(scene, truth, found)
+    problem, stepper, stop = built(evolution__stepper="per-pass", **common)
+    truth, _ = stepped(problem, stepper, stop)
+    problem, stepper, stop = boxed(evolution__tolerance=3e-3, **common)
+    found, _ = stepped(problem, stepper, stop)
+    assert_covered(problem, truth, found)
     assert found.depth_error[0] < 5e-3 * deepest(found)[0]
 
 
@@ -127,59 +127,61 @@ def test_that_no_step_skips_over_a_log(tmp_path):
     ids=["constant", "tilted", "spring", "thermal", "hertz-fastsim"],
 )
 def test_that_worn_volume_is_wear_factor_times_dissipated_energy(changes):
-    scene, stepper, stop = boxed(operation__passes=20_000, **changes)
-    state, _ = stepped(scene, stepper, stop)
-    volume = worn_volume(state.cylinder_depth, scene.grid.spacing, 0.025)
+    problem, stepper, stop = boxed(operation__passes=20_000, **changes)
+    state, _ = stepped(problem, stepper, stop)
+    volume = worn_volume(state.cylinder_depth, problem.grid.spacing, 0.025)
     assert volume.sum() == pytest.approx(K_OVER_H * state.energy[0], rel=1e-12)
 
 
 @pytest.fixture(scope="module")
 def half_worn():
-    scene, stepper, _ = boxed(contact__strips=121)
-    state, _ = stepped(scene, stepper, 300_000.0)
-    return scene, replace(state, shadow=None, decay=None)
+    problem, stepper, _ = boxed(contact__strips=121)
+    state, _ = stepped(problem, stepper, 300_000.0)
+    return problem, replace(state, coarse_step_solution=None, decay=None)
 
 
 @pytest.mark.parametrize("factor", [3.0, 10.0, 30.0])
 def test_that_steps_far_beyond_the_explicit_limit_smooth_a_scratch(half_worn, factor):
-    scene, state = half_worn
+    problem, state = half_worn
     state = roughened(state)
-    step = factor * stability_limit(scene, state)
-    first = stabilised_step(scene, state, 1.0, decay_rates(scene, state))
+    step = factor * stability_limit(problem, state)
+    first = stabilised_step(problem, state, 1.0, decay_rates(problem, state))
     worst = oscillation(first.contacts[0].line_load)
     stepper = StabilisedStepper(StepControl(1.0), forced_step=step)
     for _ in range(8):
-        state = stepper.advance(scene, state, 1e12).end
+        state = stepper.advance(problem, state, 1e12).end
         assert oscillation(state.contacts[0].line_load) < worst
     assert oscillation(state.contacts[0].line_load) < 0.05 * worst
 
 
 def test_that_the_rate_of_decay_on_a_foundation_is_that_of_its_stiffest_strip():
-    scene, _, _ = boxed(foundation=True)
-    state = fresh_state(scene)
+    problem, _, _ = boxed(foundation=True)
+    state = fresh_state(problem)
     contact = state.contacts[0]
     loaded = contact.line_load > 0.0
     # q = (4/3) E d a with a = sqrt(2 d/kappa): dq/dd = 2 E a
     stiffness = 2.0 * 2.0e13 * contact.half_length[loaded]
-    wear = K_OVER_H * contact.dissipation[loaded] / scene.kinematics.rolling_speed
+    wear = K_OVER_H * contact.dissipation[loaded] / problem.kinematics.rolling_speed
     slowest = (wear / contact.line_load[loaded] * stiffness).max()
-    before = scene.model.solved
-    assert decay_rates(scene, state)[0] == pytest.approx(slowest, rel=0.01)
-    assert scene.model.solved - before <= 2
+    before = problem.model.solved
+    assert decay_rates(problem, state)[0] == pytest.approx(slowest, rel=0.01)
+    assert problem.model.solved - before <= 2
     # one look is enough where the rate is known
-    known = replace(state, decay=decay_rates(scene, state))
-    before = scene.model.solved
-    assert decay_rates(scene, known)[0] == pytest.approx(slowest, rel=0.01)
-    assert scene.model.solved - before == 1
+    known = replace(state, decay=decay_rates(problem, state))
+    before = problem.model.solved
+    assert decay_rates(problem, known)[0] == pytest.approx(slowest, rel=0.01)
+    assert problem.model.solved - before == 1
 
 
 def test_that_an_expectation_over_passes_agrees_with_drawing_every_pass():
     drawn = {"creepage__misalignment": {**SLACK, "persistence": "per-pass"}, "passes": 3000}
     _, truth = end_of(scenario_of(evolution__stepper="per-pass", contact__strips=61, **drawn))
-    scene, state = end_of(scenario_of(evolution__stepper="stabilised", contact__strips=61, **drawn))
-    assert scene.has_nodes
+    problem, state = end_of(
+        scenario_of(evolution__stepper="stabilised", contact__strips=61, **drawn)
+    )
+    assert problem.has_nodes
     assert state.quadrature[0, 0] > 0.0
-    assert_covered(scene, truth, state)
+    assert_covered(problem, truth, state)
     assert state.depth_error[0] < 0.02 * deepest(state)[0]
 
 
@@ -195,8 +197,8 @@ class Startled(BlackBox):
 
 def test_that_a_step_is_shortened_until_every_stage_is_solved():
     common = {"foundation": True, "operation__passes": 30_000, "contact__strips": 61}
-    scene, stepper, stop = boxed(box=Startled, **common)
-    found, advances = stepped(scene, stepper, stop)
+    problem, stepper, stop = boxed(box=Startled, **common)
+    found, advances = stepped(problem, stepper, stop)
     truth, plain = stepped(*boxed(**common))
     assert found.rejected > 0
     assert len(advances) > len(plain)
@@ -210,9 +212,9 @@ def test_that_a_model_that_fails_however_short_the_step_is_quoted():
                 raise ContactError("no solution beyond a micrometre", {"gap": gap})
             return super().solve(gap, *others)
 
-    scene, stepper, stop = boxed(foundation=True, box=Failing)
+    problem, stepper, stop = boxed(foundation=True, box=Failing)
     with pytest.raises(ContactError, match="no solution beyond a micrometre") as caught:
-        stepped(scene, stepper, stop)
+        stepped(problem, stepper, stop)
     assert caught.value.state["gap"].min() > 1e-6
     with pytest.raises(ContactError, match="no solution beyond a micrometre"):
-        stepped(scene, StabilisedStepper(StepControl(1e-3), forced_step=1e5), stop)
+        stepped(problem, StabilisedStepper(StepControl(1e-3), forced_step=1e5), stop)

@@ -32,22 +32,22 @@ CASES = {
 
 
 def compared(truth_name="per-pass", passes=45_000, **changes):
-    """Return scene, truth and implicit replay of the same test."""
+    """Return problem, truth and implicit replay of the same test."""
     common = {"operation__passes": passes, "contact__strips": 91, **changes}
-    scene, truth_stepper, stop = built(evolution__stepper=truth_name, **common)
-    truth, _ = stepped(scene, truth_stepper, stop)
-    scene, stepper, _ = built(**common)
-    return scene, truth, stepped(scene, stepper, stop)[0]
+    problem, truth_stepper, stop = built(evolution__stepper=truth_name, **common)
+    truth, _ = stepped(problem, truth_stepper, stop)
+    problem, stepper, _ = built(**common)
+    return problem, truth, stepped(problem, stepper, stop)[0]
 
 
 @pytest.mark.parametrize("case", list(CASES))
 def test_that_the_implicit_replay_meets_per_pass_truth_and_its_own_estimate(case):
-    scene, truth, found = compared(**CASES[case])
+    problem, truth, found = compared(**CASES[case])
     depth, exact = cylinder_depth_of(found)[0], cylinder_depth_of(truth)[0]
     assert depth == pytest.approx(exact, rel=5e-3)
     assert abs(depth - exact) <= found.depth_error[0]
     assert found.depth_error[0] < 1e-2 * exact
-    volume, whole = cylinder_volume_of(scene, found)[0], cylinder_volume_of(scene, truth)[0]
+    volume, whole = cylinder_volume_of(problem, found)[0], cylinder_volume_of(problem, truth)[0]
     assert volume == pytest.approx(whole, rel=5e-3)
     assert abs(volume - whole) <= found.volume_error[0] + 1e-7 * whole
 
@@ -71,14 +71,14 @@ def test_that_no_step_skips_over_a_log(tmp_path, name, log, creepage):
         "contact__strips": 71,
         "evolution__tolerance": 3e-3,
     }
-    scene, stepper, stop = built(evolution__stepper="per-pass", **common)
-    truth, _ = stepped(scene, stepper, stop)
-    scene, stepper, stop = built(evolution__stepper=name, **common)
-    found, _ = stepped(scene, stepper, stop)
+    problem, stepper, stop = built(evolution__stepper="per-pass", **common)
+    truth, _ = stepped(problem, stepper, stop)
+    problem, stepper, stop = built(evolution__stepper=name, **common)
+    found, _ = stepped(problem, stepper, stop)
     depth, exact = cylinder_depth_of(found)[0], cylinder_depth_of(truth)[0]
     assert depth == pytest.approx(exact, rel=5e-3)
     assert abs(depth - exact) <= found.depth_error[0] + 2e-4 * exact
-    volume, whole = cylinder_volume_of(scene, found)[0], cylinder_volume_of(scene, truth)[0]
+    volume, whole = cylinder_volume_of(problem, found)[0], cylinder_volume_of(problem, truth)[0]
     assert volume == pytest.approx(whole, rel=5e-3)
     assert abs(volume - whole) <= found.volume_error[0] + 2e-4 * whole
 
@@ -93,10 +93,12 @@ def test_that_the_error_is_held_where_only_the_rollers_wear():
 
 def test_that_tracks_beside_each_other_have_their_own_limit_of_stability():
     apart = {"roller__offset": ["-10 mm", "0 mm", "10 mm"], "contact__strips": 241}
-    scene, _, _ = built(operation__passes=30_000, **apart)
+    problem, _, _ = built(operation__passes=30_000, **apart)
     alone, _, _ = built(operation__passes=30_000, contact__strips=81, contact__width="10.9 mm")
-    ratio = stability_limit(scene, fresh_state(scene)) / stability_limit(alone, fresh_state(alone))
-    strips = alone.grid.spacing / scene.grid.spacing  # the limit grows with the strips' width
+    ratio = stability_limit(problem, fresh_state(problem)) / stability_limit(
+        alone, fresh_state(alone)
+    )
+    strips = alone.grid.spacing / problem.grid.spacing  # the limit grows with the strips' width
     assert ratio * strips == pytest.approx(3.0, rel=0.15)
 
 
@@ -111,13 +113,13 @@ def test_that_a_tighter_tolerance_gives_a_smaller_error():
 
 def test_that_three_offset_rollers_converge_as_the_step_shrinks():
     passes = 60_000
-    scene, _, _ = built(operation__passes=passes, **THREE)
-    truth, _ = stepped(scene, PerPassStepper(), passes)
-    y = scene.grid.y
+    problem, _, _ = built(operation__passes=passes, **THREE)
+    truth, _ = stepped(problem, PerPassStepper(), passes)
+    y = problem.grid.y
     depth_errors, centre_errors = [], []
     for steps in (10, 20, 40):
         stepper = ImplicitStepper(StepControl(1.0), forced_step=passes / steps)
-        found, _ = stepped(scene, stepper, passes)
+        found, _ = stepped(problem, stepper, passes)
         depth_errors.append(abs(cylinder_depth_of(found)[0] - cylinder_depth_of(truth)[0]))
         ours, exact = (centroid(y, s.cylinder_depth[0, 0, 0]) for s in (found, truth))
         centre_errors.append(abs(ours - exact))
@@ -134,7 +136,7 @@ FOLLOWED = [("local", 2e-8), ("coupled", 2e-5)]
 
 @pytest.mark.parametrize(("half_length", "tolerance"), FOLLOWED)
 def test_that_the_compiled_loop_is_the_python_loop(half_length, tolerance):
-    scene, _, _ = built(
+    problem, _, _ = built(
         contact__half_length=half_length,
         roller__offset=["0 mm", "0 mm", "1 mm"],
         load__kind="spring",
@@ -146,8 +148,8 @@ def test_that_the_compiled_loop_is_the_python_loop(half_length, tolerance):
         operation__passes=500_000,
         **{"load.thermal": {"gain": "50 N/W", "time_constant": "2 s"}},
     )
-    state = fresh_state(scene)
-    slow, fast = _run_in_python(scene, state, 300), _run_compiled(scene, state, 300)
+    state = fresh_state(problem)
+    slow, fast = _run_in_python(problem, state, 300), _run_compiled(problem, state, 300)
     for name in ("cylinder_depth", "roller_depth", "terms", "energy"):
         one, other = getattr(slow, name), getattr(fast, name)
         assert np.abs(one - other).max() < tolerance * np.abs(one).max(), name
@@ -157,25 +159,25 @@ def test_that_the_compiled_loop_is_the_python_loop(half_length, tolerance):
 
 @pytest.mark.parametrize(("half_length", "tolerance"), FOLLOWED)
 def test_that_a_pass_followed_by_the_chord_method_leaves_next_to_nothing(half_length, tolerance):
-    scene, _, _ = built(
+    problem, _, _ = built(
         contact__half_length=half_length, operation__passes=200_000, contact__strips=91
     )
-    state, _ = stepped(scene, PerPassStepper(), 5_000)
-    last = _run_compiled(scene, state, 1)
+    state, _ = stepped(problem, PerPassStepper(), 5_000)
+    last = _run_compiled(problem, state, 1)
     assert last.full_solves == state.full_solves
     q = last.loop_strips[0, 0, 0, 0]
-    gap = scene.gap(state.cylinder_depth, state.roller_depth)[0, 0, 0]
-    exact = scene.model.solve(gap, 90.0, scene.point(0, 0, 300.0, gap * 0.0, gap * 0.0))
+    gap = problem.gap(state.cylinder_depth, state.roller_depth)[0, 0, 0]
+    exact = problem.model.solve(gap, 90.0, problem.point(0, 0, 300.0, gap * 0.0, gap * 0.0))
     assert np.abs(q - exact.line_load).max() < 5.0 * tolerance * exact.line_load.max()
     assert last.loop_contacts[0, 0, 0, 0] == pytest.approx(exact.approach, rel=tolerance)
-    assert q.sum() * scene.grid.spacing == pytest.approx(300.0, rel=1e-10)
+    assert q.sum() * problem.grid.spacing == pytest.approx(300.0, rel=1e-10)
 
 
 @pytest.fixture(scope="module")
 def half_worn():
-    scene, stepper, _ = built(contact__strips=161)
-    state, _ = stepped(scene, stepper, 300_000.0)
-    return scene, replace(state, shadow=None, step=0.0)
+    problem, stepper, _ = built(contact__strips=161)
+    state, _ = stepped(problem, stepper, 300_000.0)
+    return problem, replace(state, coarse_step_solution=None, step=0.0)
 
 
 def roughened(state):
@@ -189,13 +191,13 @@ def roughened(state):
 def test_that_the_limit_of_stability_is_where_explicit_steps_begin_to_oscillate(
     half_worn, factor, unstable
 ):
-    scene, state = half_worn
-    limit = stability_limit(scene, state)
+    problem, state = half_worn
+    limit = stability_limit(problem, state)
     stepper = ExplicitStepper(StepControl(1.0), factor * limit, allow_unstable=True)
     state, warnings = roughened(state), []
     first = None
     for _ in range(25):
-        advance = stepper.advance(scene, state, 1e12)
+        advance = stepper.advance(problem, state, 1e12)
         state = advance.end
         first = first if first is not None else oscillation(state.contacts[0].line_load)
         warnings.append(advance.warning)
@@ -209,35 +211,35 @@ def test_that_the_limit_of_stability_is_where_explicit_steps_begin_to_oscillate(
 
 
 def test_that_implicit_steps_of_ten_times_the_limit_do_not_oscillate(half_worn):
-    scene, state = half_worn
-    step = 10.0 * stability_limit(scene, state)
+    problem, state = half_worn
+    step = 10.0 * stability_limit(problem, state)
     state, stepper = roughened(state), ImplicitStepper(StepControl(1.0), forced_step=step)
     for _ in range(10):
-        state = stepper.advance(scene, state, 1e12).end
+        state = stepper.advance(problem, state, 1e12).end
         assert oscillation(state.contacts[0].line_load) < 1e-3
 
 
 def test_that_the_limit_is_the_interpenetration_of_the_strips(half_worn):
-    scene, state = half_worn
-    cylinder, _ = scene.shared_wear(*scene.wear_per_pass(list(state.contacts)))
-    wear = stability_limit(scene, state) * cylinder.max()
+    problem, state = half_worn
+    cylinder, _ = problem.shared_wear(*problem.wear_per_pass(list(state.contacts)))
+    wear = stability_limit(problem, state) * cylinder.max()
     # 0.6 of twice the interpenetration: about 0.2 um for worn strips of 0.1 mm
     assert 0.1e-6 < wear < 0.4e-6
 
 
 def test_that_a_forced_step_past_the_limit_is_refused(half_worn):
-    scene, state = half_worn
-    step = 2.0 * stability_limit(scene, state)
+    problem, state = half_worn
+    step = 2.0 * stability_limit(problem, state)
     with pytest.raises(StepError, match=r"exceeds the limit of stability.*allow_unstable = true"):
-        ExplicitStepper(StepControl(1.0), step).advance(scene, state, 1e12)
+        ExplicitStepper(StepControl(1.0), step).advance(problem, state, 1e12)
 
 
 def test_that_the_explicit_replay_stays_under_the_limit_and_meets_the_truth():
     _, truth, _ = compared(passes=45_000)
-    scene, stepper, stop = built(
+    problem, stepper, stop = built(
         operation__passes=45_000, contact__strips=91, evolution__stepper="explicit"
     )
-    state, advances = stepped(scene, stepper, stop)
+    state, advances = stepped(problem, stepper, stop)
     assert not any(advance.warning for advance in advances)
     depth, exact = cylinder_depth_of(state)[0], cylinder_depth_of(truth)[0]
     assert depth == pytest.approx(exact, rel=5e-3)
@@ -245,13 +247,13 @@ def test_that_the_explicit_replay_stays_under_the_limit_and_meets_the_truth():
 
 
 def test_that_a_free_roller_finds_its_creepage_at_every_step():
-    scene, stepper, stop = built(
+    problem, stepper, stop = built(
         creepage={"drive": "free", "bearing_torque": "100 N mm", "differential_slip": True},
         operation__passes=300_000,
     )
-    state, _ = stepped(scene, stepper, stop)
+    state, _ = stepped(problem, stepper, stop)
     contact = state.contacts[0]
-    assert scene.inputs.bearing_torque == 0.1
+    assert problem.inputs.bearing_torque == 0.1
     # the arm is the roller's own radius, which its crown makes smaller to the sides
     assert 1.0 < contact.force_x * -0.02 / 0.1 < 1.003
     # the groove shortens the cylinder's radius by d, and the roller's slip follows it
@@ -262,7 +264,7 @@ def test_that_a_load_that_falls_to_nothing_is_an_error_that_names_the_cause(tmp_
     log = tmp_path / "log.csv"
     log.write_text("time [min], load [N]\n0, 300\n2, 300\n2.1, -10\n450, -10\n")
     for name in ("implicit", "stabilised", "explicit", "per-pass"):
-        scene, stepper, stop = built(
+        problem, stepper, stop = built(
             # a term might still hold it up, so that this log is not refused beforehand
             load={"kind": "recorded", "file": str(log), "thermal": THERMAL},
             evolution__stepper=name,
@@ -270,12 +272,12 @@ def test_that_a_load_that_falls_to_nothing_is_an_error_that_names_the_cause(tmp_
             contact__width="8 mm",
         )
         with pytest.raises(SolverError, match=r"contact is lost at pass \d+: the load") as caught:
-            stepped(scene, stepper, stop)
+            stepped(problem, stepper, stop)
         assert caught.value.state
 
 
 def test_that_a_stiff_spring_brings_wear_to_rest():
-    scene, stepper, stop = built(load__kind="spring", load__stiffness="40 kN/mm")
-    state, _ = stepped(scene, stepper, stop)
+    problem, stepper, stop = built(load__kind="spring", load__stiffness="40 kN/mm")
+    state, _ = stepped(problem, stepper, stop)
     depth = cylinder_depth_of(state)[0]
     assert 0.9 * 300.0 / 40e6 < depth < 300.0 / 40e6

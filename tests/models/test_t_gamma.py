@@ -76,12 +76,12 @@ def test_that_regimes_out_of_order_are_refused():
 
 def test_that_a_mildly_worn_test_is_archards():
     law = {"wear": {"law": "t-gamma", "roller": {"factor": 0.5}}}
-    scene, state = worn(operation__duration="30 min", **law)
+    problem, state = worn(operation__duration="30 min", **law)
     energy = {"k_over_h": f"{MILD!r} 1/Pa"}, {"k_over_h": f"{0.5 * MILD!r} 1/Pa"}
     linear = {"law": "archard-dissipation", "cylinder": energy[0], "roller": energy[1]}
     _, archard = worn(operation__duration="30 min", wear=linear)
     np.testing.assert_allclose(state.cylinder_depth, archard.cylinder_depth, rtol=1e-6, atol=1e-15)
-    assert (scene.shared_wear(*scene.wear_per_pass(state.contacts))[1] > 0.0).any()
+    assert (problem.shared_wear(*problem.wear_per_pass(state.contacts))[1] > 0.0).any()
 
 
 @pytest.mark.parametrize(
@@ -96,12 +96,12 @@ def test_that_implicit_steps_agree_with_every_pass_by_itself(creepage, regime, p
         "friction__coefficient": 0.5,
         "operation__passes": passes,
     }
-    scene, stepper, stop = built(**changes)
-    start = stepped(scene, stepper, 1.0)[0]
+    problem, stepper, stop = built(**changes)
+    start = stepped(problem, stepper, 1.0)[0]
     index = start.contacts[0].dissipation.max() / (2.0 * start.contacts[0].half_length.max())
-    assert (index / scene.kinematics.rolling_speed > 77.2e6) == (regime == "catastrophic")
-    implicit, _ = stepped(scene, stepper, stop)
-    truth, _ = stepped(scene, PerPassStepper(), stop)
+    assert (index / problem.kinematics.rolling_speed > 77.2e6) == (regime == "catastrophic")
+    implicit, _ = stepped(problem, stepper, stop)
+    truth, _ = stepped(problem, PerPassStepper(), stop)
     greatest = truth.cylinder_depth.max()
     apart = np.abs(implicit.cylinder_depth - truth.cylinder_depth).max()
     assert apart < 5e-3 * greatest

@@ -80,7 +80,7 @@ def test_that_a_scenario_names_the_key_and_the_remedy_once(model):
             {}.__getitem__,
             {},
         )
-    told = [p for p in caught.value.problems if p.key == "bound"]
+    told = [p for p in caught.value.mistakes if p.key == "bound"]
     assert len(told) == 1
     assert told[0].table == "contact"
     assert 'tangential = "fastsim"' in told[0].expected

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from wearsim.errors import PluginError
 from wearsim.report.figures.contact import contact_figure
-from wearsim.report.figures.run import replay_figure
+from wearsim.report.figures.run import run_figure
 from wearsim.report.parts.measured_profiles import Measured
 from wearsim.report.parts.saving import save_figure
 from wearsim.results import Result
@@ -38,7 +38,7 @@ def panel(figure: Figure, title: str) -> object:
 
 
 def test_that_profiles_are_drawn_downwards_in_mm_and_um(result: Result) -> None:
-    axes = panel(replay_figure(result), "Worn profile")
+    axes = panel(run_figure(result), "Worn profile")
     lines = axes.get_lines()  # type: ignore[attr-defined]
     assert len(lines) == 5 + 1  # the records, and the roller
     assert lines[4].get_xdata() == pytest.approx(result.y * 1e3)
@@ -49,13 +49,13 @@ def test_that_profiles_are_drawn_downwards_in_mm_and_um(result: Result) -> None:
 
 def test_that_unworn_rollers_are_not_drawn() -> None:
     fresh = replay.run(load_scenario(SCENARIOS / "rig-450min.toml", SHORT))
-    axes = panel(replay_figure(fresh), "Worn profile")
+    axes = panel(run_figure(fresh), "Worn profile")
     assert len(axes.get_lines()) == 5  # type: ignore[attr-defined]
 
 
 def test_that_measurements_lie_on_top_and_within_the_panel(result: Result) -> None:
     probe = Measured("probe", np.array([-9e-3, 9e-3]), np.array([-1e-6, 1e-6]))
-    axes = panel(replay_figure(result, [probe]), "Worn profile")
+    axes = panel(run_figure(result, [probe]), "Worn profile")
     last = axes.get_lines()[-1]  # type: ignore[attr-defined]
     assert last.get_xdata() == pytest.approx([-9.0, 9.0])
     assert last.get_ydata() == pytest.approx([-1.0, 1.0])
@@ -65,14 +65,14 @@ def test_that_measurements_lie_on_top_and_within_the_panel(result: Result) -> No
 
 
 def test_that_depth_is_drawn_for_every_worn_step(result: Result) -> None:
-    axes = panel(replay_figure(result), "Depth")
+    axes = panel(run_figure(result), "Depth")
     drawn = axes.get_lines()[-1].get_ydata()  # type: ignore[attr-defined]
     assert drawn[-1] == pytest.approx(result.depth[-1] * 1e6)
 
 
 def test_that_rollers_of_their_own_have_dissipation_of_their_own() -> None:
     three = replay.run(load_scenario(SCENARIOS / "rig-three-rollers.toml", SHORT))
-    axes = panel(replay_figure(three), "Dissipated")
+    axes = panel(run_figure(three), "Dissipated")
     names = axes.get_legend_handles_labels()[1]  # type: ignore[attr-defined]
     assert names == ["roller 1", "roller 2", "roller 3"]
     assert len(axes.get_lines()) == 5 * 3 + 3  # type: ignore[attr-defined]
@@ -82,13 +82,13 @@ def test_that_a_logged_load_is_drawn_beside_that_at_the_steps(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     logged = replay.run(load_scenario(SCENARIOS / "rig-logged-load.toml", SHORT))
-    assert len(panel(replay_figure(logged), "Load").get_lines()) == 2  # type: ignore[attr-defined]
+    assert len(panel(run_figure(logged), "Load").get_lines()) == 2  # type: ignore[attr-defined]
 
     def fail(self: Result) -> None:
         raise PluginError("not here")
 
     monkeypatch.setattr(Result, "scenario", property(fail))
-    assert len(panel(replay_figure(logged), "Load").get_lines()) == 1  # type: ignore[attr-defined]
+    assert len(panel(run_figure(logged), "Load").get_lines()) == 1  # type: ignore[attr-defined]
 
 
 def test_that_a_test_stopped_before_its_first_step_can_be_drawn(
@@ -101,7 +101,7 @@ def test_that_a_test_stopped_before_its_first_step_can_be_drawn(
         records={name: array[:1] for name, array in raw.records.items()},
         finished=False,
     )
-    save_figure(replay_figure(Result(fresh)), tmp_path / "fresh.png")
+    save_figure(run_figure(Result(fresh)), tmp_path / "fresh.png")
     assert (tmp_path / "fresh.png").stat().st_size > 10_000
 
 

@@ -109,7 +109,7 @@ def test_that_xarray_opens_a_file_with_named_dimensions(tmp_path: Path, rollers:
         assert dataset["step"].values.tolist() == [0, 1, 2, 3, 4]
         assert dataset["roller"].values.tolist() == list(range(1, rollers + 1))
         assert all({"units", "long_name"} <= set(found.attrs) for found in dataset.values())
-        assert dataset.attrs["format"] == "wearsim-replay"
+        assert dataset.attrs["format"] == "wearsim-run"
         assert dataset.attrs["title"] == "a rig"
 
 

@@ -282,7 +282,7 @@ def test_that_the_mistakes_of_all_tables_come_together(parse: Parse) -> None:
             ('"1000 rpm"', '"1000 mm"'),
             ('"1.1e-11 1/Pa"', '"-1 1/Pa"'),
         )
-    places = [(problem.table, problem.key) for problem in caught.value.problems]
+    places = [(problem.table, problem.key) for problem in caught.value.mistakes]
     assert places == [
         ("roller", "radius"),
         ("operation", "speed"),

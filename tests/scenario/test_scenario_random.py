@@ -302,7 +302,7 @@ def test_that_an_input_with_mistakes_is_told_once(parse: Parse) -> None:
     text = 'correlation = [["load.normal_force", "wear.cylinder.k_over_h", 0.5]]'
     with pytest.raises(ScenarioError) as caught:
         parse((FORCE_LINE, 'normal_force = {distribution = "flt"}'), WEAR, _sampling(text))
-    assert len(caught.value.problems) == 1
+    assert len(caught.value.mistakes) == 1
 
 
 # --- mistakes
@@ -502,7 +502,7 @@ def test_that_the_mistakes_of_all_random_inputs_come_together(parse: Parse) -> N
             (K, 'k_over_h = {distribution = "flat", low = 3, high = "1 1/Pa"}'),
             ('"1000 rpm"', '"1000 mm"'),
         )
-    assert [(problem.table, problem.key) for problem in caught.value.problems] == [
+    assert [(problem.table, problem.key) for problem in caught.value.mistakes] == [
         ("operation", "speed"),
         ("load.normal_force", "distribution"),
         ("friction", "coefficient"),

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from wearsim.evolution.steppers import per_pass
-from wearsim.studies.run.run import _Replay
+from wearsim.studies.run.run import _RunInProgress
 
 
 @pytest.fixture
@@ -20,7 +20,9 @@ def small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def quick_disk(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let a run believe that writing takes no time, so that nothing limits its checkpoints."""
-    monkeypatch.setattr(_Replay, "_last_write", property(lambda _: 0.0, lambda _, seconds: None))
+    monkeypatch.setattr(
+        _RunInProgress, "_last_write", property(lambda _: 0.0, lambda _, seconds: None)
+    )
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ from pathlib import Path
 from wearsim.evolution.integrate import evolve
 from wearsim.evolution.state import fresh_state
 from wearsim.scenario import load_scenario
-from wearsim.studies.run.assemble import build_scene
+from wearsim.studies.run.assemble import assemble_problem
 
 RIG = Path(__file__).parents[2] / "scenarios" / "rig-450min.toml"
 LOAD = {"distribution": "maxent", "support": ["0 N", "inf"], "mean": "307 N", "std": "32 N"}
@@ -24,11 +24,11 @@ def scenario_of(passes=6000, k_over_h=FAST, **changes):
 
 
 def end_of(scenario):
-    """Run a scenario and return its scene and its last state."""
-    scene, stepper, _ = build_scene(scenario)
-    state = fresh_state(scene)
+    """Run a scenario and return its problem and its last state."""
+    problem, stepper, _ = assemble_problem(scenario)
+    state = fresh_state(problem)
     for advance in evolve(
-        scene, state, stepper, float(scenario.total_passes), lambda _: float("inf"), 10**6
+        problem, state, stepper, float(scenario.total_passes), lambda _: float("inf"), 10**6
     ):
         state = advance.end
-    return scene, state
+    return problem, state

@@ -195,12 +195,12 @@ def read_text(path: Path) -> str:
     ScenarioError
         If it cannot be read.
     """
-    from wearsim.errors import Problem, ScenarioError
+    from wearsim.errors import Mistake, ScenarioError
 
     try:
         return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
-        raise ScenarioError(str(path), [Problem("", "", "is not text in UTF-8")]) from error
+        raise ScenarioError(str(path), [Mistake("", "", "is not text in UTF-8")]) from error
     except OSError as error:
-        problem = Problem("", "", f"the file cannot be read ({error.strerror})")
+        problem = Mistake("", "", f"the file cannot be read ({error.strerror})")
         raise ScenarioError(str(path), [problem]) from error

@@ -81,7 +81,9 @@ def _state(state: dict[str, Any]) -> str:
     parts = []
     for name, value in state.items():
         numeric = isinstance(value, int | float) or (hasattr(value, "min") and value.size)
-        if not numeric or name.startswith(("contact_", "shadow_", "coarse_", "loop_")):
+        if not numeric or name.startswith(
+            ("contact_", "coarse_step_", "half_quadrature_", "loop_")
+        ):
             continue
         low, high = (value, value) if not hasattr(value, "min") else (value.min(), value.max())
         parts.append(f"{name} {low:.6g}" if low == high else f"{name} {low:.6g} to {high:.6g}")

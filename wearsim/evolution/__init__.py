@@ -1,1 +1,1 @@
-"""The incremental solver: scene, state, steppers, step-size control and the loop."""
+"""The incremental solver: problem, state, steppers, step-size control and the loop."""

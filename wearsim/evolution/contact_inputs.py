@@ -14,14 +14,14 @@ from wearsim.types import FloatArray, IntArray
 
 @dataclass(frozen=True)
 class ContactInputs:
-    """The inputs of the contacts of a scene.
+    """The inputs of the contacts of a problem.
 
     Every array has shape (contacts, realisations).
 
     Parameters
     ----------
     normal_force : ndarray
-        What is added to the load of the scene [N].
+        What is added to the load of the problem [N].
     friction : ndarray
         Friction coefficient mu.
     longitudinal : ndarray
@@ -69,7 +69,7 @@ class Varying:
     name : str
         Field of `ContactInputs`.
     rollers : tuple of int
-        Rollers of the scene that it acts on.
+        Rollers of the problem that it acts on.
     path : PiecewiseLinear
         Its value over time [s].
     """

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from wearsim.errors import StepError
-from wearsim.evolution.problem import Scene
+from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.base import Advance, Stepper
 
 
 def evolve(
-    scene: Scene,
+    problem: WearProblem,
     state: WearState,
     stepper: Stepper,
     stop: float,
@@ -25,7 +25,7 @@ def evolve(
 
     Parameters
     ----------
-    scene : Scene
+    problem : WearProblem
     state : WearState
         Where to start.
     stepper : Stepper
@@ -45,7 +45,7 @@ def evolve(
         if state.steps >= max_steps and not stepper.pass_by_pass:
             raise too_many_steps(max_steps, state.passes, stop, state.to_arrays())
         end = min(stop, next_record(state.passes)) if stepper.pass_by_pass else stop
-        advance = stepper.advance(scene, state, end)
+        advance = stepper.advance(problem, state, end)
         state = advance.end
         if not (np.isfinite(state.cylinder_depth).all() and np.isfinite(state.energy).all()):
             raise not_finite(state.passes, state.to_arrays())

@@ -1,4 +1,4 @@
-"""How rollers run on a cylinder, and the law of a scene in which nothing wears."""
+"""How rollers run on a cylinder, and the law of a problem in which nothing wears."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Kinematics:
     rolling_speed : float
         Rolling velocity V [m/s].
     multiplicity : ndarray of int, shape (rollers,)
-        Physical rollers behind each roller of the scene; alike ones are merged.
+        Physical rollers behind each roller of the problem; alike ones are merged.
     """
 
     cylinder_radius: float
@@ -54,7 +54,7 @@ class Kinematics:
 
 
 class NoWear(WearLaw):
-    """The law of a scene in which nothing wears, such as a contact by itself."""
+    """The law of a problem in which nothing wears, such as a contact by itself."""
 
     def depth_per_pass(
         self, body: Body, solution: ContactSolution, rolling_speed: float

@@ -1,4 +1,4 @@
-"""A scene: everything about a wear test that does not change while it runs."""
+"""A problem: everything about a wear test that does not change while it runs."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from wearsim.types import (
 
 
 @dataclass(frozen=True)
-class Scene:
+class WearProblem:
     """A wear test, ready to be stepped.
 
     Contacts are numbered (station, contact, realisation). A roller has one contact, or several
@@ -73,13 +73,13 @@ class Scene:
         Inputs that follow processes in time.
     redraw : callable, optional
         Draws the inputs of single passes, see `Redraw`.
-    expectation : Scene, optional
-        The same scene with contacts that stand for passes drawn one by one, to record by.
+    expectation : WearProblem, optional
+        The same problem with contacts that stand for passes drawn one by one, to record by.
     settled : float
         Relative change of wear and loads below which the iterations of an implicit step end.
-    members : tuple of Scene
-        Of tests that are stepped together, the scene of each: they have loads, wear factors and
-        paths in time of their own. Where there are none, all realisations share those of the scene.
+    members : tuple of WearProblem
+        Of tests that are stepped together, the problem of each: they have loads, wear factors and
+        paths in time of their own. Where there are none, all realisations share those of the problem.
     """
 
     grid: Grid
@@ -99,9 +99,9 @@ class Scene:
     slip_profile: FloatArray | None = None
     varying: tuple[Varying, ...] = ()
     redraw: Redraw | None = None
-    expectation: Scene | None = None
+    expectation: WearProblem | None = None
     settled: float = 1e-8
-    members: tuple[Scene, ...] = ()
+    members: tuple[WearProblem, ...] = ()
 
     @cached_property
     def shape(self) -> tuple[int, int, int]:
@@ -111,7 +111,7 @@ class Scene:
 
     @cached_property
     def rollers(self) -> int:
-        """Number of rollers of the scene."""
+        """Number of rollers of the problem."""
         return len(self.kinematics.multiplicity)
 
     @property
@@ -129,8 +129,8 @@ class Scene:
         return values if self._roller_each else values[:, self.roller]
 
     @cached_property
-    def halved(self) -> Scene:
-        """The scene with the first half of every roller's contacts in the place of all."""
+    def halved(self) -> WearProblem:
+        """The problem with the first half of every roller's contacts in the place of all."""
         chosen = np.flatnonzero(self.half == 0)
         return replace(
             self,
@@ -193,7 +193,7 @@ class Scene:
     @cached_property
     def stiffness(self) -> Number:
         """What the load loses per descent [N/m]."""
-        each = [scene.load.stiffness for scene in self.members]
+        each = [problem.load.stiffness for problem in self.members]
         return np.array(each) if each else self.load.stiffness
 
     @cached_property
@@ -211,39 +211,41 @@ class Scene:
         if not self.members:
             return float(self.load.force(np.array([time]))[0])
         times = np.broadcast_to(time, len(self.members))[:, None]
-        forces = [scene.load.force(own)[0] for scene, own in zip(self.members, times, strict=True)]
+        forces = [
+            problem.load.force(own)[0] for problem, own in zip(self.members, times, strict=True)
+        ]
         return np.array(forces)
 
     def mean_load(self, start: Number, stop: Number) -> Number:
         """Return the exact mean of the load between two times [s] [N]."""
         if not self.members:
             return self.load.mean(one_of(start), one_of(stop))
-        return each_between([scene.load.mean for scene in self.members], start, stop)
+        return each_between([problem.load.mean for problem in self.members], start, stop)
 
     def deviations(self, start: Number, stop: Number) -> list[tuple[str, tuple[int, ...], Number]]:
         """Return what varies between two times [s]: field, rollers and standard deviation."""
-        scenes, everyone = self.members or (self,), tuple(range(self.rollers))
-        load = each_between([scene.load.deviation for scene in scenes], start, stop)
+        problems, everyone = self.members or (self,), tuple(range(self.rollers))
+        load = each_between([problem.load.deviation for problem in problems], start, stop)
         found: list[tuple[str, tuple[int, ...], Number]] = [("normal_force", everyone, load)]
         for k, item in enumerate(self.varying):
-            paths = [scene.varying[k].path.deviation for scene in scenes]
+            paths = [problem.varying[k].path.deviation for problem in problems]
             found.append((item.name, item.rollers, each_between(paths, start, stop)))
         return found
 
-    def at_time(self, start: Number, stop: Number) -> Scene:
-        """Return the scene with every process at its mean between two times [s]."""
+    def at_time(self, start: Number, stop: Number) -> WearProblem:
+        """Return the problem with every process at its mean between two times [s]."""
         if not self.varying:
             return self
-        inputs, scenes = self.inputs, self.members or (self,)
+        inputs, problems = self.inputs, self.members or (self,)
         for k, item in enumerate(self.varying):
             chosen = np.isin(self.roller, item.rollers)[:, None]
-            mean = each_between([scene.varying[k].path.mean for scene in scenes], start, stop)
+            mean = each_between([problem.varying[k].path.mean for problem in problems], start, stop)
             values = np.where(chosen, mean, getattr(inputs, item.name))
             inputs = inputs.with_values({item.name: values})
         return replace(self, inputs=inputs, varying=())
 
-    def single_passes(self, rollers: IntArray, first: int, times: FloatArray) -> Scene:
-        """Return a scene whose contacts are passes number `first` on.
+    def single_passes(self, rollers: IntArray, first: int, times: FloatArray) -> WearProblem:
+        """Return a problem whose contacts are passes number `first` on.
 
         Parameters
         ----------
@@ -434,8 +436,8 @@ class Scene:
         return {body: self._wear_factor(body) for body in BODIES}
 
     def _wear_factor(self, body: Body) -> Number | None:
-        scenes, speed = self.members or (self,), self.kinematics.rolling_speed
-        factors = [scene.law.depth_per_dissipation(body, speed) for scene in scenes]
+        problems, speed = self.members or (self,), self.kinematics.rolling_speed
+        factors = [problem.law.depth_per_dissipation(body, speed) for problem in problems]
         known = [factor for factor in factors if factor is not None]
         if len(known) < len(factors):
             return None

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wearsim.contact_batch import BatchSolution, rows_of
-from wearsim.evolution.problem import Scene
+from wearsim.evolution.problem import WearProblem
 from wearsim.types import ContactSolution, FloatArray, IntArray, Number
 
 SIGMAS = 2.0  # of the scatter that draws at every pass leave, counted as error
@@ -18,7 +18,7 @@ Contacts: TypeAlias = Sequence[ContactSolution]
 Depths: TypeAlias = tuple[FloatArray, FloatArray]
 """Of cylinder and rollers, shapes as in `WearState` [m]."""
 _CONTACT = "contact_"
-_TWINS = ("shadow", "coarse")
+_TWINS = ("coarse_step_solution", "half_quadrature_solution")
 _SCALARS = ("passes", "step", "steps", "rejected", "solves", "full_solves")
 
 
@@ -104,8 +104,8 @@ class WearState:
     full_solves: int = 0
     loop_strips: FloatArray | None = None
     loop_contacts: FloatArray | None = None
-    shadow: WearState | None = None
-    coarse: WearState | None = None
+    coarse_step_solution: WearState | None = None
+    half_quadrature_solution: WearState | None = None
     decay: FloatArray | None = None
     each: Separate | None = None
 
@@ -126,7 +126,7 @@ class WearState:
         """Worn depths of cylinder and rollers."""
         return self.cylinder_depth, self.roller_depth
 
-    def but(self, **others: Any) -> WearState:
+    def replaced(self, **others: Any) -> WearState:
         """Return the state with other fields: as `replace`, which takes ten times as long."""
         state = object.__new__(WearState)
         state.__dict__.update(self.__dict__, **others)
@@ -146,9 +146,9 @@ class WearState:
         """
         if self.each is None:
             count = self.solves if solves is None else self.solves + int(solves.sum())
-            return self.but(passes=float(now), solves=count, **others)
+            return self.replaced(passes=float(now), solves=count, **others)
         counts = self.each.solves if solves is None else self.each.solves + solves
-        return self.but(each=Separate(np.asarray(now), counts), **others)
+        return self.replaced(each=Separate(np.asarray(now), counts), **others)
 
     def solves_since(self, before: WearState) -> IntArray:
         """Return the contact solves since an earlier state, of all or of each realisation."""
@@ -257,7 +257,7 @@ def widened_state(state: WearState, y: FloatArray, strips: int) -> WearState:
     loop = state.loop_strips
     shadow, coarse = (
         None if twin is None else widened_state(twin, y, strips)
-        for twin in (state.shadow, state.coarse)
+        for twin in (state.coarse_step_solution, state.half_quadrature_solution)
     )
     return replace(
         state,
@@ -265,29 +265,29 @@ def widened_state(state: WearState, y: FloatArray, strips: int) -> WearState:
         roller_depth=widened(state.roller_depth, strips),
         contacts=contacts,
         loop_strips=None if loop is None else widened(loop, strips),
-        shadow=shadow,
-        coarse=coarse,
+        coarse_step_solution=shadow,
+        half_quadrature_solution=coarse,
     )
 
 
-def contact_values(scene: Scene, contacts: Contacts, name: str) -> FloatArray:
+def contact_values(problem: WearProblem, contacts: Contacts, name: str) -> FloatArray:
     """Return the field `name` of all contacts, leading axes (station, contact, realisation)."""
-    return scene.values_of(contacts, name)
+    return problem.values_of(contacts, name)
 
 
-def fresh_state(scene: Scene) -> WearState:
+def fresh_state(problem: WearProblem) -> WearState:
     """Solve the fresh contacts and return the state before the first pass."""
-    scene = scene.at_time(0.0, 0.0)
-    stations, _, realisations = scene.shape
-    n = scene.grid.strips
+    problem = problem.at_time(0.0, 0.0)
+    stations, _, realisations = problem.shape
+    n = problem.grid.strips
     cylinder_depth = np.zeros((stations, 1, realisations, n))
-    roller_depth = np.zeros((1, scene.rollers, realisations, n))
-    terms = np.zeros((len(scene.terms), scene.rollers, realisations))
-    loads = np.broadcast_to(scene.force(0.0) + scene.inputs.normal_force, scene.shape)
-    contacts = scene.model.solve_batch(
-        scene.nominal_gap,
-        scene.kinematics.longitudinal_curvature,
-        scene.points(loads, cylinder_depth, roller_depth),
+    roller_depth = np.zeros((1, problem.rollers, realisations, n))
+    terms = np.zeros((len(problem.terms), problem.rollers, realisations))
+    loads = np.broadcast_to(problem.force(0.0) + problem.inputs.normal_force, problem.shape)
+    contacts = problem.model.solve_batch(
+        problem.nominal_gap,
+        problem.kinematics.longitudinal_curvature,
+        problem.points(loads, cylinder_depth, roller_depth),
     )
     return WearState(
         passes=0.0,
@@ -304,10 +304,10 @@ def fresh_state(scene: Scene) -> WearState:
     )
 
 
-def separate_state(scene: Scene) -> WearState:
-    """Return the fresh state of tests that are joined in a scene and go each its own way."""
-    state = fresh_state(scene)
-    count = scene.shape[2]
+def separate_state(problem: WearProblem) -> WearState:
+    """Return the fresh state of tests that are joined in a problem and go each its own way."""
+    state = fresh_state(problem)
+    count = problem.shape[2]
     solves = np.full(count, state.solves // count)
     state = replace(state, solves=0, each=Separate(np.zeros(count), solves))
-    return replace(state, shadow=state)
+    return replace(state, coarse_step_solution=state)

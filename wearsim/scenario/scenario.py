@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 from typing import Any, TypeAlias
 
-from wearsim.errors import Problem, ScenarioError
+from wearsim.errors import Mistake, ScenarioError
 from wearsim.scenario.random.model import RandomInput
 from wearsim.scenario.tables.bodies import Cylinder, Roller
 from wearsim.scenario.tables.plain import (
@@ -131,9 +131,9 @@ class Scenario:
         return value if isinstance(value, tuple) else (value,) * self.operation.rollers
 
 
-def _no_length() -> Problem:
+def _no_length() -> Mistake:
     expected = 'one of them, such as duration = "450 min"'
-    return Problem("operation", "duration or passes", "is needed for a run", "none", expected)
+    return Mistake("operation", "duration or passes", "is needed for a run", "none", expected)
 
 
 def require_run(scenario: Scenario) -> None:
@@ -154,6 +154,6 @@ def require_run(scenario: Scenario) -> None:
         problems.append(_no_length())
     if scenario.wear is None:
         expected = 'law = "archard-dissipation" and its options'
-        problems.append(Problem("wear", "", "the table is needed for a run", None, expected))
+        problems.append(Mistake("wear", "", "the table is needed for a run", None, expected))
     if problems:
         raise ScenarioError(scenario.file, problems)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import operator
 
-from wearsim.errors import Problem, ScenarioError
+from wearsim.errors import Mistake, ScenarioError
 from wearsim.scenario import Scenario
 
 MOST_BYTES = 4_000_000_000
@@ -47,7 +47,7 @@ def checked_count(scenario: Scenario, realisations: int) -> int:
     if count * each > MOST_BYTES:
         what = f"would take {count * each / 1e9:,.4g} GB of memory, {each} bytes each"
         most = f"at most {MOST_BYTES // each}, which take {MOST_BYTES / 1e9:g} GB"
-        problem = Problem("", "realisations", what, str(count), most)
+        problem = Mistake("", "realisations", what, str(count), most)
         raise ScenarioError(scenario.file, [problem])
     return count
 

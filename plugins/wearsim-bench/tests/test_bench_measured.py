@@ -16,7 +16,7 @@ POINTS = st.lists(st.tuples(st.floats(1e-6, 10.0), st.floats(0.0, 1.0)), max_siz
 
 
 def measured(seconds, error):
-    return Measurement("scenes", "method", "setting", seconds, {"power": error})
+    return Measurement("problems", "method", "setting", seconds, {"power": error})
 
 
 @given(POINTS)
@@ -35,9 +35,9 @@ def test_that_the_front_holds_those_that_none_beats(points):
 
 
 def test_that_what_has_no_time_or_no_such_error_is_on_no_front():
-    untimed = Measurement("scenes", "method", "setting", None, {"power": 0.0})
-    other = Measurement("scenes", "method", "setting", 1.0, {"width": 0.0})
-    failed = Measurement("scenes", "method", "setting", failed="no answer")
+    untimed = Measurement("problems", "method", "setting", None, {"power": 0.0})
+    other = Measurement("problems", "method", "setting", 1.0, {"width": 0.0})
+    failed = Measurement("problems", "method", "setting", failed="no answer")
     assert pareto([untimed, other, failed], "power") == []
 
 
@@ -45,7 +45,7 @@ def test_that_what_has_no_time_or_no_such_error_is_on_no_front():
 def test_that_an_error_that_is_none_beats_nobody(error):
     with pytest.raises(ValueError, match="its error 'power' is"):
         measured(1.0, error)
-    told = Measurement("scenes", "method", "setting").found(1.0, {"power": error})
+    told = Measurement("problems", "method", "setting").found(1.0, {"power": error})
     assert told.failed.startswith("its error 'power' is")
     assert (told.seconds, told.errors) == (None, {})
     assert pareto([told, measured(2.0, 0.1)], "power") == [measured(2.0, 0.1)]
@@ -72,7 +72,7 @@ def test_that_a_topic_tells_what_is_on_its_fronts():
     topic = Topic("t", "T", "", "one", "power", {"power": "power"}, {}, items)
     told = topic.as_json()["measurements"]
     assert [row["front"] for row in told] == [True, False, True]
-    assert topic.groups == ["scenes"]
+    assert topic.groups == ["problems"]
 
 
 def test_that_the_machine_is_named_and_measured():

@@ -1,4 +1,4 @@
-"""Savings: what is left out where a scene has no need of it, and that nothing else changes."""
+"""Savings: what is left out where a problem has no need of it, and that nothing else changes."""
 
 import json
 
@@ -96,8 +96,8 @@ def test_that_the_rows_name_every_model():
 def test_that_alike_rollers_are_one_contact(stepper, model):
     changes = {"evolution.stepper": stepper, "contact": {"model": model}}
     test = WearTest(RIG, 0.2)
-    merged = Ready(test.asked(changes)).scene
-    apart = Ready(test.asked({**changes, "roller.offset": APART})).scene
+    merged = Ready(test.asked(changes)).problem
+    apart = Ready(test.asked({**changes, "roller.offset": APART})).problem
     assert (merged.shape[1], apart.shape[1]) == (1, 3)
     assert merged.kinematics.physical_rollers == apart.kinematics.physical_rollers == 3.0
 
@@ -117,7 +117,7 @@ def test_that_a_way_that_fails_is_told():
         raise RuntimeError("no way")
 
     ways = Ways({"short": lambda: np.ones(3), "long": lost})
-    (row,) = Pair("scenes", "method", lambda: ways).measured(1)
+    (row,) = Pair("problems", "method", lambda: ways).measured(1)
     assert row.failed == "raised RuntimeError: no way"
     assert row.setting == "short"
 

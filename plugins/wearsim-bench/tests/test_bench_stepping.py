@@ -26,7 +26,7 @@ STEPPERS = set(get_args(EvolutionTable.model_fields["stepper"].annotation)) - {"
 
 
 def bench(model, test=SHORT):
-    return Bench("scenes", test, Method(model), 1)
+    return Bench("problems", test, Method(model), 1)
 
 
 def end_of(test=SHORT, **changes):
@@ -95,7 +95,9 @@ def test_that_more_strips_and_closer_tolerances_are_nearer(topic):
 def test_that_a_solver_converges_to_every_pass_by_itself(solver, changes):
     ready, truth = end_of(WearTest(RIG, 2.0, changes), **{"evolution.stepper": EVERY_PASS})
     loose, close = (
-        errors_of(End(ready.scene, solved_by(solver, ready.scene, ready.stop, tolerance)), truth)
+        errors_of(
+            End(ready.problem, solved_by(solver, ready.problem, ready.stop, tolerance)), truth
+        )
         for tolerance in (1e-2, 1e-6)
     )
     assert close["profile"] < 0.2 * loose["profile"]
@@ -106,7 +108,7 @@ def test_that_a_solver_converges_to_every_pass_by_itself(solver, changes):
 def test_that_bodies_which_wear_together_are_solved_together():
     both = {"wear.roller.k_over_h": "1.1e-11 1/Pa"}
     ready, truth = end_of(WearTest(RIG, 2.0, both), **{"evolution.stepper": EVERY_PASS})
-    found = End(ready.scene, solved_by("LSODA", ready.scene, ready.stop, 1e-6))
+    found = End(ready.problem, solved_by("LSODA", ready.problem, ready.stop, 1e-6))
     assert truth.state.roller_depth.max() > 0.0
     assert max(errors_of(found, truth).values()) < 3e-5
 
@@ -135,14 +137,14 @@ def test_that_the_truth_of_a_model_without_compiled_passes_is_converged():
 def test_that_a_solver_that_asks_for_too_many_contacts_is_stopped():
     ready = Ready(SHORT.asked({}))
     with pytest.raises(StepError, match="more than 5 contacts"):
-        solved_by("LSODA", ready.scene, ready.stop, 1e-6, most=5)
+        solved_by("LSODA", ready.problem, ready.stop, 1e-6, most=5)
 
 
 def test_that_errors_are_parts_of_the_exact_ones():
     ready, end = end_of()
     state = end.state
     deeper = replace(state, cylinder_depth=1.01 * state.cylinder_depth)
-    found = errors_of(End(ready.scene, deeper), end)
+    found = errors_of(End(ready.problem, deeper), end)
     assert found == pytest.approx({"depth": 0.01, "profile": 0.01, "volume": 0.01})
     assert set(errors_of(end, end).values()) == {0.0}
 

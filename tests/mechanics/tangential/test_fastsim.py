@@ -156,18 +156,18 @@ SCENES = [
 
 
 @pytest.mark.parametrize("elliptic", [False, True])
-@pytest.mark.parametrize("scene", SCENES)
-def test_that_the_march_equals_its_readable_twin(scene, elliptic):
-    case = rig(strips=11, elliptic=elliptic, **scene)
+@pytest.mark.parametrize("problem", SCENES)
+def test_that_the_march_equals_its_readable_twin(problem, elliptic):
+    case = rig(strips=11, elliptic=elliptic, **problem)
     found, expected = march(*case.arguments, 24), twin(*case.arguments, 24)
     scale = np.abs(expected).max(axis=1, keepdims=True) + 1e-300
     assert found / scale == pytest.approx(expected / scale, abs=1e-10)
 
 
 @pytest.mark.parametrize("elliptic", [False, True])
-@pytest.mark.parametrize("scene", SCENES)
-def test_that_the_fields_add_up_to_the_sums_of_the_march(scene, elliptic):
-    case = rig(strips=11, elliptic=elliptic, **scene)
+@pytest.mark.parametrize("problem", SCENES)
+def test_that_the_fields_add_up_to_the_sums_of_the_march(problem, elliptic):
+    case = rig(strips=11, elliptic=elliptic, **problem)
     sums = march(*case.arguments, 40)
     traction_x, traction_y, cut_x, cut_y = march_fields(*case.arguments, 40)
     place = np.linspace(1.0, -1.0, 41)[:, None] * case.half_length
@@ -185,18 +185,18 @@ def test_that_the_fields_add_up_to_the_sums_of_the_march(scene, elliptic):
 
 
 @pytest.mark.parametrize("elliptic", [False, True])
-@pytest.mark.parametrize("scene", SCENES)
-def test_that_a_uniform_field_of_friction_is_a_coefficient(scene, elliptic):
-    case = rig(strips=11, elliptic=elliptic, **scene)
+@pytest.mark.parametrize("problem", SCENES)
+def test_that_a_uniform_field_of_friction_is_a_coefficient(problem, elliptic):
+    case = rig(strips=11, elliptic=elliptic, **problem)
     found, expected = local(case, np.full((24, 11), 0.1)), march(*case.arguments, 24)
     scale = np.abs(expected).max(axis=1)
     for row, name in enumerate(("force_x", "force_y", "moment", "adhesion")):
         assert getattr(found, name) == pytest.approx(expected[row], abs=1e-14 * scale[row])
 
 
-@pytest.mark.parametrize("scene", SCENES)
-def test_that_a_field_of_friction_adds_up_as_its_inside_does(scene):
-    case = rig(strips=11, **scene)
+@pytest.mark.parametrize("problem", SCENES)
+def test_that_a_field_of_friction_adds_up_as_its_inside_does(problem):
+    case = rig(strips=11, **problem)
     friction = np.random.default_rng(0).uniform(0.02, 0.2, (30, 14))
     half_length, bound_peak, elliptic, *gradients = case.arguments
     own = np.ascontiguousarray(friction[:, 2:13])
@@ -307,13 +307,13 @@ def test_that_contacts_quadrature_of_fastsim_is_met(case, bound):
     assert found == pytest.approx(case[f"fastsim_{bound}_exact_P_over_V_N"], rel=2e-6)
 
 
-def errors(points, **scene):
+def errors(points, **problem):
     """Return the relative errors of the rigid slip's work and of the element sum."""
-    fine = rig(strips=800, **scene)
+    fine = rig(strips=800, **problem)
     exact = fine.power(march(*fine.arguments, 3200))
     work, textbook = [], []
     for n in points:
-        case = rig(strips=n, **scene)
+        case = rig(strips=n, **problem)
         work.append(case.power(march(*case.arguments, n)) / exact - 1.0)
         fields = march_fields(*case.arguments, n)
         flex = case.flex
@@ -327,11 +327,11 @@ def order(points, values):
 
 
 @pytest.mark.parametrize(
-    "scene", [{}, {"eta": 5e-4}, {"eta": 5e-4, "phi": 0.05}], ids=["one-way", "lateral", "spin"]
+    "problem", [{}, {"eta": 5e-4}, {"eta": 5e-4, "phi": 0.05}], ids=["one-way", "lateral", "spin"]
 )
-def test_that_the_rigid_slips_work_is_second_order_and_the_element_sum_first(scene):
+def test_that_the_rigid_slips_work_is_second_order_and_the_element_sum_first(problem):
     points = np.array([10, 20, 50, 100, 200])
-    work, textbook = errors(points, **scene)
+    work, textbook = errors(points, **problem)
     # where a strip begins to slide a corner is cut, of either sign: together they do better
     assert np.all(np.abs(work) * points**2 < 0.25)
     assert order(points, textbook) == pytest.approx(1.0, abs=0.1)

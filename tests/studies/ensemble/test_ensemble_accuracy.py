@@ -1,4 +1,4 @@
-"""Members of ensembles beside tests in which every pass is solved by itself."""
+"""RealisationFactory of ensembles beside tests in which every pass is solved by itself."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Members of an ensemble: what is observed of each, alone and together."""
+"""RealisationFactory of an ensemble: what is observed of each, alone and together."""
 
 from dataclasses import replace
 
@@ -7,8 +7,8 @@ import pytest
 
 from tests.studies.random_examples import CREEPAGE, FRICTION, LOAD, SLACK, WANDERING, scenario_of
 from wearsim.evolution.steppers.rkl2 import StabilisedStepper
-from wearsim.studies.ensemble.batch import Member, grouped, observed, observed_alone
-from wearsim.studies.run.assemble import build_scene, prepared_model, strips_of_run
+from wearsim.studies.ensemble.batch import RealisationRun, grouped, observed, observed_alone
+from wearsim.studies.run.assemble import assemble_problem, prepared_model, strips_of_run
 from wearsim.studies.run.draws import Drawer
 from wearsim.types import Grid
 
@@ -34,8 +34,8 @@ def members_of(count, **changes):
     half = max(float(np.abs(grid.y).max() + grid.spacing) for grid in grids)
     grid = Grid.spanning(-half, half, 71)
     model = prepared_model(scenario, grid)
-    built = [build_scene(one.scenario, grid, one, model)[:2] for one in draws]
-    return [Member(k, one.values, one, *built[k]) for k, one in enumerate(draws)]
+    built = [assemble_problem(one.scenario, grid, one, model)[:2] for one in draws]
+    return [RealisationRun(k, one.values, one, *built[k]) for k, one in enumerate(draws)]
 
 
 def bits(found):
@@ -92,8 +92,8 @@ def test_that_a_group_is_no_larger_than_its_strips_allow(monkeypatch):
 
 def test_that_a_member_that_fails_leaves_the_others_as_they_are():
     members = members_of(4, **CASES["one contact"])
-    heavy = replace(members[1].scene.inputs, normal_force=np.array([[1e5]]))
-    members[1] = replace(members[1], scene=replace(members[1].scene, inputs=heavy))
+    heavy = replace(members[1].problem.inputs, normal_force=np.array([[1e5]]))
+    members[1] = replace(members[1], problem=replace(members[1].problem, inputs=heavy))
     found = observed(members)
     assert str(found[1]).startswith("the contact reaches the edge of its strips")
     for k in (0, 2, 3):
@@ -103,7 +103,7 @@ def test_that_a_member_that_fails_leaves_the_others_as_they_are():
 def test_that_a_plugin_that_breaks_ends_its_own_member_alone(monkeypatch):
     members = members_of(3, **ONE)
 
-    class Broken(type(members[1].scene.load)):
+    class Broken(type(members[1].problem.load)):
         def __init__(self):
             pass
 
@@ -115,7 +115,7 @@ def test_that_a_plugin_that_breaks_ends_its_own_member_alone(monkeypatch):
         def force(self, time):
             return np.full_like(time, 300.0)
 
-    members[1] = replace(members[1], scene=replace(members[1].scene, load=Broken()))
+    members[1] = replace(members[1], problem=replace(members[1].problem, load=Broken()))
     found = observed(members)
     assert isinstance(found[1], ZeroDivisionError)
     for k in (0, 2):

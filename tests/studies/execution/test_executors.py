@@ -24,7 +24,7 @@ from batch_works import (
 )
 
 from tests.interruptible import interruptible
-from wearsim.errors import Problem, ScenarioError, WorkerError
+from wearsim.errors import Mistake, ScenarioError, WorkerError
 from wearsim.studies.execution.base import AHEAD, named
 from wearsim.studies.execution.factory import available_processors, executor
 
@@ -153,12 +153,12 @@ def test_that_a_batch_that_kills_every_process_ends_the_study(tmp_path: Path) ->
 
 @pytest.mark.parametrize(("scheduler", "workers"), CREWS)
 def test_that_an_error_of_the_work_arrives_as_it_is(scheduler: str, workers: int | None) -> None:
-    problems = [Problem("load", "normal_force", "must be above zero")]
+    problems = [Mistake("load", "normal_force", "must be above zero")]
     work = Raising(ScenarioError, "rig.toml", problems)
     with executor(scheduler, workers) as crew, pytest.raises(ScenarioError) as caught:
         list(crew.results(work, batches_of(1, 10)))
     assert caught.value.file == "rig.toml"
-    assert caught.value.problems == problems
+    assert caught.value.mistakes == problems
 
 
 def test_that_an_error_that_cannot_be_sent_is_told() -> None:

@@ -18,7 +18,7 @@ import pytest
 from batch_works import Deadly, Raising, Squares
 from dask_cluster import scheduler, worker
 
-from wearsim.errors import Problem, ScenarioError, WorkerError
+from wearsim.errors import Mistake, ScenarioError, WorkerError
 from wearsim.studies.execution import dask as executors_cluster
 from wearsim.studies.execution import dask as executors_dask
 from wearsim.studies.execution.base import AHEAD
@@ -76,10 +76,10 @@ def test_that_no_more_batches_are_taken_than_a_cluster_needs(address: str) -> No
 
 
 def test_that_a_work_on_a_cluster_raises_its_own_error(address: str) -> None:
-    problems = [Problem("load", "normal_force", "must be above zero")]
+    problems = [Mistake("load", "normal_force", "must be above zero")]
     with executor(address) as crew, pytest.raises(ScenarioError) as caught:
         list(crew.results(Raising(ScenarioError, "rig.toml", problems), iter([[1]])))
-    assert caught.value.problems == problems
+    assert caught.value.mistakes == problems
 
 
 def test_that_a_killed_worker_costs_nothing(tmp_path: Path) -> None:

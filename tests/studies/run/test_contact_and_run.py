@@ -6,7 +6,7 @@ import pytest
 import wearsim
 from tests.evolution import SCENARIOS
 from wearsim.errors import ScenarioError
-from wearsim.studies.run.assemble import build_scene
+from wearsim.studies.run.assemble import assemble_problem
 from wearsim.studies.run.dry_run import plan
 
 
@@ -70,7 +70,7 @@ def test_that_options_without_meaning_are_told():
     ):
         scenario = wearsim.load_scenario(SCENARIOS / "rig-450min.toml", overrides=changes)
         with pytest.raises(ScenarioError, match=rf"\[evolution\] {key}: has no meaning"):
-            build_scene(scenario)
+            assemble_problem(scenario)
 
 
 def test_that_the_strips_of_a_contact_can_be_moved():

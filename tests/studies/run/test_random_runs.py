@@ -20,7 +20,7 @@ from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.forward_euler import stability_limit
 from wearsim.results import open_results
 from wearsim.results.run.data import differences
-from wearsim.studies.run.assemble import build_scene
+from wearsim.studies.run.assemble import assemble_problem
 from wearsim.studies.run.draws import draw
 
 ALL_PER_PASS = {
@@ -77,15 +77,15 @@ def test_that_every_roller_has_its_own_slack():
     slack = {**SLACK, "persistence": "per-roller"}
     friction = {**FRICTION, "persistence": "per-roller"}
     scenario = scenario_of(creepage__misalignment=slack, friction__coefficient=friction)
-    scene, state = end_of(scenario)
-    assert scene.shape[1] == 3
+    problem, state = end_of(scenario)
+    assert problem.shape[1] == 3
     for name in ("yaw", "tilt", "friction"):
-        assert len(np.unique(getattr(scene.inputs, name))) == 3
-    assert np.hypot(scene.inputs.yaw, scene.inputs.tilt).max() < 2e-3
+        assert len(np.unique(getattr(problem.inputs, name))) == 3
+    assert np.hypot(problem.inputs.yaw, problem.inputs.tilt).max() < 2e-3
     # each roller touches where its tilt has moved it: R_crown x tilt, to the other side
-    forces = [contact.line_load for contact in fresh_state(scene).contacts]
-    centres = [float(np.dot(scene.grid.y, q) / q.sum()) for q in forces]
-    assert centres == pytest.approx(-0.5 * scene.inputs.tilt[:, 0], abs=2e-5)
+    forces = [contact.line_load for contact in fresh_state(problem).contacts]
+    centres = [float(np.dot(problem.grid.y, q) / q.sum()) for q in forces]
+    assert centres == pytest.approx(-0.5 * problem.inputs.tilt[:, 0], abs=2e-5)
     assert deepest(state) > 0.0
 
 
@@ -93,12 +93,12 @@ def test_that_every_roller_has_its_own_slack():
 def test_that_the_expectation_over_passes_agrees_with_drawing_every_pass(drawn):
     inputs = {name: ALL_PER_PASS[name] for name in drawn}
     _, truth = end_of(scenario_of(evolution__stepper="per-pass", contact__strips=91, **inputs))
-    fresh, _, _ = build_scene(scenario_of(contact__strips=91, **inputs))
+    fresh, _, _ = assemble_problem(scenario_of(contact__strips=91, **inputs))
     step = round(10.0 * stability_limit(fresh, fresh_state(fresh)))
-    scene, state = end_of(scenario_of(evolution__step=step, contact__strips=91, **inputs))
+    problem, state = end_of(scenario_of(evolution__step=step, contact__strips=91, **inputs))
     assert state.steps < 20
     assert abs(deepest(state) - deepest(truth)) <= state.depth_error[0]
-    volumes = whole_volume(scene, state), whole_volume(scene, truth)
+    volumes = whole_volume(problem, state), whole_volume(problem, truth)
     assert abs(volumes[0] - volumes[1])[0] <= state.volume_error[0]
     assert state.depth_error[0] < 0.02 * deepest(state)
 
@@ -140,8 +140,8 @@ def test_that_a_wandering_load_agrees_with_its_per_pass_truth():
     friction = {**WANDERING, "marginal": FRICTION, "persistence": "per-roller"}
     inputs = {"load__normal_force": load, "friction__coefficient": friction, "contact__strips": 61}
     _, truth = end_of(scenario_of(evolution__stepper="per-pass", **inputs))
-    scene, state = end_of(scenario_of(**inputs))
-    assert len(scene.varying) == 4
+    problem, state = end_of(scenario_of(**inputs))
+    assert len(problem.varying) == 4
     assert abs(deepest(state) - deepest(truth)) <= state.depth_error[0]
     assert deepest(state) == pytest.approx(deepest(truth), rel=2e-3)
 
@@ -179,18 +179,18 @@ def test_that_a_stopped_test_with_random_inputs_goes_on_as_if_unbroken(tmp_path,
 def test_that_a_field_is_refused_by_a_run():
     field = {"distribution": "white", "marginal": FRICTION}
     with pytest.raises(CapabilityError, match="resolved within one contact"):
-        build_scene(scenario_of(friction__coefficient=field))
+        assemble_problem(scenario_of(friction__coefficient=field))
 
 
 def test_that_a_latin_hypercube_is_refused_by_a_run():
     with pytest.raises(ScenarioError, match="a study of many realisations"):
-        build_scene(scenario_of(load__normal_force=LOAD, sampling__plan="latin-hypercube"))
+        assemble_problem(scenario_of(load__normal_force=LOAD, sampling__plan="latin-hypercube"))
 
 
 def test_that_a_process_far_too_fast_is_refused():
     load = {**WANDERING, "correlation_time": "1 us", "marginal": LOAD}
     with pytest.raises(ScenarioError, match="a longer correlation_time"):
-        build_scene(scenario_of(passes=100_000, load__normal_force=load))
+        assemble_problem(scenario_of(passes=100_000, load__normal_force=load))
 
 
 @pytest.mark.parametrize("key", ["load__normal_force", "friction__coefficient"])
@@ -214,13 +214,13 @@ def test_that_a_wandering_load_stays_within_the_stated_error(rollers):
     slack = {"creepage__misalignment": {**SLACK, "persistence": "per-roller"}}
     inputs = {"load__normal_force": {**WANDERING, "marginal": LOAD}, "contact__strips": 61}
     inputs |= slack if rollers == "apart" else {}
-    scene, fine = end_of(scenario_of(evolution__tolerance=1e-4, **inputs))
+    problem, fine = end_of(scenario_of(evolution__tolerance=1e-4, **inputs))
     for tolerance in (3e-3, 3e-2):
         _, state = end_of(scenario_of(evolution__tolerance=tolerance, **inputs))
         apart = abs(deepest(state) - deepest(fine))
         assert apart <= state.depth_error[0] + fine.depth_error[0]
         assert state.depth_error[0] <= tolerance * deepest(state)
-        volumes = [whole_volume(scene, one) for one in (state, fine)]
+        volumes = [whole_volume(problem, one) for one in (state, fine)]
         assert abs(volumes[0] - volumes[1]) <= state.volume_error[0] + fine.volume_error[0]
 
 
@@ -243,10 +243,10 @@ def test_that_a_record_means_the_same_whatever_the_stepper():
 def test_that_the_strips_hold_the_groove_of_the_roller_with_the_most_friction():
     friction = {"distribution": "uniform", "low": 0.05, "high": 1.0, "persistence": "per-roller"}
     scenario = scenario_of(friction__coefficient=friction, seed=3)
-    plain, _, _ = build_scene(scenario_of())
-    scene, state = end_of(scenario)
-    assert scene.inputs.friction.max() > 0.5
-    assert np.ptp(scene.grid.y) > 1.3 * np.ptp(plain.grid.y)
+    plain, _, _ = assemble_problem(scenario_of())
+    problem, state = end_of(scenario)
+    assert problem.inputs.friction.max() > 0.5
+    assert np.ptp(problem.grid.y) > 1.3 * np.ptp(plain.grid.y)
     assert deepest(state) > 0.0
 
 
@@ -259,23 +259,23 @@ def test_that_the_strips_hold_the_groove_of_the_roller_with_the_most_friction():
 )
 def test_that_the_strips_hold_the_groove_of_a_creepage_about_zero(law):
     changes = {"creepage__longitudinal": law, "evolution__tolerance": 1e-2}
-    scene, state = end_of(scenario_of(passes=20_000, **changes))
-    worn = scene.grid.y[state.cylinder_depth[0, 0, 0] > 0.0]
-    fresh = build_scene(scenario_of(passes=20_000, creepage__longitudinal=0.0))[0].grid.y[-1]
-    assert fresh < worn[-1] < scene.grid.y[-1]
+    problem, state = end_of(scenario_of(passes=20_000, **changes))
+    worn = problem.grid.y[state.cylinder_depth[0, 0, 0] > 0.0]
+    fresh = assemble_problem(scenario_of(passes=20_000, creepage__longitudinal=0.0))[0].grid.y[-1]
+    assert fresh < worn[-1] < problem.grid.y[-1]
 
 
 def test_that_nodes_are_refused_where_there_is_nothing_to_expect():
     for changes in ({}, {"evolution__stepper": "per-pass", **ALL_PER_PASS}):
         with pytest.raises(ScenarioError, match="no expectation over passes"):
-            build_scene(scenario_of(evolution__nodes=16, **changes))
+            assemble_problem(scenario_of(evolution__nodes=16, **changes))
 
 
 def test_step_is_shortened_where_its_coarse_twin_fails(monkeypatch):
     friction = {**FRICTION, "persistence": "per-pass"}
-    scene, stepper, _ = build_scene(scenario_of(passes=600, friction__coefficient=friction))
-    fresh = fresh_state(scene)
-    plain = stepper.advance(scene, fresh, 600.0).end
+    problem, stepper, _ = assemble_problem(scenario_of(passes=600, friction__coefficient=friction))
+    fresh = fresh_state(problem)
+    plain = stepper.advance(problem, fresh, 600.0).end
     original, failures = errors_of_steps.coarse_start, [StepError("the twin did not settle", {})]
 
     def fails_once(*arguments):
@@ -284,7 +284,7 @@ def test_step_is_shortened_where_its_coarse_twin_fails(monkeypatch):
         return original(*arguments)
 
     monkeypatch.setattr(errors_of_steps, "coarse_start", fails_once)
-    end = stepper.advance(scene, fresh, 600.0).end
+    end = stepper.advance(problem, fresh, 600.0).end
     assert not failures
     assert end.rejected >= 1
     assert 0.0 < end.passes < plain.passes

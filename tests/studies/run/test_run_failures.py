@@ -214,7 +214,7 @@ def test_that_an_existing_file_is_never_overwritten_unasked(
         raise AssertionError("work was done before the output was looked at")
 
     with monkeypatch.context() as patch:
-        patch.setattr(replay, "build_scene", work)
+        patch.setattr(replay, "assemble_problem", work)
         with pytest.raises(ResultsFileError, match="already exists; --force replaces it"):
             replay.run(short(), path)
     assert path.read_bytes() == content

@@ -9,7 +9,7 @@ import pytest
 from study_examples import LOADS, ROLLERS, STEPPERS, short, unlike
 
 from wearsim.errors import StepError
-from wearsim.evolution.error_control.step_doubling import TwinStepper
+from wearsim.evolution.error_control.step_doubling import StepDoublingStepper
 from wearsim.evolution.steppers.per_pass import PerPassStepper
 from wearsim.results import Result
 from wearsim.studies.run import run as replay
@@ -69,14 +69,14 @@ def _shared(one: Result, other: Result) -> tuple[list[int], list[int]]:
 
 def _short_side_steps(monkeypatch: pytest.MonkeyPatch, longest: float) -> None:
     """Let side steps longer than `longest` passes fail."""
-    side_step = TwinStepper.side_step
+    side_step = StepDoublingStepper.side_step
 
-    def step(self, scene, state, passes):
+    def step(self, problem, state, passes):
         if passes > longest:
             raise StepError(f"{passes} passes are too many")
-        return side_step(self, scene, state, passes)
+        return side_step(self, problem, state, passes)
 
-    monkeypatch.setattr(TwinStepper, "side_step", step)
+    monkeypatch.setattr(StepDoublingStepper, "side_step", step)
 
 
 def test_that_a_record_out_of_reach_of_one_step_is_reached_in_halves(

@@ -113,7 +113,7 @@ def test_that_a_slow_disk_takes_a_fiftieth_of_the_time(
     scenario = short(outputs__checkpoint_every="1e-9 s")
     for seconds in (1e-9, 1e9):
         written = property(lambda _, held=seconds: held, lambda _, found: None)
-        monkeypatch.setattr(replay._Replay, "_last_write", written)
+        monkeypatch.setattr(replay._RunInProgress, "_last_write", written)
         events: list[Event] = []
         result = replay.run(scenario, path, force=True, on_event=events.append)
         assert len(_checkpoints(events)) == (2 if seconds > 1.0 else len(result.passes) + 1)
@@ -213,14 +213,14 @@ def test_that_a_finished_test_is_left_alone(until: float | None, path: Path) -> 
 def test_that_a_test_killed_before_its_last_write_is_finished_by_it(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fail(self: replay._Replay, finished: bool = False) -> None:
+    def fail(self: replay._RunInProgress, finished: bool = False) -> None:
         write(self, False)
         if finished:
             raise OSError
 
-    write = replay._Replay._write
+    write = replay._RunInProgress._write
     with monkeypatch.context() as patch:
-        patch.setattr(replay._Replay, "_write", fail)
+        patch.setattr(replay._RunInProgress, "_write", fail)
         with pytest.raises(OSError):  # noqa: PT011  (it has no text)
             replay.run(short(), path)
     standing = open_results(path)

@@ -68,7 +68,7 @@ def _draw_test(file: Path, path: Path, measured: list[Path] | None) -> None:
 
     result = open_results(file)
     profiles = [read_measured(read_text(csv), str(csv)) for csv in measured or []]
-    from wearsim.report.figures.run import replay_figure
+    from wearsim.report.figures.run import run_figure
     from wearsim.report.parts.saving import save_figure
 
-    save_figure(replay_figure(result, profiles), path)
+    save_figure(run_figure(result, profiles), path)

@@ -10,7 +10,7 @@ from wearsim.types import IntArray
 T = TypeVar("T")
 
 
-def divided(
+def bisect_failures(
     work: Callable[[IntArray], T], places: IntArray
 ) -> tuple[list[tuple[IntArray, T]], dict[int, Exception]]:
     """Do something with all places at once, or with halves of them where it raises.
@@ -36,6 +36,6 @@ def divided(
             return [], {int(places[0]): error}
     middle = len(places) // 2
     (first, failed), (second, others) = (
-        divided(work, part) for part in (places[:middle], places[middle:])
+        bisect_failures(work, part) for part in (places[:middle], places[middle:])
     )
     return first + second, failed | others

@@ -11,43 +11,43 @@ from typing import TypeAlias
 import numpy as np
 
 from wearsim.errors import ContactError, StepError
-from wearsim.evolution.batch.bisect_failures import divided
+from wearsim.evolution.batch.bisect_failures import bisect_failures
 from wearsim.evolution.batch.stack import (
-    Flock,
-    can_be_joined,
-    joined_scene,
-    joined_states,
-    scene_of,
+    Stack,
+    can_be_stacked,
+    problem_of,
+    stacked_problem,
+    stacked_states,
     state_of,
 )
 from wearsim.evolution.error_control.step_doubling import Attempt, first_steps
 from wearsim.evolution.error_control.step_size import Trial
 from wearsim.evolution.integrate import not_finite, too_many_steps
-from wearsim.evolution.problem import Scene
+from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import separate_state
 from wearsim.evolution.steppers.backward_euler import ImplicitStepper
 from wearsim.evolution.steppers.base import Stepper
 from wearsim.types import FloatArray, IntArray
 
 
-def can_go_together(scene: Scene, stepper: Stepper) -> bool:
+def can_step_together(problem: WearProblem, stepper: Stepper) -> bool:
     """Tell whether a test can be stepped together with others that are `alike`.
 
     It takes implicit steps: those of other steppers differ from test to test in more than length.
     """
-    return isinstance(stepper, ImplicitStepper) and can_be_joined(scene)
+    return isinstance(stepper, ImplicitStepper) and can_be_stacked(problem)
 
 
-Path: TypeAlias = tuple[Flock, Flock, Flock]
+Path: TypeAlias = tuple[Stack, Stack, Stack]
 """The tests that took a step, at its start, in its middle and at its end."""
 
 
-class Together:
-    """Tests that are stepped together, numbered as their scenes are given.
+class Lockstep:
+    """Tests that are stepped together, numbered as their problems are given.
 
     Parameters
     ----------
-    scenes : sequence of Scene
+    problems : sequence of WearProblem
         Alike, and such as can go together.
     stepper : ImplicitStepper
     stop : float
@@ -57,7 +57,7 @@ class Together:
 
     Attributes
     ----------
-    flock : Flock, optional
+    stack : Stack, optional
         The tests that are under way, if any.
     steps, rejected : ndarray of int, shape (all tests,)
         Steps taken and refused.
@@ -66,23 +66,23 @@ class Together:
     """
 
     def __init__(
-        self, scenes: Sequence[Scene], stepper: ImplicitStepper, stop: float, max_steps: int
+        self, problems: Sequence[WearProblem], stepper: ImplicitStepper, stop: float, max_steps: int
     ) -> None:
         self.stepper, self.stop, self.max_steps = stepper, stop, max_steps
-        self.steps, self.rejected = np.zeros((2, len(scenes)), dtype=np.int64)
+        self.steps, self.rejected = np.zeros((2, len(problems)), dtype=np.int64)
         self._trials: dict[int, Trial] = {}
-        self.flock: Flock | None = None
-        scene = joined_scene(scenes)
-        done, self.failures = divided(
-            lambda numbers: separate_state(scene_of(scene, numbers)), np.arange(len(scenes))
+        self.stack: Stack | None = None
+        problem = stacked_problem(problems)
+        done, self.failures = bisect_failures(
+            lambda numbers: separate_state(problem_of(problem, numbers)), np.arange(len(problems))
         )
         if done:
             numbers = np.concatenate([found for found, _ in done])
-            state = joined_states([found for _, found in done])
-            self.flock = Flock(numbers, scene_of(scene, numbers), state)
+            state = stacked_states([found for _, found in done])
+            self.stack = Stack(numbers, problem_of(problem, numbers), state)
             steps = np.full(len(numbers), stepper.forced_step or 0.0)
             if not stepper.forced_step:
-                steps = first_steps(self.flock.scene, state)
+                steps = first_steps(self.stack.problem, state)
             for number, step in zip(numbers.tolist(), steps.tolist(), strict=True):
                 self._trials[number] = self._trial(step)
 
@@ -96,9 +96,9 @@ class Together:
         self._end(list(failures))
 
     def _end(self, numbers: Sequence[int]) -> None:
-        if self.flock is not None and len(numbers):
-            kept = np.flatnonzero(~np.isin(self.flock.numbers, numbers))
-            self.flock = self.flock.at(kept) if kept.size else None
+        if self.stack is not None and len(numbers):
+            kept = np.flatnonzero(~np.isin(self.stack.numbers, numbers))
+            self.stack = self.stack.at(kept) if kept.size else None
 
     def sweep(self) -> Path | None:
         """Try one step of every test under way; return those that stand, if any.
@@ -106,31 +106,31 @@ class Together:
         Tests that end by it, or fail, are no longer under way.
         """
         steps = self._proposed()
-        if self.flock is None:
+        if self.stack is None:
             return None
-        flock = self.flock
-        scheme = self.stepper.scheme(flock.scene, flock.state)
+        stack = self.stack
+        scheme = self.stepper.scheme(stack.problem, stack.state)
 
         def attempt(places: IntArray) -> Attempt:
-            some = flock.at(places)
-            return self.stepper.attempt(some.scene, some.state, steps[places], self.stop, scheme)
+            some = stack.at(places)
+            return self.stepper.attempt(some.problem, some.state, steps[places], self.stop, scheme)
 
-        done, failed = divided(attempt, np.arange(len(steps)))
-        self.fail(self._refused(flock, failed, steps))
-        tried = [(places, one, self._standing(flock, places, one, steps)) for places, one in done]
+        done, failed = bisect_failures(attempt, np.arange(len(steps)))
+        self.fail(self._refused(stack, failed, steps))
+        tried = [(places, one, self._standing(stack, places, one, steps)) for places, one in done]
         tried = [(places, one, ok) for places, one, ok in tried if ok.size]
         if not tried:
             return None
-        stood = flock.at(np.concatenate([places[ok] for places, _, ok in tried]))
-        half = joined_states([state_of(one.half, ok) for _, one, ok in tried])
-        end = joined_states([state_of(one.end, ok) for _, one, ok in tried])
+        stood = stack.at(np.concatenate([places[ok] for places, _, ok in tried]))
+        half = stacked_states([state_of(one.half, ok) for _, one, ok in tried])
+        end = stacked_states([state_of(one.end, ok) for _, one, ok in tried])
         return self._taken((stood, stood.moved_to(half), stood.moved_to(end)))
 
     def _proposed(self) -> FloatArray:
         """Return the length of the step that each test tries [passes]; end those with none."""
         steps: list[float] = []
         failures: dict[int, Exception] = {}
-        for number, passes in [] if self.flock is None else self.flock.progress:
+        for number, passes in [] if self.stack is None else self.stack.progress:
             try:
                 if self.steps[number] >= self.max_steps:
                     raise too_many_steps(self.max_steps, passes, self.stop, {})
@@ -141,12 +141,12 @@ class Together:
         return np.array(steps)
 
     def _refused(
-        self, flock: Flock, failed: dict[int, Exception], steps: FloatArray
+        self, stack: Stack, failed: dict[int, Exception], steps: FloatArray
     ) -> dict[int, Exception]:
         """Take note of tries that failed, by place; return the errors that end a test."""
         ending: dict[int, Exception] = {}
         for place, error in failed.items():
-            number = int(flock.numbers[place])
+            number = int(stack.numbers[place])
             try:
                 if not isinstance(error, (StepError, ContactError)):
                     raise error
@@ -156,13 +156,13 @@ class Together:
         return ending
 
     def _standing(
-        self, flock: Flock, places: IntArray, tried: Attempt, steps: FloatArray
+        self, stack: Stack, places: IntArray, tried: Attempt, steps: FloatArray
     ) -> IntArray:
         """Return which of the tries at some places stand."""
         stands = [
             self._trials[number].stands(over, step)
             for number, over, step in zip(
-                flock.numbers[places].tolist(),
+                stack.numbers[places].tolist(),
                 tried.excess.tolist(),
                 steps[places].tolist(),
                 strict=True,
@@ -183,8 +183,8 @@ class Together:
             self._trials[number] = self._trial(trial.proposed)
             if not ok:
                 failures[number] = not_finite(passes, {})
-        if self.flock is not None:
-            self.flock = self.flock.with_others(end)
+        if self.stack is not None:
+            self.stack = self.stack.with_others(end)
         self.fail(failures)
         self._end([number for number, passes in end.progress if passes >= self.stop])
         if not failures:

@@ -1,4 +1,4 @@
-"""Tests side by side as the realisations of one scene: joined, and taken apart again."""
+"""Tests side by side as the realisations of one problem: joined, and taken apart again."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from wearsim.evolution.contact_inputs import ContactInputs
-from wearsim.evolution.problem import Scene
+from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import Separate, WearState
 from wearsim.plugins import BODIES
 from wearsim.types import FloatArray, IntArray
@@ -28,22 +28,22 @@ _AXES = {
 _SAME_ARRAYS = ("from_apex", "roller", "weight", "half", "slip_profile")
 
 
-def can_be_joined(scene: Scene) -> bool:
+def can_be_stacked(problem: WearProblem) -> bool:
     """Tell whether a test can be stepped together with others that are like it.
 
     Load terms, a bearing torque, inputs drawn at every pass, several stations and wear laws that
     are not linear in the dissipation take one test at a time.
     """
-    linear = all(scene.wear_factors[body] is not None for body in BODIES)
-    plain = not (scene.free or scene.terms or scene.has_nodes or scene.redraw)
-    return linear and plain and scene.shape[0] == scene.shape[2] == 1
+    linear = all(problem.wear_factors[body] is not None for body in BODIES)
+    plain = not (problem.free or problem.terms or problem.has_nodes or problem.redraw)
+    return linear and plain and problem.shape[0] == problem.shape[2] == 1
 
 
-def alike(one: Scene, other: Scene) -> bool:
+def alike(one: WearProblem, other: WearProblem) -> bool:
     """Tell whether two tests that can be joined can be so with each other."""
     first, second = one.kinematics, other.kinematics
     radii = ("cylinder_radius", "roller_radius", "crown_radius", "rolling_speed")
-    varying = [[(item.name, item.rollers) for item in scene.varying] for scene in (one, other)]
+    varying = [[(item.name, item.rollers) for item in problem.varying] for problem in (one, other)]
     return (
         all(getattr(one, name) is getattr(other, name) for name in ("grid", "model"))
         and all(getattr(one, name) == getattr(other, name) for name in ("tilt_shifts", "settled"))
@@ -60,30 +60,30 @@ def _equal(one: FloatArray | None, other: FloatArray | None) -> bool:
     return np.array_equal(one, other)
 
 
-def joined_scene(scenes: Sequence[Scene]) -> Scene:
-    """Return one scene of which the tests, which are alike, are the realisations."""
-    inputs = [scene.inputs for scene in scenes]
+def stacked_problem(problems: Sequence[WearProblem]) -> WearProblem:
+    """Return one problem of which the tests, which are alike, are the realisations."""
+    inputs = [problem.inputs for problem in problems]
     joined = ContactInputs(
         *(
             np.concatenate([getattr(one, item.name) for one in inputs], axis=1)
             for item in fields(ContactInputs)
         )
     )
-    gaps = np.concatenate([scene.flat_gap for scene in scenes], axis=2)
-    return replace(scenes[0], flat_gap=gaps, inputs=joined, members=tuple(scenes))
+    gaps = np.concatenate([problem.flat_gap for problem in problems], axis=2)
+    return replace(problems[0], flat_gap=gaps, inputs=joined, members=tuple(problems))
 
 
-def scene_of(scene: Scene, numbers: IntArray) -> Scene:
-    """Return the scene with some of its realisations, in that order."""
+def problem_of(problem: WearProblem, numbers: IntArray) -> WearProblem:
+    """Return the problem with some of its realisations, in that order."""
     inputs = ContactInputs(
         *(
-            np.take(getattr(scene.inputs, item.name), numbers, axis=1)
+            np.take(getattr(problem.inputs, item.name), numbers, axis=1)
             for item in fields(ContactInputs)
         )
     )
-    members = tuple(scene.members[number] for number in numbers) if scene.members else ()
-    gap = np.take(scene.flat_gap, numbers, axis=2)
-    return replace(scene, flat_gap=gap, inputs=inputs, members=members)
+    members = tuple(problem.members[number] for number in numbers) if problem.members else ()
+    gap = np.take(problem.flat_gap, numbers, axis=2)
+    return replace(problem, flat_gap=gap, inputs=inputs, members=members)
 
 
 def state_of(state: WearState, numbers: IntArray) -> WearState:
@@ -91,17 +91,17 @@ def state_of(state: WearState, numbers: IntArray) -> WearState:
     taken: dict[str, Any] = {
         name: np.take(getattr(state, name), numbers, axis=axis) for name, axis in _AXES.items()
     }
-    shadow = state.shadow
+    shadow = state.coarse_step_solution
     return replace(
         state,
         **taken,
         contacts=state.batch.at(numbers),
-        shadow=None if shadow is None else state_of(shadow, numbers),
+        coarse_step_solution=None if shadow is None else state_of(shadow, numbers),
         each=None if state.each is None else state.each.at(numbers),
     )
 
 
-def joined_states(states: Sequence[WearState]) -> WearState:
+def stacked_states(states: Sequence[WearState]) -> WearState:
     """Return the states of tests that go each its own way as the realisations of one."""
     joined: dict[str, Any] = {
         name: np.concatenate([getattr(state, name) for state in states], axis=axis)
@@ -109,12 +109,14 @@ def joined_states(states: Sequence[WearState]) -> WearState:
     }
     first, *others = (state.batch for state in states)
     each = [state.each for state in states if state.each is not None]
-    shadows = [state.shadow for state in states if state.shadow is not None]
+    shadows = [
+        state.coarse_step_solution for state in states if state.coarse_step_solution is not None
+    ]
     return replace(
         states[0],
         **joined,
         contacts=first.joined_with(*others),
-        shadow=joined_states(shadows) if len(shadows) == len(states) else None,
+        coarse_step_solution=stacked_states(shadows) if len(shadows) == len(states) else None,
         each=Separate(
             np.concatenate([one.passes for one in each]),
             np.concatenate([one.solves for one in each]),
@@ -123,20 +125,20 @@ def joined_states(states: Sequence[WearState]) -> WearState:
 
 
 @dataclass(frozen=True)
-class Flock:
-    """Some tests, as the realisations of one scene.
+class Stack:
+    """Some tests, as the realisations of one problem.
 
     Parameters
     ----------
     numbers : ndarray of int, shape (tests,)
         Which they are.
-    scene : Scene
+    problem : WearProblem
     state : WearState
         Theirs; each goes its own way.
     """
 
     numbers: IntArray
-    scene: Scene
+    problem: WearProblem
     state: WearState
 
     @property
@@ -145,22 +147,22 @@ class Flock:
         passes: list[float] = np.asarray(self.state.now).tolist()
         return list(zip(self.numbers.tolist(), passes, strict=True))
 
-    def at(self, places: IntArray) -> Flock:
+    def at(self, places: IntArray) -> Stack:
         """Return the tests at some places, in that order."""
         if np.array_equal(places, np.arange(len(self.numbers))):
             return self
-        scene, state = scene_of(self.scene, places), state_of(self.state, places)
-        return Flock(self.numbers[places], scene, state)
+        problem, state = problem_of(self.problem, places), state_of(self.state, places)
+        return Stack(self.numbers[places], problem, state)
 
-    def moved_to(self, state: WearState) -> Flock:
+    def moved_to(self, state: WearState) -> Stack:
         """Return the same tests at another state."""
         return replace(self, state=state)
 
-    def with_others(self, others: Flock) -> Flock:
-        """Return these tests, some of them at the state that they have in another flock."""
+    def with_others(self, others: Stack) -> Stack:
+        """Return these tests, some of them at the state that they have in another stack."""
         if np.array_equal(self.numbers, others.numbers):
             return self.moved_to(others.state)
         order, place = np.arange(len(self.numbers)), np.argsort(self.numbers)
         at = place[np.searchsorted(self.numbers, others.numbers, sorter=place)]
         order[at] = len(order) + np.arange(len(at))
-        return self.moved_to(state_of(joined_states([self.state, others.state]), order))
+        return self.moved_to(state_of(stacked_states([self.state, others.state]), order))

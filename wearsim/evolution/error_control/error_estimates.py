@@ -11,14 +11,14 @@ import numpy as np
 from wearsim.evolution.batch.per_realisation import mean_along, sum_in_order
 from wearsim.evolution.error_control.step_size import StepControl
 from wearsim.evolution.observables import worn_volume
-from wearsim.evolution.problem import Scene
+from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import Depths, WearState, contact_values
 from wearsim.evolution.steppers.single_step import solve_present
-from wearsim.evolution.steppers.wear_increment import Wearing
+from wearsim.evolution.steppers.wear_increment import WearIncrement
 from wearsim.types import BoolArray, FloatArray, Number
 
 DEPTH_EXPONENT, VOLUME_EXPONENT = 0.5, 0.75  # below those of any groove: 2/3 to 1, and about 1
-Step: TypeAlias = Callable[[Scene, WearState, Number], WearState]
+Step: TypeAlias = Callable[[WearProblem, WearState, Number], WearState]
 COVER = 1.5  # of what is estimated; half as much for safety
 FIRST_ORDER_COVER = 2.0  # the twin of a first-order scheme is off by little more than it tells
 DEEP = 0.5  # depths are compared where the groove is deeper than this part of its depth
@@ -31,14 +31,14 @@ def deepest(state: WearState) -> FloatArray:
     return found
 
 
-def whole_volume(scene: Scene, state: WearState) -> FloatArray:
+def whole_volume(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the volume worn off the cylinder and all its rollers, shape (realisations,) [m^3]."""
-    return volume_of(scene, state.depths)
+    return volume_of(problem, state.depths)
 
 
-def volume_of(scene: Scene, depths: Depths) -> FloatArray:
+def volume_of(problem: WearProblem, depths: Depths) -> FloatArray:
     """Return the volume of depths of cylinder and rollers, shape (realisations,) [m^3]."""
-    kinematics, spacing = scene.kinematics, scene.grid.spacing
+    kinematics, spacing = problem.kinematics, problem.grid.spacing
     cylinder = worn_volume(depths[0], spacing, kinematics.cylinder_radius)
     rollers = worn_volume(depths[1][0], spacing, kinematics.roller_radius)
     mean: FloatArray = mean_along(mean_along(cylinder, axis=1), axis=0)[0, 0]
@@ -73,7 +73,9 @@ def depth_between(one: WearState, other: WearState) -> FloatArray:
     return greatest_in(grooves(one), apart(one, other))
 
 
-def variation_bias(scene: Scene, end: WearState, first: Number, passes: Number) -> Depths | None:
+def variation_bias(
+    problem: WearProblem, end: WearState, first: Number, passes: Number
+) -> Depths | None:
     """Return what a step leaves out where load and processes vary within it.
 
     The step takes their exact means, but wear is no linear function of them. Half the second
@@ -82,7 +84,7 @@ def variation_bias(scene: Scene, end: WearState, first: Number, passes: Number) 
 
     Parameters
     ----------
-    scene : Scene
+    problem : WearProblem
     end : WearState
         The state at the step's end.
     first, passes : float or ndarray, shape (realisations,)
@@ -93,17 +95,17 @@ def variation_bias(scene: Scene, end: WearState, first: Number, passes: Number) 
     cylinder, roller : ndarray
         Depth to add, shapes as in `WearState` [m]; None where nothing varies.
     """
-    start, stop = scene.time(first), scene.time(first + passes)
-    here = scene.at_time(start, stop)
-    mean: Wearing | None = None
+    start, stop = problem.time(first), problem.time(first + passes)
+    here = problem.at_time(start, stop)
+    mean: WearIncrement | None = None
     bias: Depths | None = None
     loads: FloatArray | None = None
-    for name, rollers, deviation in scene.deviations(start, stop):
+    for name, rollers, deviation in problem.deviations(start, stop):
         if not np.count_nonzero(deviation):
             continue
         if loads is None:
-            carried = contact_values(scene, end.contacts, "line_load").sum(axis=-1)
-            loads = carried * scene.grid.spacing
+            carried = contact_values(problem, end.contacts, "line_load").sum(axis=-1)
+            loads = carried * problem.grid.spacing
         values = loads if name == "normal_force" else getattr(here.inputs, name)
         values = values.reshape(-1, values.shape[-1])
         felt = deviation > 1e-9 * np.abs(values).max(axis=0)
@@ -114,7 +116,7 @@ def variation_bias(scene: Scene, end: WearState, first: Number, passes: Number) 
         most = 0.9 * values.min(axis=0) if bounded else np.inf
         size = np.where(felt, np.minimum(deviation, most), 0.0)
         mean = mean if mean is not None else _worn_at(here, end, loads, {}, passes)
-        shift = np.where(np.isin(scene.roller, rollers)[:, None], size, 0.0)
+        shift = np.where(np.isin(problem.roller, rollers)[:, None], size, 0.0)
         less, more = (
             _worn_at(here, end, loads, {name: sign * shift}, passes) for sign in (-1.0, 1.0)
         )
@@ -126,7 +128,9 @@ def variation_bias(scene: Scene, end: WearState, first: Number, passes: Number) 
     return bias
 
 
-def variation_error(scene: Scene, end: WearState, first: Number, passes: Number) -> FloatArray:
+def variation_error(
+    problem: WearProblem, end: WearState, first: Number, passes: Number
+) -> FloatArray:
     """Return the size of `variation_bias`, whose parameters these are, with a factor for safety.
 
     Returns
@@ -134,15 +138,15 @@ def variation_error(scene: Scene, end: WearState, first: Number, passes: Number)
     ndarray, shape (2, realisations)
         In depth [m], and in the volume worn off both bodies [m^3].
     """
-    bias = variation_bias(scene, end, first, passes)
+    bias = variation_bias(problem, end, first, passes)
     if bias is None:
-        return np.zeros((2, scene.shape[2]))
+        return np.zeros((2, problem.shape[2]))
     biased = _worn_further(end, bias)
-    volumes = np.abs(whole_volume(scene, biased) - whole_volume(scene, end))
+    volumes = np.abs(whole_volume(problem, biased) - whole_volume(problem, end))
     return COVER * np.array([depth_between(end, biased), volumes])
 
 
-def biased_twin(end: WearState, twin: WearState, bias: Depths | None) -> WearState:
+def biased_coarse_solution(end: WearState, twin: WearState, bias: Depths | None) -> WearState:
     """Return the twin of a test with the bias that the variation within a step makes.
 
     It is worn into the twin's profile, where the wear to come forgets it as it would in the test.
@@ -167,40 +171,49 @@ def biased_twin(end: WearState, twin: WearState, bias: Depths | None) -> WearSta
 
 def _worn_further(state: WearState, depths: Depths) -> WearState:
     """Return `state` with depths added to those of cylinder and rollers."""
-    return state.but(
+    return state.replaced(
         cylinder_depth=state.cylinder_depth + depths[0],
         roller_depth=state.roller_depth + depths[1],
     )
 
 
 def _worn_at(
-    scene: Scene, end: WearState, loads: FloatArray, shifts: dict[str, FloatArray], passes: Number
-) -> Wearing:
+    problem: WearProblem,
+    end: WearState,
+    loads: FloatArray,
+    shifts: dict[str, FloatArray],
+    passes: Number,
+) -> WearIncrement:
     """Return what passes on the profiles of `end` wear off with loads and inputs shifted."""
     values = {
-        name: getattr(scene.inputs, name) + shift
+        name: getattr(problem.inputs, name) + shift
         for name, shift in shifts.items()
         if name != "normal_force"
     }
-    shifted = replace(scene, inputs=scene.inputs.with_values(values))
+    shifted = replace(problem, inputs=problem.inputs.with_values(values))
     contacts = solve_present(shifted, end, loads + shifts.get("normal_force", 0.0))
-    return Wearing(shifted, contacts, passes)
+    return WearIncrement(shifted, contacts, passes)
 
 
-def coarse_start(scene: Scene, state: WearState) -> WearState:
+def coarse_start(problem: WearProblem, state: WearState) -> WearState:
     """Return the twin of a test whose rollers have half the contacts, where it has yet to begin."""
-    chosen = set(np.flatnonzero(scene.half == 0))
-    contacts = zip(scene.contacts, state.contacts, strict=True)
+    chosen = set(np.flatnonzero(problem.half == 0))
+    contacts = zip(problem.contacts, state.contacts, strict=True)
     return replace(
         state,
         contacts=tuple(contact for (_, c, _), contact in contacts if c in chosen),
-        shadow=None,
-        coarse=None,
+        coarse_step_solution=None,
+        half_quadrature_solution=None,
     )
 
 
 def with_pass_errors(
-    scene: Scene, start: WearState, end: WearState, whole: WearState, step: Step, passes: Number
+    problem: WearProblem,
+    start: WearState,
+    end: WearState,
+    whole: WearState,
+    step: Step,
+    passes: Number,
 ) -> WearState:
     """Return `end` with what the draws at every pass of a step make uncertain.
 
@@ -211,48 +224,50 @@ def with_pass_errors(
 
     Parameters
     ----------
-    scene : Scene
+    problem : WearProblem
     start, end : WearState
         The test before and after the step.
     whole : WearState
         The test stepped as the twin is.
     step : callable
-        Takes a scene, a state and a number of passes to the state after them.
+        Takes a problem, a state and a number of passes to the state after them.
     passes : float
         Length of the step.
     """
-    if not scene.has_nodes:
+    if not problem.has_nodes:
         return end
-    halved = scene.halved
-    coarse = step(halved, start.coarse or coarse_start(scene, start), passes)
-    volume = whole_volume(scene, end)
-    variance = start.scatter[1] + _volume_variance(scene, end, passes)
+    halved = problem.halved
+    coarse = step(halved, start.half_quadrature_solution or coarse_start(problem, start), passes)
+    volume = whole_volume(problem, end)
+    variance = start.scatter[1] + _volume_variance(problem, end, passes)
     depth = np.square(deepest(end) / np.where(volume > 0.0, volume, 1.0)) * variance
-    volumes = np.abs(whole_volume(scene, whole) - whole_volume(scene, coarse))
+    volumes = np.abs(whole_volume(problem, whole) - whole_volume(problem, coarse))
     return replace(
         end,
         quadrature=np.array([depth_between(whole, coarse), volumes]),
         scatter=np.array([depth, variance]),
-        coarse=coarse,
+        half_quadrature_solution=coarse,
     )
 
 
-def _volume_variance(scene: Scene, end: WearState, passes: Number) -> FloatArray:
+def _volume_variance(problem: WearProblem, end: WearState, passes: Number) -> FloatArray:
     """Return the variance of the volume that so many passes wear, shape (realisations,) [m^6]."""
-    kinematics, spacing = scene.kinematics, scene.grid.spacing
-    cylinder, roller = scene.wear_per_pass(end.contacts)
+    kinematics, spacing = problem.kinematics, problem.grid.spacing
+    cylinder, roller = problem.wear_per_pass(end.contacts)
     ratio = kinematics.roller_share * kinematics.physical_rollers
     volume = worn_volume(cylinder, spacing, kinematics.cylinder_radius)
     volume = volume + worn_volume(roller * ratio, spacing, kinematics.roller_radius)
     # what differs from roller to roller is no chance
-    chance = volume - scene.per_roller(volume)[:, scene.roller]
-    variance: FloatArray = (scene.cylinder_share[None, :, None] * chance**2).sum(axis=1).max(axis=0)
+    chance = volume - problem.per_roller(volume)[:, problem.roller]
+    variance: FloatArray = (
+        (problem.cylinder_share[None, :, None] * chance**2).sum(axis=1).max(axis=0)
+    )
     return passes * variance
 
 
 def excess(
     control: StepControl,
-    scene: Scene,
+    problem: WearProblem,
     start: WearState,
     end: WearState,
     added: FloatArray,
@@ -267,7 +282,7 @@ def excess(
     Parameters
     ----------
     control : StepControl
-    scene : Scene
+    problem : WearProblem
     start, end : WearState
         The test before and after the step.
     added : ndarray, shape (2, realisations)
@@ -277,9 +292,9 @@ def excess(
     reached : ndarray, shape (2, realisations), optional
         Error of depth [m] and volume [m^3] after the step, at most `added` and what was before.
     """
-    worst = np.zeros(scene.shape[2])
+    worst = np.zeros(problem.shape[2])
     parts = np.broadcast_to(end.now / stop, worst.shape).tolist()
-    sizes = deepest(end), whole_volume(scene, end)
+    sizes = deepest(end), whole_volume(problem, end)
     # what no shorter step would take away must not shorten it
     reducible = np.array([start.depth_error, start.volume_error]) - start.irreducible
     arrays = reducible, added, reducible + added if reached is None else reached

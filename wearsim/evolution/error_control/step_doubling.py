@@ -13,7 +13,7 @@ from wearsim.evolution.error_control.error_estimates import (
     FIRST_ORDER_COVER,
     Step,
     apart,
-    biased_twin,
+    biased_coarse_solution,
     excess,
     greatest_in,
     grooves,
@@ -22,7 +22,7 @@ from wearsim.evolution.error_control.error_estimates import (
     with_pass_errors,
 )
 from wearsim.evolution.error_control.step_size import StepControl, Trial
-from wearsim.evolution.problem import Scene
+from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, contact_values
 from wearsim.evolution.steppers.base import Advance, Stepper
 from wearsim.types import FloatArray, Number
@@ -45,7 +45,7 @@ class Attempt:
     excess: FloatArray
 
 
-class TwinStepper(Stepper):
+class StepDoublingStepper(Stepper):
     """Takes every step in halves, and whole in a twin of the test that is stepped beside it.
 
     What sets the depths of the two apart is an estimate of the error of the test, with all that
@@ -69,47 +69,47 @@ class TwinStepper(Stepper):
         self.forced_step = forced_step
 
     @abstractmethod
-    def scheme(self, scene: Scene, state: WearState) -> Step:
-        """Return what takes a scene, a state and a number of passes to the state after them.
+    def scheme(self, problem: WearProblem, state: WearState) -> Step:
+        """Return what takes a problem, a state and a number of passes to the state after them.
 
         It is asked for once at the start `state` of each step, for all that is stepped there.
         """
 
-    def side_step(self, scene: Scene, state: WearState, passes: Number) -> WearState:
+    def side_step(self, problem: WearProblem, state: WearState, passes: Number) -> WearState:
         """Return the state `passes` passes later, in one step."""
-        return self.scheme(scene, state)(scene, state, passes)
+        return self.scheme(problem, state)(problem, state, passes)
 
-    def advance(self, scene: Scene, state: WearState, stop: float) -> Advance:
+    def advance(self, problem: WearProblem, state: WearState, stop: float) -> Advance:
         """Take one step, shortened until what it adds to the error is allowed."""
-        scheme, trial = self.scheme(scene, state), self.trial(scene, state)
+        scheme, trial = self.scheme(problem, state), self.trial(problem, state)
         while True:
             step = trial.step(state.passes, stop)
             try:
-                tried = self.attempt(scene, state, step, stop, scheme)
+                tried = self.attempt(problem, state, step, stop, scheme)
             except (StepError, ContactError) as failure:
                 trial.refuse(failure, step)
                 continue
             if trial.stands(float(tried.excess.max()), step):
-                end = tried.end.but(
+                end = tried.end.replaced(
                     step=trial.proposed,
                     steps=state.steps + 1,
                     rejected=state.rejected + trial.rejected,
                 )
                 return Advance(path=(state, tried.half, end))
 
-    def trial(self, scene: Scene, state: WearState) -> Trial:
+    def trial(self, problem: WearProblem, state: WearState) -> Trial:
         """Return the search for the next step of a test."""
-        proposed = self.forced_step or state.step or float(first_steps(scene, state).min())
+        proposed = self.forced_step or state.step or float(first_steps(problem, state).min())
         return Trial(proposed, self.control, self.order, bool(self.forced_step), state.to_arrays)
 
     def attempt(
-        self, scene: Scene, state: WearState, step: Number, stop: float, scheme: Step
+        self, problem: WearProblem, state: WearState, step: Number, stop: float, scheme: Step
     ) -> Attempt:
         """Take a step in halves and whole, and tell what it adds to the error.
 
         Parameters
         ----------
-        scene : Scene
+        problem : WearProblem
         state : WearState
         step : float or ndarray, shape (realisations,)
             Passes of the step.
@@ -123,22 +123,22 @@ class TwinStepper(Stepper):
         StepError, ContactError
             If the step is too long for one of the realisations.
         """
-        twin = state.shadow or state
-        half = scheme(scene, state, 0.5 * step)
-        end = scheme(scene, half, 0.5 * step)
-        whole = scheme(scene, twin, step)
-        end = with_pass_errors(scene, state, end, whole, scheme, step)
-        whole = biased_twin(end, whole, variation_bias(scene, end, state.now, step))
+        twin = state.coarse_step_solution or state
+        half = scheme(problem, state, 0.5 * step)
+        end = scheme(problem, half, 0.5 * step)
+        whole = scheme(problem, twin, step)
+        end = with_pass_errors(problem, state, end, whole, scheme, step)
+        whole = biased_coarse_solution(end, whole, variation_bias(problem, end, state.now, step))
         now = np.where(step == stop - state.now, stop, end.now)
         end = end.moved(now, whole.solves_since(twin))
-        end, added = _with_errors(scene, (state, twin), (end, whole), self.order)
+        end, added = _with_errors(problem, (state, twin), (end, whole), self.order)
         reached = np.array([end.depth_error, end.volume_error]) - end.irreducible
-        over = excess(self.control, scene, state, end, added, stop, reached)
+        over = excess(self.control, problem, state, end, added, stop, reached)
         return Attempt(half, end, over)
 
 
 def _with_errors(
-    scene: Scene,
+    problem: WearProblem,
     before: tuple[WearState, WearState],
     after: tuple[WearState, WearState],
     order: int,
@@ -147,7 +147,7 @@ def _with_errors(
 
     Parameters
     ----------
-    scene : Scene
+    problem : WearProblem
     before, after : tuple of WearState
         The test and its twin at the step's ends.
     order : int
@@ -164,27 +164,30 @@ def _with_errors(
     deep, first, last = grooves(end), apart(*before), apart(*after)
     moved = last[0] - first[0], last[1] - first[1]
     cover = FIRST_ORDER_COVER if order == 1 else COVER
-    added = cover * np.array([greatest_in(deep, moved), np.abs(volume_of(scene, moved))])
+    added = cover * np.array([greatest_in(deep, moved), np.abs(volume_of(problem, moved))])
     others = [state.irreducible for state in (start, end)]
     twins = {
-        name: twin.moved(end.now, shadow=None, coarse=None)
-        for name, twin in (("shadow", whole), ("coarse", end.coarse))
+        name: twin.moved(end.now, coarse_step_solution=None, half_quadrature_solution=None)
+        for name, twin in (
+            ("coarse_step_solution", whole),
+            ("half_quadrature_solution", end.half_quadrature_solution),
+        )
         if twin is not None
     }
-    end = end.but(
+    end = end.replaced(
         depth_error=cover * greatest_in(deep, last) + others[1][0],
         volume_error=start.volume_error - others[0][1] + added[1] + others[1][1],
-        shadow=twins["shadow"],
-        coarse=twins.get("coarse"),
+        coarse_step_solution=twins["coarse_step_solution"],
+        half_quadrature_solution=twins.get("half_quadrature_solution"),
     )
     return end, added
 
 
-def first_steps(scene: Scene, state: WearState) -> FloatArray:
+def first_steps(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the passes that wear a tenth of the elastic approach off, shape (realisations,)."""
-    cylinder, roller = scene.shared_wear(*scene.wear_per_pass(state.contacts))
+    cylinder, roller = problem.shared_wear(*problem.wear_per_pass(state.contacts))
     rate = (cylinder + roller).max(axis=(0, 1, 3))
-    gap = scene.gap(state.cylinder_depth, state.roller_depth)
-    approach = contact_values(scene, state.contacts, "approach") - gap.min(axis=-1)
+    gap = problem.gap(state.cylinder_depth, state.roller_depth)
+    approach = contact_values(problem, state.contacts, "approach") - gap.min(axis=-1)
     worn = np.where(rate > 0.0, rate, 1.0)
     return np.asarray(np.where(rate > 0.0, 0.1 * approach.min(axis=(0, 1)) / worn, np.inf))

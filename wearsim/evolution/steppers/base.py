@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
-from wearsim.evolution.problem import Scene
+from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
 
 
@@ -38,7 +38,7 @@ class Stepper(ABC):
     pass_by_pass = False
 
     @abstractmethod
-    def advance(self, scene: Scene, state: WearState, stop: float) -> Advance:
+    def advance(self, problem: WearProblem, state: WearState, stop: float) -> Advance:
         """Take one step that ends at `stop` passes at the latest.
 
         Raises
@@ -50,7 +50,7 @@ class Stepper(ABC):
         """
 
     @abstractmethod
-    def side_step(self, scene: Scene, state: WearState, passes: float) -> WearState:
+    def side_step(self, problem: WearProblem, state: WearState, passes: float) -> WearState:
         """Return the state `passes` passes later, for a record on the way; nothing follows it."""
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from wearsim.contact_batch import OperatingPoints
-from wearsim.evolution.problem import Scene
+from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import Contacts, as_batch
 from wearsim.plugins import SharedWear
 from wearsim.types import BoolArray, FloatArray, IntArray, OperatingPoint
@@ -15,8 +15,8 @@ from wearsim.types import BoolArray, FloatArray, IntArray, OperatingPoint
 REALISATION = 2  # axis
 
 
-def solve_yielding(
-    scene: Scene,
+def solve_compliant(
+    problem: WearProblem,
     gap: FloatArray,
     points: Sequence[OperatingPoint],
     wear: SharedWear,
@@ -27,35 +27,35 @@ def solve_yielding(
 
     Parameters
     ----------
-    scene : Scene
+    problem : WearProblem
     gap : ndarray, shape (stations, contacts, realisations, strips)
         Gap of each contact [m].
     points : sequence of OperatingPoint
-        One per contact, in the scene's order.
+        One per contact, in the problem's order.
     wear : SharedWear
         With a first axis of realisations.
     warm : sequence of ContactSolution
-        Solutions nearby, in the scene's order; they stand where nothing moves.
+        Solutions nearby, in the problem's order; they stand where nothing moves.
     moving : ndarray of bool, shape (realisations,)
 
     Returns
     -------
     sequence of ContactSolution
-        In the scene's order.
+        In the problem's order.
     """
     if np.count_nonzero(moving) == len(moving):
-        return _solve(scene, gap, points, wear, warm)
+        return _solve(problem, gap, points, wear, warm)
     numbers = np.flatnonzero(moving)
     places = np.arange(len(points)).reshape(-1, len(moving))[:, numbers].ravel()
-    warm = as_batch(warm, scene.shape)
+    warm = as_batch(warm, problem.shape)
     found = _solve(
-        scene,
+        problem,
         np.take(gap, numbers, axis=REALISATION),
         some_points(points, places),
         wear.at(numbers),
         warm.at(numbers),
     )
-    return warm.with_others(numbers, as_batch(found, (*scene.shape[:2], len(numbers))))
+    return warm.with_others(numbers, as_batch(found, (*problem.shape[:2], len(numbers))))
 
 
 def some_points(points: Sequence[OperatingPoint], places: IntArray) -> Sequence[OperatingPoint]:
@@ -66,14 +66,14 @@ def some_points(points: Sequence[OperatingPoint], places: IntArray) -> Sequence[
 
 
 def _solve(
-    scene: Scene,
+    problem: WearProblem,
     gap: FloatArray,
     points: Sequence[OperatingPoint],
     wear: SharedWear,
     warm: Contacts,
 ) -> Contacts:
     """Solve the contacts of some realisations, in the order station, contact, realisation."""
-    model, curvature = scene.model, scene.kinematics.longitudinal_curvature
+    model, curvature = problem.model, problem.kinematics.longitudinal_curvature
     stations, contacts, realisations, strips = gap.shape
     together = stations * contacts
     if together == 1:

@@ -17,7 +17,7 @@ from wearsim.evolution.error_control.error_estimates import (
 )
 from wearsim.evolution.error_control.step_size import StepControl
 from wearsim.evolution.observables import oscillation
-from wearsim.evolution.problem import Scene
+from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, contact_values
 from wearsim.evolution.steppers.base import Advance, Stepper, fitted
 from wearsim.evolution.steppers.single_step import (
@@ -27,7 +27,7 @@ from wearsim.evolution.steppers.single_step import (
     solve_present,
 )
 from wearsim.evolution.steppers.spectral_radius import stability_limit
-from wearsim.evolution.steppers.wear_increment import Wearing
+from wearsim.evolution.steppers.wear_increment import WearIncrement
 from wearsim.types import FloatArray
 
 SAFETY = 0.5  # of the limit of stability
@@ -60,33 +60,35 @@ class ExplicitStepper(Stepper):
         self.forced_step = forced_step
         self.allow_unstable = allow_unstable
 
-    def side_step(self, scene: Scene, state: WearState, passes: float) -> WearState:
+    def side_step(self, problem: WearProblem, state: WearState, passes: float) -> WearState:
         """Return the state `passes` passes later, in one step."""
-        return explicit_step(scene, state, passes)
+        return explicit_step(problem, state, passes)
 
-    def advance(self, scene: Scene, state: WearState, stop: float) -> Advance:
+    def advance(self, problem: WearProblem, state: WearState, stop: float) -> Advance:
         """Take one step, under the limit of stability and within the tolerance."""
-        limit = stability_limit(scene, state)
+        limit = stability_limit(problem, state)
         proposed = self._proposal(state, limit)
         rejected = state.rejected
         while True:
             left = stop - state.passes
             step = min(proposed, left) if self.forced_step else fitted(proposed, left)
-            end = explicit_step(scene, state, step)
-            added = _errors(scene, state, end, step)
-            over = float(excess(self.control, scene, state, end, added, stop).max())
+            end = explicit_step(problem, state, step)
+            added = _errors(problem, state, end, step)
+            over = float(excess(self.control, problem, state, end, added, stop).max())
             chosen = self.control.next_step(step, over)
             if self.forced_step or over <= 1.0:
                 break
             rejected += 1
             proposed = min(chosen, 0.7 * step)
-        end = with_pass_errors(scene, state, end, end, explicit_step, step)
+        end = with_pass_errors(problem, state, end, end, explicit_step, step)
         added = added + end.irreducible - state.irreducible
         passes = stop if step == left else end.passes
         end = replace(
             end,
             passes=passes,
-            coarse=None if end.coarse is None else replace(end.coarse, passes=passes),
+            half_quadrature_solution=None
+            if end.half_quadrature_solution is None
+            else replace(end.half_quadrature_solution, passes=passes),
             depth_error=state.depth_error + added[0],
             volume_error=state.volume_error + added[1],
             step=self.forced_step or (max(chosen, proposed) if step < proposed else chosen),
@@ -121,22 +123,22 @@ def _warning(end: WearState, step: float, limit: float) -> str | None:
     )
 
 
-def _errors(scene: Scene, start: WearState, end: WearState, step: float) -> FloatArray:
+def _errors(problem: WearProblem, start: WearState, end: WearState, step: float) -> FloatArray:
     """Return half the difference to a step at the end's wear rate, and the load's spread.
 
     Shape (2, realisations): depth [m] and volume worn off both bodies [m^3].
     """
     # the processes at their means over the step, as the step itself took them
-    here = scene.at_time(scene.time(start.passes), scene.time(start.passes + step))
+    here = problem.at_time(problem.time(start.passes), problem.time(start.passes + step))
     depths = start.depths, end.depths
     loads = mean_loads(here, start, step, depths, contact_values(here, end.contacts, "power"))
-    solve = solve_present if scene.varying else contacts_at
-    again = Wearing(here, solve(here, end, loads), step)
+    solve = solve_present if problem.varying else contacts_at
+    again = WearIncrement(here, solve(here, end, loads), step)
     other = replace(
         end,
         cylinder_depth=start.cylinder_depth + again.cylinder,
         roller_depth=start.roller_depth + again.roller,
     )
-    volumes = np.abs(whole_volume(scene, end) - whole_volume(scene, other))
+    volumes = np.abs(whole_volume(problem, end) - whole_volume(problem, other))
     apart = np.array([depth_between(end, other), volumes])
-    return COVER * 0.5 * apart + variation_error(scene, end, start.passes, step)
+    return COVER * 0.5 * apart + variation_error(problem, end, start.passes, step)

@@ -11,8 +11,8 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from wearsim.evolution.error_control.error_estimates import Step
-from wearsim.evolution.error_control.step_doubling import TwinStepper
-from wearsim.evolution.problem import Scene
+from wearsim.evolution.error_control.step_doubling import StepDoublingStepper
+from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import Contacts, WearState, contact_values
 from wearsim.evolution.steppers.single_step import (
     contacts_at,
@@ -22,7 +22,7 @@ from wearsim.evolution.steppers.single_step import (
     worn_state,
 )
 from wearsim.evolution.steppers.spectral_radius import decay_rates
-from wearsim.evolution.steppers.wear_increment import Wearing
+from wearsim.evolution.steppers.wear_increment import WearIncrement
 from wearsim.types import FloatArray
 
 FEWEST = 3  # two are of little accuracy for what decays within a step
@@ -90,7 +90,7 @@ SAFETY = 1.2  # on the greatest rate of decay, which is estimated and may grow w
 Change: TypeAlias = tuple[FloatArray, FloatArray, FloatArray]
 
 
-class StabilisedStepper(TwinStepper):
+class StabilisedStepper(StepDoublingStepper):
     """Takes Runge-Kutta-Legendre steps of second order, which ask nothing of a model but solutions.
 
     A step of s stages reaches s^2/4 as far as a stable step of Euler's method. The greatest rate
@@ -103,12 +103,14 @@ class StabilisedStepper(TwinStepper):
 
     order = 2
 
-    def scheme(self, scene: Scene, state: WearState) -> Step:
+    def scheme(self, problem: WearProblem, state: WearState) -> Step:
         """Return a step for the rates of decay at `state`."""
-        return partial(stabilised_step, decay=decay_rates(scene, state))
+        return partial(stabilised_step, decay=decay_rates(problem, state))
 
 
-def stabilised_step(scene: Scene, state: WearState, passes: float, decay: FloatArray) -> WearState:
+def stabilised_step(
+    problem: WearProblem, state: WearState, passes: float, decay: FloatArray
+) -> WearState:
     """Step over `passes` passes in as many stages as the rate of decay asks for.
 
     Every stage is an explicit step on the profiles of the one before, weighted with those before
@@ -116,21 +118,21 @@ def stabilised_step(scene: Scene, state: WearState, passes: float, decay: FloatA
 
     Parameters
     ----------
-    scene : Scene
+    problem : WearProblem
     state : WearState
     passes : float
         Length of the step.
     decay : ndarray, shape (realisations,)
         Greatest rate of decay [1/pass].
     """
-    here = scene.at_time(scene.time(state.passes), scene.time(state.passes + passes))
+    here = problem.at_time(problem.time(state.passes), problem.time(state.passes + passes))
     stages = legendre_stages(stages_for(SAFETY * float(decay.max()) * passes))
     before = (
         np.zeros_like(state.cylinder_depth),
         np.zeros_like(state.roller_depth),
-        np.zeros(scene.shape),
+        np.zeros(problem.shape),
     )
-    solve = solve_present if scene.varying else contacts_at
+    solve = solve_present if problem.varying else contacts_at
     contacts, first = _rate(here, state, passes, before, solve)
     solves = len(stages) * len(contacts)
     solves += 0 if contacts is state.contacts else len(contacts)
@@ -147,15 +149,15 @@ def stabilised_step(scene: Scene, state: WearState, passes: float, decay: FloatA
     begun = replace(state, contacts=contacts, solves=state.solves + solves, decay=decay)
     ends = state.cylinder_depth + change[0], state.roller_depth + change[1]
     worn = worn_state(here, begun, passes, ends, change[2])
-    return replace(worn, contacts=solve_present(scene, worn, present_loads(scene, worn)))
+    return replace(worn, contacts=solve_present(problem, worn, present_loads(problem, worn)))
 
 
 def _rate(
-    here: Scene,
+    here: WearProblem,
     state: WearState,
     passes: float,
     change: Change,
-    solve: Callable[[Scene, WearState, FloatArray], Contacts] = solve_present,
+    solve: Callable[[WearProblem, WearState, FloatArray], Contacts] = solve_present,
 ) -> tuple[Contacts, Change]:
     """Return the contacts on the profiles of a stage, and what the whole step would do by them.
 
@@ -163,7 +165,7 @@ def _rate(
 
     Parameters
     ----------
-    here : Scene
+    here : WearProblem
         With every process at its mean over the step.
     state : WearState
         The step's start, with contacts nearby.
@@ -179,7 +181,7 @@ def _rate(
     loads = mean_loads(here, state, passes, ((cylinder, roller),), power)
     stage = replace(state, cylinder_depth=cylinder, roller_depth=roller)
     contacts = solve(here, stage, loads)
-    wearing = Wearing(here, contacts, passes)
+    wearing = WearIncrement(here, contacts, passes)
     return contacts, (wearing.cylinder, wearing.roller, contact_values(here, contacts, "power"))
 
 

@@ -9,12 +9,12 @@ import numpy as np
 
 from wearsim.errors import StepError
 from wearsim.evolution.batch.per_realisation import one_of
-from wearsim.evolution.batch.stack import scene_of, state_of
+from wearsim.evolution.batch.stack import problem_of, state_of
 from wearsim.evolution.observables import depth, worn_volume
-from wearsim.evolution.problem import Scene
+from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import Contacts, Depths, WearState, as_batch, contact_values
-from wearsim.evolution.steppers.compliant_contact import REALISATION, solve_yielding
-from wearsim.evolution.steppers.wear_increment import Wearing, exponents_between
+from wearsim.evolution.steppers.compliant_contact import REALISATION, solve_compliant
+from wearsim.evolution.steppers.wear_increment import WearIncrement, exponents_between
 from wearsim.types import FloatArray, Number
 
 MAX_FIXED_POINT = 60
@@ -23,7 +23,7 @@ SAME_LOAD = 1e-9  # relative change of a load that asks for no new solution
 
 
 def mean_loads(
-    scene: Scene,
+    problem: WearProblem,
     state: WearState,
     passes: Number,
     depths: Sequence[Depths],
@@ -34,24 +34,24 @@ def mean_loads(
     The load itself is integrated exactly; the feedback takes the mean of the descents at worn
     `depths`, as a rule those at the step's ends, and each term its exact mean at constant `power`.
     """
-    start, stop = scene.time(state.now), scene.time(state.now + passes)
-    scene = scene.at_time(start, stop)
-    loads = _loads(scene, scene.mean_load(start, stop))
-    if scene.has_spring:
-        descents = [scene.descent(scene.gap(*worn)) for worn in depths]
-        loads -= scene.stiffness * np.mean(descents, axis=0)
-    for number, term in enumerate(scene.terms.values()):
+    start, stop = problem.time(state.now), problem.time(state.now + passes)
+    problem = problem.at_time(start, stop)
+    loads = _loads(problem, problem.mean_load(start, stop))
+    if problem.has_spring:
+        descents = [problem.descent(problem.gap(*worn)) for worn in depths]
+        loads -= problem.stiffness * np.mean(descents, axis=0)
+    for number, term in enumerate(problem.terms.values()):
         # a station's power counts like any other's
-        mean = scene.per_roller(power).mean(axis=0)
+        mean = problem.per_roller(power).mean(axis=0)
         duration = one_of(stop - start)
-        loads += term.mean_force(state.terms[number], mean, duration)[scene.roller]
+        loads += term.mean_force(state.terms[number], mean, duration)[problem.roller]
     return checked_loads(loads, state.now)
 
 
-def _loads(scene: Scene, force: Number) -> FloatArray:
-    """Return the load of every contact before feedback where that of the scene is `force` [N]."""
-    loads = np.empty(scene.shape)
-    loads[:] = force + scene.inputs.normal_force
+def _loads(problem: WearProblem, force: Number) -> FloatArray:
+    """Return the load of every contact before feedback where that of the problem is `force` [N]."""
+    loads = np.empty(problem.shape)
+    loads[:] = force + problem.inputs.normal_force
     return loads
 
 
@@ -76,7 +76,7 @@ def _differs(new: FloatArray, old: FloatArray) -> FloatArray:
     return relative
 
 
-def implicit_step(scene: Scene, state: WearState, passes: Number) -> WearState:
+def implicit_step(problem: WearProblem, state: WearState, passes: Number) -> WearState:
     """Step over `passes` passes with the contacts solved on the profiles at the step's end.
 
     The wear of the step enters the contact problem as a compliance, so that no step is too long
@@ -89,34 +89,34 @@ def implicit_step(scene: Scene, state: WearState, passes: Number) -> WearState:
     StepError
         If they do not settle.
     """
-    scene = scene.at_time(scene.time(state.now), scene.time(state.now + passes))
-    gap = scene.gap(state.cylinder_depth, state.roller_depth)
+    problem = problem.at_time(problem.time(state.now), problem.time(state.now + passes))
+    gap = problem.gap(state.cylinder_depth, state.roller_depth)
     contacts = state.contacts
-    wearing = Wearing(scene, contacts, passes)
+    wearing = WearIncrement(problem, contacts, passes)
     ends = _ends(state, wearing)
-    loads = _end_loads(scene, state, passes, ends, contacts)
-    moving = np.ones(scene.shape[REALISATION], dtype=np.bool_)
+    loads = _end_loads(problem, state, passes, ends, contacts)
+    moving = np.ones(problem.shape[REALISATION], dtype=np.bool_)
     iterations = np.zeros(len(moving), dtype=np.int64)
     for iteration in range(1, MAX_FIXED_POINT + 1):
-        points = scene.points(loads, *ends)
+        points = problem.points(loads, *ends)
         open_gap, wear = gap + wearing.offset, wearing.compliance
-        found = solve_yielding(scene, open_gap, points, wear, contacts, moving)
+        found = solve_compliant(problem, open_gap, points, wear, contacts, moving)
         iterations += moving
-        new = Wearing(scene, found, passes)
+        new = WearIncrement(problem, found, passes)
         ends = _ends(state, new)
-        foreseen = wearing.foreseen(contact_values(scene, found, "line_load"))
+        foreseen = wearing.foreseen(contact_values(problem, found, "line_load"))
         change, new_loads = _differs(new.opening, foreseen), loads
-        if scene.has_feedback:
-            new_loads = _end_loads(scene, state, passes, ends, found)
+        if problem.has_feedback:
+            new_loads = _end_loads(problem, state, passes, ends, found)
             change = np.maximum(change, _differs(new_loads, loads))
-        if scene.slip_profile is not None:
+        if problem.slip_profile is not None:
             change = np.maximum(change, _differs(new.cylinder, wearing.cylinder))
-        moving &= ~(change < scene.settled * 10.0 ** ((iteration - 1) // PATIENCE))
+        moving &= ~(change < problem.settled * 10.0 ** ((iteration - 1) // PATIENCE))
         if not np.count_nonzero(moving):
-            power = contact_values(scene, found, "power")
+            power = contact_values(problem, found, "power")
             solves = iterations * (len(found) // len(moving))
             begun = state.moved(state.now, solves, contacts=found)
-            return worn_state(scene, begun, passes, ends, power)
+            return worn_state(problem, begun, passes, ends, power)
         new.exponents = exponents_between(wearing, new)
         contacts, wearing, loads = found, new, new_loads
     raise StepError(
@@ -126,84 +126,84 @@ def implicit_step(scene: Scene, state: WearState, passes: Number) -> WearState:
     )
 
 
-def _ends(state: WearState, wearing: Wearing) -> Depths:
+def _ends(state: WearState, wearing: WearIncrement) -> Depths:
     """Return the worn depths at the end of a step."""
     return state.cylinder_depth + wearing.cylinder, state.roller_depth + wearing.roller
 
 
 def _end_loads(
-    scene: Scene, state: WearState, passes: Number, ends: Depths, contacts: Contacts
+    problem: WearProblem, state: WearState, passes: Number, ends: Depths, contacts: Contacts
 ) -> FloatArray:
     """Return the mean loads of a step that leads to depths `ends`."""
-    power = contact_values(scene, contacts, "power")
-    return mean_loads(scene, state, passes, (state.depths, ends), power)
+    power = contact_values(problem, contacts, "power")
+    return mean_loads(problem, state, passes, (state.depths, ends), power)
 
 
-def explicit_step(scene: Scene, state: WearState, passes: Number) -> WearState:
+def explicit_step(problem: WearProblem, state: WearState, passes: Number) -> WearState:
     """Step over `passes` passes on the profiles of the step's start, under its mean load."""
-    here = scene.at_time(scene.time(state.passes), scene.time(state.passes + passes))
-    foreseen = Wearing(here, state.contacts, passes)
+    here = problem.at_time(problem.time(state.passes), problem.time(state.passes + passes))
+    foreseen = WearIncrement(here, state.contacts, passes)
     mean = _end_loads(here, state, passes, _ends(state, foreseen), state.contacts)
-    solve = solve_present if scene.varying else contacts_at
+    solve = solve_present if problem.varying else contacts_at
     contacts = solve(here, state, mean)
     solves = len(contacts) if contacts is state.contacts else 2 * len(contacts)
-    wearing, power = Wearing(here, contacts, passes), contact_values(here, contacts, "power")
+    wearing, power = WearIncrement(here, contacts, passes), contact_values(here, contacts, "power")
     begun = replace(state, contacts=contacts, solves=state.solves + solves)
     worn = worn_state(here, begun, passes, _ends(state, wearing), power)
-    return replace(worn, contacts=solve_present(scene, worn, present_loads(scene, worn)))
+    return replace(worn, contacts=solve_present(problem, worn, present_loads(problem, worn)))
 
 
-def present_scene(scene: Scene, state: WearState) -> Scene:
-    """Return the scene with every process at its value of this moment."""
-    now = scene.time(state.now)
-    return scene.at_time(now, now)
+def present_problem(problem: WearProblem, state: WearState) -> WearProblem:
+    """Return the problem with every process at its value of this moment."""
+    now = problem.time(state.now)
+    return problem.at_time(now, now)
 
 
-def present_loads(scene: Scene, state: WearState) -> FloatArray:
+def present_loads(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the load of each contact at this moment, shape (S, C, N) [N]."""
-    scene = present_scene(scene, state)
-    loads = _loads(scene, scene.force(scene.time(state.now)))
-    if scene.has_spring:
-        gap = scene.gap(state.cylinder_depth, state.roller_depth)
-        loads -= scene.stiffness * scene.descent(gap)
-    for number in range(len(scene.terms)):
-        loads += scene.at_contacts(state.terms[number][None])[0]
+    problem = present_problem(problem, state)
+    loads = _loads(problem, problem.force(problem.time(state.now)))
+    if problem.has_spring:
+        gap = problem.gap(state.cylinder_depth, state.roller_depth)
+        loads -= problem.stiffness * problem.descent(gap)
+    for number in range(len(problem.terms)):
+        loads += problem.at_contacts(state.terms[number][None])[0]
     return checked_loads(loads, state.now)
 
 
-def contacts_at(scene: Scene, state: WearState, loads: FloatArray) -> Contacts:
+def contacts_at(problem: WearProblem, state: WearState, loads: FloatArray) -> Contacts:
     """Return the contacts on the present profiles under `loads`, shape (S, C, N) [N].
 
     A step over many passes leaves them solved on the profile it leads to; where they carry these
     loads already there is nothing left to solve.
     """
-    if scene.varying:
-        return solve_present(scene, state, loads)
-    line_load = contact_values(scene, state.contacts, "line_load")
-    carried = line_load.sum(axis=-1) * scene.grid.spacing
+    if problem.varying:
+        return solve_present(problem, state, loads)
+    line_load = contact_values(problem, state.contacts, "line_load")
+    carried = line_load.sum(axis=-1) * problem.grid.spacing
     apart, most = np.abs(carried - loads).max(axis=(0, 1)), loads.max(axis=(0, 1))
     others = np.flatnonzero(apart > SAME_LOAD * most)
     if not others.size:
         return state.contacts
     if others.size == loads.shape[REALISATION]:
-        return solve_present(scene, state, loads)
-    chosen, part = scene_of(scene, others), state_of(state, others)
+        return solve_present(problem, state, loads)
+    chosen, part = problem_of(problem, others), state_of(state, others)
     found = solve_present(chosen, part, np.take(loads, others, axis=REALISATION))
     return state.batch.with_others(others, as_batch(found, chosen.shape))
 
 
-def solve_present(scene: Scene, state: WearState, loads: FloatArray) -> Contacts:
+def solve_present(problem: WearProblem, state: WearState, loads: FloatArray) -> Contacts:
     """Solve every contact on the present profiles under `loads`, shape (S, C, N) [N]."""
-    scene = present_scene(scene, state)
-    points = scene.points(loads, state.cylinder_depth, state.roller_depth)
-    gap = scene.gap(state.cylinder_depth, state.roller_depth)
-    return scene.model.solve_batch(
-        gap, scene.kinematics.longitudinal_curvature, points, None, state.contacts or None
+    problem = present_problem(problem, state)
+    points = problem.points(loads, state.cylinder_depth, state.roller_depth)
+    gap = problem.gap(state.cylinder_depth, state.roller_depth)
+    return problem.model.solve_batch(
+        gap, problem.kinematics.longitudinal_curvature, points, None, state.contacts or None
     )
 
 
 def worn_state(
-    scene: Scene,
+    problem: WearProblem,
     state: WearState,
     passes: Number,
     ends: Depths,
@@ -213,7 +213,7 @@ def worn_state(
 
     Parameters
     ----------
-    scene : Scene
+    problem : WearProblem
     state : WearState
         Where the step began; its contacts stand in the state returned too.
     passes : float or ndarray, shape (realisations,)
@@ -224,17 +224,17 @@ def worn_state(
         Mean dissipated power of the step [W], of the same dissipation as the wear.
     """
     terms = state.terms
-    if scene.terms:
-        duration = one_of(scene.time(state.now + passes) - scene.time(state.now))
-        mean = scene.per_roller(power).mean(axis=0)
-        each = enumerate(scene.terms.values())
+    if problem.terms:
+        duration = one_of(problem.time(state.now + passes) - problem.time(state.now))
+        mean = problem.per_roller(power).mean(axis=0)
+        each = enumerate(problem.terms.values())
         terms = np.array([term.advance(terms[number], mean, duration) for number, term in each])
     return state.moved(
         state.now + passes,
         cylinder_depth=ends[0],
         roller_depth=ends[1],
         terms=terms,
-        energy=state.energy + scene.total_power(power) * (passes / scene.kinematics.pass_rate),
+        energy=state.energy + problem.total_power(power) * (passes / problem.kinematics.pass_rate),
     )
 
 
@@ -244,9 +244,9 @@ def cylinder_depth_of(state: WearState) -> FloatArray:
     return greatest
 
 
-def cylinder_volume_of(scene: Scene, state: WearState) -> FloatArray:
+def cylinder_volume_of(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the cylinder's worn volume, shape (realisations,) [m^3]; stations share it equally."""
-    radius = scene.kinematics.cylinder_radius
-    volume = worn_volume(state.cylinder_depth, scene.grid.spacing, radius)
+    radius = problem.kinematics.cylinder_radius
+    volume = worn_volume(state.cylinder_depth, problem.grid.spacing, radius)
     mean: FloatArray = volume.mean(axis=(0, 1))
     return mean

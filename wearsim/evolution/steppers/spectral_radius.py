@@ -8,10 +8,10 @@ from typing import TypeAlias
 import numpy as np
 
 from wearsim.errors import ContactError
-from wearsim.evolution.problem import Scene
+from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, contact_values
-from wearsim.evolution.steppers.single_step import present_scene, solve_present
-from wearsim.evolution.steppers.wear_increment import Wearing
+from wearsim.evolution.steppers.single_step import present_problem, solve_present
+from wearsim.evolution.steppers.wear_increment import WearIncrement
 from wearsim.types import FloatArray
 
 MAX_POWER_ITERATIONS = 12
@@ -21,7 +21,7 @@ Shape: TypeAlias = tuple[FloatArray, FloatArray]
 SMALL = 1e-4  # of the approach: how much a profile is changed to see the wear change
 
 
-def stability_limit(scene: Scene, state: WearState) -> float:
+def stability_limit(problem: WearProblem, state: WearState) -> float:
     """Return the longest step of Euler's method that is stable [passes].
 
     Returns
@@ -29,11 +29,11 @@ def stability_limit(scene: Scene, state: WearState) -> float:
     float
         2 over the greatest rate of decay, infinite where nothing wears.
     """
-    rate = float(decay_rates(scene, state).max())
+    rate = float(decay_rates(problem, state).max())
     return 2.0 / rate if rate > 0.0 else np.inf
 
 
-def decay_rates(scene: Scene, state: WearState) -> FloatArray:
+def decay_rates(problem: WearProblem, state: WearState) -> FloatArray:
     """Return how fast each realisation's stiffest shape decays, shape (realisations,) [1/pass].
 
     Power iteration on the fall of the wear per pass that a change of the profiles causes. It
@@ -44,19 +44,19 @@ def decay_rates(scene: Scene, state: WearState) -> FloatArray:
     One iterate is enough where it finds the rate that the state carries. Where the model cannot
     solve a contact on the changed profiles, that rate is kept.
     """
-    wear = Wearing(present_scene(scene, state), state.contacts, 1.0)
-    loaded = contact_values(scene, state.contacts, "line_load") > 0.0
-    alternate = np.where(loaded.any(axis=(0, 1)), (-1.0) ** np.arange(scene.grid.strips), 0.0)
+    wear = WearIncrement(present_problem(problem, state), state.contacts, 1.0)
+    loaded = contact_values(problem, state.contacts, "line_load") > 0.0
+    alternate = np.where(loaded.any(axis=(0, 1)), (-1.0) ** np.arange(problem.grid.strips), 0.0)
     # the bodies share a change of the gap as they share the wear
     cylinder, roller = (alternate * r.max(axis=-1, keepdims=True) for r in _rates_of(wear))
     shape = cylinder, roller
-    rates = state.decay if state.decay is not None else np.zeros(scene.shape[2])
+    rates = state.decay if state.decay is not None else np.zeros(problem.shape[2])
     if not any(part.any() for part in shape):
         return np.zeros_like(rates)
     for _ in range(MAX_POWER_ITERATIONS):
         before = rates
         try:
-            shape = _fall(scene, state, wear, shape)
+            shape = _fall(problem, state, wear, shape)
         except ContactError:
             if state.decay is None:
                 raise
@@ -67,7 +67,7 @@ def decay_rates(scene: Scene, state: WearState) -> FloatArray:
     return rates
 
 
-def _rates_of(wear: Wearing) -> Shape:
+def _rates_of(wear: WearIncrement) -> Shape:
     return wear.cylinder, wear.roller
 
 
@@ -77,21 +77,21 @@ def _size(shape: Shape) -> FloatArray:
     return size
 
 
-def _fall(scene: Scene, state: WearState, wear: Wearing, shape: Shape) -> Shape:
+def _fall(problem: WearProblem, state: WearState, wear: WearIncrement, shape: Shape) -> Shape:
     """Return the fall of the wear per pass for a change of the profiles of unit size.
 
     Parameters
     ----------
-    scene : Scene
+    problem : WearProblem
     state : WearState
-    wear : Wearing
+    wear : WearIncrement
         Of one pass, by the contacts of the state.
     shape : tuple of ndarray
         Change of cylinder and rollers, of any size.
     """
-    line_load = contact_values(scene, state.contacts, "line_load")
-    gap = scene.gap(state.cylinder_depth, state.roller_depth)
-    approach = contact_values(scene, state.contacts, "approach") - gap.min(axis=-1)
+    line_load = contact_values(problem, state.contacts, "line_load")
+    gap = problem.gap(state.cylinder_depth, state.roller_depth)
+    approach = contact_values(problem, state.contacts, "approach") - gap.min(axis=-1)
     step = SMALL * np.maximum(approach.min(axis=(0, 1)), 1e-12)
     size = _size(shape)
     factor = (step / np.where(size > 0.0, size, 1.0))[:, None]
@@ -101,8 +101,8 @@ def _fall(scene: Scene, state: WearState, wear: Wearing, shape: Shape) -> Shape:
         roller_depth=state.roller_depth + factor * shape[1],
     )
     # a spring, which answers to descent as a whole, is softer than the strips
-    contacts = solve_present(scene, changed, line_load.sum(axis=-1) * scene.grid.spacing)
-    new = Wearing(present_scene(scene, state), contacts, 1.0)
+    contacts = solve_present(problem, changed, line_load.sum(axis=-1) * problem.grid.spacing)
+    new = WearIncrement(present_problem(problem, state), contacts, 1.0)
     cylinder, roller = (
         (old - now) / step[:, None]
         for old, now in zip(_rates_of(wear), _rates_of(new), strict=True)

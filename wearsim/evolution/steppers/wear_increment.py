@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from wearsim.contact_batch import rows_of
-from wearsim.evolution.problem import Scene
+from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import Contacts
 from wearsim.mechanics.numerics.wear_exponent import learn_exponents, ratio_to_load
 from wearsim.plugins import SharedWear
@@ -17,7 +17,7 @@ SLIDING = 1.0  # exponent of dissipation in full sliding, the greatest there is
 STEEPEST = 50.0  # where catastrophic wear begins, T gamma's law goes as the power 44
 
 
-class Wearing:
+class WearIncrement:
     """What a step of `passes` passes with given contacts wears off the bodies.
 
     Near the contacts' line loads the wear of each strip is taken as linear in its line load:
@@ -26,7 +26,7 @@ class Wearing:
 
     Parameters
     ----------
-    scene : Scene
+    problem : WearProblem
     contacts : sequence of ContactSolution
     passes : float or ndarray, shape (realisations,)
         Length of the step.
@@ -40,11 +40,11 @@ class Wearing:
         out, which full sliding makes exact.
     """
 
-    def __init__(self, scene: Scene, contacts: Contacts, passes: Number) -> None:
-        self._parts = scene.wear_parts(contacts, passes)
-        self.cylinder, self.roller = scene.sum_of_parts(*self._parts)
+    def __init__(self, problem: WearProblem, contacts: Contacts, passes: Number) -> None:
+        self._parts = problem.wear_parts(contacts, passes)
+        self.cylinder, self.roller = problem.sum_of_parts(*self._parts)
         self.exponents: FloatArray | None = None
-        self.scene, self.contacts = scene, contacts
+        self.problem, self.contacts = problem, contacts
 
     @property
     def per_contact(self) -> FloatArray:
@@ -54,12 +54,12 @@ class Wearing:
 
     @cached_property
     def compliance(self) -> SharedWear:
-        """How the step's wear yields, realisation by realisation; contacts as in the scene."""
+        """How the step's wear yields, realisation by realisation; contacts as in the problem."""
         parts = self._parts
         if self.exponents is not None:
             parts = self.exponents * parts[0], self.exponents * parts[1]
-        stations, contacts, realisations = self.scene.shape
-        strips, together = self.scene.grid.strips, stations * contacts
+        stations, contacts, realisations = self.problem.shape
+        strips, together = self.problem.grid.strips, stations * contacts
         each = np.zeros((realisations, together, 2, strips))
         line_load = rows_of(self.contacts, "line_load")
         for side, part in enumerate(parts):
@@ -67,7 +67,7 @@ class Wearing:
                 continue
             ratio = _ratio(part, line_load).transpose(2, 0, 1, 3)
             each[:, :, side] = ratio.reshape(realisations, together, strips)
-        return SharedWear(self.scene.bodies, each)
+        return SharedWear(self.problem.bodies, each)
 
     @cached_property
     def offset(self) -> FloatArray | float:
@@ -75,7 +75,7 @@ class Wearing:
         if self.exponents is None:
             return 0.0
         kept = 1.0 - self.exponents
-        return self._opening(*self.scene.sum_of_parts(*(kept * part for part in self._parts)))
+        return self._opening(*self.problem.sum_of_parts(*(kept * part for part in self._parts)))
 
     @property
     def opening(self) -> FloatArray:
@@ -83,7 +83,7 @@ class Wearing:
         return self._opening(self.cylinder, self.roller)
 
     def _opening(self, cylinder: FloatArray, roller: FloatArray) -> FloatArray:
-        return cylinder + self.scene.at_contacts(roller)
+        return cylinder + self.problem.at_contacts(roller)
 
     def foreseen(self, line_load: FloatArray) -> FloatArray:
         """Return the opening that compliance and offset make of a line load, shape as `opening`."""
@@ -101,12 +101,12 @@ def _ratio(wear: FloatArray, line_load: FloatArray) -> FloatArray:
     return ratio_to_load(flat, line_load).reshape(wear.shape)
 
 
-def exponents_between(old: Wearing, new: Wearing) -> FloatArray:
+def exponents_between(old: WearIncrement, new: WearIncrement) -> FloatArray:
     """Return the exponents with which wear followed the line load from `old` to `new`.
 
     Parameters
     ----------
-    old, new : Wearing
+    old, new : WearIncrement
         The wear of two solutions of the same contacts.
 
     Returns
@@ -114,9 +114,9 @@ def exponents_between(old: Wearing, new: Wearing) -> FloatArray:
     ndarray, shape (stations, contacts, realisations, strips)
         Where a strip tells nothing that of `old`, or 1.
     """
-    scene, known = old.scene, old.exponents
-    exponents = np.ones((*scene.shape, scene.grid.strips)) if known is None else known.copy()
-    linear = scene.wear_factors["cylinder"]
+    problem, known = old.problem, old.exponents
+    exponents = np.ones((*problem.shape, problem.grid.strips)) if known is None else known.copy()
+    linear = problem.wear_factors["cylinder"]
     learn_exponents(
         rows_of(old.contacts, "line_load"),
         rows_of(new.contacts, "line_load"),

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
 
 from wearsim.csv_tables import read_columns
-from wearsim.errors import Problem, ScenarioError
+from wearsim.errors import Mistake, ScenarioError
 from wearsim.plugins import Distribution, Options
 from wearsim.quantities import InputFile, Quantity
 from wearsim.types import FloatArray
@@ -50,11 +50,11 @@ def _quantiles(file: InputFile, unit: str) -> tuple[FloatArray, FloatArray]:
     problems = []
     if probability[0] != 0.0 or probability[-1] != 1.0:
         got = f"{probability[0]:g} to {probability[-1]:g}"
-        problems.append(Problem("", "", "column 'probability' must go from 0 to 1", got))
+        problems.append(Mistake("", "", "column 'probability' must go from 0 to 1", got))
     if np.any(np.diff(value) < 0.0):
         first = int(np.argmax(np.diff(value) < 0.0))
         got = f"{value[first + 1]:g} after {value[first]:g}"
-        problems.append(Problem("", "", "column 'value' must not fall", got))
+        problems.append(Mistake("", "", "column 'value' must not fall", got))
     if problems:
         raise ScenarioError(file.path, problems)
     return probability, value

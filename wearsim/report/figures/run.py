@@ -38,7 +38,7 @@ STYLES = ("-", "--", ":", "-.")
 MARKS = ("o", "s", "^", "D", "v")
 
 
-def replay_figure(result: Result, measured: Sequence[Measured] = ()) -> Figure:
+def run_figure(result: Result, measured: Sequence[Measured] = ()) -> Figure:
     """Return the figure of a wear test.
 
     Parameters

@@ -15,7 +15,7 @@ from wearsim.results.dissipation.data import DissipationData
 from wearsim.results.dissipation.schema import DISSIPATION, with_inputs
 from wearsim.results.ensemble.schema import ENSEMBLE
 from wearsim.results.run.data import RunData
-from wearsim.results.run.schema import REPLAY
+from wearsim.results.run.schema import RUN
 from wearsim.results.schema import Layout, axis_lengths
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ _SMALLEST = 96  # bytes: no HDF5 file is shorter
 _DAMAGE = (OSError, RuntimeError, ValueError, TypeError, KeyError, AttributeError, OverflowError)
 FileKind: TypeAlias = Literal["replay", "dissipation", "ensemble"]
 _KINDS: dict[str, FileKind] = {
-    REPLAY.format: "replay",
+    RUN.format: "replay",
     DISSIPATION.format: "dissipation",
     ENSEMBLE.format: "ensemble",
 }
@@ -35,7 +35,7 @@ _OPENERS: dict[FileKind, str] = {
     "dissipation": "open_dissipation",
     "ensemble": "open_ensemble",
 }
-_LAYOUTS = {layout.format: layout for layout in (REPLAY, DISSIPATION, ENSEMBLE)}
+_LAYOUTS = {layout.format: layout for layout in (RUN, DISSIPATION, ENSEMBLE)}
 
 Stored = TypeVar("Stored")
 
@@ -160,8 +160,8 @@ def _check_format(path: str | Path, file: h5py.File, wanted: Layout) -> None:
 
 def _run_data(path: str | Path, file: h5py.File) -> RunData:
     # nothing is drawn in files of version 0.1.0, which do not say so
-    found = told(path, file, REPLAY, RunData, groups=["checkpoint"], optional=["drawn"])
-    variables = _variables(file, REPLAY)
+    found = told(path, file, RUN, RunData, groups=["checkpoint"], optional=["drawn"])
+    variables = _variables(file, RUN)
     return RunData(
         **found,
         static=_of_kind("static", variables),
@@ -247,4 +247,4 @@ def _files(group: h5py.Group) -> dict[str, str]:
 
 
 def _of_kind(kind: str, variables: Arrays) -> Arrays:
-    return {name: array for name, array in variables.items() if REPLAY.variables[name].kind == kind}
+    return {name: array for name, array in variables.items() if RUN.variables[name].kind == kind}

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy.typing as npt
 
 from wearsim.results.content import Arrays, Content, StudyData
-from wearsim.results.run.schema import REPLAY
+from wearsim.results.run.schema import RUN
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -64,7 +64,7 @@ class RunData(StudyData):
     def content(self) -> Content:
         """What goes into its file."""
         return Content(
-            REPLAY, self.about, self.scenario_text, self.files, self.variables, self.checkpoint
+            RUN, self.about, self.scenario_text, self.files, self.variables, self.checkpoint
         )
 
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from wearsim.results.schema import Axis, Layout, Variable
 
-FORMAT = "wearsim-replay"
+FORMAT = "wearsim-run"
 
 VERSION = 1
 
@@ -85,4 +85,4 @@ VARIABLES: Mapping[str, Variable] = {
 }
 """The table of variables, by name."""
 
-REPLAY = Layout(FORMAT, VERSION, "a wear test, from `wearsim run`", AXES, VARIABLES)
+RUN = Layout(FORMAT, VERSION, "a wear test, from `wearsim run`", AXES, VARIABLES)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from pydantic import ConfigDict
 
-from wearsim.errors import Problem, ScenarioError
+from wearsim.errors import Mistake, ScenarioError
 from wearsim.plugins import Options
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ class Report:
     def __init__(self, file: str, read: Callable[[str], str], names: Names) -> None:
         self.file = file
         self.names = names
-        self.problems: list[Problem] = []
+        self.mistakes: list[Mistake] = []
         self.notes: list[str] = []
         self.random: list[RandomInput] = []
         self.tried: set[str] = set()
@@ -63,12 +63,12 @@ class Report:
         expected: str | None = None,
     ) -> None:
         """Note one mistake."""
-        self.problems.append(Problem(table, key, what, got, expected))
+        self.mistakes.append(Mistake(table, key, what, got, expected))
 
     def raise_any(self) -> None:
         """Raise a ScenarioError if there is any mistake."""
-        if self.problems:
-            raise ScenarioError(self.file, self.problems)
+        if self.mistakes:
+            raise ScenarioError(self.file, self.mistakes)
 
     def exactly_one(self, raw: Mapping[str, object], table: str, keys: tuple[str, ...]) -> None:
         """Note a mistake unless exactly one of `keys` is given."""
@@ -79,6 +79,6 @@ class Report:
 
     def add_file(self, error: ScenarioError, table: str, key: str) -> None:
         """Note the mistakes of a file that the table's `key` names."""
-        for problem in error.problems:
+        for problem in error.mistakes:
             what = f"{error.file} {problem}" if problem.key else f"{error.file}: {problem}"
             self.add(table, key, what)

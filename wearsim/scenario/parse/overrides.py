@@ -6,7 +6,7 @@ import tomllib
 from collections.abc import Mapping, MutableMapping
 from typing import Any
 
-from wearsim.errors import Problem, ScenarioError
+from wearsim.errors import Mistake, ScenarioError
 from wearsim.scenario.tables.plain import CADENCES
 from wearsim.units import shown
 
@@ -80,7 +80,7 @@ def apply_overrides(text: str, file: str, overrides: Mapping[str, object]) -> st
             table = _descend(document, tables, key)
             table[key] = _item(value)
         except ValueError as error:
-            problems.append(Problem("", dotted, str(error), shown(value)))
+            problems.append(Mistake("", dotted, str(error), shown(value)))
             continue
         for rival in _rivals(".".join(tables), key):
             if rival in table and f"{'.'.join(tables)}.{rival}" not in overrides:

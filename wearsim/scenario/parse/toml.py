@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path, PurePath
 from typing import Any
 
-from wearsim.errors import Problem, ScenarioError
+from wearsim.errors import Mistake, ScenarioError
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.scenario.parse.key_index import REQUIRED, TABLES, all_names
 from wearsim.scenario.parse.mistakes import Report
@@ -77,9 +77,9 @@ def load_scenario(path: str | Path, overrides: Mapping[str, object] | None = Non
     try:
         text = read(path.name)
     except UnicodeDecodeError as error:
-        raise ScenarioError(str(path), [Problem("", "", "is not text in UTF-8")]) from error
+        raise ScenarioError(str(path), [Mistake("", "", "is not text in UTF-8")]) from error
     except OSError as error:
-        problem = Problem("", "", f"the file cannot be read ({error.strerror})")
+        problem = Mistake("", "", f"the file cannot be read ({error.strerror})")
         raise ScenarioError(str(path), [problem]) from error
     return parse_scenario(text, str(path), read, overrides)
 
@@ -156,11 +156,11 @@ def _parse_toml(text: str, name: str) -> dict[str, Any]:
         raise ScenarioError(name, [_syntax_problem(text, str(error))]) from error
 
 
-def _syntax_problem(text: str, message: str) -> Problem:
+def _syntax_problem(text: str, message: str) -> Mistake:
     """Say where the TOML breaks, and show the line."""
     found = re.fullmatch(r"(?P<what>.*) \(at (?P<place>.*)\)", message, re.DOTALL)
     if found is None:
-        return Problem("", "", f"is not valid TOML: {message}")
+        return Mistake("", "", f"is not valid TOML: {message}")
     what = found["what"][:1].lower() + found["what"][1:]
     number = re.match(r"line ([0-9]+)", found["place"])
     line = text.splitlines()[int(number[1]) - 1].strip() if number else None
@@ -168,7 +168,7 @@ def _syntax_problem(text: str, message: str) -> Problem:
     bare = re.match(r"([\w.-]+)\s*=\s*([0-9.+-][^\"'#]*?)\s*(?:#.*)?$", line or "")
     if bare:
         expected = f'quotes around a value with a unit, {bare[1]} = "{bare[2]}"'
-    return Problem("", found["place"], f"is not valid TOML: {what}", line, expected)
+    return Mistake("", found["place"], f"is not valid TOML: {what}", line, expected)
 
 
 def _read_top(data: Mapping[str, object], report: Report) -> TopTable:

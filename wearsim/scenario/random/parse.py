@@ -49,7 +49,7 @@ def read_random_input(
     report : Report
         Collects mistakes.
     """
-    before = len(report.problems)
+    before = len(report.mistakes)
     ours, options = _split(raw)
     table = validate_options(report, RandomInputTable, ours, name)
     spec = _find(raw["distribution"], name, report)
@@ -61,7 +61,7 @@ def read_random_input(
     law = _build(spec, options, name, quantity, marginal, report)
     if isinstance(law, JointDistribution) and joint:
         _check_components(spec, law, joint, name, report)
-    if len(report.problems) > before or law is None or table is None:
+    if len(report.mistakes) > before or law is None or table is None:
         return None
     kind = str(table.marginal["distribution"]) if table.marginal else ""
     return RandomInput(name, spec.name, table.persistence, law, quantity, options, kind)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wearsim.errors import Problem, ScenarioError
+from wearsim.errors import Mistake, ScenarioError
 from wearsim.scenario import RandomInput, Scenario, realise
 from wearsim.scenario.random.model import CONTACT_FIELDS
 from wearsim.types import FloatArray
@@ -97,7 +97,7 @@ def _acts(scenario: Scenario, item: RandomInput) -> bool:
     table, key = item.name.split(".", 1)
     what = "changes the load of the contact, and only load.normal_force can be random here"
     expected = f"one value, such as {_mean_of(item)}"
-    raise ScenarioError(scenario.file, [Problem(table, key, what, item.kind, expected)])
+    raise ScenarioError(scenario.file, [Mistake(table, key, what, item.kind, expected)])
 
 
 def _mean_of(item: RandomInput) -> str:

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from wearsim.contact_batch import OperatingPoints
-from wearsim.errors import CapabilityError, Problem, ScenarioError
+from wearsim.errors import CapabilityError, Mistake, ScenarioError
 from wearsim.plugins import ContactModel, ContactModelSpec, FrictionField, registry
 from wearsim.scenario import RandomInput, Scenario
 from wearsim.types import FloatArray
@@ -71,7 +71,7 @@ class LocalFriction:
         if wrong is not None:
             table, key = self._item.name.split(".", 1)
             remedy = finer_grid(self._scenario, self._field, len(x), along, spacing)
-            problem = Problem(table, key, wrong, self._item.describe(), remedy)
+            problem = Mistake(table, key, wrong, self._item.describe(), remedy)
             raise ScenarioError(self._scenario.file, [problem])
 
     def put(

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from wearsim.errors import Problem, ScenarioError
+from wearsim.errors import Mistake, ScenarioError
 from wearsim.plugins import ContactModel
 from wearsim.scenario import RandomInput, Scenario
 from wearsim.studies.contact.draws import OFFSET, TILT
@@ -79,7 +79,7 @@ def _suggested(scenario: Scenario, model: ContactModel, load: float, mean_b: flo
 
 def _check_width(scenario: Scenario, width: float, needed: float) -> None:
     if width < needed * (1.0 - _MARGIN):
-        problem = Problem(
+        problem = Mistake(
             "contact",
             "width",
             "the contacts of all realisations do not fit",
@@ -99,7 +99,7 @@ def _refuse_many(scenario: Scenario, strips: int, reach: float, away: float) -> 
     shifting = _shifting(scenario)
     if not shifting:
         expected = f"{coarser}, or inputs that vary less"
-        raise ScenarioError(scenario.file, [Problem("contact", "strips", takes, None, expected)])
+        raise ScenarioError(scenario.file, [Mistake("contact", "strips", takes, None, expected)])
     alone = len(shifting) == 1 and scenario.contact.centre is None
     crown = scenario.roller.crown_radius if alone else None
     problems = [_shifts_far(item, takes, coarser, away, crown) for item in shifting]
@@ -114,7 +114,7 @@ def _shifting(scenario: Scenario) -> list[RandomInput]:
 
 def _shifts_far(
     item: RandomInput, takes: str, coarser: str, away: float, crown: float | None
-) -> Problem:
+) -> Mistake:
     """Return what is told of one input; `crown` is given where it alone moves the contact."""
     table, key = item.name.split(".", 1)
     shift = f"moves contacts by up to {away * 1e3:.4g} mm"
@@ -123,4 +123,4 @@ def _shifts_far(
         shift += f", crown radius x tilt = {crown * 1e3:.4g} mm x {away / crown * 1e3:.4g} mrad"
     if TILT in item.keys:
         less += ", creepage.tilt_shifts_contact = false"
-    return Problem(table, key, f"{shift}: {takes}", item.describe(), f"{less}, or {coarser}")
+    return Mistake(table, key, f"{shift}: {takes}", item.describe(), f"{less}, or {coarser}")

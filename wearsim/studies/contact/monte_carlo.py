@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from wearsim.contact_batch import BatchSolution
-from wearsim.errors import Interrupted, Problem, ScenarioError, SolverError
+from wearsim.errors import Interrupted, Mistake, ScenarioError, SolverError
 from wearsim.results import DissipationData, DissipationResult, check_output, write_results
 from wearsim.results.content import Arrays
 from wearsim.results.dissipation.result import BAND, as_numbers, summaries
@@ -209,10 +209,10 @@ class _Study:
         return warnings
 
 
-def _nothing_random(notes: Sequence[str]) -> Problem:
+def _nothing_random(notes: Sequence[str]) -> Mistake:
     what = "; ".join(["no random input acts on the contact", *notes])
     expected = (
         "a distribution in the place of a value, such as friction.coefficient ="
         ' {distribution = "maxent", support = [0, "inf"], mean = 0.1, std = 0.02}'
     )
-    return Problem("", "", what, None, expected)
+    return Mistake("", "", what, None, expected)

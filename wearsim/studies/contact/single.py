@@ -11,7 +11,7 @@ import numpy as np
 from wearsim.errors import WearsimError
 from wearsim.plugins import ContactModel
 from wearsim.scenario import Scenario, described_model
-from wearsim.studies.run.assemble import bare_scene, load_range
+from wearsim.studies.run.assemble import bare_problem, load_range
 from wearsim.studies.run.choose_stepper import check_model
 from wearsim.studies.run.grid import contact_centres, fresh_patch, profile_grid
 from wearsim.types import (
@@ -141,10 +141,10 @@ def _problem(
     """Prepare a model for strips; return gap [m], curvature along rolling [1/m] and the point."""
     model.prepare(grid, (scenario.cylinder.material, scenario.roller.material))
     load = scenario.load.build()
-    scene = bare_scene(scenario, model, load, grid, [0], np.ones(1), profile)
+    problem = bare_problem(scenario, model, load, grid, [0], np.ones(1), profile)
     unworn = np.zeros(grid.strips)
-    point = scene.point(0, 0, force, unworn, unworn)
-    return scene.nominal_gap[0, 0, 0], scene.kinematics.longitudinal_curvature, point
+    point = problem.point(0, 0, force, unworn, unworn)
+    return problem.nominal_gap[0, 0, 0], problem.kinematics.longitudinal_curvature, point
 
 
 def _grid_error(

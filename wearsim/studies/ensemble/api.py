@@ -15,7 +15,7 @@ from wearsim.studies.ensemble.driver import EnsembleWork
 from wearsim.studies.ensemble.grid import shared_grid
 from wearsim.studies.ensemble.metadata import header_of, nothing_random, static_of
 from wearsim.studies.ensemble.progress import EnsembleProgress
-from wearsim.studies.ensemble.realisation import Members
+from wearsim.studies.ensemble.realisation import RealisationFactory
 from wearsim.studies.execution.factory import executor
 from wearsim.studies.limits import checked_count
 from wearsim.studies.run.draws import Drawer
@@ -90,7 +90,7 @@ def ensemble(
         grid = shared_grid(scenario)
         header = header_of(scenario, asked.plan, asked.realisations, asked.target, grid)
         with EnsembleFile.create(path, header, static_of(scenario, grid)) as file:
-            members = Members(scenario, asked.plan, asked.realisations, grid)
+            members = RealisationFactory(scenario, asked.plan, asked.realisations, grid)
             EnsembleWork(file, members, asked.target, pool, on_progress, stop_requested).finish()
     return open_ensemble(path)
 
@@ -194,7 +194,7 @@ def resume_ensemble(
     plan = plan_called(data.plan)
     target = Target.parse(data.until) if data.until else None
     grid = Grid(data.variables["y"], data.strip_width)
-    members = Members(scenario, plan, data.asked, grid)
+    members = RealisationFactory(scenario, plan, data.asked, grid)
     with executor(scheduler, workers, tell=on_notice) as pool, EnsembleFile.open(path) as opened:
         work = EnsembleWork(opened, members, target, pool, on_progress, stop_requested)
         for text in changed_origins(data, scenario):

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from wearsim.evolution.batch.bisect_failures import divided
-from wearsim.evolution.batch.lockstep import Path, Together, can_go_together
+from wearsim.evolution.batch.bisect_failures import bisect_failures
+from wearsim.evolution.batch.lockstep import Lockstep, Path, can_step_together
 from wearsim.evolution.batch.per_realisation import sum_in_order
-from wearsim.evolution.batch.stack import Flock, alike, joined_states, scene_of, state_of
+from wearsim.evolution.batch.stack import Stack, alike, problem_of, stacked_states, state_of
 from wearsim.evolution.integrate import evolve
-from wearsim.evolution.problem import Scene
+from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, fresh_state
 from wearsim.evolution.steppers.backward_euler import ImplicitStepper
 from wearsim.evolution.steppers.base import Stepper
@@ -30,7 +30,7 @@ Row = dict[str, float]
 
 
 @dataclass(frozen=True)
-class Member:
+class RealisationRun:
     """A realisation that is ready to be run.
 
     Parameters
@@ -39,14 +39,14 @@ class Member:
     drawn : mapping of str to float or ndarray
         What was drawn for it, by the scenario's key [SI].
     draws : Draws
-    scene : Scene
+    problem : WearProblem
     stepper : Stepper
     """
 
     number: int
     drawn: Mapping[str, float | FloatArray]
     draws: Draws
-    scene: Scene
+    problem: WearProblem
     stepper: Stepper
 
     @property
@@ -60,13 +60,13 @@ class Member:
         return RecordSchedule.of(self.draws.scenario, self.stop)
 
     @property
-    def goes_together(self) -> bool:
+    def can_be_batched(self) -> bool:
         """Whether it can be stepped together with others."""
-        return can_go_together(self.scene, self.stepper)
+        return can_step_together(self.problem, self.stepper)
 
-    def goes_with(self, other: Member) -> bool:
+    def can_join(self, other: RealisationRun) -> bool:
         """Tell whether it can be stepped together with one that can be stepped together."""
-        return self._course == other._course and alike(self.scene, other.scene)
+        return self._course == other._course and alike(self.problem, other.problem)
 
     @property
     def _course(self) -> tuple[object, ...]:
@@ -105,17 +105,17 @@ class Observed:
         return cls(rows, scalars, end.cylinder_depth[:, 0, place].mean(axis=0))
 
 
-def grouped(members: Sequence[Member]) -> list[list[Member]]:
+def grouped(members: Sequence[RealisationRun]) -> list[list[RealisationRun]]:
     """Return the members in groups that can be stepped together, or of one each."""
-    groups: list[list[Member]] = []
-    growing: list[list[Member]] = []
+    groups: list[list[RealisationRun]] = []
+    growing: list[list[RealisationRun]] = []
     for member in members:
-        if not member.goes_together:
+        if not member.can_be_batched:
             groups.append([member])
             continue
-        numbers = len(member.scene.roller) * member.scene.grid.strips
+        numbers = len(member.problem.roller) * member.problem.grid.strips
         most = min(MOST_TOGETHER, max(1, MOST_NUMBERS // numbers))
-        found = next((g for g in growing if len(g) < most and member.goes_with(g[0])), None)
+        found = next((g for g in growing if len(g) < most and member.can_join(g[0])), None)
         if found is None:
             found = []
             groups.append(found)
@@ -124,27 +124,27 @@ def grouped(members: Sequence[Member]) -> list[list[Member]]:
     return groups
 
 
-def observed_alone(member: Member) -> Observed:
+def observed_alone(member: RealisationRun) -> Observed:
     """Step through one test."""
-    scene, stepper, schedule, stop = member.scene, member.stepper, member.schedule, member.stop
-    scenario, state = member.draws.scenario, fresh_state(scene)
+    problem, stepper, schedule, stop = member.problem, member.stepper, member.schedule, member.stop
+    scenario, state = member.draws.scenario, fresh_state(problem)
     threshold = scenario.outputs.width_threshold
-    rows = rows_of_states(scene, state, threshold, stepper.pass_by_pass)
+    rows = rows_of_states(problem, state, threshold, stepper.pass_by_pass)
     for advance in evolve(
-        scene, state, stepper, stop, schedule.next_record, scenario.evolution.max_steps
+        problem, state, stepper, stop, schedule.next_record, scenario.evolution.max_steps
     ):
-        for due in due_states(scene, stepper, schedule, advance, stop):
-            rows += rows_of_states(scene, due, threshold, stepper.pass_by_pass)
+        for due in due_states(problem, stepper, schedule, advance, stop):
+            rows += rows_of_states(problem, due, threshold, stepper.pass_by_pass)
         state = advance.end
     return Observed.of(rows, state, 0, state.steps)
 
 
 def rows_of_states(
-    scene: Scene, state: WearState, threshold: float, pass_by_pass: bool = False
+    problem: WearProblem, state: WearState, threshold: float, pass_by_pass: bool = False
 ) -> list[Row]:
     """Return the observables of every realisation of a state, one number each."""
-    row: dict[str, Any] = history_row(scene, state, None, threshold, pass_by_pass)
-    count = scene.kinematics.multiplicity[:, None]
+    row: dict[str, Any] = history_row(problem, state, None, threshold, pass_by_pass)
+    count = problem.kinematics.multiplicity[:, None]
     energy, time = row["dissipated_energy"], np.asarray(row["time"])
     begun = time > 0.0
     columns = {
@@ -160,7 +160,8 @@ def rows_of_states(
         "peak_pressure": row["peak_pressure"].max(axis=0),
     }
     return [
-        {name: float(column[v]) for name, column in columns.items()} for v in range(scene.shape[2])
+        {name: float(column[v]) for name, column in columns.items()}
+        for v in range(problem.shape[2])
     ]
 
 
@@ -171,7 +172,7 @@ class Due:
     Parameters
     ----------
     place : ndarray of int, shape (records,)
-        Of the test in its flock.
+        Of the test in its stack.
     source : ndarray of int, shape (records,)
         Which state of the path is recorded, or where the side step to the record begins.
     passes : ndarray, shape (records,)
@@ -186,7 +187,7 @@ class Due:
     def of(cls, path: Path, schedule: RecordSchedule, stop: float) -> Due:
         """Return what falls due on a path to the end of a test at `stop` passes."""
         found: list[tuple[int, int, float]] = []
-        for place, states in enumerate(zip(*(flock.progress for flock in path), strict=True)):
+        for place, states in enumerate(zip(*(stack.progress for stack in path), strict=True)):
             passes = [done for _, done in states]
             for source in range(len(path) - 1):
                 first, last = passes[source], passes[source + 1]
@@ -197,43 +198,43 @@ class Due:
         return cls(table[:, 0].astype(np.int64), table[:, 1].astype(np.int64), table[:, 2])
 
 
-def observed(members: Sequence[Member]) -> list[Observed | Exception]:
+def observed(members: Sequence[RealisationRun]) -> list[Observed | Exception]:
     """Step through the tests of a group; return what was observed, or what ended them."""
     first = members[0]
-    if isinstance(first.stepper, ImplicitStepper) and first.goes_together:
-        return MemberGroup(members, first.stepper).run()
+    if isinstance(first.stepper, ImplicitStepper) and first.can_be_batched:
+        return RealisationBatch(members, first.stepper).run()
     try:
         return [observed_alone(first)]
     except Exception as error:  # it ends this test and no other
         return [error]
 
 
-class MemberGroup:
-    """Members that are stepped together.
+class RealisationBatch:
+    """RealisationFactory that are stepped together.
 
     Parameters
     ----------
-    members : sequence of Member
+    members : sequence of RealisationRun
         Such as go with each other.
     stepper : ImplicitStepper
         Theirs.
     """
 
-    def __init__(self, members: Sequence[Member], stepper: ImplicitStepper) -> None:
+    def __init__(self, members: Sequence[RealisationRun], stepper: ImplicitStepper) -> None:
         scenario = members[0].draws.scenario
         self._stepper = stepper
         self._stop, self._schedule = members[0].stop, members[0].schedule
         self._threshold = scenario.outputs.width_threshold
-        scenes = [member.scene for member in members]
-        self._tests = Together(scenes, stepper, self._stop, scenario.evolution.max_steps)
+        problems = [member.problem for member in members]
+        self._tests = Lockstep(problems, stepper, self._stop, scenario.evolution.max_steps)
         self._rows: list[list[Row]] = [[] for _ in members]
         self._found: dict[int, Observed] = {}
 
     def run(self) -> list[Observed | Exception]:
         """Step through the tests; return what was observed of each, or what ended it."""
-        if self._tests.flock is not None:
-            self._note(self._tests.flock)
-        while self._tests.flock is not None:
+        if self._tests.stack is not None:
+            self._note(self._tests.stack)
+        while self._tests.stack is not None:
             path = self._tests.sweep()
             if path is not None:
                 self._record(path)
@@ -241,12 +242,12 @@ class MemberGroup:
         failures = self._tests.failures
         return [failures.get(k) or self._found[k] for k in range(len(self._rows))]
 
-    def _finish(self, flock: Flock) -> None:
+    def _finish(self, stack: Stack) -> None:
         """Keep what the tests have come to that have reached their end."""
-        for place, (number, passes) in enumerate(flock.progress):
+        for place, (number, passes) in enumerate(stack.progress):
             if passes >= self._stop:
                 steps, rows = int(self._tests.steps[number]), self._rows[number]
-                self._found[number] = Observed.of(rows, flock.state, place, steps)
+                self._found[number] = Observed.of(rows, stack.state, place, steps)
 
     def _record(self, path: Path) -> None:
         """Record what falls due on a path, by side steps that lead nowhere where need be."""
@@ -254,34 +255,34 @@ class MemberGroup:
         if not due.place.size:
             return
         start = path[0]
-        states = joined_states([replace(flock.state, shadow=None) for flock in path])
+        states = stacked_states([replace(stack.state, coarse_step_solution=None) for stack in path])
         state = state_of(states, due.source * len(start.numbers) + due.place)
-        scene = scene_of(start.scene, due.place)
-        self._note(Flock(start.numbers[due.place], scene, state), due.passes)
+        problem = problem_of(start.problem, due.place)
+        self._note(Stack(start.numbers[due.place], problem, state), due.passes)
 
-    def _note(self, flock: Flock, passes: FloatArray | None = None) -> None:
+    def _note(self, stack: Stack, passes: FloatArray | None = None) -> None:
         """Note the observables of tests, at `passes` where they are given."""
 
         def look(places: IntArray) -> list[Row]:
-            some = flock.at(places)
+            some = stack.at(places)
             state = some.state if passes is None else self._stepped(some, passes[places])
-            return rows_of_states(some.scene, state, self._threshold)
+            return rows_of_states(some.problem, state, self._threshold)
 
-        done, failed = divided(look, np.arange(len(flock.numbers)))
+        done, failed = bisect_failures(look, np.arange(len(stack.numbers)))
         for places, rows in done:
-            for number, row in zip(flock.numbers[places].tolist(), rows, strict=True):
+            for number, row in zip(stack.numbers[places].tolist(), rows, strict=True):
                 self._rows[number].append(row)
-        self._tests.fail({int(flock.numbers[place]): error for place, error in failed.items()})
+        self._tests.fail({int(stack.numbers[place]): error for place, error in failed.items()})
 
-    def _stepped(self, flock: Flock, passes: FloatArray) -> WearState:
+    def _stepped(self, stack: Stack, passes: FloatArray) -> WearState:
         """Return the states of tests at the passes given, by side steps where they are later."""
-        now = np.asarray(flock.state.now)
+        now = np.asarray(stack.state.now)
         sides = np.flatnonzero(passes > now)
         if not sides.size:
-            return flock.state
-        some, later = flock.at(sides), passes[sides]
+            return stack.state
+        some, later = stack.at(sides), passes[sides]
         step = self._stepper.side_step
-        stepped = stepped_aside(step, some.scene, some.state, later - now[sides])
+        stepped = stepped_aside(step, some.problem, some.state, later - now[sides])
         order = np.arange(len(now))
         order[sides] = len(order) + np.arange(len(sides))
-        return state_of(joined_states([flock.state, stepped.moved(later)]), order)
+        return state_of(stacked_states([stack.state, stepped.moved(later)]), order)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Literal, TypeAlias, get_args
 
-from wearsim.errors import Problem, ScenarioError
+from wearsim.errors import Mistake, ScenarioError
 from wearsim.scenario import Scenario
 from wearsim.uq.sampling.plans import PlanName
 
@@ -101,10 +101,10 @@ def check_plan(scenario: Scenario, plan: EnsemblePlan, until: str) -> None:
             "saltelli": "Saltelli's plan is for sensitivity, and its size is chosen beforehand",
         }[plan]
         expected = "monte-carlo, sobol or control-variate; or no --until"
-        problems.append(Problem("sampling", "plan", why, f'"{plan}" with --until', expected))
+        problems.append(Mistake("sampling", "plan", why, f'"{plan}" with --until', expected))
     if plan == "saltelli" and scenario.sampling.correlation:
         what = "Saltelli's plan draws every input by itself, and these are correlated"
         expected = "no correlation, or another plan"
-        problems.append(Problem("sampling", "correlation", what, None, expected))
+        problems.append(Mistake("sampling", "correlation", what, None, expected))
     if problems:
         raise ScenarioError(scenario.file, problems)

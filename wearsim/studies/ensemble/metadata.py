@@ -7,12 +7,12 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from wearsim.errors import CapabilityError, Problem
+from wearsim.errors import CapabilityError, Mistake
 from wearsim.results import EnsembleData
 from wearsim.scenario import Scenario
 from wearsim.studies.ensemble.control_variate import control_of
 from wearsim.studies.ensemble.designs import BASE_PLANS, EnsemblePlan
-from wearsim.studies.run.assemble import build_scene
+from wearsim.studies.run.assemble import assemble_problem
 from wearsim.studies.run.draws import Drawer, units_of
 from wearsim.studies.run.output_schedule import RecordSchedule
 from wearsim.studies.run.provenance import origin_of
@@ -48,7 +48,7 @@ def header_of(
     drawer = Drawer(scenario, BASE_PLANS[plan], count)
     averaged = tuple(item for item in scenario.random if item.name not in drawer.groups)
     # what cannot run is refused before anything is written
-    _, _, stepper = build_scene(replace(scenario, random=averaged), grid)
+    _, _, stepper = assemble_problem(replace(scenario, random=averaged), grid)
     return EnsembleData(
         **origin_of(scenario),
         finished=False,
@@ -122,7 +122,7 @@ def static_of(scenario: Scenario, grid: Grid) -> dict[str, FloatArray]:
     }
 
 
-def nothing_random(scenario: Scenario) -> Problem:
+def nothing_random(scenario: Scenario) -> Mistake:
     """Return what is wrong with a scenario whose tests would all be the same."""
     what = "no random input tells one test from another"
     if scenario.random:
@@ -131,4 +131,4 @@ def nothing_random(scenario: Scenario) -> Problem:
         "a distribution in the place of a value, such as friction.coefficient ="
         ' {distribution = "maxent", support = [0, "inf"], mean = 0.1, std = 0.02}'
     )
-    return Problem("", "", what, None, expected)
+    return Mistake("", "", what, None, expected)

@@ -13,15 +13,15 @@ from wearsim.errors import WearsimError
 from wearsim.plugins import ContactModel
 from wearsim.results import Outcome
 from wearsim.scenario import Scenario, parse_scenario
-from wearsim.studies.ensemble.batch import Member, Observed, Row, grouped, observed
+from wearsim.studies.ensemble.batch import Observed, RealisationRun, Row, grouped, observed
 from wearsim.studies.ensemble.control_variate import closed_form_depths
 from wearsim.studies.ensemble.designs import BASE_PLANS, EnsemblePlan, passes_of, sources
-from wearsim.studies.run.assemble import build_scene, prepared_model, strips_of_run
+from wearsim.studies.run.assemble import assemble_problem, prepared_model, strips_of_run
 from wearsim.studies.run.draws import Drawer, Draws
 from wearsim.types import FloatArray, Grid
 
 
-class Members:
+class RealisationFactory:
     """Runs realisations of a scenario by their numbers; it can be sent to another process.
 
     Parameters
@@ -81,7 +81,7 @@ class Members:
                 outcomes[member.number] = self._outcome(member, found)
         return [outcomes[number] for number in numbers]
 
-    def _member(self, number: int, drawn: dict[str, float | FloatArray]) -> Member:
+    def _member(self, number: int, drawn: dict[str, float | FloatArray]) -> RealisationRun:
         """Draw a realisation, whose values are left in `drawn`, and make it ready to be run."""
         groups = self.drawer.groups
         taken = sources(self.plan, groups, number)
@@ -90,8 +90,8 @@ class Members:
         own = strips_of_run(draws)
         grid = self.grid if covers(self.grid, own) else own
         model = self._model(draws.scenario, grid)
-        scene, stepper, _ = build_scene(draws.scenario, grid, draws, model)
-        return Member(number, drawn, draws, scene, stepper)
+        problem, stepper, _ = assemble_problem(draws.scenario, grid, draws, model)
+        return RealisationRun(number, drawn, draws, problem, stepper)
 
     def _model(self, scenario: Scenario, grid: Grid) -> ContactModel:
         """Return the contact model for the strips: one for all members that can share it."""
@@ -103,14 +103,14 @@ class Members:
             self._prepared = key, prepared_model(scenario, grid)
         return self._prepared[1]
 
-    def _outcome(self, member: Member, found: Observed | Exception) -> Outcome:
+    def _outcome(self, member: RealisationRun, found: Observed | Exception) -> Outcome:
         number, drawn = member.number, dict(member.drawn)
         if isinstance(found, Exception):
             return Outcome(number=number, drawn=drawn, error=told(found))
         spoilt = not_finite(found.rows)
         if spoilt:
             return Outcome(number=number, drawn=drawn, error=spoilt)
-        worn, grid = found.profile, member.scene.grid
+        worn, grid = found.profile, member.problem.grid
         if grid is not self.grid:
             worn = np.interp(self.grid.y, grid.y, worn, left=0.0, right=0.0)
         rows = found.rows

@@ -1,4 +1,4 @@
-"""Turns a scenario into a scene that can be stepped."""
+"""Turns a scenario into a problem that can be stepped."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from wearsim.errors import Problem, ScenarioError
+from wearsim.errors import Mistake, ScenarioError
 from wearsim.evolution.contact_inputs import ContactInputs
 from wearsim.evolution.error_control.error_estimates import coarse_start, whole_volume
 from wearsim.evolution.kinematics import Kinematics, NoWear
-from wearsim.evolution.problem import Scene
+from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.base import Stepper
 from wearsim.evolution.steppers.single_step import explicit_step
@@ -122,7 +122,7 @@ def load_range(scenario: Scenario, load: Load, stop: float) -> tuple[float, floa
         If the load is not known for the whole time, or falls to nothing.
     """
     if load.span is not None and (load.span[0] > 0.0 or load.span[1] < stop * (1.0 - 1e-9)):
-        problem = Problem(
+        problem = Mistake(
             "load",
             scenario.load.kind,
             "the log does not cover the test",
@@ -132,7 +132,7 @@ def load_range(scenario: Scenario, load: Load, stop: float) -> tuple[float, floa
         raise ScenarioError(scenario.file, [problem])
     low, high = load.extremes(0.0, stop)
     if low <= 0.0 and not scenario.load.terms:
-        problem = Problem(
+        problem = Mistake(
             "load",
             scenario.load.kind,
             "the load falls to nothing, and contact with it",
@@ -143,13 +143,13 @@ def load_range(scenario: Scenario, load: Load, stop: float) -> tuple[float, floa
     return low, high
 
 
-def build_scene(
+def assemble_problem(
     scenario: Scenario,
     grid: Grid | None = None,
     draws: Draws | None = None,
     model: ContactModel | None = None,
-) -> tuple[Scene, Stepper, str]:
-    """Return the scene of a run, its stepper and the stepper's name.
+) -> tuple[WearProblem, Stepper, str]:
+    """Return the problem of a run, its stepper and the stepper's name.
 
     Parameters
     ----------
@@ -178,18 +178,20 @@ def build_scene(
     stepper = build_stepper(scenario, name)
     if scenario.evolution.nodes is not None and (stepper.pass_by_pass or not draws.passes):
         what = "has no meaning where no expectation over passes is taken"
-        raise ScenarioError(scenario.file, [Problem("evolution", "nodes", what)])
+        raise ScenarioError(scenario.file, [Mistake("evolution", "nodes", what)])
     grid = grid if grid is not None else strips_of_run(draws)
     if model is None:
         chosen.prepare(grid, (scenario.cylinder.material, scenario.roller.material))
-    scene = bare_scene(scenario, chosen, load, grid, first, multiplicity, scenario.cylinder.profile)
-    scene = with_draws(scene, draws, first)
+    problem = bare_problem(
+        scenario, chosen, load, grid, first, multiplicity, scenario.cylinder.profile
+    )
+    problem = with_draws(problem, draws, first)
     if draws.passes and stepper.pass_by_pass:
-        nodes = with_nodes(scene, scenario, draws.passes, fewest_nodes(draws.passes))
-        scene = replace(scene, redraw=redrawing(scenario, draws.passes), expectation=nodes)
+        nodes = with_nodes(problem, scenario, draws.passes, fewest_nodes(draws.passes))
+        problem = replace(problem, redraw=redrawing(scenario, draws.passes), expectation=nodes)
     elif draws.passes:
-        scene = with_enough_nodes(scene, draws)
-    return scene, stepper, name
+        problem = with_enough_nodes(problem, draws)
+    return problem, stepper, name
 
 
 def prepared_model(scenario: Scenario, grid: Grid) -> ContactModel:
@@ -218,19 +220,19 @@ def _reach(draws: Draws, name: str) -> float:
     return max(abs(angle) for angle in draws.range_of(name, 0.0))
 
 
-def with_draws(scene: Scene, draws: Draws, rollers: list[int]) -> Scene:
-    """Return the scene with what is drawn for its rollers, and with the paths of processes."""
+def with_draws(problem: WearProblem, draws: Draws, rollers: list[int]) -> WearProblem:
+    """Return the problem with what is drawn for its rollers, and with the paths of processes."""
     values = {name: array[rollers][:, None] for name, array in draws.rollers.items()}
     place = {number: k for k, number in enumerate(rollers)}
     varying = tuple(
         replace(item, rollers=tuple(place[r] for r in item.rollers if r in place))
         for item in draws.varying
     )
-    return replace(scene, inputs=scene.inputs.with_values(values), varying=varying)
+    return replace(problem, inputs=problem.inputs.with_values(values), varying=varying)
 
 
-def with_enough_nodes(scene: Scene, draws: Draws) -> Scene:
-    """Return the scene with nodes for what is drawn at every pass.
+def with_enough_nodes(problem: WearProblem, draws: Draws) -> WearProblem:
+    """Return the problem with nodes for what is drawn at every pass.
 
     Unless the scenario gives their number they are doubled until the wear of the fresh contacts
     has settled to a part of the tolerance, or there are `MOST_NODES`.
@@ -239,20 +241,20 @@ def with_enough_nodes(scene: Scene, draws: Draws) -> Scene:
     asked, tolerance = scenario.evolution.nodes, scenario.evolution.tolerance
     count = asked or fewest_nodes(draws.passes)
     while True:
-        found = with_nodes(scene, scenario, draws.passes, count)
+        found = with_nodes(problem, scenario, draws.passes, count)
         if asked or 2 * count > MOST_NODES:
             return found
         fresh = fresh_state(found)
         one, other = (
-            whole_volume(scene, explicit_step(found, fresh, 1.0)),
-            whole_volume(scene, explicit_step(found.halved, coarse_start(found, fresh), 1.0)),
+            whole_volume(problem, explicit_step(found, fresh, 1.0)),
+            whole_volume(problem, explicit_step(found.halved, coarse_start(found, fresh), 1.0)),
         )
         if (np.abs(one - other) <= 0.5 * tolerance * one).all():
             return found
         count *= 2
 
 
-def bare_scene(
+def bare_problem(
     scenario: Scenario,
     model: ContactModel,
     load: Load,
@@ -260,8 +262,8 @@ def bare_scene(
     rollers: list[int],
     multiplicity: FloatArray,
     profile: Profile | None,
-) -> Scene:
-    """Return the scene of some rollers on strips, every input as the scenario gives it.
+) -> WearProblem:
+    """Return the problem of some rollers on strips, every input as the scenario gives it.
 
     Parameters
     ----------
@@ -280,7 +282,7 @@ def bare_scene(
     s = np.array([from_apex(scenario, grid, r) for r in rollers])
     height = start_height(profile, grid)
     creepage, count = scenario.creepage, len(rollers)
-    return Scene(
+    return WearProblem(
         grid=grid,
         model=model,
         law=scenario.wear.build() if scenario.wear is not None else NoWear(),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from wearsim.errors import CapabilityError, Problem, ScenarioError
+from wearsim.errors import CapabilityError, Mistake, ScenarioError
 from wearsim.evolution.error_control.step_size import StepControl
 from wearsim.evolution.steppers.backward_euler import ImplicitStepper
 from wearsim.evolution.steppers.base import Stepper
@@ -64,7 +64,7 @@ def build_stepper(scenario: Scenario, name: str) -> Stepper:
         "allow_unstable": name != "explicit" and evolution.allow_unstable,
     }
     problems = [
-        Problem("evolution", key, f'has no meaning with stepper = "{name}"')
+        Mistake("evolution", key, f'has no meaning with stepper = "{name}"')
         for key, told in idle.items()
         if told
     ]

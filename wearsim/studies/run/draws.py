@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from wearsim.errors import CapabilityError, Problem, ScenarioError
+from wearsim.errors import CapabilityError, Mistake, ScenarioError
 from wearsim.evolution.contact_inputs import Varying
 from wearsim.mechanics.numerics.piecewise_linear import PiecewiseLinear
 from wearsim.plugins import JointDistribution, Process, Uniforms
@@ -117,7 +117,7 @@ def _spreads(item: RandomInput) -> list[list[float]]:
 
 
 def origin(key: str, mean: float) -> float:
-    """Return what values of a key are counted from: a load adds to the scene's own, at its mean."""
+    """Return what values of a key are counted from: a load adds to the problem's own, at its mean."""
     return mean if key == "load.normal_force" else 0.0
 
 
@@ -140,7 +140,7 @@ def draw(scenario: Scenario) -> Draws:
         If there is a friction field, which is a matter of one contact.
     """
     if scenario.sampling.plan == "latin-hypercube" and scenario.random:
-        problem = Problem(
+        problem = Mistake(
             "sampling",
             "plan",
             "a Latin hypercube belongs to a study of many realisations, and a run takes one",
@@ -339,7 +339,7 @@ def _paths(scenario: Scenario, item: RandomInput, numbers: Mapping[str, int]) ->
     points = int(np.ceil(scenario.total_time / process.spacing)) + 2
     if points > LONGEST_PATH:
         table, key = item.name.rsplit(".", 1)
-        problem = Problem(
+        problem = Mistake(
             table,
             key,
             f"the process would take {points:,} steps of {process.spacing:.3g} s over the test",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.scenario import Scenario, described_model
 from wearsim.studies.contact.single import study_contact
-from wearsim.studies.run.assemble import build_scene, load_range
+from wearsim.studies.run.assemble import assemble_problem, load_range
 from wearsim.studies.run.choose_stepper import check_model
 from wearsim.studies.run.grid import fresh_patch
 
@@ -77,9 +77,9 @@ def _contact(scenario: Scenario, load: float) -> Rows:
 
 
 def _test(scenario: Scenario) -> Rows:
-    scene, _, stepper = build_scene(scenario)
-    grid, law = scene.grid, scenario.wear
-    counts = scene.kinematics.multiplicity
+    problem, _, stepper = assemble_problem(scenario)
+    grid, law = problem.grid, scenario.wear
+    counts = problem.kinematics.multiplicity
     alike = ", all alike" if len(counts) == 1 and counts[0] > 1 else ""
     solved = f"{len(counts)} solved{alike}" if counts.sum() > 1 else "1"
     strips = (

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wearsim.errors import Problem, ScenarioError
+from wearsim.errors import Mistake, ScenarioError
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.mechanics.hertz.ellipse import HertzContact, hertz
 from wearsim.plugins import WearLaw
@@ -208,7 +208,7 @@ def run_grid(scenario: Scenario, load: float, drawn: Drawn = NOTHING_DRAWN) -> G
         strips = strips_over(width, patch.b, scenario.evolution.tolerance)
     if width < 2.0 * (reach + patch.b):
         needed = f"at least {2e3 * (reach + patch.b):.4g} mm"
-        problem = Problem(
+        problem = Mistake(
             "contact", "width", "the fresh contact does not fit", f"{width * 1e3:.4g} mm", needed
         )
         raise ScenarioError(scenario.file, [problem])

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from wearsim.evolution.contact_inputs import ContactInputs, Redraw
-from wearsim.evolution.problem import Scene
+from wearsim.evolution.problem import WearProblem
 from wearsim.scenario import RandomInput, Scenario
 from wearsim.scenario.random.model import CONTACT_FIELDS
 from wearsim.studies.run.draws import origin
@@ -69,8 +69,10 @@ def fewest_nodes(items: Sequence[RandomInput]) -> int:
     return 8 if sum(item.dimension for item in items) == 1 else 64
 
 
-def with_nodes(scene: Scene, scenario: Scenario, items: Sequence[RandomInput], count: int) -> Scene:
-    """Return the scene with `count` contacts for each roller, a quadrature over its passes.
+def with_nodes(
+    problem: WearProblem, scenario: Scenario, items: Sequence[RandomInput], count: int
+) -> WearProblem:
+    """Return the problem with `count` contacts for each roller, a quadrature over its passes.
 
     The nodes are scrambled Sobol points. Their weights are the nearest to equal ones that give
     what the wear would be in full slip, and its moments in the tilt, their exact means: what is
@@ -78,7 +80,7 @@ def with_nodes(scene: Scene, scenario: Scenario, items: Sequence[RandomInput], c
 
     Parameters
     ----------
-    scene : Scene
+    problem : WearProblem
         With one contact for each roller.
     scenario : Scenario
         Gives seed and correlations.
@@ -92,14 +94,14 @@ def with_nodes(scene: Scene, scenario: Scenario, items: Sequence[RandomInput], c
 
     def inputs_of(points: int) -> ContactInputs:
         values = _values(items, copula.tie(sampler.uniforms(0, points)))
-        roller = np.repeat(np.arange(scene.rollers, dtype=np.int64), points)
-        everywhere = {name: np.tile(array, scene.rollers) for name, array in values.items()}
-        return _placed(scene.inputs.at(roller), everywhere)
+        roller = np.repeat(np.arange(problem.rollers, dtype=np.int64), points)
+        everywhere = {name: np.tile(array, problem.rollers) for name, array in values.items()}
+        return _placed(problem.inputs.at(roller), everywhere)
 
-    force = float(scene.load.force(np.zeros(1))[0])
+    force = float(problem.load.force(np.zeros(1))[0])
     inputs, many = inputs_of(count), inputs_of(GUIDING_POINTS)
     weights = []
-    for number in range(scene.rollers):
+    for number in range(problem.rollers):
         here = _guides(inputs, force, slice(number * count, (number + 1) * count))
         mean = _guides(
             many, force, slice(number * GUIDING_POINTS, (number + 1) * GUIDING_POINTS)
@@ -108,11 +110,11 @@ def with_nodes(scene: Scene, scenario: Scenario, items: Sequence[RandomInput], c
         halves = here[:, : count // 2], here[:, count // 2 :]
         weights += [0.5 * _calibrated(half, mean) for half in halves]
     return replace(
-        scene,
+        problem,
         inputs=inputs,
-        roller=np.repeat(np.arange(scene.rollers, dtype=np.int64), count),
+        roller=np.repeat(np.arange(problem.rollers, dtype=np.int64), count),
         weight=np.concatenate(weights),
-        half=np.tile(np.arange(count, dtype=np.int64) >= count // 2, scene.rollers).astype(
+        half=np.tile(np.arange(count, dtype=np.int64) >= count // 2, problem.rollers).astype(
             np.int64
         ),
     )

@@ -11,7 +11,7 @@ from wearsim.evolution.batch.per_realisation import mean_along
 from wearsim.evolution.error_control.error_estimates import Step
 from wearsim.evolution.error_control.step_size import SMALLEST_STEP
 from wearsim.evolution.observables import depth, width, worn_volume
-from wearsim.evolution.problem import Scene
+from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, contact_values
 from wearsim.evolution.steppers.base import Advance, Stepper
 from wearsim.evolution.steppers.single_step import (
@@ -28,64 +28,68 @@ Row = dict[str, object]
 
 
 def history_row(
-    scene: Scene, state: WearState, before: WearState | None, threshold: float, pass_by_pass: bool
+    problem: WearProblem,
+    state: WearState,
+    before: WearState | None,
+    threshold: float,
+    pass_by_pass: bool,
 ) -> Row:
     """Return the observables of a state; `threshold` [m] bounds the groove's width."""
-    scene, state, loads = present_contacts(scene, state, pass_by_pass)
-    realisations = range(scene.shape[2])
+    problem, state, loads = present_contacts(problem, state, pass_by_pass)
+    realisations = range(problem.shape[2])
     worn = state.cylinder_depth
-    power = contact_values(scene, state.contacts, "power")
+    power = contact_values(problem, state.contacts, "power")
     row: Row = {
         "passes": state.now,
-        "time": scene.time(state.now),
+        "time": problem.time(state.now),
         "step_passes": 0.0 if before is None else state.now - before.now,
         "depth": cylinder_depth_of(state),
         "width": np.array(
-            [width(scene.grid.y, worn[:, 0, v].max(axis=0), threshold) for v in realisations]
+            [width(problem.grid.y, worn[:, 0, v].max(axis=0), threshold) for v in realisations]
         ),
-        "worn_volume": cylinder_volume_of(scene, state),
+        "worn_volume": cylinder_volume_of(problem, state),
         "roller_depth": depth(state.roller_depth)[0],
         "roller_worn_volume": worn_volume(
-            state.roller_depth[0], scene.grid.spacing, scene.kinematics.roller_radius
+            state.roller_depth[0], problem.grid.spacing, problem.kinematics.roller_radius
         ),
         "dissipated_energy": state.energy,
-        "power": scene.total_power(power),
-        "normal_force": mean_along(scene.per_roller(loads), axis=0)[0],
+        "power": problem.total_power(power),
+        "normal_force": mean_along(problem.per_roller(loads), axis=0)[0],
         "depth_error": state.depth_error,
         "volume_error": state.volume_error,
         "rejected": state.rejected,
         "solves": state.solves,
         "full_solves": state.full_solves,
     }
-    peak = contact_values(scene, state.contacts, "peak_pressure")
-    row["peak_pressure"] = scene.per_roller(peak).max(axis=0)
+    peak = contact_values(problem, state.contacts, "peak_pressure")
+    row["peak_pressure"] = problem.per_roller(peak).max(axis=0)
     for name in ("approach", "longitudinal_creepage", "adhesion_fraction"):
-        values = contact_values(scene, state.contacts, name)
-        row[name] = mean_along(scene.per_roller(values), axis=0)[0]
+        values = contact_values(problem, state.contacts, name)
+        row[name] = mean_along(problem.per_roller(values), axis=0)[0]
     return row
 
 
-def at_record(scene: Scene, stepper: Stepper, start: WearState, passes: float) -> WearState:
+def at_record(problem: WearProblem, stepper: Stepper, start: WearState, passes: float) -> WearState:
     """Return the state at `passes`, reached from `start` by a step of its own that leads nowhere.
 
     A profile interpolated between two steps would not fit its contact: line loads feel a tenth of
     a micrometre. A side step does, and leaves the run as it is.
     """
 
-    def step(scene: Scene, state: WearState, passes: Number) -> WearState:
-        return stepper.side_step(scene, state, float(passes))
+    def step(problem: WearProblem, state: WearState, passes: Number) -> WearState:
+        return stepper.side_step(problem, state, float(passes))
 
-    return stepped_aside(step, scene, start, passes - start.passes).but(passes=passes)
+    return stepped_aside(step, problem, start, passes - start.passes).replaced(passes=passes)
 
 
-def stepped_aside(step: Step, scene: Scene, state: WearState, passes: Number) -> WearState:
+def stepped_aside(step: Step, problem: WearProblem, state: WearState, passes: Number) -> WearState:
     """Return the state `passes` later by one side step, or by halves where there is no such step.
 
     Parameters
     ----------
     step : callable
-        Takes a scene, a state and a number of passes to the state after them.
-    scene : Scene
+        Takes a problem, a state and a number of passes to the state after them.
+    problem : WearProblem
     state : WearState
     passes : float or ndarray, shape (realisations,)
         Halved for one test alone: what becomes of it must not hang on others.
@@ -96,51 +100,51 @@ def stepped_aside(step: Step, scene: Scene, state: WearState, passes: Number) ->
         If halves would be too short.
     """
     try:
-        return step(scene, state, passes)
+        return step(problem, state, passes)
     except (StepError, ContactError):
         half = 0.5 * passes
         if np.size(half) > 1 or np.max(half) < SMALLEST_STEP:
             raise
-    return stepped_aside(step, scene, stepped_aside(step, scene, state, half), half)
+    return stepped_aside(step, problem, stepped_aside(step, problem, state, half), half)
 
 
 def present_contacts(
-    scene: Scene, state: WearState, pass_by_pass: bool
-) -> tuple[Scene, WearState, FloatArray]:
-    """Return `state` with its contacts at the loads of this moment, their scene, and the loads.
+    problem: WearProblem, state: WearState, pass_by_pass: bool
+) -> tuple[WearProblem, WearState, FloatArray]:
+    """Return `state` with its contacts at the loads of this moment, their problem, and the loads.
 
     Where every pass draws its inputs one contact says little: contacts that stand for many passes
     take its place, so that a record holds the same whatever the stepper.
     """
-    if scene.expectation is not None:
-        scene, state = scene.expectation, state.but(contacts=())
-    loads = present_loads(scene, state)
+    if problem.expectation is not None:
+        problem, state = problem.expectation, state.replaced(contacts=())
+    loads = present_loads(problem, state)
     solve = solve_present if pass_by_pass else contacts_at
-    return scene, state.but(contacts=solve(scene, state, loads)), loads
+    return problem, state.replaced(contacts=solve(problem, state, loads)), loads
 
 
-def record_row(scene: Scene, state: WearState, pass_by_pass: bool) -> Row:
+def record_row(problem: WearProblem, state: WearState, pass_by_pass: bool) -> Row:
     """Return the profiles of a state and the contacts at the loads of this moment."""
-    scene, state, _ = present_contacts(scene, state, pass_by_pass)
+    problem, state, _ = present_contacts(problem, state, pass_by_pass)
     row: Row = {
         "record_passes": state.passes,
-        "record_time": scene.time(state.passes),
+        "record_time": problem.time(state.passes),
         "cylinder_profile": state.cylinder_depth[:, 0],
         "roller_profile": state.roller_depth[0],
     }
     for name in ("line_load", "half_length", "dissipation"):
-        row[name] = scene.per_roller(contact_values(scene, state.contacts, name))
+        row[name] = problem.per_roller(contact_values(problem, state.contacts, name))
     return row
 
 
 def due_states(
-    scene: Scene, stepper: Stepper, schedule: RecordSchedule, advance: Advance, stop: float
+    problem: WearProblem, stepper: Stepper, schedule: RecordSchedule, advance: Advance, stop: float
 ) -> list[WearState]:
     """Return the states that are to be recorded on the way of a step, in their order.
 
     Parameters
     ----------
-    scene : Scene
+    problem : WearProblem
     stepper : Stepper
         Takes the side steps to what falls due within the step.
     schedule : RecordSchedule
@@ -154,7 +158,7 @@ def due_states(
         between, at_end = schedule.due_between(
             first.passes, last.passes, stop, stepper.pass_by_pass
         )
-        found += [at_record(scene, stepper, first, passes) for passes in between]
+        found += [at_record(problem, stepper, first, passes) for passes in between]
         found += [last] if at_end else []
     return found
 
@@ -164,7 +168,7 @@ class Recorder:
 
     Parameters
     ----------
-    scene : Scene
+    problem : WearProblem
     stepper : Stepper
         Takes the side steps to what falls due within a step.
     schedule : RecordSchedule
@@ -178,7 +182,7 @@ class Recorder:
 
     def __init__(
         self,
-        scene: Scene,
+        problem: WearProblem,
         stepper: Stepper,
         schedule: RecordSchedule,
         threshold: float,
@@ -186,23 +190,23 @@ class Recorder:
         history: Mapping[str, FloatArray] | None = None,
         records: Mapping[str, FloatArray] | None = None,
     ) -> None:
-        self.scene = scene
+        self.problem = problem
         self.stepper = stepper
         self.schedule = schedule
         self.threshold = threshold
         self._history = _rows(history or {}) or [
-            history_row(scene, state, None, threshold, stepper.pass_by_pass)
+            history_row(problem, state, None, threshold, stepper.pass_by_pass)
         ]
-        self._records = _rows(records or {}) or [record_row(scene, state, stepper.pass_by_pass)]
+        self._records = _rows(records or {}) or [record_row(problem, state, stepper.pass_by_pass)]
         self._kept = len(self._history), len(self._records), state
 
     def add(self, advance: Advance, stop: float) -> None:
         """Take note of a step, and record what fell due on its way or at the end of the test."""
         start, end = advance.path[0], advance.end
-        due = due_states(self.scene, self.stepper, self.schedule, advance, stop)
+        due = due_states(self.problem, self.stepper, self.schedule, advance, stop)
         pass_by_pass = self.stepper.pass_by_pass
-        self._records += [record_row(self.scene, state, pass_by_pass) for state in due]
-        self._history.append(history_row(self.scene, end, start, self.threshold, pass_by_pass))
+        self._records += [record_row(self.problem, state, pass_by_pass) for state in due]
+        self._history.append(history_row(self.problem, end, start, self.threshold, pass_by_pass))
         # one assignment: an interrupt in the lines above leaves the step before in force
         self._kept = len(self._history), len(self._records), end
 

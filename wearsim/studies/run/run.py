@@ -13,13 +13,13 @@ import numpy as np
 from wearsim.errors import Interrupted, ResultsFileError, SolverError
 from wearsim.evolution.error_control.error_estimates import deepest, whole_volume
 from wearsim.evolution.integrate import evolve
-from wearsim.evolution.problem import Scene
+from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import SIGMAS, WearState, fresh_state, widened, widened_state
 from wearsim.evolution.steppers.base import Advance, Stepper
 from wearsim.results import Result, RunData, check_output, kind_of, read_results, write_results
 from wearsim.results.run.schema import VARIABLES
 from wearsim.scenario import Scenario, parse_scenario
-from wearsim.studies.run.assemble import build_scene, start_height, strips_of_run
+from wearsim.studies.run.assemble import assemble_problem, start_height, strips_of_run
 from wearsim.studies.run.draws import draw, drawn_values
 from wearsim.studies.run.events import Checkpointed, Event, Finished, Started, Stepped, Warned
 from wearsim.studies.run.output_schedule import RecordSchedule
@@ -68,9 +68,9 @@ def run(
     path = Path(output) if output is not None else None
     if path is not None:
         check_output(path, force, scenario.paths)
-    scene, stepper, name = build_scene(scenario)
-    replay = _Replay(scenario, scene, stepper, name, path, on_event, stop_requested)
-    replay.begin(fresh_state(scene), float(scenario.total_passes))
+    problem, stepper, name = assemble_problem(scenario)
+    replay = _RunInProgress(scenario, problem, stepper, name, path, on_event, stop_requested)
+    replay.begin(fresh_state(problem), float(scenario.total_passes))
     return replay.finish()
 
 
@@ -133,8 +133,8 @@ def resume(
         return Result(data, path)
     data, state = _widened(scenario, data, state)
     grid = Grid(data.static["y"], float(data.checkpoint["spacing"]))
-    scene, stepper, name = build_scene(scenario, grid)
-    replay = _Replay(scenario, scene, stepper, name, path, on_event, stop_requested)
+    problem, stepper, name = assemble_problem(scenario, grid)
+    replay = _RunInProgress(scenario, problem, stepper, name, path, on_event, stop_requested)
     replay.go_on(data, state)
     return replay.finish()
 
@@ -165,20 +165,20 @@ def _widened(scenario: Scenario, data: RunData, state: WearState) -> tuple[RunDa
 _EXTRA = ("record_base", "spacing")
 
 
-class _Replay:
+class _RunInProgress:
     """One run in this process: it owns the recorder, the clock and the file."""
 
     def __init__(
         self,
         scenario: Scenario,
-        scene: Scene,
+        problem: WearProblem,
         stepper: Stepper,
         stepper_name: str,
         path: Path | None,
         on_event: Watcher | None,
         stop_requested: Callable[[], bool] | None,
     ) -> None:
-        self.scenario, self.scene = scenario, scene
+        self.scenario, self.problem = scenario, problem
         self.stepper, self.stepper_name = stepper, stepper_name
         self.path = path
         self.tell: Watcher = on_event or (lambda event: None)
@@ -209,9 +209,9 @@ class _Replay:
         schedule = RecordSchedule.of(self.scenario, self.record_base)
         threshold = self.scenario.outputs.width_threshold
         if data is None:
-            return Recorder(self.scene, self.stepper, schedule, threshold, state)
+            return Recorder(self.problem, self.stepper, schedule, threshold, state)
         return Recorder(
-            self.scene, self.stepper, schedule, threshold, state, data.history, data.records
+            self.problem, self.stepper, schedule, threshold, state, data.history, data.records
         )
 
     def finish(self) -> Result:
@@ -220,7 +220,7 @@ class _Replay:
         self.tell(
             Started(
                 self.stop,
-                self.scene.time(self.stop),
+                self.problem.time(self.stop),
                 state.passes,
                 self.stepper_name,
                 self.scenario.contact.model,
@@ -243,7 +243,7 @@ class _Replay:
     def _judge(self) -> None:
         """Warn where the estimated error has outgrown the tolerance in spite of all."""
         state, tolerance = self.recorder.state, self.scenario.evolution.tolerance
-        sizes = deepest(state), whole_volume(self.scene, state)
+        sizes = deepest(state), whole_volume(self.problem, state)
         errors = state.depth_error, state.volume_error
         for kind, name in enumerate(("depth", "worn volume")):
             parts = [errors[kind], state.quadrature[kind], SIGMAS * np.sqrt(state.scatter[kind])]
@@ -266,7 +266,7 @@ class _Replay:
         every = self.scenario.outputs.checkpoint_every
         written = time.monotonic()
         for advance in evolve(
-            self.scene,
+            self.problem,
             self.recorder.state,
             self.stepper,
             self.stop,
@@ -290,7 +290,7 @@ class _Replay:
             Stepped(
                 passes=state.passes,
                 total_passes=self.stop,
-                time=self.scene.time(state.passes),
+                time=self.problem.time(state.passes),
                 depth=float(state.cylinder_depth.max()),
                 step_passes=state.passes - advance.path[0].passes,
                 depth_error=float(state.depth_error.max()),
@@ -326,11 +326,11 @@ class _Replay:
         self.tell(Checkpointed(str(self.path), self.recorder.state.passes))
 
     def _data(self, finished: bool) -> RunData:
-        scenario, scene = self.scenario, self.scene
-        kinematics = scene.kinematics
+        scenario, problem = self.scenario, self.problem
+        kinematics = problem.kinematics
         checkpoint = self.recorder.state.to_arrays()
         checkpoint["record_base"] = np.asarray(self.record_base)
-        checkpoint["spacing"] = np.asarray(scene.grid.spacing)
+        checkpoint["spacing"] = np.asarray(problem.grid.spacing)
         return RunData(
             **self.origin,
             drawn=self.drawn,
@@ -349,9 +349,9 @@ class _Replay:
                 "physical_rollers": kinematics.physical_rollers,
             },
             static={
-                "y": scene.grid.y,
-                "nominal_gap": scene.per_roller(scene.at_time(0.0, 0.0).nominal_gap),
-                "start_height": start_height(scenario.cylinder.profile, scene.grid),
+                "y": problem.grid.y,
+                "nominal_gap": problem.per_roller(problem.at_time(0.0, 0.0).nominal_gap),
+                "start_height": start_height(scenario.cylinder.profile, problem.grid),
                 "multiplicity": kinematics.multiplicity,
             },
             history=self.recorder.history,

@@ -110,7 +110,7 @@ class Output:
         self._files.append(path)
 
     def _show(self, topic: Topic) -> None:
-        """Print a table for each group of scenes, and what has no answer below it."""
+        """Print a table for each group of problems, and what has no answer below it."""
         from wearsim_bench.figures.table import MARKS, has_front, heads, lines
 
         screen, columns = _screen(), heads(topic)

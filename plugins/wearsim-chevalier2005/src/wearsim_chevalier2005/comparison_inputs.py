@@ -22,8 +22,8 @@ EXACT_POWER = 0.0771  # W, the mean problem by CONTACT (Vollebregt and Kalker), 
 def contact_rows(found: Reproduction) -> list[Row]:
     """Return size and speed of the contact, and its traction bound."""
     part, load = "contact", found.mean.point.normal_force
-    scenes = {"": found.mean_scenario, ", printed radii": found.printed_scenario}
-    patches = {name: fresh_patch(scene, load) for name, scene in scenes.items()}
+    problems = {"": found.mean_scenario, ", printed radii": found.printed_scenario}
+    patches = {name: fresh_patch(problem, load) for name, problem in problems.items()}
     halved, literal = patches[""], patches[", printed radii"]
     diameters = f"with {_radii(found.mean_scenario)}: the paper's radii are diameters"
     bound = 2.0 * load / (math.pi * halved.a * halved.b)

@@ -1,4 +1,4 @@
-"""Figures of what grows with a study, and of what a scene is spared."""
+"""Figures of what grows with a study, and of what a problem is spared."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ def heads(topic: Topic) -> list[str]:
 
 
 def lines(topic: Topic, group: str, yardstick: float, *, whole: bool = False) -> list[Line]:
-    """Return the lines of one group of scenes.
+    """Return the lines of one group of problems.
 
     Parameters
     ----------

@@ -40,7 +40,7 @@ def bench_figure(topic: Topic, machine: Machine, effort: Effort) -> Figure:
     Returns
     -------
     Figure
-        A panel for each group of scenes: a line for each method, a point for each setting, the
+        A panel for each group of problems: a line for each method, a point for each setting, the
         front drawn through, the default ringed; or how time and memory grow, or how many times as
         fast a saving is.
     """
@@ -79,7 +79,7 @@ def _colours(topic: Topic) -> dict[str, tuple[str, str]]:
 
 
 def _draw(axes: Axes, topic: Topic, group: str, colours: dict[str, tuple[str, str]]) -> None:
-    """Draw one group of scenes."""
+    """Draw one group of problems."""
     items = [i for i in topic.of(group) if i.seconds is not None and topic.error in i.errors]
     if not items:
         say(axes, group, ["nothing could be measured"])

@@ -111,7 +111,7 @@ INCOMPRESSIBLE = {"youngs_modulus": "200 GPa", "poisson_ratio": 0.4999}
 
 @dataclass(frozen=True)
 class HardCase:
-    """A scene, and what is expected of it.
+    """A problem, and what is expected of it.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ class HardCase:
     patches : tuple of int
         How many patches the contact must have, one after another; empty where that is no matter.
     strips : int
-        The coarsest strips that can show the scene; 0 where it has strips of its own.
+        The coarsest strips that can show the problem; 0 where it has strips of its own.
     rough : bool
         Whether the line load follows a profile that is rough or broken itself.
     of_default_model : bool

@@ -32,12 +32,12 @@ class Effort:
 
 @dataclass(frozen=True)
 class Measurement:
-    """One method with one setting, on one group of scenes.
+    """One method with one setting, on one group of problems.
 
     Parameters
     ----------
     group : str
-        The scenes: "partial slip with spin".
+        The problems: "partial slip with spin".
     method : str
         What was measured: "slender, strip". Methods are lines in a figure.
     setting : str
@@ -127,11 +127,11 @@ class Topic:
 
     @property
     def groups(self) -> list[str]:
-        """The groups of scenes, in the order they were measured."""
+        """The groups of problems, in the order they were measured."""
         return list(dict.fromkeys(item.group for item in self.measurements))
 
     def of(self, group: str) -> list[Measurement]:
-        """Return what was measured on a group of scenes."""
+        """Return what was measured on a group of problems."""
         return [item for item in self.measurements if item.group == group]
 
     def front(self, group: str) -> list[Measurement]:

@@ -21,7 +21,7 @@ from wearsim.studies.ensemble.batch import MOST_TOGETHER
 from wearsim.studies.ensemble.control_variate import DRAWS, closed_form_depths, control_of
 from wearsim.studies.ensemble.designs import EnsemblePlan
 from wearsim.studies.ensemble.grid import shared_grid
-from wearsim.studies.ensemble.realisation import Members
+from wearsim.studies.ensemble.realisation import RealisationFactory
 from wearsim.studies.execution.factory import executor
 from wearsim.studies.run.draws import Drawer
 from wearsim.types import FloatArray, Grid
@@ -84,7 +84,7 @@ class Part:
             If a test fails.
         """
         scenario = rig(self.seed)
-        members = Members(scenario, self.plan, self.total, _grid())
+        members = RealisationFactory(scenario, self.plan, self.total, _grid())
         numbers = range(self.first, self.first + self.count)
         outcomes = members(numbers)
         failed = [outcome for outcome in outcomes if outcome.error]

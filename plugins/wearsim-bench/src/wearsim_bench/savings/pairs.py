@@ -1,4 +1,4 @@
-"""Two or more ways to the same result, one of which leaves out what the scene does not need."""
+"""Two or more ways to the same result, one of which leaves out what the problem does not need."""
 
 from __future__ import annotations
 

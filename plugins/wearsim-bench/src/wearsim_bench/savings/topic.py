@@ -1,4 +1,4 @@
-"""What a scene does not need and is not computed: time saved, at what error."""
+"""What a problem does not need and is not computed: time saved, at what error."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from wearsim_bench.savings.pairs import Pair
 
 ERRORS, COUNTS = {"result": "result"}, {"times": "times as fast"}
 ABOUT = (
-    "The first of every group of ways is the one that a scene gets which has no need of more; the"
+    "The first of every group of ways is the one that a problem gets which has no need of more; the"
     " last does the same contact, test or draws without the saving, and `times as fast` is its time"
     " over that of the first. Errors are against the last way, but those of marches against one of"
     " 1000 steps. Full slip and strips outside have no long way to the same result: the time is"
@@ -46,7 +46,7 @@ def savings(effort: Effort, tell: Tell) -> Topic:
             found += pair.measured(effort.repetitions)
     return Topic(
         name="savings",
-        title="What is not computed where a scene has no need of it",
+        title="What is not computed where a problem has no need of it",
         about=ABOUT,
         seconds="one call",
         error="result",

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import get_args
 
-from wearsim.evolution.problem import Scene
+from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.steppers.per_pass import is_compiled
 from wearsim.scenario.tables.plain import DEFAULT_TOLERANCE, EvolutionTable
 from wearsim_bench.contact.methods import Method
@@ -95,14 +95,14 @@ class Bench:
             If it has none.
         """
         ready = self.ready(strips, stepper=EVERY_PASS)
-        if is_compiled(ready.scene):
+        if is_compiled(ready.problem):
             ready.stepped(1.0)
             end, seconds = least(lambda: ready.stepped(ready.stop), 1)
             return self._row(EVERY_PASS, "every pass", seconds, end), Truth(end, {})
-        steps = partial(by_solver, "LSODA", ready.scene, CONVERGED)
+        steps = partial(by_solver, "LSODA", ready.problem, CONVERGED)
         end, seconds = least(lambda: steps(ready.stop), 1)
         looser, other = (
-            errors_of(by_solver(solver, ready.scene, tolerance, ready.stop), end)
+            errors_of(by_solver(solver, ready.problem, tolerance, ready.stop), end)
             for solver, tolerance in _CHECKS
         )
         truth = Truth(end, {name: max(looser[name], other[name]) for name in looser})
@@ -159,9 +159,9 @@ class Bench:
         )
 
 
-def by_solver(solver: Solver, scene: Scene, tolerance: float, passes: float) -> End:
-    """Step a scene over some passes by a solver of scipy's; parameters as of `solved_by`."""
-    return End(scene, solved_by(solver, scene, passes, tolerance))
+def by_solver(solver: Solver, problem: WearProblem, tolerance: float, passes: float) -> End:
+    """Step a problem over some passes by a solver of scipy's; parameters as of `solved_by`."""
+    return End(problem, solved_by(solver, problem, passes, tolerance))
 
 
 def of_steppers(bench: Bench, tolerances: Sequence[float]) -> Iterator[Measurement]:
@@ -203,7 +203,7 @@ def _prepared(bench: Bench, strips: int, method: str, tolerance: float) -> tuple
     solver = next((name for name in SOLVERS if name == method), None)
     if solver is not None:
         ready = bench.ready(strips)
-        return partial(by_solver, solver, ready.scene, tolerance), ready.stop
+        return partial(by_solver, solver, ready.problem, tolerance), ready.stop
     ready = bench.ready(strips, stepper=method, tolerance=tolerance)
     return ready.stepped, ready.stop
 
@@ -247,7 +247,7 @@ def of_strips(bench: Bench, counts: Sequence[int]) -> Iterator[Measurement]:
     default = bench.test.grid().strips
     try:
         finest = bench.ready(2 * default + 1)
-        exact = Truth(by_solver("LSODA", finest.scene, CLOSE, finest.stop), {})
+        exact = Truth(by_solver("LSODA", finest.problem, CLOSE, finest.stop), {})
     except Exception as error:
         yield Measurement(bench.group, "LSODA", f"{2 * default + 1} strips", failed=why(error))
         return

@@ -9,12 +9,12 @@ import numpy as np
 
 from wearsim.evolution.error_control.error_estimates import DEPTHS, deepest, whole_volume
 from wearsim.evolution.integrate import evolve
-from wearsim.evolution.problem import Scene
+from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, fresh_state
 from wearsim.evolution.steppers.base import Stepper
 from wearsim.scenario import Scenario
 from wearsim.scenario.examples import shipped_scenario
-from wearsim.studies.run.assemble import build_scene, strips_of_run
+from wearsim.studies.run.assemble import assemble_problem, strips_of_run
 from wearsim.studies.run.draws import draw
 from wearsim.types import FloatArray, Grid
 from wearsim_bench.contact.accuracy import l2
@@ -50,14 +50,14 @@ class WearTest:
 
 @dataclass(frozen=True)
 class End:
-    """The end of a wear test: its scene and its state there."""
+    """The end of a wear test: its problem and its state there."""
 
-    scene: Scene
+    problem: WearProblem
     state: WearState
 
     def profiles_at(self, y: FloatArray) -> FloatArray:
         """Return the worn depths of all bodies at some positions [m], one after another."""
-        own = self.scene.grid.y
+        own = self.problem.grid.y
         depths = [
             np.apply_along_axis(lambda worn: np.interp(y, own, worn), -1, getattr(self.state, name))
             for name in DEPTHS
@@ -74,7 +74,7 @@ class Ready:
 
     Attributes
     ----------
-    scene : Scene
+    problem : WearProblem
     stepper : Stepper
     name : str
         Of the stepper.
@@ -83,18 +83,18 @@ class Ready:
     """
 
     def __init__(self, scenario: Scenario) -> None:
-        built: tuple[Scene, Stepper, str] = build_scene(scenario)
-        self.scene, self.stepper, self.name = built
+        built: tuple[WearProblem, Stepper, str] = assemble_problem(scenario)
+        self.problem, self.stepper, self.name = built
         self.stop, self._max_steps = float(scenario.total_passes), scenario.evolution.max_steps
 
     def stepped(self, passes: float) -> End:
         """Step from fresh bodies over some passes; nothing is recorded on the way."""
-        state = fresh_state(self.scene)
+        state = fresh_state(self.problem)
         for advance in evolve(
-            self.scene, state, self.stepper, passes, lambda _: np.inf, self._max_steps
+            self.problem, state, self.stepper, passes, lambda _: np.inf, self._max_steps
         ):
             state = advance.end
-        return End(self.scene, state)
+        return End(self.problem, state)
 
 
 def errors_of(found: End, exact: End) -> dict[str, float]:
@@ -110,8 +110,8 @@ def errors_of(found: End, exact: End) -> dict[str, float]:
     dict of str to float
         Greatest `depth`, `profile` (L2, of all bodies) and worn `volume` (of all bodies).
     """
-    y = found.scene.grid.y
-    volumes = [whole_volume(end.scene, end.state) for end in (found, exact)]
+    y = found.problem.grid.y
+    volumes = [whole_volume(end.problem, end.state) for end in (found, exact)]
     return {
         "depth": _apart(deepest(found.state), deepest(exact.state)),
         "profile": l2(found.profiles_at(y), exact.profiles_at(y)),

@@ -9,10 +9,10 @@ import numpy as np
 
 from wearsim.errors import StepError
 from wearsim.evolution.error_control.error_estimates import DEPTHS
-from wearsim.evolution.problem import Scene
+from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, contact_values, fresh_state
-from wearsim.evolution.steppers.single_step import present_loads, present_scene, solve_present
-from wearsim.evolution.steppers.wear_increment import Wearing
+from wearsim.evolution.steppers.single_step import present_loads, present_problem, solve_present
+from wearsim.evolution.steppers.wear_increment import WearIncrement
 from wearsim.types import FloatArray
 
 Solver = Literal["BDF", "LSODA"]
@@ -28,21 +28,21 @@ class _Rates:
 
     Parameters
     ----------
-    scene : Scene
+    problem : WearProblem
         Without terms of the load, which have a state of their own.
     most : int
         Contacts that are solved at most.
     """
 
-    def __init__(self, scene: Scene, most: int) -> None:
-        self.scene, self.state, self.most = scene, fresh_state(scene), most
+    def __init__(self, problem: WearProblem, most: int) -> None:
+        self.problem, self.state, self.most = problem, fresh_state(problem), most
         self.solves = self.state.solves
-        self.length = float(contact_values(scene, self.state.contacts, "approach").max())
+        self.length = float(contact_values(problem, self.state.contacts, "approach").max())
         rates = self._wear()
         self.bodies = [name for name in DEPTHS if rates[name].any()]
 
     def _wear(self) -> dict[str, FloatArray]:
-        wear = Wearing(present_scene(self.scene, self.state), self.state.contacts, 1.0)
+        wear = WearIncrement(present_problem(self.problem, self.state), self.state.contacts, 1.0)
         return dict(zip(DEPTHS, (wear.cylinder, wear.roller), strict=True))
 
     def start(self) -> FloatArray:
@@ -73,7 +73,7 @@ class _Rates:
                 f"the solver asked for more than {self.most} contacts", {"passes": passes}
             )
         state = self.state_at(passes, depths)
-        contacts = solve_present(self.scene, state, present_loads(self.scene, state))
+        contacts = solve_present(self.problem, state, present_loads(self.problem, state))
         self.state = replace(state, contacts=contacts)
         self.solves += len(contacts)
         return self._joined(self._wear())
@@ -98,14 +98,14 @@ class _Rates:
 
 
 def solved_by(
-    solver: Solver, scene: Scene, passes: float, tolerance: float, most: int = MOST_SOLVES
+    solver: Solver, problem: WearProblem, passes: float, tolerance: float, most: int = MOST_SOLVES
 ) -> WearState:
     """Return the test after some passes, stepped by a solver of scipy's.
 
     Parameters
     ----------
     solver : {"BDF", "LSODA"}
-    scene : Scene
+    problem : WearProblem
         Without terms of the load.
     passes : float
         From fresh bodies.
@@ -129,7 +129,7 @@ def solved_by(
     """
     from scipy.integrate import solve_ivp  # noqa: PLC0415  (slow to import)
 
-    rates = _Rates(scene, most)
+    rates = _Rates(problem, most)
     options: dict[str, Any] = {"rtol": tolerance, "atol": tolerance, "jac": rates.jacobian}
     options["t_eval"] = [passes]
     found = solve_ivp(rates, (0.0, passes), rates.start(), solver, **options)
