@@ -40,7 +40,7 @@ def made_up(
     end = scale * DEPTH * factor ** (2.0 / 3.0)
     shapes = {
         "roller_depth": 0.0,
-        "roller_worn_volume": 0.0,
+        "total_roller_worn_volume": 0.0,
         "width": 300.0,
         "worn_volume": 1e-3,
         "dissipated_energy": 1e8,
@@ -100,7 +100,7 @@ def made_up(
                 **observables,
                 **scalars,
                 "control": control,
-                "profile": np.maximum(end[:kept, None] - y**2, 0.0),
+                "depth_profile": np.maximum(end[:kept, None] - y**2, 0.0),
             },
             status=status,
             errors={number: f"lost contact at pass {number}" for number in failed},

@@ -81,7 +81,7 @@ def test_that_rows_of_failed_realisations_are_nan_but_for_what_was_drawn(ensembl
     variables = read_ensemble(ensemble_file).variables
     for name, value in some_outcome(5, error=ERROR).drawn.items():
         assert variables[name][5].tobytes() == np.asarray(value).tobytes()
-    for name in (*OBSERVABLES, *SCALARS, "profile"):
+    for name in (*OBSERVABLES, *SCALARS, "depth_profile"):
         assert np.isnan(variables[name][5]).all(), name
 
 
@@ -151,7 +151,7 @@ def test_that_xarray_opens_an_ensemble_with_named_dimensions_and_units(ensemble_
 def test_that_statistics_are_nan_until_they_are_made(ensemble_file):
     variables = read_ensemble(ensemble_file).variables
     assert np.isnan(variables["width_quantiles"]).all()
-    assert np.isnan(variables["profile_low"]).all()
+    assert np.isnan(variables["depth_profile_low"]).all()
 
 
 def test_that_every_kind_of_file_is_told_from_the_others(ensemble_file, tmp_path):
@@ -285,4 +285,4 @@ def test_that_a_million_realisations_take_no_memory_and_no_disk_before_they_are_
     assert data.done.tolist() == [3, million - 1]
     for number in data.done:
         assert depth[number] == some_outcome(number, 500).observables["depth"][1]
-    assert len(data.variables["profile"]) == 4_000_000 // 500
+    assert len(data.variables["depth_profile"]) == 4_000_000 // 500

@@ -306,11 +306,11 @@ def test_that_profiles_beyond_those_kept_are_left_out(tmp_path, monkeypatch):
     with _new(path) as file:
         file.put([some_outcome(number) for number in (1, 2, 3, 4)])
         file.put([bare])
-        with pytest.raises(ValueError, match=r"missing values \['profile'\]"):
+        with pytest.raises(ValueError, match=r"missing values \['depth_profile'\]"):
             file.put([replace(some_outcome(0), profile=None)])
     data = read_ensemble(path)
-    assert len(data.variables["profile"]) == 3
-    np.testing.assert_array_equal(data.variables["profile"][2], some_outcome(2).profile)
+    assert len(data.variables["depth_profile"]) == 3
+    np.testing.assert_array_equal(data.variables["depth_profile"][2], some_outcome(2).profile)
     np.testing.assert_array_equal(data.variables["depth"][4], some_outcome(4).observables["depth"])
 
 

@@ -23,8 +23,8 @@ def test_that_a_run_is_exported_in_engineers_units(tmp_path: Path) -> None:
     files = export_csv(result, folder)
     assert [str(path.relative_to(folder)) for path in files] == [
         "history.csv",
-        "cylinder_profiles.csv",
-        "roller_profiles.csv",
+        "cylinder_depth_profiles.csv",
+        "roller_depth_profiles.csv",
         "line_load.csv",
         "dissipation.csv",
         "scenario.toml",
@@ -54,8 +54,8 @@ def test_that_a_run_is_exported_in_engineers_units(tmp_path: Path) -> None:
         "full_solves",
     ]
     depth = ["y [mm]", *(f"depth at {passes} passes [um]" for passes in (0, 2000, 4000))]
-    assert _header(folder / "cylinder_profiles.csv") == depth
-    assert _header(folder / "roller_profiles.csv") == depth
+    assert _header(folder / "cylinder_depth_profiles.csv") == depth
+    assert _header(folder / "roller_depth_profiles.csv") == depth
     assert _header(folder / "line_load.csv")[1] == "line_load at 0 passes [N/mm]"
     assert _header(folder / "dissipation.csv")[1] == "dissipation at 0 passes [W/m]"
     assert (folder / "scenario.toml").read_text(encoding="utf-8") == SCENARIO
@@ -70,7 +70,7 @@ def test_that_exported_columns_read_back_in_si(tmp_path: Path) -> None:
     for name, column in columns.items():
         np.testing.assert_allclose(column, getattr(result, name), rtol=1e-11)
     wanted = {"y": "m", "depth at 4000 passes": "m"}
-    columns = read_columns((tmp_path / "cylinder_profiles.csv").read_text(), "p.csv", wanted)
+    columns = read_columns((tmp_path / "cylinder_depth_profiles.csv").read_text(), "p.csv", wanted)
     np.testing.assert_allclose(columns["y"], result.y, rtol=1e-11, atol=1e-18)
     np.testing.assert_allclose(columns["depth at 4000 passes"], result.profiles[-1], rtol=1e-11)
 
@@ -95,8 +95,8 @@ def test_that_each_roller_has_a_column(tmp_path: Path) -> None:
 
 def test_that_rollers_that_do_not_wear_have_no_profiles(tmp_path: Path) -> None:
     data = some_run()
-    data.records["roller_profile"][:] = 0.0
-    assert tmp_path / "roller_profiles.csv" not in export_csv(Result(data), tmp_path)
+    data.records["roller_depth_profile"][:] = 0.0
+    assert tmp_path / "roller_depth_profiles.csv" not in export_csv(Result(data), tmp_path)
 
 
 def test_that_nothing_is_overwritten(tmp_path: Path) -> None:

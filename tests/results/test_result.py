@@ -36,7 +36,7 @@ def test_that_the_axes_of_time_and_place_stay() -> None:
 
 def test_that_each_word_names_its_variable() -> None:
     result = Result(some_run(seed=3, rollers=2))
-    words = {"profiles": "cylinder_profile", "roller_profiles": "roller_profile"}
+    words = {"profiles": "cylinder_depth_profile", "roller_profiles": "roller_depth_profile"}
     for name in (*VARIABLES, *words):
         if hasattr(Result, name):
             np.testing.assert_array_equal(

@@ -20,8 +20,8 @@ class ContactInputs:
 
     Parameters
     ----------
-    normal_force : ndarray
-        What is added to the load of the problem [N].
+    normal_force_offset : ndarray
+        Force added to the load of the problem [N].
     friction : ndarray
         Friction coefficient mu.
     longitudinal : ndarray
@@ -32,7 +32,7 @@ class ContactInputs:
         Torque of the roller's bearing where the roller is free [N m].
     """
 
-    normal_force: FloatArray
+    normal_force_offset: FloatArray
     friction: FloatArray
     longitudinal: FloatArray
     yaw: FloatArray

@@ -226,7 +226,7 @@ class WearProblem:
         """Return what varies between two times [s]: field, rollers and standard deviation."""
         problems, everyone = self.members or (self,), tuple(range(self.rollers))
         load = each_between([problem.load.deviation for problem in problems], start, stop)
-        found: list[tuple[str, tuple[int, ...], Number]] = [("normal_force", everyone, load)]
+        found: list[tuple[str, tuple[int, ...], Number]] = [("normal_force_offset", everyone, load)]
         for k, item in enumerate(self.varying):
             paths = [problem.varying[k].path.deviation for problem in problems]
             found.append((item.name, item.rollers, each_between(paths, start, stop)))

@@ -283,7 +283,7 @@ def fresh_state(problem: WearProblem) -> WearState:
     cylinder_depth = np.zeros((stations, 1, realisations, n))
     roller_depth = np.zeros((1, problem.rollers, realisations, n))
     terms = np.zeros((len(problem.terms), problem.rollers, realisations))
-    loads = np.broadcast_to(problem.force(0.0) + problem.inputs.normal_force, problem.shape)
+    loads = np.broadcast_to(problem.force(0.0) + problem.inputs.normal_force_offset, problem.shape)
     contacts = problem.model.solve_batch(
         problem.nominal_gap,
         problem.kinematics.longitudinal_curvature,

@@ -182,7 +182,7 @@ def _profile(result: EnsembleResult) -> Iterator[Column]:
         yield f"depth {name} [um]", getattr(band, name) / 1e-6
 
 
-_DEPTHS = {"cylinder_profile": "depth", "roller_profile": "depth"}
+_DEPTHS = {"cylinder_depth_profile": "depth", "roller_depth_profile": "depth"}
 
 _OTHER_INPUTS = "inputs"  # where input files go that cannot stand where the scenario names them
 
@@ -254,10 +254,10 @@ def _of_run(raw: RunData) -> dict[str, str]:
     """Return the tables of a run, by the name of the file each goes into."""
     texts = {
         "history.csv": table(_history(raw)),
-        "cylinder_profiles.csv": table(_records(raw, "cylinder_profile")),
+        "cylinder_depth_profiles.csv": table(_records(raw, "cylinder_depth_profile")),
     }
-    if raw.records["roller_profile"].any():
-        texts["roller_profiles.csv"] = table(_records(raw, "roller_profile"))
+    if raw.records["roller_depth_profile"].any():
+        texts["roller_depth_profiles.csv"] = table(_records(raw, "roller_depth_profile"))
     texts["line_load.csv"] = table(_records(raw, "line_load"))
     texts["dissipation.csv"] = table(_records(raw, "dissipation"))
     return texts

@@ -97,7 +97,7 @@ def test_that_a_groove_that_wanders_is_seen(plain):
         return np.roll(worn, 1, axis=-1)
 
     assert measures.drift(plain[1]) < 1e-12
-    wrong = doctored(plain[1], "records", "cylinder_profile", shifted)
+    wrong = doctored(plain[1], "records", "cylinder_depth_profile", shifted)
     assert measures.drift(wrong) > 1e-3
     assert measures.asymmetry(wrong, plain[1]) > 1e-3
 
@@ -108,7 +108,7 @@ def test_that_a_depth_that_is_none_is_seen(plain, wrong):
         worn[-1, ..., 3] = wrong
         return worn
 
-    assert not measures.is_finite(doctored(plain[1], "records", "cylinder_profile", spoilt))
+    assert not measures.is_finite(doctored(plain[1], "records", "cylinder_depth_profile", spoilt))
 
 
 def test_that_patches_are_counted_in_turn(plain):

@@ -92,7 +92,7 @@ def test_that_a_group_is_no_larger_than_its_strips_allow(monkeypatch):
 
 def test_that_a_member_that_fails_leaves_the_others_as_they_are():
     members = members_of(4, **CASES["one contact"])
-    heavy = replace(members[1].problem.inputs, normal_force=np.array([[1e5]]))
+    heavy = replace(members[1].problem.inputs, normal_force_offset=np.array([[1e5]]))
     members[1] = replace(members[1], problem=replace(members[1].problem, inputs=heavy))
     found = observed(members)
     assert str(found[1]).startswith("the contact reaches the edge of its strips")

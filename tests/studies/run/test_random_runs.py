@@ -151,7 +151,7 @@ def test_that_passes_draw_the_same_however_often_they_are_recorded():
     few = wearsim.run(scenario_of(outputs__records=1, **inputs))
     many = wearsim.run(scenario_of(outputs__records=9, **inputs))
     assert few.depth[-1] == many.depth[-1]
-    profiles = [result.raw.records["cylinder_profile"][-1] for result in (few, many)]
+    profiles = [result.raw.records["cylinder_depth_profile"][-1] for result in (few, many)]
     assert (profiles[0] == profiles[1]).all()
 
 

@@ -144,15 +144,17 @@ def test_that_records_begin_fresh_and_end_with_the_end(stepper: str, rollers: st
     run = replay.run(short(**{**ROLLERS[rollers], **LOADS["spring"], **STEPPERS[stepper]}))
     records, checkpoint = run.raw.records, run.raw.checkpoint
     assert records["record_passes"][0] == 0.0
-    assert not records["cylinder_profile"][0].any()
-    assert not records["roller_profile"][0].any()
+    assert not records["cylinder_depth_profile"][0].any()
+    assert not records["roller_depth_profile"][0].any()
     assert records["record_passes"][-1] == run.passes[-1] == run.raw.total_passes
     assert records["record_time"][-1] == run.time[-1]
     np.testing.assert_array_equal(
-        records["cylinder_profile"][-1], checkpoint["cylinder_depth"][:, 0]
+        records["cylinder_depth_profile"][-1], checkpoint["cylinder_depth"][:, 0]
     )
-    np.testing.assert_array_equal(records["roller_profile"][-1], checkpoint["roller_depth"][0])
-    assert records["cylinder_profile"][-1].max() == run.depth[-1]
+    np.testing.assert_array_equal(
+        records["roller_depth_profile"][-1], checkpoint["roller_depth"][0]
+    )
+    assert records["cylinder_depth_profile"][-1].max() == run.depth[-1]
     assert (np.diff(records["record_passes"]) > 0.0).all()
 
 

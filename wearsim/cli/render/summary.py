@@ -26,18 +26,21 @@ def end_state(result: Result) -> Rows:
     """Return the observables at the end of a run."""
     depth, error = result.depth[-1], result.depth_error[-1]
     rows = [
-        ("depth", each(depth, "um")),
+        ("depth worn since the start", each(depth, "um")),
+        ("depth below nominal", each(result.depth_below_nominal[-1], "um")),
         ("width", each(result.width[-1], "mm")),
         ("worn volume", each(result.worn_volume[-1], "mm^3")),
         ("dissipated energy", each(result.dissipated_energy[-1], "J")),
         ("power", each(result.power[-1], "W")),
-        ("load at the end", each(result.normal_force[-1], "N")),
+        ("normal force", each(result.normal_force[-1], "N")),
         ("peak pressure", each(result.peak_pressure[-1], "MPa")),
     ]
     if result.stepper == "per-pass":
         rows.append(("error of stepping", "none: every pass was solved by itself"))
     else:
         rows.append(("estimated error of depth", _with_part(error, _deepest(result))))
+    if not result.start_height.any():
+        rows[:2] = [("depth", each(depth, "um"))]
     if np.any(np.asarray(result.roller_depth[-1]) > 0.0):
         rows.insert(1, ("depth of roller", each(result.roller_depth[-1], "um")))
     return rows

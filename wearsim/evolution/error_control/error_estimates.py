@@ -106,13 +106,13 @@ def variation_bias(
         if loads is None:
             carried = contact_values(problem, end.contacts, "line_load").sum(axis=-1)
             loads = carried * problem.grid.spacing
-        values = loads if name == "normal_force" else getattr(here.inputs, name)
+        values = loads if name == "normal_force_offset" else getattr(here.inputs, name)
         values = values.reshape(-1, values.shape[-1])
         felt = deviation > 1e-9 * np.abs(values).max(axis=0)
         if not felt.any():
             continue
         # a load and a friction coefficient are never below zero
-        bounded = name in {"normal_force", "friction"}
+        bounded = name in {"normal_force_offset", "friction"}
         most = 0.9 * values.min(axis=0) if bounded else np.inf
         size = np.where(felt, np.minimum(deviation, most), 0.0)
         mean = mean if mean is not None else _worn_at(here, end, loads, {}, passes)
@@ -188,10 +188,10 @@ def _worn_at(
     values = {
         name: getattr(problem.inputs, name) + shift
         for name, shift in shifts.items()
-        if name != "normal_force"
+        if name != "normal_force_offset"
     }
     shifted = replace(problem, inputs=problem.inputs.with_values(values))
-    contacts = solve_present(shifted, end, loads + shifts.get("normal_force", 0.0))
+    contacts = solve_present(shifted, end, loads + shifts.get("normal_force_offset", 0.0))
     return WearIncrement(shifted, contacts, passes)
 
 

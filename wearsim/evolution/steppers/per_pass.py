@@ -76,7 +76,7 @@ def _passes(
     passes_done = state.passes + np.arange(count, dtype=np.float64)
     times = (passes_done + 0.5) / problem.kinematics.pass_rate
     passes = problem.single_passes(rollers, first, times)
-    force = problem.load.force(times)[:, None] + passes.inputs.normal_force
+    force = problem.load.force(times)[:, None] + passes.inputs.normal_force_offset
     return rollers, force, passes
 
 

@@ -51,7 +51,7 @@ def mean_loads(
 def _loads(problem: WearProblem, force: Number) -> FloatArray:
     """Return the load of every contact before feedback where that of the problem is `force` [N]."""
     loads = np.empty(problem.shape)
-    loads[:] = force + problem.inputs.normal_force
+    loads[:] = force + problem.inputs.normal_force_offset
     return loads
 
 

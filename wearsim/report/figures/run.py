@@ -71,10 +71,13 @@ def run_figure(result: Result, measured: Sequence[Measured] = ()) -> Figure:
 
 
 def _caption(result: Result) -> str:
-    depth = shown(float(np.max(result.depth[-1])), "um")
+    depth = f"{shown(float(np.max(result.depth[-1])), 'um')} deep"
+    if result.start_height.any():
+        below = shown(float(np.max(result.depth_below_nominal[-1])), "um")
+        depth = f"{depth[:-5]} worn since the start, {below} below nominal"
     return (
         f"{count(float(result.passes[-1]))} roller passes in"
-        f" {shown(float(result.time[-1]), 'min')}: {depth} deep,"
+        f" {shown(float(result.time[-1]), 'min')}: {depth},"
         f" {shown(float(np.max(result.width[-1])), 'mm')} wide"
         f" ({result.described_model}, {result.stepper}{'' if result.finished else ', unfinished'})"
     )
@@ -208,7 +211,7 @@ def _draw_load(axes: Axes, result: Result) -> None:
         axes.plot(time * MIN, force[:, roller], style, color=colour, ms=2.6, label=label)
     if rollers > 1 or base is not None:
         axes.legend(loc="best")
-    name_axes(axes, "Load on a roller", "time [min]", "N [N]")
+    name_axes(axes, "Normal force of a roller", "time [min]", "N [N]")
     if np.ptp(force) < 0.02 * force.max() and base is None:  # a constant must look like one
         axes.set_ylim(0.0, 1.25 * float(force.max()))
     axes.margins(x=0.02)

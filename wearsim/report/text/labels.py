@@ -40,11 +40,11 @@ OBSERVABLES: Mapping[str, Named] = {
     "width": Named("width", "mm"),
     "worn_volume": Named("worn volume", "mm^3"),
     "roller_depth": Named("roller depth", "um"),
-    "roller_worn_volume": Named("roller volume", "mm^3"),
+    "total_roller_worn_volume": Named("roller volume", "mm^3"),
     "dissipated_energy": Named("energy", "J"),
     "mean_power": Named("mean power", "W"),
     "power": Named("power", "W"),
-    "normal_force": Named("roller load", "N"),
+    "normal_force": Named("normal force", "N"),
     "peak_pressure": Named("peak pressure", "MPa"),
 }
 """Those that an ensemble follows, by name."""

@@ -57,7 +57,7 @@ class Outcome:
     @property
     def values(self) -> dict[str, float | FloatArray]:
         """All numbers by the name of their variable."""
-        profile = {} if self.profile is None else {"profile": self.profile}
+        profile = {} if self.profile is None else {"depth_profile": self.profile}
         return {**self.drawn, **self.observables, **self.scalars, **profile}
 
 

@@ -305,7 +305,7 @@ class EnsembleResult(StudyResult[EnsembleData]):
     @cached_property
     def profiles(self) -> FloatArray:
         """Worn depth of the cylinder at the end, shape (kept, strips) [m]; failed ones left out."""
-        kept = self.raw.variables["profile"]
+        kept = self.raw.variables["depth_profile"]
         status = self.raw.status[: len(kept)]
         return np.asarray(kept[status == DONE])
 
@@ -380,7 +380,7 @@ class EnsembleResult(StudyResult[EnsembleData]):
             found[f"{name}_quantiles"] = np.array([course.quantiles[p] for p in QUANTILES])
         band = self.band()
         for part in ("mean", "std", "low", "high"):
-            found[f"profile_{part}"] = getattr(band, part)
+            found[f"depth_profile_{part}"] = getattr(band, part)
         return found
 
     def is_constant(self, name: str) -> bool:

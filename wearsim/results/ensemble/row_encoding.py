@@ -87,11 +87,11 @@ def rows_of(run: Sequence[Outcome], layout: Layout, extents: Mapping[str, Extent
         for name, variable in layout.variables.items()
         if is_row(variable) and name not in {"status", "error"}
     }
-    kept = extents["profile"].shape[0]
+    kept = extents["depth_profile"].shape[0]
     for place, outcome in enumerate(run):
         values = outcome.values
         unknown = sorted(values.keys() - arrays.keys())
-        spared = {"profile"} if outcome.number >= kept else set()
+        spared = {"depth_profile"} if outcome.number >= kept else set()
         missing = [] if outcome.error else sorted(arrays.keys() - values.keys() - spared)
         if unknown or missing:
             raise ValueError(
@@ -99,7 +99,7 @@ def rows_of(run: Sequence[Outcome], layout: Layout, extents: Mapping[str, Extent
             )
         for name, value in values.items():
             _place(arrays[name][place : place + 1], outcome.number, name, value)
-    arrays["profile"] = arrays["profile"][: max(kept - first, 0)]
+    arrays["depth_profile"] = arrays["depth_profile"][: max(kept - first, 0)]
     return Rows(
         first,
         np.array([FAILED if outcome.error else DONE for outcome in run], np.uint8),

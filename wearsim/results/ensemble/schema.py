@@ -47,7 +47,7 @@ OBSERVABLES: Mapping[str, Variable] = _table(
     Variable("width", _HISTORY, "m", "width of the cylinder's groove", "record"),
     Variable("worn_volume", _HISTORY, "m^3", "worn volume of the cylinder", "record"),
     Variable("roller_depth", _HISTORY, "m", "greatest worn depth of the rollers", "record"),
-    Variable("roller_worn_volume", _HISTORY, "m^3", "worn volume of all rollers", "record"),
+    Variable("total_roller_worn_volume", _HISTORY, "m^3", "worn volume of all rollers", "record"),
     Variable("dissipated_energy", _HISTORY, "J", "dissipated energy, all rollers", "record"),
     Variable("mean_power", _HISTORY, "W", "dissipated energy per time so far", "record"),
     Variable("power", _HISTORY, "W", "dissipated power, all rollers", "record"),
@@ -73,7 +73,9 @@ _OUTCOMES = _table(
     Variable("solves", _EACH, "1", "contacts solved", "record"),
     Variable("depth_error", _EACH, "m", "estimated error of the final depth", "record"),
     Variable("volume_error", _EACH, "m^3", "estimated error of the final worn volume", "record"),
-    Variable("profile", ("kept", "y"), "m", "worn depth of the cylinder at the end", "record"),
+    Variable(
+        "depth_profile", ("kept", "y"), "m", "worn depth of the cylinder at the end", "record"
+    ),
 )
 
 _CONTROL = Variable("control", _EACH, "1", "control variate, in the unit of its own mean", "record")
@@ -96,7 +98,7 @@ def _statistics() -> dict[str, Variable]:
         ("high", "97.5 % quantile"),
     ):
         told = f"{what} over kept realisations: worn depth of the cylinder at the end"
-        found.append(Variable(f"profile_{ending}", _STRIPS, "m", told, "statistic"))
+        found.append(Variable(f"depth_profile_{ending}", _STRIPS, "m", told, "statistic"))
     return _table(*found)
 
 

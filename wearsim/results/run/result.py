@@ -167,12 +167,22 @@ class Result(StudyResult[RunData]):
     @property
     def profiles(self) -> FloatArray:
         """Worn depth of the cylinder over the strips at each record, shape (record, y) [m]."""
-        return self.values("cylinder_profile")
+        return self.values("cylinder_depth_profile")
+
+    @property
+    def depth_below_nominal(self) -> FloatArray:
+        """Greatest depth of the cylinder below its nominal shape at each record [m].
+
+        It differs from `depth`, worn since the start, where the cylinder has a start profile.
+        """
+        below = self.raw.records["cylinder_depth_profile"] - self.start_height
+        deepest: FloatArray = below.max(axis=(1, 3))
+        return deepest[:, 0] if deepest.shape[1] == 1 else deepest
 
     @property
     def roller_profiles(self) -> FloatArray:
         """Worn depth of each roller over the strips at each record [m]."""
-        return self.values("roller_profile")
+        return self.values("roller_depth_profile")
 
     @property
     def line_load(self) -> FloatArray:
@@ -208,6 +218,7 @@ class Result(StudyResult[RunData]):
             "passes": _number(last["passes"]),
             "time_s": _number(last["time"]),
             "depth_m": _number(last["depth"]),
+            **self._below_nominal(),
             "width_m": _number(last["width"]),
             "worn_volume_m3": _number(last["worn_volume"]),
             "roller_depth_m": _number(last["roller_depth"]),
@@ -221,6 +232,11 @@ class Result(StudyResult[RunData]):
             "relative_depth_error": _number(_relative(last["depth_error"], deepest)),
             "relative_volume_error": _number(_relative(last["volume_error"], volume)),
         }
+
+    def _below_nominal(self) -> dict[str, Number]:
+        if not self.start_height.any():
+            return {}
+        return {"depth_below_nominal_m": _number(np.asarray(self.depth_below_nominal[-1]))}
 
 
 def _number(values: npt.NDArray[Any]) -> Number:

@@ -65,14 +65,14 @@ VARIABLES: Mapping[str, Variable] = {
         Variable("record_passes", ("record",), "1", "roller passes at a record", "record"),
         Variable("record_time", ("record",), "s", "simulated time at a record", "record"),
         Variable(
-            "cylinder_profile",
+            "cylinder_depth_profile",
             ("record", "station", "realisation", "y"),
             "m",
             "worn depth of the cylinder",
             "record",
         ),
         Variable(
-            "roller_profile",
+            "roller_depth_profile",
             ("record", "roller", "realisation", "y"),
             "m",
             "worn depth of a roller",

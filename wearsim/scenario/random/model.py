@@ -22,7 +22,7 @@ LEAST = 1.0 - BELOW_ONE  # the least uniform number that a draw takes
 MISALIGNMENT = "creepage.misalignment"
 FRICTION = "friction.coefficient"
 CONTACT_FIELDS = {
-    "load.normal_force": "normal_force",
+    "load.normal_force": "normal_force_offset",
     FRICTION: "friction",
     "creepage.longitudinal": "longitudinal",
     "creepage.bearing_torque": "bearing_torque",

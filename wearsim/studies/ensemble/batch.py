@@ -152,7 +152,7 @@ def rows_of_states(
         "width": row["width"],
         "worn_volume": row["worn_volume"],
         "roller_depth": row["roller_depth"].max(axis=0),
-        "roller_worn_volume": sum_in_order(row["roller_worn_volume"] * count, axis=0),
+        "total_roller_worn_volume": sum_in_order(row["roller_worn_volume"] * count, axis=0),
         "dissipated_energy": energy,
         "mean_power": np.where(begun, energy / np.where(begun, time, 1.0), row["power"]),
         "power": row["power"],

@@ -205,7 +205,7 @@ def strips_of_run(draws: Draws) -> Grid:
     """Return the strips that a run's draws and the end of its test call for."""
     scenario = draws.scenario
     greatest = load_range(scenario, scenario.load.build(), scenario.total_time)[1]
-    greatest += draws.range_of("normal_force", 0.0)[1]
+    greatest += draws.range_of("normal_force_offset", 0.0)[1]
     drawn = Drawn(
         yaw=_reach(draws, "yaw"),
         tilt=_reach(draws, "tilt"),

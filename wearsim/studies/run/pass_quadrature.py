@@ -37,8 +37,8 @@ def _values(
 def _placed(inputs: ContactInputs, values: Mapping[str, FloatArray]) -> ContactInputs:
     """Return inputs with values drawn for each contact, shape (contacts,); loads are added."""
     columns = {name: array[:, None] for name, array in values.items()}
-    if "normal_force" in columns:
-        columns["normal_force"] = inputs.normal_force + columns["normal_force"]
+    if "normal_force_offset" in columns:
+        columns["normal_force_offset"] = inputs.normal_force_offset + columns["normal_force_offset"]
     return inputs.with_values(columns)
 
 
@@ -122,7 +122,7 @@ def with_nodes(
 
 def _guides(inputs: ContactInputs, force: float, part: slice) -> FloatArray:
     """Return functions of the inputs that wear nearly follows, shape (functions, draws)."""
-    load = np.maximum(force + inputs.normal_force[part, 0], 0.0)
+    load = np.maximum(force + inputs.normal_force_offset[part, 0], 0.0)
     slip = np.hypot(inputs.longitudinal[part, 0], inputs.yaw[part, 0])
     wear, tilt = load * inputs.friction[part, 0] * slip, inputs.tilt[part, 0]
     one = np.ones_like(tilt)

@@ -129,8 +129,8 @@ def record_row(problem: WearProblem, state: WearState, pass_by_pass: bool) -> Ro
     row: Row = {
         "record_passes": state.passes,
         "record_time": problem.time(state.passes),
-        "cylinder_profile": state.cylinder_depth[:, 0],
-        "roller_profile": state.roller_depth[0],
+        "cylinder_depth_profile": state.cylinder_depth[:, 0],
+        "roller_depth_profile": state.roller_depth[0],
     }
     for name in ("line_load", "half_length", "dissipation"):
         row[name] = problem.per_roller(contact_values(problem, state.contacts, name))

@@ -14,7 +14,7 @@ from wearsim.studies.run.assemble import merged_rollers
 from wearsim.studies.run.draws import draw
 from wearsim.types import FloatArray
 
-PROFILES = ("cylinder_profile", "roller_profile")
+PROFILES = ("cylinder_depth_profile", "roller_depth_profile")
 _ENOUGH = 20  # strips in contact, whose parabola has second differences of 2 %
 _NOTHING = 1e-12  # relative: round-off
 
@@ -122,7 +122,7 @@ def roughest(result: Result) -> float:
 
 def drift(result: Result) -> float:
     """Return how far a groove's centre is from y = 0 at most, over the groove's width."""
-    y, worn = result.y, result.raw.records["cylinder_profile"][:, 0, 0]
+    y, worn = result.y, result.raw.records["cylinder_depth_profile"][:, 0, 0]
     worst = 0.0
     for row in worn:
         wide = float(np.ptp(y[row > 0.0])) if (row > 0.0).any() else 0.0

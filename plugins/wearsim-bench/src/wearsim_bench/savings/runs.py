@@ -66,7 +66,7 @@ def records(quick: bool) -> Iterator[Pair]:
 
 
 def _recorded(scenario: Scenario) -> FloatArray:
-    profiles: FloatArray = run(scenario).raw.records["cylinder_profile"]
+    profiles: FloatArray = run(scenario).raw.records["cylinder_depth_profile"]
     return np.ravel(profiles[-1])
 
 
