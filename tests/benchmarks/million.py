@@ -25,7 +25,7 @@ from wearsim.studies.ensemble.realisation import RealisationFactory
 
 
 class ClosedForm(RealisationFactory):
-    """RealisationFactory whose depth is that of full slip of rigid bodies, and nothing else is known."""
+    """Realisations with the closed-form depth of full slip of rigid bodies."""
 
     def __call__(self, numbers: Sequence[int]) -> list[Outcome]:
         """Return what realisations on end would wear, in closed form."""

@@ -78,8 +78,8 @@ class WearProblem:
     settled : float
         Relative change of wear and loads below which the iterations of an implicit step end.
     members : tuple of WearProblem
-        Of tests that are stepped together, the problem of each: they have loads, wear factors and
-        paths in time of their own. Where there are none, all realisations share those of the problem.
+        The problem of each realisation where several are stepped together, with its own loads, wear
+        factors and paths in time. Empty: all realisations share those of this problem.
     """
 
     grid: Grid

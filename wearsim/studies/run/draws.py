@@ -117,7 +117,7 @@ def _spreads(item: RandomInput) -> list[list[float]]:
 
 
 def origin(key: str, mean: float) -> float:
-    """Return what values of a key are counted from: a load adds to the problem's own, at its mean."""
+    """Return the origin of the values of a key: the mean for a load, which is an offset."""
     return mean if key == "load.normal_force" else 0.0
 
 
