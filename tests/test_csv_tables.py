@@ -157,6 +157,6 @@ def test_that_any_text_gives_columns_or_a_scenario_error(text: str) -> None:
     try:
         columns = _read(text)
     except ScenarioError as error:
-        assert error.problems  # noqa: PT017
+        assert error.mistakes  # noqa: PT017
     else:
         assert np.all(np.diff(columns["time"]) > 0.0)

@@ -4,9 +4,9 @@ import sys
 from importlib.metadata import version
 
 import pytest
-import wearsim.cli.check
 from cli_examples import Command
 
+import wearsim.cli.commands.check
 from wearsim.errors import CapabilityError, PluginError, ResultsFileError, SolverError
 
 VERBS = [

@@ -13,7 +13,7 @@ from ensemble_examples import some_header, some_outcome, some_static
 
 from wearsim.results import EnsembleFile, Outcome
 from wearsim.results.ensemble.schema import DONE
-from wearsim.results.io import writer
+from wearsim.results.io import atomic_write
 
 ASKED, STRIPS = 5, 60
 BATCHES = ([3, 0, 1], [4, 2])
@@ -55,7 +55,7 @@ def kill_while(work: Callable[[], None], at: int) -> int:
         if next(calls) == at:
             os.kill(os.getpid(), signal.SIGKILL)
 
-    writer.on_write_stage = kill
+    atomic_write.on_write_stage = kill
     work()
     os._exit(0)
 
@@ -63,9 +63,9 @@ def kill_while(work: Callable[[], None], at: int) -> int:
 def stages_of(work: Callable[[], None]) -> list[str]:
     """Return every call of the seam, in order."""
     seen: list[str] = []
-    writer.on_write_stage = seen.append
+    atomic_write.on_write_stage = seen.append
     work()
-    writer.on_write_stage = lambda _: None
+    atomic_write.on_write_stage = lambda _: None
     return seen
 
 
@@ -91,6 +91,6 @@ if __name__ == "__main__":
     fresh, whole = folder / "fresh.h5", folder / "whole.h5"
     create(fresh)
     kill_at_stages("create", None, create)
-    writer._CHUNK = SMALL_CHUNK
+    atomic_write._CHUNK = SMALL_CHUNK
     kill_at_stages("rows", fresh, lambda path: go_on(path, BATCHES[:1]))
     go_on(whole)

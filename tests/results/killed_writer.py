@@ -9,13 +9,13 @@ from pathlib import Path
 
 from run_examples import some_run
 
-from wearsim.results.io import writer
+from wearsim.results.io import atomic_write, writer
 
 
 def stages_of_a_write(path: Path) -> list[str]:
     """Return every call of the seam, in order; a stage may come more than once."""
     seen: list[str] = []
-    writer.on_write_stage = seen.append
+    atomic_write.on_write_stage = seen.append
     writer.write_results(path, some_run(seed=2, strips=400, records=20))
     return seen
 
@@ -31,7 +31,7 @@ def kill_while_writing(path: Path, at: int) -> int:
         if next(calls) == at:
             os.kill(os.getpid(), signal.SIGKILL)
 
-    writer.on_write_stage = kill
+    atomic_write.on_write_stage = kill
     writer.write_results(path, some_run(seed=2, strips=400, records=20))
     os._exit(0)
 
@@ -41,7 +41,7 @@ if __name__ == "__main__":
     stages = stages_of_a_write(folder / "whole.h5")
     for number, name in enumerate(stages):
         target = folder / f"{number}.h5"
-        writer.on_write_stage = lambda stage: None
+        atomic_write.on_write_stage = lambda stage: None
         if number % 2 == 0:  # over an old file, and where there is none
             writer.write_results(target, some_run(seed=1))
         killed_by = kill_while_writing(target, number)

@@ -29,7 +29,7 @@ from run_examples import some_run
 from wearsim.errors import ResultsFileError
 from wearsim.results import EnsembleFile, check_output, read_ensemble, write_results
 from wearsim.results.ensemble.schema import DONE, OBSERVABLES, PENDING
-from wearsim.results.io import writer
+from wearsim.results.io import atomic_write
 
 HERE = Path(__file__).parent
 ASKED = 12
@@ -193,7 +193,7 @@ def test_that_a_full_disk_is_told_in_a_line_and_costs_no_row(tmp_path, monkeypat
 
     with _new(path) as file:
         file.put(_outcomes([1]))
-        monkeypatch.setattr(writer, "on_write_stage", fill)
+        monkeypatch.setattr(atomic_write, "on_write_stage", fill)
         with pytest.raises(ResultsFileError) as caught:
             _new(other)
         assert str(caught.value) == f"{other}: cannot be written (No space left on device)"

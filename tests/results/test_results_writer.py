@@ -14,7 +14,7 @@ from run_examples import some_run
 
 from wearsim.errors import ResultsFileError
 from wearsim.results import check_output, read_results, write_results
-from wearsim.results.io import writer
+from wearsim.results.io import atomic_write
 from wearsim.results.run.data import differences
 
 HERE = Path(__file__).parent
@@ -27,7 +27,7 @@ class Fault(Exception):  # noqa: N818
 
 def _all_calls(folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     calls: list[str] = []
-    monkeypatch.setattr(writer, "on_write_stage", calls.append)
+    monkeypatch.setattr(atomic_write, "on_write_stage", calls.append)
     write_results(folder / "all.h5", NEW)
     monkeypatch.undo()
     return calls
@@ -37,7 +37,7 @@ def test_that_the_seam_is_called_around_every_stage(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     calls = _all_calls(tmp_path, monkeypatch)
-    expected = [f"{when} {stage}" for stage in writer.STAGES for when in ("before", "after")]
+    expected = [f"{when} {stage}" for stage in atomic_write.STAGES for when in ("before", "after")]
     assert list(dict.fromkeys(calls)) == expected
     assert calls.count("before write") > 1  # a fault may strike a half-written file
 
@@ -58,7 +58,7 @@ def test_that_a_failure_at_any_stage_leaves_the_old_file_or_the_new(
             if left < 0:
                 raise Fault(stage)
 
-        monkeypatch.setattr(writer, "on_write_stage", fail)
+        monkeypatch.setattr(atomic_write, "on_write_stage", fail)
         with pytest.raises(Fault):
             write_results(path, NEW)
         monkeypatch.undo()
@@ -78,7 +78,7 @@ def test_that_a_kill_at_any_stage_leaves_the_old_file_or_the_new(tmp_path: Path)
         cwd=HERE.parents[1],
     )
     lines = [line.split(",") for line in done.stdout.splitlines()]
-    assert {name.split(maxsplit=1)[1] for _, _, name in lines} == set(writer.STAGES)
+    assert {name.split(maxsplit=1)[1] for _, _, name in lines} == set(atomic_write.STAGES)
     renamed = [name for _, _, name in lines].index("after rename")
     for number, (_, killed_by, _) in enumerate(lines):
         path = tmp_path / f"{number}.h5"
@@ -104,7 +104,7 @@ def test_that_a_full_disk_is_told_in_a_line(
         if stage == "before fsync":
             raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(writer, "on_write_stage", fill)
+    monkeypatch.setattr(atomic_write, "on_write_stage", fill)
     with pytest.raises(ResultsFileError) as caught:
         write_results(path, NEW)
     assert str(caught.value) == f"{path}: cannot be written (No space left on device)"

@@ -5,14 +5,14 @@ from __future__ import annotations
 import textwrap
 
 import pytest
-import wearsim.scenario.choices
-import wearsim.scenario.known
-import wearsim.scenario.random_reading
-import wearsim.scenario.random_schema
 from random_examples import SmallRandomInputs
 from scenario_examples import GOOD, Parse, SmallPlugins
 
-import wearsim.scenario.schema
+import wearsim.scenario.parse.key_index
+import wearsim.scenario.random.parse
+import wearsim.scenario.schema.document
+import wearsim.scenario.schema.random_inputs
+import wearsim.scenario.tables.plugin
 from wearsim.plugins.manager import Registry
 from wearsim.scenario import Scenario, parse_scenario
 

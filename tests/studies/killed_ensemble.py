@@ -14,7 +14,7 @@ from killed_run import chosen_of, ended, ended_after, forked, killing, seconds_o
 
 from tests.studies.ensemble_cases import small, unlike
 from wearsim.results import open_ensemble
-from wearsim.results.io import writer
+from wearsim.results.io import atomic_write
 from wearsim.scenario import Scenario
 from wearsim.studies.ensemble import grid as ensemble_grid
 from wearsim.studies.ensemble.api import ensemble, resume_ensemble
@@ -54,7 +54,7 @@ def kill_at_stages(scenario: Scenario, count: int, folder: Path, extent: str) ->
         for at in (number, *again):
 
             def work(at: int = at, path: Path = path) -> None:
-                writer.on_write_stage = killing(at)
+                atomic_write.on_write_stage = killing(at)
                 go(scenario, count, path)
 
             killed.append(ended(forked(work)))

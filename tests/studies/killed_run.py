@@ -16,7 +16,7 @@ from pathlib import Path
 from study_examples import LOADS, ROLLERS, short, unlike
 
 from wearsim.results import Result, open_results
-from wearsim.results.io import writer
+from wearsim.results.io import atomic_write
 from wearsim.scenario import Scenario
 from wearsim.studies.run import run as replay
 from wearsim.studies.run.events import Event, Started
@@ -90,9 +90,9 @@ def ended_after(seconds: float, work: Callable[[], object]) -> int:
 def stages_of(work: Callable[[], object]) -> list[str]:
     """Return every call of the seam while `work` is done."""
     seen: list[str] = []
-    writer.on_write_stage = seen.append
+    atomic_write.on_write_stage = seen.append
     work()
-    writer.on_write_stage = lambda _: None
+    atomic_write.on_write_stage = lambda _: None
     return seen
 
 
@@ -127,7 +127,7 @@ def kill_at_stages(scenario: Scenario, folder: Path, extent: str) -> None:
     Tells the names of all calls first.
     """
     whole = replay.run(scenario)
-    writer._CHUNK = SMALL_CHUNK
+    atomic_write._CHUNK = SMALL_CHUNK
     stages = stages_of(lambda: go(scenario, folder / "whole.h5"))
     tell(stages=stages)
     for turn, number in enumerate(chosen_of(stages, extent)):
@@ -137,7 +137,7 @@ def kill_at_stages(scenario: Scenario, folder: Path, extent: str) -> None:
         for at in (number, *again):
 
             def work(at: int = at) -> None:
-                writer.on_write_stage = killing(at)
+                atomic_write.on_write_stage = killing(at)
                 go(scenario, path)  # noqa: B023  (done before the next turn)
 
             killed.append(ended(forked(work)))

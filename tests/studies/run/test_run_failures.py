@@ -20,7 +20,7 @@ from wearsim.errors import (
 )
 from wearsim.evolution.steppers import backward_euler as implicit
 from wearsim.results import Result, open_results, read_results, write_results
-from wearsim.results.io import writer
+from wearsim.results.io import atomic_write
 from wearsim.scenario import Scenario, parse_scenario
 from wearsim.studies.run import recorder
 from wearsim.studies.run import run as replay
@@ -92,7 +92,7 @@ def _stages(scenario: Scenario, path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     """Return every call of the writer's seam over a whole run, which goes to `path`."""
     seen: list[str] = []
     with monkeypatch.context() as patch:
-        patch.setattr(writer, "on_write_stage", seen.append)
+        patch.setattr(atomic_write, "on_write_stage", seen.append)
         replay.run(scenario, path)
     return seen
 
@@ -109,7 +109,7 @@ def test_that_an_interrupt_while_writing_leaves_a_file_that_goes_on(
     at_the_end = range(len(stages) - 3, len(stages) + 1)  # around the rename and after it
     for at in (*in_the_midst, *at_the_end):
         with monkeypatch.context() as patch:
-            patch.setattr(writer, "on_write_stage", Press(lambda _: None, at))
+            patch.setattr(atomic_write, "on_write_stage", Press(lambda _: None, at))
             with pytest.raises(Interrupted, match="go on with"):
                 replay.run(scenario, path, force=True)
         assert list(path.parent.iterdir()) == [path]
@@ -126,7 +126,7 @@ def test_that_an_interrupt_of_the_first_write_leaves_a_fresh_file_or_none(
     for at in (1, renamed, renamed + 1):
         path.unlink(missing_ok=True)
         with monkeypatch.context() as patch:
-            patch.setattr(writer, "on_write_stage", Press(lambda _: None, at))
+            patch.setattr(atomic_write, "on_write_stage", Press(lambda _: None, at))
             with pytest.raises(KeyboardInterrupt):
                 replay.run(scenario, path)
         assert path.exists() == (at > renamed)
