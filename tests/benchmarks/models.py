@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable
+from importlib.metadata import entry_points
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -165,7 +166,9 @@ def report(tell: Callable[[str], object], share: float = 1.0, repetitions: int =
 
 
 def install_template(folder: Path) -> None:
-    """Put the plugin template on Python's path, as an installation would have it."""
+    """Put the plugin template on Python's path, as if installed, unless it is installed."""
+    if any(point.value == "wearsim_template" for point in entry_points(group="wearsim")):
+        return
     info = folder / "wearsim_template-0.1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text(

@@ -28,12 +28,12 @@ class BlackBox(ContactModel):
         return self.inner.solve(gap, longitudinal_curvature, point, None, warm)
 
 
-def winkler(grid):
+def foundation_model(grid):
     """Return the third party's elastic foundation, prepared for a grid."""
     spec = importlib.util.spec_from_file_location("wearsim_tiny", TINY)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    model = module.Winkler(module.WinklerOptions().foundation_modulus)
+    model = module.Foundation(module.FoundationOptions().foundation_modulus)
     model.prepare(grid, None)
     return model
 
@@ -44,5 +44,5 @@ def boxed(foundation=False, box=BlackBox, **changes):
     It is the built-in one of slender contacts, or an elastic foundation.
     """
     problem, stepper, stop = built(evolution__stepper="stabilised", **changes)
-    model = winkler(problem.grid) if foundation else problem.model
+    model = foundation_model(problem.grid) if foundation else problem.model
     return replace(problem, model=box(model)), stepper, stop

@@ -15,8 +15,12 @@ Install = Callable[..., None]
 
 @pytest.fixture
 def install(monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
-    """Install made-up entry points beside the real ones."""
-    real = list(entry_points(group=manager.PROJECT))
+    """Return a function that installs made-up entry points next to those of wearsim alone."""
+    real = [
+        point
+        for point in entry_points(group=manager.PROJECT)
+        if point.dist is not None and point.dist.name == "wearsim"
+    ]
 
     def install(*points: Point) -> None:
         monkeypatch.setattr(manager, "entry_points", lambda group: [*real, *points])

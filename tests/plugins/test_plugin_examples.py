@@ -65,14 +65,14 @@ def test_that_every_hook_is_tested(hook):
 
 
 def test_that_the_example_of_a_contact_model_runs(example, monkeypatch):
-    package, winkler = ModuleType("my_package"), ModuleType("my_package.winkler")
+    package, own = ModuleType("my_package"), ModuleType("my_package.foundation")
     monkeypatch.syspath_prepend(Path(__file__).parent / "data" / "tiny")
-    winkler.Winkler = importlib.import_module("wearsim_tiny").Winkler
+    own.Foundation = importlib.import_module("wearsim_tiny").Foundation
     monkeypatch.setitem(sys.modules, "my_package", package)
-    monkeypatch.setitem(sys.modules, "my_package.winkler", winkler)
+    monkeypatch.setitem(sys.modules, "my_package.foundation", own)
     example("wearsim_contact_models")
     result = wearsim.run(
-        rig(contact='model = "winkler"\nfoundation_modulus = 4e13\nwidth = "8 mm"\nstrips = 81')
+        rig(contact='model = "foundation"\nfoundation_modulus = 4e13\nwidth = "8 mm"\nstrips = 81')
     )
     assert result.stepper == "stabilised"
     assert result.finished

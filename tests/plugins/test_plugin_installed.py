@@ -34,14 +34,14 @@ def test_that_an_installed_plugin_is_listed_with_its_distribution():
     done = wearsim("plugins", "--json", plugins=("tiny",))
     assert done.returncode == 0, done.stderr
     listed = json.loads(done.stdout)
-    own = {item["name"]: item for item in listed["plugins"] if item["distribution"] != "wearsim"}
-    assert set(own) == {"winkler", "abrasion", "drift"}
-    assert own["winkler"]["kind"] == "contact model"
-    assert own["winkler"]["capabilities"] == []
-    assert own["drift"]["capabilities"] == ["term"]
-    assert {(item["distribution"], item["version"]) for item in own.values()} == {
-        ("wearsim-tiny", "1.2")
+    own = {
+        item["name"]: item for item in listed["plugins"] if item["distribution"] == "wearsim-tiny"
     }
+    assert set(own) == {"foundation", "abrasion", "drift"}
+    assert own["foundation"]["kind"] == "contact model"
+    assert own["foundation"]["capabilities"] == []
+    assert own["drift"]["capabilities"] == ["term"]
+    assert {item["version"] for item in own.values()} == {"1.2"}
     assert listed["broken"] == []
 
 
@@ -49,23 +49,23 @@ def test_that_a_broken_distribution_is_listed_with_its_cause():
     done = wearsim("plugins", "--json", plugins=("broken", "tiny"))
     assert done.returncode == 0, done.stderr
     listed = json.loads(done.stdout)
-    assert "winkler" in {item["name"] for item in listed["plugins"]}
+    assert "foundation" in {item["name"] for item in listed["plugins"]}
     (broken,) = listed["broken"]
     assert (broken["distribution"], broken["version"]) == ("wearsim-broken", "0.3")
     assert broken["cause"] == "ModuleNotFoundError: No module named 'a_library_nobody_has'"
 
 
 def test_that_a_run_uses_an_installed_plugin_and_its_file_names_it(tmp_path):
-    path = write_rig(tmp_path, 'model = "winkler"\nwidth = "8 mm"\nstrips = 81')
+    path = write_rig(tmp_path, 'model = "foundation"\nwidth = "8 mm"\nstrips = 81')
     done = wearsim("run", path, "-o", tmp_path / "rig.h5", "--json", plugins=("tiny",))
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout)
-    assert (told["model"], told["stepper"]) == ("winkler", "stabilised")
+    assert (told["model"], told["stepper"]) == ("foundation", "stabilised")
     shown = wearsim("show", tmp_path / "rig.h5", plugins=("tiny",))
     assert "wearsim-tiny" in shown.stdout
     resumed = wearsim("resume", tmp_path / "rig.h5", "--until", "2 min", plugins=())
     assert resumed.returncode == 2
-    assert "needs the contact model 'winkler' of wearsim-tiny 1.2" in resumed.stderr
+    assert "needs the contact model 'foundation' of wearsim-tiny 1.2" in resumed.stderr
     assert "install it and resume again" in resumed.stderr
 
 

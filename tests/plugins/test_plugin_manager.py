@@ -23,7 +23,8 @@ def failing():
     raise ImportError("no module named 'sparse_magic'")
 
 
-def test_that_builtins_come_through_the_hooks_of_anyone():
+def test_that_builtins_come_through_the_hooks_of_anyone(install):
+    install()
     found = registry()
     assert found.names(ContactModelSpec) == ["hertz", "hertz-fastsim", "semi-hertzian", "slender"]
     assert found.names(WearLawSpec) == ["archard-dissipation", "t-gamma"]

@@ -8,32 +8,32 @@ from plugin_examples import rig
 import wearsim
 from wearsim.errors import CapabilityError
 
-WINKLER = 'model = "winkler"\nwidth = "8 mm"\nstrips = 81'
+FOUNDATION = 'model = "foundation"\nwidth = "8 mm"\nstrips = 81'
 
 pytestmark = pytest.mark.usefixtures("tiny")
 
 
-def winkler(overrides=None, **tables):
-    return rig(overrides, **({"contact": WINKLER} | tables))
+def foundation(overrides=None, **tables):
+    return rig(overrides, **({"contact": FOUNDATION} | tables))
 
 
 def test_that_a_single_contact_is_solved():
-    solution = wearsim.solve_contact(winkler())
+    solution = wearsim.solve_contact(foundation())
     spacing = solution.y[1] - solution.y[0]
     assert solution.line_load.sum() * spacing == pytest.approx(300.0, rel=1e-10)
     assert solution.power == pytest.approx(0.1 * 300.0 * 1e-3 * 2.618, rel=1e-4)
 
 
 def test_that_auto_takes_stabilised_steps_for_a_model_without_wear_compliance():
-    result = wearsim.run(winkler())
+    result = wearsim.run(foundation())
     assert result.stepper == "stabilised"
     assert result.worn_volume[-1] == pytest.approx(1.1e-11 * result.dissipated_energy[-1], rel=1e-9)
 
 
 def test_that_its_steps_agree_with_every_pass_by_itself():
     short = {"operation.duration": "12 s"}
-    steps = wearsim.run(winkler(short))
-    truth = wearsim.run(winkler(short | {"evolution.stepper": "per-pass"}))
+    steps = wearsim.run(foundation(short))
+    truth = wearsim.run(foundation(short | {"evolution.stepper": "per-pass"}))
     assert truth.stepper == "per-pass"
     assert int(truth.full_solves[-1]) == 600
     assert steps.depth[-1] == pytest.approx(float(truth.depth[-1]), rel=5e-3)
@@ -42,14 +42,14 @@ def test_that_its_steps_agree_with_every_pass_by_itself():
 
 def test_that_rollers_which_differ_run_one_after_another():
     offsets = {"roller.offset": ["-0.5 mm", "0 mm", "0.5 mm"]}
-    result = wearsim.run(winkler(offsets))
+    result = wearsim.run(foundation(offsets))
     assert result.stepper == "stabilised"
     assert result.finished
 
 
 @pytest.mark.parametrize("stepper", ["auto", "per-pass"])
 def test_that_a_law_and_a_term_of_its_own_run_with_it(stepper):
-    scenario = winkler(
+    scenario = foundation(
         {"evolution.stepper": stepper, "operation.duration": "12 s"},
         wear='law = "abrasion"\nfactor = 1e-15',
         load='normal_force = "300 N"\n[load.drift]\nrate = 1.0',
@@ -70,12 +70,12 @@ def test_that_a_law_and_a_term_of_its_own_run_with_it(stepper):
     ],
 )
 def test_that_what_it_does_not_claim_is_refused_by_name(overrides, told):
-    with pytest.raises(CapabilityError, match=f"'winkler'.*{told}"):
-        wearsim.run(winkler(overrides))
+    with pytest.raises(CapabilityError, match=f"'foundation'.*{told}"):
+        wearsim.run(foundation(overrides))
 
 
 def test_that_a_bearing_torque_is_refused():
-    scenario = rig(contact=WINKLER).text.replace(
+    scenario = rig(contact=FOUNDATION).text.replace(
         "longitudinal = 1e-3", 'drive = "free"\nbearing_torque = "0.1 N m"'
     )
     parsed = wearsim.scenario.parse_scenario(scenario, "rig.toml", {}.__getitem__)

@@ -36,19 +36,19 @@ class HookSpecs:
         .. code-block:: python
 
             from wearsim.plugins import ContactModelSpec, Options, hookimpl
-            from my_package.winkler import Winkler
+            from my_package.foundation import Foundation
 
 
-            class WinklerOptions(Options):
+            class FoundationOptions(Options):
                 foundation_modulus: float = 2.0e13  # Pa/m
 
 
             @hookimpl
             def wearsim_contact_models():
                 yield ContactModelSpec(
-                    name="winkler",
-                    factory=lambda options: Winkler(options.foundation_modulus),
-                    options=WinklerOptions,
+                    name="foundation",
+                    factory=lambda options: Foundation(options.foundation_modulus),
+                    options=FoundationOptions,
                     summary="elastic foundation",
                 )
         """

@@ -124,9 +124,9 @@ def test_that_a_plugin_is_measured_beside_the_default(monkeypatch):
     monkeypatch.syspath_prepend(TINY)
     manager.registry.cache_clear()
     try:
-        methods = {item.method for item in points(QUICK, Effort(quick=True, plugin="winkler"))}
-        assert {"slender", "winkler"} <= methods
-        found = measured(Work(RIG, {"contact.model": "winkler", **SHORT}))
+        methods = {item.method for item in points(QUICK, Effort(quick=True, plugin="foundation"))}
+        assert {"slender", "foundation"} <= methods
+        found = measured(Work(RIG, {"contact.model": "foundation", **SHORT}))
     finally:
         monkeypatch.undo()
         manager.registry.cache_clear()

@@ -16,7 +16,7 @@ from wearsim.plugins import (
 from wearsim.types import ContactSolution
 
 
-class Winkler(ContactModel):
+class Foundation(ContactModel):
     """Springs side by side, sliding everywhere; it claims nothing beyond `solve`."""
 
     def __init__(self, foundation_modulus):
@@ -61,7 +61,7 @@ class Winkler(ContactModel):
         )
 
 
-class WinklerOptions(Options):
+class FoundationOptions(Options):
     foundation_modulus: float = 2.0e13  # Pa/m
 
 
@@ -99,9 +99,9 @@ class DriftOptions(Options):
 @hookimpl
 def wearsim_contact_models():
     yield ContactModelSpec(
-        name="winkler",
-        factory=lambda options: Winkler(options.foundation_modulus),
-        options=WinklerOptions,
+        name="foundation",
+        factory=lambda options: Foundation(options.foundation_modulus),
+        options=FoundationOptions,
         summary="elastic foundation",
     )
 
