@@ -112,7 +112,7 @@ def memory(quick: bool) -> list[Row]:
 
 
 PARTS: Mapping[str, tuple[str, Callable[[bool], list[Row]]]] = {
-    "truth": ("RealisationFactory of rig-ensemble beside single passes", truth),
+    "truth": ("RealisationRunner of rig-ensemble beside single passes", truth),
     "cost": ("What ensembles of rig-ensemble cost", cost),
     "memory": ("Memory against realisations", memory),
 }

@@ -21,10 +21,10 @@ from wearsim.results import Outcome
 from wearsim.results.ensemble.schema import OBSERVABLES
 from wearsim.studies.ensemble import api as study
 from wearsim.studies.ensemble.control_variate import closed_form_depths
-from wearsim.studies.ensemble.realisation import RealisationFactory
+from wearsim.studies.ensemble.realisation import RealisationRunner
 
 
-class ClosedForm(RealisationFactory):
+class ClosedForm(RealisationRunner):
     """Realisations with the closed-form depth of full slip of rigid bodies."""
 
     def __call__(self, numbers: Sequence[int]) -> list[Outcome]:
@@ -46,7 +46,7 @@ class ClosedForm(RealisationFactory):
 
 def main(count: int) -> None:
     """Run an ensemble of `count` and print its peak memory, time and size."""
-    study.RealisationFactory = ClosedForm  # type: ignore[misc]
+    study.RealisationRunner = ClosedForm  # type: ignore[misc]
     begun = time.perf_counter()
     with TemporaryDirectory() as folder:
         path = Path(folder) / "many.h5"

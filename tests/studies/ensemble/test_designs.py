@@ -10,7 +10,7 @@ from tests.studies.ensemble_cases import small
 from wearsim.errors import Interrupted
 from wearsim.studies.ensemble.api import ensemble
 from wearsim.studies.ensemble.compare import compare, have_same_draws
-from wearsim.studies.ensemble.designs import plan_called, sources, whole_count
+from wearsim.studies.ensemble.designs import parse_plan, sources, whole_count
 from wearsim.studies.ensemble.interim_analyses import checkpoints
 from wearsim.studies.ensemble.sweep import path_of, sweep
 from wearsim.studies.run.draws import Drawer
@@ -33,7 +33,7 @@ def test_that_saltellis_rows_take_one_input_after_the_other_from_the_second_draw
 
 def test_that_an_unknown_plan_is_told_with_those_there_are():
     with pytest.raises(ValueError, match="unknown plan 'halton', expected one of monte-carlo"):
-        plan_called("halton")
+        parse_plan("halton")
 
 
 def test_that_looks_rise_to_the_last_realisation():
@@ -153,9 +153,9 @@ def test_that_of_two_runs_one_is_deeper_or_it_is_open():
 
 def test_that_a_comparison_knows_how_long_the_tests_are(swept):
     run = wearsim.run(small(passes=2000))
-    assert compare(swept, ["low", "high"]).are_as_long
+    assert compare(swept, ["low", "high"]).equally_long
     found = compare([swept[0], run], ["low", "run"])
-    assert not found.are_as_long
+    assert not found.equally_long
     assert [row.passes for row in found.rows] == [3000.0, 2000.0]
     assert found.rows[1].time == pytest.approx(2.0 / 3.0 * found.rows[0].time)
 

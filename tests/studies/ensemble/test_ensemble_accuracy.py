@@ -1,4 +1,4 @@
-"""RealisationFactory of ensembles beside tests in which every pass is solved by itself."""
+"""RealisationRunner of ensembles beside tests in which every pass is solved by itself."""
 
 from __future__ import annotations
 

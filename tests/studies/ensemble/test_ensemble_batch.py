@@ -1,4 +1,4 @@
-"""RealisationFactory of an ensemble: what is observed of each, alone and together."""
+"""RealisationRunner of an ensemble: what is observed of each, alone and together."""
 
 from dataclasses import replace
 

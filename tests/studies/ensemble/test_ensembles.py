@@ -136,17 +136,17 @@ def test_that_failed_realisations_are_kept_with_their_errors(tmp_path):
 
 
 def test_that_failed_realisations_alone_run_once_more(tmp_path, monkeypatch):
-    from wearsim.studies.ensemble.realisation import RealisationFactory
+    from wearsim.studies.ensemble.realisation import RealisationRunner
 
     whole = ensemble(small(), 8, tmp_path / "whole.h5", **SERIAL)
-    run = RealisationFactory._member
+    run = RealisationRunner._member
 
     def failing(self, number, *rest):
         if number in {2, 5}:
             raise wearsim.errors.StepError("no step is short enough")
         return run(self, number, *rest)
 
-    monkeypatch.setattr(RealisationFactory, "_member", failing)
+    monkeypatch.setattr(RealisationRunner, "_member", failing)
     path = tmp_path / "failing.h5"
     assert sorted(ensemble(small(), 8, path, **SERIAL).errors) == [2, 5]
     assert resume_ensemble(path, **SERIAL).failed == 2  # no more than asked for
@@ -156,24 +156,24 @@ def test_that_failed_realisations_alone_run_once_more(tmp_path, monkeypatch):
             raise wearsim.errors.StepError("was done before")
         return run(self, number, *rest)
 
-    monkeypatch.setattr(RealisationFactory, "_member", failing_if_done_again)
+    monkeypatch.setattr(RealisationRunner, "_member", failing_if_done_again)
     again = resume_ensemble(path, failed=True, **SERIAL)
     assert unlike(again, whole) == []
 
 
 def test_that_a_kill_while_failed_ones_run_once_more_costs_nothing(tmp_path, monkeypatch):
-    from wearsim.studies.ensemble.realisation import RealisationFactory
+    from wearsim.studies.ensemble.realisation import RealisationRunner
 
     monkeypatch.setattr(ensemble_work.EnsembleWork, "_batch_size", lambda self: 1)
     whole = ensemble(small(), 6, tmp_path / "whole.h5", **SERIAL)
-    run = RealisationFactory._member
+    run = RealisationRunner._member
 
     def failing(self, number, *rest):
         if number in {2, 4}:
             raise wearsim.errors.StepError("no step is short enough")
         return run(self, number, *rest)
 
-    monkeypatch.setattr(RealisationFactory, "_member", failing)
+    monkeypatch.setattr(RealisationRunner, "_member", failing)
     path = tmp_path / "failing.h5"
     ensemble(small(), 6, path, **SERIAL)
 
@@ -182,30 +182,30 @@ def test_that_a_kill_while_failed_ones_run_once_more_costs_nothing(tmp_path, mon
             raise SystemExit  # as a kill would: nothing after it is written
         return run(self, number, *rest)
 
-    monkeypatch.setattr(RealisationFactory, "_member", killed)
+    monkeypatch.setattr(RealisationRunner, "_member", killed)
     with pytest.raises(SystemExit):
         resume_ensemble(path, failed=True, **SERIAL)
     assert not open_ensemble(path).finished
-    monkeypatch.setattr(RealisationFactory, "_member", run)
+    monkeypatch.setattr(RealisationRunner, "_member", run)
     assert unlike(resume_ensemble(path, **SERIAL), whole) == []
 
 
 def test_that_failed_ones_count_for_the_target_once_they_have_run(tmp_path, monkeypatch):
-    from wearsim.studies.ensemble.realisation import RealisationFactory
+    from wearsim.studies.ensemble.realisation import RealisationRunner
 
     monkeypatch.setattr("wearsim.studies.ensemble.interim_analyses.FEWEST", 32)
     whole = ensemble(small(), 90, tmp_path / "whole.h5", until="depth.mean 8%", **SERIAL)
-    run = RealisationFactory._member
+    run = RealisationRunner._member
 
     def failing(self, number, *rest):
         if number % 9 == 0:
             raise wearsim.errors.StepError("no step is short enough")
         return run(self, number, *rest)
 
-    monkeypatch.setattr(RealisationFactory, "_member", failing)
+    monkeypatch.setattr(RealisationRunner, "_member", failing)
     path = tmp_path / "failing.h5"
     ensemble(small(), 90, path, until="depth.mean 8%", **SERIAL)
-    monkeypatch.setattr(RealisationFactory, "_member", run)
+    monkeypatch.setattr(RealisationRunner, "_member", run)
     again = resume_ensemble(path, failed=True, **SERIAL)
     estimate = again.estimate("depth").mean
     assert again.finished
@@ -263,14 +263,14 @@ def test_that_a_straggler_holds_no_more_than_a_few_back(tmp_path, monkeypatch):
 
 
 def test_that_a_plugins_mistake_ends_one_realisation_alone(tmp_path, monkeypatch):
-    from wearsim.studies.ensemble.realisation import RealisationFactory
+    from wearsim.studies.ensemble.realisation import RealisationRunner
 
-    run = RealisationFactory._member
+    run = RealisationRunner._member
 
     def failing(self, number, *rest):
         return run(self, number, *rest) if number != 1 else 1 / 0
 
-    monkeypatch.setattr(RealisationFactory, "_member", failing)
+    monkeypatch.setattr(RealisationRunner, "_member", failing)
     result = ensemble(small(), 3, tmp_path / "e.h5", **SERIAL)
     assert result.errors == {1: "ZeroDivisionError: division by zero"}
 

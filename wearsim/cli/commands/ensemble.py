@@ -139,10 +139,10 @@ def _plan(name: str | None) -> str | None:
     """Return a plan's name, checked."""
     if name is None:
         return None
-    from wearsim.studies.ensemble.designs import plan_called
+    from wearsim.studies.ensemble.designs import parse_plan
 
     try:
-        return plan_called(name)
+        return parse_plan(name)
     except ValueError as error:
         raise typer.BadParameter(str(error), param_hint="--plan") from error
 
@@ -151,10 +151,10 @@ def _until(text: str | None) -> str | None:
     """Return what is to be reached, checked."""
     if text is None:
         return None
-    from wearsim.studies.ensemble.api import target_of
+    from wearsim.studies.ensemble.api import parse_target
 
     try:
-        target_of(text)
+        parse_target(text)
     except ValueError as error:
         raise typer.BadParameter(str(error), param_hint="--until") from error
     return text

@@ -70,7 +70,7 @@ def _heading(results: Sequence[Result | EnsembleResult], title: str) -> str:
 def _doubts(found: Comparison) -> list[str]:
     """Return why what is compared may not be alike."""
     texts = []
-    if not found.are_as_long:
+    if not found.equally_long:
         ends = "; ".join(f"{row.label}: {length(row)}" for row in found.rows)
         texts.append(
             f"the tests are not of the same length ({ends}): what differs at their ends is that too"
@@ -126,7 +126,7 @@ def as_json(found: Comparison, files: Sequence[str]) -> dict[str, Any]:
     """Return a comparison in SI, the first being what the others are held against."""
     return {
         "observable": si_key(found.observable),
-        "same_length": found.are_as_long,
+        "same_length": found.equally_long,
         "compared": [
             {
                 "label": row.label,

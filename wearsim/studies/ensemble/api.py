@@ -10,12 +10,12 @@ from wearsim.errors import ResultsFileError, ScenarioError
 from wearsim.results import EnsembleFile, EnsembleResult, check_output, open_ensemble, read_ensemble
 from wearsim.results.ensemble.schema import OBSERVABLES
 from wearsim.scenario import Scenario, parse_scenario, require_run
-from wearsim.studies.ensemble.designs import EnsemblePlan, check_plan, plan_called, whole_count
+from wearsim.studies.ensemble.designs import EnsemblePlan, check_plan, parse_plan, whole_count
 from wearsim.studies.ensemble.driver import EnsembleWork
 from wearsim.studies.ensemble.grid import shared_grid
 from wearsim.studies.ensemble.metadata import header_of, nothing_random, static_of
 from wearsim.studies.ensemble.progress import EnsembleProgress
-from wearsim.studies.ensemble.realisation import RealisationFactory
+from wearsim.studies.ensemble.realisation import RealisationRunner
 from wearsim.studies.execution.factory import executor
 from wearsim.studies.limits import checked_count
 from wearsim.studies.run.draws import Drawer
@@ -90,7 +90,7 @@ def ensemble(
         grid = shared_grid(scenario)
         header = header_of(scenario, asked.plan, asked.realisations, asked.target, grid)
         with EnsembleFile.create(path, header, static_of(scenario, grid)) as file:
-            members = RealisationFactory(scenario, asked.plan, asked.realisations, grid)
+            members = RealisationRunner(scenario, asked.plan, asked.realisations, grid)
             EnsembleWork(file, members, asked.target, pool, on_progress, stop_requested).finish()
     return open_ensemble(path)
 
@@ -116,8 +116,8 @@ def checked(scenario: Scenario, realisations: int, plan: str | None, until: str 
     """Return what is asked of an ensemble, or refuse it; parameters and errors as of `ensemble`."""
     checked_count(scenario, realisations)
     require_run(scenario)
-    chosen = plan_called(plan or scenario.sampling.plan)
-    target = None if until is None else target_of(until)
+    chosen = parse_plan(plan or scenario.sampling.plan)
+    target = None if until is None else parse_target(until)
     check_plan(scenario, chosen, until or "")
     drawer = Drawer(scenario, "monte-carlo")
     by_pass = any(item.persistence == "per-pass" for item in scenario.random)
@@ -126,7 +126,7 @@ def checked(scenario: Scenario, realisations: int, plan: str | None, until: str 
     return Asked(chosen, whole_count(chosen, drawer.groups, realisations), target)
 
 
-def target_of(text: str) -> Target:
+def parse_target(text: str) -> Target:
     """Return what is to be reached.
 
     Parameters
@@ -191,10 +191,10 @@ def resume_ensemble(
     if data.finished and not (failed and len(data.failed)):
         return open_ensemble(path)
     scenario = parse_scenario(data.scenario_text, data.scenario_file, data.files.__getitem__)
-    plan = plan_called(data.plan)
+    plan = parse_plan(data.plan)
     target = Target.parse(data.until) if data.until else None
     grid = Grid(data.variables["y"], data.strip_width)
-    members = RealisationFactory(scenario, plan, data.asked, grid)
+    members = RealisationRunner(scenario, plan, data.asked, grid)
     with executor(scheduler, workers, tell=on_notice) as pool, EnsembleFile.open(path) as opened:
         work = EnsembleWork(opened, members, target, pool, on_progress, stop_requested)
         for text in changed_origins(data, scenario):

@@ -22,7 +22,7 @@ from wearsim.studies.run.output_schedule import RecordSchedule
 from wearsim.studies.run.recorder import due_states, history_row, stepped_aside
 from wearsim.types import FloatArray, IntArray
 
-MOST_TOGETHER = 128  # more gain nothing
+MAX_BATCH = 128  # more gain nothing
 
 MOST_NUMBERS = 50_000  # strips of all contacts; some 100 arrays of so many numbers live at a time
 
@@ -114,7 +114,7 @@ def grouped(members: Sequence[RealisationRun]) -> list[list[RealisationRun]]:
             groups.append([member])
             continue
         numbers = len(member.problem.roller) * member.problem.grid.strips
-        most = min(MOST_TOGETHER, max(1, MOST_NUMBERS // numbers))
+        most = min(MAX_BATCH, max(1, MOST_NUMBERS // numbers))
         found = next((g for g in growing if len(g) < most and member.can_join(g[0])), None)
         if found is None:
             found = []
@@ -210,7 +210,7 @@ def observed(members: Sequence[RealisationRun]) -> list[Observed | Exception]:
 
 
 class RealisationBatch:
-    """RealisationFactory that are stepped together.
+    """RealisationRunner that are stepped together.
 
     Parameters
     ----------

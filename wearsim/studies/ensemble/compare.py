@@ -91,7 +91,7 @@ class Comparison:
     rows: list[Compared]
 
     @property
-    def are_as_long(self) -> bool:
+    def equally_long(self) -> bool:
         """Whether all tests are compared after as many passes and as long a time."""
         ends = np.array([(row.passes, row.time) for row in self.rows])
         return bool(np.allclose(ends, ends[0], rtol=_SAME_LENGTH, atol=0.0))

@@ -23,7 +23,7 @@ BASE_PLANS: Mapping[EnsemblePlan, PlanName] = {
 """The plan by which numbers are drawn."""
 
 
-def plan_called(name: str) -> EnsemblePlan:
+def parse_plan(name: str) -> EnsemblePlan:
     """Return the plan of a name.
 
     Raises

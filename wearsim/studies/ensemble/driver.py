@@ -16,7 +16,7 @@ from wearsim.results import EnsembleFile, EnsembleResult, Outcome
 from wearsim.results.ensemble.schema import DONE, FAILED, PENDING
 from wearsim.studies.ensemble.interim_analyses import checkpoints, judged
 from wearsim.studies.ensemble.progress import EnsembleProgress
-from wearsim.studies.ensemble.realisation import RealisationFactory
+from wearsim.studies.ensemble.realisation import RealisationRunner
 from wearsim.studies.execution.base import Executor
 from wearsim.uq.estimation.intervals import UNKNOWN
 from wearsim.uq.estimation.stopping_rule import Target
@@ -39,7 +39,7 @@ class EnsembleWork:
     ----------
     file : EnsembleFile
         Open for writing.
-    members : RealisationFactory
+    members : RealisationRunner
     target : Target, optional
         What ends the ensemble early.
     pool : Executor
@@ -52,7 +52,7 @@ class EnsembleWork:
     def __init__(
         self,
         file: EnsembleFile,
-        members: RealisationFactory,
+        members: RealisationRunner,
         target: Target | None,
         pool: Executor,
         on_progress: Callable[[EnsembleProgress], None] | None,

@@ -21,7 +21,7 @@ from wearsim.studies.run.draws import Drawer, Draws
 from wearsim.types import FloatArray, Grid
 
 
-class RealisationFactory:
+class RealisationRunner:
     """Runs realisations of a scenario by their numbers; it can be sent to another process.
 
     Parameters

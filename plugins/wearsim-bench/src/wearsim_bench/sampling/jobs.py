@@ -17,11 +17,11 @@ from wearsim.errors import SolverError
 from wearsim.scenario import Scenario
 from wearsim.scenario.examples import shipped_scenario
 from wearsim.studies.ensemble.api import ensemble
-from wearsim.studies.ensemble.batch import MOST_TOGETHER
+from wearsim.studies.ensemble.batch import MAX_BATCH
 from wearsim.studies.ensemble.control_variate import DRAWS, closed_form_depths, control_of
 from wearsim.studies.ensemble.designs import EnsemblePlan
 from wearsim.studies.ensemble.grid import shared_grid
-from wearsim.studies.ensemble.realisation import RealisationFactory
+from wearsim.studies.ensemble.realisation import RealisationRunner
 from wearsim.studies.execution.factory import executor
 from wearsim.studies.run.draws import Drawer
 from wearsim.types import FloatArray, Grid
@@ -84,7 +84,7 @@ class Part:
             If a test fails.
         """
         scenario = rig(self.seed)
-        members = RealisationFactory(scenario, self.plan, self.total, _grid())
+        members = RealisationRunner(scenario, self.plan, self.total, _grid())
         numbers = range(self.first, self.first + self.count)
         outcomes = members(numbers)
         failed = [outcome for outcome in outcomes if outcome.error]
@@ -161,8 +161,8 @@ Job: TypeAlias = Part | CheapDraws | Timing
 
 def parts(plan: PlanName, seed: int, total: int) -> list[Part]:
     """Return a study in parts of as many tests as gain from being stepped together."""
-    firsts = range(0, total, MOST_TOGETHER)
-    return [Part(plan, seed, total, k, min(MOST_TOGETHER, total - k)) for k in firsts]
+    firsts = range(0, total, MAX_BATCH)
+    return [Part(plan, seed, total, k, min(MAX_BATCH, total - k)) for k in firsts]
 
 
 class Jobs:
