@@ -1,7 +1,7 @@
 import os
 import subprocess
 import sys
-from importlib.metadata import version
+from importlib.metadata import entry_points, version
 
 import pytest
 from cli_examples import Command
@@ -11,8 +11,9 @@ from wearsim.errors import CapabilityError, PluginError, ResultsFileError, Solve
 
 VERBS = [
     *("check", "contact", "dissipation", "run", "ensemble", "resume", "show", "plot", "compare"),
-    *("export", "maxent", "reproduce", "plugins", "schema", "new"),
+    *("export", "maxent", "plugins", "schema", "new"),
 ]
+INSTALLED = sorted(point.name for point in entry_points(group="wearsim.commands"))
 
 
 def python(*args: str) -> subprocess.CompletedProcess[str]:
@@ -22,27 +23,27 @@ def python(*args: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_that_help_lists_every_verb(command: Command) -> None:
+def test_help_lists_every_verb(command: Command) -> None:
     result = command("--help")
     assert result.exit_code == 0
     listed = [line.split()[0] for line in result.stdout.splitlines() if line.startswith("  ")]
-    assert [word for word in listed if word in VERBS] == VERBS
+    assert [word for word in listed if word in [*VERBS, *INSTALLED]] == [*VERBS, *INSTALLED]
 
 
-@pytest.mark.parametrize("verb", VERBS)
-def test_that_every_verb_has_help_in_a_sentence(command: Command, verb: str) -> None:
+@pytest.mark.parametrize("verb", [*VERBS, *INSTALLED])
+def test_every_verb_has_help(command: Command, verb: str) -> None:
     result = command(verb, "--help")
     assert result.exit_code == 0
     assert "Parameters" not in result.stdout
     assert f"wearsim {verb}" in result.stdout or "Usage:" in result.stdout
 
 
-def test_that_the_version_is_that_of_the_distribution(command: Command) -> None:
+def test_version_is_that_of_the_distribution(command: Command) -> None:
     result = command("--version")
     assert (result.exit_code, result.stdout) == (0, f"wearsim {version('wearsim')}\n")
 
 
-def test_that_the_shell_comes_up_without_the_heavy_libraries() -> None:
+def test_help_imports_no_heavy_library() -> None:
     heavy = [
         "numpy",
         "scipy",
@@ -62,13 +63,13 @@ def test_that_the_shell_comes_up_without_the_heavy_libraries() -> None:
     assert python("-c", code).stdout.splitlines()[-1] == "HEAVY []"
 
 
-def test_that_python_m_wearsim_is_the_same_command() -> None:
+def test_python_m_wearsim_is_the_same_command() -> None:
     done = python("-m", "wearsim", "--version")
     assert (done.returncode, done.stdout) == (0, f"wearsim {version('wearsim')}\n")
 
 
 @pytest.mark.parametrize("arguments", [["bogus"], ["run"], ["run", "a.toml", "--nonsense"]])
-def test_that_wrong_usage_is_bad_input(command: Command, arguments: list[str]) -> None:
+def test_wrong_usage_is_bad_input(command: Command, arguments: list[str]) -> None:
     result = command(*arguments)
     assert result.exit_code == 2
     assert "Error" in result.stderr
@@ -91,7 +92,7 @@ def test_that_wrong_usage_is_bad_input(command: Command, arguments: list[str]) -
         (KeyboardInterrupt(), 130, "interrupted\n"),
     ],
 )
-def test_that_errors_are_told_in_a_line_and_set_the_exit_code(
+def test_errors_print_one_line_and_set_the_exit_code(
     command: Command,
     monkeypatch: pytest.MonkeyPatch,
     error: BaseException,
@@ -110,7 +111,7 @@ def test_that_errors_are_told_in_a_line_and_set_the_exit_code(
 
 
 @pytest.mark.parametrize("by", ["option", "environment"])
-def test_that_a_traceback_is_shown_when_asked_for(
+def test_traceback_is_shown_on_request(
     command: Command, monkeypatch: pytest.MonkeyPatch, by: str
 ) -> None:
     def fail(*_: object) -> None:
