@@ -9,7 +9,7 @@ from tests.evolution import SCENARIOS, built, stepped
 from wearsim.errors import ContactError, StepError
 from wearsim.evolution.batch.bisect_failures import bisect_failures
 from wearsim.evolution.batch.lockstep import Lockstep, can_step_together
-from wearsim.evolution.batch.stack import alike, problem_of, state_of
+from wearsim.evolution.batch.stack import compatible, problem_of, state_of
 from wearsim.evolution.state import fresh_state
 from wearsim.models.contact.slender import Slender
 from wearsim.scenario import load_scenario
@@ -70,7 +70,7 @@ def bits(found):
     if isinstance(found, Exception):
         return type(found), str(found)
     end, *counts = found
-    arrays = {**end.to_arrays(), "passes": end.each.passes, "solves": end.each.solves}
+    arrays = {**end.to_arrays(), "passes": end.individual.passes, "solves": end.individual.solves}
     return counts, {name: array.tobytes() for name, array in arrays.items()}
 
 
@@ -90,7 +90,11 @@ def test_that_a_test_in_company_is_the_run_of_itself(case):
         problems, ends_of(problems, stepper, stop), strict=True
     ):
         run, _ = stepped(problem, stepper, stop)
-        assert (steps, rejected, int(end.each.solves[0])) == (run.steps, run.rejected, run.solves)
+        assert (steps, rejected, int(end.individual.solves[0])) == (
+            run.steps,
+            run.rejected,
+            run.solves,
+        )
         for name in ("cylinder_depth", "roller_depth", "energy", "depth_error", "volume_error"):
             assert getattr(end, name) == pytest.approx(getattr(run, name), rel=1e-12, abs=1e-300)
 
@@ -194,11 +198,11 @@ def test_that_what_is_not_vectorised_goes_alone(changes):
 
 def test_that_only_alike_tests_go_with_each_other():
     (one, other), _, _ = scenes_of({}, EACH[:2])
-    assert alike(one, other)
-    assert not alike(one, replace(other, settled=2.0 * other.settled))
+    assert compatible(one, other)
+    assert not compatible(one, replace(other, iteration_tolerance=2.0 * other.iteration_tolerance))
     faster = replace(other.kinematics, rolling_speed=2.0 * other.kinematics.rolling_speed)
-    assert not alike(one, replace(other, kinematics=faster))
-    assert not alike(one, built()[0])
+    assert not compatible(one, replace(other, kinematics=faster))
+    assert not compatible(one, built()[0])
 
 
 def test_that_work_is_divided_until_what_fails_stands_alone():
@@ -225,7 +229,7 @@ def test_that_a_joined_scene_can_be_taken_apart():
     tests = Lockstep(problems, stepper, stop, 10**6)
     for k, problem in enumerate(problems):
         one = problem_of(tests.stack.problem, np.array([k]))
-        assert one.members == (problem,)
+        assert one.stacked == (problem,)
         assert (one.flat_gap == problem.flat_gap).all()
         assert (one.inputs.friction == problem.inputs.friction).all()
         state = state_of(tests.stack.state, np.array([k]))

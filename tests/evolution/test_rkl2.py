@@ -16,7 +16,7 @@ from tests.evolution.test_closed_forms import (
 from tests.evolution.test_steppers import CASES, SPIKE, THREE, roughened
 from tests.studies.random_examples import SLACK, end_of, scenario_of
 from wearsim.errors import ContactError
-from wearsim.evolution.error_control.error_estimates import deepest, whole_volume
+from wearsim.evolution.error_control.error_estimates import greatest_depth, total_worn_volume
 from wearsim.evolution.error_control.step_size import StepControl
 from wearsim.evolution.observables import oscillation, worn_volume
 from wearsim.evolution.state import fresh_state
@@ -30,8 +30,8 @@ THERMAL = {"load.thermal": {"gain": "300 N/W", "time_constant": "3 min"}}
 
 def assert_covered(problem, truth, found):
     """Hold the stated errors of depth and volume against the actual ones."""
-    assert abs(deepest(found) - deepest(truth))[0] <= found.depth_error[0]
-    volumes = whole_volume(problem, found)[0], whole_volume(problem, truth)[0]
+    assert abs(greatest_depth(found) - greatest_depth(truth))[0] <= found.depth_error[0]
+    volumes = total_worn_volume(problem, found)[0], total_worn_volume(problem, truth)[0]
     assert abs(volumes[0] - volumes[1]) <= found.volume_error[0] + 1e-7 * volumes[1]
 
 
@@ -44,7 +44,7 @@ def foundation():
 def test_that_the_rig_on_a_foundation_takes_fewer_than_300_contacts(foundation):
     problem, state, advances = foundation
     assert problem.model.solved < 300
-    assert state.depth_error[0] < 1e-3 * deepest(state)[0]
+    assert state.depth_error[0] < 1e-3 * greatest_depth(state)[0]
     assert max(oscillation(a.end.contacts[0].line_load) for a in advances) < 0.01
 
 
@@ -64,7 +64,7 @@ def test_that_a_tighter_tolerance_gives_a_smaller_error(foundation):
     loose = stepped(problem, StabilisedStepper(StepControl(1e-2)), stop)[0]
     assert_covered(problem, exact, foundation[1])
     assert_covered(problem, exact, loose)
-    errors = [abs(deepest(s) - deepest(exact))[0] for s in (foundation[1], loose)]
+    errors = [abs(greatest_depth(s) - greatest_depth(exact))[0] for s in (foundation[1], loose)]
     assert errors[0] < 0.5 * errors[1]
 
 
@@ -95,8 +95,8 @@ def test_that_slender_contacts_meet_per_pass_truth_and_their_own_estimate(case, 
     problem, stepper, stop = boxed(evolution__tolerance=tolerance, **common)
     found, _ = stepped(problem, stepper, stop)
     assert_covered(problem, truth, found)
-    assert found.depth_error[0] < tolerance * deepest(found)[0]
-    assert found.volume_error[0] < tolerance * whole_volume(problem, found)[0]
+    assert found.depth_error[0] < tolerance * greatest_depth(found)[0]
+    assert found.volume_error[0] < tolerance * total_worn_volume(problem, found)[0]
 
 
 def test_that_no_step_skips_over_a_log(tmp_path):
@@ -112,7 +112,7 @@ def test_that_no_step_skips_over_a_log(tmp_path):
     problem, stepper, stop = boxed(evolution__tolerance=3e-3, **common)
     found, _ = stepped(problem, stepper, stop)
     assert_covered(problem, truth, found)
-    assert found.depth_error[0] < 5e-3 * deepest(found)[0]
+    assert found.depth_error[0] < 5e-3 * greatest_depth(found)[0]
 
 
 @pytest.mark.parametrize(
@@ -182,7 +182,7 @@ def test_that_an_expectation_over_passes_agrees_with_drawing_every_pass():
     assert problem.has_nodes
     assert state.quadrature[0, 0] > 0.0
     assert_covered(problem, truth, state)
-    assert state.depth_error[0] < 0.02 * deepest(state)[0]
+    assert state.depth_error[0] < 0.02 * greatest_depth(state)[0]
 
 
 class Startled(BlackBox):
@@ -202,7 +202,7 @@ def test_that_a_step_is_shortened_until_every_stage_is_solved():
     truth, plain = stepped(*boxed(**common))
     assert found.rejected > 0
     assert len(advances) > len(plain)
-    assert deepest(found) == pytest.approx(deepest(truth), rel=2e-3)
+    assert greatest_depth(found) == pytest.approx(greatest_depth(truth), rel=2e-3)
 
 
 def test_that_a_model_that_fails_however_short_the_step_is_quoted():

@@ -40,7 +40,7 @@ class ContactInputs:
     bearing_torque: FloatArray
 
     @classmethod
-    def alike(cls, contacts: int, realisations: int = 1, **values: float) -> ContactInputs:
+    def uniform(cls, contacts: int, realisations: int = 1, **values: float) -> ContactInputs:
         """Return inputs that are the same everywhere; those that are not named are zero."""
         shape = (contacts, realisations)
         return cls(*(np.full(shape, values.get(item.name, 0.0)) for item in fields(cls)))

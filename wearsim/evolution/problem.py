@@ -75,9 +75,9 @@ class WearProblem:
         Draws the inputs of single passes, see `Redraw`.
     expectation : WearProblem, optional
         The same problem with contacts that stand for passes drawn one by one, to record by.
-    settled : float
+    iteration_tolerance : float
         Relative change of wear and loads below which the iterations of an implicit step end.
-    members : tuple of WearProblem
+    stacked : tuple of WearProblem
         The problem of each realisation where several are stepped together, with its own loads, wear
         factors and paths in time. Empty: all realisations share those of this problem.
     """
@@ -100,8 +100,8 @@ class WearProblem:
     varying: tuple[Varying, ...] = ()
     redraw: Redraw | None = None
     expectation: WearProblem | None = None
-    settled: float = 1e-8
-    members: tuple[WearProblem, ...] = ()
+    iteration_tolerance: float = 1e-8
+    stacked: tuple[WearProblem, ...] = ()
 
     @cached_property
     def shape(self) -> tuple[int, int, int]:
@@ -193,7 +193,7 @@ class WearProblem:
     @cached_property
     def stiffness(self) -> Number:
         """What the load loses per descent [N/m]."""
-        each = [problem.load.stiffness for problem in self.members]
+        each = [problem.load.stiffness for problem in self.stacked]
         return np.array(each) if each else self.load.stiffness
 
     @cached_property
@@ -208,23 +208,23 @@ class WearProblem:
 
     def force(self, time: Number) -> Number:
         """Return the load at a time [s] [N]."""
-        if not self.members:
+        if not self.stacked:
             return float(self.load.force(np.array([time]))[0])
-        times = np.broadcast_to(time, len(self.members))[:, None]
+        times = np.broadcast_to(time, len(self.stacked))[:, None]
         forces = [
-            problem.load.force(own)[0] for problem, own in zip(self.members, times, strict=True)
+            problem.load.force(own)[0] for problem, own in zip(self.stacked, times, strict=True)
         ]
         return np.array(forces)
 
     def mean_load(self, start: Number, stop: Number) -> Number:
         """Return the exact mean of the load between two times [s] [N]."""
-        if not self.members:
+        if not self.stacked:
             return self.load.mean(one_of(start), one_of(stop))
-        return each_between([problem.load.mean for problem in self.members], start, stop)
+        return each_between([problem.load.mean for problem in self.stacked], start, stop)
 
     def deviations(self, start: Number, stop: Number) -> list[tuple[str, tuple[int, ...], Number]]:
         """Return what varies between two times [s]: field, rollers and standard deviation."""
-        problems, everyone = self.members or (self,), tuple(range(self.rollers))
+        problems, everyone = self.stacked or (self,), tuple(range(self.rollers))
         load = each_between([problem.load.deviation for problem in problems], start, stop)
         found: list[tuple[str, tuple[int, ...], Number]] = [("normal_force_offset", everyone, load)]
         for k, item in enumerate(self.varying):
@@ -236,7 +236,7 @@ class WearProblem:
         """Return the problem with every process at its mean between two times [s]."""
         if not self.varying:
             return self
-        inputs, problems = self.inputs, self.members or (self,)
+        inputs, problems = self.inputs, self.stacked or (self,)
         for k, item in enumerate(self.varying):
             chosen = np.isin(self.roller, item.rollers)[:, None]
             mean = each_between([problem.varying[k].path.mean for problem in problems], start, stop)
@@ -436,12 +436,12 @@ class WearProblem:
         return {body: self._wear_factor(body) for body in BODIES}
 
     def _wear_factor(self, body: Body) -> Number | None:
-        problems, speed = self.members or (self,), self.kinematics.rolling_speed
+        problems, speed = self.stacked or (self,), self.kinematics.rolling_speed
         factors = [problem.law.depth_per_dissipation(body, speed) for problem in problems]
         known = [factor for factor in factors if factor is not None]
         if len(known) < len(factors):
             return None
-        return np.array(known) if self.members else known[0]
+        return np.array(known) if self.stacked else known[0]
 
     def shared_wear(
         self, cylinder: FloatArray, roller: FloatArray

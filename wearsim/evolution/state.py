@@ -23,7 +23,7 @@ _SCALARS = ("passes", "step", "steps", "rejected", "solves", "full_solves")
 
 
 @dataclass(frozen=True)
-class Separate:
+class IndividualCounts:
     """Where tests stand that are stepped together and go each its own way.
 
     Parameters
@@ -37,9 +37,9 @@ class Separate:
     passes: FloatArray
     solves: IntArray
 
-    def at(self, numbers: IntArray) -> Separate:
+    def at(self, numbers: IntArray) -> IndividualCounts:
         """Return those of some tests."""
-        return Separate(self.passes[numbers], self.solves[numbers])
+        return IndividualCounts(self.passes[numbers], self.solves[numbers])
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class WearState:
         The shadow with half the contacts that stand for inputs drawn at every pass.
     decay : ndarray, shape (realisations,), optional
         Greatest rate at which wear flattens a profile, where last measured [1/pass].
-    each : Separate, optional
+    individual : IndividualCounts, optional
         In place of `passes` and `solves` where the realisations are tests that go each its own way.
     """
 
@@ -107,12 +107,12 @@ class WearState:
     coarse_step_solution: WearState | None = None
     half_quadrature_solution: WearState | None = None
     decay: FloatArray | None = None
-    each: Separate | None = None
+    individual: IndividualCounts | None = None
 
     @property
-    def now(self) -> Number:
+    def passes_done(self) -> Number:
         """Passes done: one number, or one for each realisation that goes its own way."""
-        return self.passes if self.each is None else self.each.passes
+        return self.passes if self.individual is None else self.individual.passes
 
     @property
     def batch(self) -> BatchSolution:
@@ -132,7 +132,7 @@ class WearState:
         state.__dict__.update(self.__dict__, **others)
         return state
 
-    def moved(self, now: Number, solves: IntArray | None = None, **others: Any) -> WearState:
+    def advanced_to(self, now: Number, solves: IntArray | None = None, **others: Any) -> WearState:
         """Return the state with other passes done, and whatever else is new.
 
         Parameters
@@ -144,17 +144,17 @@ class WearState:
         **others
             Other fields.
         """
-        if self.each is None:
+        if self.individual is None:
             count = self.solves if solves is None else self.solves + int(solves.sum())
             return self.replaced(passes=float(now), solves=count, **others)
-        counts = self.each.solves if solves is None else self.each.solves + solves
-        return self.replaced(each=Separate(np.asarray(now), counts), **others)
+        counts = self.individual.solves if solves is None else self.individual.solves + solves
+        return self.replaced(individual=IndividualCounts(np.asarray(now), counts), **others)
 
     def solves_since(self, before: WearState) -> IntArray:
         """Return the contact solves since an earlier state, of all or of each realisation."""
-        if self.each is None or before.each is None:
+        if self.individual is None or before.individual is None:
             return np.array(self.solves - before.solves)
-        return self.each.solves - before.each.solves
+        return self.individual.solves - before.individual.solves
 
     @property
     def irreducible(self) -> FloatArray:
@@ -167,7 +167,7 @@ class WearState:
         arrays: dict[str, npt.NDArray[np.generic]] = {
             item.name: np.asarray(getattr(self, item.name))
             for item in fields(self)
-            if item.name not in {"contacts", "each", *_TWINS}
+            if item.name not in {"contacts", "individual", *_TWINS}
             and getattr(self, item.name) is not None
         }
         for item in fields(ContactSolution):
@@ -270,11 +270,6 @@ def widened_state(state: WearState, y: FloatArray, strips: int) -> WearState:
     )
 
 
-def contact_values(problem: WearProblem, contacts: Contacts, name: str) -> FloatArray:
-    """Return the field `name` of all contacts, leading axes (station, contact, realisation)."""
-    return problem.values_of(contacts, name)
-
-
 def fresh_state(problem: WearProblem) -> WearState:
     """Solve the fresh contacts and return the state before the first pass."""
     problem = problem.at_time(0.0, 0.0)
@@ -304,10 +299,10 @@ def fresh_state(problem: WearProblem) -> WearState:
     )
 
 
-def separate_state(problem: WearProblem) -> WearState:
+def fresh_stacked_state(problem: WearProblem) -> WearState:
     """Return the fresh state of tests that are joined in a problem and go each its own way."""
     state = fresh_state(problem)
     count = problem.shape[2]
     solves = np.full(count, state.solves // count)
-    state = replace(state, solves=0, each=Separate(np.zeros(count), solves))
+    state = replace(state, solves=0, individual=IndividualCounts(np.zeros(count), solves))
     return replace(state, coarse_step_solution=state)

@@ -15,7 +15,7 @@ from tests.studies.random_examples import (
 )
 from wearsim.errors import CapabilityError, Interrupted, ScenarioError, StepError
 from wearsim.evolution.error_control import error_estimates as errors_of_steps
-from wearsim.evolution.error_control.error_estimates import whole_volume
+from wearsim.evolution.error_control.error_estimates import total_worn_volume
 from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.forward_euler import stability_limit
 from wearsim.results import open_results
@@ -98,7 +98,7 @@ def test_that_the_expectation_over_passes_agrees_with_drawing_every_pass(drawn):
     problem, state = end_of(scenario_of(evolution__step=step, contact__strips=91, **inputs))
     assert state.steps < 20
     assert abs(deepest(state) - deepest(truth)) <= state.depth_error[0]
-    volumes = whole_volume(problem, state), whole_volume(problem, truth)
+    volumes = total_worn_volume(problem, state), total_worn_volume(problem, truth)
     assert abs(volumes[0] - volumes[1])[0] <= state.volume_error[0]
     assert state.depth_error[0] < 0.02 * deepest(state)
 
@@ -220,7 +220,7 @@ def test_that_a_wandering_load_stays_within_the_stated_error(rollers):
         apart = abs(deepest(state) - deepest(fine))
         assert apart <= state.depth_error[0] + fine.depth_error[0]
         assert state.depth_error[0] <= tolerance * deepest(state)
-        volumes = [whole_volume(problem, one) for one in (state, fine)]
+        volumes = [total_worn_volume(problem, one) for one in (state, fine)]
         assert abs(volumes[0] - volumes[1]) <= state.volume_error[0] + fine.volume_error[0]
 
 
@@ -276,14 +276,17 @@ def test_step_is_shortened_where_its_coarse_twin_fails(monkeypatch):
     problem, stepper, _ = assemble_problem(scenario_of(passes=600, friction__coefficient=friction))
     fresh = fresh_state(problem)
     plain = stepper.advance(problem, fresh, 600.0).end
-    original, failures = errors_of_steps.coarse_start, [StepError("the twin did not settle", {})]
+    original, failures = (
+        errors_of_steps.half_quadrature_start,
+        [StepError("the twin did not settle", {})],
+    )
 
     def fails_once(*arguments):
         if failures:
             raise failures.pop()
         return original(*arguments)
 
-    monkeypatch.setattr(errors_of_steps, "coarse_start", fails_once)
+    monkeypatch.setattr(errors_of_steps, "half_quadrature_start", fails_once)
     end = stepper.advance(problem, fresh, 600.0).end
     assert not failures
     assert end.rejected >= 1

@@ -24,7 +24,7 @@ from wearsim.evolution.error_control.step_doubling import Attempt, first_steps
 from wearsim.evolution.error_control.step_size import Trial
 from wearsim.evolution.integrate import not_finite, too_many_steps
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import separate_state
+from wearsim.evolution.state import fresh_stacked_state
 from wearsim.evolution.steppers.backward_euler import ImplicitStepper
 from wearsim.evolution.steppers.base import Stepper
 from wearsim.types import FloatArray, IntArray
@@ -74,7 +74,8 @@ class Lockstep:
         self.stack: Stack | None = None
         problem = stacked_problem(problems)
         done, self.failures = bisect_failures(
-            lambda numbers: separate_state(problem_of(problem, numbers)), np.arange(len(problems))
+            lambda numbers: fresh_stacked_state(problem_of(problem, numbers)),
+            np.arange(len(problems)),
         )
         if done:
             numbers = np.concatenate([found for found, _ in done])

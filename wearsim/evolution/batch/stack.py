@@ -10,7 +10,7 @@ import numpy as np
 
 from wearsim.evolution.contact_inputs import ContactInputs
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import Separate, WearState
+from wearsim.evolution.state import IndividualCounts, WearState
 from wearsim.plugins import BODIES
 from wearsim.types import FloatArray, IntArray
 
@@ -39,14 +39,17 @@ def can_be_stacked(problem: WearProblem) -> bool:
     return linear and plain and problem.shape[0] == problem.shape[2] == 1
 
 
-def alike(one: WearProblem, other: WearProblem) -> bool:
+def compatible(one: WearProblem, other: WearProblem) -> bool:
     """Tell whether two tests that can be joined can be so with each other."""
     first, second = one.kinematics, other.kinematics
     radii = ("cylinder_radius", "roller_radius", "crown_radius", "rolling_speed")
     varying = [[(item.name, item.rollers) for item in problem.varying] for problem in (one, other)]
     return (
         all(getattr(one, name) is getattr(other, name) for name in ("grid", "model"))
-        and all(getattr(one, name) == getattr(other, name) for name in ("tilt_shifts", "settled"))
+        and all(
+            getattr(one, name) == getattr(other, name)
+            for name in ("tilt_shifts", "iteration_tolerance")
+        )
         and all(_equal(getattr(one, name), getattr(other, name)) for name in _SAME_ARRAYS)
         and all(getattr(first, name) == getattr(second, name) for name in radii)
         and _equal(first.multiplicity, second.multiplicity)
@@ -61,7 +64,7 @@ def _equal(one: FloatArray | None, other: FloatArray | None) -> bool:
 
 
 def stacked_problem(problems: Sequence[WearProblem]) -> WearProblem:
-    """Return one problem of which the tests, which are alike, are the realisations."""
+    """Return one problem of which the tests, which are compatible, are the realisations."""
     inputs = [problem.inputs for problem in problems]
     joined = ContactInputs(
         *(
@@ -70,7 +73,7 @@ def stacked_problem(problems: Sequence[WearProblem]) -> WearProblem:
         )
     )
     gaps = np.concatenate([problem.flat_gap for problem in problems], axis=2)
-    return replace(problems[0], flat_gap=gaps, inputs=joined, members=tuple(problems))
+    return replace(problems[0], flat_gap=gaps, inputs=joined, stacked=tuple(problems))
 
 
 def problem_of(problem: WearProblem, numbers: IntArray) -> WearProblem:
@@ -81,9 +84,9 @@ def problem_of(problem: WearProblem, numbers: IntArray) -> WearProblem:
             for item in fields(ContactInputs)
         )
     )
-    members = tuple(problem.members[number] for number in numbers) if problem.members else ()
+    stacked = tuple(problem.stacked[number] for number in numbers) if problem.stacked else ()
     gap = np.take(problem.flat_gap, numbers, axis=2)
-    return replace(problem, flat_gap=gap, inputs=inputs, members=members)
+    return replace(problem, flat_gap=gap, inputs=inputs, stacked=stacked)
 
 
 def state_of(state: WearState, numbers: IntArray) -> WearState:
@@ -97,7 +100,7 @@ def state_of(state: WearState, numbers: IntArray) -> WearState:
         **taken,
         contacts=state.batch.at(numbers),
         coarse_step_solution=None if shadow is None else state_of(shadow, numbers),
-        each=None if state.each is None else state.each.at(numbers),
+        individual=None if state.individual is None else state.individual.at(numbers),
     )
 
 
@@ -108,7 +111,7 @@ def stacked_states(states: Sequence[WearState]) -> WearState:
         for name, axis in _AXES.items()
     }
     first, *others = (state.batch for state in states)
-    each = [state.each for state in states if state.each is not None]
+    each = [state.individual for state in states if state.individual is not None]
     shadows = [
         state.coarse_step_solution for state in states if state.coarse_step_solution is not None
     ]
@@ -117,7 +120,7 @@ def stacked_states(states: Sequence[WearState]) -> WearState:
         **joined,
         contacts=first.joined_with(*others),
         coarse_step_solution=stacked_states(shadows) if len(shadows) == len(states) else None,
-        each=Separate(
+        individual=IndividualCounts(
             np.concatenate([one.passes for one in each]),
             np.concatenate([one.solves for one in each]),
         ),
@@ -144,7 +147,7 @@ class Stack:
     @property
     def progress(self) -> list[tuple[int, float]]:
         """Number and roller passes done of each test."""
-        passes: list[float] = np.asarray(self.state.now).tolist()
+        passes: list[float] = np.asarray(self.state.passes_done).tolist()
         return list(zip(self.numbers.tolist(), passes, strict=True))
 
     def at(self, places: IntArray) -> Stack:

@@ -12,7 +12,7 @@ from wearsim.evolution.batch.per_realisation import mean_along, sum_in_order
 from wearsim.evolution.error_control.step_size import StepControl
 from wearsim.evolution.observables import worn_volume
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import Depths, WearState, contact_values
+from wearsim.evolution.state import Depths, WearState
 from wearsim.evolution.steppers.single_step import solve_present
 from wearsim.evolution.steppers.wear_increment import WearIncrement
 from wearsim.types import BoolArray, FloatArray, Number
@@ -25,13 +25,13 @@ DEEP = 0.5  # depths are compared where the groove is deeper than this part of i
 DEPTHS = ("cylinder_depth", "roller_depth")
 
 
-def deepest(state: WearState) -> FloatArray:
+def greatest_depth(state: WearState) -> FloatArray:
     """Return the greatest worn depth of either body, shape (realisations,) [m]."""
     found: FloatArray = np.maximum(*(getattr(state, name).max(axis=(0, 1, 3)) for name in DEPTHS))
     return found
 
 
-def whole_volume(problem: WearProblem, state: WearState) -> FloatArray:
+def total_worn_volume(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the volume worn off the cylinder and all its rollers, shape (realisations,) [m^3]."""
     return volume_of(problem, state.depths)
 
@@ -104,7 +104,7 @@ def variation_bias(
         if not np.count_nonzero(deviation):
             continue
         if loads is None:
-            carried = contact_values(problem, end.contacts, "line_load").sum(axis=-1)
+            carried = problem.values_of(end.contacts, "line_load").sum(axis=-1)
             loads = carried * problem.grid.spacing
         values = loads if name == "normal_force_offset" else getattr(here.inputs, name)
         values = values.reshape(-1, values.shape[-1])
@@ -142,7 +142,7 @@ def variation_error(
     if bias is None:
         return np.zeros((2, problem.shape[2]))
     biased = _worn_further(end, bias)
-    volumes = np.abs(whole_volume(problem, biased) - whole_volume(problem, end))
+    volumes = np.abs(total_worn_volume(problem, biased) - total_worn_volume(problem, end))
     return COVER * np.array([depth_between(end, biased), volumes])
 
 
@@ -195,7 +195,7 @@ def _worn_at(
     return WearIncrement(shifted, contacts, passes)
 
 
-def coarse_start(problem: WearProblem, state: WearState) -> WearState:
+def half_quadrature_start(problem: WearProblem, state: WearState) -> WearState:
     """Return the twin of a test whose rollers have half the contacts, where it has yet to begin."""
     chosen = set(np.flatnonzero(problem.half == 0))
     contacts = zip(problem.contacts, state.contacts, strict=True)
@@ -237,11 +237,13 @@ def with_pass_errors(
     if not problem.has_nodes:
         return end
     halved = problem.halved
-    coarse = step(halved, start.half_quadrature_solution or coarse_start(problem, start), passes)
-    volume = whole_volume(problem, end)
+    coarse = step(
+        halved, start.half_quadrature_solution or half_quadrature_start(problem, start), passes
+    )
+    volume = total_worn_volume(problem, end)
     variance = start.scatter[1] + _volume_variance(problem, end, passes)
-    depth = np.square(deepest(end) / np.where(volume > 0.0, volume, 1.0)) * variance
-    volumes = np.abs(whole_volume(problem, whole) - whole_volume(problem, coarse))
+    depth = np.square(greatest_depth(end) / np.where(volume > 0.0, volume, 1.0)) * variance
+    volumes = np.abs(total_worn_volume(problem, whole) - total_worn_volume(problem, coarse))
     return replace(
         end,
         quadrature=np.array([depth_between(whole, coarse), volumes]),
@@ -293,8 +295,8 @@ def excess(
         Error of depth [m] and volume [m^3] after the step, at most `added` and what was before.
     """
     worst = np.zeros(problem.shape[2])
-    parts = np.broadcast_to(end.now / stop, worst.shape).tolist()
-    sizes = deepest(end), whole_volume(problem, end)
+    parts = np.broadcast_to(end.passes_done / stop, worst.shape).tolist()
+    sizes = greatest_depth(end), total_worn_volume(problem, end)
     # what no shorter step would take away must not shorten it
     reducible = np.array([start.depth_error, start.volume_error]) - start.irreducible
     arrays = reducible, added, reducible + added if reached is None else reached

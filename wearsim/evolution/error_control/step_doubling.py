@@ -23,7 +23,7 @@ from wearsim.evolution.error_control.error_estimates import (
 )
 from wearsim.evolution.error_control.step_size import StepControl, Trial
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import WearState, contact_values
+from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.base import Advance, Stepper
 from wearsim.types import FloatArray, Number
 
@@ -128,9 +128,11 @@ class StepDoublingStepper(Stepper):
         end = scheme(problem, half, 0.5 * step)
         whole = scheme(problem, twin, step)
         end = with_pass_errors(problem, state, end, whole, scheme, step)
-        whole = biased_coarse_solution(end, whole, variation_bias(problem, end, state.now, step))
-        now = np.where(step == stop - state.now, stop, end.now)
-        end = end.moved(now, whole.solves_since(twin))
+        whole = biased_coarse_solution(
+            end, whole, variation_bias(problem, end, state.passes_done, step)
+        )
+        now = np.where(step == stop - state.passes_done, stop, end.passes_done)
+        end = end.advanced_to(now, whole.solves_since(twin))
         end, added = _with_errors(problem, (state, twin), (end, whole), self.order)
         reached = np.array([end.depth_error, end.volume_error]) - end.irreducible
         over = excess(self.control, problem, state, end, added, stop, reached)
@@ -167,7 +169,9 @@ def _with_errors(
     added = cover * np.array([greatest_in(deep, moved), np.abs(volume_of(problem, moved))])
     others = [state.irreducible for state in (start, end)]
     twins = {
-        name: twin.moved(end.now, coarse_step_solution=None, half_quadrature_solution=None)
+        name: twin.advanced_to(
+            end.passes_done, coarse_step_solution=None, half_quadrature_solution=None
+        )
         for name, twin in (
             ("coarse_step_solution", whole),
             ("half_quadrature_solution", end.half_quadrature_solution),
@@ -188,6 +192,6 @@ def first_steps(problem: WearProblem, state: WearState) -> FloatArray:
     cylinder, roller = problem.shared_wear(*problem.wear_per_pass(state.contacts))
     rate = (cylinder + roller).max(axis=(0, 1, 3))
     gap = problem.gap(state.cylinder_depth, state.roller_depth)
-    approach = contact_values(problem, state.contacts, "approach") - gap.min(axis=-1)
+    approach = problem.values_of(state.contacts, "approach") - gap.min(axis=-1)
     worn = np.where(rate > 0.0, rate, 1.0)
     return np.asarray(np.where(rate > 0.0, 0.1 * approach.min(axis=(0, 1)) / worn, np.inf))

@@ -11,14 +11,14 @@ from wearsim.evolution.error_control.error_estimates import (
     COVER,
     depth_between,
     excess,
+    total_worn_volume,
     variation_error,
-    whole_volume,
     with_pass_errors,
 )
 from wearsim.evolution.error_control.step_size import StepControl
 from wearsim.evolution.observables import oscillation
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import WearState, contact_values
+from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.base import Advance, Stepper, fitted
 from wearsim.evolution.steppers.single_step import (
     contacts_at,
@@ -131,7 +131,7 @@ def _errors(problem: WearProblem, start: WearState, end: WearState, step: float)
     # the processes at their means over the step, as the step itself took them
     here = problem.at_time(problem.time(start.passes), problem.time(start.passes + step))
     depths = start.depths, end.depths
-    loads = mean_loads(here, start, step, depths, contact_values(here, end.contacts, "power"))
+    loads = mean_loads(here, start, step, depths, here.values_of(end.contacts, "power"))
     solve = solve_present if problem.varying else contacts_at
     again = WearIncrement(here, solve(here, end, loads), step)
     other = replace(
@@ -139,6 +139,6 @@ def _errors(problem: WearProblem, start: WearState, end: WearState, step: float)
         cylinder_depth=start.cylinder_depth + again.cylinder,
         roller_depth=start.roller_depth + again.roller,
     )
-    volumes = np.abs(whole_volume(problem, end) - whole_volume(problem, other))
+    volumes = np.abs(total_worn_volume(problem, end) - total_worn_volume(problem, other))
     apart = np.array([depth_between(end, other), volumes])
     return COVER * 0.5 * apart + variation_error(problem, end, start.passes, step)

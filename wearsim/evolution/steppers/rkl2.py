@@ -13,7 +13,7 @@ import numpy as np
 from wearsim.evolution.error_control.error_estimates import Step
 from wearsim.evolution.error_control.step_doubling import StepDoublingStepper
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import Contacts, WearState, contact_values
+from wearsim.evolution.state import Contacts, WearState
 from wearsim.evolution.steppers.single_step import (
     contacts_at,
     mean_loads,
@@ -177,12 +177,12 @@ def _rate(
         Solves the contacts on the profiles of a state under given loads.
     """
     cylinder, roller = state.cylinder_depth + change[0], state.roller_depth + change[1]
-    power = contact_values(here, state.contacts, "power")
+    power = here.values_of(state.contacts, "power")
     loads = mean_loads(here, state, passes, ((cylinder, roller),), power)
     stage = replace(state, cylinder_depth=cylinder, roller_depth=roller)
     contacts = solve(here, stage, loads)
     wearing = WearIncrement(here, contacts, passes)
-    return contacts, (wearing.cylinder, wearing.roller, contact_values(here, contacts, "power"))
+    return contacts, (wearing.cylinder, wearing.roller, here.values_of(contacts, "power"))
 
 
 def _sum(*terms: tuple[float, Change]) -> Change:

@@ -12,7 +12,7 @@ from wearsim.evolution.batch.per_realisation import one_of
 from wearsim.evolution.batch.stack import problem_of, state_of
 from wearsim.evolution.observables import depth, worn_volume
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import Contacts, Depths, WearState, as_batch, contact_values
+from wearsim.evolution.state import Contacts, Depths, WearState, as_batch
 from wearsim.evolution.steppers.compliant_contact import REALISATION, solve_compliant
 from wearsim.evolution.steppers.wear_increment import WearIncrement, exponents_between
 from wearsim.types import FloatArray, Number
@@ -34,7 +34,7 @@ def mean_loads(
     The load itself is integrated exactly; the feedback takes the mean of the descents at worn
     `depths`, as a rule those at the step's ends, and each term its exact mean at constant `power`.
     """
-    start, stop = problem.time(state.now), problem.time(state.now + passes)
+    start, stop = problem.time(state.passes_done), problem.time(state.passes_done + passes)
     problem = problem.at_time(start, stop)
     loads = _loads(problem, problem.mean_load(start, stop))
     if problem.has_spring:
@@ -45,7 +45,7 @@ def mean_loads(
         mean = problem.per_roller(power).mean(axis=0)
         duration = one_of(stop - start)
         loads += term.mean_force(state.terms[number], mean, duration)[problem.roller]
-    return checked_loads(loads, state.now)
+    return checked_loads(loads, state.passes_done)
 
 
 def _loads(problem: WearProblem, force: Number) -> FloatArray:
@@ -89,7 +89,9 @@ def implicit_step(problem: WearProblem, state: WearState, passes: Number) -> Wea
     StepError
         If they do not settle.
     """
-    problem = problem.at_time(problem.time(state.now), problem.time(state.now + passes))
+    problem = problem.at_time(
+        problem.time(state.passes_done), problem.time(state.passes_done + passes)
+    )
     gap = problem.gap(state.cylinder_depth, state.roller_depth)
     contacts = state.contacts
     wearing = WearIncrement(problem, contacts, passes)
@@ -104,23 +106,23 @@ def implicit_step(problem: WearProblem, state: WearState, passes: Number) -> Wea
         iterations += moving
         new = WearIncrement(problem, found, passes)
         ends = _ends(state, new)
-        foreseen = wearing.foreseen(contact_values(problem, found, "line_load"))
+        foreseen = wearing.foreseen(problem.values_of(found, "line_load"))
         change, new_loads = _differs(new.opening, foreseen), loads
         if problem.has_feedback:
             new_loads = _end_loads(problem, state, passes, ends, found)
             change = np.maximum(change, _differs(new_loads, loads))
         if problem.slip_profile is not None:
             change = np.maximum(change, _differs(new.cylinder, wearing.cylinder))
-        moving &= ~(change < problem.settled * 10.0 ** ((iteration - 1) // PATIENCE))
+        moving &= ~(change < problem.iteration_tolerance * 10.0 ** ((iteration - 1) // PATIENCE))
         if not np.count_nonzero(moving):
-            power = contact_values(problem, found, "power")
+            power = problem.values_of(found, "power")
             solves = iterations * (len(found) // len(moving))
-            begun = state.moved(state.now, solves, contacts=found)
+            begun = state.advanced_to(state.passes_done, solves, contacts=found)
             return worn_state(problem, begun, passes, ends, power)
         new.exponents = exponents_between(wearing, new)
         contacts, wearing, loads = found, new, new_loads
     raise StepError(
-        f"an implicit step of {one_of(passes):.4g} passes from pass {one_of(state.now):.0f} did not"
+        f"an implicit step of {one_of(passes):.4g} passes from pass {one_of(state.passes_done):.0f} did not"
         f" settle (last change {change.max():.1e})",
         state.to_arrays(),
     )
@@ -135,7 +137,7 @@ def _end_loads(
     problem: WearProblem, state: WearState, passes: Number, ends: Depths, contacts: Contacts
 ) -> FloatArray:
     """Return the mean loads of a step that leads to depths `ends`."""
-    power = contact_values(problem, contacts, "power")
+    power = problem.values_of(contacts, "power")
     return mean_loads(problem, state, passes, (state.depths, ends), power)
 
 
@@ -147,7 +149,7 @@ def explicit_step(problem: WearProblem, state: WearState, passes: Number) -> Wea
     solve = solve_present if problem.varying else contacts_at
     contacts = solve(here, state, mean)
     solves = len(contacts) if contacts is state.contacts else 2 * len(contacts)
-    wearing, power = WearIncrement(here, contacts, passes), contact_values(here, contacts, "power")
+    wearing, power = WearIncrement(here, contacts, passes), here.values_of(contacts, "power")
     begun = replace(state, contacts=contacts, solves=state.solves + solves)
     worn = worn_state(here, begun, passes, _ends(state, wearing), power)
     return replace(worn, contacts=solve_present(problem, worn, present_loads(problem, worn)))
@@ -155,20 +157,20 @@ def explicit_step(problem: WearProblem, state: WearState, passes: Number) -> Wea
 
 def present_problem(problem: WearProblem, state: WearState) -> WearProblem:
     """Return the problem with every process at its value of this moment."""
-    now = problem.time(state.now)
+    now = problem.time(state.passes_done)
     return problem.at_time(now, now)
 
 
 def present_loads(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the load of each contact at this moment, shape (S, C, N) [N]."""
     problem = present_problem(problem, state)
-    loads = _loads(problem, problem.force(problem.time(state.now)))
+    loads = _loads(problem, problem.force(problem.time(state.passes_done)))
     if problem.has_spring:
         gap = problem.gap(state.cylinder_depth, state.roller_depth)
         loads -= problem.stiffness * problem.descent(gap)
     for number in range(len(problem.terms)):
         loads += problem.at_contacts(state.terms[number][None])[0]
-    return checked_loads(loads, state.now)
+    return checked_loads(loads, state.passes_done)
 
 
 def contacts_at(problem: WearProblem, state: WearState, loads: FloatArray) -> Contacts:
@@ -179,7 +181,7 @@ def contacts_at(problem: WearProblem, state: WearState, loads: FloatArray) -> Co
     """
     if problem.varying:
         return solve_present(problem, state, loads)
-    line_load = contact_values(problem, state.contacts, "line_load")
+    line_load = problem.values_of(state.contacts, "line_load")
     carried = line_load.sum(axis=-1) * problem.grid.spacing
     apart, most = np.abs(carried - loads).max(axis=(0, 1)), loads.max(axis=(0, 1))
     others = np.flatnonzero(apart > SAME_LOAD * most)
@@ -225,12 +227,14 @@ def worn_state(
     """
     terms = state.terms
     if problem.terms:
-        duration = one_of(problem.time(state.now + passes) - problem.time(state.now))
+        duration = one_of(
+            problem.time(state.passes_done + passes) - problem.time(state.passes_done)
+        )
         mean = problem.per_roller(power).mean(axis=0)
         each = enumerate(problem.terms.values())
         terms = np.array([term.advance(terms[number], mean, duration) for number, term in each])
-    return state.moved(
-        state.now + passes,
+    return state.advanced_to(
+        state.passes_done + passes,
         cylinder_depth=ends[0],
         roller_depth=ends[1],
         terms=terms,

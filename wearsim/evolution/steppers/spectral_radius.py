@@ -9,7 +9,7 @@ import numpy as np
 
 from wearsim.errors import ContactError
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import WearState, contact_values
+from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.single_step import present_problem, solve_present
 from wearsim.evolution.steppers.wear_increment import WearIncrement
 from wearsim.types import FloatArray
@@ -45,7 +45,7 @@ def decay_rates(problem: WearProblem, state: WearState) -> FloatArray:
     solve a contact on the changed profiles, that rate is kept.
     """
     wear = WearIncrement(present_problem(problem, state), state.contacts, 1.0)
-    loaded = contact_values(problem, state.contacts, "line_load") > 0.0
+    loaded = problem.values_of(state.contacts, "line_load") > 0.0
     alternate = np.where(loaded.any(axis=(0, 1)), (-1.0) ** np.arange(problem.grid.strips), 0.0)
     # the bodies share a change of the gap as they share the wear
     cylinder, roller = (alternate * r.max(axis=-1, keepdims=True) for r in _rates_of(wear))
@@ -89,9 +89,9 @@ def _fall(problem: WearProblem, state: WearState, wear: WearIncrement, shape: Sh
     shape : tuple of ndarray
         Change of cylinder and rollers, of any size.
     """
-    line_load = contact_values(problem, state.contacts, "line_load")
+    line_load = problem.values_of(state.contacts, "line_load")
     gap = problem.gap(state.cylinder_depth, state.roller_depth)
-    approach = contact_values(problem, state.contacts, "approach") - gap.min(axis=-1)
+    approach = problem.values_of(state.contacts, "approach") - gap.min(axis=-1)
     step = SMALL * np.maximum(approach.min(axis=(0, 1)), 1e-12)
     size = _size(shape)
     factor = (step / np.where(size > 0.0, size, 1.0))[:, None]

@@ -9,7 +9,7 @@ import numpy as np
 from wearsim.contact_batch import rows_of
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import Contacts
-from wearsim.mechanics.numerics.wear_exponent import learn_exponents, ratio_to_load
+from wearsim.mechanics.numerics.wear_exponent import estimate_exponents, ratio_to_load
 from wearsim.plugins import SharedWear
 from wearsim.types import FloatArray, Number
 
@@ -117,7 +117,7 @@ def exponents_between(old: WearIncrement, new: WearIncrement) -> FloatArray:
     problem, known = old.problem, old.exponents
     exponents = np.ones((*problem.shape, problem.grid.strips)) if known is None else known.copy()
     linear = problem.wear_factors["cylinder"]
-    learn_exponents(
+    estimate_exponents(
         rows_of(old.contacts, "line_load"),
         rows_of(new.contacts, "line_load"),
         old.per_contact,

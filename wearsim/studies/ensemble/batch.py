@@ -11,7 +11,7 @@ import numpy as np
 from wearsim.evolution.batch.bisect_failures import bisect_failures
 from wearsim.evolution.batch.lockstep import Lockstep, Path, can_step_together
 from wearsim.evolution.batch.per_realisation import sum_in_order
-from wearsim.evolution.batch.stack import Stack, alike, problem_of, stacked_states, state_of
+from wearsim.evolution.batch.stack import Stack, compatible, problem_of, stacked_states, state_of
 from wearsim.evolution.integrate import evolve
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, fresh_state
@@ -66,7 +66,7 @@ class RealisationRun:
 
     def can_join(self, other: RealisationRun) -> bool:
         """Tell whether it can be stepped together with one that can be stepped together."""
-        return self._course == other._course and alike(self.problem, other.problem)
+        return self._course == other._course and compatible(self.problem, other.problem)
 
     @property
     def _course(self) -> tuple[object, ...]:
@@ -95,7 +95,7 @@ class Observed:
     @classmethod
     def of(cls, rows: list[Row], end: WearState, place: int, steps: int) -> Observed:
         """Return what a test has come to whose end is one of the realisations of a state."""
-        solves = end.solves if end.each is None else end.each.solves[place]
+        solves = end.solves if end.individual is None else end.individual.solves[place]
         scalars = {
             "depth_error": float(end.depth_error[place]),
             "volume_error": float(end.volume_error[place]),
@@ -276,7 +276,7 @@ class RealisationBatch:
 
     def _stepped(self, stack: Stack, passes: FloatArray) -> WearState:
         """Return the states of tests at the passes given, by side steps where they are later."""
-        now = np.asarray(stack.state.now)
+        now = np.asarray(stack.state.passes_done)
         sides = np.flatnonzero(passes > now)
         if not sides.size:
             return stack.state
@@ -285,4 +285,4 @@ class RealisationBatch:
         stepped = stepped_aside(step, some.problem, some.state, later - now[sides])
         order = np.arange(len(now))
         order[sides] = len(order) + np.arange(len(sides))
-        return state_of(stacked_states([stack.state, stepped.moved(later)]), order)
+        return state_of(stacked_states([stack.state, stepped.advanced_to(later)]), order)

@@ -8,7 +8,7 @@ import numpy as np
 
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.evolution.contact_inputs import ContactInputs
-from wearsim.evolution.error_control.error_estimates import coarse_start, whole_volume
+from wearsim.evolution.error_control.error_estimates import half_quadrature_start, total_worn_volume
 from wearsim.evolution.kinematics import Kinematics, NoWear
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import fresh_state
@@ -100,7 +100,7 @@ def slip_profile(scenario: Scenario, s: FloatArray, height: FloatArray) -> Float
 def mean_inputs(scenario: Scenario, rollers: list[int]) -> ContactInputs:
     """Return the inputs of some rollers as the scenario gives them."""
     creepage = scenario.creepage
-    alike = ContactInputs.alike(
+    alike = ContactInputs.uniform(
         len(rollers),
         friction=scenario.friction.coefficient,
         longitudinal=creepage.longitudinal or 0.0,
@@ -246,8 +246,10 @@ def with_enough_nodes(problem: WearProblem, draws: Draws) -> WearProblem:
             return found
         fresh = fresh_state(found)
         one, other = (
-            whole_volume(problem, explicit_step(found, fresh, 1.0)),
-            whole_volume(problem, explicit_step(found.halved, coarse_start(found, fresh), 1.0)),
+            total_worn_volume(problem, explicit_step(found, fresh, 1.0)),
+            total_worn_volume(
+                problem, explicit_step(found.halved, half_quadrature_start(found, fresh), 1.0)
+            ),
         )
         if (np.abs(one - other) <= 0.5 * tolerance * one).all():
             return found
@@ -298,5 +300,5 @@ def bare_problem(
         tilt_shifts=creepage.tilt_shifts_contact,
         free=creepage.drive == "free",
         slip_profile=slip_profile(scenario, s, height) if creepage.differential_slip else None,
-        settled=float(np.clip(SETTLED * scenario.evolution.tolerance, *SETTLED_RANGE)),
+        iteration_tolerance=float(np.clip(SETTLED * scenario.evolution.tolerance, *SETTLED_RANGE)),
     )

@@ -12,7 +12,7 @@ from wearsim.evolution.error_control.error_estimates import Step
 from wearsim.evolution.error_control.step_size import SMALLEST_STEP
 from wearsim.evolution.observables import depth, width, worn_volume
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import WearState, contact_values
+from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.base import Advance, Stepper
 from wearsim.evolution.steppers.single_step import (
     contacts_at,
@@ -38,11 +38,11 @@ def history_row(
     problem, state, loads = present_contacts(problem, state, pass_by_pass)
     realisations = range(problem.shape[2])
     worn = state.cylinder_depth
-    power = contact_values(problem, state.contacts, "power")
+    power = problem.values_of(state.contacts, "power")
     row: Row = {
-        "passes": state.now,
-        "time": problem.time(state.now),
-        "step_passes": 0.0 if before is None else state.now - before.now,
+        "passes": state.passes_done,
+        "time": problem.time(state.passes_done),
+        "step_passes": 0.0 if before is None else state.passes_done - before.passes_done,
         "depth": cylinder_depth_of(state),
         "width": np.array(
             [width(problem.grid.y, worn[:, 0, v].max(axis=0), threshold) for v in realisations]
@@ -61,10 +61,10 @@ def history_row(
         "solves": state.solves,
         "full_solves": state.full_solves,
     }
-    peak = contact_values(problem, state.contacts, "peak_pressure")
+    peak = problem.values_of(state.contacts, "peak_pressure")
     row["peak_pressure"] = problem.per_roller(peak).max(axis=0)
     for name in ("approach", "longitudinal_creepage", "adhesion_fraction"):
-        values = contact_values(problem, state.contacts, name)
+        values = problem.values_of(state.contacts, name)
         row[name] = mean_along(problem.per_roller(values), axis=0)[0]
     return row
 
@@ -133,7 +133,7 @@ def record_row(problem: WearProblem, state: WearState, pass_by_pass: bool) -> Ro
         "roller_depth_profile": state.roller_depth[0],
     }
     for name in ("line_load", "half_length", "dissipation"):
-        row[name] = problem.per_roller(contact_values(problem, state.contacts, name))
+        row[name] = problem.per_roller(problem.values_of(state.contacts, name))
     return row
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from wearsim.errors import Interrupted, ResultsFileError, SolverError
-from wearsim.evolution.error_control.error_estimates import deepest, whole_volume
+from wearsim.evolution.error_control.error_estimates import greatest_depth, total_worn_volume
 from wearsim.evolution.integrate import evolve
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import SIGMAS, WearState, fresh_state, widened, widened_state
@@ -243,7 +243,7 @@ class _RunInProgress:
     def _judge(self) -> None:
         """Warn where the estimated error has outgrown the tolerance in spite of all."""
         state, tolerance = self.recorder.state, self.scenario.evolution.tolerance
-        sizes = deepest(state), whole_volume(self.problem, state)
+        sizes = greatest_depth(state), total_worn_volume(self.problem, state)
         errors = state.depth_error, state.volume_error
         for kind, name in enumerate(("depth", "worn volume")):
             parts = [errors[kind], state.quadrature[kind], SIGMAS * np.sqrt(state.scatter[kind])]

@@ -7,7 +7,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from wearsim.evolution.error_control.error_estimates import DEPTHS, deepest, whole_volume
+from wearsim.evolution.error_control.error_estimates import (
+    DEPTHS,
+    greatest_depth,
+    total_worn_volume,
+)
 from wearsim.evolution.integrate import evolve
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, fresh_state
@@ -111,9 +115,9 @@ def errors_of(found: End, exact: End) -> dict[str, float]:
         Greatest `depth`, `profile` (L2, of all bodies) and worn `volume` (of all bodies).
     """
     y = found.problem.grid.y
-    volumes = [whole_volume(end.problem, end.state) for end in (found, exact)]
+    volumes = [total_worn_volume(end.problem, end.state) for end in (found, exact)]
     return {
-        "depth": _apart(deepest(found.state), deepest(exact.state)),
+        "depth": _apart(greatest_depth(found.state), greatest_depth(exact.state)),
         "profile": l2(found.profiles_at(y), exact.profiles_at(y)),
         "volume": _apart(*volumes),
     }

@@ -10,7 +10,7 @@ import numpy as np
 from wearsim.errors import StepError
 from wearsim.evolution.error_control.error_estimates import DEPTHS
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import WearState, contact_values, fresh_state
+from wearsim.evolution.state import WearState, fresh_state
 from wearsim.evolution.steppers.single_step import present_loads, present_problem, solve_present
 from wearsim.evolution.steppers.wear_increment import WearIncrement
 from wearsim.types import FloatArray
@@ -37,7 +37,7 @@ class _Rates:
     def __init__(self, problem: WearProblem, most: int) -> None:
         self.problem, self.state, self.most = problem, fresh_state(problem), most
         self.solves = self.state.solves
-        self.length = float(contact_values(problem, self.state.contacts, "approach").max())
+        self.length = float(problem.values_of(self.state.contacts, "approach").max())
         rates = self._wear()
         self.bodies = [name for name in DEPTHS if rates[name].any()]
 
@@ -58,7 +58,7 @@ class _Rates:
             last = first + int(np.prod(shape))
             values[name] = self.length * depths[first:last].reshape(shape)
             first = last
-        return self.state.moved(passes, **values)
+        return self.state.advanced_to(passes, **values)
 
     def __call__(self, passes: float, depths: FloatArray) -> FloatArray:
         """Return the wear per pass at some depths, after some passes.
