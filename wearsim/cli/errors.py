@@ -1,4 +1,4 @@
-"""What all verbs share: errors told in a line and turned into exit codes."""
+"""Errors of all verbs: messages on stderr and exit codes."""
 
 from __future__ import annotations
 
@@ -9,36 +9,38 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
-from wearsim.cli.installed_verbs import InstalledVerb, installed_verbs, missing_verb
+from wearsim.cli.installed_verbs import installation_hint, installed_verbs
 from wearsim.errors import Interrupted, ScenarioError, SolverError, WearsimError
 
 FAILED = 1
-BAD_INPUT = 2
 INTERRUPTED = 130
 TRACEBACK = "WEARSIM_TRACEBACK"
+_INTERNAL = ("contact_", "coarse_step_", "half_quadrature_", "loop_")
 
 
 class Shell(TyperGroup):
-    """The group of verbs, built-in and installed, which turns errors into exit codes."""
+    """Group of built-in and installed verbs that converts errors to exit codes."""
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of all verbs, built-in ones first."""
-        built_in = super().list_commands(ctx)
-        return [*built_in, *(name for name in installed_verbs() if name not in built_in)]
+        self._add_installed()
+        return super().list_commands(ctx)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """Return a verb; an installed one is not imported."""
-        return super().get_command(ctx, cmd_name) or installed_verbs().get(cmd_name)
+        """Return a verb, built-in before installed, or None; no plugin is imported."""
+        if cmd_name not in self.commands:
+            self._add_installed()
+        return super().get_command(ctx, cmd_name)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """Return the verb that is called, imported, and its arguments."""
-        hint = missing_verb(args[0]) if self.get_command(ctx, args[0]) is None else None
-        if hint:
+        """Return name, verb and remaining arguments; fail with a hint if it is not installed."""
+        if self.get_command(ctx, args[0]) is None and (hint := installation_hint(args[0])):
             ctx.fail(hint)
-        name, command, rest = super().resolve_command(ctx, args)
-        if isinstance(command, InstalledVerb):
-            command = command.load()
-        return name, command, rest
+        return super().resolve_command(ctx, args)
+
+    def _add_installed(self) -> None:
+        for name, verb in installed_verbs().items():
+            self.commands.setdefault(name, verb)
 
     def invoke(self, ctx: Any) -> Any:
         """Run a verb.
@@ -46,30 +48,25 @@ class Shell(TyperGroup):
         Raises
         ------
         typer.Exit
-            With the error's exit code.
+            With the exit code of the error.
         """
         try:
             return super().invoke(ctx)
-        except WearsimError as error:
-            tell(error)
-            raise typer.Exit(error.exit_code) from error
         except KeyboardInterrupt as error:
             typer.echo("interrupted", err=True)
             raise typer.Exit(INTERRUPTED) from error
         except BrokenPipeError:  # "wearsim schema | head"
             raise
-        except OSError as error:
-            tell(error)
-            raise typer.Exit(FAILED) from error
         except Exception as error:
             if type(error).__module__.split(".")[0] in {"click", "typer"}:
                 raise
-            tell(error)
-            raise typer.Exit(FAILED) from error
+            write_error(error)
+            code = error.exit_code if isinstance(error, WearsimError) else FAILED
+            raise typer.Exit(code) from error
 
 
-def tell(error: BaseException) -> None:
-    """Write an error to stderr: one clear message, with its traceback only where asked for."""
+def write_error(error: BaseException) -> None:
+    """Write the message of an error to stderr, or its traceback if requested."""
     if os.environ.get(TRACEBACK, "") not in {"", "0"}:
         typer.echo("".join(traceback.format_exception(error)), err=True, nl=False)
         return
@@ -77,13 +74,11 @@ def tell(error: BaseException) -> None:
 
 
 def _state(state: dict[str, Any]) -> str:
-    """Return the numbers of a state that fit on a line; an array is told by its range."""
+    """Return the numbers of a solver state on one line, an array as its range."""
     parts = []
     for name, value in state.items():
         numeric = isinstance(value, int | float) or (hasattr(value, "min") and value.size)
-        if not numeric or name.startswith(
-            ("contact_", "coarse_step_", "half_quadrature_", "loop_")
-        ):
+        if not numeric or name.startswith(_INTERNAL):
             continue
         low, high = (value, value) if not hasattr(value, "min") else (value.min(), value.max())
         parts.append(f"{name} {low:.6g}" if low == high else f"{name} {low:.6g} to {high:.6g}")
@@ -93,7 +88,7 @@ def _state(state: dict[str, Any]) -> str:
 def _message(error: BaseException) -> str:
     if isinstance(error, SolverError) and error.state:
         return f"error: {error}\nstate at the failure: {_state(error.state)}"
-    if isinstance(error, ScenarioError | Interrupted):  # each says where it stands
+    if isinstance(error, ScenarioError | Interrupted):  # their messages start with a place
         return str(error)
     if isinstance(error, WearsimError):
         return f"error: {error}"
@@ -101,5 +96,5 @@ def _message(error: BaseException) -> str:
         return f"error: {error.filename or 'a file'}: {error.strerror or error}"
     return (
         f"internal error: {type(error).__name__}: {error}\n"
-        "this is a fault of wearsim or of a plugin; --traceback shows where"
+        "this is a defect of wearsim or of a plugin; --traceback shows where"
     )
