@@ -19,7 +19,7 @@ CONTACT = f"""
 import hashlib, json, sys
 import wearsim
 solution = wearsim.solve_contact(wearsim.load_scenario(r"{SCENARIOS / "rig-450min.toml"}"))
-from wearsim.mechanics.slender.batch import solve_each as kernel
+from wearsim.mechanics.slender.newton import solve_each as kernel
 stats = getattr(kernel, "stats")
 print(json.dumps({{
     "bits": hashlib.sha256(solution.dissipation.tobytes()).hexdigest(),

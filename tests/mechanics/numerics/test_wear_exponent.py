@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wearsim.mechanics.numerics.wear_exponent import learn_exponents, ratio_to_load
+from wearsim.mechanics.numerics.wear_exponent import estimate_exponents, ratio_to_load
 
 
 def test_that_the_ratio_is_carried_on_into_strips_without_load():
@@ -19,7 +19,7 @@ def test_that_a_contact_without_load_has_no_ratio():
 def test_that_the_exponent_of_a_power_law_is_found():
     load, new = np.array([[1.0, 2.0, 3.0, 0.0]]), np.array([[1.5, 1.0, 3.0, 0.0]])
     exponents = np.full((1, 4), 0.9)
-    learn_exponents(load, new, load**0.7, new**0.7, 1.0, exponents)
+    estimate_exponents(load, new, load**0.7, new**0.7, 1.0, exponents)
     # a strip whose load stays, and one without, tell nothing
     assert exponents[0] == pytest.approx([0.7, 0.7, 0.9, 0.9])
 
@@ -27,5 +27,5 @@ def test_that_the_exponent_of_a_power_law_is_found():
 def test_that_exponents_stay_within_what_rolling_contact_can_have():
     exponents = np.ones((1, 2))
     load, new = np.array([[1.0, 1.0]]), np.array([[2.0, 2.0]])
-    learn_exponents(load, new, load, new ** np.array([[3.0, 0.1]]), 1.0, exponents)
+    estimate_exponents(load, new, load, new ** np.array([[3.0, 0.1]]), 1.0, exponents)
     assert exponents[0].tolist() == [1.0, 0.4]

@@ -29,8 +29,8 @@ from wearsim.mechanics.tangential.hertz_fastsim_batch import (
     NO_LIMIT,
     NOT_FINITE,
     TABLE,
-    Asked,
-    Found,
+    ContactInputs,
+    ContactResults,
     Theory,
     solve_contacts,
 )
@@ -136,11 +136,11 @@ def asked(chosen=slice(None)):
     numbers = random.normal(size=(3, CONTACTS)) * [[4e-4], [5e-4], [0.1]]
     friction = random.uniform(0.05, 0.15, (CONTACTS, 1, 1))
     columns = [LOADS, 1e-3 + numbers[0], numbers[1], numbers[2], friction]
-    return Asked(*(column[chosen] for column in columns), False, np.zeros((0, len(Y))), 2.6)
+    return ContactInputs(*(column[chosen] for column in columns), False, np.zeros((0, len(Y))), 2.6)
 
 
 def solve(rules, wanted, row=ROW, gaps=GAPS, **given):
-    found = Found(*np.zeros((3, len(row), len(Y))), *np.zeros((5, len(row))))
+    found = ContactResults(*np.zeros((3, len(row), len(Y))), *np.zeros((5, len(row))))
     patches = patches_of(len(row))
     failed = solve_contacts(bodies(**given), rules, gaps, row, wanted, patches, found)
     return failed, found, patches
@@ -164,7 +164,7 @@ def test_that_order_and_company_change_no_bit(rules):
     _, other, _ = solve(rules, asked(order), ROW[order])
     copied = GAPS[ROW]
     _, apart, _ = solve(rules, asked(), np.arange(CONTACTS), copied)
-    for name in Found._fields:
+    for name in ContactResults._fields:
         assert np.array_equal(getattr(found, name)[order], getattr(other, name)), name
         assert np.array_equal(getattr(found, name), getattr(apart, name)), name
 

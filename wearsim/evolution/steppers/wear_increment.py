@@ -1,4 +1,4 @@
-"""What the wear of one step does to the bodies, and how it yields under the contacts."""
+"""Wear of the bodies in one step, and its compliance under the contacts."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from wearsim.mechanics.numerics.wear_exponent import estimate_exponents, ratio_t
 from wearsim.plugins import SharedWear
 from wearsim.types import FloatArray, Number
 
-SLIDING = 1.0  # exponent of dissipation in full sliding, the greatest there is
-STEEPEST = 50.0  # where catastrophic wear begins, T gamma's law goes as the power 44
+MAX_LINEAR_EXPONENT = 1.0  # of dissipation over line load: full sliding
+MAX_EXPONENT = 50.0  # T gamma's wear law goes as the power 44 where catastrophic wear begins
 
 
 class WearIncrement:
-    """What a step of `passes` passes with given contacts wears off the bodies.
+    """Depth worn off the bodies in a step of `passes` passes with given contacts.
 
-    Near the contacts' line loads the wear of each strip is taken as linear in its line load:
+    The wear u of each strip is linearised about the contact's line load q_0:
     u = (1 - e) u_0 + e (u_0/q_0) q, with the exponent e of u ~ q^e. The second term is a
-    compliance, the first a wear that does not yield.
+    compliance, the first an offset independent of the line load.
 
     Parameters
     ----------
@@ -34,10 +34,10 @@ class WearIncrement:
     Attributes
     ----------
     cylinder, roller : ndarray
-        Depth the step adds, shapes as in `WearState` [m].
+        Depth worn in the step, shapes as in `WearState` [m].
     exponents : ndarray, shape (stations, contacts, realisations, strips), optional
-        e of every strip, to be set before compliance or offset are first asked for; 1 where left
-        out, which full sliding makes exact.
+        Exponent e of every strip, to be set before the first use of compliance or offset. If
+        absent it is 1, which is exact in full sliding.
     """
 
     def __init__(self, problem: WearProblem, contacts: Contacts, passes: Number) -> None:
@@ -46,83 +46,65 @@ class WearIncrement:
         self.exponents: FloatArray | None = None
         self.problem, self.contacts = problem, contacts
 
-    @property
-    def per_contact(self) -> FloatArray:
-        """Depth that each contact wears off both bodies, shape (contacts, strips) [m]."""
-        worn: FloatArray = (self._parts[0] + self._parts[1]).reshape(len(self.contacts), -1)
-        return worn
-
     @cached_property
     def compliance(self) -> SharedWear:
-        """How the step's wear yields, realisation by realisation; contacts as in the problem."""
+        """Wear compliance of the step, per realisation; contacts in the problem's order."""
         parts = self._parts
         if self.exponents is not None:
             parts = self.exponents * parts[0], self.exponents * parts[1]
         stations, contacts, realisations = self.problem.shape
-        strips, together = self.problem.grid.strips, stations * contacts
-        each = np.zeros((realisations, together, 2, strips))
+        shape = realisations, stations * contacts, self.problem.grid.strips
+        compliance = np.zeros((*shape[:2], 2, shape[2]))
         line_load = rows_of(self.contacts, "line_load")
         for side, part in enumerate(parts):
-            if not np.count_nonzero(part):
-                continue
-            ratio = _ratio(part, line_load).transpose(2, 0, 1, 3)
-            each[:, :, side] = ratio.reshape(realisations, together, strips)
-        return SharedWear(self.problem.bodies, each)
+            if np.count_nonzero(part):
+                wear = np.ascontiguousarray(part).reshape(line_load.shape)
+                ratio = ratio_to_load(wear, line_load).reshape(part.shape)
+                compliance[:, :, side] = ratio.transpose(2, 0, 1, 3).reshape(shape)
+        return SharedWear(self.problem.bodies, compliance)
 
     @cached_property
     def offset(self) -> FloatArray | float:
-        """Gap that opens whatever the line load, (stations, contacts, realisations, strips) [m]."""
+        """Opening independent of the line load, (stations, contacts, realisations, strips) [m]."""
         if self.exponents is None:
             return 0.0
-        kept = 1.0 - self.exponents
-        return self._opening(*self.problem.sum_of_parts(*(kept * part for part in self._parts)))
+        constant = 1.0 - self.exponents
+        return self._opening(*self.problem.sum_of_parts(*(constant * p for p in self._parts)))
 
     @property
     def opening(self) -> FloatArray:
-        """Gap that the step opens at every contact, (stations, contacts, realisations, strips)."""
+        """Gap that the step opens, shape (stations, contacts, realisations, strips) [m]."""
         return self._opening(self.cylinder, self.roller)
 
     def _opening(self, cylinder: FloatArray, roller: FloatArray) -> FloatArray:
         return cylinder + self.problem.at_contacts(roller)
 
-    def foreseen(self, line_load: FloatArray) -> FloatArray:
-        """Return the opening that compliance and offset make of a line load, shape as `opening`."""
+    def predicted_opening(self, line_load: FloatArray) -> FloatArray:
+        """Return the opening of the linearised wear at a line load, shape as `opening` [m]."""
         stations, contacts, realisations, strips = line_load.shape
         flat = line_load.transpose(2, 0, 1, 3).reshape(realisations, -1, strips)
-        yielding = self.compliance.opening(flat)
-        shaped = yielding.reshape(realisations, stations, contacts, strips)
+        by_realisation = self.compliance.opening(flat)
+        shaped = by_realisation.reshape(realisations, stations, contacts, strips)
         opening = shaped.transpose(1, 2, 0, 3)
         return opening if self.exponents is None else opening + self.offset
 
+    def estimate_exponents(self, old: WearIncrement) -> None:
+        """Set the exponents from the changes of wear and line load since another increment.
 
-def _ratio(wear: FloatArray, line_load: FloatArray) -> FloatArray:
-    """Return wear over line load, carried on into strips without load, last axis strips."""
-    flat = np.ascontiguousarray(wear).reshape(line_load.shape)
-    return ratio_to_load(flat, line_load).reshape(wear.shape)
+        Strips without a change keep the exponent of the other increment, or 1.
 
-
-def exponents_between(old: WearIncrement, new: WearIncrement) -> FloatArray:
-    """Return the exponents with which wear followed the line load from `old` to `new`.
-
-    Parameters
-    ----------
-    old, new : WearIncrement
-        The wear of two solutions of the same contacts.
-
-    Returns
-    -------
-    ndarray, shape (stations, contacts, realisations, strips)
-        Where a strip tells nothing that of `old`, or 1.
-    """
-    problem, known = old.problem, old.exponents
-    exponents = np.ones((*problem.shape, problem.grid.strips)) if known is None else known.copy()
-    linear = problem.wear_factors["cylinder"]
-    estimate_exponents(
-        rows_of(old.contacts, "line_load"),
-        rows_of(new.contacts, "line_load"),
-        old.per_contact,
-        new.per_contact,
-        SLIDING if linear is not None else STEEPEST,
-        exponents.reshape(len(new.contacts), -1),
-    )
-    return exponents
+        Parameters
+        ----------
+        old : WearIncrement
+            Wear of another solution of the same contacts.
+        """
+        problem = self.problem
+        if old.exponents is None:
+            self.exponents = np.ones((*problem.shape, problem.grid.strips))
+        else:
+            self.exponents = old.exponents.copy()
+        loads = rows_of(old.contacts, "line_load"), rows_of(self.contacts, "line_load")
+        wear = ((w._parts[0] + w._parts[1]).reshape(loads[0].shape) for w in (old, self))
+        linear = problem.wear_factors["cylinder"] is not None
+        greatest = MAX_LINEAR_EXPONENT if linear else MAX_EXPONENT
+        estimate_exponents(*loads, *wear, greatest, self.exponents.reshape(loads[0].shape))

@@ -11,7 +11,7 @@ from wearsim.types import FloatArray
 
 
 @kernel
-def follow(noise: FloatArray, memory: float) -> FloatArray:
+def filter_noise(noise: FloatArray, memory: float) -> FloatArray:
     """Return z_0 = w_0, z_k+1 = r z_k + sqrt(1 - r^2) w_k+1: unit variance at every step.
 
     Parameters

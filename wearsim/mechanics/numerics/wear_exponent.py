@@ -8,7 +8,7 @@ from wearsim.mechanics.numerics.jit import kernel
 from wearsim.types import FloatArray
 
 LEAST_EXPONENT = 0.4  # wear goes as q^(1/2) in adhesion, and where its rate is at rest
-FELT = 1e-7  # relative change of a line load from which an exponent can be read
+MIN_LOG_CHANGE = 1e-7  # relative change of a line load from which an exponent can be read
 
 
 @kernel
@@ -45,7 +45,7 @@ def ratio_to_load(wear: FloatArray, line_load: FloatArray) -> FloatArray:
 
 
 @kernel
-def learn_exponents(
+def estimate_exponents(
     load: FloatArray,
     new_load: FloatArray,
     wear: FloatArray,
@@ -71,6 +71,6 @@ def learn_exponents(
             if not (wear[k, i] > 0.0 and new_wear[k, i] > 0.0):
                 continue
             rise = np.log(new_load[k, i] / load[k, i])
-            if abs(rise) > FELT:
+            if abs(rise) > MIN_LOG_CHANGE:
                 slope = np.log(new_wear[k, i] / wear[k, i]) / rise
                 exponents[k, i] = min(max(slope, LEAST_EXPONENT), greatest)

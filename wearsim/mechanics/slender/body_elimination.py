@@ -1,12 +1,12 @@
-"""Newton's step for contacts that wear bodies they share, by elimination of the contacts.
+"""Newton step of contacts that wear shared bodies, by elimination of the contacts.
 
-Every contact by itself answers a change D of its gap with dq = r - S D, its load held. The depths
-of the shared bodies then follow from
+A contact that is solved separately responds to a change D of its gap with dq = r - S D at constant
+load. The worn depths of the shared bodies then solve
 
     D_b = sum over the contacts l of b of c_lb (r_l - S_l sum over its bodies b' of D_b'),
 
-a system as large as the bodies have strips under load, however many contacts there are. It is
-factored once for as long as the S serve.
+a system with one unknown per body and loaded strip, whatever the number of contacts. It is factored
+once and reused while the matrices S are unchanged.
 """
 
 from __future__ import annotations
@@ -22,11 +22,12 @@ from wearsim.types import FloatArray, IntArray
 SIDES = 2  # a contact touches a cylinder and a roller
 
 
-class Depths(NamedTuple):
-    """The factored system of the bodies' depths: number of every strip, -1 where it has no depth.
+class DepthSystem(NamedTuple):
+    """Factored linear system of the bodies' worn depths.
 
-    The number (bodies, strips); how many there are (1,); the system by columns and the order of its
-    equations; its right-hand side and its solution.
+    `number` is the unknown of each body's strip, -1 for none, (bodies, strips), and `unknowns`
+    their count, (1,). `matrix` is stored by columns, `order` is the order of its equations,
+    `right` its right-hand side and `depth` its solution [m].
     """
 
     number: IntArray
@@ -38,56 +39,46 @@ class Depths(NamedTuple):
 
 
 @kernel
-def count_bodies(members: IntArray) -> int:
-    """Return how many bodies contacts share, from their numbers, shape (contacts, 2)."""
-    count = 0
-    for k in range(members.shape[0]):
-        for side in range(SIDES):
-            count = max(count, members[k, side] + 1)
-    return count
-
-
-@kernel
-def new_depths(members: IntArray, n: int) -> Depths:
-    """Return the `Depths` of bodies with `n` strips that have no system yet."""
-    bodies = count_bodies(members)
-    most = bodies * n
-    return Depths(
-        np.empty((bodies, n), np.int64),
+def new_depth_system(bodies: IntArray, n: int) -> DepthSystem:
+    """Return an empty `DepthSystem` for the shared `bodies`, (contacts, 2), with `n` strips."""
+    count = bodies.max() + 1
+    size = count * n
+    return DepthSystem(
+        np.empty((count, n), np.int64),
         np.zeros(1, np.int64),
-        np.empty((most, most)),
-        np.empty(most, np.int64),
-        np.empty(most),
-        np.empty(most),
+        np.empty((size, size)),
+        np.empty(size, np.int64),
+        np.empty(size),
+        np.empty(size),
     )
 
 
 @kernel
 def add_depths(
-    members: IntArray, shared: FloatArray, line_load: FloatArray, surface: FloatArray
+    bodies: IntArray, shared: FloatArray, line_load: FloatArray, surface: FloatArray
 ) -> None:
-    """Add to every contact's `surface` what all contacts wear off its shared bodies.
+    """Add the depth that all contacts wear off the shared bodies to `surface`.
 
     Parameters
     ----------
-    members : ndarray of int, shape (contacts, 2)
+    bodies : ndarray of int, shape (contacts, 2)
         The shared bodies of each contact, -1 for none.
     shared : ndarray, shape (contacts, 2, strips)
         Depth of those bodies per unit of line load [m/(N/m)].
     line_load, surface : ndarray, shape (contacts, strips)
-        [N/m]; [m], added to.
+        Line load [N/m]; gap of each contact, updated [m].
     """
     contacts, n = line_load.shape
-    depth = np.zeros((count_bodies(members), n))
+    depth = np.zeros((bodies.max() + 1, n))
     for k in range(contacts):
         for side in range(SIDES):
-            b = members[k, side]
+            b = bodies[k, side]
             if b >= 0:
                 for i in range(n):
                     depth[b, i] += shared[k, side, i] * line_load[k, i]
     for k in range(contacts):
         for side in range(SIDES):
-            b = members[k, side]
+            b = bodies[k, side]
             if b >= 0:
                 for i in range(n):
                     surface[k, i] += depth[b, i]
@@ -95,16 +86,14 @@ def add_depths(
 
 @kernel
 def _number_unknowns(
-    members: IntArray, shared: FloatArray, index: IntArray, number: IntArray
+    bodies: IntArray, shared: FloatArray, index: IntArray, number: IntArray
 ) -> int:
-    """Give the strips of bodies that wear under a contact their numbers, the others -1."""
+    """Assign unknowns to the strips of bodies that wear under a contact, -1 to the others."""
     contacts, n = index.shape
-    for b in range(number.shape[0]):
-        for i in range(n):
-            number[b, i] = -1
+    number[:] = -1
     for k in range(contacts):
         for side in range(SIDES):
-            b = members[k, side]
+            b = bodies[k, side]
             if b >= 0:
                 for i in range(n):
                     if index[k, i] >= 0 and shared[k, side, i] > 0.0:
@@ -120,19 +109,20 @@ def _number_unknowns(
 
 @kernel
 def factor_depths(
-    members: IntArray, shared: FloatArray, index: IntArray, response: FloatArray, depths: Depths
+    bodies: IntArray, shared: FloatArray, index: IntArray, response: FloatArray, system: DepthSystem
 ) -> bool:
-    """Set up and factor the system of the bodies' depths.
+    """Assemble and factor the system of the bodies' depths.
 
     Parameters
     ----------
-    members, shared
+    bodies, shared
         As in `add_depths`.
     index : ndarray of int, shape (contacts, strips)
-        Row of every strip in its contact, -1 outside it.
+        Row of each strip in its contact, -1 outside the contact.
     response : ndarray, shape (contacts, strips, strips)
-        S by columns: fall of line load, by row, per rise of the gap, by row, at held load [N/m^2].
-    depths : Depths
+        S by columns: decrease of the line load, by row, per increase of the gap, by row, at
+        constant load [N/m^2].
+    system : DepthSystem
         Filled.
 
     Returns
@@ -140,109 +130,106 @@ def factor_depths(
     bool
         False if the system is singular.
     """
-    count, matrix = _number_unknowns(members, shared, index, depths.number), depths.matrix
-    depths.unknowns[0] = count
+    count, matrix = _number_unknowns(bodies, shared, index, system.number), system.matrix
+    system.unknowns[0] = count
     for i in range(count):
-        for j in range(count):
-            matrix[i, j] = 0.0
+        matrix[i, :count] = 0.0
         matrix[i, i] = 1.0
-    for k in range(members.shape[0]):
+    for k in range(bodies.shape[0]):
         for side in range(SIDES):
             for other in range(SIDES):
-                if members[k, side] >= 0 and members[k, other] >= 0:
-                    _add_contact(k, side, other, members, shared, index, response, depths)
-    return factor_in_place(matrix, count, depths.order)
+                if bodies[k, side] >= 0 and bodies[k, other] >= 0:
+                    _add_contact_terms(k, side, other, bodies, shared, index, response, system)
+    return factor_in_place(matrix, count, system.order)
 
 
 @kernel
 def solve_depths(
-    members: IntArray,
+    bodies: IntArray,
     shared: FloatArray,
     index: IntArray,
     response: FloatArray,
-    lift: FloatArray,
-    depths: Depths,
+    approach_slope: FloatArray,
+    system: DepthSystem,
     step: FloatArray,
     approach: FloatArray,
 ) -> None:
-    """Turn each contact's own step into the step of all together.
+    """Turn the separate steps of the contacts into the coupled step.
 
     Parameters
     ----------
-    members, shared, index, response
+    bodies, shared, index, response
         As in `factor_depths`.
-    lift : ndarray, shape (contacts, strips)
-        Rise of the approach per rise of the gap, by row.
-    depths : Depths
+    approach_slope : ndarray, shape (contacts, strips)
+        Increase of the approach per increase of the gap, by row.
+    system : DepthSystem
         From `factor_depths`.
     step : ndarray, shape (contacts, strips)
-        Change of line load by row, r before and with the bodies' wear after [N/m].
+        Change of line load by row [N/m]: r of the separate contact, replaced by the coupled one.
     approach : ndarray, shape (contacts,)
-        Approach without and with the bodies' wear [m].
+        Approach without the bodies' wear, replaced by the one with it [m].
     """
     contacts, n = index.shape
-    count, right, number = depths.unknowns[0], depths.right, depths.number
-    for place in range(count):
-        right[place] = 0.0
+    count, right, number = system.unknowns[0], system.right, system.number
+    right[:count] = 0.0
     for k in range(contacts):
         for side in range(SIDES):
             for i in range(n):
-                if members[k, side] >= 0 and index[k, i] >= 0 and shared[k, side, i] > 0.0:
-                    place = number[members[k, side], i]
-                    right[place] += shared[k, side, i] * step[k, index[k, i]]
-    solve_factored(depths.matrix, count, depths.order, right, depths.depth)
+                if bodies[k, side] >= 0 and index[k, i] >= 0 and shared[k, side, i] > 0.0:
+                    unknown = number[bodies[k, side], i]
+                    right[unknown] += shared[k, side, i] * step[k, index[k, i]]
+    solve_factored(system.matrix, count, system.order, right, system.depth)
     for k in range(contacts):
-        _open_contact(k, members, index, response, lift, depths, step, approach)
+        _apply_body_wear(k, bodies, index, response, approach_slope, system, step, approach)
 
 
 @kernel
-def _add_contact(
+def _add_contact_terms(
     k: int,
     side: int,
     other: int,
-    members: IntArray,
+    bodies: IntArray,
     shared: FloatArray,
     index: IntArray,
     response: FloatArray,
-    depths: Depths,
+    system: DepthSystem,
 ) -> None:
-    """Add how contact `k` wears its body on one side while that on a side opens its gap."""
-    n, number = index.shape[1], depths.number
-    worn, opening = members[k, side], members[k, other]
+    """Add the wear of contact `k`'s body on `side` per worn depth of its body on side `other`."""
+    n, number = index.shape[1], system.number
+    worn_body, opening_body = bodies[k, side], bodies[k, other]
     for j in range(n):
-        column, place = index[k, j], number[opening, j]
-        if column < 0 or place < 0:
+        column, unknown = index[k, j], number[opening_body, j]
+        if column < 0 or unknown < 0:
             continue
         for i in range(n):
             row = index[k, i]
             if row >= 0 and shared[k, side, i] > 0.0:
-                change = shared[k, side, i] * response[k, column, row]
-                depths.matrix[place, number[worn, i]] += change
+                system.matrix[unknown, number[worn_body, i]] += (
+                    shared[k, side, i] * response[k, column, row]
+                )
 
 
 @kernel
-def _open_contact(
+def _apply_body_wear(
     k: int,
-    members: IntArray,
+    bodies: IntArray,
     index: IntArray,
     response: FloatArray,
-    lift: FloatArray,
-    depths: Depths,
+    approach_slope: FloatArray,
+    system: DepthSystem,
     step: FloatArray,
     approach: FloatArray,
 ) -> None:
-    """Take from contact `k`'s step and approach what the depths of its bodies change in them."""
-    n, size = index.shape[1], 0
+    """Correct the step and the approach of contact `k` for the worn depths of its bodies."""
+    n, size = index.shape[1], index[k].max() + 1
     for i in range(n):
-        size = max(size, index[k, i] + 1)
-    for i in range(n):
-        column, opened = index[k, i], 0.0
+        column, opening = index[k, i], 0.0
         if column < 0:
             continue
         for side in range(SIDES):
-            b = members[k, side]
-            if b >= 0 and depths.number[b, i] >= 0:
-                opened += depths.depth[depths.number[b, i]]
-        approach[k] += lift[k, column] * opened
+            b = bodies[k, side]
+            if b >= 0 and system.number[b, i] >= 0:
+                opening += system.depth[system.number[b, i]]
+        approach[k] += approach_slope[k, column] * opening
         for row in range(size):
-            step[k, row] -= response[k, column, row] * opened
+            step[k, row] -= response[k, column, row] * opening

@@ -1,12 +1,12 @@
-"""Slender contacts that wear bodies they share, all at once: `slender`, coupled.
+"""Normal contact of slender patches that wear shared bodies.
 
-The gap of contact k opens by what all contacts wear off the bodies that it touches,
+The gap of contact k opens by the wear that all contacts cause on its bodies,
 
     sum_j W_ij(a_j) q_j + c_i q_i + D_i + z_i = delta_k,   D_i = sum over its bodies and all l of
     their contacts c_l,i q_l,i,
 
-and each of Newton's steps is a step of every contact by itself, from which `shared_bodies` makes
-that of all together.
+Each step of Newton's method consists of the steps of the separate contacts (`newton`), which
+`body_elimination` turns into the coupled step.
 """
 
 from __future__ import annotations
@@ -15,99 +15,101 @@ import numpy as np
 
 from wearsim.mechanics.numerics.jit import kernel
 from wearsim.mechanics.numerics.lu import invert_factored
-from wearsim.mechanics.slender.batch import attempts, forget_start
 from wearsim.mechanics.slender.body_elimination import (
     add_depths,
     factor_depths,
-    new_depths,
+    new_depth_system,
     solve_depths,
 )
-from wearsim.mechanics.slender.half_length import NEWTON_REACH, fill_half_lengths, new_lengths
+from wearsim.mechanics.slender.half_length import NEWTON_REACH, fill_half_lengths, new_half_lengths
 from wearsim.mechanics.slender.influence import HIGHEST
 from wearsim.mechanics.slender.newton import (
     CAUTIOUS,
+    CONTINUE,
     CONVERGED,
-    GOING_ON,
     MAX_ITERATIONS,
     NO_CONVERGENCE,
     SINGULAR,
     TOO_FINE,
+    check_convergence,
     least_gap,
     log_scale_of,
-    settle,
     start_contact,
     update_loads,
 )
 from wearsim.mechanics.slender.newton_step import (
-    Steps,
-    add_beyond,
+    NewtonState,
+    correct_residual,
     displace,
     factor_jacobian,
-    foresee,
-    new_steps,
+    new_newton_state,
+    predict_surface,
     take_step,
 )
 from wearsim.types import FloatArray, IntArray
 
 
 @kernel
-def _fill_responses(k: int, steps: Steps, response: FloatArray, lift: FloatArray) -> None:
-    """Fill how contact `k`'s step and its approach follow its gap at held load."""
-    size, unit_load = steps.size[k], steps.unit_load
-    invert_factored(steps.matrix[k], size, steps.order[k], response[k])
+def _fill_responses(
+    k: int, state: NewtonState, response: FloatArray, approach_slope: FloatArray
+) -> None:
+    """Fill the derivatives of contact `k`'s step and approach by its gap at constant load."""
+    size, unit_load = state.size[k], state.unit_load
+    invert_factored(state.matrix[k], size, state.order[k], response[k])
     for column in range(size):
         total = 0.0
         for row in range(size):
             total += response[k, column, row]
-        lift[k, column] = total / steps.risen[k]
+        approach_slope[k, column] = total / state.unit_load_sum[k]
         for row in range(size):
-            response[k, column, row] -= unit_load[k, row] * lift[k, column]
+            response[k, column, row] -= unit_load[k, row] * approach_slope[k, column]
 
 
 @kernel
 def solve_coupled(
     gap: FloatArray,
-    own: FloatArray,
-    members: IntArray,
+    compliance: FloatArray,
+    bodies: IntArray,
     shared: FloatArray,
     loads: FloatArray,
     spacing: float,
     contact_modulus: float,
     longitudinal_curvature: float,
     table: FloatArray,
-    bend: FloatArray,
+    curvature_influence: FloatArray,
     line_load: FloatArray,
     approach: FloatArray,
     half_length: FloatArray,
 ) -> tuple[int, int]:
-    """Solve several coupled slender contacts, from the line loads given.
+    """Solve several coupled slender contacts, from starting line loads.
 
     Parameters
     ----------
-    members : ndarray of int, shape (contacts, 2)
+    bodies : ndarray of int, shape (contacts, 2)
         Bodies that each contact shares with others, numbered from 0; -1 for none.
     shared : ndarray, shape (contacts, 2, strips)
         Depth that a contact wears off those bodies per unit of line load [m/(N/m)].
-    gap, own, loads, spacing, contact_modulus, longitudinal_curvature, table, bend
-        As in `slender.solve_slender`.
-    line_load, approach, half_length
+    gap, compliance, loads, spacing, contact_modulus, longitudinal_curvature
+        As in `newton.solve_slender`.
+    table, curvature_influence, line_load, approach, half_length
         Likewise.
 
     Returns
     -------
     status, iterations : int
-        CONVERGED, or what went wrong.
+        CONVERGED or the cause of failure; iterations of Newton's method.
     """
     contacts, n = gap.shape
     unit, before = 1.0 / (np.pi * contact_modulus), 0.0
     surface, work = np.empty((contacts, n)), np.empty((2, n))
-    response, lift = np.empty((contacts, n, n)), np.empty((contacts, n))
-    steps, depths = new_steps(contacts, n), new_depths(members, n)
+    response, approach_slope = np.empty((contacts, n, n)), np.empty((contacts, n))
+    state, system = new_newton_state(contacts, n), new_depth_system(bodies, n)
     log_scale = log_scale_of(contact_modulus, longitudinal_curvature, spacing)
-    lengths, lowest = new_lengths(contacts, bend, log_scale, NEWTON_REACH), np.empty(contacts)
+    lengths = new_half_lengths(contacts, curvature_influence, log_scale, NEWTON_REACH)
+    lowest = np.empty(contacts)
     for k in range(contacts):
         for i in range(n):
-            surface[k, i] = own[k, i] + shared[k, 0, i] + shared[k, 1, i]
+            surface[k, i] = compliance[k, i] + shared[k, 0, i] + shared[k, 1, i]
         start_contact(k, gap, surface, contact_modulus, loads[k], spacing, line_load, approach)
         lowest[k] = least_gap(k, gap)
         approach[k] -= lowest[k]
@@ -115,37 +117,39 @@ def solve_coupled(
         for k in range(contacts):
             for i in range(n):
                 surface[k, i] = gap[k, i] - lowest[k]
-        add_depths(members, shared, line_load, surface)
+        add_depths(bodies, shared, line_load, surface)
         renewed = False
         for k in range(contacts):
-            widest = displace(k, own, table, unit, lengths, line_load, work, surface, steps)
+            widest = displace(k, compliance, table, unit, lengths, line_load, work, surface, state)
             if widest > HIGHEST:
                 return TOO_FINE, iteration
-            if steps.fresh[k]:
-                if not factor_jacobian(k, steps):
+            if state.fresh[k]:
+                if not factor_jacobian(k, state):
                     return SINGULAR, iteration
-                _fill_responses(k, steps, response, lift)
+                _fill_responses(k, state, response, approach_slope)
                 renewed = True
-        if renewed and not factor_depths(members, shared, steps.rows, response, depths):
+        if renewed and not factor_depths(bodies, shared, state.rows, response, system):
             return SINGULAR, iteration
-        for again in range(2):
+        for sweep in range(2):
             for k in range(contacts):
-                if again:
-                    add_beyond(k, table, unit, line_load, lengths, steps)
-                take_step(k, loads[k] / spacing, line_load, steps, approach)
-            solve_depths(members, shared, steps.rows, response, lift, depths, steps.step, approach)
-        change, left = update_loads(line_load, steps, iteration > CAUTIOUS)
+                if sweep:
+                    correct_residual(k, table, unit, line_load, lengths, state)
+                take_step(k, loads[k] / spacing, line_load, state, approach)
+            solve_depths(
+                bodies, shared, state.rows, response, approach_slope, system, state.step, approach
+            )
+        change, left = update_loads(line_load, state, iteration > CAUTIOUS)
         for k in range(contacts):
-            foresee(k, surface, steps)
-        add_depths(members, shared, steps.change, surface)
-        status, before = settle(
-            iteration, unit, before, change, left, surface, steps, approach, line_load
+            predict_surface(k, surface, state)
+        add_depths(bodies, shared, state.change, surface)
+        status, before = check_convergence(
+            iteration, unit, before, change, left, surface, state, approach, line_load
         )
         if status == CONVERGED:
             fill_half_lengths(spacing, line_load, lengths, half_length)
             for k in range(contacts):
                 approach[k] += lowest[k]
-        if status != GOING_ON:
+        if status != CONTINUE:
             return status, iteration
     return NO_CONVERGENCE, MAX_ITERATIONS
 
@@ -153,50 +157,50 @@ def solve_coupled(
 @kernel
 def solve_each_coupled(
     gap: FloatArray,
-    own: FloatArray,
-    members: IntArray,
+    compliance: FloatArray,
+    bodies: IntArray,
     shared: FloatArray,
     loads: FloatArray,
     spacing: float,
     contact_modulus: float,
     longitudinal_curvature: float,
     table: FloatArray,
-    bend: FloatArray,
+    curvature_influence: FloatArray,
     line_load: FloatArray,
     approach: FloatArray,
     half_length: FloatArray,
     status: IntArray,
     iterations: IntArray,
 ) -> None:
-    """Solve sets of coupled contacts one by one, as `slender_each.solve_each` does uncoupled ones.
+    """Solve sets of coupled contacts, as `newton.solve_each` does for independent contacts.
 
     Parameters
     ----------
-    gap, own, members, shared, loads, line_load, approach, half_length : ndarray
-        As in `solve_coupled`, with the axis of the sets first, except for `members`.
-    spacing, contact_modulus, longitudinal_curvature, table, bend
+    gap, compliance, bodies, shared, loads, line_load, approach, half_length : ndarray
+        As in `solve_coupled`, with the axis of the sets first, except for `bodies`.
+    spacing, contact_modulus, longitudinal_curvature, table, curvature_influence
         As in `solve_coupled`.
     status, iterations : ndarray of int, shape (sets,)
-        Filled with what `solve_coupled` returns.
+        Filled with the values that `solve_coupled` returns.
     """
-    for m in range(gap.shape[0]):
-        for attempt in range(attempts(line_load[m])):
+    for number in range(gap.shape[0]):
+        for attempt in range(2 if np.any(line_load[number]) else 1):
             if attempt > 0:
-                forget_start(line_load[m])
-            status[m], iterations[m] = solve_coupled(
-                gap[m],
-                own[m],
-                members,
-                shared[m],
-                loads[m],
+                line_load[number] = 0.0
+            status[number], iterations[number] = solve_coupled(
+                gap[number],
+                compliance[number],
+                bodies,
+                shared[number],
+                loads[number],
                 spacing,
                 contact_modulus,
                 longitudinal_curvature,
                 table,
-                bend,
-                line_load[m],
-                approach[m],
-                half_length[m],
+                curvature_influence,
+                line_load[number],
+                approach[number],
+                half_length[number],
             )
-            if status[m] == CONVERGED:
+            if status[number] == CONVERGED:
                 break

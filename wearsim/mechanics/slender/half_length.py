@@ -1,21 +1,21 @@
-"""Half-lengths of strips that feel each other: longer or shorter than their own load makes them.
+"""Half-lengths of interacting strips.
 
-A strip without end, under the line load q, has a^2 = 4 q / (pi E* kappa), kappa being the relative
-curvature along rolling. In a patch the neighbours curve a strip too, and its half-length is the one
-at which the surface in its middle takes the curvature of the bodies:
+An infinitely wide strip under the line load q has a^2 = 4 q / (pi E* kappa) with the relative
+curvature along rolling kappa. In a patch the neighbouring strips curve the surface of a strip too,
+and its half-length is the one at which the surface in its middle has the curvature of the bodies:
 
     a_j^2 = s_j 4 q_j / (pi E* kappa),   s_j = s_j K_j,   K_j = (1/4) sum_k C_jk(a_k) / s_k,
 
-K_j being the curvature there over kappa (see `influence`). In a Hertzian ellipse of any axis ratio
-the pressure is semi-elliptic in every strip and s the same for all, so that the condition is exact;
-elsewhere it is as good as a semi-ellipse is. For s are taken the first `SWEEPS` evaluations of s K
-from s = 1. Two leave 2e-3 of p0 on a circle and 1e-4 at b/a = 3; to iterate to the end would gain
-little, and s would be ill-determined: the curvature in the middle hardly feels how a varies from
-one strip to the next.
+where K_j is that curvature over kappa (see `influence`). In a Hertzian ellipse of any axis ratio
+the pressure is semi-elliptic in every strip and s is the same for all, so that the condition is
+exact; elsewhere it is as accurate as the semi-ellipse. s is the result of `SWEEPS` evaluations of
+s K from s = 1. Two leave an error of 2e-3 of p0 on a circle and 1e-4 at b/a = 3. Iterating to
+convergence would gain little and s would be ill-conditioned, as the curvature in the middle hardly
+depends on the variation of a from one strip to the next.
 
 Where strips are wider than long, C_0 tends to 4, the other C_k to 0 and s to 1. The first sweep
-lies between 0 and 2 by itself. The bounds on s are met only by strips that are alone and far
-narrower than long, or that carry next to nothing beside others that carry much.
+always lies between 0 and 2. The bounds on s are reached only by isolated strips that are far
+narrower than long, and by strips with a very small load next to strips with a great one.
 """
 
 from __future__ import annotations
@@ -31,36 +31,34 @@ from wearsim.types import FloatArray, IntArray
 SWEEPS = 2
 LOWEST_FACTOR = 0.1
 HIGHEST_FACTOR = 4.0
-REACH = 4  # strips on either side whose loads are known to change s where contacts are followed
-NEWTON_REACH = 3  # the same in Newton's method, whose last steps then shrink a hundred times
+REACH = 4  # strips on either side whose loads enter the derivative of s in the chord method
+NEWTON_REACH = 3  # the same in Newton's method, whose last steps then shrink a hundredfold
 
 
-class Lengths(NamedTuple):
-    """Half-lengths of several contacts, and the work space for them.
+class HalfLengths(NamedTuple):
+    """Half-lengths of several contacts and their work space.
 
-    From `curvature_table`, or `no_table` where every strip is taken by itself; ln(a/dy) of such a
-    strip at 1 N/m; s and ln(a/dy) as last found (contacts, strips); the derivative of ln s_j by
-    ln q of the strip c - reach further (contacts, strips, c); work space.
+    `table` is from `curvature_table`, or from `no_table` for strips without interaction, and
+    `log_scale` is ln(a/dy) of such a strip at 1 N/m. `factor` is s and `log_ratio` is ln(a/dy),
+    (contacts, strips); `slope` is the derivative of ln s_j by ln q of strip j + c - reach,
+    (contacts, strips, c). `slope_part`, `gathered` and `work` are work space.
     """
 
     table: FloatArray
     log_scale: float
     factor: FloatArray
-    found: FloatArray
+    log_ratio: FloatArray
     slope: FloatArray
-    fresh: FloatArray
-    lengthening: FloatArray
+    slope_part: FloatArray
+    gathered: FloatArray
     work: FloatArray
 
 
 @kernel
-def new_lengths(contacts: int, table: FloatArray, log_scale: float, reach: int) -> Lengths:
-    """Return the `Lengths` of contacts whose every strip is taken by itself so far.
-
-    `reach` is `REACH` or `NEWTON_REACH`.
-    """
+def new_half_lengths(contacts: int, table: FloatArray, log_scale: float, reach: int) -> HalfLengths:
+    """Return the `HalfLengths` of contacts with s = 1; `reach` is `REACH` or `NEWTON_REACH`."""
     n = table.shape[2]
-    return Lengths(
+    return HalfLengths(
         table,
         log_scale,
         np.ones((contacts, n)),
@@ -73,30 +71,29 @@ def new_lengths(contacts: int, table: FloatArray, log_scale: float, reach: int) 
 
 
 @kernel
-def log_length(k: int, j: int, line_load: FloatArray, lengths: Lengths) -> float:
-    """Return ln(a/dy) of strip `j` of contact `k`, which carries load."""
-    tau: float = lengths.log_scale + 0.5 * np.log(line_load[k, j] * lengths.factor[k, j])
-    return tau
+def log_half_length(k: int, j: int, line_load: FloatArray, lengths: HalfLengths) -> float:
+    """Return ln(a/dy) of the loaded strip `j` of contact `k`."""
+    return float(lengths.log_scale + 0.5 * np.log(line_load[k, j] * lengths.factor[k, j]))
 
 
 @kernel
 def fill_half_lengths(
-    spacing: float, line_load: FloatArray, lengths: Lengths, half_length: FloatArray
+    spacing: float, line_load: FloatArray, lengths: HalfLengths, half_length: FloatArray
 ) -> None:
     """Fill the half-length a [m] of every strip, (contacts, strips)."""
     for k in range(line_load.shape[0]):
         for j in range(line_load.shape[1]):
             half_length[k, j] = 0.0
             if line_load[k, j] > 0.0:
-                half_length[k, j] = spacing * np.exp(log_length(k, j, line_load, lengths))
+                half_length[k, j] = spacing * np.exp(log_half_length(k, j, line_load, lengths))
 
 
 @kernel
 def add_around(
     j: int, first: int, last: int, weight: float, value: FloatArray, total: FloatArray
 ) -> None:
-    """Add what strip `j` does to all strips from `first` to `last`, `value` by distance."""
-    here = np.uint64(j)  # unsigned numbers let the loops be vectorised, see `linear`
+    """Add the influence of strip `j`, `value` by distance, to the strips `first` to `last`."""
+    here = np.uint64(j)  # unsigned indices allow vectorised loops, see `numerics.lu`
     for d in range(np.uint64(0), np.uint64(last - j + 1)):
         total[here + d] += weight * value[d]
     for d in range(np.uint64(1), np.uint64(j - first + 1)):
@@ -111,47 +108,46 @@ def _add_slope(
     tangent: FloatArray,
     chained: bool,
     slope: FloatArray,
-    fresh: FloatArray,
+    slope_part: FloatArray,
 ) -> None:
-    """Add how the curvature that strip `j` causes nearby follows the loads.
+    """Add the derivative by the loads of the curvature that strip `j` causes nearby.
 
-    It follows ln q_j through a and, once s has a `slope`, ln s_j through a and 1/s.
+    The curvature depends on ln q_j through a and, if `chained`, on ln s_j through a and 1/s.
     """
     wide = slope.shape[1]
     reach = wide // 2
     for i in range(max(0, j - reach), min(slope.shape[0], j + reach + 1)):
         by_length = weight * (tangent[abs(i - j)] - value[abs(i - j)])
-        fresh[i, j - i + 2 * reach] += by_length
+        slope_part[i, j - i + 2 * reach] += by_length
         if chained:
             by_factor, start = by_length - weight * value[abs(i - j)], j - i + reach
             for c in range(wide):
-                fresh[i, start + c] += by_factor * slope[j, c]
+                slope_part[i, start + c] += by_factor * slope[j, c]
 
 
 @kernel
-def _take_slope(
+def _update_slope(
     k: int,
     first: int,
     last: int,
     line_load: FloatArray,
     total: FloatArray,
     slope: FloatArray,
-    fresh: FloatArray,
+    slope_part: FloatArray,
 ) -> None:
-    """Add the slope of ln K to that of ln s, and empty it; what lies beyond reach is let go."""
+    """Add the slope of ln K to that of ln s, truncated to the reach, and clear `slope_part`."""
     wide = slope.shape[1]
     for j in range(max(0, first - wide // 2), min(slope.shape[0], last + wide // 2 + 1)):
         if line_load[k, j] > 0.0:
             scale = 1.0 / total[j]
             for c in range(wide):
-                slope[j, c] += fresh[j, c + wide // 2] * scale
-        for c in range(2 * wide - 1):
-            fresh[j, c] = 0.0
+                slope[j, c] += slope_part[j, c + wide // 2] * scale
+        slope_part[j] = 0.0
 
 
 @kernel
 def _find_span(k: int, line_load: FloatArray) -> tuple[int, int]:
-    """Return the first and the last strip with load; the last is before the first if none has."""
+    """Return the first and the last loaded strip; last < first if no strip is loaded."""
     first, last = 0, line_load.shape[1] - 1
     while last >= 0 and not line_load[k, last] > 0.0:
         last -= 1
@@ -161,104 +157,103 @@ def _find_span(k: int, line_load: FloatArray) -> tuple[int, int]:
 
 
 @kernel
-def _take_sweep(
-    k: int, first: int, last: int, line_load: FloatArray, total: FloatArray, lengths: Lengths
+def _update_factors(
+    k: int, first: int, last: int, line_load: FloatArray, total: FloatArray, lengths: HalfLengths
 ) -> float:
-    """Multiply s by the curvature found, between its bounds; return the greatest ln(a/dy)."""
+    """Multiply s by the curvature `total` within its bounds; return the greatest ln(a/dy)."""
     widest, factor = -np.inf, lengths.factor
     for j in range(first, last + 1):
         if line_load[k, j] > 0.0:
             before = factor[k, j]
             after = min(max(before * total[j], LOWEST_FACTOR), HIGHEST_FACTOR)
             factor[k, j] = after
-            lengths.found[k, j] += 0.5 * np.log(after / before)
-            widest = max(widest, lengths.found[k, j])
+            lengths.log_ratio[k, j] += 0.5 * np.log(after / before)
+            widest = max(widest, lengths.log_ratio[k, j])
     return widest
 
 
 @kernel
-def find_factors(k: int, line_load: FloatArray, sloped: bool, lengths: Lengths) -> float:
-    """Fill s and ln(a/dy) of contact `k`, and the slope of s if asked.
+def find_factors(k: int, line_load: FloatArray, sloped: bool, lengths: HalfLengths) -> float:
+    """Fill s and ln(a/dy) of contact `k`, and the slope of s if `sloped`.
 
     Parameters
     ----------
     k : int
-        Which contact.
+        Number of the contact.
     line_load : ndarray, shape (contacts, strips)
-        q [N/m]; strips without load take no part.
+        q [N/m]; strips without load are ignored.
     sloped : bool
-        Whether the slope is wanted as well.
-    lengths : Lengths
+        Whether the slope is computed.
+    lengths : HalfLengths
+        Filled.
 
     Returns
     -------
     float
-        The greatest ln(a/dy) met; past HIGHEST nothing more is found.
+        The greatest ln(a/dy) encountered; where it exceeds HIGHEST the results are incomplete.
     """
     total, value, tangent = lengths.work[0], lengths.work[1], lengths.work[2]
     slope, n = lengths.slope[k], line_load.shape[1]
     first, last = _find_span(k, line_load)
     widest = -np.inf
+    slope[:] = 0.0
     for j in range(n):
         lengths.factor[k, j] = 1.0
-        for c in range(slope.shape[1]):
-            slope[j, c] = 0.0
         if line_load[k, j] > 0.0:
-            lengths.found[k, j] = log_length(k, j, line_load, lengths)
-            widest = max(widest, lengths.found[k, j])
+            lengths.log_ratio[k, j] = log_half_length(k, j, line_load, lengths)
+            widest = max(widest, lengths.log_ratio[k, j])
     if lengths.table.shape[0] == 0:
         return widest
     for sweep in range(SWEEPS):
         if widest > HIGHEST:
             break
-        for j in range(n):
-            total[j] = 0.0
+        total[:] = 0.0
         for j in range(first, last + 1):
             if not line_load[k, j] > 0.0:
                 continue
             far, weight = max(last - j, j - first) + 1, 0.25 / lengths.factor[k, j]
             if sloped:
                 count = min(n, max(far, slope.shape[1]))
-                read_influence(lengths.table, lengths.found[k, j], count, value, tangent)
-                _add_slope(j, weight, value, tangent, sweep > 0, slope, lengths.fresh)
+                read_influence(lengths.table, lengths.log_ratio[k, j], count, value, tangent)
+                _add_slope(j, weight, value, tangent, sweep > 0, slope, lengths.slope_part)
             else:
-                read_values(lengths.table, lengths.found[k, j], far, value)
+                read_values(lengths.table, lengths.log_ratio[k, j], far, value)
             add_around(j, first, last, weight, value, total)
-        widest = max(widest, _take_sweep(k, first, last, line_load, total, lengths))
+        widest = max(widest, _update_factors(k, first, last, line_load, total, lengths))
         if sloped:
-            _take_slope(k, first, last, line_load, total, slope, lengths.fresh)
+            _update_slope(k, first, last, line_load, total, slope, lengths.slope_part)
     return widest
 
 
 @kernel
-def lengthen(
-    k: int, j: int, push: float, value: FloatArray, tangent: FloatArray, lengths: Lengths
+def gather_length_slopes(
+    k: int, j: int, push: float, value: FloatArray, tangent: FloatArray, lengths: HalfLengths
 ) -> None:
-    """Add how the loads near strip `j` of contact `k` move the surface around it through s_j.
+    """Add the derivative of the surface around strip `j` of contact `k` by ln q, through s_j.
 
     `value` and `tangent` are those of F_k (see `read_influence`), and `push` is the displacement
-    that F_k = 1 stands for.
+    for F_k = 1.
     """
-    slope, lengthening = lengths.slope[k], lengths.lengthening
+    slope, gathered = lengths.slope[k], lengths.gathered
     wide = slope.shape[1]
     reach = wide // 2
     for i in range(max(0, j - reach), min(slope.shape[0], j + reach + 1)):
         moved, start = push * (tangent[abs(i - j)] - value[abs(i - j)]), j - i + reach
         for c in range(wide):
-            lengthening[i, start + c] += moved * slope[j, c]
+            gathered[i, start + c] += moved * slope[j, c]
 
 
 @kernel
-def add_lengthening(
-    k: int, line_load: FloatArray, index: IntArray, lengths: Lengths, matrix: FloatArray
+def add_length_slopes(
+    k: int, line_load: FloatArray, index: IntArray, lengths: HalfLengths, matrix: FloatArray
 ) -> None:
-    """Add what `lengthen` has gathered to the Jacobian of contact `k`, by columns, and empty it.
+    """Add the terms of `gather_length_slopes` to the Jacobian of contact `k` and clear them.
 
-    `index` holds the row of each strip in contact, and -1 of the others, (contacts, strips).
+    `matrix` is stored by columns; `index` is the row of each strip in contact and -1 for the
+    others, (contacts, strips).
     """
-    lengthening = lengths.lengthening
-    n, wide = lengthening.shape
-    half = wide // 2
+    gathered = lengths.gathered
+    n, half = gathered.shape[0], gathered.shape[1] // 2
     first, last = _find_span(k, line_load)
     for j in range(first, last + 1):
         column = index[k, j]
@@ -267,7 +262,6 @@ def add_lengthening(
         scale = 1.0 / line_load[k, j]
         for i in range(max(0, j - half), min(n, j + half + 1)):
             if index[k, i] >= 0:
-                matrix[column, index[k, i]] += lengthening[i, j - i + half] * scale
+                matrix[column, index[k, i]] += gathered[i, j - i + half] * scale
     for i in range(max(0, first - half), min(n, last + half + 1)):
-        for c in range(wide):
-            lengthening[i, c] = 0.0
+        gathered[i] = 0.0

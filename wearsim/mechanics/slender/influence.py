@@ -1,19 +1,19 @@
-"""Displacement under strips that carry semi-elliptic pressure: the kernel of slender contact.
+"""Influence functions of strips with semi-elliptic pressure: displacement and curvature.
 
-A strip of width dy and half-length a that carries the line load q presses the surface down by
+A strip of width dy and half-length a with the line load q displaces the surface by
 ``F_k(a / dy) q / (pi E*)`` at the centre of the strip k places away (Kalker, On elastic line
 contact, J. Appl. Mech. 39 (1972), DOI 10.1115/1.3422842), with
 
     F_k = f((k + 1/2) dy/a) - f((k - 1/2) dy/a),
     f(t) = mean of asinh(t/|s|) over s in (-1, 1), weighted by (2/pi) sqrt(1 - s^2).
 
-At the same place that strip curves the surface along rolling by ``C_k q / (pi E* a^2)``, with
+At the same point the strip curves the surface along rolling by ``C_k q / (pi E* a^2)``, with
 
     C_k = h((k + 1/2) dy/a) - h((k - 1/2) dy/a),   h(t) = (4/pi) k' K,   k' = t / sqrt(1 + t^2),
 
-K being the complete elliptic integral of complementary modulus k'; it is the second derivative of f
-with respect to the place along rolling, and C_0 = 4 for a strip without end. F_k and C_k depend on
-ln(a/dy) alone, smoothly; so they are tabulated once and read by cubic interpolation.
+where K is the complete elliptic integral of complementary modulus k'. C_k is the second derivative
+of f with respect to the position along rolling, and C_0 = 4 for an infinitely wide strip. F_k and
+C_k are smooth functions of ln(a/dy) only; they are tabulated once and interpolated by cubics.
 """
 
 from __future__ import annotations
@@ -28,26 +28,23 @@ from wearsim.mechanics.hertz.ellipse import elliptic_integrals
 from wearsim.mechanics.numerics.jit import kernel
 from wearsim.types import FloatArray
 
-LOWEST = -10.0  # ln(a/dy) below which F_k no longer depends on a, to 1e-9
-HIGHEST = 4.75  # ln(a/dy) of the narrowest strips the table serves: dy = a/115
+LOWEST = -10.0  # ln(a/dy) below which F_k does not depend on a, to 1e-9
+HIGHEST = 4.75  # greatest ln(a/dy) of the table: strips of width dy = a/115
 STEP = 1.0 / 32.0
 
-_FAR = 3.0  # beyond this t the series below has converged to 1e-13
+_FAR = 3.0  # t above which the series has converged to 1e-13
 _TERMS = 10
 
 
-def _series_coefficients() -> list[float]:
-    """Return the coefficients of f(t) = ln(4t) + 1/2 + sum c_m t^(-2m)."""
-    coefficients = []
-    for m in range(1, _TERMS + 1):
-        catalan = comb(2 * m, m) // (m + 1)
-        asinh = (-1) ** (m + 1) * comb(2 * m, m) / 4.0**m / (2 * m)
-        coefficients.append(asinh * catalan / 4.0**m)
-    return coefficients
+def _series_coefficient(m: int) -> float:
+    """Return c_m of f(t) = ln(4t) + 1/2 + sum c_m t^(-2m)."""
+    catalan = comb(2 * m, m) // (m + 1)
+    asinh = (-1) ** (m + 1) * comb(2 * m, m) / 4.0**m / (2 * m)
+    return float(asinh * catalan / 4.0**m)
 
 
 def _near(t: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return f(t) and t f'(t) by Gauss quadrature, s = t sinh v making the integrands smooth."""
+    """Return f(t) and t f'(t) by Gauss quadrature; s = t sinh v makes the integrands smooth."""
     nodes, weights = np.polynomial.legendre.leggauss(24)
     angle = 0.25 * np.pi * (nodes + 1.0)
     reach = np.arcsinh(1.0 / t)[:, None]
@@ -78,26 +75,16 @@ def mean_asinh(t: FloatArray) -> tuple[FloatArray, FloatArray]:
     value[near], slope[near] = _near(t[near])
     inverse = t[~near] ** -2.0
     far_value, far_slope = np.zeros_like(inverse), np.zeros_like(inverse)
-    coefficients = _series_coefficients()
     for m in range(_TERMS, 0, -1):
-        far_value = (far_value + coefficients[m - 1]) * inverse
-        far_slope = (far_slope - 2.0 * m * coefficients[m - 1]) * inverse
+        coefficient = _series_coefficient(m)
+        far_value = (far_value + coefficient) * inverse
+        far_slope = (far_slope - 2.0 * m * coefficient) * inverse
     value[~near] = np.log(4.0 * t[~near]) + 0.5 + far_value
     slope[~near] = 1.0 + far_slope
     return value, slope
 
 
 @kernel
-def _fill_curvature(t: FloatArray, value: FloatArray, slope: FloatArray) -> None:
-    """Fill h(t) and t h'(t) at every distance."""
-    for i in range(t.shape[0]):
-        square = 1.0 + t[i] * t[i]
-        complement = t[i] / np.sqrt(square)
-        first, d_integral = elliptic_integrals(complement)
-        value[i] = 4.0 / np.pi * complement * first
-        slope[i] = 4.0 / np.pi * complement * d_integral / square
-
-
 def middle_curvature(t: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return h(t) and its logarithmic derivative t h'(t).
 
@@ -111,8 +98,13 @@ def middle_curvature(t: FloatArray) -> tuple[FloatArray, FloatArray]:
     value, slope : ndarray, shape (points,)
         h(t) and t h'(t), to 1e-15.
     """
-    value, slope = np.empty_like(t), np.empty_like(t)
-    _fill_curvature(t, value, slope)
+    value, slope = np.empty(len(t)), np.empty(len(t))
+    for i in range(len(t)):
+        square = 1.0 + t[i] * t[i]
+        complement = t[i] / np.sqrt(square)
+        first, d_integral = elliptic_integrals(complement)
+        value[i] = 4.0 / np.pi * complement * first
+        slope[i] = 4.0 / np.pi * complement * d_integral / square
     return value, slope
 
 
@@ -137,14 +129,14 @@ def influence_table(strips: int) -> FloatArray:
 def curvature_table(strips: int) -> FloatArray:
     """Tabulate C_k and its derivative by ln(a/dy).
 
-    Parameters and returns are those of `influence_table`, with C_k in the place of F_k.
+    Parameters and returned values are those of `influence_table`, with C_k instead of F_k.
     """
     return _tabulated(middle_curvature, strips)
 
 
 @cache
 def no_table(strips: int) -> FloatArray:
-    """Return a table without nodes, for strips that are taken by themselves."""
+    """Return a table without nodes, for half-lengths without interaction of the strips."""
     table = np.empty((0, 2, strips))
     table.setflags(write=False)
     return table
@@ -153,12 +145,10 @@ def no_table(strips: int) -> FloatArray:
 def _tabulated(
     function: Callable[[FloatArray], tuple[FloatArray, FloatArray]], strips: int
 ) -> FloatArray:
-    """Return a table of the differences of an odd function across strips k places away."""
+    """Return a table of the differences of an odd function over the strips k places away."""
     tau = LOWEST + STEP * np.arange(round((HIGHEST - LOWEST) / STEP) + 1)
-    edges = np.arange(strips) + 0.5
-    t = edges[None, :] * np.exp(-tau)[:, None]
-    value, slope = function(t.ravel())
-    value, slope = value.reshape(t.shape), slope.reshape(t.shape)
+    t = (np.arange(strips) + 0.5) * np.exp(-tau)[:, None]
+    value, slope = (part.reshape(t.shape) for part in function(t.ravel()))
     table = np.empty((len(tau), 2, strips))
     table[:, 0, 0], table[:, 1, 0] = 2.0 * value[:, 0], -2.0 * STEP * slope[:, 0]
     table[:, 0, 1:] = np.diff(value, axis=1)
@@ -169,9 +159,9 @@ def _tabulated(
 
 @kernel
 def _weights(table: FloatArray, tau: float) -> tuple[int, float, tuple[float, float, float, float]]:
-    """Return the node below `tau`, how far past it in steps, and the weights of the cubic.
+    """Return the node below `tau`, the distance to it in steps, and the weights of the cubic.
 
-    They are those of value and slope at the node, then at the one above.
+    The weights are those of value and slope at the node, then at the next one.
     """
     position = max((tau - LOWEST) / STEP, 0.0)
     node = min(int(position), table.shape[0] - 2)
@@ -183,7 +173,7 @@ def _weights(table: FloatArray, tau: float) -> tuple[int, float, tuple[float, fl
 
 @kernel
 def read_value(table: FloatArray, tau: float, distance: int) -> float:
-    """Interpolate F_k or C_k for one strip at one distance.
+    """Interpolate F_k or C_k of one strip at one distance.
 
     Parameters
     ----------
@@ -205,7 +195,7 @@ def read_value(table: FloatArray, tau: float, distance: int) -> float:
 
 @kernel
 def read_values(table: FloatArray, tau: float, count: int, value: FloatArray) -> None:
-    """Interpolate F_k or C_k for one strip; parameters are those of `read_influence`."""
+    """Interpolate F_k or C_k of one strip; parameters as in `read_influence`."""
     node, _, (v0, v1, w0, w1) = _weights(table, tau)
     low, low_slope = table[node, 0], table[node, 1]
     high, high_slope = table[node + 1, 0], table[node + 1, 1]
@@ -217,20 +207,20 @@ def read_values(table: FloatArray, tau: float, count: int, value: FloatArray) ->
 def read_influence(
     table: FloatArray, tau: float, count: int, value: FloatArray, tangent: FloatArray
 ) -> None:
-    """Interpolate F_k or C_k for one strip, and what Newton's method needs of it.
+    """Interpolate F_k or C_k of one strip, and its derivative for Newton's method.
 
     Parameters
     ----------
     table : ndarray, shape (nodes, 2, strips)
         From `influence_table` or `curvature_table`.
     tau : float
-        ln(a/dy) of the loaded strip, up to HIGHEST; below LOWEST it is taken as LOWEST.
+        ln(a/dy) of the loaded strip, up to HIGHEST; values below LOWEST are replaced by LOWEST.
     count : int
-        How many distances k to fill.
+        Number of distances k to fill.
     value : ndarray, shape (>= count,)
-        Receives F_k (or C_k).
+        Filled: F_k (or C_k).
     tangent : ndarray, shape (>= count,)
-        Receives d(q F_k)/dq = F_k + (dF_k/dtau)/2, since a grows as the root of q.
+        Filled: d(q F_k)/dq = F_k + (dF_k/dtau)/2, as a is proportional to the square root of q.
     """
     node, s, (v0, v1, w0, w1) = _weights(table, tau)
     half = 0.5 / STEP if tau > LOWEST else 0.0

@@ -1,10 +1,11 @@
-"""One step of Newton's method for slender contacts: displacements, their Jacobian and the step.
+"""Newton step of slender contacts: displacements, Jacobian and step.
 
-The Jacobian is exact but for what s owes to strips further than `NEWTON_REACH` (see
-`half_length`). It may serve for several steps, which then shrink twenty times or so where they
-would be squared; most of that is a strip's displacement under its own load, which is not straight.
-So each step is taken twice: the second time with what it leaves of that put right (`add_beyond`),
-and a new Jacobian is hardly needed unless strips leave or enter.
+The Jacobian is exact except for the dependence of s on the loads of strips further away than
+`NEWTON_REACH` (see `half_length`). It may be reused for several steps, which then shrink about
+twentyfold instead of quadratically; most of the error is the nonlinearity of a strip's displacement
+under its own load. Each step is therefore taken twice, the second time with the residual corrected
+for that nonlinearity (`correct_residual`). A new Jacobian is then rarely needed unless strips leave
+or enter the contact.
 """
 
 from __future__ import annotations
@@ -16,27 +17,28 @@ import numpy as np
 from wearsim.mechanics.numerics.jit import kernel
 from wearsim.mechanics.numerics.lu import factor_in_place, solve_factored
 from wearsim.mechanics.slender.half_length import (
-    Lengths,
+    HalfLengths,
     add_around,
-    add_lengthening,
+    add_length_slopes,
     find_factors,
-    lengthen,
+    gather_length_slopes,
 )
 from wearsim.mechanics.slender.influence import HIGHEST, read_influence, read_value, read_values
 from wearsim.types import BoolArray, FloatArray, IntArray
 
-STRAIGHT = 0.5  # relative change of a load up to which the Jacobian is trusted to be put right
+MAX_CORRECTED = 0.5  # relative change of a load up to which the residual is corrected
 
 
-class Steps(NamedTuple):
-    """What steps are made of, one entry per contact first, then one per strip in contact: its row.
+class NewtonState(NamedTuple):
+    """Jacobian, residual and step of the contacts; the first axis is the contact.
 
-    Whether the Jacobian is to be found anew; the number of rows; the strip of each row; the row of
-    each strip, -1 outside the contact; how all strips are displaced by the load of each row; the
-    Jacobian by columns, factored, and the order of its equations; the loads that a unit approach
-    adds [N/m^2], and their sum; the displacement of each strip under its own load [m] and its
-    derivative; what the loads have to press down further [m]; the step [N/m]; and the change of
-    load that was made of it, by strip [N/m].
+    A row is a strip in contact. `fresh` marks contacts that need a new Jacobian, `size` is the
+    number of rows, `place` the strip of each row, `rows` the row of each strip, -1 outside the
+    contact. `outer` is the displacement of all strips per load of each row, `matrix` the factored
+    Jacobian by columns and `order` the order of its equations. `unit_load` are the loads per unit
+    of approach [N/m^2] and `unit_load_sum` is their sum. `pressed` is the displacement of each
+    strip under its own load [m], `diagonal` its derivative, `missing` the residual [m], `step` the
+    step by row [N/m] and `change` the applied change of load by strip [N/m].
     """
 
     fresh: BoolArray
@@ -47,7 +49,7 @@ class Steps(NamedTuple):
     matrix: FloatArray
     order: IntArray
     unit_load: FloatArray
-    risen: FloatArray
+    unit_load_sum: FloatArray
     pressed: FloatArray
     diagonal: FloatArray
     missing: FloatArray
@@ -56,9 +58,9 @@ class Steps(NamedTuple):
 
 
 @kernel
-def new_steps(contacts: int, n: int) -> Steps:
-    """Return the `Steps` of contacts that have no Jacobian yet."""
-    return Steps(
+def new_newton_state(contacts: int, n: int) -> NewtonState:
+    """Return the `NewtonState` of contacts without a Jacobian."""
+    return NewtonState(
         np.ones(contacts, np.bool_),
         np.zeros(contacts, np.int64),
         np.empty((contacts, n), np.int64),
@@ -77,148 +79,144 @@ def new_steps(contacts: int, n: int) -> Steps:
 
 
 @kernel
-def _number_strips(k: int, line_load: FloatArray, steps: Steps) -> None:
-    """Give the strips of contact `k` that carry load their rows."""
+def _number_strips(k: int, line_load: FloatArray, state: NewtonState) -> None:
+    """Assign rows to the loaded strips of contact `k`."""
     count = 0
     for i in range(line_load.shape[1]):
-        steps.rows[k, i] = -1
+        state.rows[k, i] = -1
         if line_load[k, i] > 0.0:
-            steps.rows[k, i] = count
-            steps.place[k, count] = i
+            state.rows[k, i] = count
+            state.place[k, count] = i
             count += 1
-    steps.size[k] = count
+    state.size[k] = count
 
 
 @kernel
-def _press(
+def _fill_displacement(
     k: int,
     line_load: FloatArray,
     table: FloatArray,
     unit: float,
-    lengths: Lengths,
+    lengths: HalfLengths,
     work: FloatArray,
     surface: FloatArray,
-    steps: Steps,
+    state: NewtonState,
 ) -> None:
-    """Add contact `k`'s elastic displacement to `surface`, and fill a fresh Jacobian."""
-    n, size, fresh = line_load.shape[1], steps.size[k], steps.fresh[k]
+    """Add contact `k`'s elastic displacement to `surface` and fill a fresh Jacobian."""
+    n, size, fresh = line_load.shape[1], state.size[k], state.fresh[k]
     value, tangent, pressed = work[0], work[1], surface[k]
     for column in range(size):
-        j = steps.place[k, column]
-        push, tau, reach = unit * line_load[k, j], lengths.found[k, j], max(j + 1, n - j)
+        j = state.place[k, column]
+        push, tau, reach = unit * line_load[k, j], lengths.log_ratio[k, j], max(j + 1, n - j)
         if fresh:
             read_influence(table, tau, reach, value, tangent)
-            steps.diagonal[k, column] = unit * tangent[0]
-            outer = steps.outer[k, column]
-            for i in range(n):
-                outer[i] = 0.0
+            state.diagonal[k, column] = unit * tangent[0]
+            outer = state.outer[k, column]
+            outer[:] = 0.0
             add_around(j, 0, n - 1, unit, tangent, outer)
             for row in range(size):
-                steps.matrix[k, column, row] = outer[steps.place[k, row]]
+                state.matrix[k, column, row] = outer[state.place[k, row]]
             if lengths.table.shape[0] > 0:
-                lengthen(k, j, push, value, tangent, lengths)
+                gather_length_slopes(k, j, push, value, tangent, lengths)
         else:
             read_values(table, tau, reach, value)
-        steps.pressed[k, column] = push * value[0]
+        state.pressed[k, column] = push * value[0]
         add_around(j, 0, n - 1, push, value, pressed)
 
 
 @kernel
 def displace(
     k: int,
-    own: FloatArray,
+    compliance: FloatArray,
     table: FloatArray,
     unit: float,
-    lengths: Lengths,
+    lengths: HalfLengths,
     line_load: FloatArray,
     work: FloatArray,
     surface: FloatArray,
-    steps: Steps,
+    state: NewtonState,
 ) -> float:
-    """Add contact `k`'s displacement and own wear to `surface`; return the greatest ln(a/dy).
+    """Add displacement and wear of contact `k` to `surface`; return the greatest ln(a/dy).
 
-    `surface` holds the gap before and equals delta in contact at the solution. A fresh Jacobian is
-    filled. Past HIGHEST nothing is complete.
+    `surface` contains the gap on entry and equals delta in contact at the solution. A fresh
+    Jacobian is filled. Where the returned value exceeds HIGHEST the results are incomplete.
     """
-    fresh = steps.fresh[k]
+    fresh = state.fresh[k]
     if fresh:
-        _number_strips(k, line_load, steps)
+        _number_strips(k, line_load, state)
     widest = find_factors(k, line_load, fresh, lengths)
     if widest > HIGHEST:
         return widest
-    _press(k, line_load, table, unit, lengths, work, surface, steps)
+    _fill_displacement(k, line_load, table, unit, lengths, work, surface, state)
     if fresh and lengths.table.shape[0] > 0:
-        add_lengthening(k, line_load, steps.rows, lengths, steps.matrix[k])
-    for row in range(steps.size[k]):
-        i = steps.place[k, row]
-        surface[k, i] += own[k, i] * line_load[k, i]
-        steps.missing[k, row] = -surface[k, i]
+        add_length_slopes(k, line_load, state.rows, lengths, state.matrix[k])
+    for row in range(state.size[k]):
+        i = state.place[k, row]
+        surface[k, i] += compliance[k, i] * line_load[k, i]
+        state.missing[k, row] = -surface[k, i]
         if fresh:
-            steps.matrix[k, row, row] += own[k, i]
+            state.matrix[k, row, row] += compliance[k, i]
     return widest
 
 
 @kernel
-def factor_jacobian(k: int, steps: Steps) -> bool:
-    """Factor contact `k`'s fresh Jacobian; False where it is singular, or no approach adds load."""
-    size = steps.size[k]
-    if not factor_in_place(steps.matrix[k], size, steps.order[k]):
+def factor_jacobian(k: int, state: NewtonState) -> bool:
+    """Factor contact `k`'s fresh Jacobian; False if it is singular or approach adds no load."""
+    size = state.size[k]
+    if not factor_in_place(state.matrix[k], size, state.order[k]):
         return False
+    state.step[k, :size] = 1.0
+    solve_factored(state.matrix[k], size, state.order[k], state.step[k], state.unit_load[k])
+    state.unit_load_sum[k] = 0.0
     for row in range(size):
-        steps.step[k, row] = 1.0
-    solve_factored(steps.matrix[k], size, steps.order[k], steps.step[k], steps.unit_load[k])
-    steps.risen[k] = 0.0
-    for row in range(size):
-        steps.risen[k] += steps.unit_load[k, row]
-    steps.fresh[k] = False
-    sound: bool = abs(steps.risen[k]) > 0.0
-    return sound
+        state.unit_load_sum[k] += state.unit_load[k, row]
+    state.fresh[k] = False
+    return bool(abs(state.unit_load_sum[k]) > 0.0)
 
 
 @kernel
 def take_step(
-    k: int, load: float, line_load: FloatArray, steps: Steps, approach: FloatArray
+    k: int, load: float, line_load: FloatArray, state: NewtonState, approach: FloatArray
 ) -> None:
-    """Find contact `k`'s step, and the approach with which its strips carry `load` [N/m]."""
-    size, step = steps.size[k], steps.step[k]
-    solve_factored(steps.matrix[k], size, steps.order[k], steps.missing[k], step)
+    """Compute contact `k`'s step and the approach at which its strips carry `load` [N/m]."""
+    size, step = state.size[k], state.step[k]
+    solve_factored(state.matrix[k], size, state.order[k], state.missing[k], step)
     lacking = load
     for row in range(size):
-        lacking -= line_load[k, steps.place[k, row]] + step[row]
-    approach[k] = lacking / steps.risen[k]
+        lacking -= line_load[k, state.place[k, row]] + step[row]
+    approach[k] = lacking / state.unit_load_sum[k]
     for row in range(size):
-        step[row] += steps.unit_load[k, row] * approach[k]
+        step[row] += state.unit_load[k, row] * approach[k]
 
 
 @kernel
-def add_beyond(
+def correct_residual(
     k: int,
     table: FloatArray,
     unit: float,
     line_load: FloatArray,
-    lengths: Lengths,
-    steps: Steps,
+    lengths: HalfLengths,
+    state: NewtonState,
 ) -> None:
-    """Take what the step leaves of each strip's displacement by its own load off what is missing.
+    """Subtract the nonlinear part of each strip's displacement by its own load from the residual.
 
-    Strips whose load changes by more than `STRAIGHT` are left as they are: what is put right must
-    stay far smaller than the step.
+    Strips whose load changes by more than `MAX_CORRECTED` are skipped, as the correction must be
+    far smaller than the step.
     """
-    for row in range(steps.size[k]):
-        j = steps.place[k, row]
-        old, step = line_load[k, j], steps.step[k, row]
-        if abs(step) > STRAIGHT * old:
+    for row in range(state.size[k]):
+        j = state.place[k, row]
+        old, step = line_load[k, j], state.step[k, row]
+        if abs(step) > MAX_CORRECTED * old:
             continue
-        tau = min(lengths.found[k, j] + 0.5 * np.log1p(step / old), HIGHEST)
+        tau = min(lengths.log_ratio[k, j] + 0.5 * np.log1p(step / old), HIGHEST)
         pressed = unit * (old + step) * read_value(table, tau, 0)
-        steps.missing[k, row] -= pressed - steps.pressed[k, row] - steps.diagonal[k, row] * step
+        state.missing[k, row] -= pressed - state.pressed[k, row] - state.diagonal[k, row] * step
 
 
 @kernel
-def foresee(k: int, surface: FloatArray, steps: Steps) -> None:
-    """Add what the change of contact `k`'s loads displaces to `surface`, to first order."""
-    n = surface.shape[1]
-    for row in range(steps.size[k]):
-        change = steps.change[k, steps.place[k, row]]
-        for i in range(n):
-            surface[k, i] += change * steps.outer[k, row, i]
+def predict_surface(k: int, surface: FloatArray, state: NewtonState) -> None:
+    """Add the first-order displacement by contact `k`'s change of load to `surface`."""
+    for row in range(state.size[k]):
+        change = state.change[k, state.place[k, row]]
+        for i in range(surface.shape[1]):
+            surface[k, i] += change * state.outer[k, row, i]

@@ -19,7 +19,7 @@ import math
 import numpy as np
 
 from wearsim.mechanics.numerics.jit import kernel
-from wearsim.mechanics.tangential.fastsim import Sums, march_into, new_sums, part_of, stacked
+from wearsim.mechanics.tangential.fastsim import Sums, march_into, new_sums, slice_sums, stack_sums
 from wearsim.mechanics.tangential.strip_with_spin import (
     Moduli,
     Motion,
@@ -31,7 +31,7 @@ from wearsim.mechanics.tangential.strip_with_spin import (
 from wearsim.types import FloatArray
 
 # a direction alone turns smoothly: a fifth of the steps that a march of tractions takes will do
-_FEWER = 5
+_STEP_RATIO = 5
 
 
 @kernel
@@ -82,20 +82,20 @@ def fastrip(
                 motion.lateral / flexibility,
                 motion.spin / flexibility,
                 points,
-                part_of(sums, j, j + 1),
+                slice_sums(sums, j, j + 1),
             )
         else:
             strip = strip_of(j, half_length, bound_peak, motion, moduli)
             one_way = motion.lateral == 0.0 or motion.longitudinal[j] == 0.0
             # what slides one way does not turn, and one step is exact
-            steps = 1 if motion.spin == 0.0 and one_way else 1 + points // _FEWER
-            _adhere(j, strip, sums)
-            _slide(j, strip, steps, sums)
-    return stacked(sums)
+            steps = 1 if motion.spin == 0.0 and one_way else 1 + points // _STEP_RATIO
+            _integrate_adhesion(j, strip, sums)
+            _march_slip(j, strip, steps, sums)
+    return stack_sums(sums)
 
 
 @kernel
-def _adhere(j: int, strip: Strip, sums: Sums) -> None:
+def _integrate_adhesion(j: int, strip: Strip, sums: Sums) -> None:
     """Integrate the traction where strip `j` adheres."""
     a, radius = strip.half_length, strip.half_length - strip.shift
     if not radius > 0.0:
@@ -116,7 +116,7 @@ def _adhere(j: int, strip: Strip, sums: Sums) -> None:
 
 
 @kernel
-def _slide(j: int, strip: Strip, steps: int, sums: Sums) -> None:
+def _march_slip(j: int, strip: Strip, steps: int, sums: Sums) -> None:
     """March the traction's direction through the part of strip `j` that slides."""
     if not strip.shift > 0.0:
         return
@@ -133,7 +133,7 @@ def _slide(j: int, strip: Strip, steps: int, sums: Sums) -> None:
         next_cos = cosine * step_cos - sine * step_sin if k < steps - 1 else -1.0
         next_sin = sine * step_cos + cosine * step_sin if k < steps - 1 else 0.0
         slip_x, slip_y = slip_at(strip, x, e_x, e_y)
-        n_x, n_y = turned(strip, slip_x, slip_y, way, e_x, e_y)
+        n_x, n_y = turn_direction(strip, slip_x, slip_y, way, e_x, e_y)
         bound = 0.5 * a * a * (arc - next_sin * next_cos + sine * cosine)
         lever = a**3 * (next_sin**3 - sine**3) / 3.0
         along, across = 0.5 * strip.rise * (e_x + n_x), 0.5 * strip.rise * (e_y + n_y)
@@ -144,7 +144,7 @@ def _slide(j: int, strip: Strip, steps: int, sums: Sums) -> None:
 
 
 @kernel
-def turned(
+def turn_direction(
     strip: Strip, slip_x: float, slip_y: float, way: float, e_x: float, e_y: float
 ) -> tuple[float, float]:
     """Return the traction's direction e after a step.
@@ -205,12 +205,12 @@ def fastrip_fields(
         if beyond_strip_theory(j, half_length, bound_peak, motion, moduli):
             continue
         strip = strip_of(j, half_length, bound_peak, motion, moduli)
-        _put_fields(j, strip, out)
+        _fill_fields(j, strip, out)
     return out
 
 
 @kernel
-def _put_fields(j: int, strip: Strip, out: FloatArray) -> None:
+def _fill_fields(j: int, strip: Strip, out: FloatArray) -> None:
     """Put traction and slip of strip `j`, point by point from the leading edge."""
     a, d, rise = strip.half_length, strip.shift, strip.rise
     points = out.shape[1]
@@ -230,7 +230,7 @@ def _put_fields(j: int, strip: Strip, out: FloatArray) -> None:
         if arc > before:
             slip_x, slip_y = slip_at(strip, a * math.cos(middle), e_x, e_y)
             way = (arc - before) / math.sin(middle)
-            e_x, e_y = turned(strip, slip_x, slip_y, way, e_x, e_y)
+            e_x, e_y = turn_direction(strip, slip_x, slip_y, way, e_x, e_y)
         before = arc
         slip_x, slip_y = slip_at(strip, x, e_x, e_y)
         against = max(-(slip_x * e_x + slip_y * e_y), 0.0)

@@ -84,7 +84,7 @@ def march(
         points,
         sums,
     )
-    return stacked(sums)
+    return stack_sums(sums)
 
 
 @kernel
@@ -101,7 +101,7 @@ def new_sums(strips: int) -> Sums:
 
 
 @kernel
-def part_of(sums: Sums, first: int, stop: int) -> Sums:
+def slice_sums(sums: Sums, first: int, stop: int) -> Sums:
     """Return the room of the strips from `first` to before `stop`.
 
     Parameters
@@ -123,7 +123,7 @@ def part_of(sums: Sums, first: int, stop: int) -> Sums:
 
 
 @kernel
-def stacked(sums: Sums) -> FloatArray:
+def stack_sums(sums: Sums) -> FloatArray:
     """Return the first four of the sums as one array, shape (4, strips)."""
     out = np.empty((4, len(sums.force_x)))
     out[0], out[1], out[2], out[3] = sums.force_x, sums.force_y, sums.moment, sums.adhesion
@@ -226,7 +226,7 @@ def _step(
     """
     tx = sums.traction_x[j] - along * dx
     ty = sums.traction_y[j] - across * dx
-    sticks, scale = hold(tx, ty, bound)
+    sticks, scale = limit_traction(tx, ty, bound)
     sums.traction_x[j] = scale * tx
     sums.traction_y[j] = scale * ty
     weighed = scale * (sticking if sticks else sliding)
@@ -292,7 +292,7 @@ def bound_shape(place: float, elliptic: bool) -> float:
 
 
 @inlined_kernel
-def hold(traction_x: float, traction_y: float, bound: float) -> tuple[bool, float]:
+def limit_traction(traction_x: float, traction_y: float, bound: float) -> tuple[bool, float]:
     """Return whether the traction keeps to the bound, and the factor that holds it there.
 
     Parameters

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from wearsim.mechanics.numerics.jit import kernel
-from wearsim.mechanics.tangential.fastsim import Sums, clear, new_sums, stacked
+from wearsim.mechanics.tangential.fastsim import Sums, clear, new_sums, stack_sums
 from wearsim.types import FloatArray
 
 
@@ -43,7 +43,7 @@ def closed_form(
     closed_form_into(
         len(half_length), half_length, bound_peak, elliptic, gradient_x, gradient_y, sums
     )
-    return stacked(sums)
+    return stack_sums(sums)
 
 
 @kernel

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wearsim.mechanics.numerics.jit import kernel
-from wearsim.mechanics.tangential.fastsim import bound_shape, hold, place_of
+from wearsim.mechanics.tangential.fastsim import bound_shape, limit_traction, place_of
 from wearsim.types import FloatArray
 
 
@@ -73,7 +73,7 @@ def march_local_fields(
             dx = cell * a
             tx = out[0, k - 1, j] - gradient_x[j] * dx
             ty = out[1, k - 1, j] - (gradient_y + gradient_spin * middle * a) * dx
-            _, scale = hold(tx, ty, shape * (friction[k - 1, j] * bound_peak[j]))
+            _, scale = limit_traction(tx, ty, shape * (friction[k - 1, j] * bound_peak[j]))
             out[0, k, j] = scale * tx
             out[1, k, j] = scale * ty
             out[2, k, j] = (1.0 - scale) * tx

@@ -46,7 +46,7 @@ class Theory(NamedTuple):
     tables: tuple[Spline, Spline, Spline]
 
 
-class Asked(NamedTuple):
+class ContactInputs(NamedTuple):
     """What is asked of every contact.
 
     Loads [N], creepages and spins [1/m], all (contacts,); friction (contacts, points, strips), with
@@ -64,7 +64,7 @@ class Asked(NamedTuple):
     rolling_speed: float
 
 
-class Found(NamedTuple):
+class ContactResults(NamedTuple):
     """What comes out: a(y) [m], q(y) [N/m] and P_l [W/m] (contacts, strips), the rest (contacts,).
 
     Forces [N] and spin moment [N m] on body 1, adhering part of the area and power [W].
@@ -80,7 +80,7 @@ class Found(NamedTuple):
     power: FloatArray
 
 
-class Work(NamedTuple):
+class Workspace(NamedTuple):
     """Room for one contact: coverage and slip of all strips, and what the march takes.
 
     Half-lengths, gradients and bounds begin at the first strip in contact, and have room for as
@@ -103,9 +103,9 @@ def solve_contacts(
     theory: Theory,
     gaps: FloatArray,
     row: IntArray,
-    asked: Asked,
+    inputs: ContactInputs,
     patches: Patches,
-    found: Found,
+    results: ContactResults,
 ) -> int:
     """Solve every contact; their order and company change nothing.
 
@@ -129,11 +129,11 @@ def solve_contacts(
     """
     strips = len(bodies.y)
     room, lanes = np.empty((5, strips)), np.empty((3, _whole_lanes(strips)))
-    work = Work(room[0], room[1], room[2], room[3], room[4], lanes[0], lanes[1], lanes[2])
+    work = Workspace(room[0], room[1], room[2], room[3], room[4], lanes[0], lanes[1], lanes[2])
     total, sums = new_sums(strips), new_sums(_whole_lanes(strips))
-    alike = np.ones((theory.points, strips))
+    ones = np.ones((theory.points, strips))
     given = theory.given
-    find_patches(bodies, gaps, row, asked.normal_force, patches)
+    find_patches(bodies, gaps, row, inputs.normal_force, patches)
     last_ratio, last = math.nan, (math.nan, math.nan, math.nan)
     for k in range(len(row)):
         if patches.status[k] != CONVERGED:
@@ -151,18 +151,18 @@ def solve_contacts(
             a,
             b,
             patches.centre[k],
-            asked.normal_force[k],
-            found.half_length[k],
-            found.line_load[k],
+            inputs.normal_force[k],
+            results.half_length[k],
+            results.line_load[k],
             work.middle,
             work.coverage,
         )
-        _spread(k, bodies, asked, found.line_load[k], work)
+        _fill_creepage(k, bodies, inputs, results.line_load[k], work)
         _solve_tractions(
-            k, first, stop, last, theory, asked, patches, found, work, alike, sums, total
+            k, first, stop, last, theory, inputs, patches, results, work, ones, sums, total
         )
-        _sum_up(k, bodies, theory, asked, found, work, total)
-        if not math.isfinite(found.power[k]):
+        _fill_results(k, bodies, theory, inputs, results, work, total)
+        if not math.isfinite(results.power[k]):
             patches.status[k] = NOT_FINITE
             return k
     return len(row)
@@ -175,10 +175,10 @@ def _coefficients(theory: Theory, ratio: float) -> tuple[float, float, float]:
     if theory.kalker == LINE_LIMIT:
         limits = short_limit(ratio, nu)
         return limits[0], limits[1], limits[2]
-    found = (math.nan, math.nan, math.nan)
+    results = (math.nan, math.nan, math.nan)
     for which in range(3):
-        found = found[1], found[2], coefficient(which, ratio, nu, theory.tables[which])
-    return found
+        results = results[1], results[2], coefficient(which, ratio, nu, theory.tables[which])
+    return results
 
 
 @kernel
@@ -191,20 +191,20 @@ def _load_weighted_mean(values: FloatArray, line_load: FloatArray) -> float:
 
 
 @kernel
-def _spread(k: int, bodies: Bodies, asked: Asked, line_load: FloatArray, work: Work) -> None:
+def _fill_creepage(k: int, bodies: Bodies, inputs: ContactInputs, line_load: FloatArray, work: Workspace) -> None:
     """Spread the mean creepage over the strips, as `Creepage` says."""
-    strips, mean = len(bodies.y), asked.longitudinal[k]
-    varied = len(asked.variation) > 0
+    strips, mean = len(bodies.y), inputs.longitudinal[k]
+    varied = len(inputs.variation) > 0
     for j in range(strips):
         work.longitudinal[j] = mean
         work.spin_part[j] = 0.0
     if varied:
-        shift = _load_weighted_mean(asked.variation[k], line_load)
+        shift = _load_weighted_mean(inputs.variation[k], line_load)
         for j in range(strips):
-            work.longitudinal[j] = mean + (asked.variation[k, j] - shift)
-    elif asked.spin[k] != 0.0:
+            work.longitudinal[j] = mean + (inputs.variation[k, j] - shift)
+    elif inputs.spin[k] != 0.0:
         for j in range(strips):
-            work.spin_part[j] = -asked.spin[k] * bodies.y[j]
+            work.spin_part[j] = -inputs.spin[k] * bodies.y[j]
         shift = _load_weighted_mean(work.spin_part, line_load)
         for j in range(strips):
             work.spin_part[j] -= shift
@@ -218,11 +218,11 @@ def _solve_tractions(
     stop: int,
     coefficients: tuple[float, float, float],
     theory: Theory,
-    asked: Asked,
+    inputs: ContactInputs,
     patches: Patches,
-    found: Found,
-    work: Work,
-    alike: FloatArray,
+    results: ContactResults,
+    work: Workspace,
+    ones: FloatArray,
     sums: Sums,
     total: Sums,
 ) -> None:
@@ -230,49 +230,49 @@ def _solve_tractions(
     a, b = patches.a[k], patches.b[k]
     longitudinal, lateral, turning = _flexibilities(a, b, coefficients, theory.shear_modulus)
     if theory.single:
-        along = _mean_of_magnitudes(found.line_load[k], work)
-        spinning = asked.spin[k] * math.sqrt(a * b)
+        along = _mean_magnitude(results.line_load[k], work)
+        spinning = inputs.spin[k] * math.sqrt(a * b)
         longitudinal = one_flexibility(
-            longitudinal, lateral, turning, along, asked.lateral[k], spinning
+            longitudinal, lateral, turning, along, inputs.lateral[k], spinning
         )
         lateral, turning = longitudinal, longitudinal
-    parabola = 2.0 * asked.normal_force[k] / (math.pi * a * b)
-    _put_bounds(b, patches.peak_pressure[k], parabola, theory.elliptic, work)
+    parabola = 2.0 * inputs.normal_force[k] / (math.pi * a * b)
+    _fill_bounds(b, patches.peak_pressure[k], parabola, theory.elliptic, work)
     count, whole = stop - first, _whole_lanes(stop - first)
     for j in range(count):
         here = first + j
         mean = work.longitudinal[here] - work.spin_part[here]
         work.gradient_x[j] = mean / longitudinal + work.spin_part[here] / turning
-        work.half_length[j] = found.half_length[k, here]
+        work.half_length[j] = results.half_length[k, here]
         work.bound[j] = work.peak[here]
     for j in range(count, whole):  # strips of no length and no traction
         work.gradient_x[j] = work.half_length[j] = work.bound[j] = 0.0
-    gradient_y, gradient_spin = asked.lateral[k] / lateral, asked.spin[k] / turning
+    gradient_y, gradient_spin = inputs.lateral[k] / lateral, inputs.spin[k] / turning
     slopes = gradient_y, gradient_spin, longitudinal, lateral
     half_length, gradient_x, bound = work.half_length, work.gradient_x, work.bound
-    friction = asked.friction[k]
+    friction = inputs.friction[k]
     lanes, columns = friction.shape
     clear(len(total.force_x), total)
-    if lanes > 1 and not asked.carried:
+    if lanes > 1 and not inputs.carried:
         march_local(
             count, half_length, bound, friction, first, theory.elliptic, gradient_x, *slopes, sums
         )
-        _add(count, sums, 1.0, first, total)
+        _accumulate(count, sums, 1.0, first, total)
         return
     closed = theory.closed_form == ALWAYS
-    closed = closed or (theory.closed_form == EXACT and asked.spin[k] == 0.0)
+    closed = closed or (theory.closed_form == EXACT and inputs.spin[k] == 0.0)
     for lane in range(lanes):  # the particles of a pattern that rolls through, or one for all
         for j in range(count):
             bound[j] = friction[lane, first + j if columns > 1 else 0] * work.peak[first + j]
         if theory.element_sum:
             march_local(
-                count, half_length, bound, alike, first, theory.elliptic, gradient_x, *slopes, sums
+                count, half_length, bound, ones, first, theory.elliptic, gradient_x, *slopes, sums
             )
         elif closed:
             closed_form_into(
                 count, half_length, bound, theory.elliptic, gradient_x, gradient_y, sums
             )
-            if asked.spin[k] != 0.0:
+            if inputs.spin[k] != 0.0:
                 for j in range(count):
                     sums.moment[j] = 0.0  # phi x is left out, of the work as of the traction
         else:
@@ -287,7 +287,7 @@ def _solve_tractions(
                 theory.points,
                 sums,
             )
-        _add(count, sums, 1.0 / lanes, first, total)
+        _accumulate(count, sums, 1.0 / lanes, first, total)
 
 
 @kernel
@@ -309,7 +309,7 @@ def _flexibilities(
 
 
 @kernel
-def _mean_of_magnitudes(line_load: FloatArray, work: Work) -> float:
+def _mean_magnitude(line_load: FloatArray, work: Workspace) -> float:
     """Return the mean size of the longitudinal creepage without spin, weighted by the load."""
     product, load = 0.0, 0.0
     for j in range(len(line_load)):
@@ -319,8 +319,8 @@ def _mean_of_magnitudes(line_load: FloatArray, work: Work) -> float:
 
 
 @kernel
-def _put_bounds(
-    b: float, peak_pressure: float, parabola: float, elliptic: bool, work: Work
+def _fill_bounds(
+    b: float, peak_pressure: float, parabola: float, elliptic: bool, work: Workspace
 ) -> None:
     """Put the traction bound's pressure at x = 0 of every strip, elliptic or parabolic."""
     for j in range(len(work.peak)):
@@ -330,7 +330,7 @@ def _put_bounds(
 
 
 @kernel
-def _add(count: int, part: Sums, weight: float, first: int, total: Sums) -> None:
+def _accumulate(count: int, part: Sums, weight: float, first: int, total: Sums) -> None:
     """Add the weighted sums of the strips from `first` on to those of all."""
     for j in range(count):
         total.force_x[first + j] += weight * part.force_x[j]
@@ -341,12 +341,12 @@ def _add(count: int, part: Sums, weight: float, first: int, total: Sums) -> None
 
 
 @kernel
-def _sum_up(
-    k: int, bodies: Bodies, theory: Theory, asked: Asked, found: Found, work: Work, total: Sums
+def _fill_results(
+    k: int, bodies: Bodies, theory: Theory, inputs: ContactInputs, results: ContactResults, work: Workspace, total: Sums
 ) -> None:
     """Turn the sums along the strips into the solution of contact `k`."""
-    eta, phi, speed = asked.lateral[k], asked.spin[k], asked.rolling_speed
-    centre = _load_weighted_mean(bodies.y, found.line_load[k])
+    eta, phi, speed = inputs.lateral[k], inputs.spin[k], inputs.rolling_speed
+    centre = _load_weighted_mean(bodies.y, results.line_load[k])
     force_x, force_y, moment, power, sticking, length = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(len(bodies.y)):
         part = work.coverage[j]
@@ -355,13 +355,13 @@ def _sum_up(
             dissipation = part * (speed * total.work[j])
         else:
             dissipation = part * (-speed * (work.longitudinal[j] * tx + eta * ty + phi * turning))
-        found.dissipation[k, j] = dissipation
+        results.dissipation[k, j] = dissipation
         power += dissipation
         force_x += part * tx
         force_y += part * ty
         moment += part * turning - (bodies.y[j] - centre) * (part * tx)
         sticking += total.adhesion[j]
-        length += found.half_length[k, j]
-    found.force_x[k], found.force_y[k] = force_x * bodies.spacing, force_y * bodies.spacing
-    found.spin_moment[k], found.power[k] = moment * bodies.spacing, power * bodies.spacing
-    found.adhesion_fraction[k] = sticking / (2.0 * length)
+        length += results.half_length[k, j]
+    results.force_x[k], results.force_y[k] = force_x * bodies.spacing, force_y * bodies.spacing
+    results.spin_moment[k], results.power[k] = moment * bodies.spacing, power * bodies.spacing
+    results.adhesion_fraction[k] = sticking / (2.0 * length)

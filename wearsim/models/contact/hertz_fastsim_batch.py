@@ -11,7 +11,7 @@ from wearsim.contact_batch import BatchSolution, OperatingPoints
 from wearsim.mechanics.hertz.elasticity import ElasticPair
 from wearsim.mechanics.hertz.parabola_fit import CONVERGED
 from wearsim.mechanics.hertz.patches import Bodies, Patches, find_patches, half_lengths
-from wearsim.mechanics.tangential.hertz_fastsim_batch import Asked, Found, solve_contacts
+from wearsim.mechanics.tangential.hertz_fastsim_batch import ContactInputs, ContactResults, solve_contacts
 from wearsim.models.tangential.fastsim import FastsimTheory
 from wearsim.types import FloatArray, Grid, IntArray
 
@@ -60,13 +60,13 @@ class HertzFastsimBatch:
         forces = _loads(points.normal_force, longitudinal_curvature)
         self._check(len(row), points)
         patches = _patches(len(row))
-        found = Found(*np.zeros((3, len(row), strips)), *np.zeros((5, len(row))))
+        found = ContactResults(*np.zeros((3, len(row), strips)), *np.zeros((5, len(row))))
         first_failed = solve_contacts(
             self._bodies(longitudinal_curvature),
             self._theory,
             gaps,
             row,
-            Asked(
+            ContactInputs(
                 forces,
                 _column(points.longitudinal),
                 _column(points.lateral),

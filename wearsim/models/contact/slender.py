@@ -323,7 +323,7 @@ class Slender(ContactModel):
             return super().pass_loop(loop)
         from wearsim.mechanics.slender import chord_method, pass_loop  # noqa: PLC0415  (slow to load, rarely needed)
 
-        medium = chord_method.medium(
+        medium = chord_method.contact_constants(
             self._grid.spacing,
             self._pair.contact_modulus,
             self._pair.shear_modulus,
@@ -354,11 +354,11 @@ class Slender(ContactModel):
             chord_method.Loads(
                 loop.line_load, loop.anchor, loop.anchor_gap, loop.approach, loop.anchor_approach
             ),
-            chord_method.empty_follower(medium, *loop.nominal_gap.shape),
+            chord_method.new_chord_state(medium, *loop.nominal_gap.shape),
             loop.energy,
         )
         gap = loop.nominal_gap + loop.cylinder_depth + loop.roller_depth
-        if status == pass_loop.LOST:
+        if status == pass_loop.UNLOADED:
             raise ContactError(
                 f"contact is lost at pass {loop.first_pass + done}: the load is not positive",
                 {"line_load": loop.line_load, "gap": gap},

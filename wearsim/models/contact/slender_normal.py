@@ -9,8 +9,7 @@ import numpy as np
 
 from wearsim.contact_batch import BatchSolution, rows_of
 from wearsim.mechanics.numerics.jit import own_array
-from wearsim.mechanics.slender.batch import solve_each
-from wearsim.mechanics.slender.newton import CONVERGED, NOT_FINITE
+from wearsim.mechanics.slender.newton import CONVERGED, NOT_FINITE, solve_each
 from wearsim.plugins import SharedWear
 from wearsim.plugins.shared_wear import NO_BODY
 from wearsim.types import ContactSolution, FloatArray, IntArray, Number

@@ -7,7 +7,7 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
-from wearsim.mechanics.numerics.ornstein_uhlenbeck import follow
+from wearsim.mechanics.numerics.ornstein_uhlenbeck import filter_noise
 from wearsim.plugins import Distribution, Options, Process, RandomInputSpec, Uniforms
 from wearsim.quantities import PositiveDuration
 from wearsim.types import FloatArray
@@ -71,7 +71,7 @@ class OrnsteinUhlenbeck(Process):
         from scipy.special import ndtr, ndtri  # noqa: PLC0415  (slow to import)
 
         memory = math.exp(-self.spacing / self.correlation_time)
-        scores = follow(ndtri(uniforms(0, points)), memory)
+        scores = filter_noise(ndtri(uniforms(0, points)), memory)
         if self.level > 0.0:
             lasting = float(ndtri(uniforms(_LEVEL_AT, 1))[0])
             scores = math.sqrt(self.level) * lasting + math.sqrt(1.0 - self.level) * scores
