@@ -1,4 +1,4 @@
-"""Fixtures of the scenario room: a registry of small plugins, and a parser of changed text."""
+"""Fixtures of the scenario tests: a registry of small plugins, and a parser of changed text."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from random_examples import SmallRandomInputs
 from scenario_examples import GOOD, Parse, SmallPlugins
 
 import wearsim.scenario.parse.key_index
+import wearsim.scenario.parse.mistakes
 import wearsim.scenario.random.parse
-import wearsim.scenario.schema.document
-import wearsim.scenario.schema.random_inputs
+import wearsim.scenario.schema
 import wearsim.scenario.tables.plugin
 from wearsim.plugins.manager import Registry
 from wearsim.scenario import Scenario, parse_scenario
@@ -23,9 +23,9 @@ def small_registry(monkeypatch: pytest.MonkeyPatch) -> Registry:
     for module in (
         wearsim.scenario.tables.plugin,
         wearsim.scenario.parse.key_index,
+        wearsim.scenario.parse.mistakes,
         wearsim.scenario.random.parse,
-        wearsim.scenario.schema.random_inputs,
-        wearsim.scenario.schema.document,
+        wearsim.scenario.schema,
     ):
         monkeypatch.setattr(module, "registry", lambda: registry)
     return registry

@@ -125,7 +125,7 @@ rig.toml: [load.thermal] time_constant: is missing, expected a time such as "450
         LOAD,
         '[load]\nkind = "spring"\nstiffness = "3 N"\nthermal = 3\n[load.spring]\n[load.thrmal]\n',
         """\
-rig.toml: [load.spring]: 'spring' is no term but a load of its own, chosen by load.kind
+rig.toml: [load.spring]: 'spring' is a load, chosen by load.kind, not a term
 rig.toml: [load.thrmal]: no load is named 'thrmal'; known: constant, recorded, spring, thermal; did you mean 'thermal'?
 rig.toml: [load] thermal: is a term of the load, got 3, expected a table [load.thermal]
 rig.toml: [load] normal_force: is missing, expected a force above zero such as "300 N"
@@ -167,7 +167,7 @@ rig.toml: [cylinder] profile: log.csv line 1: column 'height' is missing, got ti
 rig.toml: [creepage] bearing_torque: is needed with drive = "free", got none
 rig.toml: [creepage] longitudinal: has no meaning with drive = "free"
 rig.toml: [creepage] yaw (entry 3): needs a unit, got 3, expected an angle such as "1 mrad"
-rig.toml: [creepage] tilt: a list has one value per roller, got 1 value, expected 3, as operation.rollers says""",
+rig.toml: [creepage] tilt: a list has one value per roller, got 1 value, expected 3, the value of operation.rollers""",
     ),
     "a prescribed creepage that is missing": (
         SLIP,

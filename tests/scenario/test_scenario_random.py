@@ -69,7 +69,7 @@ def test_that_a_draw_is_in_si(rig: Scenario) -> None:
     slack, friction, load, _ = rig.random
     np.testing.assert_allclose(load.values(np.array([[0.0], [0.75]])), [[200.0], [350.0]])
     np.testing.assert_allclose(slack.values(np.array([[0.0, 1.0]])), [[-2e-3, 2e-3]])
-    with pytest.raises(TypeError, match="no one value per draw"):
+    with pytest.raises(TypeError, match="no single value per draw"):
         friction.values(np.zeros((1, 0)))
 
 
@@ -384,7 +384,7 @@ rig.toml: [load.normal_force] persistance: unknown key (did you mean 'persistenc
     "a field of loads": (
         FORCE_LINE,
         'normal_force = {distribution = "patches"}',
-        'rig.toml: [load.normal_force] distribution: differs within the contact, as only friction.coefficient can, got "patches", expected one of "bell", "flat", "logged", "wander"',
+        'rig.toml: [load.normal_force] distribution: varies within the contact, which only friction.coefficient can, got "patches", expected one of "bell", "flat", "logged", "wander"',
     ),
     "a field without a marginal": (
         MU,
@@ -409,7 +409,7 @@ rig.toml: [friction.coefficient.marginal] men: unknown key (did you mean 'mean'?
     "a process as the marginal": (
         MU,
         'coefficient = {distribution = "patches", length = "3 um", marginal = {distribution = "wander"}}',
-        'rig.toml: [friction.coefficient.marginal] distribution: is a process, and a marginal is one number\'s, got "wander", expected one of "bell", "flat", "logged"',
+        'rig.toml: [friction.coefficient.marginal] distribution: is a process, but a marginal is the distribution of one number, got "wander", expected one of "bell", "flat", "logged"',
     ),
     "a marginal that is no table": (
         MU,
@@ -424,12 +424,12 @@ rig.toml: [friction.coefficient.marginal] men: unknown key (did you mean 'mean'?
     "a marginal of a scalar": (
         MU,
         'coefficient = {distribution = "flat", low = 0, high = 1, marginal = {distribution = "flat"}}',
-        "rig.toml: [friction.coefficient] marginal: goes with a field or a process, and 'flat' is neither",
+        "rig.toml: [friction.coefficient] marginal: is only for a field or a process; 'flat' is neither",
     ),
     "a process per pass": (
         MU,
         'coefficient = {distribution = "wander", time = "3 s", persistence = "per-pass", marginal = {distribution = "flat", low = 0, high = 1}}',
-        'rig.toml: [friction.coefficient] persistence: would break a process, which goes on through the whole test, got "per-pass", expected "per-test" or "per-roller"',
+        'rig.toml: [friction.coefficient] persistence: is not for a process, which runs through the whole test, got "per-pass", expected "per-test" or "per-roller"',
     ),
     "a wear factor per pass": (
         K,
@@ -449,7 +449,7 @@ rig.toml: [friction.coefficient.marginal] men: unknown key (did you mean 'mean'?
     "a misalignment of one value": (
         XI,
         f'{XI}\nmisalignment = {{distribution = "flat", low = "0 rad", high = "1 mrad"}}',
-        'rig.toml: [creepage.misalignment] distribution: sets one value, and creepage.misalignment stands for yaw and tilt, got "flat", expected one of "pair", "square"',
+        'rig.toml: [creepage.misalignment] distribution: sets one value, but creepage.misalignment sets yaw and tilt, got "flat", expected one of "pair", "square"',
     ),
     "a misalignment that is not random": (
         XI,
@@ -471,7 +471,7 @@ rig.toml: [creepage] tilt: is set by misalignment already, got a table, expected
     "two angles of one": (
         XI,
         f'{XI}\nyaw = {{distribution = "square", side = "2 mrad"}}',
-        'rig.toml: [creepage.yaw] distribution: sets several values together, as only creepage.misalignment can, got "square", expected one of "bell", "flat", "logged", "wander"',
+        'rig.toml: [creepage.yaw] distribution: sets several values together, which only creepage.misalignment can, got "square", expected one of "bell", "flat", "logged", "wander"',
     ),
     "a file that is not there": (
         FORCE_LINE,
@@ -539,7 +539,7 @@ def test_that_what_no_contact_sees_cannot_change_in_time(key):
     unit = "1/Pa" if "wear" in key else "m"
     marginal = {"distribution": "uniform", "low": f"1e-11 {unit}", "high": f"2e-11 {unit}"}
     process = {"distribution": "ornstein-uhlenbeck", "correlation_time": "1 min"}
-    with pytest.raises(ScenarioError, match="changes in time, as only"):
+    with pytest.raises(ScenarioError, match="varies in time, which only"):
         load_scenario(RIG, {key: {**process, "marginal": marginal}})
 
 

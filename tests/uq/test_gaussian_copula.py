@@ -54,7 +54,7 @@ def test_that_groups_do_not_touch_each_other():
 def test_that_tied_numbers_stay_strictly_between_0_and_1():
     copula = GaussianCopula([("a", "b", 0.7)], {"a": 1, "b": 1})
     ends = np.array([[2.0**-53], [1.0 - 2.0**-53]])
-    tied = copula.tie({"a": ends, "b": ends})["b"]
+    tied = copula.correlate({"a": ends, "b": ends})["b"]
     assert ((tied > 0.0) & (tied < 1.0)).all()
 
 

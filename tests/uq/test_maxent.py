@@ -15,7 +15,7 @@ from scipy.special import digamma
 
 from wearsim.errors import WearsimError
 from wearsim.types import FloatArray
-from wearsim.uq.distributions.base import Law
+from wearsim.uq.distributions.base import MaxentDistribution
 from wearsim.uq.distributions.maxent import Infeasible, maximum_entropy
 from wearsim.uq.distributions.truncated_normal import QuadraticExponent, TruncatedNormal, cut_normal
 
@@ -48,7 +48,7 @@ KNOWN = {
 
 
 @pytest.fixture(params=KNOWN)
-def law(request: pytest.FixtureRequest) -> Law:
+def law(request: pytest.FixtureRequest) -> MaxentDistribution:
     support, mean, std, mean_log = KNOWN[request.param]
     return maximum_entropy(support, mean, std, mean_log)
 
@@ -58,7 +58,7 @@ def uniforms() -> FloatArray:
     return np.random.default_rng(5).random(1_000_000)
 
 
-def integral(law: Law, power: float, low: float, high: float) -> float:
+def integral(law: MaxentDistribution, power: float, low: float, high: float) -> float:
     """Integrate the density times a power of the distance from the mean, by adaptive rules."""
 
     def function(x: float) -> float:
@@ -67,7 +67,7 @@ def integral(law: Law, power: float, low: float, high: float) -> float:
     return float(quad(function, low, high, epsabs=1e-13, epsrel=1e-12, limit=200)[0])
 
 
-def ends(law: Law) -> tuple[float, float]:
+def ends(law: MaxentDistribution) -> tuple[float, float]:
     """Return the support, or where an infinite one has nothing left."""
     low, high = law.support
     return max(low, law.mean - 60 * law.std), min(high, law.mean + 60 * law.std)
@@ -115,14 +115,14 @@ def test_that_there_is_no_parent_where_the_density_is_dented() -> None:
     assert law.multipliers[1] == pytest.approx(-law.multipliers[2], rel=1e-12)  # by symmetry
 
 
-def test_that_the_multipliers_give_the_density(law: Law) -> None:
+def test_that_the_multipliers_give_the_density(law: MaxentDistribution) -> None:
     l0, l1, l2 = law.multipliers
     x = law.quantile(np.array([0.03, 0.4, 0.98]))
     third = np.log(x) if law.third == "log x" else x * x
     assert law.density(x) == pytest.approx(np.exp(-l0 - l1 * x - l2 * third), rel=1e-9)
 
 
-def test_that_the_density_has_the_moments_that_are_told(law: Law) -> None:
+def test_that_the_density_has_the_moments_that_are_told(law: MaxentDistribution) -> None:
     low, high = ends(law)
     middle = float(law.quantile(np.array(0.5)))
     for power, expected in ((0, 1.0), (1, 0.0), (2, 1.0)):
@@ -130,7 +130,7 @@ def test_that_the_density_has_the_moments_that_are_told(law: Law) -> None:
         assert whole == pytest.approx(expected, abs=1e-9)
 
 
-def test_that_what_is_known_is_met(law: Law, request: pytest.FixtureRequest) -> None:
+def test_that_what_is_known_is_met(law: MaxentDistribution, request: pytest.FixtureRequest) -> None:
     _, mean, std, mean_log = next(
         known for known in KNOWN.values() if maximum_entropy(*known).multipliers == law.multipliers
     )
@@ -144,7 +144,7 @@ def test_that_what_is_known_is_met(law: Law, request: pytest.FixtureRequest) -> 
         assert np.log(values).mean() == pytest.approx(mean_log, abs=2e-5)
 
 
-def test_that_quantiles_invert_the_integral_of_the_density(law: Law) -> None:
+def test_that_quantiles_invert_the_integral_of_the_density(law: MaxentDistribution) -> None:
     probabilities = np.array([1e-4, 0.025, 0.3, 0.6, 0.975, 0.9999])
     values = law.quantile(probabilities)
     low, high = ends(law)
@@ -154,7 +154,9 @@ def test_that_quantiles_invert_the_integral_of_the_density(law: Law) -> None:
         assert integral(law, 0, value, high) == pytest.approx(1.0 - probability, rel=1e-9)
 
 
-def test_that_a_million_draws_have_the_mean_and_the_std(law: Law, uniforms: FloatArray) -> None:
+def test_that_a_million_draws_have_the_mean_and_the_std(
+    law: MaxentDistribution, uniforms: FloatArray
+) -> None:
     draws = law.quantile(uniforms)
     centred = draws - law.mean
     # each within 4 of its own standard errors, the draws' fourth moment telling that of the std
@@ -163,7 +165,7 @@ def test_that_a_million_draws_have_the_mean_and_the_std(law: Law, uniforms: Floa
     assert abs((centred**2).mean() / law.std**2 - 1.0) < 4.0 * fourth / 1e3
 
 
-def test_that_quantiles_rise_from_end_to_end(law: Law) -> None:
+def test_that_quantiles_rise_from_end_to_end(law: MaxentDistribution) -> None:
     probabilities = np.concatenate([[0.0], np.logspace(-15, -1, 60), np.linspace(0.1, 1.0, 400)])
     values = law.quantile(probabilities)
     assert (values[0], values[-1]) == law.support
@@ -171,7 +173,7 @@ def test_that_quantiles_rise_from_end_to_end(law: Law) -> None:
     assert law.quantile(probabilities.reshape(-1, 1)).shape == (461, 1)
 
 
-def test_that_nothing_lies_outside_the_support(law: Law) -> None:
+def test_that_nothing_lies_outside_the_support(law: MaxentDistribution) -> None:
     low, high = law.support
     outside = np.array([low - 1.0 if low > -INF else 0.0, high + 1.0 if high < INF else 0.0])
     wrong = (outside < low) | (outside > high)
@@ -298,10 +300,10 @@ def test_that_a_spike_at_a_far_limit_is_told() -> None:
 
 def test_that_the_spike_makes_up_the_std() -> None:
     law = maximum_entropy((0.0, 1.0), 1e-3, 1.1e-3)
-    trough = law.trough
-    assert trough is not None
+    antimode = law.antimode
+    assert antimode is not None
     above = integral(law, 0, 0.96, 1.0)
-    assert above == pytest.approx(trough[1], rel=1e-6)
+    assert above == pytest.approx(antimode[1], rel=1e-6)
     assert integral(law, 2, 0.0, 0.04) + integral(law, 2, 0.96, 1.0) == pytest.approx(1.0, rel=1e-9)
 
 
@@ -324,7 +326,7 @@ def test_that_the_unit_does_not_matter() -> None:
     assert si.multipliers[2] == pytest.approx(engineers.multipliers[2] * 1e12)
 
 
-def test_that_laws_travel_between_processes(law: Law) -> None:
+def test_that_laws_travel_between_processes(law: MaxentDistribution) -> None:
     values = np.linspace(0.01, 0.99, 9)
     assert np.array_equal(
         pickle.loads(pickle.dumps(law)).quantile(values),  # it was made here

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from wearsim.uq.estimation.moments import order_ranks
-from wearsim.uq.estimation.quantiles import WeightedLaw, fractional_ranks
+from wearsim.uq.estimation.quantiles import WeightedDistribution, fractional_ranks
 
 
 @given(st.integers(1, 100_000), st.floats(0.001, 0.999))
@@ -34,26 +34,29 @@ def test_that_each_end_is_missed_by_half_of_what_the_confidence_leaves(count, pr
 def test_that_equal_weights_give_numpys_quantiles(count, probability):
     values = np.random.default_rng(count).random(count)
     known = pytest.approx(np.quantile(values, probability), rel=1e-12)
-    assert WeightedLaw(values).quantile(probability) == known
-    assert WeightedLaw(values, np.full(count, 1.0 / count)).quantile(probability) == known
+    assert WeightedDistribution(values).quantile(probability) == known
+    assert WeightedDistribution(values, np.full(count, 1.0 / count)).quantile(probability) == known
 
 
 def test_that_a_level_is_a_rank_and_there_is_nothing_beyond_the_ends():
-    law = WeightedLaw(np.array([3.0, 1.0, 2.0, 4.0]))
+    law = WeightedDistribution(np.array([3.0, 1.0, 2.0, 4.0]))
     assert [law.at(rank / 5.0) for rank in (1, 2, 2.5, 4)] == pytest.approx([1.0, 2.0, 2.5, 4.0])
     assert (law.at(0.99 / 5.0), law.at(4.01 / 5.0)) == (-math.inf, math.inf)
 
 
 def test_that_a_value_of_twice_the_weight_counts_as_two():
     weights = np.array([1.0, 2.0, 1.0]) / 4.0
-    law, plain = WeightedLaw(np.array([1.0, 2.0, 3.0]), weights), np.array([1.0, 2.0, 2.0, 3.0])
+    law, plain = (
+        WeightedDistribution(np.array([1.0, 2.0, 3.0]), weights),
+        np.array([1.0, 2.0, 2.0, 3.0]),
+    )
     assert law.quantile(0.5) == pytest.approx(np.median(plain))
 
 
 def test_that_negative_weights_let_no_quantile_fall():
     rng = np.random.default_rng(8)
     weights = rng.normal(0.02, 0.03, 50)
-    law = WeightedLaw(rng.random(50), weights / weights.sum())
+    law = WeightedDistribution(rng.random(50), weights / weights.sum())
     assert weights.min() < 0.0
     levels = np.linspace(0.01, 0.99, 99)
     assert (np.diff([law.quantile(level) for level in levels]) >= 0.0).all()

@@ -1,4 +1,4 @@
-"""A scenario: TOML with units, validated as a whole, frozen, in SI."""
+"""Scenarios: TOML with units, validated as a whole, immutable and in SI once read."""
 
 from wearsim.scenario.model_label import described_model
 from wearsim.scenario.parse.overrides import parse_override
@@ -6,7 +6,7 @@ from wearsim.scenario.parse.toml import load_scenario, parse_scenario
 from wearsim.scenario.random.model import Persistence, RandomInput
 from wearsim.scenario.random.substitute import realise
 from wearsim.scenario.scenario import Drawn, Scenario, require_run
-from wearsim.scenario.schema.document import scenario_schema
+from wearsim.scenario.schema import scenario_schema
 from wearsim.scenario.tables.bodies import Cylinder, Roller, read_profile
 from wearsim.scenario.tables.plain import (
     CreepageTable,

@@ -1,4 +1,4 @@
-"""The scenarios that come with wearsim."""
+"""The scenarios shipped with wearsim."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from wearsim.scenario.scenario import Scenario
 
 _PACKAGE = Path(__file__).parents[1]
 
-# an installed package holds them; in the source tree they stand beside it
+# inside an installed package; next to the package in the source tree
 _FOLDERS = (_PACKAGE / "scenarios", _PACKAGE.parent / "scenarios")
 
 
 def shipped_scenario(name: str, overrides: Mapping[str, object] | None = None) -> Scenario:
-    """Read a scenario that comes with wearsim, installed or not.
+    """Read a scenario shipped with wearsim.
 
     Parameters
     ----------
     name : str
-        Its file's name without the suffix, "mean-contact".
+        File name without the suffix, "mean-contact".
     overrides : mapping of str to object, optional
-        Values by dotted key, as of `load_scenario`.
+        Values by dotted key, as for `load_scenario`.
 
     Returns
     -------
@@ -37,9 +37,6 @@ def shipped_scenario(name: str, overrides: Mapping[str, object] | None = None) -
     return load_scenario(folder / f"{name}.toml", overrides)
 
 
-_STARTER = Path(__file__).with_name("starter.toml")
-
-
 def starter_scenario() -> str:
-    """Return a scenario that runs as it stands, with its alternatives in comments."""
-    return _STARTER.read_text(encoding="utf-8")
+    """Return the TOML of a complete scenario, with alternatives as comments."""
+    return Path(__file__).with_name("starter.toml").read_text(encoding="utf-8")

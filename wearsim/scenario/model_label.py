@@ -1,4 +1,4 @@
-"""A contact model with the options that a scenario gives it, in a line."""
+"""One-line label of a contact model with its options."""
 
 from __future__ import annotations
 
@@ -9,24 +9,23 @@ from wearsim.units import shown
 
 
 def described_model(model: str, scenario_text: str) -> str:
-    """Return a contact model with its options, ``slender (tangential = "fastsim")``.
+    """Return the label of a contact model, ``slender (tangential = "fastsim")``.
 
     Parameters
     ----------
     model : str
-        Its name.
+        Name of the model.
     scenario_text : str
-        The scenario's TOML; the model itself need not be installed.
+        TOML of the scenario; the model's plugin need not be installed.
 
     Returns
     -------
     str
-        The name alone where the scenario gives no option.
+        Only the name if the scenario gives no option.
     """
-    table = tomllib.loads(scenario_text).get("contact", {})
     given = [
         f"{key} = {shown(value)}"
-        for key, value in table.items()
+        for key, value in tomllib.loads(scenario_text).get("contact", {}).items()
         if key not in ContactTable.model_fields
     ]
     return f"{model} ({', '.join(given)})" if given else model

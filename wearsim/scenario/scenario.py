@@ -1,4 +1,4 @@
-"""The scenario: frozen, validated, in SI, with the text and files it came from."""
+"""The scenario: immutable, validated, in SI, with its TOML text and its input files."""
 
 from __future__ import annotations
 
@@ -27,30 +27,30 @@ Drawn: TypeAlias = float | tuple[float, ...]
 
 @dataclass(frozen=True, eq=False)
 class Scenario:
-    """Everything that is asked of a run, in SI.
+    """All inputs of a run, in SI.
 
     Parameters
     ----------
     file : str
-        Where the scenario came from.
+        The file that it was read from.
     title : str
-        What it is, in a line.
+        One line of description.
     seed : int
-        Seed of every random draw.
+        Seed of all random draws.
     text : str
-        Its TOML, overrides included.
+        Its TOML, with the overrides applied.
     files : mapping of str to str
-        Content of every file it names, by the path as written.
+        Content of every file it names, by the path as written in the scenario.
     roller, cylinder, operation, load, friction, creepage, contact, evolution, outputs, sampling
-        The tables; what is random has its mean in them.
+        The tables; a random input is represented by its mean.
     wear : WearChoice, optional
-        The wear law; a scenario of a single contact may leave it out.
+        The wear law; optional in a scenario of a single contact.
     notes : tuple of str
-        What a user should know before trusting the result.
+        Notes for the user on the validity of the results.
     random : tuple of RandomInput
-        The random inputs, by name.
+        The random inputs, in the order of their names.
     drawn : mapping of str to float or tuple of float
-        Values that stand for random inputs, by dotted key, in SI; one per roller as a tuple.
+        Values that replace random inputs, by dotted key, in SI; a tuple has one value per roller.
     """
 
     file: str
@@ -76,21 +76,20 @@ class Scenario:
 
     @property
     def name(self) -> str:
-        """The file's name without folder and suffix."""
+        """File name without folder and suffix."""
         return PurePath(self.file).stem
 
     @property
     def paths(self) -> tuple[Path, ...]:
-        """Where it came from, and the files it names, which are sought beside it."""
+        """Paths of the scenario's file and of the files it names, relative to its folder."""
         own = Path(self.file)
         return (own, *(own.parent / name for name in self.files))
 
     @property
     def sha256(self) -> str:
-        """Digest of the text and of every file's path and content."""
+        """SHA-256 digest of the text and of every file's path and content."""
         digest = hashlib.sha256()
-        parts = [self.text, *(part for item in sorted(self.files.items()) for part in item)]
-        for part in parts:
+        for part in (self.text, *(part for item in sorted(self.files.items()) for part in item)):
             data = part.encode()
             digest.update(f"{len(data)}:".encode())
             digest.update(data)
@@ -108,7 +107,7 @@ class Scenario:
 
     @property
     def total_passes(self) -> int:
-        """Whole roller passes of the test, at least one; raises as `require_run`."""
+        """Number of roller passes of the test, at least one; raises as `require_run`."""
         if self.operation.passes is not None:
             return self.operation.passes
         if self.operation.duration is None:
@@ -117,7 +116,7 @@ class Scenario:
 
     @property
     def total_time(self) -> float:
-        """Simulated time of those passes [s]; raises as `require_run`."""
+        """Simulated time of all roller passes [s]; raises as `require_run`."""
         return self.total_passes / self.pass_rate
 
     def per_roller(self, value: float | tuple[float, ...]) -> tuple[float, ...]:
@@ -137,23 +136,23 @@ def _no_length() -> Mistake:
 
 
 def require_run(scenario: Scenario) -> None:
-    """Check that a scenario says all that a run needs.
+    """Check that a scenario has all that a run needs.
 
     Parameters
     ----------
     scenario : Scenario
-        May be that of a single contact.
+        Any scenario, also one of a single contact.
 
     Raises
     ------
     ScenarioError
-        If it has no duration or no wear law; both are told at once.
+        If it has no duration or no wear law; both are reported together.
     """
-    problems = []
+    mistakes = []
     if scenario.operation.duration is None and scenario.operation.passes is None:
-        problems.append(_no_length())
+        mistakes.append(_no_length())
     if scenario.wear is None:
         expected = 'law = "archard-dissipation" and its options'
-        problems.append(Mistake("wear", "", "the table is needed for a run", None, expected))
-    if problems:
-        raise ScenarioError(scenario.file, problems)
+        mistakes.append(Mistake("wear", "", "the table is needed for a run", None, expected))
+    if mistakes:
+        raise ScenarioError(scenario.file, mistakes)

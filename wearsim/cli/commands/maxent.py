@@ -1,4 +1,4 @@
-"""`wearsim maxent`: the law of maximum entropy that agrees with what is known of a value."""
+"""`wearsim maxent`: maximum-entropy distribution for a given support and moments."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from wearsim.cli.arguments import Figure, Force, Json, check_figure
-from wearsim.cli.output import note, refuse_existing, write_json, write_table
+from wearsim.cli.output import note, write_json, write_notes, write_table
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from wearsim.uq.distributions.base import Law
+    from wearsim.uq.distributions.base import MaxentDistribution
 
 PROBABILITIES = (0.025, 0.05, 0.25, 0.5, 0.75, 0.95, 0.975)
 _COLUMNS, _ROWS = 60, 8
@@ -24,7 +24,7 @@ Support = Annotated[
     typer.Option(
         "--support",
         metavar="LOW HIGH",
-        help="Least and greatest value possible: 0 inf.",
+        help="Least and greatest possible value: 0 inf.",
         show_default=False,
     ),
 ]
@@ -34,7 +34,7 @@ MeanLog = Annotated[
     float | None,
     typer.Option(
         "--mean-log",
-        help="Mean of the natural logarithm, in place of --std: a gamma law.",
+        help="Mean of the natural logarithm, instead of --std: a gamma distribution.",
         show_default=False,
     ),
 ]
@@ -49,11 +49,14 @@ def maxent(
     json: Json = False,
     force: Force = False,
 ) -> None:
-    """Find the law of maximum entropy from what is known."""
-    if figure is not None:
-        check_figure(figure)
-        refuse_existing(figure, force)
-    law = _law((_limit(support[0]), _limit(support[1])), mean, std, mean_log)
+    """Compute the maximum-entropy distribution for a support and moments."""
+    check_figure(figure, force)
+    from wearsim.uq.distributions.maxent import Infeasible, maximum_entropy
+
+    try:
+        law = maximum_entropy((_limit(support[0]), _limit(support[1])), mean, std, mean_log)
+    except Infeasible as error:
+        raise Infeasible(re.sub(r"\bmean_log\b", "--mean-log", str(error))) from error
     if figure is not None:
         from wearsim.report.figures.maxent import maxent_figure
         from wearsim.report.parts.saving import save_figure
@@ -62,10 +65,9 @@ def maxent(
     if json:
         write_json(_data(law, figure))
         return
-    write_table("law of maximum entropy", _rows(law))
+    write_table("maximum-entropy distribution", _rows(law))
     typer.echo("\n".join(_plot(law)))
-    for text in law.warnings:
-        note(f"warning: {text}")
+    write_notes((), law.warnings)
     if figure is not None:
         note(f"figure: {figure}")
 
@@ -80,60 +82,39 @@ def _limit(text: str) -> float:
         ) from error
 
 
-def _law(
-    support: tuple[float, float], mean: float | None, std: float | None, mean_log: float | None
-) -> Law:
-    """Return the law, or raise with the options as they are typed."""
-    from wearsim.uq.distributions.maxent import Infeasible, maximum_entropy
+def _rows(law: MaxentDistribution) -> list[tuple[str, str]]:
+    from wearsim.report.text.maxent_numbers import multipliers, parent, value
 
-    try:
-        return maximum_entropy(support, mean, std, mean_log)
-    except Infeasible as error:
-        raise Infeasible(_as_typed(str(error))) from error
-
-
-def _as_typed(text: str) -> str:
-    """Return a message in which knowledge is named as the options are."""
-    return re.sub(r"\bmean_log\b", "--mean-log", text)
-
-
-def _rows(law: Law) -> list[tuple[str, str]]:
-    from wearsim.report.text import maxent_numbers
-
-    l0, l1, l2 = (f"{value:.7g}" for value in maxent_numbers.multipliers(law))
-    parent = maxent_numbers.parent(law)
+    found = parent(law)
     return [
         ("family", law.family),
         ("support", " to ".join(f"{end:g}" for end in law.support)),
         ("density", f"exp(-l0 - l1 x - l2 {law.third})"),
-        ("l0", l0),
-        ("l1", l1),
-        ("l2", l2),
-        ("parent normal law", _parent(parent) if parent else "none"),
-        ("mean", f"{maxent_numbers.value(law, law.mean):.7g}"),
+        *((f"l{number}", f"{item:.7g}") for number, item in enumerate(multipliers(law))),
+        (
+            "parent normal distribution",
+            f"mean {found[0]:.7g}, standard deviation {found[1]:.7g}" if found else "none",
+        ),
+        ("mean", f"{value(law, law.mean):.7g}"),
         ("standard deviation", f"{law.std:.7g}"),
         *(
-            (f"{100.0 * probability:g} % quantile", f"{value:.7g}")
-            for probability, value in _quantiles(law).items()
+            (f"{100.0 * probability:g} % quantile", f"{item:.7g}")
+            for probability, item in _quantiles(law).items()
         ),
     ]
 
 
-def _parent(parent: tuple[float, float]) -> str:
-    return f"mean {parent[0]:.7g}, standard deviation {parent[1]:.7g}"
-
-
-def _quantiles(law: Law) -> dict[float, float]:
+def _quantiles(law: MaxentDistribution) -> dict[float, float]:
     import numpy as np
 
     from wearsim.report.text.maxent_numbers import value
 
     values = law.quantile(np.array(PROBABILITIES)).tolist()
-    return {part: value(law, found) for part, found in zip(PROBABILITIES, values, strict=True)}
+    return {p: value(law, item) for p, item in zip(PROBABILITIES, values, strict=True)}
 
 
-def _plot(law: Law) -> list[str]:
-    """Return lines that draw the density in blocks, and where it begins and ends."""
+def _plot(law: MaxentDistribution) -> list[str]:
+    """Return the density as a plot of block characters, line by line, with its range below."""
     import numpy as np
 
     low, high = law.bulk
@@ -148,19 +129,18 @@ def _plot(law: Law) -> list[str]:
     return [*lines, f"  {'▔' * _COLUMNS}", f"  {left}{right:>{_COLUMNS - len(left)}}"]
 
 
-def _data(law: Law, figure: Path | None) -> dict[str, Any]:
-    """Return the law in the unit of what was given."""
-    from wearsim.report.text import maxent_numbers
+def _data(law: MaxentDistribution, figure: Path | None) -> dict[str, Any]:
+    """Return the distribution in the units of the given moments."""
+    from wearsim.report.text.maxent_numbers import multipliers, parent, value
 
-    parent = maxent_numbers.parent(law)
-    multipliers = maxent_numbers.multipliers(law)
+    found = parent(law)
     return {
         "family": law.family,
         "support": law.support,
-        "multipliers": dict(zip(("l0", "l1", "l2"), multipliers, strict=True)),
+        "multipliers": dict(zip(("l0", "l1", "l2"), multipliers(law), strict=True)),
         "l2_multiplies": law.third,
-        "parent": parent and {"mean": parent[0], "std": parent[1]},
-        "mean": maxent_numbers.value(law, law.mean),
+        "parent": found and {"mean": found[0], "std": found[1]},
+        "mean": value(law, law.mean),
         "std": law.std,
         "quantiles": _quantiles(law),
         "warnings": list(law.warnings),

@@ -1,4 +1,4 @@
-"""The random inputs `maxent` and those with a law of their own: what a Law gives, as a plugin."""
+"""The random input `maxent`, and maximum-entropy distributions as plugins."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from wearsim.plugins import Distribution, Options
 from wearsim.quantities import Limit, PositiveValue, Quantity, Value
 from wearsim.types import FloatArray
 from wearsim.units import QuantityError
-from wearsim.uq.distributions.base import Law
+from wearsim.uq.distributions.base import MaxentDistribution
 from wearsim.uq.distributions.maxent import Infeasible, maximum_entropy
 
 
 class LawDistribution(Distribution):
     """A distribution that a law gives."""
 
-    def __init__(self, law: Law) -> None:
+    def __init__(self, law: MaxentDistribution) -> None:
         self.law = law
 
     def quantile(self, probability: FloatArray) -> FloatArray:
@@ -56,7 +56,7 @@ class MaxentOptions(Options):
     mean_log: float | None = Field(
         None, description="mean of the logarithm of the SI value, in place of std: a gamma law"
     )
-    _law: Law = PrivateAttr()
+    _law: MaxentDistribution = PrivateAttr()
 
     @model_validator(mode="after")
     def _find_law(self, info: ValidationInfo) -> MaxentOptions:
@@ -67,7 +67,7 @@ class MaxentOptions(Options):
         return self
 
     @property
-    def law(self) -> Law:
+    def law(self) -> MaxentDistribution:
         """The law of maximum entropy."""
         return self._law
 

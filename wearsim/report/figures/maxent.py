@@ -9,17 +9,17 @@ from matplotlib.figure import Figure
 from wearsim.report.parts.style import BLUE, GREY, ORANGE, figure_style, name_axes
 from wearsim.report.text.maxent_numbers import multipliers, parent, value
 from wearsim.types import FloatArray
-from wearsim.uq.distributions.base import Law
+from wearsim.uq.distributions.base import MaxentDistribution
 
 _POINTS = 1001
 
 
-def maxent_figure(law: Law) -> Figure:
+def maxent_figure(law: MaxentDistribution) -> Figure:
     """Return the figure of a law of maximum entropy.
 
     Parameters
     ----------
-    law : Law
+    law : MaxentDistribution
 
     Returns
     -------
@@ -45,7 +45,7 @@ def maxent_figure(law: Law) -> Figure:
     return figure
 
 
-def _draw_bulk(axes: Axes, law: Law, x: FloatArray, density: FloatArray) -> None:
+def _draw_bulk(axes: Axes, law: MaxentDistribution, x: FloatArray, density: FloatArray) -> None:
     """Shade the middle 95 % of the law."""
     first, last = law.quantile(np.array([0.025, 0.975]))
     inside = (x >= first) & (x <= last)
@@ -53,7 +53,7 @@ def _draw_bulk(axes: Axes, law: Law, x: FloatArray, density: FloatArray) -> None
     axes.fill_between(x, density, where=inside.tolist(), color=BLUE, alpha=0.15, lw=0, label=label)
 
 
-def _draw_parent(axes: Axes, law: Law, x: FloatArray, density: FloatArray) -> None:
+def _draw_parent(axes: Axes, law: MaxentDistribution, x: FloatArray, density: FloatArray) -> None:
     """Draw the parent normal law where it can be told from the law that is cut from it."""
     found = parent(law)
     if found is None:

@@ -1,1 +1,1 @@
-"""From TOML text to a validated scenario, or to a list of all its mistakes."""
+"""Parsing of TOML into a validated scenario or a list of all its mistakes."""

@@ -1,10 +1,9 @@
-"""The tables of a scenario and everything that may stand in them, plugins' options included."""
+"""The tables of a scenario and their keys, including the options of plugins."""
 
 from __future__ import annotations
 
 from wearsim.plugins import ContactModelSpec, LoadSpec, RandomInputSpec, WearLawSpec, registry
 from wearsim.scenario.parse.mistakes import Table
-from wearsim.scenario.parse.suggestions import Names
 from wearsim.scenario.random.model import RandomInputTable
 from wearsim.scenario.tables.bodies import CylinderTable, RollerTable
 from wearsim.scenario.tables.plain import (
@@ -34,14 +33,10 @@ TABLES: dict[str, type[Table]] = {
 REQUIRED = ("roller", "cylinder", "operation", "load", "friction", "creepage")
 
 
-def all_names() -> Names:
-    """Return the keys of every table and of every plugin."""
-    return Names(_places)
-
-
-def _places() -> dict[str, set[str]]:
-    places = {"the top of the file": set(TopTable.model_fields)}
-    places |= {f"[{table}]": set(model.model_fields) for table, model in TABLES.items()}
+def keys_by_place() -> dict[str, set[str]]:
+    """Return the keys of every table and of every plugin, by their place in words."""
+    keys = {"the top of the file": set(TopTable.model_fields)}
+    keys |= {f"[{table}]": set(model.model_fields) for table, model in TABLES.items()}
     for kind, table, key in (
         (ContactModelSpec, "contact", "model"),
         (LoadSpec, "load", "kind"),
@@ -51,9 +46,9 @@ def _places() -> dict[str, set[str]]:
             spec = registry().get(kind, name)
             term = isinstance(spec, LoadSpec) and spec.role == "term"
             place = f"[load.{name}]" if term else f'[{table}] with {key} = "{name}"'
-            places[place] = set(spec.options.model_fields)
-    places["a random input"] = set(RandomInputTable.model_fields)
+            keys[place] = set(spec.options.model_fields)
+    keys["a random input"] = set(RandomInputTable.model_fields)
     for name in registry().names(RandomInputSpec):
         options = registry().get(RandomInputSpec, name).options
-        places[f'a random input with distribution = "{name}"'] = set(options.model_fields)
-    return places
+        keys[f'a random input with distribution = "{name}"'] = set(options.model_fields)
+    return keys

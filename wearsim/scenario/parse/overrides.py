@@ -1,4 +1,4 @@
-"""Changes to a scenario by dotted keys, "load.normal_force", that leave its comments alone."""
+"""Changes to a scenario's text by dotted keys, "load.normal_force"; comments are kept."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from wearsim.errors import Mistake, ScenarioError
 from wearsim.scenario.tables.plain import CADENCES
 from wearsim.units import shown
 
-# An override of one of these takes the place of the others.
+#: Keys that exclude each other: an override of one removes the others.
 _ALTERNATIVES = {
     "roller": (("radius", "diameter"), ("crown_radius", "crown_diameter")),
     "cylinder": (("radius", "diameter"),),
@@ -21,12 +21,13 @@ _ALTERNATIVES = {
 
 
 def parse_override(text: str) -> tuple[str, object]:
-    """Return the dotted key and the value of an override as given at the shell.
+    """Return the dotted key and the value of an override given on the command line.
 
     Parameters
     ----------
     text : str
-        "contact.mx=50" or "load.normal_force=350 N": the value is TOML, or else plain text.
+        "contact.mx=50" or "load.normal_force=350 N": the value is TOML if it can be parsed, and
+        plain text otherwise.
 
     Returns
     -------
@@ -41,23 +42,22 @@ def parse_override(text: str) -> tuple[str, object]:
     if not equals or not key.strip():
         raise ValueError(f"'{text}' is not an override, expected key=value")
     try:
-        parsed: object = tomllib.loads(f"value = {value.strip()}")["value"]
+        return key.strip(), tomllib.loads(f"value = {value.strip()}")["value"]
     except tomllib.TOMLDecodeError:
-        parsed = value.strip()
-    return key.strip(), parsed
+        return key.strip(), value.strip()
 
 
 def apply_overrides(text: str, file: str, overrides: Mapping[str, object]) -> str:
     """Return the scenario's text with values replaced or added.
 
-    A key that excludes another, as passes does duration, takes its place.
+    A key that excludes another, as passes excludes duration, replaces it.
 
     Parameters
     ----------
     text : str
         Valid TOML.
     file : str
-        Where it came from, for messages.
+        The scenario's file, for messages.
     overrides : mapping of str to object
         Values by dotted key.
 
@@ -68,25 +68,27 @@ def apply_overrides(text: str, file: str, overrides: Mapping[str, object]) -> st
     Raises
     ------
     ScenarioError
-        If a key leads nowhere or a value cannot be written in TOML.
+        If a key does not lead to a table or a value cannot be written in TOML.
     """
     import tomlkit  # noqa: PLC0415  (only overrides need it)
 
     document = tomlkit.parse(text)
-    problems = []
+    mistakes = []
     for dotted, value in overrides.items():
-        *tables, key = dotted.split(".")
+        *names, key = dotted.split(".")
         try:
-            table = _descend(document, tables, key)
+            table = _descend(document, names, key)
             table[key] = _item(value)
         except ValueError as error:
-            problems.append(Mistake("", dotted, str(error), shown(value)))
+            mistakes.append(Mistake("", dotted, str(error), shown(value)))
             continue
-        for rival in _rivals(".".join(tables), key):
-            if rival in table and f"{'.'.join(tables)}.{rival}" not in overrides:
-                del table[rival]
-    if problems:
-        raise ScenarioError(file, problems)
+        prefix = ".".join(names)
+        for group in _ALTERNATIVES.get(prefix, ()):
+            for other in group if key in group else ():
+                if other != key and other in table and f"{prefix}.{other}" not in overrides:
+                    del table[other]
+    if mistakes:
+        raise ScenarioError(file, mistakes)
     return tomlkit.dumps(document)
 
 
@@ -100,7 +102,7 @@ def _item(value: object) -> Any:
 
 
 def _descend(document: Any, tables: list[str], key: str) -> MutableMapping[str, Any]:
-    """Return the table that holds `key`, made where it is missing."""
+    """Return the table that holds `key`; missing tables are created."""
     import tomlkit  # noqa: PLC0415
 
     if not all([*tables, key]):
@@ -113,8 +115,3 @@ def _descend(document: Any, tables: list[str], key: str) -> MutableMapping[str, 
         if not isinstance(table, MutableMapping):
             raise ValueError(f"cannot be set, since '{name}' is not a table")
     return table  # type: ignore[no-any-return]
-
-
-def _rivals(table: str, key: str) -> list[str]:
-    groups = _ALTERNATIVES.get(table, ())
-    return [other for group in groups if key in group for other in group if other != key]

@@ -4,129 +4,21 @@ from __future__ import annotations
 
 import difflib
 import json
-from typing import TYPE_CHECKING, TypeVar
+from collections.abc import Mapping, Sequence
+from typing import TypeVar
 
 from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
 
 from wearsim.errors import ScenarioError
+from wearsim.quantities import Quantity
 from wearsim.scenario.parse.field_wording import choices, field_at, form, model_at
+from wearsim.scenario.parse.mistakes import Mistakes, nearest
 from wearsim.scenario.random.model import can_be_random
-from wearsim.scenario.random.targets import host_of, joint_of
+from wearsim.scenario.random.targets import joint_target_of, random_target_of
 from wearsim.units import QuantityError, shown
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from pydantic.fields import FieldInfo
-    from pydantic_core import ErrorDetails
-
-    from wearsim.quantities import Quantity
-    from wearsim.scenario.parse.mistakes import Report
-
 M = TypeVar("M", bound=BaseModel)
-
-
-def validate_options(
-    report: Report,
-    model: type[M],
-    raw: Mapping[str, object],
-    table: str,
-    beside: type[BaseModel] | None = None,
-    host: Quantity | None = None,
-    refused: Sequence[Sequence[str | int]] = (),
-) -> M | None:
-    """Return `raw` as an instance of `model`, or None after adding its mistakes to the report.
-
-    Parameters
-    ----------
-    report : Report
-        Collects the mistakes.
-    model : type of BaseModel
-        The model of the table.
-    raw : mapping of str to object
-        The table, without random inputs.
-    table : str
-        Its name.
-    beside : type of BaseModel, optional
-        Model of keys that stand in the same table and were removed, for suggestions.
-    host : Quantity, optional
-        Quantity that the values of a random input measure.
-    refused : sequence of locations
-        Locations whose mistakes have been reported already.
-    """
-    # as JSON, whose strict mode takes no "3" for 3 and yet a list for a tuple
-    text = json.dumps(raw, default=str)
-    context = {"read": report.read, "quantity": host}
-    try:
-        return model.model_validate_json(text, strict=True, context=context)
-    except ValidationError as error:
-        for details in error.errors(include_url=False):
-            if not any(_same_way(details["loc"], place) for place in refused):
-                _translate(report, details, model, raw, table, beside, host)
-    except ScenarioError as error:
-        report.add_file(error, table, key_of_file(raw, error.file))
-    return None
-
-
-def _translate(
-    report: Report,
-    details: ErrorDetails,
-    model: type[BaseModel],
-    raw: object,
-    table: str,
-    beside: type[BaseModel] | None,
-    host: Quantity | None,
-) -> None:
-    place, key = _where(details["loc"], raw, table)
-    field = field_at(model, details["loc"])
-    kind, value = details["type"], details["input"]
-    expected = form(field, host) if field else None
-    if kind != "missing" and isinstance(value, dict) and _meant_random(report, field, place, key):
-        _add_no_distribution(report, f"{place}.{key}", value)
-    elif kind == "value_error":
-        _add_value_error(report, place, key, details["ctx"]["error"], value)
-    elif kind == "extra_forbidden":
-        known = model_at(model, details["loc"][:-1])
-        here = list(known.model_fields) if known else []
-        if beside and len(details["loc"]) == 1:
-            here += beside.model_fields
-        report.add(place, key, f"unknown key{report.names.hint(key, here)}")
-    elif kind == "missing":
-        report.add(place, key, "is missing", None, expected)
-    elif kind == "literal_error" and isinstance(value, str):
-        hint = report.names.near(value, choices(field))
-        report.add(place, key, f"unknown choice{hint}", shown(value), expected)
-    else:
-        what = _WHAT.get(kind, "is out of range" if kind in _BOUNDS else "cannot be used")
-        said = details["msg"].removeprefix("Input should be ")
-        report.add(place, key, what, shown(value), expected or said[:1].lower() + said[1:])
-
-
-def _meant_random(report: Report, field: FieldInfo | None, place: str, key: str) -> bool:
-    """Tell whether a table in a field's place can only have been meant as a random input."""
-    if field is None or not can_be_random(f"{place}.{key}"):
-        return False
-    within = any(f"{place}.".startswith(f"{name}.") for name in report.tried)
-    return not within and (host_of(field) or joint_of(field)) is not None
-
-
-def _add_no_distribution(report: Report, name: str, value: Mapping[str, object]) -> None:
-    """Note a table in the place of a value that does not say which random input it is."""
-    near = difflib.get_close_matches("distribution", value, n=1)
-    if near:
-        report.add(name, near[0], "unknown key (did you mean 'distribution'?)")
-    else:
-        report.add(name, "distribution", "is missing", None, "the name of a random input")
-
-
-def _add_value_error(report: Report, table: str, key: str, error: Exception, value: object) -> None:
-    if isinstance(error, QuantityError):
-        report.add(table, key, error.what, error.got, error.expected)
-    elif isinstance(error.__cause__, ScenarioError):
-        report.add_file(error.__cause__, table, key)
-    else:
-        report.add(table, key, str(error), None if isinstance(value, dict) else shown(value))
-
 
 _BOUNDS = {"greater_than", "greater_than_equal", "less_than", "less_than_equal"}
 _WHAT = {
@@ -143,18 +35,126 @@ _WHAT = {
 }
 
 
+def validate_options(
+    mistakes: Mistakes,
+    model: type[M],
+    raw: Mapping[str, object],
+    table: str,
+    other_keys: type[BaseModel] | None = None,
+    quantity: Quantity | None = None,
+    refused: Sequence[Sequence[str | int]] = (),
+) -> M | None:
+    """Return `raw` as an instance of `model`, or None after adding its mistakes.
+
+    Parameters
+    ----------
+    mistakes : Mistakes
+        Collects the mistakes.
+    model : type of BaseModel
+        The model of the table.
+    raw : mapping of str to object
+        The table, without random inputs.
+    table : str
+        Its name.
+    other_keys : type of BaseModel, optional
+        Model of the other keys of the same table, which `raw` lacks; for suggestions.
+    quantity : Quantity, optional
+        Quantity of the values, for the options of a random input.
+    refused : sequence of locations
+        Locations whose mistakes have been added already.
+    """
+    # as JSON: its strict mode rejects "3" for 3 but accepts a list for a tuple
+    text = json.dumps(raw, default=str)
+    context = {"read": mistakes.read, "quantity": quantity}
+    try:
+        return model.model_validate_json(text, strict=True, context=context)
+    except ValidationError as error:
+        for details in error.errors(include_url=False):
+            # a refused random input is still in the table, and fails again at or below its location
+            if not details["loc"] or not any(
+                all(one == other for one, other in zip(details["loc"], place, strict=False))
+                for place in refused
+            ):
+                _translate(mistakes, details, model, raw, table, other_keys, quantity)
+    except ScenarioError as error:
+        mistakes.add_file(error, table, key_of_file(raw, error.file))
+    return None
+
+
+def _translate(
+    mistakes: Mistakes,
+    details: ErrorDetails,
+    model: type[BaseModel],
+    raw: object,
+    table: str,
+    other_keys: type[BaseModel] | None,
+    quantity: Quantity | None,
+) -> None:
+    """Add the mistake that an error of pydantic reports."""
+    place, key = _where(details["loc"], raw, table)
+    field = field_at(model, details["loc"])
+    kind, value = details["type"], details["input"]
+    expected = form(field, quantity) if field else None
+    # a table in place of a value that can be random: a random input without its distribution
+    is_random = (
+        field is not None
+        and can_be_random(f"{place}.{key}")
+        and (random_target_of(field) or joint_target_of(field))
+        and not any(f"{place}.".startswith(f"{name}.") for name in mistakes.random_keys)
+    )
+    if kind != "missing" and isinstance(value, dict) and is_random:
+        if near := difflib.get_close_matches("distribution", value, n=1):
+            what = "unknown key (did you mean 'distribution'?)"
+            mistakes.add(f"{place}.{key}", near[0], what)
+        else:
+            expected = "the name of a random input"
+            mistakes.add(f"{place}.{key}", "distribution", "is missing", None, expected)
+    elif kind == "value_error":
+        _add_value_error(mistakes, place, key, details["ctx"]["error"], value)
+    elif kind == "extra_forbidden":
+        known = model_at(model, details["loc"][:-1])
+        here = list(known.model_fields) if known else []
+        if other_keys and len(details["loc"]) == 1:
+            here += other_keys.model_fields
+        mistakes.add(place, key, f"unknown key{mistakes.hint(key, here)}")
+    elif kind == "missing":
+        mistakes.add(place, key, "is missing", None, expected)
+    elif kind == "literal_error" and isinstance(value, str):
+        what = f"unknown choice{nearest(value, choices(field))}"
+        mistakes.add(place, key, what, shown(value), expected)
+    else:
+        what = _WHAT.get(kind, "is out of range" if kind in _BOUNDS else "cannot be used")
+        message = details["msg"].removeprefix("Input should be ")
+        expected = expected or message[:1].lower() + message[1:]
+        mistakes.add(place, key, what, shown(value), expected)
+
+
+def _add_value_error(
+    mistakes: Mistakes, table: str, key: str, error: Exception, value: object
+) -> None:
+    if isinstance(error, QuantityError):
+        mistakes.add(table, key, error.what, error.got, error.expected)
+    elif isinstance(error.__cause__, ScenarioError):
+        mistakes.add_file(error.__cause__, table, key)
+    else:
+        mistakes.add(table, key, str(error), None if isinstance(value, dict) else shown(value))
+
+
 def key_of_file(raw: Mapping[str, object], file: str) -> str:
     """Return the key of a table that names `file`, or nothing."""
     return next((key for key, value in raw.items() if value == file), "")
 
 
-def _same_way(loc: Sequence[str | int], refused: Sequence[str | int]) -> bool:
-    """Tell whether a mistake comes of a refused random input, which still stands in its place."""
-    return bool(loc) and all(one == other for one, other in zip(loc, refused, strict=False))
+def split_keys(
+    raw: Mapping[str, object], model: type[BaseModel]
+) -> tuple[dict[str, object], dict[str, object]]:
+    """Split a table into the keys of `model` and all others."""
+    own = {key: value for key, value in raw.items() if key in model.model_fields}
+    return own, {key: value for key, value in raw.items() if key not in own}
 
 
 def _where(loc: Sequence[str | int], raw: object, table: str) -> tuple[str, str]:
-    """Return the table and the key that a location within a table's model means."""
+    """Return the table and the key of a location within a table's model."""
     key = ""
     for part in loc:
         if isinstance(part, int):

@@ -1,4 +1,4 @@
-"""From TOML to a `Scenario`, with every mistake of the file told at once."""
+"""Parsing of TOML into a `Scenario`; all mistakes of the file are reported together."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from typing import Any
 
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.mechanics.hertz.elasticity import combine
-from wearsim.scenario.parse.key_index import REQUIRED, TABLES, all_names
-from wearsim.scenario.parse.mistakes import Report
+from wearsim.scenario.parse.key_index import REQUIRED, TABLES, keys_by_place
+from wearsim.scenario.parse.mistakes import Mistakes, nearest
 from wearsim.scenario.parse.overrides import apply_overrides
 from wearsim.scenario.parse.validate import validate
 from wearsim.scenario.random.model import RandomInput
@@ -19,42 +19,42 @@ from wearsim.scenario.random.placeholders import put_all
 from wearsim.scenario.scenario import Scenario
 from wearsim.scenario.tables.bodies import Cylinder, Roller, read_cylinder, read_roller
 from wearsim.scenario.tables.plain import (
+    EvolutionTable,
+    FrictionTable,
     TopTable,
     read_creepage,
-    read_evolution,
-    read_friction,
     read_operation,
     read_outputs,
 )
 from wearsim.scenario.tables.plugin import read_contact, read_load, read_wear
-from wearsim.scenario.tables.sampling import check_correlation, read_sampling
+from wearsim.scenario.tables.sampling import SamplingTable, check_correlation
 from wearsim.units import shown
 
 DUNDURS_LIMIT = 0.1
 
-READERS: dict[str, Callable[[Mapping[str, object], Report], Any]] = {
+READERS: dict[str, Callable[[Mapping[str, object], Mistakes], Any]] = {
     "roller": read_roller,
     "cylinder": read_cylinder,
     "operation": read_operation,
     "load": read_load,
-    "friction": read_friction,
+    "friction": lambda raw, mistakes: validate(mistakes, FrictionTable, raw, "friction"),
     "creepage": read_creepage,
     "contact": read_contact,
     "wear": read_wear,
-    "evolution": read_evolution,
+    "evolution": lambda raw, mistakes: validate(mistakes, EvolutionTable, raw, "evolution"),
     "outputs": read_outputs,
-    "sampling": read_sampling,
+    "sampling": lambda raw, mistakes: validate(mistakes, SamplingTable, raw, "sampling"),
 }
-_OPTIONAL = {"wear"}  # tables that stay None where they are left out
+"""Function that reads each table: returns None after adding the table's mistakes."""
 
 
 def load_scenario(path: str | Path, overrides: Mapping[str, object] | None = None) -> Scenario:
-    """Read a scenario from a TOML file; the files it names are sought beside it.
+    """Read a scenario from a TOML file.
 
     Parameters
     ----------
     path : str or Path
-        The file.
+        The file; paths of files that it names are relative to its folder.
     overrides : mapping of str to object, optional
         Values by dotted key, {"load.normal_force": "350 N"}.
 
@@ -65,9 +65,9 @@ def load_scenario(path: str | Path, overrides: Mapping[str, object] | None = Non
     Raises
     ------
     ScenarioError
-        With every mistake found.
+        With all mistakes of the scenario.
     PluginError
-        If two plugins share a name.
+        If two plugins have the same name.
     """
     path = Path(path)
 
@@ -79,8 +79,8 @@ def load_scenario(path: str | Path, overrides: Mapping[str, object] | None = Non
     except UnicodeDecodeError as error:
         raise ScenarioError(str(path), [Mistake("", "", "is not text in UTF-8")]) from error
     except OSError as error:
-        problem = Mistake("", "", f"the file cannot be read ({error.strerror})")
-        raise ScenarioError(str(path), [problem]) from error
+        mistake = Mistake("", "", f"the file cannot be read ({error.strerror})")
+        raise ScenarioError(str(path), [mistake]) from error
     return parse_scenario(text, str(path), read, overrides)
 
 
@@ -97,9 +97,9 @@ def parse_scenario(
     text : str
         TOML.
     name : str
-        Where it came from, for messages.
+        The scenario's file, for messages.
     read : callable
-        Returns the content of a file that the scenario names; a stored scenario passes
+        Returns the content of a file that the scenario names; for a stored scenario,
         ``scenario.files.__getitem__``.
     overrides : mapping of str to object, optional
         Values by dotted key.
@@ -111,9 +111,9 @@ def parse_scenario(
     Raises
     ------
     ScenarioError
-        With every mistake found.
+        With all mistakes of the scenario.
     PluginError
-        If two plugins share a name.
+        If two plugins have the same name.
     """
     data = _parse_toml(text, name)
     if overrides:
@@ -125,13 +125,13 @@ def parse_scenario(
         files[path] = read(path)
         return files[path]
 
-    report = Report(name, read_and_keep, all_names())
-    top = _read_top(data, report)
-    sections = {table: _read_table(table, data, report) for table in TABLES}
-    check_lists(data, report)
-    check_correlation(sections["sampling"], report)
-    report.raise_any()
-    random = tuple(sorted(report.random, key=lambda item: item.name))
+    mistakes = Mistakes(name, read_and_keep, keys_by_place)
+    top = _read_top(data, mistakes)
+    sections = {table: _read_table(table, data, mistakes) for table in TABLES}
+    check_lists(data, mistakes)
+    check_correlation(sections["sampling"], mistakes)
+    mistakes.raise_any()
+    random = tuple(sorted(mistakes.random, key=lambda item: item.name))
     return Scenario(
         file=name,
         title=top.title or PurePath(name).stem,
@@ -139,12 +139,13 @@ def parse_scenario(
         text=text,
         files=files,
         notes=(
-            *_notes(sections["roller"], sections["cylinder"], random),
-            *_idle_sampling(data, random),
-            *report.notes,
+            *_dundurs_note(sections["roller"], sections["cylinder"]),
+            *(f"{item.name}: {warning}" for item in random for warning in item.warnings),
+            *_unused_sampling_note(data, random),
+            *mistakes.notes,
         ),
         random=random,
-        _tables=put_all(data, report.means),
+        _tables=put_all(data, mistakes.means),
         **sections,
     )
 
@@ -152,59 +153,55 @@ def parse_scenario(
 def _parse_toml(text: str, name: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
-    except ValueError as error:  # a TOMLDecodeError, or an integer beyond all bounds
-        raise ScenarioError(name, [_syntax_problem(text, str(error))]) from error
+    except ValueError as error:  # a TOMLDecodeError, or an integer with too many digits
+        raise ScenarioError(name, [_syntax_mistake(text, str(error))]) from error
 
 
-def _syntax_problem(text: str, message: str) -> Mistake:
-    """Say where the TOML breaks, and show the line."""
-    found = re.fullmatch(r"(?P<what>.*) \(at (?P<place>.*)\)", message, re.DOTALL)
-    if found is None:
+def _syntax_mistake(text: str, message: str) -> Mistake:
+    """Return the mistake of invalid TOML, with its place and the line."""
+    match = re.fullmatch(r"(?P<what>.*) \(at (?P<place>.*)\)", message, re.DOTALL)
+    if match is None:
         return Mistake("", "", f"is not valid TOML: {message}")
-    what = found["what"][:1].lower() + found["what"][1:]
-    number = re.match(r"line ([0-9]+)", found["place"])
+    what = match["what"][:1].lower() + match["what"][1:]
+    number = re.match(r"line ([0-9]+)", match["place"])
     line = text.splitlines()[int(number[1]) - 1].strip() if number else None
-    expected = None
     bare = re.match(r"([\w.-]+)\s*=\s*([0-9.+-][^\"'#]*?)\s*(?:#.*)?$", line or "")
-    if bare:
-        expected = f'quotes around a value with a unit, {bare[1]} = "{bare[2]}"'
-    return Mistake("", found["place"], f"is not valid TOML: {what}", line, expected)
+    expected = f'quotes around a value with a unit, {bare[1]} = "{bare[2]}"' if bare else None
+    return Mistake("", match["place"], f"is not valid TOML: {what}", line, expected)
 
 
-def _read_top(data: Mapping[str, object], report: Report) -> TopTable:
-    """Read what stands above the tables, and report what belongs nowhere."""
+def _read_top(data: Mapping[str, object], mistakes: Mistakes) -> TopTable:
+    """Return the keys above the tables; add a mistake for each unknown key and table."""
     own = {key: data[key] for key in TopTable.model_fields if key in data}
     for key, value in data.items():
         if key in TABLES or key in own:
             continue
         if isinstance(value, dict):
-            report.add(key, "", f"unknown table{report.names.near(key, TABLES)}")
+            mistakes.add(key, "", f"unknown table{nearest(key, TABLES)}")
         else:
-            report.add("", key, f"unknown key{report.names.hint(key, TopTable.model_fields)}")
-    return validate(report, TopTable, own, "") or TopTable()
+            mistakes.add("", key, f"unknown key{mistakes.hint(key, TopTable.model_fields)}")
+    return validate(mistakes, TopTable, own, "") or TopTable()
 
 
-def _read_table(table: str, data: Mapping[str, object], report: Report) -> Any:
-    raw = data.get(table)
-    if raw is None:
-        if table in REQUIRED:
-            report.add(table, "", "the table is missing")
-            return None
-        if table in _OPTIONAL:
-            return None
-        raw = {}
-    if not isinstance(raw, dict):
-        report.add("", table, "is not a table", shown(raw), f"a line [{table}] and its keys below")
+def _read_table(table: str, data: Mapping[str, object], mistakes: Mistakes) -> Any:
+    if table not in data and table in REQUIRED:
+        mistakes.add(table, "", "the table is missing")
+    if table not in data and table in {*REQUIRED, "wear"}:
         return None
-    return READERS[table](raw, report)
+    raw = data.get(table, {})
+    if not isinstance(raw, dict):
+        expected = f"a line [{table}] and its keys below"
+        mistakes.add("", table, "is not a table", shown(raw), expected)
+        return None
+    return READERS[table](raw, mistakes)
 
 
-def check_lists(data: Mapping[str, Any], report: Report) -> None:
-    """Check that lists have one value per roller."""
+def check_lists(data: Mapping[str, Any], mistakes: Mistakes) -> None:
+    """Add a mistake for each list that does not have one value per roller."""
 
     def raw(table: str, key: str, default: object = None) -> object:
-        found = data.get(table)
-        return found.get(key, default) if isinstance(found, dict) else None
+        keys = data.get(table)
+        return keys.get(key, default) if isinstance(keys, dict) else None
 
     rollers = raw("operation", "rollers", 1)
     if not isinstance(rollers, int):
@@ -213,26 +210,24 @@ def check_lists(data: Mapping[str, Any], report: Report) -> None:
         value = raw(table, key)
         if isinstance(value, list) and len(value) != rollers:
             got = f"{len(value)} values" if len(value) != 1 else "1 value"
-            expected = f"{rollers}, as operation.rollers says"
-            report.add(table, key, "a list has one value per roller", got, expected)
+            expected = f"{rollers}, the value of operation.rollers"
+            mistakes.add(table, key, "a list has one value per roller", got, expected)
 
 
-def _idle_sampling(data: Mapping[str, Any], random: tuple[RandomInput, ...]) -> tuple[str, ...]:
-    """Return a note if draws are asked for where there is nothing to draw."""
+def _unused_sampling_note(data: Mapping[str, Any], random: tuple[RandomInput, ...]) -> list[str]:
+    """Return a note if the table [sampling] has keys but no input is random."""
     given = data.get("sampling")
     if random or not given:
-        return ()
+        return []
     keys = ", ".join(f"sampling.{key}" for key in given)
-    return (f"{keys} {'has' if len(given) == 1 else 'have'} no effect: no input is random",)
+    return [f"{keys} {'has' if len(given) == 1 else 'have'} no effect: no input is random"]
 
 
-def _notes(roller: Roller, cylinder: Cylinder, random: tuple[RandomInput, ...]) -> tuple[str, ...]:
-    warnings = tuple(f"{item.name}: {text}" for item in random for text in item.warnings)
+def _dundurs_note(roller: Roller, cylinder: Cylinder) -> list[str]:
+    """Return a note if the coupling of pressure and traction is not negligible."""
     dundurs = combine(cylinder.material, roller.material).dundurs
-    if abs(dundurs) <= DUNDURS_LIMIT:
-        return warnings
     note = (
         f"the materials' Dundurs constant is {dundurs:.3g}: beyond {DUNDURS_LIMIT} the coupling of"
         " pressure and traction, which is neglected, is no longer small"
     )
-    return (note, *warnings)
+    return [note] if abs(dundurs) > DUNDURS_LIMIT else []

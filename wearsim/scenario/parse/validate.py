@@ -2,30 +2,26 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
+from pydantic import BaseModel
+
+from wearsim.scenario.parse.mistakes import Mistakes
 from wearsim.scenario.parse.pydantic_errors import M, validate_options
 from wearsim.scenario.random.placeholders import lift
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from pydantic import BaseModel
-
-    from wearsim.scenario.parse.mistakes import Report
-
 
 def validate(
-    report: Report,
+    mistakes: Mistakes,
     model: type[M],
     raw: Mapping[str, object],
     table: str,
-    beside: type[BaseModel] | None = None,
+    other_keys: type[BaseModel] | None = None,
 ) -> M | None:
-    """Return `raw` as an instance of `model`, or None after adding its mistakes to the report.
+    """Return `raw` as an instance of `model`, or None after adding its mistakes.
 
-    Random inputs are added to the report and replaced by their means; `beside` is the model of
-    keys that stand in the same table and were removed.
+    Random inputs are added to `mistakes` and replaced by their means; `other_keys` is the model of
+    the other keys of the same table, which `raw` lacks.
     """
-    values, refused = lift(report, model, raw, table)
-    return validate_options(report, model, values, table, beside, refused=refused)
+    values, refused = lift(mistakes, model, raw, table)
+    return validate_options(mistakes, model, values, table, other_keys, refused=refused)

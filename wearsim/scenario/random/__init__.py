@@ -1,1 +1,1 @@
-"""Random inputs in the place of values."""
+"""Random inputs of a scenario."""

@@ -1,4 +1,4 @@
-"""A random input as a scenario holds it: which values it sets, how long one draw lasts, its law."""
+"""Random input of a scenario: target values, persistence of a draw, and distribution."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from wearsim.uq.sampling.plans import BELOW_ONE
 Persistence: TypeAlias = Literal["per-test", "per-roller", "per-pass"]
 Role: TypeAlias = Literal["scalar", "joint", "field", "process"]
 
-LEAST = 1.0 - BELOW_ONE  # the least uniform number that a draw takes
+LEAST = 1.0 - BELOW_ONE  # least uniform number of a draw
 MISALIGNMENT = "creepage.misalignment"
 FRICTION = "friction.coefficient"
 CONTACT_FIELDS = {
@@ -29,37 +29,36 @@ CONTACT_FIELDS = {
     "creepage.yaw": "yaw",
     "creepage.tilt": "tilt",
 }
-"""What one contact sees: its name where contacts are solved, by the scenario's key."""
+"""Random values of one contact: field name in the contact solution, by scenario key."""
 OF_A_CONTACT = (*CONTACT_FIELDS, MISALIGNMENT)
-"""What may change from pass to pass."""
+"""Keys of the values that may vary from pass to pass."""
 OF_A_ROLLER = (*OF_A_CONTACT, "roller.offset")
-"""What may differ from roller to roller."""
+"""Keys of the values that may differ from roller to roller."""
 RANDOM_PLACES = "the values of [load], [friction], [creepage] and [wear], and roller.offset"
 
 
 class RandomInputTable(Options):
-    """A random input in the place of a value; its own options stand beside these keys."""
+    """Random input given for a value; the other keys are options of the distribution."""
 
-    distribution: str = Field(description="Name of the random input.")
+    distribution: str = Field(description="Name of the distribution.")
     persistence: Persistence = Field(
-        default="per-test", description="How long one draw lasts: the test, a roller or a pass."
+        default="per-test",
+        description="Persistence of one draw: for the test, per roller or per pass.",
     )
     marginal: dict[str, object] | None = Field(
         default=None,
-        description="Distribution at any one point or time; for a field and a process.",
+        description="Marginal distribution at one point or time, of a field or a process.",
     )
 
 
 def can_be_random(name: str) -> bool:
-    """Tell whether a random input may stand at a dotted key."""
-    return (
-        name.split(".", maxsplit=1)[0] in {"load", "friction", "creepage", "wear"}
-        or name == "roller.offset"
-    )
+    """Return whether the value at a dotted key can be random."""
+    tables = {"load", "friction", "creepage", "wear"}
+    return name.split(".", maxsplit=1)[0] in tables or name == "roller.offset"
 
 
 def amount(value: float, quantity: Quantity | None) -> str:
-    """Return an SI value in the engineers' unit of its quantity."""
+    """Return the text of an SI value in the engineering unit of its quantity."""
     return in_engineers_unit(value, quantity.kind.unit if quantity else "1")
 
 
@@ -70,17 +69,17 @@ class RandomInput:
     Parameters
     ----------
     name : str
-        Dotted key that it stands for, "load.normal_force".
+        Dotted key of the value that it replaces, "load.normal_force".
     kind : str
         Name of the distribution, "maxent".
     persistence : {"per-test", "per-roller", "per-pass"}
-        How long one draw lasts.
+        Persistence of one draw.
     distribution : Distribution, JointDistribution, FrictionField or Process
-        The law.
+        The distribution.
     quantity : Quantity, optional
-        What its values measure; nothing for a plain number.
+        Quantity of its values; None for a plain number.
     options : mapping of str to object
-        Its options as written.
+        Options of the distribution, as written.
     marginal : str
         Name of the marginal distribution of a field or a process.
     """
@@ -95,7 +94,7 @@ class RandomInput:
 
     @property
     def role(self) -> Role:
-        """What it is: a scalar, several scalars drawn together, a field or a process."""
+        """Role: a scalar, several scalars drawn together, a field or a process."""
         if isinstance(self.distribution, Distribution):
             return "scalar"
         if isinstance(self.distribution, JointDistribution):
@@ -112,7 +111,7 @@ class RandomInput:
 
     @property
     def dimension(self) -> int:
-        """Uniform numbers that one draw takes; none where a field or process has its own stream."""
+        """Number of uniform numbers per draw; 0 for a field or process with its own stream."""
         if isinstance(self.distribution, JointDistribution):
             return self.distribution.dimension
         return 1 if isinstance(self.distribution, Distribution) else 0
@@ -126,14 +125,14 @@ class RandomInput:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What a user should know before trusting it."""
+        """Notes for the user on the validity of the distribution."""
         if isinstance(self.distribution, JointDistribution):
             return ()
         return self.distribution.warnings
 
     @property
     def scalar(self) -> Distribution:
-        """Distribution of one value: its own, or the marginal of a field or a process."""
+        """Distribution of one value; the marginal one for a field or a process."""
         if isinstance(self.distribution, FrictionField | Process):
             return self.distribution.marginal
         if isinstance(self.distribution, Distribution):
@@ -142,13 +141,13 @@ class RandomInput:
 
     @property
     def extremes(self) -> tuple[float, float]:
-        """Least and greatest value that a draw can have; a continuous law keeps off its ends."""
+        """Least and greatest value of a draw; inside the support of a continuous distribution."""
         least, most = self.scalar.quantile(np.array([LEAST, BELOW_ONE]))
         return float(least), float(most)
 
     @property
     def greatest(self) -> float:
-        """Greatest size that any of the values it sets can have."""
+        """Greatest magnitude of the values that it sets."""
         if isinstance(self.distribution, JointDistribution):
             return max(self.distribution.reach)
         return max(abs(end) for end in self.extremes)
@@ -169,16 +168,16 @@ class RandomInput:
         Raises
         ------
         TypeError
-            If it is a field or a process, whose values depend on place or time.
+            If it is a field or a process, whose values depend on position or time.
         """
         if isinstance(self.distribution, JointDistribution):
             return self.distribution.values(uniform)
         if not isinstance(self.distribution, Distribution):
-            raise TypeError(f"{self.name} is a {self.role}: it has no one value per draw")
+            raise TypeError(f"{self.name} is a {self.role}, which has no single value per draw")
         return self.distribution.quantile(uniform[:, 0])[:, None]
 
     def describe(self) -> str:
-        """Return what it is in one line, in engineers' units."""
+        """Return a description in one line, in engineering units."""
         words = [self.kind]
         if isinstance(self.distribution, JointDistribution):
             pairs = zip(self.distribution.components, self.distribution.reach, strict=True)
@@ -189,15 +188,12 @@ class RandomInput:
             if isinstance(self.distribution, FrictionField) and "frame" not in self.options:
                 words.append(f"frame {self.distribution.frame}")
             words.append(f"of {self.marginal}")
-        law = self.scalar
-        words += [
-            f"mean {amount(law.mean, self.quantity)}",
-            f"std {amount(law.std, self.quantity)}",
-        ]
-        return ", ".join([*words, f"on {self._support()}", self.persistence])
-
-    def _support(self) -> str:
         low, high = self.scalar.support
         left = "(" if low == -float("inf") else "["
         right = ")" if high == float("inf") else "]"
-        return f"{left}{amount(low, self.quantity)}, {amount(high, self.quantity)}{right}"
+        words += [
+            f"mean {amount(self.scalar.mean, self.quantity)}",
+            f"std {amount(self.scalar.std, self.quantity)}",
+            f"on {left}{amount(low, self.quantity)}, {amount(high, self.quantity)}{right}",
+        ]
+        return ", ".join([*words, self.persistence])

@@ -14,25 +14,30 @@ from wearsim.scenario.random.model import (
     can_be_random,
 )
 from wearsim.scenario.random.parse import read_random_input
-from wearsim.scenario.random.targets import Host, Joint, host_of, joint_of
+from wearsim.scenario.random.targets import (
+    JointTarget,
+    RandomTarget,
+    joint_target_of,
+    random_target_of,
+)
 from wearsim.units import shown
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
 
-    from wearsim.scenario.parse.mistakes import Report
+    from wearsim.scenario.parse.mistakes import Mistakes
 
 Loc = tuple[str | int, ...]
 
 
 def lift(
-    report: Report, model: type[BaseModel], raw: Mapping[str, object], table: str
+    mistakes: Mistakes, model: type[BaseModel], raw: Mapping[str, object], table: str
 ) -> tuple[Mapping[str, object], list[Loc]]:
     """Return a table with means in the place of random inputs, and where these have mistakes.
 
     Parameters
     ----------
-    report : Report
+    mistakes : Mistakes
         Collects the random inputs, and their mistakes.
     model : type of BaseModel
         What the table is about to be validated by.
@@ -48,13 +53,13 @@ def lift(
         holder: Any = raw
         for part in loc[:-1]:
             holder = holder[part]
-        means = _means(report, model, holder, ".".join(filter(None, [table, *inner])), loc)
+        means = _means(mistakes, model, holder, ".".join(filter(None, [table, *inner])), loc)
         if means is None:
             refused.append(loc)
             continue
         for key, value in means.items():
             lifted = put(lifted, [*inner, key], value)
-            report.means[".".join([table, *inner, key])] = value
+            mistakes.means[".".join([table, *inner, key])] = value
     return lifted, refused
 
 
@@ -102,69 +107,71 @@ def _places(model: type[BaseModel], raw: object, loc: Loc = ()) -> Iterator[Loc]
 
 
 def _means(
-    report: Report, model: type[BaseModel], holder: Any, table: str, loc: Loc
+    mistakes: Mistakes, model: type[BaseModel], holder: Any, table: str, loc: Loc
 ) -> dict[str, object] | None:
     """Note a random input and return what takes its place; None after noting its mistakes."""
     field, key = field_at(model, loc), loc[-1]
     if isinstance(key, int):
-        _refuse_entry(report, table, key)
+        _refuse_entry(mistakes, table, key)
         return None
     name = f"{table}.{key}" if table else key
-    report.tried.add(name)
-    joint, host = (joint_of(field), host_of(field)) if field else (None, None)
-    if not can_be_random(name) or (joint is None and host is None):
+    mistakes.random_keys.add(name)
+    joint, target = (joint_target_of(field), random_target_of(field)) if field else (None, None)
+    if not can_be_random(name) or (joint is None and target is None):
         expected = f"a value; only {RANDOM_PLACES} can be random"
-        report.add(table, key, "cannot be random", "a table with a distribution", expected)
+        mistakes.add(table, key, "cannot be random", "a table with a distribution", expected)
         return None
-    mark = joint or host
-    item = read_random_input(holder[key], name, mark.quantity if mark else None, joint, report)
-    if joint and not _alone(report, joint, holder, table, key):
+    mark = joint or target
+    item = read_random_input(holder[key], name, mark.quantity if mark else None, joint, mistakes)
+    if joint and not _alone(mistakes, joint, holder, table, key):
         return None
-    if item is None or (host and not _fits(report, item, host, table, key)):
+    if item is None or (target and not _fits(mistakes, item, target, table, key)):
         return None
-    report.random.append(item)
-    written = host.written if host else item.quantity.write if item.quantity else float
+    mistakes.random.append(item)
+    written = target.written if target else item.quantity.write if item.quantity else float
     pairs = zip(item.keys, item.mean, strict=True)
     means = {path.rsplit(".", 1)[-1]: written(mean) for path, mean in pairs}
-    return means if host else {key: None, **means}
+    return means if target else {key: None, **means}
 
 
-def _refuse_entry(report: Report, place: str, entry: int) -> None:
+def _refuse_entry(mistakes: Mistakes, place: str, entry: int) -> None:
     table, _, key = place.rpartition(".")
     expected = f"a value; only {RANDOM_PLACES} can be random"
     if place in OF_A_ROLLER:
         expected = 'one random input for all rollers, with persistence = "per-roller" to differ'
-    report.add(table, f"{key} (entry {entry + 1})", "cannot be random", "a table", expected)
+    mistakes.add(table, f"{key} (entry {entry + 1})", "cannot be random", "a table", expected)
 
 
 def _alone(
-    report: Report, joint: Joint, holder: Mapping[str, object], table: str, key: str
+    mistakes: Mistakes, joint: JointTarget, holder: Mapping[str, object], table: str, key: str
 ) -> bool:
     """Check that none of the values that a joint input sets is given besides."""
     rivals = [rival for rival in joint.components if rival in holder]
     for rival in rivals:
         what = f"is set by {key} already"
-        report.add(table, rival, what, shown(holder[rival]), "one of the two")
+        mistakes.add(table, rival, what, shown(holder[rival]), "one of the two")
     return not rivals
 
 
-def _fits(report: Report, item: RandomInput, host: Host, table: str, key: str) -> bool:
+def _fits(
+    mistakes: Mistakes, item: RandomInput, target: RandomTarget, table: str, key: str
+) -> bool:
     """Check the support and the mean of a random input against what its field allows."""
     (low, high), (least, most) = item.scalar.support, item.extremes
     reach = None
-    if low < host.low or (host.above and least <= host.low):
-        reach = f"down to {amount(low, host.quantity)}"
-    elif high > host.high or (host.below and most >= host.high):
-        reach = f"up to {amount(high, host.quantity)}"
+    if low < target.low or (target.above and least <= target.low):
+        reach = f"down to {amount(low, target.quantity)}"
+    elif high > target.high or (target.below and most >= target.high):
+        reach = f"up to {amount(high, target.quantity)}"
     if reach:
-        what = f"takes values {reach}, and must be {host.allowed}"
-        remedy = f"maxent with support {host.support} or truncated-normal"
+        what = f"takes values {reach}, and must be {target.allowed}"
+        remedy = f"maxent with support {target.support} or truncated-normal"
         if low == high:
-            what, remedy = f"must be {host.allowed}", f"a value {host.allowed}"
-        got = amount(low, host.quantity) if low == high else item.describe()
-        report.add(table, key, what, got, remedy)
+            what, remedy = f"must be {target.allowed}", f"a value {target.allowed}"
+        got = amount(low, target.quantity) if low == high else item.describe()
+        mistakes.add(table, key, what, got, remedy)
         return False
     if item.mean[0] - item.mean[0] != 0.0:  # infinite or not a number
-        report.add(table, key, "has no finite mean", item.describe())
+        mistakes.add(table, key, "has no finite mean", item.describe())
         return False
     return True

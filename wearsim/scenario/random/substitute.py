@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, cast
 
-from wearsim.scenario.parse.key_index import all_names
-from wearsim.scenario.parse.mistakes import Report
+from wearsim.scenario.parse.key_index import keys_by_place
+from wearsim.scenario.parse.mistakes import Mistakes
 from wearsim.scenario.parse.toml import READERS, check_lists
 from wearsim.scenario.random.placeholders import put_all
 from wearsim.scenario.scenario import Drawn, Scenario
@@ -52,14 +52,14 @@ def realise(scenario: Scenario, values: Mapping[str, Drawn]) -> Scenario:
         texts = [quantity.write(number) if quantity else number for number in numbers]
         written[key] = texts if isinstance(value, tuple) else texts[0]
     tables = put_all(scenario._tables, written)
-    report = Report(scenario.file, scenario.files.__getitem__, all_names())
+    mistakes = Mistakes(scenario.file, scenario.files.__getitem__, keys_by_place)
     changed = [table for table in READERS if any(key.startswith(f"{table}.") for key in written)]
     sections: dict[str, Any] = {
-        table: READERS[table](cast("Mapping[str, object]", tables[table]), report)
+        table: READERS[table](cast("Mapping[str, object]", tables[table]), mistakes)
         for table in changed
     }
-    check_lists(tables, report)
-    report.raise_any()
+    check_lists(tables, mistakes)
+    mistakes.raise_any()
     return replace(
         scenario,
         **sections,

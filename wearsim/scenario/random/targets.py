@@ -1,36 +1,34 @@
-"""What a random input may stand for: a field that holds one number, or several set together."""
+"""Targets of random inputs: a field with one number, or several fields set together."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin
+from typing import Annotated, Any, get_args, get_origin
 
 from annotated_types import Ge, Gt, Le, Lt
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, core_schema
 
 from wearsim.quantities import Quantity
 from wearsim.scenario.parse.field_wording import alternatives
 from wearsim.units import QuantityError, shown
 
-if TYPE_CHECKING:
-    from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
-    from pydantic.fields import FieldInfo
-
 _INFINITE = float("inf")
 
 
 @dataclass(frozen=True)
-class Host:
-    """A field that holds one number, and the values it takes.
+class RandomTarget:
+    """A field that holds one number, and the range of its values.
 
     Parameters
     ----------
     quantity : Quantity, optional
-        What it measures; nothing for a plain number.
+        Its quantity; None for a plain number.
     low, high : float
         Bounds of its values in SI.
     above, below : bool
-        Whether the values stay clear of the lower, and of the upper bound itself.
+        Whether the lower and the upper bound are themselves excluded.
     """
 
     quantity: Quantity | None
@@ -40,12 +38,12 @@ class Host:
     below: bool = False
 
     def written(self, value: float) -> object:
-        """Return an SI value as a scenario would hold it."""
+        """Return an SI value as a scenario holds it."""
         return self.quantity.write(value) if self.quantity else value
 
     @property
     def allowed(self) -> str:
-        """The values it takes, in words."""
+        """Range of the values, in words."""
         words = []
         if self.low > -_INFINITE:
             words.append(f"above {self.low:g}" if self.above else f"at least {self.low:g}")
@@ -55,24 +53,24 @@ class Host:
 
     @property
     def support(self) -> str:
-        """The widest support of a random input in its place, as a scenario would hold it."""
+        """Widest allowed support of a random input, as a scenario holds it."""
         ends = {-_INFINITE: "-inf", _INFINITE: "inf"}
         written = [ends.get(end, self.written(end)) for end in (self.low, self.high)]
         return shown([int(end) if end == 0.0 else end for end in written])
 
 
 @dataclass(frozen=True)
-class Joint:
-    """Marks a key that only a joint random input can stand for: ``Annotated[None, Joint(...)]``.
+class JointTarget:
+    """Annotation of a key for a joint random input: ``Annotated[None, JointTarget(...)]``.
 
     Parameters
     ----------
     components : tuple of str
-        The keys of the same table that it sets together.
+        The keys of the same table that the input sets together.
     quantity : Quantity
-        What they measure.
+        Quantity of the components.
     example : str
-        A random input as it would be written.
+        A random input as it is written in a scenario.
     """
 
     components: tuple[str, ...]
@@ -80,7 +78,7 @@ class Joint:
     example: str
 
     def parse(self, value: object) -> None:
-        """Refuse `value`: whatever random input was here has been taken out before."""
+        """Reject `value`: a random input has been removed before validation."""
         raise QuantityError(
             "is not a random input", shown(value), f"a table such as {self.example}"
         )
@@ -96,22 +94,21 @@ class Joint:
         return {"type": "object"}
 
 
-def joint_of(field: FieldInfo) -> Joint | None:
-    """Return the mark of a key that only a joint random input can stand for."""
-    return next((item for item in field.metadata if isinstance(item, Joint)), None)
+def joint_target_of(field: FieldInfo) -> JointTarget | None:
+    """Return the annotation of a key that takes a joint random input, or None."""
+    return next((item for item in field.metadata if isinstance(item, JointTarget)), None)
 
 
-def host_of(field: FieldInfo) -> Host | None:
-    """Return what a field asks of a number, or None where it is no number."""
-    marks = list(field.metadata)
+def random_target_of(field: FieldInfo) -> RandomTarget | None:
+    """Return the quantity and range of a field with one number, or None for another field."""
     for part in alternatives(field):
         annotated = get_origin(part) is Annotated
         if (get_args(part)[0] if annotated else part) is float:
-            return _host([*marks, *(part.__metadata__ if annotated else ())])
+            return _random_target([*field.metadata, *(part.__metadata__ if annotated else ())])
     return None
 
 
-def _host(marks: list[Any]) -> Host:
+def _random_target(marks: list[Any]) -> RandomTarget:
     quantity, low, high, above, below = None, -_INFINITE, _INFINITE, False, False
     for mark in marks:
         if isinstance(mark, Quantity):
@@ -126,4 +123,4 @@ def _host(marks: list[Any]) -> Host:
             high, below = float(mark.lt), True  # type: ignore[arg-type]
         elif isinstance(mark, Le):
             high, below = float(mark.le), False  # type: ignore[arg-type]
-    return Host(quantity, low, high, above, below)
+    return RandomTarget(quantity, low, high, above, below)

@@ -1,1 +1,1 @@
-"""The tables of a scenario."""
+"""Tables of a scenario."""

@@ -1,4 +1,4 @@
-"""The tables [roller] and [cylinder]: shapes and materials."""
+"""Tables [roller] and [cylinder]: shapes and materials."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from pydantic import Field, PlainValidator
 from wearsim.csv_tables import read_columns
 from wearsim.errors import ScenarioError
 from wearsim.quantities import InputFile, Length, PerRoller, PositiveLength, PositivePressure
-from wearsim.scenario.parse.mistakes import Report, Table
+from wearsim.scenario.parse.mistakes import Mistakes, Table
 from wearsim.scenario.parse.validate import validate
 from wearsim.types import Material, Profile
 from wearsim.units import QuantityError, shown
 
-# Handbook constants; the bronze is phosphor bronze C51000, the ductile iron follows EN 1563.
+#: Handbook constants: phosphor bronze C51000, ductile iron of EN 1563.
 MATERIALS = {
     "steel": Material(200e9, 0.3),
     "aluminium": Material(70e9, 0.33),
@@ -28,7 +28,7 @@ MaterialName: TypeAlias = Literal["steel", "aluminium", "bronze", "ductile-iron"
 
 
 class MaterialTable(Table):
-    """A material by its constants."""
+    """Elastic constants of a material."""
 
     youngs_modulus: PositivePressure = Field(description="Young's modulus.")
     poisson_ratio: float = Field(ge=0.0, le=0.5, description="Poisson's ratio.")
@@ -56,49 +56,51 @@ MaterialField: TypeAlias = Annotated[
 
 
 class RollerTable(Table):
-    """The rollers: crowned, all of one shape."""
+    """Rollers: crowned, all of the same shape."""
 
     radius: PositiveLength | None = Field(
-        default=None, description="Rolling radius; give it or the diameter."
+        default=None, description="Rolling radius; either it or the diameter is needed."
     )
     diameter: PositiveLength | None = Field(default=None, description="Rolling diameter.")
     crown_radius: PositiveLength | None = Field(
-        default=None, description="Radius of the crown across the track; or its diameter."
+        default=None,
+        description="Radius of the crown across the track; or give its diameter.",
     )
     crown_diameter: PositiveLength | None = Field(default=None, description="Crown diameter.")
     offset: PerRoller[Length] = Field(
-        default=0.0, description="Axial position of each roller's apex, one for all or a list."
+        default=0.0,
+        description="Axial position of the apex: one value for all rollers or one per roller.",
     )
-    material: MaterialField = Field(description="A material's name, or a table of its constants.")
+    material: MaterialField = Field(description="Name of a material, or a table of its constants.")
 
 
 class CylinderTable(Table):
-    """The cylinder that the rollers run on."""
+    """Cylinder on which the rollers run."""
 
     radius: PositiveLength | None = Field(
-        default=None, description="Radius; give it or the diameter."
+        default=None, description="Radius; either it or the diameter is needed."
     )
     diameter: PositiveLength | None = Field(default=None, description="Diameter.")
-    material: MaterialField = Field(description="A material's name, or a table of its constants.")
+    material: MaterialField = Field(description="Name of a material, or a table of its constants.")
     profile: InputFile | None = Field(
         default=None,
-        description="CSV with columns y and height: the surface above its nominal shape at the"
-        " start, worn material negative.",
+        description="CSV file with columns y and height: initial height of the surface above its"
+        " nominal shape, negative where material is worn.",
     )
 
 
 @dataclass(frozen=True)
 class Roller:
-    """The rollers.
+    """Geometry and material of the rollers.
 
     Parameters
     ----------
     radius, crown_radius : float
         Rolling radius, and radius of the crown across the track [m].
     offset : float or tuple of float
-        Axial position of the apex, for all rollers or one per roller [m].
+        Axial position of the apex, one for all rollers or one per roller [m].
     material : Material
-        What they are made of.
+        Material of the rollers.
     """
 
     radius: float
@@ -109,16 +111,16 @@ class Roller:
 
 @dataclass(frozen=True)
 class Cylinder:
-    """The cylinder.
+    """Geometry and material of the cylinder.
 
     Parameters
     ----------
     radius : float
         Radius [m].
     material : Material
-        What it is made of.
+        Material of the cylinder.
     profile : Profile, optional
-        Its surface above nominal at the start.
+        Initial height of the surface above its nominal shape.
     """
 
     radius: float
@@ -130,11 +132,11 @@ def _radius(radius: float | None, diameter: float | None) -> float | None:
     return radius if diameter is None else 0.5 * diameter
 
 
-def read_roller(raw: Mapping[str, object], report: Report) -> Roller | None:
-    """Return the table [roller], or None after noting its mistakes."""
-    report.exactly_one(raw, "roller", ("radius", "diameter"))
-    report.exactly_one(raw, "roller", ("crown_radius", "crown_diameter"))
-    table = validate(report, RollerTable, raw, "roller")
+def read_roller(raw: Mapping[str, object], mistakes: Mistakes) -> Roller | None:
+    """Return the rollers, or None after adding the mistakes of the table [roller]."""
+    mistakes.require_one(raw, "roller", ("radius", "diameter"))
+    mistakes.require_one(raw, "roller", ("crown_radius", "crown_diameter"))
+    table = validate(mistakes, RollerTable, raw, "roller")
     if table is None:
         return None
     radius = _radius(table.radius, table.diameter)
@@ -144,28 +146,28 @@ def read_roller(raw: Mapping[str, object], report: Report) -> Roller | None:
     return Roller(radius, crown, table.offset, table.material)
 
 
-def read_cylinder(raw: Mapping[str, object], report: Report) -> Cylinder | None:
-    """Return the table [cylinder], or None after noting its mistakes."""
-    report.exactly_one(raw, "cylinder", ("radius", "diameter"))
-    table = validate(report, CylinderTable, raw, "cylinder")
+def read_cylinder(raw: Mapping[str, object], mistakes: Mistakes) -> Cylinder | None:
+    """Return the cylinder, or None after adding the mistakes of the table [cylinder]."""
+    mistakes.require_one(raw, "cylinder", ("radius", "diameter"))
+    table = validate(mistakes, CylinderTable, raw, "cylinder")
     if table is None:
         return None
     radius = _radius(table.radius, table.diameter)
     try:
         profile = read_profile(table.profile) if table.profile else None
     except ScenarioError as error:
-        report.add_file(error, "cylinder", "profile")
+        mistakes.add_file(error, "cylinder", "profile")
         return None
     return None if radius is None else Cylinder(radius, table.material, profile)
 
 
 def read_profile(file: InputFile) -> Profile:
-    """Return the profile in a CSV with the columns y and height.
+    """Return the profile of a CSV file with the columns y and height.
 
     Raises
     ------
     ScenarioError
-        With every mistake in the file.
+        With all mistakes of the file.
     """
     columns = read_columns(file.text, file.path, {"y": "m", "height": "m"}, rising="y")
     return Profile(columns["y"], columns["height"])

@@ -59,7 +59,7 @@ def redrawing(scenario: Scenario, items: Sequence[RandomInput]) -> Redraw:
             item.name: stream.rows(first, count, item.dimension, realisation)
             for item, stream in streams.items()
         }
-        return _placed(inputs, _values(items, copula.tie(uniforms)))
+        return _placed(inputs, _values(items, copula.correlate(uniforms)))
 
     return redraw
 
@@ -93,7 +93,7 @@ def with_nodes(
     sampler, copula = Sampler(scenario.seed, names, "sobol"), _copula(scenario, items)
 
     def inputs_of(points: int) -> ContactInputs:
-        values = _values(items, copula.tie(sampler.uniforms(0, points)))
+        values = _values(items, copula.correlate(sampler.uniforms(0, points)))
         roller = np.repeat(np.arange(problem.rollers, dtype=np.int64), points)
         everywhere = {name: np.tile(array, problem.rollers) for name, array in values.items()}
         return _placed(problem.inputs.at(roller), everywhere)

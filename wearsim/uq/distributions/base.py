@@ -11,7 +11,7 @@ from wearsim.types import FloatArray
 from wearsim.uq.distributions.quantile_table import NOTHING_LEFT
 
 
-class Law(ABC):
+class MaxentDistribution(ABC):
     """A law with density ``exp(-l0 - l1 x - l2 g(x))`` on its support, g being x^2 or log x.
 
     Attributes
@@ -41,16 +41,16 @@ class Law(ABC):
         return None
 
     @property
-    def trough(self) -> tuple[float, float] | None:
+    def antimode(self) -> tuple[float, float] | None:
         """Where inside the support the density is least, and the probability above; or None."""
         return None
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """What a user should know before trusting it."""
-        if self.trough is None:
+        if self.antimode is None:
             return ()
-        least, above = self.trough
+        least, above = self.antimode
         share, end = min((above, self.support[1]), (1.0 - above, self.support[0]))
         much = "a spike" if share < 0.1 else "a peak"
         told = (
@@ -105,7 +105,7 @@ class Law(ABC):
         """Return the log of the density at `x` within the support."""
 
 
-class Uniform(Law):
+class Uniform(MaxentDistribution):
     """All that is known is a bounded support."""
 
     family = "uniform"
@@ -126,7 +126,7 @@ class Uniform(Law):
         return np.full_like(x, -self.multipliers[0])
 
 
-class Exponential(Law):
+class Exponential(MaxentDistribution):
     """The law ``exp(-rate x)`` from a finite lower end on, cut off at an upper one or not.
 
     Parameters
@@ -189,10 +189,10 @@ def exponential_fall(mean: float) -> float:
     return fall
 
 
-class Mirrored(Law):
+class Mirrored(MaxentDistribution):
     """A law with its values' sign turned, for what is known towards an upper end."""
 
-    def __init__(self, law: Law) -> None:
+    def __init__(self, law: MaxentDistribution) -> None:
         self._law = law
         self.family, self.std, self.mean = law.family, law.std, -law.mean
         self.support = (-law.support[1], -law.support[0])
@@ -206,10 +206,10 @@ class Mirrored(Law):
         return None if parent is None else (-parent[0], parent[1])
 
     @property
-    def trough(self) -> tuple[float, float] | None:
+    def antimode(self) -> tuple[float, float] | None:
         """Where inside the support the density is least, and the probability above; or None."""
-        trough = self._law.trough
-        return None if trough is None else (-trough[0], 1.0 - trough[1])
+        antimode = self._law.antimode
+        return None if antimode is None else (-antimode[0], 1.0 - antimode[1])
 
     def inverse(self, below: FloatArray, above: FloatArray) -> FloatArray:
         """Return quantiles, shape (draws,), from probabilities below and above them."""

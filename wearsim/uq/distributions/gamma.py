@@ -8,13 +8,13 @@ from functools import cached_property
 import numpy as np
 
 from wearsim.types import FloatArray
-from wearsim.uq.distributions.base import Law
+from wearsim.uq.distributions.base import MaxentDistribution
 from wearsim.uq.distributions.quantile_table import InverseTable, Piece, panel_edges
 
 _LARGE = 50.0  # shape from which on differences cancel, and their series do not
 
 
-class Gamma(Law):
+class Gamma(MaxentDistribution):
     """The law on [0, inf) of given mean and mean logarithm.
 
     Parameters

@@ -10,7 +10,7 @@ from wearsim.errors import WearsimError
 from wearsim.uq.distributions import maxent_solver
 from wearsim.uq.distributions.base import (
     Exponential,
-    Law,
+    MaxentDistribution,
     Mirrored,
     Uniform,
     exponential_fall,
@@ -36,7 +36,7 @@ def maximum_entropy(
     mean: float | None = None,
     std: float | None = None,
     mean_log: float | None = None,
-) -> Law:
+) -> MaxentDistribution:
     """Return the law of maximum entropy: the least certain one that agrees with what is known.
 
     Parameters
@@ -53,7 +53,7 @@ def maximum_entropy(
 
     Returns
     -------
-    Law
+    MaxentDistribution
         Uniform, exponential, normal, truncated normal, exponential of a quadratic, or gamma.
 
     Raises
@@ -174,7 +174,7 @@ def _interval(low: float, high: float) -> str:
     return f"{start}, {high:g}]" if math.isfinite(high) else f"{start}, {high:g})"
 
 
-def _towards_lower(low: float, high: float, mean: float, std: float | None) -> Law:
+def _towards_lower(low: float, high: float, mean: float, std: float | None) -> MaxentDistribution:
     """Return the law whose mean lies nearer the lower end, or in the middle."""
     if math.isinf(low):
         assert std is not None
@@ -192,7 +192,7 @@ def _towards_lower(low: float, high: float, mean: float, std: float | None) -> L
     return _two_ends(low, high, mean, std, fall)
 
 
-def _one_peak(low: float, high: float, mean: float, std: float) -> Law:
+def _one_peak(low: float, high: float, mean: float, std: float) -> MaxentDistribution:
     """Return the law that spreads less than the exponential one: cut from a normal parent."""
     start = (low - mean) / std
     z, weights = maxent_solver.even_quadrature(
@@ -208,7 +208,7 @@ def _one_peak(low: float, high: float, mean: float, std: float) -> Law:
     return QuadraticExponent(low, high, std, slope + 2.0 * bend * start, bend)
 
 
-def _two_ends(low: float, high: float, mean: float, std: float, fall: float) -> Law:
+def _two_ends(low: float, high: float, mean: float, std: float, fall: float) -> MaxentDistribution:
     """Return the law that spreads more than the exponential one: dented, with l2 < 0.
 
     Its exponent is told by ``t (1 - t)`` and t, t going from 0 to 1 over the support, because

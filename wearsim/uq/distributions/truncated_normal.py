@@ -8,14 +8,14 @@ from functools import cached_property
 import numpy as np
 
 from wearsim.types import FloatArray
-from wearsim.uq.distributions.base import Law, Mirrored
+from wearsim.uq.distributions.base import MaxentDistribution, Mirrored
 from wearsim.uq.distributions.quantile_table import InverseTable, Piece, panel_edges
 
 _DEEPEST = 5.0  # standard deviations of the parent between its mean and a support that is cut off
 _NARROWEST = 0.03  # support, in standard deviations of the parent
 
 
-class TruncatedNormal(Law):
+class TruncatedNormal(MaxentDistribution):
     """A normal law cut off at the ends of a support that is not far out in its tail.
 
     Parameters
@@ -77,7 +77,7 @@ class TruncatedNormal(Law):
         return self._log_top - 0.5 * ((x - mean) / std) ** 2
 
 
-class QuadraticExponent(Law):
+class QuadraticExponent(MaxentDistribution):
     """The law ``exp(-a u - b u^2)``, u counted from the lower end, where no parent serves.
 
     It is nearly exponential, nearly uniform, or (b < 0) rises towards an end.
@@ -129,7 +129,7 @@ class QuadraticExponent(Law):
         return self.support[0] - self._scale * self._fall / (2.0 * self._bend), std
 
     @property
-    def trough(self) -> tuple[float, float] | None:
+    def antimode(self) -> tuple[float, float] | None:
         """Where inside the support the density is least, and the probability above; or None."""
         if not self._two_peaks:
             return None
@@ -187,7 +187,9 @@ def _falling_from(
     return Piece(high, scale, edges, lambda v: -top + (fall - bend * v) * v)
 
 
-def cut_normal(low: float, high: float, parent_mean: float, parent_std: float) -> Law:
+def cut_normal(
+    low: float, high: float, parent_mean: float, parent_std: float
+) -> MaxentDistribution:
     """Return a normal law cut off at the ends of a support, wherever that lies.
 
     Parameters
@@ -199,7 +201,7 @@ def cut_normal(low: float, high: float, parent_mean: float, parent_std: float) -
 
     Returns
     -------
-    Law
+    MaxentDistribution
     """
     if high - parent_mean < parent_mean - low:
         return Mirrored(cut_normal(-high, -low, -parent_mean, parent_std))

@@ -80,7 +80,7 @@ class Controlled:
         return float(self._apart @ parts) / self._square
 
 
-def is_of_use(control: Control) -> bool:
+def is_usable(control: Control) -> bool:
     """Tell whether there are realisations enough for a regression, and the control has a spread."""
     values = control.values
     return len(values) >= _FEWEST and not is_constant(float(values.mean()), float(values.std()))

@@ -10,10 +10,10 @@ from typing import Literal, TypeAlias, get_args
 import numpy as np
 
 from wearsim.types import FloatArray, IntArray
-from wearsim.uq.estimation.control_variate import Control, Controlled, is_of_use
-from wearsim.uq.estimation.intervals import UNKNOWN, Interval, about, student
+from wearsim.uq.estimation.control_variate import Control, Controlled, is_usable
+from wearsim.uq.estimation.intervals import UNKNOWN, Interval, t_interval, t_quantile
 from wearsim.uq.estimation.moments import summarise
-from wearsim.uq.estimation.quantiles import WeightedLaw, fractional_ranks
+from wearsim.uq.estimation.quantiles import WeightedDistribution, fractional_ranks
 from wearsim.uq.estimation.standard_errors import Independent, PlanErrors, Replicated
 
 Design: TypeAlias = Literal[
@@ -131,7 +131,7 @@ def estimate(
         quantiles = tuple((probability, same) for probability in probabilities)
     else:
         mean, std = _mean_and_std(values, errors)
-        law = WeightedLaw(values, errors.weights)
+        law = WeightedDistribution(values, errors.weights)
         quantiles = tuple((p, _quantile(law, values, p, errors)) for p in probabilities)
     return Estimate(
         count=summary.count,
@@ -159,7 +159,7 @@ def _errors(
     if plan == "control-variate":
         if control is None or len(control.values) != count:
             raise ValueError("a control-variate plan needs the control of each realisation")
-        if is_of_use(control):
+        if is_usable(control):
             return Controlled(control)
         return Independent(count, "independent realisations, too few or too alike for a control")
     words = {
@@ -183,7 +183,7 @@ def _mean_and_std(values: FloatArray, errors: PlanErrors) -> tuple[Interval, Int
     # what the mean's own error takes from the squares; and never below 0, whatever the weights
     plain = float(square.mean()) + error**2
     variance = plain * math.exp((_weighted(errors, square) - float(square.mean())) / plain)
-    mean = about(centre + offset, error, errors.degrees)
+    mean = t_interval(centre + offset, error, errors.degrees)
     return mean, _std_interval(math.sqrt(variance), apart, errors)
 
 
@@ -199,13 +199,13 @@ def _std_interval(std: float, apart: FloatArray, errors: PlanErrors) -> Interval
     if left.min() < _NOTHING_LEFT:
         return unknown
     pseudo = -(count - 1.0) * np.log(left)
-    reach, shift = student(errors.degrees) * errors.error(pseudo), float(pseudo.mean())
+    reach, shift = t_quantile(errors.degrees) * errors.error(pseudo), float(pseudo.mean())
     low, high = (math.exp(0.5 * min(shift + side, _LARGEST)) for side in (-reach, reach))
     return Interval(std, std * min(low, 1.0), std * max(high, 1.0))
 
 
 def _quantile(
-    law: WeightedLaw, values: FloatArray, probability: float, errors: PlanErrors
+    law: WeightedDistribution, values: FloatArray, probability: float, errors: PlanErrors
 ) -> Interval:
     """Return one quantile."""
     value = law.quantile(probability)
@@ -215,7 +215,7 @@ def _quantile(
     if not isinstance(errors, Independent):
         below = (values <= value).astype(np.float64)
         error = max(
-            errors.error(below) * student(errors.degrees) / student(math.inf), _STEP / count
+            errors.error(below) * t_quantile(errors.degrees) / t_quantile(math.inf), _STEP / count
         )
         count = probability * (1.0 - probability) / error**2
     low, high = (law.at(rank / (count + 1.0)) for rank in fractional_ranks(count, probability))

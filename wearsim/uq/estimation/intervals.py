@@ -40,7 +40,7 @@ UNKNOWN = Interval(math.nan, -math.inf, math.inf)
 """What too few realisations tell."""
 
 
-def about(value: float, error: float, degrees: float) -> Interval:
+def t_interval(value: float, error: float, degrees: float) -> Interval:
     """Return the interval of Student's t about an estimate.
 
     Parameters
@@ -50,11 +50,11 @@ def about(value: float, error: float, degrees: float) -> Interval:
     degrees : float
         Degrees of freedom of the error; infinite for the normal law.
     """
-    reach = error * student(degrees)
+    reach = error * t_quantile(degrees)
     return Interval(value, value - reach, value + reach)
 
 
-def student(degrees: float) -> float:
+def t_quantile(degrees: float) -> float:
     """Return how many standard errors an interval reaches to either side, by Student's t."""
     from scipy.special import ndtri, stdtrit  # noqa: PLC0415  (slow to import)
 

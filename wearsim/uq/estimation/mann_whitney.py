@@ -9,7 +9,7 @@ import numpy as np
 
 from wearsim.types import FloatArray, IntArray
 from wearsim.uq.estimation.estimates import Design, estimate
-from wearsim.uq.estimation.intervals import UNKNOWN, Interval, student
+from wearsim.uq.estimation.intervals import UNKNOWN, Interval, t_quantile
 
 FEWEST = 5  # values, of which an error can be told
 _NEAR_CERTAIN = 0.1  # of 0 or 1, where few realisations of one ensemble are among the other's
@@ -48,7 +48,7 @@ def superiority(first: FloatArray, second: FloatArray) -> Interval:
     if parts.sum() > 0.0:
         degrees = float(parts.sum() ** 2 / (parts**2 / np.array([n - 1, m - 1])).sum())
         spread = chance * (1.0 - chance)
-        reach = student(degrees) * math.sqrt(float(parts.sum())) / spread
+        reach = t_quantile(degrees) * math.sqrt(float(parts.sum())) / spread
         odds = chance / (1.0 - chance)
         low, high = (1.0 / (1.0 + math.exp(side) / odds) for side in (reach, -reach))
     if not _NEAR_CERTAIN < chance < 1.0 - _NEAR_CERTAIN:
@@ -110,7 +110,7 @@ def paired(
     if count == 0:
         return Paired(difference, UNKNOWN, 0)
     share = float((apart > 0.0).mean() + 0.5 * (apart == 0.0).mean())
-    square = student(math.inf) ** 2 / count
+    square = t_quantile(math.inf) ** 2 / count
     middle = (share + 0.5 * square) / (1.0 + square)
     reach = math.sqrt(square * (share * (1.0 - share) + 0.25 * square)) / (1.0 + square)
     return Paired(difference, Interval(share, middle - reach, middle + reach).within(0, 1), count)
@@ -126,7 +126,7 @@ def _part_below(values: FloatArray, others: FloatArray) -> FloatArray:
 def _newcombe(chance: float, n: int, m: int) -> tuple[float, float]:
     """Return the chances that are as far off as the error that belongs to each of them allows."""
     others = 0.5 * (n + m) - 1.0
-    reach = student(math.inf)
+    reach = t_quantile(math.inf)
 
     def too_far(true: float) -> bool:
         doubled = others * ((1.0 - true) / (2.0 - true) + true / (1.0 + true))

@@ -13,7 +13,7 @@ from wearsim.uq.estimation.moments import CONFIDENCE
 _HALVINGS = 50  # of an interval of ranks: to rounding
 
 
-class WeightedLaw:
+class WeightedDistribution:
     """The empirical law of values of which each stands for a part of all.
 
     Parameters

@@ -49,7 +49,7 @@ class GaussianCopula:
             pairs[pair] = rank
         self._groups = [(names, _factor(names, pairs)) for names in _groups(pairs)]
 
-    def tie(self, uniforms: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    def correlate(self, uniforms: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
         """Return uniform numbers with the correlations, from independent ones.
 
         Parameters

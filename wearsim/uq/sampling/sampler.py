@@ -76,7 +76,7 @@ class Sampler:
             raise ValueError(
                 f"realisations are counted from 0, got {count} of them from {first} on"
             )
-        return self._copula.tie(
+        return self._copula.correlate(
             {
                 name: self._draw(name, dimension, first, count)
                 for name, dimension in self._dimensions.items()

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from wearsim.types import FloatArray
-from wearsim.uq.estimation.intervals import UNKNOWN, Interval, about
+from wearsim.uq.estimation.intervals import UNKNOWN, Interval, t_interval
 from wearsim.uq.estimation.moments import is_constant
 from wearsim.uq.sensitivity.polynomial_chaos import best_fit, fewest_realisations
 
@@ -98,7 +98,7 @@ def _share(values: FloatArray, numbers: FloatArray, name: str) -> Interval:
     influence = (fit.residual * without - left * apart**2) / variance
     noise = 2.0 * (fit.terms - 1) * (left / count) ** 2
     error = math.sqrt(float(influence.var()) / count + noise)
-    return about(1.0 - left, error, math.inf).within(0.0, 1.0)
+    return t_interval(1.0 - left, error, math.inf).within(0.0, 1.0)
 
 
 def _ranks(column: FloatArray) -> FloatArray:
@@ -169,4 +169,4 @@ def _ratio(part: FloatArray, square: FloatArray) -> Interval:
     share = float(part.mean() / square.mean())
     influence = (part - share * square) / float(square.mean())
     error = float(influence.std(ddof=1)) / math.sqrt(len(part))
-    return about(share, error, len(part) - 1).within(0.0, 1.0)
+    return t_interval(share, error, len(part) - 1).within(0.0, 1.0)

@@ -10,7 +10,7 @@ from wearsim.models.random.maxent import LawDistribution
 from wearsim.scenario import Scenario
 from wearsim.studies.contact.draws import LOAD, LONGITUDINAL, TILT, YAW
 from wearsim.studies.run.grid import fresh_patch
-from wearsim.uq.distributions.base import Law
+from wearsim.uq.distributions.base import MaxentDistribution
 from wearsim.uq.estimation.moments import summarise
 from wearsim_chevalier2005 import paper
 from wearsim_chevalier2005.comparison_row import Row, beside, percent
@@ -58,7 +58,7 @@ def _radii(scenario: Scenario) -> str:
     return "/".join(f"{1e3 * length:g}" for length in lengths) + " mm"
 
 
-def law_of(scenario: Scenario, key: str) -> Law:
+def law_of(scenario: Scenario, key: str) -> MaxentDistribution:
     """Return the law of maximum entropy that a scenario's random input draws from."""
     (item,) = (item for item in scenario.random if item.name == key)
     if not isinstance(item.distribution, LawDistribution):
@@ -66,7 +66,7 @@ def law_of(scenario: Scenario, key: str) -> Law:
     return item.distribution.law
 
 
-def printed_area(printed: paper.PrintedMultipliers, law: Law) -> float:
+def printed_area(printed: paper.PrintedMultipliers, law: MaxentDistribution) -> float:
     """Return what the density with the printed multipliers integrates to; 1 for a density."""
     low, high = law.bulk
     x = np.linspace(low - (high - low), high + (high - low), 20001)
@@ -109,7 +109,11 @@ def input_rows(found: Reproduction) -> list[Row]:
 
 
 def _multipliers(
-    what: str, unit: str, printed: paper.PrintedMultipliers, law: Law, why: tuple[str, str, str]
+    what: str,
+    unit: str,
+    printed: paper.PrintedMultipliers,
+    law: MaxentDistribution,
+    why: tuple[str, str, str],
 ) -> list[Row]:
     units = ("1", f"1/{unit}", f"1/{unit}^2") if unit else ("1", "1", "1")
     values = zip((printed.l0, printed.l1, printed.l2), law.multipliers, units, why, strict=True)

@@ -12,7 +12,7 @@ from wearsim.types import FloatArray
 from wearsim.uq.estimation.control_variate import Control, Controlled
 from wearsim.uq.estimation.estimates import Estimate, estimate
 from wearsim.uq.estimation.intervals import Interval
-from wearsim.uq.estimation.quantiles import WeightedLaw
+from wearsim.uq.estimation.quantiles import WeightedDistribution
 from wearsim.uq.sampling.plans import REPLICATES
 
 PROBABILITY = 0.95
@@ -111,7 +111,7 @@ def _together(studies: Sequence[Study]) -> dict[str, float]:
     means = sorted({study.known for study in studies})
     known = float(np.mean([mean for mean, _ in means]))
     weights = Controlled(Control(controls, known)).weights
-    quantile = WeightedLaw(depths, weights).quantile(PROBABILITY)
+    quantile = WeightedDistribution(depths, weights).quantile(PROBABILITY)
     return {MEAN: float(weights @ depths), QUANTILE: quantile}
 
 
