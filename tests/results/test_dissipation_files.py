@@ -24,7 +24,7 @@ from wearsim.results import (
     write_results,
 )
 from wearsim.results.dissipation.result import as_numbers, summaries
-from wearsim.results.dissipation.schema import VARIABLES, with_inputs
+from wearsim.results.dissipation.schema import VARIABLES, dissipation_schema
 
 INPUTS = [{"key": "load.normal_force", "unit": "N"}, {"key": "friction.coefficient", "unit": "1"}]
 
@@ -35,7 +35,7 @@ def some_study(count: int = 40, kept: int = 30, **changes: object) -> Dissipatio
     lengths = {"realisation": count, "kept": kept, "y": 9}
     variables = {
         name: rng.random([lengths[dim] for dim in variable.dims])
-        for name, variable in with_inputs(INPUTS).variables.items()
+        for name, variable in dissipation_schema(INPUTS).variables.items()
     }
     values: dict[str, object] = {
         "scenario_text": 'title = "µ"\n',

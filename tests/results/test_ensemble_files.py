@@ -159,7 +159,7 @@ def test_that_every_kind_of_file_is_told_from_the_others(ensemble_file, tmp_path
     write_results(run, some_run())
     write_results(study, some_study())
     assert [kind_of(path) for path in (run, study, ensemble_file)] == [
-        "replay",
+        "run",
         "dissipation",
         "ensemble",
     ]

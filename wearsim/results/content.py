@@ -1,4 +1,4 @@
-"""What the files of all studies have in common, as plain values and arrays."""
+"""Content common to the results files of all studies, as plain values and arrays."""
 
 from __future__ import annotations
 
@@ -8,35 +8,35 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from wearsim.results.schema import Layout
+from wearsim.results.schema import Schema
 
 Arrays = dict[str, npt.NDArray[Any]]
 
 
 @dataclass(frozen=True, eq=False)
 class Content:
-    """What goes into a results file of any kind.
+    """Content of a results file of any kind.
 
     Parameters
     ----------
-    layout : Layout
+    schema : Schema
         The kind of file.
-    about : dict of str to object
-        Everything but arrays and texts, ready for JSON.
+    attributes : dict of str to object
+        Everything except arrays and long texts, ready for JSON.
     scenario_text : str
         TOML of the scenario.
     files : dict of str to str
-        Content of every file the scenario names.
+        Content of every file named in the scenario.
     variables : dict of str to ndarray
-        Those of the layout.
+        The variables of the schema.
     checkpoint : dict of str to ndarray
-        The state to resume from; nothing where there is nothing to resume.
+        State for resuming; empty if nothing can be resumed.
     reserved : frozenset of str
-        Variables that are given a place and no values; only their shape and type count here.
+        Variables for which only space is allocated; their values are ignored.
     """
 
-    layout: Layout
-    about: dict[str, Any]
+    schema: Schema
+    attributes: dict[str, Any]
     scenario_text: str
     files: dict[str, str]
     variables: Arrays
@@ -46,36 +46,35 @@ class Content:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class StudyData:
-    """What there is to know of any study.
+    """Data common to all studies.
 
     Parameters
     ----------
     scenario_text : str
         TOML of the scenario, overrides included.
     scenario_file : str
-        Where the scenario came from.
+        Path of the scenario file.
     title, sha256, seed : str, str, int
-        Of the scenario.
+        Title, checksum and seed of the scenario.
     files : dict of str to str
-        Content of every file the scenario names, by the path as written.
+        Content of every file named in the scenario, by the path as written there.
     software : dict of str to str
         Version by package.
     plugins : list of dict
         Plugins in use: kind, name, distribution and version of each.
     model : str
-        Name of the contact model in use.
+        Name of the contact model.
     notes, warnings : list of str
-        What a user should know, of the scenario and of the study.
+        Remarks on the scenario and on the computation.
     finished : bool
-        Whether all that was asked for is done.
+        Whether the study is complete.
     wall_seconds : float
-        Time the study took so far [s].
+        Wall time of the study so far [s].
     created : str
-        When the study began, ISO 8601.
+        Start of the study, ISO 8601.
     """
 
-    stored_apart: ClassVar[frozenset[str]] = frozenset({"scenario_text", "files"})
-    """Texts and arrays: what the file has a place of its own for."""
+    separately_stored: ClassVar[frozenset[str]] = frozenset({"scenario_text", "files"})
 
     scenario_text: str
     scenario_file: str
@@ -93,18 +92,18 @@ class StudyData:
     warnings: list[str] = field(default_factory=list)
 
     @classmethod
-    def told(cls) -> tuple[str, ...]:
-        """Return the names of what is told besides texts and arrays."""
-        return tuple(item.name for item in fields(cls) if item.name not in cls.stored_apart)
+    def attribute_names(cls) -> tuple[str, ...]:
+        """Return the names of all fields except those stored separately (long texts, arrays)."""
+        return tuple(item.name for item in fields(cls) if item.name not in cls.separately_stored)
 
     @property
-    def about(self) -> dict[str, Any]:
-        """Everything but arrays, the scenario's text and its files, by name."""
-        return {name: getattr(self, name) for name in self.told()}
+    def attributes(self) -> dict[str, Any]:
+        """Fields by name, without those stored separately."""
+        return {name: getattr(self, name) for name in self.attribute_names()}
 
 
 def as_plain(value: object) -> object:
-    """Return a numpy scalar as the Python number it is, for `json.dumps`."""
+    """Return a numpy scalar as a Python number, for `json.dumps`."""
     if isinstance(value, np.generic):
         return value.item()
     raise TypeError(f"{type(value).__name__} cannot be stored")

@@ -1,20 +1,20 @@
-"""Axes, variables and layouts of result files."""
+"""Axes, variables and schemas of result files."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, Protocol, TypeAlias
+from typing import Literal, Protocol, TypeAlias, TypeVar
 
 Kind: TypeAlias = Literal["static", "history", "record", "statistic"]
 
 
 class Shaped(Protocol):
-    """An array, or the place of one."""
+    """An object with the shape of an array."""
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Its length along each axis."""
+        """Length of each axis."""
 
 
 @dataclass(frozen=True)
@@ -24,11 +24,11 @@ class Axis:
     Parameters
     ----------
     name : str
-        Its name in the file.
+        Name in the file.
     long_name : str
-        What is counted along it.
+        Description.
     first : int
-        Number of its first entry.
+        Number of the first entry.
     """
 
     name: str
@@ -38,20 +38,20 @@ class Axis:
 
 @dataclass(frozen=True)
 class Variable:
-    """A variable of the file.
+    """A variable of a file.
 
     Parameters
     ----------
     name : str
-        Its name, in the file and in `RunData`.
+        Name, in the file and in `RunData`.
     dims : tuple of str
-        Its axes, slowest first.
+        Axes, slowest first.
     unit : str
-        Its SI unit; "1" for a plain number.
+        SI unit; "1" for a plain number.
     long_name : str
-        What it is.
+        Description.
     kind : {"static", "history", "record", "statistic"}
-        Given once, once per step, once per record, or taken over realisations.
+        Stored once, once per step, once per record, or estimated over the realisations.
     """
 
     name: str
@@ -61,22 +61,30 @@ class Variable:
     kind: Kind
 
 
+Item = TypeVar("Item", Axis, Variable)
+
+
+def by_name(items: Iterable[Item]) -> dict[str, Item]:
+    """Return axes or variables by name."""
+    return {item.name: item for item in items}
+
+
 @dataclass(frozen=True)
-class Layout:
-    """What a kind of results file holds.
+class Schema:
+    """Format, axes and variables of one kind of results file.
 
     Parameters
     ----------
     format : str
-        Its name.
+        Name of the format.
     version : int
-        The version that is written, and the newest that can be read.
+        Version written, which is also the newest that can be read.
     holds : str
-        What is in it and which command writes it, for messages.
+        Content and the command that writes it, for messages.
     axes : mapping of str to Axis
-        Every axis but those whose coordinate is a variable of their own, such as y.
+        Axes by name, without those whose coordinate is a variable, such as y.
     variables : mapping of str to Variable
-        The table of variables, by name.
+        Variables by name.
     """
 
     format: str
@@ -86,27 +94,27 @@ class Layout:
     variables: Mapping[str, Variable]
 
 
-def with_drawn(layout: Layout, inputs: Sequence[Mapping[str, str]]) -> Layout:
-    """Return the layout of a study, a variable for each value that was drawn.
+def with_random_inputs(schema: Schema, inputs: Sequence[Mapping[str, str]]) -> Schema:
+    """Return a schema extended by a variable for each drawn value.
 
     Parameters
     ----------
-    layout : Layout
-        The layout without them.
+    schema : Schema
+        The schema without drawn values.
     inputs : sequence of mapping
-        Dotted key and SI unit of each drawn value, and ``"rollers": "each"`` where every roller
-        has its own: ``{"key": "load.normal_force", "unit": "N"}``.
+        Dotted key and SI unit of each drawn value, ``{"key": "load.normal_force", "unit": "N"}``,
+        with ``"rollers": "each"`` where the rollers have separate values.
 
     Returns
     -------
-    Layout
+    Schema
     """
     drawn = {}
     for item in inputs:
-        each = ("roller",) if item.get("rollers") == "each" else ()
-        key, dims = item["key"], ("realisation", *each)
+        rollers = ("roller",) if item.get("rollers") == "each" else ()
+        key, dims = item["key"], ("realisation", *rollers)
         drawn[key] = Variable(key, dims, item["unit"], "drawn value", "record")
-    return replace(layout, variables={**layout.variables, **drawn})
+    return replace(schema, variables={**schema.variables, **drawn})
 
 
 def axis_lengths(arrays: Mapping[str, Shaped], table: Mapping[str, Variable]) -> dict[str, int]:
@@ -115,9 +123,9 @@ def axis_lengths(arrays: Mapping[str, Shaped], table: Mapping[str, Variable]) ->
     Parameters
     ----------
     arrays : mapping of str to ndarray
-        All variables of the table, by name, or anything that has their shapes.
+        All variables of the table, by name, or other objects with their shapes.
     table : mapping of str to Variable
-        The table.
+        The variables of the schema.
 
     Returns
     -------
@@ -126,7 +134,7 @@ def axis_lengths(arrays: Mapping[str, Shaped], table: Mapping[str, Variable]) ->
     Raises
     ------
     ValueError
-        If a variable is missing or unknown, or if one does not fit the axes of the others.
+        If a variable is missing or unknown, or has another length along an axis than the others.
     """
     if arrays.keys() != table.keys():
         missing = [name for name in table if name not in arrays]

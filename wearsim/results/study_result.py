@@ -1,4 +1,4 @@
-"""What the results of all studies tell alike."""
+"""Properties common to the results of all studies."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ Data = TypeVar("Data", bound=StudyData)
 
 @dataclass(frozen=True, eq=False)
 class StudyResult(Generic[Data]):
-    """A study, finished or not.
+    """Result of a study, finished or not.
 
     Parameters
     ----------
-    raw : RunData or DissipationData
-        All there is, every axis kept.
+    raw : RunData, DissipationData or EnsembleData
+        Content of the results file, with all axes.
     path : Path, optional
-        The results file, where there is one.
+        The results file, if there is one.
     """
 
     raw: Data
@@ -32,40 +32,40 @@ class StudyResult(Generic[Data]):
 
     @cached_property
     def scenario(self) -> Scenario:
-        """The scenario, read from the text and files that are stored with the results."""
-        from wearsim.scenario import parse_scenario  # noqa: PLC0415  (a results file needs none)
+        """The scenario, parsed from the text and the files stored with the results."""
+        from wearsim.scenario import parse_scenario  # noqa: PLC0415  (reading results needs none)
 
         raw = self.raw
         return parse_scenario(raw.scenario_text, raw.scenario_file, raw.files.__getitem__)
 
     @property
     def title(self) -> str:
-        """What the scenario is, in a line."""
+        """Title of the scenario."""
         return self.raw.title
 
     @property
     def model(self) -> str:
-        """Name of the contact model in use."""
+        """Name of the contact model."""
         return self.raw.model
 
     @property
     def described_model(self) -> str:
-        """The contact model with the options that the scenario gives it."""
+        """The contact model with the options set in the scenario."""
         from wearsim.scenario import described_model  # noqa: PLC0415  (slow to import)
 
         return described_model(self.raw.model, self.raw.scenario_text)
 
     @property
     def finished(self) -> bool:
-        """Whether all that was asked for is done."""
+        """Whether the study is complete."""
         return self.raw.finished
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a user should know of the scenario."""
+        """Remarks on the scenario."""
         return tuple(self.raw.notes)
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What a user should know of how it was computed."""
+        """Remarks on the computation, such as limits of accuracy."""
         return tuple(self.raw.warnings)

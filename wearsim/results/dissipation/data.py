@@ -1,4 +1,4 @@
-"""What the file of a dissipation study holds, as plain values and arrays."""
+"""Content of the file of a dissipation study, as plain values and arrays."""
 
 from __future__ import annotations
 
@@ -6,36 +6,36 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 from wearsim.results.content import Arrays, Content, StudyData
-from wearsim.results.dissipation.schema import with_inputs
+from wearsim.results.dissipation.schema import dissipation_schema
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class DissipationData(StudyData):
-    """All there is to know of realisations of one contact, in SI, beside `StudyData`.
+    """Realisations of one contact, in SI, in addition to `StudyData`.
 
     Parameters
     ----------
     plan : str
         Name of the sampling plan.
     inputs : list of dict
-        Dotted key and SI unit of each value that was drawn.
+        Dotted key and SI unit of each drawn value.
     asked : int
-        Realisations that were asked for.
+        Requested number of realisations.
     strip_width : float
         Width of a strip [m].
     friction_grid : str
-        Points and strips at which a friction field was taken; empty where there is none.
+        Points and strips at which a friction field was evaluated; empty if there is none.
     mean_problem_power : float
-        Dissipated power with every input at its mean [W].
+        Dissipated power with every random input at its mean [W].
     variables : dict of str to ndarray
-        Those of `wearsim.results.dissipation.schema`, and the drawn values by dotted key.
+        Variables of `wearsim.results.dissipation.schema`, and the drawn values by dotted key.
     statistics : dict of str to object
-        Estimates made from them, for readers of the file.
+        Estimates over the realisations, for other programs that read the file.
     solve_seconds : float
-        Time that the contacts took [s].
+        Time spent on contact solves [s].
     """
 
-    stored_apart: ClassVar[frozenset[str]] = StudyData.stored_apart | {"variables"}
+    separately_stored: ClassVar[frozenset[str]] = StudyData.separately_stored | {"variables"}
 
     plan: str
     inputs: list[dict[str, str]]
@@ -49,6 +49,6 @@ class DissipationData(StudyData):
 
     @property
     def content(self) -> Content:
-        """What goes into its file."""
-        layout = with_inputs(self.inputs)
-        return Content(layout, self.about, self.scenario_text, self.files, self.variables, {})
+        """Content of the results file."""
+        schema = dissipation_schema(self.inputs)
+        return Content(schema, self.attributes, self.scenario_text, self.files, self.variables, {})

@@ -1,4 +1,4 @@
-"""What a user gets from realisations of one contact: draws, power and their statistics, in SI."""
+"""Result of a dissipation study: drawn inputs, power and their statistics, in SI."""
 
 from __future__ import annotations
 
@@ -18,49 +18,42 @@ from wearsim.types import FloatArray
 from wearsim.uq.estimation.moments import Convergence, Summary, converge, summarise
 
 BAND = (0.025, 0.975)
-"""Probabilities between which 95 % lie."""
+"""Probabilities that bound 95 % of the realisations."""
 PAPER_BAND = (0.05, 0.95)
-"""Those of the paper's eq. 21, whose labels P+ and P- are swapped in print."""
+"""Probabilities of eq. 21 of Chevalier et al. (2005), where the labels P+ and P- are swapped."""
 
 SUMMARISED = ("power", "force_x", "force_y", "spin_moment", "normal_force", "peak_pressure")
 
 
 @dataclass(frozen=True, eq=False)
 class DissipationResult(StudyResult[DissipationData]):
-    """Realisations of one contact, as many as are done."""
+    """Realisations of one contact, finished or not."""
 
     def __repr__(self) -> str:
         done = f"{self.count}" if self.finished else f"{self.count} of {self.raw.asked}"
         noun = "realisation" if done == "1" else "realisations"
-        return f"<DissipationResult '{self.title}': {done} {noun}, {self._power()}>"
-
-    def _power(self) -> str:
         power = self.summaries["power"]
         std = f", std {power.std:.4g} W" if power.count > 1 else ""
-        return f"power {power.mean:.4g} W{std}"
+        return f"<DissipationResult '{self.title}': {done} {noun}, power {power.mean:.4g} W{std}>"
 
     def values(self, name: str) -> FloatArray:
-        """Return any variable of the results file, or drawn values by their dotted key.
+        """Return a variable of the results file, or the drawn values of an input.
 
         Parameters
         ----------
         name : str
-            Its name, "peak_pressure" or "load.normal_force".
-
-        Returns
-        -------
-        ndarray
+            Name or dotted key, such as "peak_pressure" or "load.normal_force".
         """
         return self.raw.variables[name]
 
     @property
     def count(self) -> int:
-        """Realisations that are done."""
+        """Number of finished realisations."""
         return len(self.power)
 
     @property
     def inputs(self) -> dict[str, FloatArray]:
-        """Drawn values by the scenario's key, each shape (realisations,)."""
+        """Drawn values by scenario key, shape (realisations,) [SI]."""
         return {item["key"]: self.values(item["key"]) for item in self.raw.inputs}
 
     @property
@@ -70,7 +63,7 @@ class DissipationResult(StudyResult[DissipationData]):
 
     @property
     def mean_problem_power(self) -> float:
-        """Dissipated power with every input at its mean [W]."""
+        """Dissipated power with every random input at its mean [W]."""
         return self.raw.mean_problem_power
 
     @property
@@ -85,7 +78,7 @@ class DissipationResult(StudyResult[DissipationData]):
 
     @cached_property
     def summaries(self) -> dict[str, Summary]:
-        """What the realisations tell of power, forces, load and pressure, by variable."""
+        """Estimates of power, forces, moment and pressure over the realisations, by variable."""
         return summaries(self.raw.variables)
 
     def convergence(self, points: int = 200) -> Convergence:
@@ -94,30 +87,26 @@ class DissipationResult(StudyResult[DissipationData]):
         Parameters
         ----------
         points : int
-            At how many numbers, evenly spaced in their logarithm, about.
+            Approximate number of points, evenly spaced in the logarithm of the sample size.
         """
         counts = np.geomspace(1, self.count, min(points, self.count)).round().astype(np.int64)
         return converge(self.power, np.unique(counts))
 
 
 def summaries(variables: Arrays) -> dict[str, Summary]:
-    """Return what the realisations tell of each number.
+    """Return estimates over the realisations, for each variable of `SUMMARISED`.
 
     Parameters
     ----------
     variables : dict of str to ndarray
-        Of a dissipation study.
-
-    Returns
-    -------
-    dict of str to Summary
+        Variables of a dissipation study.
     """
     probabilities = tuple(sorted({*BAND, *PAPER_BAND, 0.5}))
     return {name: summarise(variables[name], probabilities) for name in SUMMARISED}
 
 
 def as_numbers(found: dict[str, Summary]) -> dict[str, Any]:
-    """Return summaries as JSON has it: what there are too few realisations for is None."""
+    """Return summaries ready for JSON, with None for estimates that are not finite."""
     return {name: _finite(asdict(summary)) for name, summary in found.items()}
 
 

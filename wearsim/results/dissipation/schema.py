@@ -1,70 +1,71 @@
-"""The layout of the file of a dissipation study: its axes and variables."""
+"""Schema of the results file of a dissipation study: format, axes and variables."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from wearsim.results.schema import Axis, Layout, Variable, with_drawn
+from wearsim.results.schema import Axis, Schema, Variable, by_name, with_random_inputs
 
 FORMAT = "wearsim-dissipation"
 VERSION = 1
 
-AXES: Mapping[str, Axis] = {
-    axis.name: axis
-    for axis in (
+AXES: Mapping[str, Axis] = by_name(
+    (
         Axis("realisation", "realisation of the random inputs", 0),
-        Axis("kept", "realisation whose dissipation is kept strip by strip", 0),
+        Axis("kept", "realisation whose dissipation per strip is stored", 0),
     )
-}
+)
 
-_EACH = ("realisation",)
+_DRAW = ("realisation",)
 _STRIPS = ("y",)
+_PER_LENGTH = "dissipated power per axial length"
 
-VARIABLES: Mapping[str, Variable] = {
-    variable.name: variable
-    for variable in (
+VARIABLES: Mapping[str, Variable] = by_name(
+    (
         Variable("y", _STRIPS, "m", "axial position", "static"),
-        Variable("power", _EACH, "W", "dissipated power", "record"),
-        Variable("force_x", _EACH, "N", "longitudinal force on the cylinder", "record"),
-        Variable("force_y", _EACH, "N", "lateral force on the cylinder", "record"),
-        Variable("spin_moment", _EACH, "N m", "spin moment on the cylinder", "record"),
-        Variable("normal_force", _EACH, "N", "normal force", "record"),
-        Variable("longitudinal_creepage", _EACH, "1", "mean longitudinal creepage", "record"),
-        Variable("peak_pressure", _EACH, "Pa", "greatest normal pressure", "record"),
-        Variable("adhesion_fraction", _EACH, "1", "part of the contact that adheres", "record"),
+        Variable("power", _DRAW, "W", "dissipated power of the contact", "record"),
+        Variable("force_x", _DRAW, "N", "longitudinal force on the cylinder", "record"),
+        Variable("force_y", _DRAW, "N", "lateral force on the cylinder", "record"),
+        Variable("spin_moment", _DRAW, "N m", "spin moment on the cylinder", "record"),
+        Variable("normal_force", _DRAW, "N", "normal force of a roller", "record"),
+        Variable("longitudinal_creepage", _DRAW, "1", "mean longitudinal creepage", "record"),
+        Variable("peak_pressure", _DRAW, "Pa", "greatest normal pressure", "record"),
         Variable(
-            "dissipation", ("kept", "y"), "W/m", "dissipated power per axial length", "record"
+            "adhesion_fraction", _DRAW, "1", "part of the contact area that adheres", "record"
         ),
-        Variable("dissipation_mean", _STRIPS, "W/m", "its mean over all", "statistic"),
-        Variable("dissipation_std", _STRIPS, "W/m", "its std over all", "statistic"),
-        Variable("dissipation_low", _STRIPS, "W/m", "its 2.5 % quantile over kept", "statistic"),
-        Variable("dissipation_high", _STRIPS, "W/m", "its 97.5 % quantile over kept", "statistic"),
+        Variable("dissipation", ("kept", "y"), "W/m", _PER_LENGTH, "record"),
+        *(
+            Variable(
+                f"dissipation_{ending}", _STRIPS, "W/m", f"{words}: {_PER_LENGTH}", "statistic"
+            )
+            for ending, words in (
+                ("mean", "mean over all realisations"),
+                ("std", "standard deviation over all realisations"),
+                ("low", "2.5 % quantile over kept realisations"),
+                ("high", "97.5 % quantile over kept realisations"),
+            )
+        ),
         Variable(
-            "mean_problem_dissipation", _STRIPS, "W/m", "it with inputs at their mean", "static"
+            "mean_problem_dissipation",
+            _STRIPS,
+            "W/m",
+            f"{_PER_LENGTH}, every random input at its mean",
+            "static",
         ),
     )
-}
+)
+"""Variables by name."""
 
-DISSIPATION = Layout(
+DISSIPATION = Schema(
     FORMAT,
     VERSION,
     "realisations of one contact, from `wearsim dissipation`",
     AXES,
     VARIABLES,
 )
-"""Without the drawn inputs, which differ from study to study."""
+"""Schema without the random inputs, which differ between studies."""
 
 
-def with_inputs(inputs: Sequence[Mapping[str, str]]) -> Layout:
-    """Return the layout of a study, a variable for each value that was drawn.
-
-    Parameters
-    ----------
-    inputs : sequence of mapping
-        Dotted key and SI unit of each drawn value: ``{"key": "load.normal_force", "unit": "N"}``.
-
-    Returns
-    -------
-    Layout
-    """
-    return with_drawn(DISSIPATION, inputs)
+def dissipation_schema(inputs: Sequence[Mapping[str, str]]) -> Schema:
+    """Return the schema of a study, with its drawn values; see `with_random_inputs`."""
+    return with_random_inputs(DISSIPATION, inputs)

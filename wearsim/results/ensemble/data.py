@@ -1,4 +1,4 @@
-"""What the file of an ensemble of wear tests holds, and what each realisation brings to it."""
+"""Content of the file of an ensemble of wear tests, and outcome of one realisation."""
 
 from __future__ import annotations
 
@@ -16,35 +16,35 @@ from wearsim.results.ensemble.schema import (
     FAILED,
     QUANTILES,
     STATIC,
+    ensemble_schema,
     is_row,
     kept_profiles,
-    layout_of,
     type_of,
 )
 from wearsim.results.ensemble.stored_arrays import StoredArrays
-from wearsim.results.schema import Layout
+from wearsim.results.schema import Schema
 from wearsim.types import FloatArray
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Outcome:
-    """What became of one realisation.
+    """Outcome of one realisation.
 
     Parameters
     ----------
     number : int
-        Which it is, from 0.
+        Number of the realisation, from 0.
     error : str
-        Why it failed; empty where it ended well.
+        Error message of a failed realisation; empty on success.
     drawn : dict of str to float or ndarray
-        Drawn values by dotted key, one or (rollers,).
+        Drawn values by dotted key, a number or shape (rollers,).
     observables : dict of str to ndarray
-        Each of `ensemble_layout.OBSERVABLES`, shape (records,).
+        Every variable of `schema.OBSERVABLES`, shape (records,).
     scalars : dict of str to float
-        steps, solves, depth_error, volume_error, and control where there is a control variate.
+        steps, solves, depth_error, volume_error, and control if the plan has a control variate.
     profile : ndarray, optional
-        Worn depth of the cylinder at the end, shape (strips,) [m]; may be left out where it is
-        not kept.
+        Worn depth of the cylinder at the end, shape (strips,) [m]; not needed for realisations
+        whose profile is not stored.
     """
 
     number: int
@@ -56,23 +56,23 @@ class Outcome:
 
     @property
     def values(self) -> dict[str, float | FloatArray]:
-        """All numbers by the name of their variable."""
+        """All numbers by variable name."""
         profile = {} if self.profile is None else {"depth_profile": self.profile}
         return {**self.drawn, **self.observables, **self.scalars, **profile}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class EnsembleData(StudyData):
-    """All there is to know of an ensemble of wear tests, in SI, beside `StudyData`.
+    """Ensemble of wear tests, in SI, in addition to `StudyData`.
 
     Parameters
     ----------
     stepper : str
-        Name of the stepper in use.
+        Name of the stepper.
     tolerance : float
-        Relative error asked of the final depth and worn volume of each test.
+        Required relative error of the final depth and worn volume of each test.
     width_threshold : float
-        Worn depth from which on the width counts [m].
+        Worn depth above which the profile counts towards the width [m].
     total_passes, total_time : float, float
         Roller passes and duration [s] of a whole test.
     strip_width : float
@@ -80,30 +80,30 @@ class EnsembleData(StudyData):
     plan : str
         Name of the sampling plan.
     asked : int
-        Realisations at most: rows of the file.
+        Requested number of realisations, which is the number of rows of the file.
     until : str
-        What to reach before that, such as "depth.mean 1%"; empty where all are asked for.
+        Stopping criterion, such as "depth.mean 1%"; empty if all realisations are required.
     inputs : list of dict
-        One for each drawn value: dotted `key`, SI `unit`, the random `input` that it belongs to,
-        and `rollers`, "each" where every roller has its own, else "".
+        For each drawn value: dotted `key`, SI `unit`, the random `input` to which it belongs,
+        and `rollers`, "each" if the rollers have separate values, else "".
     groups : list of dict
-        One for each random input: `name`, `role`, `persistence` and a `text` that describes it.
+        For each random input: `name`, `role`, `persistence` and a description, `text`.
     control : dict
-        Mean and std of the control variate and from how many draws; empty where there is none.
+        Mean, std and number of draws of the control variate; empty if the plan has none.
     variables : mapping of str to ndarray
-        Those of `wearsim.results.ensemble.schema`, and the drawn values by dotted key; those of
-        a file are read when they are asked for. Rows of pending realisations mean nothing, those
-        of failed ones are nan.
+        Variables of `wearsim.results.ensemble.schema`, and the drawn values by dotted key; those
+        of a file are read on access. Rows of pending realisations are undefined, those of failed
+        ones are nan.
     status : ndarray
         PENDING, DONE or FAILED of every realisation, shape (asked,).
     errors : dict of int to str
-        Why realisations failed, by their number.
+        Error messages of failed realisations by their number.
     statistics : dict of str to object
-        Estimates made from them, for readers of the file.
+        Estimates over the realisations, for other programs that read the file.
     """
 
-    stored_apart: ClassVar[frozenset[str]] = (
-        StudyData.stored_apart | {"variables", "status", "errors"} | set(state_slots.NAMES)
+    separately_stored: ClassVar[frozenset[str]] = StudyData.separately_stored.union(
+        ("variables", "status", "errors"), state_slots.NAMES
     )
 
     stepper: str
@@ -124,102 +124,88 @@ class EnsembleData(StudyData):
     statistics: dict[str, Any] = field(default_factory=dict)
 
     @property
-    def layout(self) -> Layout:
-        """The layout of its file."""
-        return layout_of(self.inputs, self.control)
+    def schema(self) -> Schema:
+        """Schema of the results file."""
+        return ensemble_schema(self.inputs, self.control)
 
     @property
     def state(self) -> dict[str, Any]:
-        """What changes while it grows, by name."""
+        """Fields that change while the ensemble is computed, by name."""
         return {name: getattr(self, name) for name in state_slots.NAMES}
 
     @property
     def done(self) -> npt.NDArray[np.int64]:
-        """Numbers of the realisations that ended well, ascending."""
+        """Numbers of the successful realisations, ascending."""
         return np.flatnonzero(self.status == DONE)
 
     @property
     def failed(self) -> npt.NDArray[np.int64]:
-        """Numbers of the realisations that failed, ascending."""
+        """Numbers of the failed realisations, ascending."""
         return np.flatnonzero(self.status == FAILED)
 
     def rows(self, name: str, start: int, stop: int) -> npt.NDArray[Any]:
-        """Return a variable of some realisations, pending and failed ones too, and read no others.
+        """Return rows of a variable, including those of pending and failed realisations.
 
         Parameters
         ----------
         name : str
-            One whose first axis is the realisations.
+            A variable with one row per realisation.
         start, stop : int
             The first realisation, and the one after the last.
         """
         if isinstance(self.variables, StoredArrays):
-            return self.variables.rows(name, start, stop)
+            return self.variables.rows(name, start, stop)  # reads no other rows
         return self.variables[name][start:stop]
 
     def columns(self, name: str, records: slice) -> FloatArray:
-        """Return an observable at some records in every realisation, as `column` does.
+        """Return an observable at some records of all realisations, shape (asked, records).
+
+        The rows of pending and failed realisations are included.
 
         Parameters
         ----------
         name : str
-            One of `ensemble_layout.OBSERVABLES`.
+            One of `schema.OBSERVABLES`.
         records : slice
-            From which record to which.
-
-        Returns
-        -------
-        ndarray
-            Shape (asked, records).
+            The records.
         """
         if isinstance(self.variables, StoredArrays):
-            return self.variables.columns(name, records)
+            return self.variables.columns(name, records)  # reads a few rows at a time
         return self.variables[name][:, records]
 
     def column(self, name: str, record: int) -> FloatArray:
-        """Return an observable at one record in every realisation, pending and failed ones too.
+        """Return an observable at one record of all realisations, shape (asked,); see `columns`.
 
-        Parameters
-        ----------
-        name : str
-            One of `ensemble_layout.OBSERVABLES`.
-        record : int
-            The record; negative ones count from the end.
-
-        Returns
-        -------
-        ndarray
-            Shape (asked,).
+        Negative numbers of a record count from the end.
         """
-        if isinstance(self.variables, StoredArrays):
-            return self.variables.column(name, record)
-        return self.variables[name][:, record]
+        return self.columns(name, slice(record, record + 1 or None))[:, 0]
 
     @property
     def content(self) -> Content:
-        """What goes into its file before any realisation is done; rows are places only."""
-        layout = self.layout
+        """Content of a new file, in which the rows of the realisations are only allocated."""
+        schema = self.schema
         static = {name: np.asarray(self.variables[name], float) for name in STATIC}
-        strips, rollers = len(static["y"]), len(static["multiplicity"])
         lengths = {
             "realisation": self.asked,
             "record": len(static["record_passes"]),
-            "roller": rollers,
-            "y": strips,
-            "kept": kept_profiles(self.asked, strips),
+            "roller": len(static["multiplicity"]),
+            "y": len(static["y"]),
+            "kept": kept_profiles(self.asked, len(static["y"])),
             "quantile": len(QUANTILES),
         }
-        variables: Arrays = {}
-        for name, variable in layout.variables.items():
-            shape = [lengths[dim] for dim in variable.dims]
-            nothing = np.array(np.nan if variable.kind == "statistic" else 0, type_of(variable))
-            variables[name] = np.broadcast_to(nothing, shape)  # takes no memory
+        variables: Arrays = {
+            name: np.broadcast_to(  # takes no memory
+                np.array(np.nan if variable.kind == "statistic" else 0, type_of(variable)),
+                [lengths[dim] for dim in variable.dims],
+            )
+            for name, variable in schema.variables.items()
+        }
         return Content(
-            layout,
-            self.about,
+            schema,
+            self.attributes,
             self.scenario_text,
             self.files,
             {**variables, **static, "quantile": np.array(QUANTILES)},
             state_slots.first_places(self.state),
-            frozenset(name for name, variable in layout.variables.items() if is_row(variable)),
+            frozenset(name for name, variable in schema.variables.items() if is_row(variable)),
         )

@@ -1,4 +1,4 @@
-"""What a user gets from an ensemble of wear tests: estimates with intervals, in SI."""
+"""Result of an ensemble of wear tests: estimates with confidence intervals, in SI."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from wearsim.uq.sampling.plans import REPLICATES
 if TYPE_CHECKING:
     from wearsim.uq.estimation.stopping_rule import Target
 
-_AT_ONCE = 4_000_000  # numbers that are read at once
+_READ_SIZE = 4_000_000  # numbers read at once
 PROBABILITIES = (0.025, 0.05, 0.5, 0.95, 0.975)
 
 
 @dataclass(frozen=True)
 class Course:
-    """An observable against the passes, over the realisations.
+    """Estimates of an observable against the roller passes.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class Course:
     mean, mean_low, mean_high, std : ndarray, shape (records,)
         Mean with its confidence interval, and standard deviation.
     quantiles : mapping of float to ndarray, shape (records,)
-        By probability.
+        Quantiles by probability.
     """
 
     passes: FloatArray
@@ -53,7 +53,7 @@ class Course:
 
 @dataclass(frozen=True)
 class Band:
-    """Worn profiles at the end, over the realisations whose profile is kept.
+    """Worn profile at the end of the test, over the realisations with a stored profile.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class Band:
     mean, std, low, high : ndarray, shape (strips,)
         Mean and standard deviation of the worn depth, and its 2.5 and 97.5 % quantiles [m].
     kept : int
-        How many realisations tell it.
+        Number of profiles.
     """
 
     y: FloatArray
@@ -75,20 +75,20 @@ class Band:
 
 @dataclass(frozen=True)
 class Effect:
-    """What a random input does to an observable.
+    """Sensitivity of an observable to a random input.
 
     Parameters
     ----------
     name : str
-        Name of the input, "creepage.misalignment".
+        Name of the input, such as "creepage.misalignment".
     text : str
-        What it is, in words.
+        Description of the input.
     first : Interval
-        First-order Sobol index: part of the variance that this input makes by itself.
+        First-order Sobol index: share of the variance due to this input alone.
     total : Interval, optional
-        Total index, with all that it makes together with others; Saltelli's plan tells it.
+        Total Sobol index, interactions with other inputs included; only with Saltelli's plan.
     without_effect : bool
-        Whether nothing of an effect is to be seen.
+        Whether no effect is detectable.
     """
 
     name: str
@@ -100,7 +100,7 @@ class Effect:
 
 @dataclass(frozen=True, eq=False)
 class EnsembleResult(StudyResult[EnsembleData]):
-    """An ensemble of wear tests, as many as have ended well."""
+    """Result of an ensemble of wear tests, from its successful realisations."""
 
     def __repr__(self) -> str:
         done = f"{self.count}" if self.finished else f"{self.count} of {self.asked}"
@@ -114,37 +114,37 @@ class EnsembleResult(StudyResult[EnsembleData]):
 
     @property
     def until(self) -> str:
-        """What was to be reached, such as "depth.mean 1%"; empty where all were asked for."""
+        """Stopping criterion, such as "depth.mean 1%"; empty if there is none."""
         return self.raw.until
 
     @property
     def asked(self) -> int:
-        """Realisations that were asked for, at most."""
+        """Requested number of realisations."""
         return self.raw.asked
 
     @property
     def count(self) -> int:
-        """Realisations that ended well."""
+        """Number of successful realisations."""
         return len(self.numbers)
 
     @property
     def failed(self) -> int:
-        """Realisations that failed."""
+        """Number of failed realisations."""
         return len(self.raw.failed)
 
     @property
     def errors(self) -> Mapping[int, str]:
-        """Why realisations failed, by their number."""
+        """Error messages of failed realisations by their number."""
         return self.raw.errors
 
     @cached_property
     def numbers(self) -> IntArray:
-        """Numbers of the realisations that ended well, shape (count,)."""
+        """Numbers of the successful realisations, shape (count,)."""
         return self.raw.done
 
     @property
     def observables(self) -> tuple[str, ...]:
-        """Names of what is followed through every test."""
+        """Names of the observables."""
         return tuple(OBSERVABLES)
 
     @property
@@ -154,7 +154,7 @@ class EnsembleResult(StudyResult[EnsembleData]):
 
     @property
     def record_passes(self) -> FloatArray:
-        """Roller passes at each record; the first is the fresh state."""
+        """Roller passes at each record; the first record is the start of the run."""
         return self.raw.variables["record_passes"]
 
     @property
@@ -163,12 +163,12 @@ class EnsembleResult(StudyResult[EnsembleData]):
         return self.raw.variables["record_time"]
 
     def values(self, name: str) -> FloatArray:
-        """Return any variable of the realisations that ended well.
+        """Return a variable of the successful realisations.
 
         Parameters
         ----------
         name : str
-            An observable, "depth", or the dotted key of a drawn value.
+            An observable, such as "depth", or the dotted key of a drawn value.
 
         Returns
         -------
@@ -181,9 +181,9 @@ class EnsembleResult(StudyResult[EnsembleData]):
         return self.raw.column(name, record)[self.numbers]
 
     def independent(self, name: str, record: int = -1) -> tuple[IntArray, FloatArray]:
-        """Return numbers and values of the realisations that are draws by themselves.
+        """Return numbers and values of the independent realisations.
 
-        They are all of them, but in Saltelli's plan, which takes the same draws again and again.
+        These are all successful realisations, except with Saltelli's plan, which reuses draws.
 
         Parameters
         ----------
@@ -202,16 +202,16 @@ class EnsembleResult(StudyResult[EnsembleData]):
 
     @property
     def inputs(self) -> dict[str, FloatArray]:
-        """Drawn values by the scenario's key, each (count,) or (count, rollers) [SI].
+        """Drawn values by scenario key, shape (count,) or (count, rollers) [SI].
 
-        Of what follows a process it is the mean over the test.
+        For a random process, the mean over the test.
         """
         return {item["key"]: self.values(item["key"]) for item in self.raw.inputs}
 
     def estimate(
         self, name: str, record: int = -1, probabilities: tuple[float, ...] = PROBABILITIES
     ) -> Estimate:
-        """Return what the realisations tell of an observable, with intervals that fit the plan.
+        """Return mean, standard deviation and quantiles, with intervals valid for the plan.
 
         Parameters
         ----------
@@ -220,25 +220,19 @@ class EnsembleResult(StudyResult[EnsembleData]):
         record : int
             The record; by default the end of the test.
         probabilities : tuple of float
-            Of the quantiles wanted.
-
-        Returns
-        -------
-        Estimate
+            Probabilities of the quantiles.
         """
-        chosen = self._independent
-        return self._estimate(self.at_end(name, record)[chosen], probabilities)
+        return self._estimate(self.independent(name, record)[1], probabilities)
 
     def _estimate(self, values: FloatArray, probabilities: tuple[float, ...]) -> Estimate:
-        """Return what values of the independent realisations tell."""
         replicate = self.numbers[self._independent] % REPLICATES
         return estimate(values, probabilities, self.design, replicate, self._control)
 
     @property
     def design(self) -> Design:
-        """What the intervals take the realisations for.
+        """Sampling plan assumed for the intervals.
 
-        Where some fail, the mean of a control is that of others than those that are left.
+        Without the failed realisations the known mean of a control variate does not apply.
         """
         return "monte-carlo" if self.plan == "control-variate" and self.failed else self.plan
 
@@ -251,76 +245,62 @@ class EnsembleResult(StudyResult[EnsembleData]):
         return Control(self.values("control"), known["mean"], error)
 
     def estimate_for(self, target: Target) -> Estimate:
-        """Return the estimate that a target is about."""
+        """Return the estimate to which a target applies."""
         return self.estimate(target.observable, probabilities=target.probabilities)
 
-    def told_estimates(self) -> dict[str, Any]:
-        """Return the estimates at the end by observable, as plain values."""
+    def final_estimates(self) -> dict[str, Any]:
+        """Return the estimates at the end of the test by observable, as plain values."""
         return {name: asdict(self.estimate(name)) for name in self.observables if self.count}
 
     @cached_property
     def _independent(self) -> slice | IntArray:
-        """Which realisations are draws by themselves: of Saltelli's plan, those of A and B."""
+        """Independent realisations: with Saltelli's plan, those of the blocks A and B."""
         if self.plan != "saltelli":
             return slice(None)
         return np.flatnonzero(self.numbers % (len(self.raw.groups) + 2) < 2)
 
     def course(self, name: str) -> Course:
-        """Return an observable against the passes, with the quantiles that the file has.
-
-        Parameters
-        ----------
-        name : str
-            The observable.
-
-        Returns
-        -------
-        Course
-        """
+        """Return estimates of an observable at all records, with the stored quantiles."""
         found = [self._estimate(values, QUANTILES) for values in self._by_record(name)]
-        means = [item.mean for item in found]
         return Course(
             passes=self.record_passes,
             time=self.record_time,
-            mean=np.array([mean.value for mean in means]),
-            mean_low=np.array([mean.low for mean in means]),
-            mean_high=np.array([mean.high for mean in means]),
+            mean=np.array([item.mean.value for item in found]),
+            mean_low=np.array([item.mean.low for item in found]),
+            mean_high=np.array([item.mean.high for item in found]),
             std=np.array([item.std.value for item in found]),
             quantiles={p: np.array([item.quantile(p).value for item in found]) for p in QUANTILES},
         )
 
     def _by_record(self, name: str) -> Iterator[FloatArray]:
-        """Yield an observable of the independent realisations at one record after the other."""
-        records, together = len(self.record_passes), max(_AT_ONCE // max(self.asked, 1), 1)
-        for first in range(0, records, together):
-            some = self.raw.columns(name, slice(first, min(first + together, records)))
-            for values in some[self.numbers][self._independent].T:
-                yield np.ascontiguousarray(values)
+        """Yield an observable of the independent realisations, record by record."""
+        records, block = len(self.record_passes), max(_READ_SIZE // max(self.asked, 1), 1)
+        for first in range(0, records, block):
+            some = self.raw.columns(name, slice(first, min(first + block, records)))
+            yield from map(np.ascontiguousarray, some[self.numbers][self._independent].T)
 
     @property
     def kept(self) -> int:
-        """How many realisations, the first ones, have their profiles kept."""
+        """Number of realisations, starting with the first, whose profile is stored."""
         return kept_profiles(self.asked, len(self.y))
 
     @cached_property
     def profiles(self) -> FloatArray:
-        """Worn depth of the cylinder at the end, shape (kept, strips) [m]; failed ones left out."""
+        """Worn depth of the cylinder at the end, shape (kept, strips) [m], without failed ones."""
         kept = self.raw.variables["depth_profile"]
-        status = self.raw.status[: len(kept)]
-        return np.asarray(kept[status == DONE])
+        return np.asarray(kept[self.raw.status[: len(kept)] == DONE])
 
     def band(self) -> Band:
         """Return mean and 95 % band of the worn profiles at the end."""
-        kept = self.profiles
+        kept, unknown = self.profiles, np.full_like(self.y, np.nan)
         if len(kept) == 0:
-            nothing = np.full_like(self.y, np.nan)
-            return Band(self.y, nothing, nothing, nothing, nothing, 0)
-        std = kept.std(axis=0, ddof=1) if len(kept) > 1 else np.full_like(self.y, np.nan)
+            return Band(self.y, unknown, unknown, unknown, unknown, 0)
+        std = kept.std(axis=0, ddof=1) if len(kept) > 1 else unknown
         low, high = np.quantile(kept, (0.025, 0.975), axis=0)
         return Band(self.y, kept.mean(axis=0), std, low, high, len(kept))
 
     def sensitivity(self, name: str = "depth") -> list[Effect]:
-        """Return what each random input does to an observable at the end, the greatest first.
+        """Return the effect of each random input on an observable at the end, largest first.
 
         Parameters
         ----------
@@ -330,79 +310,52 @@ class EnsembleResult(StudyResult[EnsembleData]):
         Returns
         -------
         list of Effect
-            Yaw and tilt of one slack are one input.
+            Yaw and tilt of one misalignment are one input.
         """
         from wearsim.uq.sensitivity.sobol_indices import without_effect  # noqa: PLC0415  (rarely needed)
 
         groups = {item["name"]: item["text"] for item in self.raw.groups if self.count}
-        first, total = self._indices(name, list(groups))
+        indices = self._indices(name, list(groups))
         effects = [
-            Effect(
-                name=group,
-                text=text,
-                first=first[group],
-                total=total.get(group),
-                without_effect=without_effect(total.get(group, first[group])),
-            )
+            Effect(group, text, first, total, without_effect(total or first))
             for group, text in groups.items()
+            for first, total in [indices[group]]
         ]
         return sorted(effects, key=lambda effect: -np.nan_to_num(effect.first.value, nan=-1.0))
 
     def _indices(
         self, name: str, groups: list[str]
-    ) -> tuple[dict[str, Interval], dict[str, Interval]]:
+    ) -> Mapping[str, tuple[Interval, Interval | None]]:
+        """Return first-order and, with Saltelli's plan, total indices by random input."""
         from wearsim.uq.sensitivity.sobol_indices import first_order, saltelli_indices  # noqa: PLC0415  (rarely needed)
 
         if self.plan == "saltelli":
-            size = len(groups) + 2
             values = np.where(self.raw.status == DONE, self.raw.column(name, -1), np.nan)
-            found = saltelli_indices(values.reshape(-1, size), groups)
-            return (
-                {group: pair[0] for group, pair in found.items()},
-                {group: pair[1] for group, pair in found.items()},
-            )
-        keys = {
-            group: [i["key"] for i in self.raw.inputs if i["input"] == group] for group in groups
-        }
-        inputs = self.inputs
+            return saltelli_indices(values.reshape(-1, len(groups) + 2), groups)
+        drawn = [(item["input"], self.values(item["key"])) for item in self.raw.inputs]
         numbers = {
-            group: np.column_stack([inputs[key].reshape(self.count, -1) for key in keys[group]])
+            group: np.column_stack([v.reshape(self.count, -1) for of, v in drawn if of == group])
             for group in groups
         }
-        return first_order(self.at_end(name), numbers), {}
+        found = first_order(self.at_end(name), numbers)
+        return {group: (index, None) for group, index in found.items()}
 
     def statistics(self) -> dict[str, FloatArray]:
-        """Return the arrays of statistics that stand in the file, by name."""
+        """Return the variables of the file that are estimates, by name."""
         found: dict[str, FloatArray] = {}
         for name in self.observables:
             course = self.course(name)
             found[f"{name}_mean"], found[f"{name}_std"] = course.mean, course.std
             found[f"{name}_quantiles"] = np.array([course.quantiles[p] for p in QUANTILES])
         band = self.band()
-        for part in ("mean", "std", "low", "high"):
-            found[f"depth_profile_{part}"] = getattr(band, part)
-        return found
+        profile = {part: getattr(band, part) for part in ("mean", "std", "low", "high")}
+        return found | {f"depth_profile_{part}": values for part, values in profile.items()}
 
     def is_constant(self, name: str) -> bool:
-        """Tell whether an observable is the same in all realisations, but for rounding."""
+        """Return whether an observable is equal in all realisations, within rounding."""
         return bool(self.count) and summarise(self.at_end(name)).is_constant
 
 
 def open_ensemble(path: str | Path) -> EnsembleResult:
-    """Open the file of an ensemble.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file.
-
-    Returns
-    -------
-    EnsembleResult
-
-    Raises
-    ------
-    ResultsFileError
-        If it is missing, foreign, truncated, damaged, or written by a newer wearsim.
-    """
+    """Open the file of an ensemble; see `open_results`."""
     return EnsembleResult(read_ensemble(path), Path(path))

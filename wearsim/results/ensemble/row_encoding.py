@@ -12,7 +12,7 @@ import numpy.typing as npt
 from wearsim.results.content import Arrays
 from wearsim.results.ensemble.data import Outcome
 from wearsim.results.ensemble.schema import DONE, ERROR_BYTES, FAILED, is_row
-from wearsim.results.schema import Layout
+from wearsim.results.schema import Schema
 
 if TYPE_CHECKING:
     from wearsim.results.io.hdf5_read import Extent
@@ -60,14 +60,14 @@ def runs(outcomes: Sequence[Outcome]) -> Iterator[list[Outcome]]:
         yield run
 
 
-def rows_of(run: Sequence[Outcome], layout: Layout, extents: Mapping[str, Extent]) -> Rows:
+def rows_of(run: Sequence[Outcome], schema: Schema, extents: Mapping[str, Extent]) -> Rows:
     """Return outcomes as the rows of a file.
 
     Parameters
     ----------
     run : sequence of Outcome
         Their numbers follow each other.
-    layout : Layout
+    schema : Schema
         Of the file.
     extents : mapping of str to Extent
         Where its variables stand.
@@ -84,7 +84,7 @@ def rows_of(run: Sequence[Outcome], layout: Layout, extents: Mapping[str, Extent
     first = run[0].number
     arrays = {
         name: np.full((len(run), *extents[name].row_shape), np.nan)
-        for name, variable in layout.variables.items()
+        for name, variable in schema.variables.items()
         if is_row(variable) and name not in {"status", "error"}
     }
     kept = extents["depth_profile"].shape[0]

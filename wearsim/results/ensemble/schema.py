@@ -1,4 +1,4 @@
-"""The layout of the file of an ensemble of wear tests: its axes and variables."""
+"""Schema of the results file of an ensemble of wear tests: format, axes and variables."""
 
 from __future__ import annotations
 
@@ -8,164 +8,181 @@ from typing import Any
 
 import numpy as np
 
-from wearsim.results.schema import Axis, Layout, Variable, with_drawn
+from wearsim.results.schema import Axis, Schema, Variable, by_name, with_random_inputs
 
 FORMAT = "wearsim-ensemble"
 VERSION = 1
 
 PENDING, DONE, FAILED = 0, 1, 2
-"""What the status of a realisation says."""
+"""Values of the status of a realisation."""
 ERROR_BYTES = 400
-"""Length of the text that says why a realisation failed, its final zero included."""
+"""Length of the stored error message of a failed realisation, with its final zero."""
 QUANTILES = (0.025, 0.05, 0.25, 0.5, 0.75, 0.95, 0.975)
-"""Probabilities of the quantiles that stand in the file."""
-MOST_KEPT = 4_000_000  # numbers of worn profiles that are kept; they take 32 MB
+"""Probabilities of the quantiles stored in the file."""
+MOST_KEPT = 4_000_000  # stored numbers of worn profiles, 32 MB
 
-AXES: Mapping[str, Axis] = {
-    axis.name: axis
-    for axis in (
+AXES: Mapping[str, Axis] = by_name(
+    (
         Axis("realisation", "realisation of the random inputs", 0),
-        Axis("record", "record of a test; 0 is the fresh state", 0),
-        Axis("roller", "roller; alike ones are merged"),
-        Axis("kept", "realisation whose worn profile is kept", 0),
+        Axis("record", "record of a test; record 0 is the start of the run", 0),
+        Axis("roller", "roller; identical rollers are merged"),
+        Axis("kept", "realisation whose worn profile is stored", 0),
     )
-}
+)
 
-_EACH = ("realisation",)
+_DRAW = ("realisation",)
 _HISTORY = ("realisation", "record")
 _RECORDS = ("record",)
 _STRIPS = ("y",)
-_ROWS = ("realisation", "kept")  # the axes along which a file is filled row by row
 
-
-def _table(*variables: Variable) -> dict[str, Variable]:
-    return {variable.name: variable for variable in variables}
-
-
-OBSERVABLES: Mapping[str, Variable] = _table(
-    Variable("depth", _HISTORY, "m", "greatest worn depth of the cylinder", "record"),
-    Variable("width", _HISTORY, "m", "width of the cylinder's groove", "record"),
-    Variable("worn_volume", _HISTORY, "m^3", "worn volume of the cylinder", "record"),
-    Variable("roller_depth", _HISTORY, "m", "greatest worn depth of the rollers", "record"),
-    Variable("total_roller_worn_volume", _HISTORY, "m^3", "worn volume of all rollers", "record"),
-    Variable("dissipated_energy", _HISTORY, "J", "dissipated energy, all rollers", "record"),
-    Variable("mean_power", _HISTORY, "W", "dissipated energy per time so far", "record"),
-    Variable("power", _HISTORY, "W", "dissipated power, all rollers", "record"),
-    Variable("normal_force", _HISTORY, "N", "mean normal force of a roller", "record"),
-    Variable("peak_pressure", _HISTORY, "Pa", "greatest normal pressure, any roller", "record"),
+OBSERVABLES: Mapping[str, Variable] = by_name(
+    Variable(name, _HISTORY, unit, long_name, "record")
+    for name, unit, long_name in (
+        ("depth", "m", "greatest depth of the cylinder worn since the start of the run"),
+        ("width", "m", "width of the groove in the cylinder"),
+        ("worn_volume", "m^3", "worn volume of the cylinder"),
+        ("roller_depth", "m", "greatest depth of a roller worn since the start of the run"),
+        ("total_roller_worn_volume", "m^3", "worn volume of all rollers"),
+        ("dissipated_energy", "J", "energy dissipated by all rollers since the start of the run"),
+        ("mean_power", "W", "dissipated energy per time since the start of the run"),
+        ("power", "W", "dissipated power of all rollers"),
+        ("normal_force", "N", "normal force of a roller, mean over the rollers"),
+        ("peak_pressure", "Pa", "greatest normal pressure, maximum over the rollers"),
+    )
 )
-"""What is followed through every test, by name."""
+"""Variables stored for every record of every realisation, by name."""
 
-STATIC: Mapping[str, Variable] = _table(
-    Variable("y", _STRIPS, "m", "axial position", "static"),
-    Variable("multiplicity", ("roller",), "1", "physical rollers behind a roller", "static"),
-    Variable("record_passes", _RECORDS, "1", "roller passes at a record", "static"),
-    Variable("record_time", _RECORDS, "s", "simulated time at a record", "static"),
+STATIC: Mapping[str, Variable] = by_name(
+    (
+        Variable("y", _STRIPS, "m", "axial position", "static"),
+        Variable(
+            "multiplicity", ("roller",), "1", "physical rollers per computed roller", "static"
+        ),
+        Variable("record_passes", _RECORDS, "1", "roller passes at a record", "static"),
+        Variable("record_time", _RECORDS, "s", "simulated time at a record", "static"),
+    )
 )
-"""What all realisations have in common."""
+"""Variables common to all realisations."""
 
 _QUANTILE = Variable("quantile", ("quantile",), "1", "probability of a quantile", "static")
 
-_OUTCOMES = _table(
-    Variable("status", _EACH, "1", "0 pending, 1 done, 2 failed", "record"),
-    Variable("error", _EACH, "1", "why the realisation failed", "record"),
-    Variable("steps", _EACH, "1", "steps taken", "record"),
-    Variable("solves", _EACH, "1", "contacts solved", "record"),
-    Variable("depth_error", _EACH, "m", "estimated error of the final depth", "record"),
-    Variable("volume_error", _EACH, "m^3", "estimated error of the final worn volume", "record"),
-    Variable(
-        "depth_profile", ("kept", "y"), "m", "worn depth of the cylinder at the end", "record"
-    ),
+_DEPTH_PROFILE = Variable(
+    "depth_profile",
+    ("kept", "y"),
+    "m",
+    "worn depth of the cylinder at the end, positive down",
+    "record",
 )
 
-_CONTROL = Variable("control", _EACH, "1", "control variate, in the unit of its own mean", "record")
+_OUTCOMES = by_name(
+    (
+        Variable("status", _DRAW, "1", "0 pending, 1 done, 2 failed", "record"),
+        Variable("error", _DRAW, "1", "error message of a failed realisation", "record"),
+        Variable("steps", _DRAW, "1", "accepted steps", "record"),
+        Variable("solves", _DRAW, "1", "contact solves of accepted steps", "record"),
+        Variable(
+            "depth_error",
+            _DRAW,
+            "m",
+            "estimated error of the depth of either body at the end",
+            "record",
+        ),
+        Variable(
+            "volume_error",
+            _DRAW,
+            "m^3",
+            "estimated error of the volume worn off both bodies at the end",
+            "record",
+        ),
+        _DEPTH_PROFILE,
+    )
+)
 
+_CONTROL = Variable("control", _DRAW, "1", "control variate, in the unit of its mean", "record")
 
-def _statistics() -> dict[str, Variable]:
-    found = []
-    for name, of in OBSERVABLES.items():
-        for ending, dims, what in (
+STATISTICS: Mapping[str, Variable] = by_name(
+    [
+        Variable(
+            f"{of.name}_{ending}",
+            dims,
+            of.unit,
+            f"{words} over realisations: {of.long_name}",
+            "statistic",
+        )
+        for of in OBSERVABLES.values()
+        for ending, dims, words in (
             ("mean", _RECORDS, "mean"),
             ("std", _RECORDS, "standard deviation"),
             ("quantiles", ("quantile", "record"), "quantiles"),
-        ):
-            told = f"{what} over realisations: {of.long_name}"
-            found.append(Variable(f"{name}_{ending}", dims, of.unit, told, "statistic"))
-    for ending, what in (
-        ("mean", "mean"),
-        ("std", "standard deviation"),
-        ("low", "2.5 % quantile"),
-        ("high", "97.5 % quantile"),
-    ):
-        told = f"{what} over kept realisations: worn depth of the cylinder at the end"
-        found.append(Variable(f"depth_profile_{ending}", _STRIPS, "m", told, "statistic"))
-    return _table(*found)
+        )
+    ]
+    + [
+        Variable(
+            f"depth_profile_{ending}",
+            _STRIPS,
+            "m",
+            f"{words} over kept realisations: {_DEPTH_PROFILE.long_name}",
+            "statistic",
+        )
+        for ending, words in (
+            ("mean", "mean"),
+            ("std", "standard deviation"),
+            ("low", "2.5 % quantile"),
+            ("high", "97.5 % quantile"),
+        )
+    ]
+)
+"""Estimates over the realisations; nan until the ensemble is finished."""
 
-
-STATISTICS: Mapping[str, Variable] = _statistics()
-"""Estimates made from the realisations, for readers of the file; nan until they are made."""
-
-ENSEMBLE = Layout(
+ENSEMBLE = Schema(
     FORMAT,
     VERSION,
     "an ensemble of wear tests, from `wearsim ensemble`",
     AXES,
     {**STATIC, "quantile": _QUANTILE, **_OUTCOMES, **OBSERVABLES, **STATISTICS},
 )
-"""Without the drawn inputs, which differ from study to study, and without a control variate."""
+"""Schema without the random inputs, which differ between studies, and the control variate."""
 
 
-def layout_of(inputs: Sequence[Mapping[str, str]], control: Mapping[str, Any]) -> Layout:
-    """Return the layout of an ensemble.
+def ensemble_schema(inputs: Sequence[Mapping[str, str]], control: Mapping[str, Any]) -> Schema:
+    """Return the schema of an ensemble, with its drawn values.
 
     Parameters
     ----------
     inputs : sequence of mapping
-        Key, unit and rollers of each drawn value; see `with_drawn`.
+        Key, unit and rollers of each drawn value; see `with_random_inputs`.
     control : mapping
-        What is known of the control variate; empty where there is none.
+        Mean, std and number of draws of the control variate; empty if the plan has none.
 
     Returns
     -------
-    Layout
+    Schema
     """
-    layout = with_drawn(ENSEMBLE, inputs)
+    schema = with_random_inputs(ENSEMBLE, inputs)
     if not control:
-        return layout
-    return replace(layout, variables={**layout.variables, "control": _CONTROL})
+        return schema
+    return replace(schema, variables={**schema.variables, "control": _CONTROL})
 
 
 def is_row(variable: Variable) -> bool:
-    """Tell whether a variable is filled row by row, as realisations finish.
-
-    Parameters
-    ----------
-    variable : Variable
-        Of an ensemble.
-    """
-    return variable.dims[0] in _ROWS
+    """Return whether a variable of an ensemble has one row per realisation."""
+    return variable.dims[0] in {"realisation", "kept"}
 
 
 def type_of(variable: Variable) -> np.dtype[Any]:
-    """Return the type in which a variable is stored.
-
-    Parameters
-    ----------
-    variable : Variable
-        Of an ensemble.
-    """
+    """Return the type in which a variable of an ensemble is stored."""
     other = {"status": np.dtype(np.uint8), "error": np.dtype(f"S{ERROR_BYTES}")}
     return other.get(variable.name, np.dtype("<f8"))
 
 
-def kept_profiles(asked: int, strips: int) -> int:
-    """Return of how many realisations, the first ones, the worn profile is kept.
+def kept_profiles(requested: int, strips: int) -> int:
+    """Return for how many realisations, starting with the first, the worn profile is stored.
 
     Parameters
     ----------
-    asked : int
-        Realisations at most.
+    requested : int
+        Requested number of realisations.
     strips : int
         Strips of a profile.
     """
-    return min(asked, max(MOST_KEPT // strips, 1))
+    return min(requested, max(MOST_KEPT // strips, 1))

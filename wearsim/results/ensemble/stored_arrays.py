@@ -83,24 +83,6 @@ class StoredArrays(Mapping[str, npt.NDArray[Any]]):
             raise ResultsFileError(truncated(self._path))
         return found.reshape(shape)
 
-    def column(self, name: str, index: int) -> npt.NDArray[Any]:
-        """Return one entry of every row; see `columns`.
-
-        Parameters
-        ----------
-        name : str
-            An array with two axes.
-        index : int
-            Which entry; negative ones count from the end.
-
-        Returns
-        -------
-        ndarray
-            As many as the array has rows.
-        """
-        place = index % self.extents[name].row_shape[0]
-        return self.columns(name, slice(place, place + 1))[:, 0]
-
     def columns(self, name: str, places: slice) -> npt.NDArray[Any]:
         """Return some entries of every row, with no more than a few rows read at a time.
 

@@ -18,7 +18,7 @@ from wearsim.results.ensemble.data import EnsembleData, Outcome
 from wearsim.results.ensemble.reader import EnsembleFileParts, read_parts
 from wearsim.results.ensemble.row_encoding import Rows, rows_of, runs
 from wearsim.results.ensemble.schema import PENDING, STATIC, STATISTICS
-from wearsim.results.io.atomic_write import refused_in_a_line, stage, write_chunks, write_pieces
+from wearsim.results.io.atomic_write import os_errors_converted, stage, write_chunks, write_pieces
 from wearsim.results.io.file_lock import lock_or_refuse, refuse_if_locked
 from wearsim.results.io.reader import kind_of
 
@@ -36,7 +36,7 @@ class FileInPlace:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        with refused_in_a_line(path):
+        with os_errors_converted(path):
             self._file = path.open("r+b", buffering=0)
         try:
             lock_or_refuse(self._file, path)
@@ -68,13 +68,13 @@ class FileInPlace:
         content : bytes
             What to write.
         """
-        with refused_in_a_line(self._path):
+        with os_errors_converted(self._path):
             self._file.seek(offset)
             write_chunks(self._file, content)
 
     def synchronise(self) -> None:
         """Wait until all that was written is on the disk."""
-        with refused_in_a_line(self._path), stage("fsync"):
+        with os_errors_converted(self._path), stage("fsync"):
             os.fsync(self._file.fileno())
 
     def close(self) -> None:
@@ -181,14 +181,14 @@ class EnsembleFile:
         Raises
         ------
         ValueError
-            If one is not pending, or if its numbers are not those of the layout. Nothing is
+            If one is not pending, or if its numbers are not those of the schema. Nothing is
             written then.
         """
         taken = [item.number for item in outcomes if self._status_of(item.number) != PENDING]
         if taken or len({item.number for item in outcomes}) < len(outcomes):
             raise ValueError(f"realisations {taken or 'twice in a batch'} are there already")
-        layout = self.data.layout
-        batch = [rows_of(run, layout, self._extents) for run in runs(outcomes)]
+        schema = self.data.schema
+        batch = [rows_of(run, schema, self._extents) for run in runs(outcomes)]
         for rows in batch:
             self._put_rows(rows)
         self._file.synchronise()

@@ -20,67 +20,49 @@ def _do_nothing(stage: str) -> None:
 
 
 on_write_stage: Callable[[str], None] = _do_nothing
-"""The seam for fault injection, called with "before <stage>" and "after <stage>" at each of STAGES.
+"""Hook for fault injection, called with "before <stage>" and "after <stage>" for each of STAGES.
 
-A file is written in chunks, each a "write" of its own. A test sets this to something that raises
-or kills the process.
+A file is written in chunks, each of which is one "write". Tests replace the hook by a function
+that raises an exception or kills the process.
 """
 
 
 @contextmanager
 def stage(name: str) -> Iterator[None]:
-    """Call the seam before and after what is done inside.
+    """Call the hook before and after the body of the with statement.
 
     Parameters
     ----------
     name : str
-        Which of STAGES it is.
+        One of STAGES.
     """
     on_write_stage(f"before {name}")
     yield
     on_write_stage(f"after {name}")
 
 
-def write_whole(path: str | Path, content: bytes) -> None:
-    """Write a file so that its name only ever stands for a whole one.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file; the content goes to `path`.part first.
-    content : bytes
-        What it shall hold.
-
-    Raises
-    ------
-    ResultsFileError
-        If it cannot be written; a file that stood there is untouched.
-    """
-    write_pieces(path, [(0, content)], len(content))
-
-
 def write_pieces(
     path: str | Path, pieces: Iterable[tuple[int, bytes]], size: int | None = None
 ) -> None:
-    """Write a file with holes; see `write_whole`.
+    """Write a file atomically; it may have holes.
 
     Parameters
     ----------
     path : str or Path
-        The file; the pieces go to `path`.part first.
+        The file; the pieces are first written to `path`.part.
     pieces : iterable of tuple
-        How many bytes stand before each piece, and the piece.
+        Offset of each piece in bytes, and the piece.
     size : int, optional
-        Bytes of the file, holes included; by default it ends with the last piece.
+        Size of the file in bytes, holes included; by default it ends with the last piece.
 
     Raises
     ------
     ResultsFileError
-        If it cannot be written; a file that stood there is untouched.
+        If it cannot be written; an existing file is then unchanged.
     """
-    target = Path(path).resolve()  # where a link points: the link stays one
+    target = Path(path).resolve()  # follows links, which are kept
     part = target.with_name(target.name + ".part")
-    with refused_in_a_line(path):
+    with os_errors_converted(path):
         try:
             _write_part(part, pieces, size)
             with stage("rename"):
@@ -93,13 +75,13 @@ def write_pieces(
 
 
 @contextmanager
-def refused_in_a_line(path: str | Path) -> Iterator[None]:
-    """Turn what the system says of a file that cannot be written into a ResultsFileError.
+def os_errors_converted(path: str | Path) -> Iterator[None]:
+    """Convert an OSError into a ResultsFileError with a one-line message.
 
     Parameters
     ----------
     path : str or Path
-        The file, as the user calls it.
+        The file that is written, as named by the user.
     """
     try:
         yield
@@ -108,20 +90,20 @@ def refused_in_a_line(path: str | Path) -> Iterator[None]:
 
 
 def write_chunks(file: IO[bytes], content: bytes | memoryview) -> None:
-    """Write to an open file where it stands, in chunks that are each a "write" of the seam.
+    """Write at the current position of a file, in chunks that are separate "write" stages.
 
     Parameters
     ----------
     file : binary file
-        With or without a buffer.
+        Open file, buffered or not.
     content : bytes or memoryview
-        What to write.
+        The bytes to write.
     """
     view = memoryview(content)
     for start in range(0, len(view), _CHUNK):
         with stage("write"):
             rest = view[start : start + _CHUNK]
-            while rest:  # a file without a buffer may take less than it is given
+            while rest:  # an unbuffered file may write fewer bytes than given
                 rest = rest[file.write(rest) :]
 
 
@@ -135,7 +117,7 @@ def _write_part(part: Path, pieces: Iterable[tuple[int, bytes]], size: int | Non
         with stage("flush"):
             file.flush()
             if size is not None:
-                file.truncate(size)  # a hole may be the last
+                file.truncate(size)  # the file may end with a hole
         with stage("fsync"):
             os.fsync(file.fileno())
         with stage("close"):
@@ -143,7 +125,7 @@ def _write_part(part: Path, pieces: Iterable[tuple[int, bytes]], size: int | Non
 
 
 def _sync_folder(folder: Path) -> None:
-    if os.name == "nt":  # folders cannot be opened there
+    if os.name == "nt":  # Windows cannot open folders
         return
     handle = os.open(folder, os.O_RDONLY)
     try:

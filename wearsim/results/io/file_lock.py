@@ -1,4 +1,4 @@
-"""Only one process writes a file; others are told so, and readers are in nobody's way."""
+"""Exclusive lock of the process that writes a file; readers are not blocked."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from wearsim.errors import ResultsFileError
 
 
 def lock_or_refuse(file: IO[bytes], path: str | Path) -> None:
-    """Take the lock of an open file, which holds until it is closed or the process ends.
+    """Lock an open file until it is closed or the process ends.
 
-    The lock is one of the open file (OFD) where the system has such, for HDF5 takes the other
+    Where available, the lock belongs to the open file description (OFD): HDF5 uses the other
     kind, flock, when it opens a file for reading.
 
     Parameters
@@ -22,12 +22,12 @@ def lock_or_refuse(file: IO[bytes], path: str | Path) -> None:
     file : binary file
         The file, open for writing.
     path : str or Path
-        Its name, as the user calls it.
+        Its name, as given by the user.
 
     Raises
     ------
     ResultsFileError
-        If another holds the lock, or if the name stands for another file by now.
+        If another process holds the lock, or if the file was replaced after it was opened.
     """
     busy = ResultsFileError(f"{path}: is being written by another process")
     try:
@@ -35,32 +35,21 @@ def lock_or_refuse(file: IO[bytes], path: str | Path) -> None:
     except OSError as error:
         if error.errno in {errno.EAGAIN, errno.EACCES}:
             raise busy from error
-        what = error.strerror or str(error)
-        raise ResultsFileError(f"{path}: cannot be locked for writing ({what})") from error
+        reason = error.strerror or str(error)
+        raise ResultsFileError(f"{path}: cannot be locked for writing ({reason})") from error
     if not os.path.samestat(os.fstat(file.fileno()), os.stat(path)):
         raise busy
 
 
 def refuse_if_locked(path: str | Path) -> None:
-    """Refuse to replace a file that another process is writing.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file; there may be none.
-
-    Raises
-    ------
-    ResultsFileError
-        If another holds its lock.
-    """
-    if os.access(path, os.R_OK | os.W_OK):  # else there is none, or nobody may write it
+    """Raise a ResultsFileError if another process is writing a file, which need not exist."""
+    if os.access(path, os.R_OK | os.W_OK):
         with Path(path).open("r+b", buffering=0) as file:
             lock_or_refuse(file, path)
 
 
 def _lock(handle: int) -> None:
-    if os.name == "nt":  # a lock would keep readers away there
+    if os.name == "nt":  # a lock would block readers on Windows
         return
     import fcntl  # noqa: PLC0415  (not on every system)
 

@@ -1,4 +1,4 @@
-"""The pieces of an open HDF5 file, as `hdf5` wrote them."""
+"""Reading the items of an HDF5 file written by `hdf5_write`."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from wearsim.results.io.hdf5_write import ERRORS
 
 @dataclass(frozen=True)
 class Extent:
-    """Where an array stands in a file.
+    """Position, shape and type of a contiguous array in a file.
 
     Parameters
     ----------
     offset : int
-        Bytes before it.
+        Position of its first byte.
     shape : tuple of int
-        Its length along each axis.
+        Length of each axis.
     dtype : dtype
-        The type of its numbers, or texts of fixed length.
+        Type of its numbers, or of texts of fixed length.
     """
 
     offset: int
@@ -37,28 +37,22 @@ class Extent:
 
     @property
     def row_shape(self) -> tuple[int, ...]:
-        """Length along each axis but the first."""
+        """Length of each axis except the first."""
         return self.shape[1:]
 
     @property
     def row_bytes(self) -> int:
-        """Bytes of all that has one number along the first axis."""
+        """Size of one row along the first axis in bytes."""
         return math.prod(self.row_shape) * self.dtype.itemsize
 
     def at(self, row: int) -> int:
-        """Return how many bytes stand before a row.
-
-        Parameters
-        ----------
-        row : int
-            Its number along the first axis.
-        """
+        """Return the position of a row in the file."""
         return self.offset + row * self.row_bytes
 
 
 @contextmanager
 def opened(path: Path) -> Iterator[h5py.File]:
-    """Open an HDF5 file for reading; no lock is needed, since its structure never changes.
+    """Open an HDF5 file for reading, without a lock since its structure never changes.
 
     Parameters
     ----------
@@ -75,59 +69,39 @@ def opened(path: Path) -> Iterator[h5py.File]:
 
 
 def get_text(dataset: h5py.Dataset) -> str:
-    """Return a text that `hdf5` wrote.
-
-    Parameters
-    ----------
-    dataset : h5py.Dataset
-        Where it stands.
-    """
+    """Return a text dataset written by `hdf5_write`."""
     kind = dataset.id.get_type()
     content = np.empty((), f"S{kind.get_size()}")
     dataset.id.read(h5s.ALL, h5s.ALL, content, kind)
-    return content.tobytes()[:-1].decode("utf-8", ERRORS)  # to the byte, where h5py strips zeros
+    return content.tobytes()[:-1].decode("utf-8", ERRORS)  # h5py would strip zeros
 
 
 def get_label(item: h5py.Dataset | h5py.Group, name: str) -> str:
-    """Return a text attribute that `hdf5` wrote.
-
-    Parameters
-    ----------
-    item : h5py.Dataset or h5py.Group
-        What it belongs to.
-    name : str
-        Its name.
-    """
+    """Return a text attribute written by `hdf5_write`."""
     content = item.attrs[name]
     return content if isinstance(content, str) else bytes(content).decode("utf-8", ERRORS)
 
 
 def get_arrays(group: h5py.Group) -> Arrays:
-    """Return all arrays of a group by name, with their types.
-
-    Parameters
-    ----------
-    group : h5py.Group
-        The group; what else it holds is left out.
-    """
+    """Return all arrays of a group by name."""
     items = group.items()
     return {name: np.asarray(item[()]) for name, item in items if isinstance(item, h5py.Dataset)}
 
 
 def extents(group: h5py.Group, names: Iterable[str]) -> dict[str, Extent]:
-    """Return where arrays stand in a file.
+    """Return the positions of arrays in a file.
 
     Parameters
     ----------
     group : h5py.Group
-        What holds them, such as the file itself.
+        The group of the arrays, such as the file itself.
     names : iterable of str
         The arrays.
 
     Raises
     ------
     ValueError
-        If one does not stand there in one piece.
+        If an array is not contiguous.
     """
     return {name: _extent(group[name]) for name in names}
 

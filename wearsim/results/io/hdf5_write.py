@@ -1,4 +1,4 @@
-"""The image of a file that is mostly holes, in memory."""
+"""Content of a results file as HDF5, written to memory."""
 
 from __future__ import annotations
 
@@ -22,44 +22,42 @@ _PAGE = 1 << 16
 
 
 class SparseImage:
-    """What is written to a file, holes left out, with the calls that HDF5 makes of a file.
+    """In-memory file without storage for holes, with the file methods that HDF5 calls.
 
-    The disk is then written by our own calls, which fail as writing does: HDF5 itself is left in
-    disorder by a disk that is full.
+    The image is then written to the disk without HDF5, which does not recover from a full disk.
     """
 
     def __init__(self) -> None:
         self._pages: dict[int, bytearray] = {}
         self._place = 0
-        self.size = 0
-        """Bytes of the file, holes included."""
+        self.size = 0  # in bytes, holes included
 
     def pieces(self) -> Iterator[tuple[int, bytes]]:
-        """Yield what was written, and how many bytes stand before it."""
+        """Yield the written bytes, each piece with its offset."""
         for number in sorted(self._pages):
             start = number * _PAGE
             yield start, bytes(self._pages[number][: self.size - start])
 
     def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
-        """Go to a place, as files do."""
+        """Set the position, as a file."""
         start = {io.SEEK_SET: 0, io.SEEK_CUR: self._place, io.SEEK_END: self.size}[whence]
         self._place = start + offset
         return self._place
 
     def tell(self) -> int:
-        """Return the place, as files do."""
+        """Return the position, as a file."""
         return self._place
 
     def truncate(self, size: int) -> int:
-        """Set the size, as files do; only the last is cut off."""
+        """Set the size, as a file."""
         self.size = size
         return size
 
     def flush(self) -> None:
-        """Do nothing: there is no disk."""
+        """Do nothing, since there is no disk."""
 
     def write(self, content: bytes | memoryview) -> int:
-        """Write at the place, as files do."""
+        """Write at the position, as a file."""
         view = memoryview(content).cast("B")
         for page, inside, done in self._spans(len(view)):
             piece = view[done : done + _PAGE - inside]
@@ -69,7 +67,7 @@ class SparseImage:
         return len(view)
 
     def readinto(self, target: memoryview) -> int:
-        """Read at the place, as files do."""
+        """Read at the position, as a file."""
         view = memoryview(target).cast("B")
         for page, inside, done in self._spans(len(view)):
             piece = self._pages.get(page, bytes(_PAGE))[inside : inside + len(view) - done]
@@ -78,7 +76,7 @@ class SparseImage:
         return len(view)
 
     def _spans(self, count: int) -> Iterator[tuple[int, int, int]]:
-        """Yield the pages of the bytes at the place: which, where in it, how many before."""
+        """Yield page number, offset in the page and bytes done, for bytes at the position."""
         done = 0
         while done < count:
             page, inside = divmod(self._place + done, _PAGE)
@@ -90,7 +88,7 @@ SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 CHECKPOINT, INPUTS, ABOUT, SCENARIO, FILES = "checkpoint", "inputs", "about", "scenario", "files"
 
-ERRORS = "surrogatepass"  # so that every Python string comes back as it was
+ERRORS = "surrogatepass"  # so that every Python string can be stored
 
 _LABEL_LENGTH = 1000  # an attribute holds 64 kB at most
 
@@ -107,7 +105,7 @@ def file_image(content: Content) -> bytes:
     Parameters
     ----------
     content : Content
-        What it shall hold.
+        Content of the file.
 
     Returns
     -------
@@ -116,11 +114,11 @@ def file_image(content: Content) -> bytes:
     Raises
     ------
     ValueError
-        If the variables are not those of the layout, or do not fit together.
+        If the variables are not those of the schema, or their shapes are inconsistent.
     """
     access = h5p.create(h5p.FILE_ACCESS)
     access.set_fapl_core(1 << 20, False)
-    name = f"wearsim-{os.getpid()}-{next(_number)}"  # of no file: the image stays in memory
+    name = f"wearsim-{os.getpid()}-{next(_number)}"  # the image stays in memory
     with _new_file(name.encode(), access) as file:
         _put_content(file, content)
         h5f.flush(file)
@@ -129,15 +127,15 @@ def file_image(content: Content) -> bytes:
 
 
 def sparse_image(content: Content) -> SparseImage:
-    """Return a file whose reserved variables are holes, so that it may be of any size.
+    """Return a results file whose reserved variables are holes, so that it may have any size.
 
-    Every variable stands in one piece. Where it stands is told by `hdf5_reading.extents`, so that
-    rows can be written there later by plain writes, which leave the structure alone.
+    Every variable is contiguous, at the offset returned by `hdf5_read.extents`, so that its rows
+    can be written later by plain writes, which leave the HDF5 structure unchanged.
 
     Parameters
     ----------
     content : Content
-        What it shall hold.
+        Content of the file.
 
     Returns
     -------
@@ -146,7 +144,7 @@ def sparse_image(content: Content) -> SparseImage:
     Raises
     ------
     ValueError
-        If the variables are not those of the layout, or do not fit together.
+        If the variables are not those of the schema, or their shapes are inconsistent.
     """
     image = SparseImage()
     access = h5p.create(h5p.FILE_ACCESS)
@@ -170,7 +168,7 @@ def _new_file(name: bytes, access: Any) -> Iterator[Any]:
 
 
 def _put_content(file: Any, content: Content) -> None:
-    lengths = axis_lengths(content.variables, content.layout.variables)
+    lengths = axis_lengths(content.variables, content.schema.variables)
     _put_labels(file, content)
     _put_variables(file, content, lengths)
     _put_inputs(_group(file, INPUTS), content)
@@ -180,10 +178,10 @@ def _put_content(file: Any, content: Content) -> None:
 
 
 def _put_labels(file: Any, content: Content) -> None:
-    """Write what a person, or xarray, should see first; it is read back from the texts."""
-    _put_attribute(file, "format", content.layout.format)
-    _put_attribute(file, "format_version", content.layout.version)
-    for name, value in content.about.items():
+    """Write short values as HDF5 attributes for other programs; wearsim reads them from JSON."""
+    _put_attribute(file, "format", content.schema.format)
+    _put_attribute(file, "format_version", content.schema.version)
+    for name, value in content.attributes.items():
         if isinstance(value, str):
             _put_attribute(file, name, value[:_LABEL_LENGTH])
         elif isinstance(value, bool | np.bool_):
@@ -193,14 +191,14 @@ def _put_labels(file: Any, content: Content) -> None:
 
 
 def _put_variables(file: Any, content: Content, lengths: Mapping[str, int]) -> None:
-    layout = content.layout
+    schema = content.schema
     scales: dict[str, Any] = {}
     datasets: dict[str, Any] = {}
-    for axis in layout.axes.values():
+    for axis in schema.axes.values():
         numbers = np.arange(axis.first, axis.first + lengths[axis.name])
         scales[axis.name] = _put_array(file, axis.name, numbers)
         _describe(scales[axis.name], "1", axis.long_name)
-    for name, variable in layout.variables.items():
+    for name, variable in schema.variables.items():
         put = _reserve if name in content.reserved else _put_array
         dataset = put(file, name, content.variables[name])
         _describe(dataset, variable.unit, variable.long_name)
@@ -208,13 +206,13 @@ def _put_variables(file: Any, content: Content, lengths: Mapping[str, int]) -> N
     for name, scale in scales.items():
         h5ds.set_scale(scale, name.encode())
     for name, dataset in datasets.items():
-        for position, dim in enumerate(layout.variables[name].dims):
+        for position, dim in enumerate(schema.variables[name].dims):
             h5ds.attach_scale(dataset, scales[dim], position)
 
 
 def _put_inputs(group: Any, content: Content) -> None:
     _put_text(group, SCENARIO, content.scenario_text)
-    _put_text(group, ABOUT, json.dumps(content.about, default=as_plain))
+    _put_text(group, ABOUT, json.dumps(content.attributes, default=as_plain))
     files = _group(group, FILES)
     for number, (path, text) in enumerate(content.files.items()):
         _put_attribute(_put_text(files, str(number), text), "path", path)
@@ -226,9 +224,9 @@ def _group(group: Any, name: str) -> Any:
     return h5g.create(group, name.encode(), gcpl=creation)
 
 
-def _describe(dataset: Any, unit: str, what: str) -> None:
+def _describe(dataset: Any, unit: str, long_name: str) -> None:
     _put_attribute(dataset, "units", unit)
-    _put_attribute(dataset, "long_name", what)
+    _put_attribute(dataset, "long_name", long_name)
 
 
 def _put_array(group: Any, name: str, array: npt.NDArray[Any]) -> Any:
@@ -241,7 +239,7 @@ def _put_array(group: Any, name: str, array: npt.NDArray[Any]) -> Any:
 
 
 def _reserve(group: Any, name: str, array: npt.NDArray[Any]) -> Any:
-    """Give an array its place, all of it at once, and write nothing: the file has holes."""
+    """Allocate the space of an array without writing it, which leaves a hole in the file."""
     creation = _creation().copy()
     creation.set_alloc_time(h5d.ALLOC_TIME_EARLY)
     creation.set_fill_time(h5d.FILL_TIME_NEVER)
@@ -266,7 +264,7 @@ def _put_attribute(target: Any, name: str, value: object) -> None:
 
 
 def _text(text: str) -> tuple[npt.NDArray[Any], Any]:
-    """Return a text as an array and its HDF5 type, of fixed length: no heap, no limit but 4 GB."""
+    """Return a text as an array with its HDF5 type of fixed length, up to 4 GB without a heap."""
     content = text.encode("utf-8", ERRORS)
     size = len(content) + 1
     return np.array(content, f"S{size}"), _text_type(size)

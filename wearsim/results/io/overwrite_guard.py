@@ -1,4 +1,4 @@
-"""Files that are read stay as they are: no output may take their place, not even by force."""
+"""Checks of an output path before a computation; input files are never replaced."""
 
 from __future__ import annotations
 
@@ -9,27 +9,30 @@ from pathlib import Path
 from wearsim.errors import ResultsFileError
 from wearsim.results.io.file_lock import refuse_if_locked
 
+OTHER_KINDS = (".png", ".pdf", ".svg", ".toml", ".csv")
+"""Suffixes of figures, scenarios and tables, which are refused for results files."""
+
 
 def refuse_inputs(
     path: str | Path, inputs: Iterable[Path], what: str = "the scenario", option: str = "-o"
 ) -> None:
-    """Raise if an output would replace a file that is read.
+    """Raise if an output would replace an input file.
 
     Parameters
     ----------
     path : str or Path
         The output.
     inputs : iterable of Path
-        The files that are read.
+        The input files.
     what : str
-        What is read from them.
+        Description of the inputs.
     option : str
-        The option that named the output.
+        The option that set the output.
 
     Raises
     ------
     ResultsFileError
-        If it is one of them, by whatever name.
+        If the output is one of the inputs, also by another name.
     """
     for source in inputs:
         if same_file(path, source):
@@ -40,28 +43,15 @@ def refuse_inputs(
 
 
 def same_file(one: str | Path, other: str | Path) -> bool:
-    """Tell whether two paths name one file, which need not exist.
-
-    Parameters
-    ----------
-    one, other : str or Path
-
-    Returns
-    -------
-    bool
-    """
+    """Return whether two paths refer to the same file, which need not exist."""
     try:
         return os.path.samefile(one, other)
-    except OSError:  # one of them is not there yet
+    except OSError:  # one of them does not exist
         return Path(one).resolve() == Path(other).resolve()
 
 
-OTHER_KINDS = (".png", ".pdf", ".svg", ".toml", ".csv")
-"""How names end that mean a figure, a scenario or a table."""
-
-
 def check_output(path: str | Path, force: bool, inputs: Iterable[Path] = ()) -> None:
-    """Check that a results file may be written, before hours are spent on it.
+    """Check before a long computation that a results file may be written.
 
     Parameters
     ----------
@@ -70,23 +60,22 @@ def check_output(path: str | Path, force: bool, inputs: Iterable[Path] = ()) -> 
     force : bool
         Whether an existing file may be replaced.
     inputs : iterable of Path
-        Files that the scenario is read from, which are never replaced.
+        Files of the scenario, which are never replaced.
 
     Raises
     ------
     ResultsFileError
-        If it exists and `force` is not set, if it is an input, if its name is that of a figure, a
-        scenario or a table, if its folder is missing or not writable, or if another process is
-        writing it.
+        If the file exists and `force` is not set, is an input, has the suffix of a figure, a
+        scenario or a table, is being written by another process, or if its folder is missing or
+        not writable.
     """
     refuse_inputs(path, inputs)
-    target = Path(path).resolve()
+    target, suffix = Path(path).resolve(), Path(path).suffix
     folder = target.parent
-    suffix = Path(path).suffix
     if suffix.lower() in OTHER_KINDS:
-        name = Path(path).with_suffix(".h5").name
         raise ResultsFileError(
-            f"{path}: no results file ends in {suffix}; choose another name with -o, such as {name}"
+            f"{path}: no results file ends in {suffix}; choose another name with -o, such as"
+            f" {Path(path).with_suffix('.h5').name}"
         )
     if target.is_dir():
         raise ResultsFileError(f"{path}: is a folder; name a file in it with -o")

@@ -1,9 +1,9 @@
-"""A results file read back; whatever is wrong with it is said in a line."""
+"""Reading of results files, with one-line messages on missing, foreign or damaged files."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar
 
@@ -12,36 +12,31 @@ import numpy as np
 from wearsim.errors import ResultsFileError
 from wearsim.results.content import Arrays, StudyData
 from wearsim.results.dissipation.data import DissipationData
-from wearsim.results.dissipation.schema import DISSIPATION, with_inputs
+from wearsim.results.dissipation.schema import DISSIPATION, dissipation_schema
 from wearsim.results.ensemble.schema import ENSEMBLE
 from wearsim.results.run.data import RunData
 from wearsim.results.run.schema import RUN
-from wearsim.results.schema import Layout, axis_lengths
+from wearsim.results.schema import Schema, axis_lengths
 
 if TYPE_CHECKING:
     import h5py
 
 _SMALLEST = 96  # bytes: no HDF5 file is shorter
-# what h5py, json and numpy raise on content that is not as it was written
+# exceptions of h5py, json and numpy on damaged content
 _DAMAGE = (OSError, RuntimeError, ValueError, TypeError, KeyError, AttributeError, OverflowError)
-FileKind: TypeAlias = Literal["replay", "dissipation", "ensemble"]
-_KINDS: dict[str, FileKind] = {
-    RUN.format: "replay",
-    DISSIPATION.format: "dissipation",
-    ENSEMBLE.format: "ensemble",
+FileKind: TypeAlias = Literal["run", "dissipation", "ensemble"]
+# kind, schema and Python function for opening, by format
+_KINDS: dict[str, tuple[FileKind, Schema, str]] = {
+    RUN.format: ("run", RUN, "open_results"),
+    DISSIPATION.format: ("dissipation", DISSIPATION, "open_dissipation"),
+    ENSEMBLE.format: ("ensemble", ENSEMBLE, "open_ensemble"),
 }
-_OPENERS: dict[FileKind, str] = {
-    "replay": "open_results",
-    "dissipation": "open_dissipation",
-    "ensemble": "open_ensemble",
-}
-_LAYOUTS = {layout.format: layout for layout in (RUN, DISSIPATION, ENSEMBLE)}
 
 Stored = TypeVar("Stored")
 
 
 def read_results(path: str | Path) -> RunData:
-    """Read a results file.
+    """Read the results file of a run.
 
     Parameters
     ----------
@@ -61,12 +56,12 @@ def read_results(path: str | Path) -> RunData:
 
 
 def read_dissipation(path: str | Path) -> DissipationData:
-    """Read the file of a study of the dissipation of a contact; see `read_results`."""
+    """Read the file of a dissipation study; see `read_results`."""
     return read_file(path, lambda file: _dissipation_data(path, file))
 
 
 def kind_of(path: str | Path) -> FileKind:
-    """Return what a results file holds; raises as `read_results`.
+    """Return the kind of a results file.
 
     Parameters
     ----------
@@ -75,25 +70,35 @@ def kind_of(path: str | Path) -> FileKind:
 
     Returns
     -------
-    {"replay", "dissipation", "ensemble"}
+    {"run", "dissipation", "ensemble"}
+
+    Raises
+    ------
+    ResultsFileError
+        As `read_results`.
     """
-    return read_file(path, lambda file: _KINDS[_layout_of(path, file).format])
+    return read_file(path, lambda file: _kind(path, file)[0])
 
 
 def is_dissipation(path: str | Path) -> bool:
-    """Tell whether a results file holds a study of a contact; raises as `read_results`."""
+    """Return whether a results file holds a dissipation study; raises as `read_results`."""
     return kind_of(path) == "dissipation"
 
 
 def read_file(path: str | Path, take: Callable[[h5py.File], Stored]) -> Stored:
-    """Open a file and take from it; whatever goes wrong becomes a ResultsFileError.
+    """Open a file and return what `take` reads from it.
 
     Parameters
     ----------
     path : str or Path
         The file.
     take : callable
-        Returns what is wanted of the open file.
+        Function of the open file.
+
+    Raises
+    ------
+    ResultsFileError
+        As `read_results`.
     """
     from wearsim.results.io import hdf5_read, hdf5_write  # noqa: PLC0415  (h5py takes 0.2 s to import)
 
@@ -117,134 +122,122 @@ def _check_signature(path: str | Path, signature: bytes) -> None:
         raise ResultsFileError(f"{path}: cannot be read ({error.strerror})") from error
     if not start:
         raise ResultsFileError(f"{path}: is empty")
-    if start.startswith(signature) and len(start) == _SMALLEST:
-        return
-    if start.startswith(signature) or signature.startswith(start):
+    if not (start.startswith(signature) or signature.startswith(start)):
+        raise ResultsFileError(f"{path}: is not a results file of wearsim, not even HDF5")
+    if len(start) < _SMALLEST:
         raise ResultsFileError(truncated(path))
-    raise ResultsFileError(f"{path}: is not a results file of wearsim, not even HDF5")
 
 
 def truncated(path: str | Path) -> str:
-    """Return what is said of a file whose end is missing."""
+    """Return the error message on a truncated file."""
     return f"{path}: is truncated: its end is missing, as after a copy that was cut short"
 
 
 def _first_line(error: Exception) -> str:
     text = str(error.args[0]) if isinstance(error, KeyError) and error.args else str(error)
-    lines = text.splitlines()
-    return lines[0] if lines else type(error).__name__
+    return next(iter(text.splitlines()), type(error).__name__)
 
 
-def _layout_of(path: str | Path, file: h5py.File) -> Layout:
+def _kind(path: str | Path, file: h5py.File) -> tuple[FileKind, Schema, str]:
     name = file.attrs.get("format")
     text = name.decode(errors="replace") if isinstance(name, bytes) else name
-    if not isinstance(text, str) or text not in _LAYOUTS:
+    if not isinstance(text, str) or text not in _KINDS:
         raise ResultsFileError(f"{path}: is HDF5, but not a results file of wearsim")
-    return _LAYOUTS[text]
-
-
-def _check_format(path: str | Path, file: h5py.File, wanted: Layout) -> None:
-    found = _layout_of(path, file)
-    if found is not wanted:
-        raise ResultsFileError(
-            f"{path}: holds {found.holds}; what is needed is {wanted.holds}. In Python,"
-            f" wearsim.{_OPENERS[_KINDS[found.format]]} opens it"
-        )
-    version = int(file.attrs["format_version"])
-    if version > wanted.version:
-        raise ResultsFileError(
-            f"{path}: was written by a newer wearsim (format {version}, this one reads up to"
-            f" {wanted.version}); update wearsim to read it"
-        )
+    return _KINDS[text]
 
 
 def _run_data(path: str | Path, file: h5py.File) -> RunData:
-    # nothing is drawn in files of version 0.1.0, which do not say so
-    found = told(path, file, RUN, RunData, groups=["checkpoint"], optional=["drawn"])
+    from wearsim.results.io import hdf5_read, hdf5_write  # noqa: PLC0415
+
+    # files of version 0.1.0 have no "drawn": they have no random inputs
+    group = hdf5_write.CHECKPOINT
+    attributes = read_attributes(path, file, RUN, RunData, groups=[group], optional=["drawn"])
     variables = _variables(file, RUN)
+
+    def of_kind(kind: str) -> Arrays:
+        return {name: variables[name] for name, item in RUN.variables.items() if item.kind == kind}
+
     return RunData(
-        **found,
-        static=_of_kind("static", variables),
-        history=_of_kind("history", variables),
-        records=_of_kind("record", variables),
-        checkpoint=_checkpoint(file),
+        **attributes,
+        static=of_kind("static"),
+        history=of_kind("history"),
+        records=of_kind("record"),
+        checkpoint=hdf5_read.get_arrays(file[group]),
     )
 
 
 def _dissipation_data(path: str | Path, file: h5py.File) -> DissipationData:
-    found = told(path, file, DISSIPATION, DissipationData)
-    layout = with_inputs(found["inputs"])
-    check_complete(path, [name for name in layout.variables if name not in file])
-    return DissipationData(**found, variables=_variables(file, layout))
+    attributes = read_attributes(path, file, DISSIPATION, DissipationData)
+    schema = dissipation_schema(attributes["inputs"])
+    check_complete(path, file, schema.variables)
+    return DissipationData(**attributes, variables=_variables(file, schema))
 
 
-def told(
+def _variables(file: h5py.File, schema: Schema) -> Arrays:
+    variables = {name: np.asarray(file[name][()]) for name in schema.variables}
+    axis_lengths(variables, schema.variables)
+    return variables
+
+
+def read_attributes(
     path: str | Path,
     file: h5py.File,
-    layout: Layout,
-    kind: type[StudyData],
+    schema: Schema,
+    data: type[StudyData],
     groups: Sequence[str] = (),
     optional: Sequence[str] = (),
 ) -> dict[str, Any]:
-    """Return all that a file tells besides arrays, having checked that these are there too.
+    """Return the fields of a file except arrays, after checks of its kind and completeness.
 
     Parameters
     ----------
     path, file : str or Path, h5py.File
         The file.
-    layout : Layout
-        The kind of file that it must be.
-    kind : type of StudyData
-        What is made of it.
+    schema : Schema
+        The required kind of file.
+    data : type of StudyData
+        The class with these fields.
     groups : sequence of str
-        Groups that must be there.
+        Required groups.
     optional : sequence of str
-        What may be missing, as in files of older versions.
+        Fields that may be missing, as in files of older versions.
+
+    Raises
+    ------
+    ResultsFileError
+        If the file is of another kind, written by a newer wearsim, or incomplete.
     """
     from wearsim.results.io import hdf5_read, hdf5_write  # noqa: PLC0415
 
-    _check_format(path, file, layout)
-    about_at, scenario_at = (
-        f"{hdf5_write.INPUTS}/{hdf5_write.ABOUT}",
-        f"{hdf5_write.INPUTS}/{hdf5_write.SCENARIO}",
+    _, found, opener = _kind(path, file)
+    if found is not schema:
+        raise ResultsFileError(
+            f"{path}: holds {found.holds}; what is needed is {schema.holds}. In Python,"
+            f" wearsim.{opener} opens it"
+        )
+    version = int(file.attrs["format_version"])
+    if version > schema.version:
+        raise ResultsFileError(
+            f"{path}: was written by a newer wearsim (format {version}, this one reads up to"
+            f" {schema.version}); update wearsim to read it"
+        )
+    about, scenario, files = (
+        f"{hdf5_write.INPUTS}/{name}"
+        for name in (hdf5_write.ABOUT, hdf5_write.SCENARIO, hdf5_write.FILES)
     )
-    files_at = f"{hdf5_write.INPUTS}/{hdf5_write.FILES}"
-    wanted = (*layout.variables, about_at, scenario_at, files_at, *groups)
-    check_complete(path, [name for name in wanted if name not in file])
-    about: dict[str, Any] = json.loads(hdf5_read.get_text(file[about_at]))
-    names = kind.told()
-    check_complete(path, [name for name in names if name not in {*about, *optional}])
-    texts = {
-        "scenario_text": hdf5_read.get_text(file[scenario_at]),
-        "files": _files(file[files_at]),
+    check_complete(path, file, [*schema.variables, about, scenario, files, *groups])
+    attributes: dict[str, Any] = json.loads(hdf5_read.get_text(file[about]))
+    names = data.attribute_names()
+    check_complete(path, {*attributes, *optional}, names)
+    datasets = [file[files][str(number)] for number in range(len(file[files]))]
+    return {name: attributes[name] for name in names if name in attributes} | {
+        "scenario_text": hdf5_read.get_text(file[scenario]),
+        "files": {hdf5_read.get_label(item, "path"): hdf5_read.get_text(item) for item in datasets},
     }
-    return {name: about[name] for name in names if name in about} | texts
 
 
-def _variables(file: h5py.File, layout: Layout) -> Arrays:
-    variables = {name: np.asarray(file[name][()]) for name in layout.variables}
-    axis_lengths(variables, layout.variables)
-    return variables
-
-
-def _checkpoint(file: h5py.File) -> Arrays:
-    from wearsim.results.io import hdf5_read, hdf5_write  # noqa: PLC0415
-
-    return hdf5_read.get_arrays(file[hdf5_write.CHECKPOINT])
-
-
-def check_complete(path: str | Path, missing: list[str]) -> None:
-    """Refuse a file that lacks something; see `read_file`."""
+def check_complete(path: str | Path, present: Container[str], names: Iterable[str]) -> None:
+    """Raise a ResultsFileError unless all names are present in a file."""
+    missing = [name for name in names if name not in present]
     if missing:
         raise ResultsFileError(f"{path}: is damaged (lacks {', '.join(missing)})")
-
-
-def _files(group: h5py.Group) -> dict[str, str]:
-    from wearsim.results.io.hdf5_read import get_label, get_text  # noqa: PLC0415
-
-    datasets = [group[str(number)] for number in range(len(group))]
-    return {get_label(item, "path"): get_text(item) for item in datasets}
-
-
-def _of_kind(kind: str, variables: Arrays) -> Arrays:
-    return {name: array for name, array in variables.items() if RUN.variables[name].kind == kind}

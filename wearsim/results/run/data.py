@@ -1,4 +1,4 @@
-"""What the file of a run holds, as plain values and arrays."""
+"""Content of the file of a run, as plain values and arrays."""
 
 from __future__ import annotations
 
@@ -10,19 +10,21 @@ import numpy.typing as npt
 from wearsim.results.content import Arrays, Content, StudyData
 from wearsim.results.run.schema import RUN
 
+_ARRAYS = ("static", "history", "records", "checkpoint")
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RunData(StudyData):
-    """All there is to know of a run, in SI; what its file holds beside `StudyData`.
+    """Data of a run, in SI, in addition to `StudyData`.
 
     Parameters
     ----------
     stepper : str
-        Name of the stepper in use.
+        Name of the stepper.
     tolerance : float
-        Relative error asked of the final depth and worn volume.
+        Required relative error of the final depth and worn volume.
     width_threshold : float
-        Worn depth from which on the width counts [m].
+        Worn depth above which the profile counts towards the width [m].
     total_passes : float
         Roller passes of the whole test.
     kinematics : dict of str to float
@@ -31,18 +33,13 @@ class RunData(StudyData):
     static, history, records : dict of str to ndarray
         The variables of `wearsim.results.run.schema`, by kind and name.
     checkpoint : dict of str to ndarray
-        The state to resume from.
+        State for resuming the run.
     drawn : dict of str to dict
-        What was drawn in the place of random inputs, by the scenario's key: `values`, one for the
-        test or one per roller, and their SI `unit`.
+        Drawn values of the random inputs by scenario key: `values`, one for the test or one per
+        roller, and their SI `unit`.
     """
 
-    stored_apart: ClassVar[frozenset[str]] = StudyData.stored_apart | {
-        "static",
-        "history",
-        "records",
-        "checkpoint",
-    }
+    separately_stored: ClassVar[frozenset[str]] = StudyData.separately_stored.union(_ARRAYS)
 
     stepper: str
     tolerance: float
@@ -57,46 +54,36 @@ class RunData(StudyData):
 
     @property
     def variables(self) -> Arrays:
-        """The variables of all kinds, by name."""
+        """Variables of all kinds by name."""
         return {**self.static, **self.history, **self.records}
 
     @property
     def content(self) -> Content:
-        """What goes into its file."""
+        """Content of the results file."""
         return Content(
-            RUN, self.about, self.scenario_text, self.files, self.variables, self.checkpoint
+            RUN, self.attributes, self.scenario_text, self.files, self.variables, self.checkpoint
         )
 
 
 def differences(one: RunData, other: RunData) -> list[str]:
-    """Return the names of all fields and arrays in which two runs differ, to the bit.
-
-    Parameters
-    ----------
-    one, other : RunData
-        The runs.
-
-    Returns
-    -------
-    list of str
-    """
+    """Return the names of all fields and arrays in which two runs differ, bit for bit."""
     names = [
         name
-        for name in (*RunData.told(), "scenario_text", "files")
+        for name in (*RunData.attribute_names(), "scenario_text", "files")
         if getattr(one, name) != getattr(other, name)
     ]
-    for kind in ("static", "history", "records", "checkpoint"):
-        mine, theirs = getattr(one, kind), getattr(other, kind)
+    for kind in _ARRAYS:
+        first, second = getattr(one, kind), getattr(other, kind)
         names += [
             f"{kind}.{name}"
-            for name in sorted(mine.keys() | theirs.keys())
-            if not _same(mine.get(name), theirs.get(name))
+            for name in sorted(first.keys() | second.keys())
+            if not _identical(first.get(name), second.get(name))
         ]
     return names
 
 
-def _same(one: npt.NDArray[Any] | None, other: npt.NDArray[Any] | None) -> bool:
+def _identical(one: npt.NDArray[Any] | None, other: npt.NDArray[Any] | None) -> bool:
     if one is None or other is None:
         return False
-    alike = one.dtype == other.dtype and one.shape == other.shape
-    return alike and one.tobytes() == other.tobytes()
+    same_type = one.dtype == other.dtype and one.shape == other.shape
+    return same_type and one.tobytes() == other.tobytes()

@@ -1,4 +1,4 @@
-"""What a user gets from a run: its results in their words, in SI."""
+"""Result of a run, in SI."""
 
 from __future__ import annotations
 
@@ -22,7 +22,10 @@ _DROPPED = {"station", "roller", "realisation"}
 
 @dataclass(frozen=True, eq=False)
 class Result(StudyResult[RunData]):
-    """A run, finished or not. Axes station, roller and realisation are dropped at length one."""
+    """Result of a run, finished or not.
+
+    The axes station, roller and realisation are dropped where their length is one.
+    """
 
     def __repr__(self) -> str:
         passes, total = float(self.passes[-1]), self.raw.total_passes
@@ -31,16 +34,12 @@ class Result(StudyResult[RunData]):
         return f"<Result '{self.title}': {done} roller passes, depth {depth * 1e6:.4g} um>"
 
     def values(self, name: str) -> npt.NDArray[Any]:
-        """Return any variable of the results file, axes of length one dropped as above.
+        """Return a variable of the results file, axes of length one dropped as above.
 
         Parameters
         ----------
         name : str
-            Its name, "half_length".
-
-        Returns
-        -------
-        ndarray
+            Name of the variable, such as "half_length".
         """
         array = self.raw.variables[name]
         dims = zip(VARIABLES[name].dims, array.shape, strict=True)
@@ -48,25 +47,25 @@ class Result(StudyResult[RunData]):
 
     @property
     def drawn(self) -> dict[str, tuple[float, ...]]:
-        """What was drawn for the random inputs by the scenario's key, one or one per roller [SI].
+        """Drawn values of the random inputs by scenario key, one or one per roller [SI].
 
-        What stays random in the run, a process or what is drawn at every pass, is not among it.
+        Inputs that vary during the run (processes, draws at every pass) are not included.
         """
         return {key: tuple(item["values"]) for key, item in self.raw.drawn.items()}
 
     @property
     def start_height(self) -> FloatArray:
-        """Height of the cylinder above its nominal shape before the test, shape (strips,) [m]."""
+        """Height of the cylinder above its nominal shape at the start, shape (strips,) [m]."""
         return self.raw.static["start_height"]
 
     @property
     def stepper(self) -> str:
-        """Name of the stepper in use."""
+        """Name of the stepper."""
         return self.raw.stepper
 
     @property
     def passes(self) -> FloatArray:
-        """Roller passes done after each step, all rollers together; the first row is 0."""
+        """Roller passes after each step, all rollers together; the first row is 0."""
         return self.values("passes")
 
     @property
@@ -76,12 +75,12 @@ class Result(StudyResult[RunData]):
 
     @property
     def depth(self) -> FloatArray:
-        """Greatest worn depth of the cylinder after each step [m]."""
+        """Greatest depth of the cylinder worn since the start, after each step [m]."""
         return self.values("depth")
 
     @property
     def width(self) -> FloatArray:
-        """Width of the cylinder's groove after each step [m]."""
+        """Width of the groove in the cylinder after each step [m]."""
         return self.values("width")
 
     @property
@@ -91,7 +90,7 @@ class Result(StudyResult[RunData]):
 
     @property
     def roller_depth(self) -> FloatArray:
-        """Greatest worn depth of each roller after each step [m]."""
+        """Greatest depth of each roller worn since the start, after each step [m]."""
         return self.values("roller_depth")
 
     @property
@@ -101,7 +100,7 @@ class Result(StudyResult[RunData]):
 
     @property
     def dissipated_energy(self) -> FloatArray:
-        """Energy dissipated so far by all rollers, after each step [J]."""
+        """Energy dissipated by all rollers since the start, after each step [J]."""
         return self.values("dissipated_energy")
 
     @property
@@ -126,27 +125,27 @@ class Result(StudyResult[RunData]):
 
     @property
     def depth_error(self) -> FloatArray:
-        """Estimated error of the depth after each step [m]."""
+        """Estimated error of the depth of either body after each step [m]."""
         return self.values("depth_error")
 
     @property
     def volume_error(self) -> FloatArray:
-        """Estimated error of the worn volume after each step [m^3]."""
+        """Estimated error of the volume worn off both bodies, after each step [m^3]."""
         return self.values("volume_error")
 
     @property
     def rejected(self) -> IntArray:
-        """Steps refused so far, after each step."""
+        """Rejected steps so far, after each step."""
         return self.values("rejected")
 
     @property
     def solves(self) -> IntArray:
-        """Contacts solved so far, after each step."""
+        """Contact solves of accepted steps so far, after each step."""
         return self.values("solves")
 
     @property
     def full_solves(self) -> IntArray:
-        """Passes solved in full so far, after each step."""
+        """Roller passes solved in full so far, after each step."""
         return self.values("full_solves")
 
     @property
@@ -166,14 +165,14 @@ class Result(StudyResult[RunData]):
 
     @property
     def profiles(self) -> FloatArray:
-        """Worn depth of the cylinder over the strips at each record, shape (record, y) [m]."""
+        """Worn depth of the cylinder at each record, positive down, shape (record, y) [m]."""
         return self.values("cylinder_depth_profile")
 
     @property
     def depth_below_nominal(self) -> FloatArray:
         """Greatest depth of the cylinder below its nominal shape at each record [m].
 
-        It differs from `depth`, worn since the start, where the cylinder has a start profile.
+        It differs from `depth` (worn since the start) if the cylinder has a start profile.
         """
         below = self.raw.records["cylinder_depth_profile"] - self.start_height
         deepest: FloatArray = below.max(axis=(1, 3))
@@ -181,7 +180,7 @@ class Result(StudyResult[RunData]):
 
     @property
     def roller_profiles(self) -> FloatArray:
-        """Worn depth of each roller over the strips at each record [m]."""
+        """Worn depth of each roller at each record, positive into the roller [m]."""
         return self.values("roller_depth_profile")
 
     @property
@@ -196,29 +195,30 @@ class Result(StudyResult[RunData]):
 
     @property
     def steps(self) -> int:
-        """Steps taken, which may be more than the history has rows."""
-        counted = self.raw.checkpoint.get("steps")
-        return len(self.passes) - 1 if counted is None else int(counted)
+        """Number of accepted steps; the history may have fewer rows."""
+        return int(self.raw.checkpoint.get("steps", len(self.passes) - 1))
 
     @property
     def final(self) -> dict[str, Number]:
-        """The end state in SI, ready for JSON.
+        """Final state in SI, ready for JSON.
 
-        What each roller has of its own is that of the roller where it is greatest. With several
-        realisations a value is a list of theirs. An error relative to nothing worn is 0.
+        Quantities that differ between rollers are the maximum over the rollers. With several
+        realisations each value is a list. A relative error is 0 if nothing is worn.
         """
         last = {name: array[-1] for name, array in self.raw.history.items()}
-        of_rollers = ("roller_depth", "roller_worn_volume", "normal_force", "peak_pressure")
-        last.update({name: last[name].max(axis=0) for name in of_rollers})
-        # the errors are those of either body's depth, and of all volume worn off
+        per_roller = ("roller_depth", "roller_worn_volume", "normal_force", "peak_pressure")
+        last.update({name: last[name].max(axis=0) for name in per_roller})
+        # the estimated errors apply to the deeper body and to the volume of both bodies
         deepest = np.maximum(last["depth"], last["roller_depth"])
         multiplicity = self.raw.static["multiplicity"]
         volume = last["worn_volume"] + multiplicity @ self.raw.history["roller_worn_volume"][-1]
+        below = np.asarray(self.depth_below_nominal[-1])
+        below_nominal = {"depth_below_nominal_m": _number(below)} if self.start_height.any() else {}
         return {
             "passes": _number(last["passes"]),
             "time_s": _number(last["time"]),
             "depth_m": _number(last["depth"]),
-            **self._below_nominal(),
+            **below_nominal,
             "width_m": _number(last["width"]),
             "worn_volume_m3": _number(last["worn_volume"]),
             "roller_depth_m": _number(last["roller_depth"]),
@@ -233,11 +233,6 @@ class Result(StudyResult[RunData]):
             "relative_volume_error": _number(_relative(last["volume_error"], volume)),
         }
 
-    def _below_nominal(self) -> dict[str, Number]:
-        if not self.start_height.any():
-            return {}
-        return {"depth_below_nominal_m": _number(np.asarray(self.depth_below_nominal[-1]))}
-
 
 def _number(values: npt.NDArray[Any]) -> Number:
     numbers: list[float] = values.astype(float).ravel().tolist()
@@ -246,7 +241,7 @@ def _number(values: npt.NDArray[Any]) -> Number:
 
 def _relative(error: FloatArray, value: FloatArray) -> FloatArray:
     worn = value > 0.0
-    relative: FloatArray = worn * error / (value + ~worn)
+    relative: FloatArray = worn * error / (value + ~worn)  # without division by zero
     return relative
 
 
