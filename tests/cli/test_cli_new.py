@@ -169,7 +169,7 @@ def test_that_a_plugin_takes_no_name_that_its_code_has_a_use_for(
     refused = command("new", "plugin", name)
     assert refused.exit_code == 2
     told = " ".join(refused.stderr.split())
-    assert f"would take the name {taken}," in told
+    assert f"would define the name {taken}," in told
     assert f"add a word, 'my-{name}'" in told
     assert not list(Path().iterdir())
     assert command("new", "plugin", f"my-{name}").exit_code == 0

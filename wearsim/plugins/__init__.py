@@ -1,10 +1,11 @@
-"""What a plugin's author imports: hooks, the specs they yield, protocols, options and errors."""
+"""Public interface for plugins: hooks, specs, base classes, options and errors."""
 
 from pydantic import Field
 
+from wearsim.contact_batch import BatchSolution, OperatingPoints
 from wearsim.errors import CapabilityError, ContactError
 from wearsim.plugins.capabilities import Capabilities, PassLoop
-from wearsim.plugins.contact_model import ContactModel
+from wearsim.plugins.contact_model import ContactModel, refuse_unclaimed
 from wearsim.plugins.hookspecs import hookimpl
 from wearsim.plugins.manager import registry
 from wearsim.plugins.protocols import BODIES, Body, Load, LoadTerm, WearLaw
@@ -16,7 +17,6 @@ from wearsim.plugins.random_inputs import (
     Process,
     Uniforms,
 )
-from wearsim.plugins.refusing import refuse_unclaimed
 from wearsim.plugins.shared_wear import SharedWear
 from wearsim.plugins.specs import (
     ContactModelSpec,
@@ -40,10 +40,11 @@ from wearsim.quantities import (
     Quantity,
     Value,
 )
-from wearsim.units import Kind
+from wearsim.units import Kind, QuantityError
 
 __all__ = [
     "BODIES",
+    "BatchSolution",
     "Body",
     "Capabilities",
     "CapabilityError",
@@ -63,6 +64,7 @@ __all__ = [
     "LoadTerm",
     "NonNegativeStiffness",
     "NonNegativeWearFactor",
+    "OperatingPoints",
     "Options",
     "PassLoop",
     "PositiveDuration",
@@ -73,6 +75,7 @@ __all__ = [
     "PositiveWearFactor",
     "Process",
     "Quantity",
+    "QuantityError",
     "RandomInputSpec",
     "SharedWear",
     "Spec",

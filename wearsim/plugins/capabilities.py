@@ -1,37 +1,34 @@
-"""Capabilities that a contact model may claim."""
+"""Capabilities of contact models, and the arguments of the compiled pass loop."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from wearsim.types import (
-    FloatArray,
-    IntArray,
-)
+from wearsim.types import FloatArray, IntArray
 
 
 @dataclass(frozen=True)
 class Capabilities:
-    """What a contact model can take; the solver picks the stepper that fits.
+    """Optional capabilities of a contact model; the default stepper is chosen by them.
 
     Parameters
     ----------
     wear_compliance : bool
-        `solve` honours its `wear_compliance`, so that implicit steps are possible.
+        `solve` accepts `wear_compliance`, which implicit steps require.
     coupled : bool
-        `solve_coupled` takes several contacts that share a wearing profile.
+        `solve_coupled` accepts several contacts that wear the same bodies.
     creepage_variation : bool
         The creepage may vary from strip to strip (`Creepage.variation`).
     bearing_torque : bool
-        The mean longitudinal creepage can be found from a bearing torque.
+        The mean longitudinal creepage may follow from a prescribed bearing torque.
     local_friction : bool
         Friction may be given per strip.
     friction_field : bool
-        Friction may differ from point to point within the contact, and be carried through it.
+        Friction may be given per point within the contact, fixed to the contact or to a body.
     pass_loop : bool
         `pass_loop` runs the per-pass loop in compiled code.
     fields : bool
-        `fields` gives the inside of a contact.
+        `fields` returns pressure, traction and slip within a contact.
     """
 
     wear_compliance: bool = False
@@ -44,58 +41,61 @@ class Capabilities:
     fields: bool = False
 
     def names(self) -> list[str]:
-        """Return the names of what the model can take."""
+        """Return the names of the capabilities that the model has."""
         return [name for name, able in vars(self).items() if able]
 
 
 @dataclass
 class PassLoop:
-    """A run of roller passes in compiled code; arrays marked *state* are changed in place.
+    """Arguments of a compiled loop over roller passes; arrays marked *state* are updated in place.
 
-    The physical rollers take turns, one pass each. Pass p of contact g meets the gap
-    ``nominal_gap[g] + tilt[p] * from_apex[g]`` and the worn depths; its creepage varies by
-    ``slip_base[g] - spin[p] * spin_arm[g]`` and what worn depth adds. It wears ``wear[0] * w`` off
-    the cylinder and ``wear[1 + g] * w`` off the roller, w(y) being the dissipation P_l over V.
+    The physical rollers pass in turn. In pass p, contact g has the gap
+    ``nominal_gap[g] + tilt[p] * from_apex[g]`` plus the worn depths; its longitudinal creepage
+    varies by ``slip_base[g] - spin[p] * spin_arm[g]`` plus the contribution of the worn depths.
+    The pass wears the depth ``wear[0] * w`` off the cylinder and ``wear[1 + g] * w`` off the
+    roller, where w(y) = P_l(y) / V.
 
     Parameters
     ----------
     order : ndarray of int, shape (physical rollers,)
-        Which contact each physical roller is.
+        Index of the contact of each physical roller.
     first_pass : int
         Number of the first pass, counted from the start of the test.
     base_load : ndarray, shape (passes,)
-        Load before feedback at each pass [N].
+        Load of each pass before feedback [N].
     creepage : ndarray, shape (passes, 2)
-        Mean longitudinal, and lateral creepage.
+        Mean longitudinal creepage and lateral creepage.
     friction, tilt, spin : ndarray, shape (passes,)
-        Friction coefficient, tilt that moves the contact [rad], and spin [1/m].
+        Friction coefficient, tilt of the roller that shifts the contact [rad], spin [1/m].
     stiffness : float
-        Load lost per descent of a roller [N/m].
+        Load lost per displacement of a roller towards the cylinder [N/m].
     nominal_gap, from_apex : ndarray, shape (contacts, strips)
-        Gap before wear, and distance from the roller's apex [m].
+        Gap before wear and axial distance from the roller's apex [m].
     longitudinal_curvature, rolling_speed : float
-        Relative curvature along rolling [1/m], V [m/s].
+        Relative curvature along rolling [1/m], rolling velocity V [m/s].
     slip_base, spin_arm : ndarray, shape (contacts, strips)
-        Variation of the longitudinal creepage on unworn bodies; its fall per spin [m].
+        Variation of the longitudinal creepage on unworn bodies; its decrease per spin [m].
     slip_rates : ndarray, shape (2,)
-        What worn depth of the roller adds to it, and of the cylinder takes off it [1/m].
+        Increase of that variation per worn depth of the roller, and its decrease per worn depth
+        of the cylinder [1/m].
     wear : ndarray, shape (1 + contacts,)
-        Depth per pass and w: the cylinder's, then each roller's [m/(N/m)].
+        Worn depth per pass and per w, of the cylinder and then of each roller [m/(N/m)].
     term_rates : ndarray, shape (terms, 1 + contacts)
-        Gain of each load term [N/W], and the part of the way to rest that a pass goes.
+        Gain of each load term [N/W], then the fraction of the distance to its equilibrium that it
+        covers in one pass of each contact.
     similar : bool
-        Whether one pass of a contact is much like the one before, so that it can be followed.
+        Whether consecutive passes of a contact differ little, so that a factorisation is reused.
     terms : ndarray, shape (terms, contacts)
-        *State*: the load terms [N].
+        *State*: load terms [N].
     cylinder_depth, roller_depth : ndarray, shape (strips,) and (contacts, strips)
         *State*: worn depths [m].
     line_load, anchor, anchor_gap : ndarray, shape (contacts, strips)
-        *State*: line load after the last pass; line load [N/m] and gap [m] where the factorisation
-        in use was made, zero where there is none.
+        *State*: line load after the last pass; line load [N/m] and gap [m] at which the current
+        factorisation was computed, zero if there is none.
     approach, anchor_approach : ndarray, shape (contacts,)
-        *State*: approach after the last pass, and where the factorisation was made [m].
+        *State*: approach after the last pass, and at the current factorisation [m].
     energy : ndarray, shape (contacts,)
-        *State*: sum over the passes of the dissipated power [W].
+        *State*: dissipated power summed over the passes [W].
     """
 
     order: IntArray

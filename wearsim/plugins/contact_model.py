@@ -1,4 +1,4 @@
-"""The protocol of contact models."""
+"""Base class of contact models."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ from wearsim.types import (
 
 
 class ContactModel(ABC):
-    """Turns a gap profile and an operating point into strips.
+    """Solver of the contact of two bodies for a gap profile and an operating point.
 
     Body 1 is the cylinder, body 2 the roller. The undeformed gap at (x, y) is
     ``longitudinal_curvature * x**2 / 2 + gap(y)``; x points along rolling, so that the leading edge
-    of a strip lies at x = +a(y). Tractions act on body 1, whose rigid slip per unit of rolling
-    velocity is ``(xi - phi y, eta + phi x)``. Hence P = -V (xi F_x + eta F_y + phi M_z), and both
-    sides are positive.
+    of a strip is at x = +a(y). Tractions act on body 1, whose rigid slip per unit of rolling
+    velocity is ``(xi - phi y, eta + phi x)``. Hence P = -V (xi F_x + eta F_y + phi M_z), which is
+    not negative.
     """
 
     capabilities = Capabilities()
 
     @abstractmethod
     def prepare(self, grid: Grid, materials: tuple[Material, Material]) -> None:
-        """Take the strips and the two bodies' materials; called once, before any `solve`."""
+        """Set the strips and the materials of both bodies; called once, before any `solve`."""
 
     @abstractmethod
     def solve(
@@ -57,10 +57,10 @@ class ContactModel(ABC):
         point : OperatingPoint
             Load, velocity, creepage and friction.
         wear_compliance : ndarray, shape (strips,), optional
-            Gap that opens per unit of line load while the contact carries it [m/(N/m)]: the gap
-            in contact is ``gap + wear_compliance * q``.
+            Gap that wear opens per unit of line load q [m/(N/m)]: the contact is solved on the
+            gap ``gap + wear_compliance * q``.
         warm : ContactSolution, optional
-            A solution nearby to start from.
+            Solution of a similar contact, as the initial guess.
 
         Returns
         -------
@@ -69,10 +69,10 @@ class ContactModel(ABC):
         Raises
         ------
         ContactError
-            If contact is lost or reaches beyond the strips, the solver does not converge or a
+            If contact is lost or extends beyond the strips, the solver does not converge or a
             value is not finite.
         CapabilityError
-            If something is asked that `capabilities` do not claim.
+            If the arguments require a capability that the model does not have.
         """
 
     def solve_coupled(
@@ -83,7 +83,7 @@ class ContactModel(ABC):
         wear: SharedWear,
         warm: Sequence[ContactSolution] | None = None,
     ) -> Sequence[ContactSolution]:
-        """Solve several contacts that wear bodies they share, by what they carry in the end.
+        """Solve several contacts that wear common bodies in proportion to their line loads.
 
         Parameters
         ----------
@@ -94,9 +94,9 @@ class ContactModel(ABC):
         points : sequence of OperatingPoint
             One per contact.
         wear : SharedWear
-            Who wears which body, and how much per unit of line load.
+            Bodies of each contact, and their wear per unit of line load.
         warm : sequence of ContactSolution, optional
-            Solutions nearby to start from.
+            Solutions of similar contacts, as the initial guess.
 
         Returns
         -------
@@ -109,14 +109,21 @@ class ContactModel(ABC):
         CapabilityError
             If there are several contacts and the model solves one at a time.
         """
-        if len(points) == 1:
-            first = warm[0] if warm is not None else None
-            own = wear.total[0]
-            return [self.solve(gap[0], longitudinal_curvature, points[0], own, first)]
-        raise CapabilityError(
-            f"{type(self).__name__} solves one contact at a time, and rollers that differ share the"
-            " cylinder's wear; use evolution.stepper = 'stabilised' or 'per-pass'"
-        )
+        if len(points) != 1:
+            raise CapabilityError(
+                f"{type(self).__name__} solves one contact at a time, and rollers that differ are"
+                " coupled by the wear of the cylinder; use evolution.stepper = 'stabilised' or"
+                " 'per-pass'"
+            )
+        return [
+            self.solve(
+                gap[0],
+                longitudinal_curvature,
+                points[0],
+                wear.total[0],
+                None if warm is None else warm[0],
+            )
+        ]
 
     def solve_coupled_batch(
         self,
@@ -126,7 +133,7 @@ class ContactModel(ABC):
         wear: SharedWear,
         warm: Sequence[ContactSolution] | None = None,
     ) -> Sequence[ContactSolution]:
-        """Solve many sets of contacts as `solve_coupled` does one; by default one after another.
+        """Solve many sets of contacts as by `solve_coupled`; by default one set after another.
 
         Parameters
         ----------
@@ -135,11 +142,11 @@ class ContactModel(ABC):
         longitudinal_curvature : float
             Relative curvature along rolling [1/m].
         points : sequence of OperatingPoint
-            One per contact, set by set.
+            One per contact, set after set.
         wear : SharedWear
-            Its compliance has the axis of the sets first.
+            As in `solve_coupled`, with a compliance of shape (sets, contacts, 2, strips).
         warm : sequence of ContactSolution, optional
-            Solutions nearby, in the order of `points`.
+            Initial guess, in the order of `points`.
 
         Returns
         -------
@@ -151,14 +158,14 @@ class ContactModel(ABC):
         ContactError, CapabilityError
             As `solve_coupled`, of the first set that fails.
         """
-        found: list[ContactSolution] = []
+        solutions: list[ContactSolution] = []
         for k, gaps in enumerate(gap):
             own = slice(k * len(gaps), (k + 1) * len(gaps))
             start = None if warm is None else warm[own]
-            found += self.solve_coupled(
+            solutions += self.solve_coupled(
                 gaps, longitudinal_curvature, points[own], wear.at(k), start
             )
-        return found
+        return solutions
 
     def solve_batch(
         self,
@@ -173,16 +180,16 @@ class ContactModel(ABC):
         Parameters
         ----------
         gap : ndarray, shape (stations, rollers, realisations, strips)
-            Gap of each contact [m]; an axis along which all are the same may have stride 0.
+            Gap of each contact [m]; an axis along which the gaps are equal may have stride 0.
         longitudinal_curvature : float
             Relative curvature along rolling [1/m].
         points : sequence of OperatingPoint
-            One per contact, in the order of `gap` with its last leading axis fastest. For thousands
-            of contacts, `OperatingPoints` holds them as columns.
+            One per contact, in the order of `gap`, realisations fastest. `OperatingPoints` stores
+            thousands of them as columns.
         wear_compliance : ndarray, shape as `gap`, optional
             As in `solve`.
         warm : sequence of ContactSolution, optional
-            Solutions nearby, in the order of `points`.
+            Initial guess, in the order of `points`.
 
         Returns
         -------
@@ -191,7 +198,7 @@ class ContactModel(ABC):
         Raises
         ------
         ContactError
-            As `solve`, of the first contact that fails; it names the contact.
+            As `solve`, of the first contact that fails, with its position in the batch.
         """
         shape = gap.shape[:-1]
         if len(points) != int(np.prod(shape)):
@@ -200,41 +207,46 @@ class ContactModel(ABC):
         compliances = None if wear_compliance is None else wear_compliance.reshape(gaps.shape)
         solutions = []
         for k in range(len(gaps)):
-            compliance = None if compliances is None else compliances[k]
-            start = None if warm is None else warm[k]
             try:
-                found = self.solve(gaps[k], longitudinal_curvature, points[k], compliance, start)
+                solutions.append(
+                    self.solve(
+                        gaps[k],
+                        longitudinal_curvature,
+                        points[k],
+                        None if compliances is None else compliances[k],
+                        None if warm is None else warm[k],
+                    )
+                )
             except ContactError as error:
                 raise naming_contact(error, k, shape) from error
-            solutions.append(found)
         return BatchSolution.of(shape, solutions)
 
     def friction_points(
         self, gap: FloatArray, longitudinal_curvature: float, point: OperatingPoint
     ) -> tuple[FloatArray, FloatArray]:
-        """Return where friction is asked for; only where `capabilities.friction_field`.
+        """Return the points at which friction must be given; requires `friction_field`.
 
         Parameters
         ----------
         gap, longitudinal_curvature, point
-            As in `solve`; the friction of `point` counts for nothing yet.
+            As in `solve`; the friction of `point` is not used.
 
         Returns
         -------
         x : ndarray, shape (points, strips)
-            Position along rolling, from the leading edge on [m]; 0 outside the contact.
+            Position along rolling, starting at the leading edge [m]; 0 outside the contact.
         y : ndarray, shape (strips,)
             Axial position [m].
         """
         raise CapabilityError(
-            f"{type(self).__name__} takes no friction that differs from point to point; use"
-            " contact.model = 'hertz-fastsim'"
+            f"{type(self).__name__} does not support friction that varies from point to point;"
+            " use contact.model = 'hertz-fastsim'"
         )
 
     def friction_points_batch(
         self, gap: FloatArray, longitudinal_curvature: float, points: Sequence[OperatingPoint]
     ) -> tuple[FloatArray, FloatArray]:
-        """Return `friction_points` of every contact of a batch, by default one after another.
+        """Return `friction_points` of all contacts of a batch; by default one after another.
 
         Parameters
         ----------
@@ -244,16 +256,16 @@ class ContactModel(ABC):
         Returns
         -------
         x : ndarray, shape (contacts, points, strips)
-            As of `friction_points`.
+            As in `friction_points`.
         y : ndarray, shape (strips,)
             Axial position [m].
         """
         gaps = gap.reshape(-1, gap.shape[-1])
-        found = [
+        places = [
             self.friction_points(gaps[k], longitudinal_curvature, points[k])
             for k in range(len(gaps))
         ]
-        return np.array([x for x, _ in found]), found[0][1]
+        return np.array([x for x, _ in places]), places[0][1]
 
     def suggest_grid(
         self,
@@ -262,7 +274,7 @@ class ContactModel(ABC):
         normal_force: float,
         materials: tuple[Material, Material],
     ) -> Grid | None:
-        """Return the strips that suit one contact of a fresh profile centred on y = 0, if any.
+        """Return a grid for one contact of unworn bodies centred on y = 0, or None.
 
         `gap_curvature` is the relative curvature across the track [1/m].
         """
@@ -276,34 +288,72 @@ class ContactModel(ABC):
         point: OperatingPoint,
         points_along: int = 101,
     ) -> ContactFields:
-        """Return tractions and slip inside a solved contact; only where `capabilities.fields`."""
-        raise CapabilityError(f"{type(self).__name__} gives no fields inside the contact")
+        """Return pressure, traction and slip in a solved contact; requires `fields`."""
+        raise CapabilityError(f"{type(self).__name__} returns no fields inside the contact")
 
     def pass_loop(self, loop: PassLoop) -> int:
-        """Run roller passes in compiled code, where `capabilities.pass_loop`.
+        """Run roller passes in compiled code; requires `pass_loop`.
 
         Returns
         -------
         int
-            How many of the passes were solved in full, from no factorisation in use.
+            Number of passes solved in full, without an earlier factorisation.
         """
         raise CapabilityError(f"{type(self).__name__} has no compiled per-pass loop")
 
 
 def naming_contact(error: ContactError, number: int, shape: tuple[int, ...]) -> ContactError:
-    """Return an error that says which contact of a batch it befell.
+    """Return an error with the position of the contact in its batch.
 
     Parameters
     ----------
     error : ContactError
-        What went wrong.
+        The error of the contact.
     number : int
-        The contact, in the order of the batch.
+        Index of the contact in the batch.
     shape : tuple of int
-        The batch's leading axes, the last three of them station, contact and realisation.
+        Leading axes of the batch, the last three being station, contact and realisation.
     """
     place = [int(i) for i in np.unravel_index(number, shape)]
-    axes = ("station", "contact", "realisation")[-len(shape) :]
-    parts = [f"{axis} {i}" for axis, i, n in zip(axes, place, shape, strict=True) if n > 1]
+    axes = zip(("station", "contact", "realisation")[-len(shape) :], place, shape, strict=True)
+    parts = [f"{axis} {i}" for axis, i, length in axes if length > 1]
     text = f"{', '.join(parts)}: {error}" if parts else str(error)
     return ContactError(text, error.state | {"contact": place})
+
+
+def refuse_unclaimed(
+    model: ContactModel, point: OperatingPoint, wear_compliance: FloatArray | None = None
+) -> None:
+    """Raise an error if a problem requires a capability that a contact model does not have.
+
+    Parameters
+    ----------
+    model : ContactModel
+        The model, with its `capabilities`.
+    point : OperatingPoint
+        The operating point of the problem.
+    wear_compliance : ndarray, shape (strips,), optional
+        As in `ContactModel.solve`.
+
+    Raises
+    ------
+    CapabilityError
+        With the name of the missing capability.
+    """
+    rank = np.ndim(point.friction)
+    required = {
+        "wear_compliance": (wear_compliance is not None, "wear compliance"),
+        "creepage_variation": (
+            point.creepage.variation is not None,
+            "creepage that varies from strip to strip",
+        ),
+        "bearing_torque": (point.bearing_torque is not None, "bearing torque"),
+        "local_friction": (rank == 1, "friction that varies from strip to strip"),
+        "friction_field": (rank > 1, "friction that varies from point to point"),
+    }
+    for name, (needed, quantity) in required.items():
+        if needed and not getattr(model.capabilities, name):
+            raise CapabilityError(
+                f"{type(model).__name__} does not support {quantity}, since its capabilities do"
+                f" not include {name}; choose a contact.model that does"
+            )

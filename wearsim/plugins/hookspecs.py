@@ -1,6 +1,6 @@
-"""The hooks a plugin can implement, each with an example that works as it stands.
+"""Hooks that a plugin can implement, each with a complete example.
 
-docs/plugins.md has a longer example of each; ``wearsim.testing`` holds a plugin to its promises.
+docs/plugins.md has a longer example of each; ``wearsim.testing`` tests the requirements.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ class HookSpecs:
 
     @hookspec
     def wearsim_contact_models(self) -> Iterable[ContactModelSpec]:  # type: ignore[empty-body]
-        """Yield contact models, chosen in a scenario by ``contact.model``.
+        """Yield contact models, selected in a scenario by ``contact.model``.
 
-        What they keep is promised in `ContactModel`, and put to the test by
-        `wearsim.testing.contact_model_tests`; ``wearsim new plugin NAME`` writes one whole.
+        The requirements are documented in `ContactModel` and tested by
+        `wearsim.testing.contact_model_tests`; ``wearsim new plugin NAME`` writes a complete one.
 
         Returns
         -------
@@ -55,9 +55,9 @@ class HookSpecs:
 
     @hookspec
     def wearsim_wear_laws(self) -> Iterable[WearLawSpec]:  # type: ignore[empty-body]
-        """Yield wear laws, chosen in a scenario by ``wear.law``.
+        """Yield wear laws, selected in a scenario by ``wear.law``.
 
-        What they keep is promised in `WearLaw`, and put to the test by
+        The requirements are documented in `WearLaw` and tested by
         `wearsim.testing.wear_law_tests`.
 
         Returns
@@ -72,7 +72,7 @@ class HookSpecs:
 
 
             class PerPass(Options):
-                depth: float = 1e-12  # m, wherever the bodies slide
+                depth: float = 1e-12  # m, where the bodies slide
 
 
             class Constant(WearLaw):
@@ -89,15 +89,15 @@ class HookSpecs:
                     name="constant-depth",
                     factory=Constant,
                     options=PerPass,
-                    summary="the same depth at every pass",
+                    summary="the same depth in every pass",
                 )
         """
 
     @hookspec
     def wearsim_loads(self) -> Iterable[LoadSpec]:  # type: ignore[empty-body]
-        """Yield loads, chosen by ``load.kind``, and terms, added by a table ``[load.NAME]``.
+        """Yield loads, selected by ``load.kind``, and terms, added by a table ``[load.NAME]``.
 
-        What they keep is promised in `Load` and `LoadTerm`, and put to the test by
+        The requirements are documented in `Load` and `LoadTerm` and tested by
         `wearsim.testing.load_tests`.
 
         Returns
@@ -140,12 +140,12 @@ class HookSpecs:
 
     @hookspec
     def wearsim_random_inputs(self) -> Iterable[RandomInputSpec]:  # type: ignore[empty-body]
-        """Yield random inputs, chosen by ``distribution`` in the table that stands for a value.
+        """Yield random inputs, selected by ``distribution`` in the table that replaces a value.
 
-        Options that are measured like the value itself have the types `Value`, `PositiveValue`
-        and `Limit`: "300 N" for a load, a plain number for a coefficient. What they keep is
-        promised in `Distribution` and its like, and put to the test by
-        `wearsim.testing.random_input_tests`.
+        Options in the unit of the replaced value have the types `Value`, `PositiveValue` and
+        `Limit`: "300 N" for a load, a plain number for a coefficient. The requirements are
+        documented in `Distribution`, `JointDistribution`, `FrictionField` and `Process` and tested
+        by `wearsim.testing.random_input_tests`.
 
         Returns
         -------

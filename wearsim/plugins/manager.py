@@ -1,4 +1,4 @@
-"""Finds plugins through their entry points and keeps what they registered."""
+"""Registry of plugins, found through their entry points."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _HOOKS: dict[type[Spec], str] = {
 
 @dataclass(frozen=True)
 class Registered:
-    """A spec, and the distribution that brought it."""
+    """Spec with the name and version of its distribution."""
 
     spec: Spec
     distribution: str
@@ -36,7 +36,7 @@ class Registered:
 
 @dataclass(frozen=True)
 class Broken:
-    """A plugin that could not be loaded, with its own cause."""
+    """Plugin that could not be loaded, with the cause."""
 
     entry_point: str
     distribution: str
@@ -44,13 +44,8 @@ class Broken:
     cause: str
 
 
-def _origin(entry_point: EntryPoint) -> tuple[str, str]:
-    dist = entry_point.dist
-    return (dist.name, dist.version) if dist is not None else ("unknown distribution", "?")
-
-
 class Registry:
-    """Everything the plugins registered, by kind and name.
+    """All registered specs, by kind and name.
 
     Parameters
     ----------
@@ -60,7 +55,7 @@ class Registry:
     Raises
     ------
     PluginError
-        If two plugins share a name, or a hook is misspelt.
+        If two plugins register the same name, or a hook does not fit its specification.
     """
 
     def __init__(self, points: Iterable[EntryPoint]) -> None:
@@ -70,27 +65,29 @@ class Registry:
             self._load(point)
 
     def _load(self, point: EntryPoint) -> None:
-        name, version = _origin(point)
+        dist = point.dist
+        name, version = (dist.name, dist.version) if dist else ("unknown distribution", "?")
         manager = pluggy.PluginManager(PROJECT)
         manager.add_hookspecs(HookSpecs)
         try:
             manager.register(point.load(), name=point.name)
             manager.check_pending()
-            found = {
+            specs = {
                 kind: [spec for batch in getattr(manager.hook, hook)() for spec in batch]
                 for kind, hook in _HOOKS.items()
             }
         except pluggy.PluginValidationError as error:
             raise PluginError(
-                f"plugin '{point.name}' of {name} {version} does not fit the hooks: {error};"
+                f"plugin '{point.name}' of {name} {version} does not match the hooks: {error};"
                 f" the hooks are {', '.join(_HOOKS.values())}, without arguments"
             ) from error
-        except (Exception, SystemExit) as error:  # whatever it does, it must not take us along
-            cause = f"{type(error).__name__}: {error}"
-            self.broken.append(Broken(point.name, name, version, cause))
+        except (Exception, SystemExit) as error:  # scenarios without this plugin must work
+            self.broken.append(
+                Broken(point.name, name, version, f"{type(error).__name__}: {error}")
+            )
             return
-        for kind, specs in found.items():
-            for spec in specs:
+        for kind, yielded in specs.items():
+            for spec in yielded:
                 self._add(kind, Registered(spec, name, version))
 
     def _add(self, kind: type[Spec], item: Registered) -> None:
@@ -99,26 +96,20 @@ class Registry:
                 f"{item.distribution} {item.version}: hook {_HOOKS[kind]} yielded"
                 f" {item.spec!r}, expected a {kind.__name__}"
             )
-        known = self._specs[kind]
-        if item.spec.name in known:
-            other = known[item.spec.name]
+        other = self._specs[kind].setdefault(item.spec.name, item)
+        if other is not item:
             raise PluginError(
                 f"two plugins register a {kind.kind} named '{item.spec.name}':"
                 f" {other.distribution} {other.version} and {item.distribution} {item.version};"
                 " uninstall one of them"
             )
-        known[item.spec.name] = item
 
     def all(self) -> list[Registered]:
-        """Return everything registered, by kind and then by name."""
-        return [
-            items[name]
-            for items in (self._specs[kind] for kind in _HOOKS)
-            for name in sorted(items)
-        ]
+        """Return all registered specs, sorted by kind and then by name."""
+        return [item for items in self._specs.values() for _, item in sorted(items.items())]
 
     def names(self, kind: type[Spec]) -> list[str]:
-        """Return the names registered for `kind`."""
+        """Return the sorted names registered for `kind`."""
         return sorted(self._specs[kind])
 
     def get(self, kind: type[S], name: str) -> S:
@@ -127,33 +118,28 @@ class Registry:
         Raises
         ------
         PluginError
-            If there is none; broken plugins are named with their causes.
+            If there is none; the message includes broken plugins and their causes.
         """
         item = self._specs[kind].get(name)
-        if item is None or not isinstance(item.spec, kind):
-            raise PluginError(self._unknown(kind, name))
-        return item.spec
-
-    def registered(self, kind: type[Spec], name: str) -> Registered:
-        """Return the spec called `name` together with its distribution; raises as `get`."""
-        self.get(kind, name)
-        return self._specs[kind][name]
-
-    def _unknown(self, kind: type[Spec], name: str) -> str:
+        if item is not None and isinstance(item.spec, kind):
+            return item.spec
         known = self.names(kind)
         text = f"no {kind.kind} is named '{name}'; known: {', '.join(known) or 'none'}"
-        near = difflib.get_close_matches(name, known, n=1)
-        if near:
+        if near := difflib.get_close_matches(name, known, n=1):
             text += f"; did you mean '{near[0]}'?"
-        for item in self.broken:
+        for broken in self.broken:
             text += (
-                f"; plugin '{item.entry_point}' of {item.distribution} {item.version}"
-                f" failed to load ({item.cause})"
+                f"; plugin '{broken.entry_point}' of {broken.distribution} {broken.version}"
+                f" failed to load ({broken.cause})"
             )
-        return text
+        raise PluginError(text)
+
+    def registered(self, kind: type[Spec], name: str) -> Registered:
+        """Return the spec called `name` with its distribution; errors as in `get`."""
+        return self._specs[kind][self.get(kind, name).name]
 
 
 @cache
 def registry() -> Registry:
-    """Return the registry of the installed plugins, found once per process."""
+    """Return the registry of the installed plugins, built once per process."""
     return Registry(entry_points(group=PROJECT))

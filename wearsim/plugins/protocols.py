@@ -1,4 +1,4 @@
-"""What a contact model, a wear law, a load and a load term promise: written down once, and kept."""
+"""Base classes of wear laws, loads and load terms."""
 
 from __future__ import annotations
 
@@ -7,10 +7,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from wearsim.types import (
-    ContactSolution,
-    FloatArray,
-)
+from wearsim.types import ContactSolution, FloatArray
 
 Body: TypeAlias = Literal["cylinder", "roller"]
 
@@ -18,30 +15,30 @@ BODIES: tuple[Body, ...] = ("cylinder", "roller")
 
 
 class WearLaw(ABC):
-    """Turns the dissipation of one pass into worn depth."""
+    """Wear of both bodies as a function of a solved contact."""
 
     @abstractmethod
     def depth_per_pass(
         self, body: Body, solution: ContactSolution, rolling_speed: float
     ) -> FloatArray:
-        """Return the depth that one pass wears off `body`, shape (strips,) [m]."""
+        """Return the depth worn off `body` in one pass, shape (strips,) [m]."""
 
     def depth_per_dissipation(self, body: Body, rolling_speed: float) -> float | None:
-        """Return depth per pass over dissipation [m/(W/m)] where the law is linear, else None."""
+        """Return depth per pass over dissipation [m/(W/m)], or None if the law is not linear."""
         return None
 
 
 class Load(ABC):
-    """The load on a roller as a function of time, before any feedback.
+    """Load on a roller as a function of time, before any feedback.
 
-    `stiffness` [N/m] is what the load loses per unit of the roller's descent into worn material.
+    `stiffness` [N/m] is the decrease of the load per displacement of the roller into worn material.
     """
 
     stiffness: float = 0.0
 
     @property
     def span(self) -> tuple[float, float] | None:
-        """First and last time the load is known at [s], or None if at all times."""
+        """First and last time at which the load is known [s], or None if at all times."""
         return None
 
     @abstractmethod
@@ -53,7 +50,7 @@ class Load(ABC):
         """Return the exact mean of the load between two times [s] [N]."""
 
     def extremes(self, start: float, stop: float) -> tuple[float, float]:
-        """Return the least and greatest load between two times [s] [N]; by default sampled."""
+        """Return the minimum and maximum load between two times [s] [N]; by default sampled."""
         forces = self.force(np.linspace(start, stop, 10_001))
         return float(forces.min()), float(forces.max())
 
@@ -63,7 +60,7 @@ class Load(ABC):
 
 
 class LoadTerm(ABC):
-    """A term added to a load: one number of state per roller, its force [N], follows the power."""
+    """Term added to a load; its state is one force per roller [N] that follows the power."""
 
     @abstractmethod
     def advance(self, state: FloatArray, power: FloatArray, duration: float) -> FloatArray:
@@ -71,11 +68,11 @@ class LoadTerm(ABC):
 
     @abstractmethod
     def mean_force(self, state: FloatArray, power: FloatArray, duration: float) -> FloatArray:
-        """Return the term's mean over that time, shape (rollers,) [N]."""
+        """Return the mean of the term over `duration` [s], shape (rollers,) [N]."""
 
     def lag(self) -> tuple[float, float] | None:
         """Return gain [N/W] and time constant [s] if the term is a first-order lag, else None.
 
-        A first-order lag can follow the compiled per-pass loop; other terms fall back on Python.
+        The compiled per-pass loop supports first-order lags only; other terms need Python.
         """
         return None

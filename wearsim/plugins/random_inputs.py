@@ -1,4 +1,4 @@
-"""What a random input promises: a distribution, a joint one, a friction field or a process."""
+"""Base classes of random inputs: distributions, friction fields and processes."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from wearsim.types import FloatArray
 
 Frame: TypeAlias = Literal["contact", "cylinder", "roller"]
 
+#: uniform random numbers of one stream, by first index and count; reproducible by index
 Uniforms: TypeAlias = Callable[[int, int], FloatArray]
-"""Uniform numbers of one stream, by first index and count; each index has one value for ever."""
 
 
 class Distribution(ABC):
-    """A random number, given by its quantile function; values are in SI."""
+    """Distribution of a random number, given by its quantile function; values in SI units."""
 
     @abstractmethod
     def quantile(self, probability: FloatArray) -> FloatArray:
-        """Return the values below which a draw falls with these probabilities.
+        """Return the quantiles.
 
         Parameters
         ----------
         probability : ndarray
-            0 to 1; at 0 and 1 the ends of the support, which may be infinite.
+            0 to 1; the quantiles at 0 and 1 are the ends of the support, which may be infinite.
 
         Returns
         -------
@@ -36,7 +36,7 @@ class Distribution(ABC):
 
     @cached_property
     def support(self) -> tuple[float, float]:
-        """Least and greatest value."""
+        """Minimum and maximum."""
         low, high = self.quantile(np.array([0.0, 1.0]))
         return float(low), float(high)
 
@@ -52,31 +52,31 @@ class Distribution(ABC):
 
     @cached_property
     def _moments(self) -> tuple[float, float]:
-        # in normal scores, where the quantile function of any common law is smooth
+        # in normal scores, as functions of which common quantile functions are smooth
         from scipy.special import ndtr  # noqa: PLC0415  (slow to import, and rarely needed)
 
         scores, weights = np.polynomial.hermite_e.hermegauss(120)
-        # far out the weights are nothing, but an infinite end of the support would be felt
+        # the weights in the tails vanish, but an infinite end of the support would dominate
         values = self.quantile(np.clip(ndtr(scores), 2.0**-53, 1.0 - 2.0**-53))
-        weights = weights / weights.sum()
+        weights /= weights.sum()
         mean = float(np.dot(weights, values))
         return mean, float(np.sqrt(np.dot(weights, (values - mean) ** 2)))
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What a user should know before trusting it."""
+        """Warnings about the validity, for the user."""
         return ()
 
 
 class JointDistribution(ABC):
-    """Several random numbers that are drawn together, such as the two angles of a roller's slack.
+    """Joint distribution of several random numbers, such as the misalignment angles of a roller.
 
     Attributes
     ----------
     components : tuple of str
-        The keys of the scenario's table that it sets, ("yaw", "tilt").
+        Keys of the scenario's table that are set, such as ("yaw", "tilt").
     dimension : int
-        How many independent uniform numbers a draw takes.
+        Number of independent uniform random numbers per realisation.
     """
 
     components: tuple[str, ...] = ()
@@ -89,23 +89,23 @@ class JointDistribution(ABC):
     @property
     @abstractmethod
     def mean(self) -> tuple[float, ...]:
-        """Mean of every component."""
+        """Mean of each component."""
 
     @property
     @abstractmethod
     def reach(self) -> tuple[float, ...]:
-        """Greatest size of every component."""
+        """Maximum magnitude of each component."""
 
 
 class FrictionField(ABC):
-    """A friction coefficient that differs from place to place within one contact.
+    """Random field of the friction coefficient within one contact.
 
     Attributes
     ----------
     frame : {"contact", "cylinder", "roller"}
-        What the pattern is fixed to: it stays in the contact, or it rolls through with a body.
+        Frame in which the field is fixed: the contact, or a body that carries it through.
     marginal : Distribution
-        Distribution of the friction coefficient at any one point.
+        Distribution of the friction coefficient at a point.
     """
 
     frame: Frame = "contact"
@@ -118,11 +118,11 @@ class FrictionField(ABC):
         Parameters
         ----------
         x : ndarray, shape (points, strips)
-            Position along rolling, from the leading edge on [m].
+            Position along rolling, starting at the leading edge [m].
         y : ndarray, shape (strips,)
             Axial position [m].
         uniforms : callable
-            The realisation's own stream of uniform numbers.
+            Stream of uniform random numbers of the realisation.
 
         Returns
         -------
@@ -130,24 +130,24 @@ class FrictionField(ABC):
         """
 
     def unresolved(self, along: float, across: float) -> str | None:
-        """Return what is wrong with a grid of these spacings [m], or None where it resolves it."""
+        """Return why a grid of these spacings [m] does not resolve the field, or None."""
         return None
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What a user should know before trusting it."""
+        """Warnings about the validity, for the user."""
         return self.marginal.warnings
 
 
 class Process(ABC):
-    """A random number that changes with time, on a time grid of its own.
+    """Random process in time, linear between the points of an equally spaced time grid.
 
     Attributes
     ----------
     marginal : Distribution
-        Distribution at any one time.
+        Distribution at a point of the time grid.
     spacing : float
-        Step of its time grid [s]; between its points it is linear.
+        Spacing of the time grid [s].
     """
 
     marginal: Distribution
@@ -157,10 +157,10 @@ class Process(ABC):
     def path(self, points: int, uniforms: Uniforms) -> FloatArray:
         """Return one realisation at the times 0, spacing, 2 spacing, ..., shape (points,).
 
-        A longer path begins with the shorter one, bit for bit.
+        A longer path starts with the values of a shorter one, bit for bit.
         """
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What a user should know before trusting it."""
+        """Warnings about the validity, for the user."""
         return self.marginal.warnings

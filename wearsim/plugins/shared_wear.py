@@ -1,4 +1,4 @@
-"""How the contacts of an implicit step wear the bodies that they share."""
+"""Wear compliance of several contacts that wear common bodies in an implicit step."""
 
 from __future__ import annotations
 
@@ -14,49 +14,41 @@ NO_BODY = -1
 
 @dataclass(frozen=True)
 class SharedWear:
-    """The wear compliance of several contacts, body by body.
+    """Wear compliance of several contacts on the bodies that they have in common.
 
-    A contact touches two bodies, and whatever any contact wears off a body opens the gap of all
-    that touch it. Contact k meets the gap
+    Each contact touches two bodies, and the wear of a body opens the gaps of all contacts that
+    touch it. The gap of contact k is
 
         gap[k] + sum over its bodies b of sum_l compliance[l, side of b] * line_load[l],
 
-    the inner sum running over the contacts that touch b.
+    where the inner sum is over the contacts l that touch b.
 
     Parameters
     ----------
     bodies : ndarray of int, shape (contacts, 2)
-        Number of the cylinder's station, and of the roller, that each contact touches; either
-        column counts by itself.
+        Number of the cylinder's station and number of the roller of each contact; the columns are
+        numbered independently.
     compliance : ndarray, shape (contacts, 2, strips)
-        Depth that a contact wears off either body per unit of its line load [m/(N/m)]. One more
-        axis before these may count sets of contacts that share nothing with each other.
+        Depth that a contact wears off each of its bodies per unit of line load [m/(N/m)]. A
+        leading axis may count independent sets of such contacts.
     """
 
     bodies: IntArray
     compliance: FloatArray
 
-    @classmethod
-    def of_one(cls, compliance: FloatArray) -> SharedWear:
-        """Return the wear of a single contact that opens its gap by `compliance`, (strips,)."""
-        both = np.stack([compliance, np.zeros_like(compliance)])
-        return cls(np.zeros((1, 2), dtype=np.int64), both[None])
-
     def at(self, numbers: int | IntArray) -> SharedWear:
-        """Return the wear of one set of contacts, or of some."""
+        """Return the wear of one set of contacts, or of several sets."""
         return SharedWear(self.bodies, self.compliance[numbers])
 
     @property
     def total(self) -> FloatArray:
-        """Gap that a contact opens for itself per unit of its line load, (contacts, strips)."""
-        own: FloatArray = self.compliance.sum(axis=-2)
-        return own
+        """Gap that a contact opens for itself per unit of line load, (contacts, strips)."""
+        return np.asarray(self.compliance.sum(axis=-2))
 
     def opening(self, line_load: FloatArray) -> FloatArray:
-        """Return the gap that line loads, (contacts, strips), open at every contact [m]."""
+        """Return the gap that line loads, (contacts, strips), open at each contact [m]."""
         if len(self.bodies) == 1:
-            alone: FloatArray = (self.compliance * line_load[..., None, :]).sum(axis=-2)
-            return alone
+            return np.asarray((self.compliance * line_load[..., None, :]).sum(axis=-2))
         gap = np.zeros_like(line_load)
         for side in (0, 1):
             worn = self.compliance[..., side, :] * line_load
@@ -73,16 +65,16 @@ class SharedWear:
 
     @property
     def reduced(self) -> tuple[FloatArray, IntArray, FloatArray]:
-        """The same wear with as few shared bodies as there need be.
+        """Equivalent wear with the smallest number of shared bodies.
 
-        A body that one contact touches alone is a compliance of that contact's own; a cylinder and
-        a roller that the same contacts touch are one body; a body that does not wear is none.
+        A body touched by one contact only becomes a compliance of that contact; a cylinder and a
+        roller touched by the same contacts become one body; a body that does not wear is dropped.
 
         Returns
         -------
         own : ndarray, shape (contacts, strips)
         members : ndarray of int, shape (contacts, 2)
-            Number of each contact's shared bodies, counted over both columns, or -1.
+            Number of the shared bodies of each contact, counted over both columns, or -1.
         shared : ndarray, shape (contacts, 2, strips)
         """
         _, own, members, shared = self.groups[0]
@@ -90,13 +82,13 @@ class SharedWear:
 
     @cached_property
     def groups(self) -> list[tuple[IntArray, FloatArray, IntArray, FloatArray]]:
-        """The wear of many as `reduced` has it, in groups of those in which the same bodies wear.
+        """Reduced wear of several sets, grouped by the bodies that wear.
 
         Returns
         -------
         list of tuple
-            Numbers of those that a group holds, and `own`, `members` and `shared` of `reduced`,
-            of which `own` and `shared` have a first axis more.
+            Numbers of the sets of a group, and `own`, `members` and `shared` as in `reduced`,
+            with the sets as leading axis of `own` and `shared`.
         """
         bodies, contacts = self.bodies.tobytes(), len(self.bodies)
         wear = self.compliance.reshape(-1, *self.compliance.shape[-3:])
@@ -111,23 +103,25 @@ class SharedWear:
         groups = []
         for kind in sorted(set(kinds)):
             numbers = np.array([number for number, other in enumerate(kinds) if other == kind])
-            some = wear if len(numbers) == len(wear) else wear[numbers]
+            part = wear if len(numbers) == len(wear) else wear[numbers]
             members = _membership(bodies, contacts, kind)
             alone = (members == NO_BODY)[:, :, None]
-            own = np.where(alone, some, 0.0).sum(axis=2)
-            groups.append((numbers, own, members, np.where(alone, 0.0, some)))
+            own = np.where(alone, part, 0.0).sum(axis=2)
+            groups.append((numbers, own, members, np.where(alone, 0.0, part)))
         return groups
 
 
 @lru_cache(maxsize=64)
 def _merged(bodies: bytes, contacts: int) -> bool:
-    """Tell whether a cylinder and a roller that the same contacts touch are one body."""
-    return _same_groups(np.frombuffer(bodies, dtype=np.int64).reshape(contacts, 2))
+    """Return whether both columns of `bodies` group the contacts identically."""
+    pairs = np.frombuffer(bodies, dtype=np.int64).reshape(contacts, 2)
+    count = len(np.unique(pairs, axis=0))
+    return all(len(np.unique(pairs[:, side])) == count for side in (0, 1))
 
 
 @lru_cache(maxsize=64)
 def _membership(bodies: bytes, contacts: int, idle: tuple[bool, bool]) -> IntArray:
-    """Return which shared bodies each contact has.
+    """Return the numbers of the shared bodies of each contact, counted from 0 without gaps.
 
     Parameters
     ----------
@@ -136,7 +130,7 @@ def _membership(bodies: bytes, contacts: int, idle: tuple[bool, bool]) -> IntArr
     contacts : int
         Its length.
     idle : tuple of bool
-        Whether the bodies of either column do not wear.
+        Whether the bodies of each column do not wear.
     """
     members = np.frombuffer(bodies, dtype=np.int64).reshape(contacts, 2).copy()
     if _merged(bodies, contacts):
@@ -145,17 +139,7 @@ def _membership(bodies: bytes, contacts: int, idle: tuple[bool, bool]) -> IntArr
         numbers, place, count = np.unique(members[:, side], return_inverse=True, return_counts=True)
         members[(count == 1)[place] | (numbers[place] == NO_BODY), side] = NO_BODY
     members[:, 1] += (members[:, 0].max() + 1) * (members[:, 1] != NO_BODY)
-    return _counted(np.where(idle, NO_BODY, members))
-
-
-def _counted(members: IntArray) -> IntArray:
-    """Return the numbers of bodies counted from 0 without gaps."""
-    counted, kept = members.copy(), members != NO_BODY
-    counted[kept] = np.unique(members[kept], return_inverse=True)[1]
-    return counted
-
-
-def _same_groups(members: IntArray) -> bool:
-    """Tell whether both columns sort the contacts into the same groups."""
-    pairs = len(np.unique(members, axis=0))
-    return all(len(np.unique(members[:, side])) == pairs for side in (0, 1))
+    members[:, list(idle)] = NO_BODY
+    shared = members != NO_BODY
+    members[shared] = np.unique(members[shared], return_inverse=True)[1]
+    return members

@@ -1,4 +1,4 @@
-"""What a plugin's hook yields: a name, how to build the thing, and what can be said of it."""
+"""Specs that the hooks of a plugin yield: name, options, factory and description."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from wearsim.plugins.random_inputs import Distribution, FrictionField, JointDist
 
 
 class Options(BaseModel):
-    """Base of every options model: frozen, and strict about names."""
+    """Base class of options: frozen, and unknown keys are an error."""
 
     model_config = ConfigDict(
         extra="forbid", frozen=True, arbitrary_types_allowed=True, allow_inf_nan=False
@@ -24,14 +24,14 @@ class Options(BaseModel):
 
 @dataclass(frozen=True)
 class Spec:
-    """What all specs share.
+    """Base class of specs.
 
     Parameters
     ----------
     name : str
-        The name a scenario asks for.
+        Name used in a scenario.
     options : type of Options
-        The table's remaining keys, validated.
+        Model that validates the remaining keys of the table.
     summary : str
         One line for lists.
     references : tuple of str
@@ -46,13 +46,13 @@ class Spec:
     references: tuple[str, ...] = ()
 
     def describe(self) -> list[str]:
-        """Return the capabilities as words."""
+        """Return the capabilities or the role as words."""
         return []
 
 
 @dataclass(frozen=True)
 class ContactModelSpec(Spec):
-    """A contact model: `factory(options)` builds it."""
+    """Spec of a contact model, built by `factory(options)`."""
 
     kind: ClassVar[str] = "contact model"
 
@@ -60,13 +60,13 @@ class ContactModelSpec(Spec):
     capabilities: Capabilities = field(kw_only=True, default=Capabilities())
 
     def describe(self) -> list[str]:
-        """Return the capabilities as words."""
+        """Return the names of the capabilities."""
         return self.capabilities.names()
 
 
 @dataclass(frozen=True)
 class WearLawSpec(Spec):
-    """A wear law: `factory(options)` builds it."""
+    """Spec of a wear law, built by `factory(options)`."""
 
     kind: ClassVar[str] = "wear law"
 
@@ -75,7 +75,7 @@ class WearLawSpec(Spec):
 
 @dataclass(frozen=True)
 class LoadSpec(Spec):
-    """A load (`role = "base"`) or a term added to it (`role = "term"`): `factory(options)`."""
+    """Spec of a load (role "base") or of a term added to it (role "term")."""
 
     kind: ClassVar[str] = "load"
 
@@ -83,22 +83,22 @@ class LoadSpec(Spec):
     role: Literal["base", "term"] = "base"
 
     def describe(self) -> list[str]:
-        """Return the role as a word."""
+        """Return the role."""
         return [self.role]
 
 
 @dataclass(frozen=True)
 class RandomInputSpec(Spec):
-    """A random input, chosen by the key `distribution` of the table that stands for a value.
+    """Spec of a random input, selected by the key `distribution` of a table.
 
     Parameters
     ----------
     factory : callable
-        `factory(options)` builds a Distribution or, with ``role = "joint"``, a JointDistribution;
-        with ``role = "field"`` and ``role = "process"`` it is `factory(options, marginal)`, the
-        marginal Distribution being read from the sub-table `marginal`.
+        `factory(options)` returns a Distribution or, with ``role = "joint"``, a JointDistribution;
+        with ``role = "field"`` or ``role = "process"``, `factory(options, marginal)` returns a
+        FrictionField or a Process. The marginal Distribution is read from the table `marginal`.
     role : {"scalar", "joint", "field", "process"}
-        What it builds.
+        Kind of the object that the factory returns.
     """
 
     kind: ClassVar[str] = "random input"
@@ -109,5 +109,5 @@ class RandomInputSpec(Spec):
     role: Literal["scalar", "joint", "field", "process"] = "scalar"
 
     def describe(self) -> list[str]:
-        """Return the role as a word."""
+        """Return the role."""
         return [self.role]

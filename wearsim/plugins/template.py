@@ -1,14 +1,14 @@
-"""A new plugin, made from the one that comes with wearsim."""
+"""New plugins, written from the template that is part of wearsim."""
 
 from __future__ import annotations
 
 import ast
 import re
-from keyword import iskeyword
+from keyword import kwlist
 from pathlib import Path
 
 _PACKAGE = Path(__file__).parents[1]
-# an installed package holds it; in the source tree it stands beside it
+# an installed package contains the template; a source tree has it in the folder `plugins`
 _FOLDERS = (_PACKAGE / "plugin_template", _PACKAGE.parent / "plugins" / "wearsim-template")
 _LEFT_OUT = {"__pycache__", "build", "dist"}
 _WORD = re.compile("wearsim_template|winkler|Winkler")
@@ -16,17 +16,17 @@ NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 
 
 def template_folder() -> Path:
-    """Return where the template lies, installed or not."""
+    """Return the folder of the template, in an installed package or a source tree."""
     return next((folder for folder in _FOLDERS if folder.is_dir()), _FOLDERS[0])
 
 
 def renamed(text: str, name: str) -> str:
-    """Return a text of the template with its own names replaced.
+    """Return a text of the template with the names of a new plugin.
 
     Parameters
     ----------
     text : str
-        The content of a file, or a path.
+        Content of a file, or a path.
     name : str
         Name of the contact model, lower-case words joined by hyphens.
     """
@@ -38,12 +38,12 @@ def renamed(text: str, name: str) -> str:
         "winkler": name,
         "Winkler": camel,
     }
-    # in one go: the new name may hold a word of the template's, as in soft-winkler
-    return re.sub("|".join(new), lambda found: new[found[0]], text)
+    # in one pass: the new name may contain a word of the template, such as soft-winkler
+    return re.sub("|".join(new), lambda match: new[match[0]], text)
 
 
 def clash(name: str) -> str | None:
-    """Return an identifier that a new plugin would give a second meaning, or a word of Python's.
+    """Return an identifier of the new plugin that is already used or a keyword, or None.
 
     Parameters
     ----------
@@ -51,29 +51,31 @@ def clash(name: str) -> str | None:
         Name of the contact model, lower-case words joined by hyphens.
     """
     own = set().union(*(_identifiers(path) for path in _files() if path.suffix == ".py"))
-    made = {item: renamed(item, name) for item in own if _WORD.search(item)}
-    kept = own - set(made)
-    return next((new for new in sorted(made.values()) if new in kept or iskeyword(new)), None)
+    new = {item: renamed(item, name) for item in own if _WORD.search(item)}
+    taken = {*(own - set(new)), *kwlist}
+    return next((item for item in sorted(new.values()) if item in taken), None)
 
 
 def _identifiers(path: Path) -> set[str]:
-    """Return the names that a file defines, imports or uses, but for attributes."""
-    found = set()
+    """Return the names that a file defines, imports or uses, except attributes."""
+    names = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Name):
-            found.add(node.id)
-        elif isinstance(node, ast.arg):
-            found.add(node.arg)
-        elif isinstance(node, ast.ClassDef | ast.FunctionDef):
-            found.add(node.name)
-        elif isinstance(node, ast.Import | ast.ImportFrom):
-            found |= {alias.asname or alias.name for alias in node.names}
-            found |= {node.module or ""} if isinstance(node, ast.ImportFrom) else set()
-    return found
+        match node:
+            case (
+                ast.Name(id=name)
+                | ast.arg(arg=name)
+                | ast.ClassDef(name=name)
+                | ast.FunctionDef(name=name)
+            ):
+                names.add(name)
+            case ast.Import(names=aliases) | ast.ImportFrom(names=aliases):
+                names |= {alias.asname or alias.name for alias in aliases}
+                names.add(getattr(node, "module", None) or "")
+    return names
 
 
 def _files() -> list[Path]:
-    """Return the files of the template, but for what building and running leave behind."""
+    """Return the files of the template, without build results and caches."""
     source = template_folder()
     return [
         path
@@ -86,25 +88,25 @@ def _files() -> list[Path]:
 
 
 def write_plugin(name: str, directory: Path) -> list[Path]:
-    """Write a distribution with a contact model of its own into ``directory/wearsim-NAME``.
+    """Write a distribution with a new contact model into ``directory/wearsim-NAME``.
 
     Parameters
     ----------
     name : str
         Name of the contact model.
     directory : Path
-        Where its folder goes; made where it does not exist.
+        Parent folder of the distribution, created if it does not exist.
 
     Returns
     -------
     list of Path
-        The files.
+        The files written.
 
     Raises
     ------
     ValueError
-        If the name is not made of lower-case words joined by hyphens, or would give a name in
-        the plugin's code a second meaning.
+        If the name is not made of lower-case words joined by hyphens, or clashes with an
+        identifier in the code of the plugin.
     FileExistsError
         If the folder exists.
     """
@@ -113,19 +115,18 @@ def write_plugin(name: str, directory: Path) -> list[Path]:
             f"'{name}' cannot be the name of a contact model; expected lower-case words joined by"
             " hyphens, 'soft-layer', without 'wearsim', which is added"
         )
-    taken = clash(name)
-    if taken is not None:
+    if taken := clash(name):
         raise ValueError(
-            f"'{name}' cannot be the name of a contact model: its code would take the name {taken},"
-            f" which stands for something else there; add a word, 'my-{name}'"
+            f"'{name}' cannot be the name of a contact model: its code would define the name"
+            f" {taken}, which has another meaning there; add a word, 'my-{name}'"
         )
     source, target = template_folder(), directory / f"wearsim-{name}"
     if target.exists():
         raise FileExistsError(f"{target} exists")
     written = []
     for path in _files():
-        own = target / renamed(path.relative_to(source).as_posix(), name)
-        own.parent.mkdir(parents=True, exist_ok=True)
-        own.write_text(renamed(path.read_text(encoding="utf-8"), name), encoding="utf-8")
-        written.append(own)
+        copy = target / renamed(path.relative_to(source).as_posix(), name)
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        copy.write_text(renamed(path.read_text(encoding="utf-8"), name), encoding="utf-8")
+        written.append(copy)
     return written

@@ -61,6 +61,12 @@ def no_wear(count, n):
     return SharedWear(np.zeros((count, 2), dtype=np.int64), np.zeros((count, 2, n)))
 
 
+def wear_of_one(compliance):
+    """Return the wear of a single contact whose gap opens by `compliance`, (strips,)."""
+    both = np.stack([compliance, np.zeros_like(compliance)])
+    return SharedWear(np.zeros((1, 2), dtype=np.int64), both[None])
+
+
 def factors(line_load, spacing):
     """Return s of one contact's loaded strips: two sweeps over its curvature, without any table."""
     place = np.flatnonzero(line_load)
@@ -183,7 +189,7 @@ def test_that_random_rough_profiles_are_solved_to_the_equations(
     grid = Grid.spanning(-3e-3, 3e-3, strips)
     random = np.random.default_rng(seed)
     gap = (curvature * grid.y**2 + roughness * 1e-6 * random.random(strips))[None, :]
-    wear = SharedWear.of_one(compliance * random.random(strips))
+    wear = wear_of_one(compliance * random.random(strips))
     status, q, approach, _ = solve(grid, gap, load, wear)
     assert status in {CONVERGED, TOO_FINE}
     if status == CONVERGED:
@@ -253,7 +259,7 @@ RIDGES = {
 @pytest.mark.parametrize("ridge", RIDGES)
 def test_that_a_patch_splits_and_merges_from_warm_starts_as_from_cold_ones(ridge, compliance):
     grid = Grid.spanning(-3e-3, 3e-3, 81)
-    wear = SharedWear.of_one(np.full(81, compliance))
+    wear = wear_of_one(np.full(81, compliance))
     start, patches = None, []
     for depth in (0.0, 1.0, 3.0, 8.0, 12.0, 5.0, 1.5, 0.0):
         gap = (grid.y**2 + depth * 1e-6 * RIDGES[ridge](grid.y))[None, :]

@@ -1,4 +1,4 @@
-"""What a model is asked and does not claim is refused in a line, by the name of the capability."""
+"""`refuse_unclaimed`: a missing capability is an error with its name."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from wearsim.types import Creepage, OperatingPoint
 
 POINT = OperatingPoint(300.0, 2.6, Creepage(1e-3), 0.1)
 EVEN = np.full(5, 0.1)
-ASKED = {
+PROBLEMS = {
     "wear_compliance": (POINT, EVEN),
     "creepage_variation": (replace(POINT, creepage=Creepage(1e-3, variation=EVEN)), None),
     "bearing_torque": (replace(POINT, bearing_torque=0.0, rolling_radius=EVEN), None),
@@ -23,25 +23,26 @@ ASKED = {
 
 
 class Sponge:
-    """A model as far as it matters here."""
+    """A contact model reduced to its capabilities."""
 
     def __init__(self, **claims):
         self.capabilities = Capabilities(**claims)
 
 
-@pytest.mark.parametrize("name", ASKED)
-def test_that_what_is_not_claimed_is_refused_by_name(name):
-    with pytest.raises(CapabilityError, match=rf"^Sponge takes no .* say \({name}\); choose"):
-        refuse_unclaimed(Sponge(), *ASKED[name])
-    others = {other: True for other in ASKED if other != name}
+@pytest.mark.parametrize("name", PROBLEMS)
+def test_missing_capability_is_refused_by_name(name):
+    message = rf"^Sponge does not support .* include {name}; choose"
+    with pytest.raises(CapabilityError, match=message):
+        refuse_unclaimed(Sponge(), *PROBLEMS[name])
+    others = {other: True for other in PROBLEMS if other != name}
     with pytest.raises(CapabilityError, match=name):
-        refuse_unclaimed(Sponge(**others), *ASKED[name])
+        refuse_unclaimed(Sponge(**others), *PROBLEMS[name])
 
 
-@pytest.mark.parametrize("name", ASKED)
-def test_that_what_is_claimed_is_let_through(name):
-    refuse_unclaimed(Sponge(**{name: True}), *ASKED[name])
+@pytest.mark.parametrize("name", PROBLEMS)
+def test_claimed_capability_is_accepted(name):
+    refuse_unclaimed(Sponge(**{name: True}), *PROBLEMS[name])
 
 
-def test_that_a_plain_question_needs_no_claim():
+def test_plain_problem_needs_no_capability():
     refuse_unclaimed(Sponge(), POINT)
