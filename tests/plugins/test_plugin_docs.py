@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import re
 import sys
+import tomllib
 from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 import pytest
 from plugin_examples import HOOKS, Point, rig
+from typer.testing import CliRunner
 
 import wearsim
+from wearsim.cli.app import app as cli_app
 from wearsim.errors import CapabilityError
 from wearsim.plugins import (
     Capabilities,
@@ -23,12 +26,12 @@ from wearsim.plugins import (
     registry,
 )
 from wearsim.testing import loads, random_inputs
-from wearsim.testing.contact_bench import ContactBench
+from wearsim.testing.contact_fixtures import ContactFixture
 from wearsim.testing.kit import CONTACT_MODEL
-from wearsim.testing.loads import LoadBench
-from wearsim.testing.random_bench import RandomBench
-from wearsim.testing.specs import Chosen
-from wearsim.testing.wear_laws import WEAR_LAW, WearLawBench
+from wearsim.testing.loads import LoadFixture
+from wearsim.testing.random_inputs import RandomInputFixture
+from wearsim.testing.specs import ConfiguredSpec
+from wearsim.testing.wear_laws import WEAR_LAW, WearLawFixture
 from wearsim.units import ANGLE, FORCE
 
 PAGE = (Path(__file__).parents[2] / "docs" / "plugins.md").read_text(encoding="utf-8")
@@ -77,13 +80,13 @@ def test_that_every_hook_is_documented_and_tested(hook):
     assert f"@hookimpl\ndef {hook}():" in code
     assert f'documented("{hook}")' in Path(__file__).read_text(), f"no test here runs {hook}"
     assert hook in HOOKS
-    assert f"| `{hook}` |" in section("How it is found")
+    assert f"| `{hook}` |" in section("How plugins are found")
 
 
 def test_that_the_documented_contact_model_keeps_its_promises_and_runs(documented):
     tables = documented("wearsim_contact_models")
     spec = registry().get(ContactModelSpec, "plastic")
-    keeps(CONTACT_MODEL, ContactBench(Chosen(spec)))
+    keeps(CONTACT_MODEL, ContactFixture(ConfiguredSpec(spec)))
     scenario = rig(**tables)
     assert scenario.contact.options.hardness == 1.2e9
     solution = wearsim.solve_contact(scenario)
@@ -99,7 +102,7 @@ def test_that_the_documented_contact_model_keeps_its_promises_and_runs(documente
 def test_that_the_documented_wear_law_keeps_its_promises_and_runs(documented, stepper):
     tables = documented("wearsim_wear_laws")
     spec = registry().get(WearLawSpec, "threshold")
-    keeps(WEAR_LAW, WearLawBench(Chosen(spec, {"k_over_h": "1.1e-11 1/Pa"})))
+    keeps(WEAR_LAW, WearLawFixture(ConfiguredSpec(spec, {"k_over_h": "1.1e-11 1/Pa"})))
     changes = {"evolution.stepper": stepper, "operation.duration": "12 s"}
     result = wearsim.run(rig(changes, **tables))
     free = wearsim.run(rig(changes | {"wear.threshold": "0 J/m^2"}, **tables))
@@ -112,8 +115,13 @@ def test_that_the_documented_loads_keep_their_promises_and_run(documented, stepp
     tables = documented("wearsim_loads")
     wave = {"normal_force": "300 N", "amplitude": "20 N", "period": "90 s"}
     warmth = {"time_constant": "1 min"}
-    keeps(loads.BY_ROLE["base"], LoadBench(Chosen(registry().get(LoadSpec, "wave"), wave)))
-    keeps(loads.BY_ROLE["term"], LoadBench(Chosen(registry().get(LoadSpec, "warmth"), warmth)))
+    keeps(
+        loads.BY_ROLE["base"], LoadFixture(ConfiguredSpec(registry().get(LoadSpec, "wave"), wave))
+    )
+    keeps(
+        loads.BY_ROLE["term"],
+        LoadFixture(ConfiguredSpec(registry().get(LoadSpec, "warmth"), warmth)),
+    )
     result = wearsim.run(rig({"evolution.stepper": stepper}, **tables))
     # a time constant and more under some 0.08 W at 50 N/W, beside a wave of 20 N
     wave_now = 20.0 * np.sin(2.0 * np.pi * 120.0 / 90.0)
@@ -125,17 +133,17 @@ def test_that_the_documented_random_inputs_keep_their_promises_and_run(documente
     tables = documented("wearsim_random_inputs")
 
     def chosen(name, raw, kind=None):
-        return Chosen(registry().get(RandomInputSpec, name), raw, kind)
+        return ConfiguredSpec(registry().get(RandomInputSpec, name), raw, kind)
 
     triangle = chosen("triangle", {"mode": "300 N", "width": "30 N"}, FORCE)
-    keeps(random_inputs.BY_ROLE["scalar"], RandomBench(triangle))
+    keeps(random_inputs.BY_ROLE["scalar"], RandomInputFixture(triangle))
     assert triangle.spec.factory(triangle.options).std == pytest.approx(30.0 / 6**0.5, rel=1e-4)
     slack = chosen("slack", {"yaw": "1 mrad", "tilt": "0.5 mrad"}, ANGLE)
-    keeps(random_inputs.BY_ROLE["joint"], RandomBench(slack))
+    keeps(random_inputs.BY_ROLE["joint"], RandomInputFixture(slack))
     friction = chosen("triangle", {"mode": 0.1, "width": 0.02})
-    stripes = RandomBench(chosen("stripes", {}), friction)
+    stripes = RandomInputFixture(chosen("stripes", {}), friction)
     keeps(random_inputs.BY_ROLE["field"], stripes)
-    steady = RandomBench(chosen("steady", {"spacing": "10 s"}), friction)
+    steady = RandomInputFixture(chosen("steady", {"spacing": "10 s"}), friction)
     keeps(random_inputs.BY_ROLE["process"], steady)
     text = "".join(f"\n[{name}]\n{body}" for name, body in tables.items())
     scenario = rig_with(text)
@@ -153,24 +161,50 @@ def rig_with(tables: str):
 
 
 def test_that_every_capability_is_in_the_table():
-    text = PAGE[PAGE.index("### What a model can take besides") :]
+    text = PAGE[PAGE.index("### Optional capabilities") :]
     rows = re.findall(r"^\| `(\w+)` \|", text[: text.index("\n## ")], flags=re.MULTILINE)
     assert rows == list(vars(Capabilities()))
 
 
 def test_that_every_check_is_in_the_table():
-    rows = re.findall(r"^\| `([\w-]+)` \| (.*) \|$", section("Put it to the test"), re.MULTILINE)
-    assert rows == [(check.name, check.promise) for check in CONTACT_MODEL]
+    rows = re.findall(r"^\| `([\w-]+)` \| (.*) \|$", section("Conformance tests"), re.MULTILINE)
+    assert rows == [(check.name, check.requirement) for check in CONTACT_MODEL]
 
 
-@pytest.mark.parametrize("title", ["Options and units", "Put it to the test"])
+def test_documented_verb_runs(tmp_path, monkeypatch):
+    (code,), (toml,) = (blocks(section("Add a verb"), language) for language in ("python", "toml"))
+    project = tomllib.loads(toml)["project"]
+    ((group, points),) = project["entry-points"].items()
+    ((verb, value),) = points.items()
+    info = tmp_path / "wearsim_pressure-0.1.0.dist-info"
+    info.mkdir()
+    (info / "entry_points.txt").write_text(f"[{group}]\n{verb} = {value}\n")
+    (info / "METADATA").write_text(
+        f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n"
+        f"Summary: {project['description']}\n"
+    )
+    (tmp_path / "wearsim_pressure.py").write_text(code)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    Path("scenario.toml").write_text(rig().text)
+    (call,) = re.findall(r"^wearsim (.*)$", blocks(section("Add a verb"), "")[0], re.MULTILINE)
+    result = CliRunner().invoke(cli_app, call.split())
+    peak = wearsim.solve_contact(rig()).peak_pressure
+    assert result.exit_code == 0, result.output
+    assert result.stdout == f"{peak / 1e6:.1f} MPa\n"
+    assert re.search(
+        rf"{verb} +{project['description']}", CliRunner().invoke(cli_app, "--help").stdout
+    )
+
+
+@pytest.mark.parametrize("title", ["Options and units", "Conformance tests"])
 def test_that_the_other_examples_run(title):
     for code in blocks(section(title), "python"):
         exec(compile(code, "docs/plugins.md", "exec", dont_inherit=True), {})
 
 
 def test_that_the_message_on_the_page_is_what_the_kit_says():
-    (told,) = blocks(section("Put it to the test"), "")
+    (told,) = blocks(section("Conformance tests"), "")
     check = CONTACT_MODEL["strips-carry-the-load"]
     flat = " ".join(told.split())
-    assert flat.endswith(f"It breaks a promise: {check.promise} ({check.promised_in})")
+    assert flat.endswith(f"Violated requirement: {check.requirement} ({check.specified_in})")

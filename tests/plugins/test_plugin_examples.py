@@ -17,10 +17,10 @@ import wearsim
 from wearsim.errors import ScenarioError
 from wearsim.plugins import LoadSpec, RandomInputSpec, WearLawSpec, hookspecs, registry
 from wearsim.testing import loads, random_inputs
-from wearsim.testing.loads import LoadBench
-from wearsim.testing.random_bench import RandomBench
-from wearsim.testing.specs import Chosen
-from wearsim.testing.wear_laws import WEAR_LAW, WearLawBench
+from wearsim.testing.loads import LoadFixture
+from wearsim.testing.random_inputs import RandomInputFixture
+from wearsim.testing.specs import ConfiguredSpec
+from wearsim.testing.wear_laws import WEAR_LAW, WearLawFixture
 
 
 def example_of(hook: str) -> str:
@@ -118,13 +118,13 @@ def test_that_an_option_of_a_load_that_seldom_differs_is_seen_to_change_the_cont
 @pytest.mark.parametrize(
     ("hook", "kind", "name", "checks", "bench"),
     [
-        ("wearsim_wear_laws", WearLawSpec, "constant-depth", WEAR_LAW, WearLawBench),
-        ("wearsim_loads", LoadSpec, "ramp", loads.BY_ROLE["base"], LoadBench),
+        ("wearsim_wear_laws", WearLawSpec, "constant-depth", WEAR_LAW, WearLawFixture),
+        ("wearsim_loads", LoadSpec, "ramp", loads.BY_ROLE["base"], LoadFixture),
     ],
 )
 def test_that_the_examples_keep_their_promises(example, hook, kind, name, checks, bench):
     example(hook)
-    chosen = Chosen(registry().get(kind, name))
+    chosen = ConfiguredSpec(registry().get(kind, name))
     for check in checks:
         check(bench(chosen))
 
@@ -132,7 +132,7 @@ def test_that_the_examples_keep_their_promises(example, hook, kind, name, checks
 def test_that_the_example_of_a_random_input_runs(example):
     example("wearsim_random_inputs")
     spec = registry().get(RandomInputSpec, "flat")
-    bench = RandomBench(Chosen(spec, {"low": 2.0, "high": 4.0}))
+    bench = RandomInputFixture(ConfiguredSpec(spec, {"low": 2.0, "high": 4.0}))
     for check in random_inputs.BY_ROLE["scalar"]:
         check(bench)
     flat = bench.thing

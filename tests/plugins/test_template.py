@@ -15,9 +15,9 @@ from plugin_examples import Point, rig
 import wearsim
 from wearsim.plugins.template import clash, renamed, template_folder, write_plugin
 from wearsim.testing import contact_model_tests
-from wearsim.testing.contact_bench import ContactBench
+from wearsim.testing.contact_fixtures import ContactFixture
 from wearsim.testing.kit import CONTACT_MODEL
-from wearsim.testing.specs import Chosen
+from wearsim.testing.specs import ConfiguredSpec
 
 FOLDER = template_folder()
 MODULE = FOLDER / "src" / "wearsim_template" / "__init__.py"
@@ -134,7 +134,7 @@ def test_that_a_plugin_of_an_awkward_name_is_imported_and_solves(name, tmp_path,
     tests = tmp_path / f"wearsim-{name}" / "tests" / f"test_{under}.py"
     monkeypatch.setitem(sys.modules, made.__name__, made)
     assert f"test_{under}" in runpy.run_path(str(tests))
-    CONTACT_MODEL["strips-carry-the-load"](ContactBench(Chosen(yielded)))
+    CONTACT_MODEL["strips-carry-the-load"](ContactFixture(ConfiguredSpec(yielded)))
 
 
 def test_that_no_name_is_refused_that_only_words_of_a_docstring_have():

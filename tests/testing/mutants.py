@@ -1,4 +1,4 @@
-"""Contact models that break one promise each, made of a built-in one that keeps them all."""
+"""Contact models that each violate one requirement, derived from built-in models."""
 
 from __future__ import annotations
 
@@ -13,109 +13,109 @@ from wearsim.models.tangential.strip_theory import StripTheory
 from wearsim.plugins import ContactModelSpec, Options
 from wearsim.types import Creepage, Grid, OperatingPoint
 
-ANY = Creepage(1e-3)
+CREEPAGE = Creepage(1e-3)
 
 
-class Sound(Slender):
-    """The model that all but one of the mutants are made of."""
+class Unmodified(Slender):
+    """Base class of all mutants but two."""
 
     def __init__(self):
         super().__init__(StripTheory())
 
 
 def after(change):
-    """Return a model whose answers are changed by `change(solution, gap)`, a dict of fields."""
+    """Return a model whose solutions are changed by `change(solution, gap)`, a dict of fields."""
 
-    class Spoilt(Sound):
+    class ChangedSolution(Unmodified):
         def solve(self, gap, curvature, point, wear_compliance=None, warm=None):
-            found = super().solve(gap, curvature, point, wear_compliance, warm)
-            return replace(found, **change(found, gap))
+            solution = super().solve(gap, curvature, point, wear_compliance, warm)
+            return replace(solution, **change(solution, gap))
 
-    return Spoilt
+    return ChangedSolution
 
 
 def before(change):
-    """Return a model that answers another question: `change(gap, point, compliance)`."""
+    """Return a model that solves other inputs: `change(gap, point, compliance)`."""
 
-    class Misled(Sound):
+    class ChangedInput(Unmodified):
         def solve(self, gap, curvature, point, wear_compliance=None, warm=None):
             gap, point, wear_compliance = change(gap, point, wear_compliance)
             return super().solve(gap, curvature, point, wear_compliance, warm)
 
-    return Misled
+    return ChangedInput
 
 
-def without(capability, model=Sound):
-    """Return a model that does what it does not claim."""
+def without(capability, model=Unmodified):
+    """Return a model that does not claim a capability it has."""
 
-    class Modest(model):
+    class Unclaimed(model):
         capabilities = replace(model.capabilities, **{capability: False})
 
-    return Modest
+    return Unclaimed
 
 
-class Restless(Sound):
-    """Answers a little more every time."""
+class Drifting(Unmodified):
+    """Returns a slightly larger approach at every call."""
 
-    asked = 0
+    calls = 0
 
     def solve(self, *args, **kwargs):
-        self.asked += 1
-        found = super().solve(*args, **kwargs)
-        return replace(found, approach=found.approach * (1.0 + 1e-14 * self.asked))
+        self.calls += 1
+        solution = super().solve(*args, **kwargs)
+        return replace(solution, approach=solution.approach * (1.0 + 1e-14 * self.calls))
 
 
-class Buffered(Sound):
-    """Answers in arrays that it uses again."""
+class Buffered(Unmodified):
+    """Returns arrays that later calls overwrite."""
 
     def prepare(self, grid, materials):
         super().prepare(grid, materials)
         self.load = np.zeros(grid.strips)
 
     def solve(self, *args, **kwargs):
-        found = super().solve(*args, **kwargs)
-        self.load[:] = found.line_load
-        return replace(found, line_load=self.load)
+        solution = super().solve(*args, **kwargs)
+        self.load[:] = solution.line_load
+        return replace(solution, line_load=self.load)
 
 
-class Scribbling(Sound):
-    """Writes into the gap that it is given."""
+class ChangesInput(Unmodified):
+    """Changes the gap in place."""
 
     def solve(self, gap, *args, **kwargs):
         gap += 1e-9
         return super().solve(gap, *args, **kwargs)
 
 
-class Inert(Sound):
-    """Takes a part of its start for the answer."""
+class DependsOnWarmStart(Unmodified):
+    """Mixes the warm start into the solution."""
 
     def solve(self, gap, curvature, point, wear_compliance=None, warm=None):
-        found = super().solve(gap, curvature, point, wear_compliance, warm)
+        solution = super().solve(gap, curvature, point, wear_compliance, warm)
         if warm is None:
-            return found
-        return replace(found, line_load=0.99 * found.line_load + 0.01 * warm.line_load)
+            return solution
+        return replace(solution, line_load=0.99 * solution.line_load + 0.01 * warm.line_load)
 
 
-class Unflinching(Sound):
-    """Answers what has no answer with another contact."""
+class HidesErrors(Unmodified):
+    """Returns the solution of another contact instead of an error."""
 
     def solve(self, gap, curvature, point, *args, **kwargs):
         try:
             return super().solve(gap, curvature, point, *args, **kwargs)
         except ContactError:
-            return super().solve(self._grid.y**2, 90.0, OperatingPoint(300.0, 1.0, ANY, 0.1))
+            return super().solve(self._grid.y**2, 90.0, OperatingPoint(300.0, 1.0, CREEPAGE, 0.1))
 
 
-class Crashing(Sound):
-    """Divides by the load."""
+class WrongError(Unmodified):
+    """Raises ZeroDivisionError for a zero load."""
 
     def solve(self, gap, curvature, point, *args, **kwargs):
         1.0 / point.normal_force
         return super().solve(gap, curvature, point, *args, **kwargs)
 
 
-class Cutting(Sound):
-    """Cuts a contact that reaches beyond its strips short."""
+class Truncating(Unmodified):
+    """Truncates a contact that is wider than the strips."""
 
     def _check(self, status, gap, loads, line_load, approach):
         inside = line_load.copy()
@@ -123,17 +123,17 @@ class Cutting(Sound):
         super()._check(status, gap, loads, inside, approach)
 
 
-class Batched(Sound):
-    """Solves batches a little differently."""
+class WrongBatch(Unmodified):
+    """Returns a slightly different power in batches."""
 
     def solve_batch(self, *args, **kwargs):
-        found = super().solve_batch(*args, **kwargs)
-        columns = dict(found.columns) | {"power": 1.001 * found.columns["power"]}
-        return replace(found, columns=columns)
+        solution = super().solve_batch(*args, **kwargs)
+        columns = dict(solution.columns) | {"power": 1.001 * solution.columns["power"]}
+        return replace(solution, columns=columns)
 
 
-class Nameless(Sound):
-    """Does not say which contact of a batch failed."""
+class UnnamedBatchError(Unmodified):
+    """Does not name the failed contact of a batch."""
 
     def solve_batch(self, *args, **kwargs):
         try:
@@ -142,15 +142,15 @@ class Nameless(Sound):
             raise ContactError("a contact failed") from error
 
 
-class Narrow(Sound):
-    """Suggests strips that do not hold the contact."""
+class NarrowGrid(Unmodified):
+    """Suggests strips narrower than the contact."""
 
     def suggest_grid(self, *args):
         return Grid.spanning(-1e-4, 1e-4, 31)
 
 
-class Separate(Sound):
-    """Says that it couples contacts and solves each by itself."""
+class Uncoupled(Unmodified):
+    """Claims coupled contacts and solves them separately."""
 
     def solve_coupled(self, gap, curvature, points, wear, warm=None):
         if len(points) == 1:
@@ -158,8 +158,8 @@ class Separate(Sound):
         return [self.solve(gap[k], curvature, point) for k, point in enumerate(points)]
 
 
-class Weightless(Sound):
-    """Does not count all the energy of its passes."""
+class LosesEnergy(Unmodified):
+    """Returns 99 % of the dissipated energy."""
 
     def pass_loop(self, loop):
         solved = super().pass_loop(loop)
@@ -167,138 +167,146 @@ class Weightless(Sound):
         return solved
 
 
-class Idle(without("pass_loop", Sound)):
-    """Claims no loop, and runs none when asked."""
+class IgnoresLoop(without("pass_loop", Unmodified)):
+    """Claims no pass loop, and returns without an error."""
 
     def pass_loop(self, loop):
         return 0
 
 
-class Faded(Sound):
-    """Gives fields that do not add up."""
+class WeakTraction(Unmodified):
+    """Returns a traction that does not integrate to the force."""
 
     def fields(self, *args, **kwargs):
-        found = super().fields(*args, **kwargs)
-        return replace(found, traction_x=0.9 * found.traction_x)
+        solution = super().fields(*args, **kwargs)
+        return replace(solution, traction_x=0.9 * solution.traction_x)
 
 
-class Turned(Sound):
-    """Gives fields whose lateral traction points the wrong way."""
+class ReversedTraction(Unmodified):
+    """Returns a lateral traction of the wrong sign."""
 
     def fields(self, *args, **kwargs):
-        found = super().fields(*args, **kwargs)
-        return replace(found, traction_y=-found.traction_y)
+        solution = super().fields(*args, **kwargs)
+        return replace(solution, traction_y=-solution.traction_y)
 
 
-class Averaging(HertzFastsim):
-    """Says that it takes a field of friction and takes its mean."""
+class AveragesFriction(HertzFastsim):
+    """Claims a friction field and uses its mean."""
 
     def solve(self, gap, curvature, point, wear_compliance=None, warm=None):
         point = replace(point, friction=float(np.mean(point.friction)))
         return super().solve(gap, curvature, point, wear_compliance, warm)
 
 
-def _varied(gap, point, compliance):
+def _without_variation(gap, point, compliance):
     creepage = replace(point.creepage, variation=None)
     return gap, replace(point, creepage=creepage), compliance
 
 
-def _evened(gap, point, compliance):
+def _mean_friction(gap, point, compliance):
     return gap, replace(point, friction=float(np.mean(point.friction))), compliance
 
 
-def _crept(gap, point, compliance):
+def _extra_creepage(gap, point, compliance):
     creepage = point.creepage
     more = Creepage(creepage.longitudinal, creepage.lateral + 1e-6, creepage.spin)
     return gap, replace(point, creepage=more), compliance
 
 
-def _leaning(gap, point, compliance):
+def _inclined_gap(gap, point, compliance):
     return gap + np.linspace(0.0, 1e-8, len(gap)), point, compliance
 
 
 MUTANTS = {
-    "solution-is-whole-and-finite": [
-        after(lambda found, gap: {"power": np.nan}),
-        after(lambda found, gap: {"half_length": found.half_length[1:]}),
-        after(lambda found, gap: {"force_x": np.array([found.force_x])}),
+    "solution-is-complete-and-finite": [
+        after(lambda solution, gap: {"power": np.nan}),
+        after(lambda solution, gap: {"half_length": solution.half_length[1:]}),
+        after(lambda solution, gap: {"force_x": np.array([solution.force_x])}),
     ],
-    "strips-carry-the-load": [after(lambda found, gap: {"line_load": 1.01 * found.line_load})],
-    "nothing-outside-the-contact": [
-        after(lambda found, gap: {"dissipation": found.dissipation + 1e-12}),
-        after(lambda found, gap: {"dissipation": found.dissipation - 1e-12}),
+    "strips-carry-the-load": [
+        after(lambda solution, gap: {"line_load": 1.01 * solution.line_load})
     ],
-    "power-is-the-sum-over-the-strips": [
-        after(lambda found, gap: {"dissipation": 0.99 * found.dissipation})
+    "zero-outside-the-contact": [
+        after(lambda solution, gap: {"dissipation": solution.dissipation + 1e-12}),
+        after(lambda solution, gap: {"dissipation": solution.dissipation - 1e-12}),
     ],
-    "power-is-the-work-of-the-rigid-slip": [
+    "power-equals-strip-sum": [
+        after(lambda solution, gap: {"dissipation": 0.99 * solution.dissipation})
+    ],
+    "power-equals-rigid-slip-work": [
         after(
-            lambda found, gap: {
-                "dissipation": 0.99 * found.dissipation,
-                "power": 0.99 * found.power,
+            lambda solution, gap: {
+                "dissipation": 0.99 * solution.dissipation,
+                "power": 0.99 * solution.power,
             }
         )
     ],
-    "creepage-is-the-mean-that-was-asked": [
-        after(lambda found, gap: {"longitudinal_creepage": found.longitudinal_creepage + 1e-9})
+    "mean-creepage-is-preserved": [
+        after(
+            lambda solution, gap: {"longitudinal_creepage": solution.longitudinal_creepage + 1e-9}
+        )
     ],
-    "forces-obey-coulomb": [
+    "force-within-coulomb-bound": [
         before(lambda gap, point, c: (gap, replace(point, friction=1.1 * point.friction), c)),
     ],
-    "gross-sliding-leaves-no-adhesion": [
-        after(lambda found, gap: {"adhesion_fraction": -0.1}),
-        after(lambda found, gap: {"adhesion_fraction": 1.0 - found.adhesion_fraction}),
+    "no-adhesion-in-gross-sliding": [
+        after(lambda solution, gap: {"adhesion_fraction": -0.1}),
+        after(lambda solution, gap: {"adhesion_fraction": 1.0 - solution.adhesion_fraction}),
     ],
-    "peak-pressure-is-no-less-than-a-mean": [
-        after(lambda found, gap: {"peak_pressure": 0.5 * found.peak_pressure})
+    "peak-pressure-exceeds-strip-means": [
+        after(lambda solution, gap: {"peak_pressure": 0.5 * solution.peak_pressure})
     ],
-    "no-creepage-no-power": [before(_crept)],
-    "mirror-image-has-the-mirrored-answer": [before(_leaning)],
-    "zero-of-the-gap-is-arbitrary": [
-        after(lambda found, gap: {"approach": found.approach - gap.min()}),
-        after(lambda found, gap: {"approach": gap.min()}),
+    "no-power-without-creepage": [before(_extra_creepage)],
+    "mirror-symmetry": [before(_inclined_gap)],
+    "gap-offset-shifts-approach": [
+        after(lambda solution, gap: {"approach": solution.approach - gap.min()}),
+        after(lambda solution, gap: {"approach": gap.min()}),
     ],
     "approach-rises-with-load": [
-        after(lambda found, gap: {"approach": 1.0}),
-        after(lambda found, gap: {"peak_pressure": -found.peak_pressure}),
+        after(lambda solution, gap: {"approach": 1.0}),
+        after(lambda solution, gap: {"peak_pressure": -solution.peak_pressure}),
     ],
-    "answers-settle-as-strips-are-refined": [
-        after(lambda found, gap: {"peak_pressure": found.peak_pressure * len(gap)})
+    "convergence-with-strips": [
+        after(lambda solution, gap: {"peak_pressure": solution.peak_pressure * len(gap)})
     ],
-    "same-bits-twice": [Restless, Buffered],
-    "inputs-are-left-as-they-were": [Scribbling],
-    "warm-start-changes-nothing": [Inert],
-    "impossible-input-is-a-clean-error": [Unflinching, Crashing],
-    "contact-beyond-the-strips-is-a-clean-error": [Cutting],
-    "many-contacts-are-solved-as-each-alone": [Batched],
-    "batch-names-the-contact-that-fails": [Nameless],
-    "suggested-strips-hold-the-contact": [Narrow],
+    "repeated-solves-identical": [Drifting, Buffered],
+    "inputs-unchanged": [ChangesInput],
+    "result-independent-of-warm-start": [DependsOnWarmStart],
+    "invalid-input-raises-contact-error": [HidesErrors, WrongError],
+    "contact-wider-than-strips-raises": [Truncating],
+    "batch-equals-single-solves": [WrongBatch],
+    "batch-error-names-contact": [UnnamedBatchError],
+    "suggested-grid-holds-contact": [NarrowGrid],
     "wear-compliance": [
         without("wear_compliance"),
         before(lambda gap, point, c: (gap, point, None)),
     ],
-    "coupled": [without("coupled"), Separate],
-    "creepage-variation": [without("creepage_variation"), before(_varied)],
+    "coupled": [without("coupled"), Uncoupled],
+    "creepage-variation": [without("creepage_variation"), before(_without_variation)],
     "bearing-torque": [
         without("bearing_torque"),
         before(lambda gap, point, c: (gap, replace(point, bearing_torque=None), c)),
     ],
-    "local-friction": [without("local_friction"), before(_evened)],
-    "friction-field": [without("friction_field", HertzFastsim), Averaging],
+    "local-friction": [without("local_friction"), before(_mean_friction)],
+    "friction-field": [without("friction_field", HertzFastsim), AveragesFriction],
     "fields": [
         without("fields"),
-        Faded,
-        Turned,
-        after(lambda found, gap: {"peak_pressure": 2.0 * found.peak_pressure}),
+        WeakTraction,
+        ReversedTraction,
+        after(lambda solution, gap: {"peak_pressure": 2.0 * solution.peak_pressure}),
     ],
-    "pass-loop": [Idle, Weightless],
+    "pass-loop": [IgnoresLoop, LosesEnergy],
 }
 
 
 def spec_of(model, **changes):
-    """Return a spec that builds a mutant and claims what it does."""
-    able = model().capabilities
-    given = {"name": "mutant", "options": Options, "summary": "a model that breaks a promise"}
+    """Return the spec of a mutant, with the capabilities of the model."""
+    capabilities = model().capabilities
+    fields = {
+        "name": "mutant",
+        "options": Options,
+        "summary": "a model that violates a requirement",
+    }
     return ContactModelSpec(
-        **(given | {"factory": lambda options: model(), "capabilities": able} | changes)
+        **(fields | {"factory": lambda options: model(), "capabilities": capabilities} | changes)
     )

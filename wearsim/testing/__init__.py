@@ -1,12 +1,12 @@
-"""Conformance tests for plugins: one line in an author's pytest puts a model to the test.
+"""Conformance tests for plugins, built by one line of a pytest module.
 
-``test_sponge = contact_model_tests(SPEC)`` gives one item per promise that every contact model
-keeps; random inputs, wear laws and loads have the same. A promise that is broken is told with its
-numbers and with the place where it is written.
+``test_sponge = contact_model_tests(SPEC)`` gives one test item for each requirement on a contact
+model; random inputs, wear laws and loads have equivalent functions. A failed item reports the
+measured numbers, the requirement and the dotted name of the class or method that specifies it.
 """
 
-from wearsim.testing.checks import Check, Checks, PromiseBroken
-from wearsim.testing.contact_bench import STEEL, ContactCase
+from wearsim.testing.checks import Check, Checks, ConformanceError
+from wearsim.testing.contact_fixtures import STEEL, ContactCase
 from wearsim.testing.kit import (
     contact_model_tests,
     load_tests,
@@ -19,8 +19,8 @@ __all__ = [
     "STEEL",
     "Check",
     "Checks",
+    "ConformanceError",
     "ContactCase",
-    "PromiseBroken",
     "contact_model_tests",
     "load_tests",
     "random_input_tests",

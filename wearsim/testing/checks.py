@@ -1,4 +1,4 @@
-"""Checks: a promise, where it is written, and what is said when it is broken."""
+"""Conformance checks: a requirement, the place that specifies it, and the error message."""
 
 from __future__ import annotations
 
@@ -12,129 +12,134 @@ import numpy.typing as npt
 
 from wearsim.errors import WearsimError
 
-B = TypeVar("B")
+F = TypeVar("F")
 
 
-class PromiseBroken(AssertionError):  # noqa: N818  (an assertion that says what it is)
-    """Something does not keep what its protocol promises; the message says what and by how much."""
+class ConformanceError(AssertionError):
+    """A plugin violates a requirement; the message holds the measured numbers."""
 
 
 @dataclass(frozen=True)
-class Check(Generic[B]):
-    """One promise that can be put to the test.
+class Check(Generic[F]):
+    """One testable requirement.
 
     Parameters
     ----------
     name : str
-        The promise in a few words, as an item of a test report.
-    promise : str
-        The promise in a sentence.
-    promised_in : str
-        Dotted name of what promises it, "wearsim.plugins.ContactModel.solve".
+        Short name, used as the id of the test item.
+    requirement : str
+        The requirement in one sentence.
+    specified_in : str
+        Dotted name of the class or method that specifies it, "wearsim.plugins.ContactModel.solve".
     run : callable
-        Takes the bench that holds the thing, and raises PromiseBroken.
+        Takes the fixture with the object under test and raises ConformanceError.
     """
 
     name: str
-    promise: str
-    promised_in: str
-    run: Callable[[B], None]
+    requirement: str
+    specified_in: str
+    run: Callable[[F], None]
 
-    def __call__(self, bench: B) -> None:
-        """Put the thing on a bench to the test.
+    def __call__(self, fixture: F) -> None:
+        """Check the object under test.
 
         Raises
         ------
-        PromiseBroken
-            If it breaks the promise, or raises an error of wearsim's where it should answer.
+        ConformanceError
+            If it violates the requirement, or raises a WearsimError where a result is required.
         """
         __tracebackhide__ = True
         try:
-            self.run(bench)
-        except PromiseBroken as broken:
-            told = str(broken)
+            self.run(fixture)
+        except ConformanceError as violation:
+            message = str(violation)
         except WearsimError as error:
-            told = f"it raised {type(error).__name__} where it should answer: {error}"
+            message = f"{type(error).__name__} raised where a result is required: {error}"
         else:
             return
-        raise PromiseBroken(
-            f"{bench}: {told}. It breaks a promise: {self.promise} ({self.promised_in})"
+        raise ConformanceError(
+            f"{fixture}: {message}. Violated requirement: {self.requirement} ({self.specified_in})"
         )
 
 
-class Checks(Generic[B]):
-    """The promises of one kind of thing, in order."""
+class Checks(Generic[F]):
+    """The checks of one kind of plugin, in order."""
 
-    def __init__(self, *parts: Checks[B]) -> None:
-        self._checks: dict[str, Check[B]] = {check.name: check for part in parts for check in part}
+    def __init__(self, *parts: Checks[F]) -> None:
+        self._checks: dict[str, Check[F]] = {check.name: check for part in parts for check in part}
 
-    def __iter__(self) -> Iterator[Check[B]]:
+    def __iter__(self) -> Iterator[Check[F]]:
         return iter(self._checks.values())
 
-    def __getitem__(self, name: str) -> Check[B]:
+    def __getitem__(self, name: str) -> Check[F]:
         return self._checks[name]
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What the checks are called."""
+        """Names of the checks."""
         return tuple(self._checks)
 
-    def promised_in(self, place: str) -> Callable[[Callable[[B], None]], Check[B]]:
-        """Return a decorator that makes a function a check: its name, and its docstring's sentence.
+    def specified_in(self, place: str) -> Callable[[Callable[[F], None]], Check[F]]:
+        """Return a decorator that adds a function as a check.
+
+        The check takes its name from the function and its requirement from the docstring.
 
         Parameters
         ----------
         place : str
-            Dotted name of what promises it.
+            Dotted name of the class or method that specifies the requirement.
         """
 
-        def add(function: Callable[[B], None]) -> Check[B]:
-            name, promise = function.__name__.replace("_", "-"), inspect.getdoc(function) or ""
-            check = Check(name, promise, place, function)
-            self._checks[check.name] = check
+        def add(function: Callable[[F], None]) -> Check[F]:
+            name = function.__name__.replace("_", "-")
+            check = Check(name, inspect.getdoc(function) or "", place, function)
+            self._checks[name] = check
             return check
 
         return add
 
 
-def require(kept: bool, told: str) -> None:
-    """Raise PromiseBroken with what is to be told unless the promise was kept."""
-    if not kept:
-        raise PromiseBroken(told)
+def require(condition: object, message: str) -> None:
+    """Raise ConformanceError with a message unless the condition holds."""
+    if not condition:
+        raise ConformanceError(message)
 
 
 def agree(
-    what: str,
+    name: str,
     got: npt.ArrayLike,
     expected: npt.ArrayLike,
     tolerance: float,
     scale: float = 0.0,
 ) -> None:
-    """Raise PromiseBroken unless two numbers, or arrays, agree.
+    """Raise ConformanceError unless two numbers or arrays agree.
 
     Parameters
     ----------
-    what : str
-        What they are, for the message.
+    name : str
+        Name of the quantity, for the message.
     got, expected : array_like
         Of the same shape.
     tolerance : float
-        Greatest difference, relative to the greatest of `expected` or to `scale`.
+        Largest difference, relative to the largest magnitude in `expected` or to `scale`.
     scale : float
-        The least size against which a difference is measured.
+        Smallest reference magnitude of the relative difference.
     """
-    found, wanted = np.asarray(got, dtype=np.float64), np.asarray(expected, dtype=np.float64)
-    require(found.shape == wanted.shape, f"{what} has the shape {found.shape}, not {wanted.shape}")
-    require(bool(np.isfinite(found).all()), f"{what} is not finite")
-    size = max(float(np.abs(wanted).max(initial=0.0)), scale)
-    difference = np.abs(found - wanted)
+    actual, reference = np.asarray(got, dtype=np.float64), np.asarray(expected, dtype=np.float64)
+    require(
+        actual.shape == reference.shape,
+        f"{name} has the shape {actual.shape}, not {reference.shape}",
+    )
+    require(np.isfinite(actual).all(), f"{name} is not finite")
+    size = max(float(np.abs(reference).max(initial=0.0)), scale)
+    difference = np.abs(actual - reference)
     if (difference <= tolerance * size).all():
         return
     worst = int(np.argmax(difference))
-    index = ", ".join(str(i) for i in np.unravel_index(worst, found.shape))
-    place = f" at index {index}" if found.ndim else ""
-    raise PromiseBroken(
-        f"{what} is {found.flat[worst]:.9g}{place}, expected {wanted.flat[worst]:.9g}: off by"
+    index = ", ".join(str(i) for i in np.unravel_index(worst, actual.shape))
+    place = f" at index {index}" if actual.ndim else ""
+    raise ConformanceError(
+        f"{name} is {actual.flat[worst]:.9g}{place}, expected {reference.flat[worst]:.9g}: off by"
         f" {difference.flat[worst] / size if size else np.inf:.2e} of {size:.3g}, and"
         f" {tolerance:.0e} is allowed"
     )

@@ -1,4 +1,4 @@
-"""Each capability of a contact model: what is claimed works, what is not claimed is refused."""
+"""Capabilities of contact models: claimed ones work, others raise a CapabilityError."""
 
 from __future__ import annotations
 
@@ -9,216 +9,249 @@ from typing import Any
 import numpy as np
 
 from wearsim.errors import CapabilityError, ContactError
-from wearsim.plugins import SharedWear
-from wearsim.testing.checks import Checks, PromiseBroken, agree, require
-from wearsim.testing.contact_bench import ContactBench
+from wearsim.plugins import PassLoop, SharedWear
+from wearsim.testing.checks import Checks, ConformanceError, agree, require
+from wearsim.testing.contact_fixtures import ContactFixture
 from wearsim.types import ContactSolution, Creepage, FloatArray, OperatingPoint
 
-CAPABILITIES: Checks[ContactBench] = Checks()
+CAPABILITIES: Checks[ContactFixture] = Checks()
 _CAPABILITIES = "wearsim.plugins.Capabilities"
+_PASSES = 12
 
 
-def refuses(bench: ContactBench, capability: str, ask: Callable[[], Any]) -> bool:
-    """Tell whether a capability is not claimed, after seeing to it that it is refused then.
+def _is_refused(fixture: ContactFixture, capability: str, call: Callable[[], Any]) -> bool:
+    """Return False if a capability is claimed, else True.
 
-    Parameters
-    ----------
-    bench : ContactBench
-        The model.
-    capability : str
-        Its name.
-    ask : callable
-        Asks for it.
+    Raises
+    ------
+    ConformanceError
+        If the capability is not claimed and `call`, which requires it, raises no CapabilityError.
     """
-    if getattr(bench.capabilities, capability):
+    if getattr(fixture.capabilities, capability):
         return False
-    told = f"{capability} is not claimed, and asking for it "
+    message = f"{capability} is not claimed, and a call that requires it"
     try:
-        ask()
+        call()
     except CapabilityError:
         return True
     except Exception as error:
-        told += f"raises {type(error).__name__} ({error}), where a CapabilityError is due"
-        raise PromiseBroken(told) from error
-    raise PromiseBroken(f"{told}is silently ignored, where a CapabilityError is due")
+        raise ConformanceError(
+            f"{message} raises {type(error).__name__} ({error}) instead of CapabilityError"
+        ) from error
+    raise ConformanceError(f"{message} is silently ignored instead of raising CapabilityError")
 
 
-@CAPABILITIES.promised_in("wearsim.plugins.ContactModelSpec")
-def spec_claims_what_its_models_claim(bench: ContactBench) -> None:
-    """The spec claims no less than the models it builds, and no more than with no option given."""
-    claimed = set(bench.chosen.spec.capabilities.names())
-    more = set(bench.capabilities.names()) - claimed
-    require(not more, f"the model claims {', '.join(sorted(more))}, and its spec does not")
-    if not bench.chosen.raw:
-        less = claimed - set(bench.capabilities.names())
-        require(not less, f"the spec claims {', '.join(sorted(less))}, and its model does not")
+@CAPABILITIES.specified_in("wearsim.plugins.ContactModelSpec")
+def spec_and_model_capabilities_agree(fixture: ContactFixture) -> None:
+    """The spec claims all capabilities of its models, and with default options no others."""
+    of_spec = set(fixture.configured.spec.capabilities.names())
+    of_model = set(fixture.capabilities.names())
+    extra = ", ".join(sorted(of_model - of_spec))
+    require(not extra, f"the model claims {extra}, and its spec does not")
+    missing = "" if fixture.configured.raw else ", ".join(sorted(of_spec - of_model))
+    require(not missing, f"the spec claims {missing}, and its model does not")
 
 
-def softening(bench: ContactBench) -> FloatArray:
-    """Return a wear compliance, uneven, that opens the gap by a part of the approach [m/(N/m)]."""
-    pressed = bench.solution.approach - float(bench.gap.min())
-    share = 1.0 + 0.5 * np.tanh(bench.grid.y / (0.2 * bench.case.width))
-    compliance: FloatArray = 0.2 * pressed / float(bench.solution.line_load.max()) * share
+def _uneven_compliance(fixture: ContactFixture) -> FloatArray:
+    """Return an uneven wear compliance that opens the gap by a part of the approach [m/(N/m)]."""
+    overlap = fixture.solution.approach - float(fixture.gap.min())
+    shape = 1.0 + 0.5 * np.tanh(fixture.grid.y / (0.2 * fixture.case.width))
+    compliance: FloatArray = 0.2 * overlap / float(fixture.solution.line_load.max()) * shape
     return compliance
 
 
-@CAPABILITIES.promised_in(_CAPABILITIES)
-def wear_compliance(bench: ContactBench) -> None:
-    """With a wear compliance c the answer is that of the gap plus c q."""
-    compliance = softening(bench)
-    if refuses(bench, "wear_compliance", lambda: bench.solve(wear_compliance=compliance)):
+@CAPABILITIES.specified_in(_CAPABILITIES)
+def wear_compliance(fixture: ContactFixture) -> None:
+    """With a wear compliance c the solution is that of the gap plus c q."""
+    compliance = _uneven_compliance(fixture)
+    if _is_refused(fixture, "wear_compliance", lambda: fixture.solve(wear_compliance=compliance)):
         return
-    for what, gap in bench.gaps.items():
-        found = bench.solve(gap=gap, wear_compliance=compliance)
+    for case, gap in fixture.gaps.items():
+        solution = fixture.solve(gap=gap, wear_compliance=compliance)
         agree(
-            f"{what}: the load of strips that wear",
-            float(found.line_load.sum()) * bench.grid.spacing,
-            bench.case.normal_force,
-            bench.case.tolerance,
+            f"{case}: load of the strips with wear compliance",
+            float(solution.line_load.sum()) * fixture.grid.spacing,
+            fixture.case.normal_force,
+            fixture.case.tolerance,
         )
-        worn = bench.solve(gap=gap + compliance * found.line_load)
-        told = f"{what}: the line load on gap + c q, against that with the wear compliance c,"
-        agree(told, worn.line_load, found.line_load, 1e-4)
-    nothing = bench.solve(wear_compliance=np.zeros_like(compliance))
-    agree("the line load with no compliance", nothing.line_load, bench.solution.line_load, 1e-6)
+        agree(
+            f"{case}: the line load on gap + c q, compared with that with the wear compliance c,",
+            fixture.solve(gap=gap + compliance * solution.line_load).line_load,
+            solution.line_load,
+            1e-4,
+        )
+    line_load = fixture.solve(wear_compliance=np.zeros_like(compliance)).line_load
+    agree("the line load at zero compliance", line_load, fixture.solution.line_load, 1e-6)
 
 
-@CAPABILITIES.promised_in(_CAPABILITIES)
-def coupled(bench: ContactBench) -> None:
-    """Contacts that wear one body together each solve the gap that all of them open."""
-    gap = np.array([bench.gaps["fresh"], bench.gaps["off centre"]])
-    load = bench.case.normal_force
-    points = [bench.point(), bench.point(Creepage(5e-4, 2e-4), normal_force=0.8 * load)]
-    each = 0.25 * softening(bench)
-    wear = SharedWear(np.array([[0, 0], [0, 1]]), np.array([[each, each], [each, 0.0 * each]]))
+@CAPABILITIES.specified_in(_CAPABILITIES)
+def coupled(fixture: ContactFixture) -> None:
+    """Contacts coupled by the wear of a shared body each solve the gap that all of them open."""
+    gap = np.array([fixture.gaps["fresh"], fixture.gaps["off centre"]])
+    load = fixture.case.normal_force
+    points = [fixture.point(), fixture.point(Creepage(5e-4, 2e-4), normal_force=0.8 * load)]
+    own = 0.25 * _uneven_compliance(fixture)
+    wear = SharedWear(np.array([[0, 0], [0, 1]]), np.array([[own, own], [own, 0.0 * own]]))
 
-    def ask() -> Sequence[ContactSolution]:
-        return bench.model.solve_coupled(gap, bench.case.curvature, points, wear)
+    def solve() -> Sequence[ContactSolution]:
+        return fixture.model.solve_coupled(gap, fixture.case.curvature, points, wear)
 
-    if refuses(bench, "coupled", ask):
+    if _is_refused(fixture, "coupled", solve):
         return
-    found = ask()
-    opened = gap + wear.opening(np.array([item.line_load for item in found]))
-    for k, (point, item) in enumerate(zip(points, found, strict=True)):
-        alone = bench.solve(point, opened[k])
-        told = f"of contact {k} on what both wear, solved alone, against both together,"
-        agree(f"the line load {told}", alone.line_load, item.line_load, 1e-4)
-        agree(f"the power {told}", alone.power, item.power, 1e-3)
+    solutions = solve()
+    opened = gap + wear.opening(np.array([item.line_load for item in solutions]))
+    for k, (point, solution) in enumerate(zip(points, solutions, strict=True)):
+        single = fixture.solve(point, opened[k])
+        how = f"of contact {k}, solved separately on the worn gap, compared with the coupled one,"
+        agree(f"the line load {how}", single.line_load, solution.line_load, 1e-4)
+        agree(f"the power {how}", single.power, solution.power, 1e-3)
 
 
-@CAPABILITIES.promised_in("wearsim.types.Creepage")
-def creepage_variation(bench: ContactBench) -> None:
-    """Strips that slide dissipate by their own creepage xi + g - <g>."""
-    variation = 5e-3 * np.tanh(bench.grid.y / (0.2 * bench.case.width)) + 1e-2
-    point = bench.point(Creepage(2e-2, variation=variation))
-    if refuses(bench, "creepage_variation", lambda: bench.solve(point)):
+@CAPABILITIES.specified_in("wearsim.types.Creepage")
+def creepage_variation(fixture: ContactFixture) -> None:
+    """Sliding strips dissipate according to their local creepage xi + g - <g>."""
+    variation = 5e-3 * np.tanh(fixture.grid.y / (0.2 * fixture.case.width)) + 1e-2
+    point = fixture.point(Creepage(2e-2, variation=variation))
+    if _is_refused(fixture, "creepage_variation", lambda: fixture.solve(point)):
         return
-    for what, gap in bench.gaps.items():
-        found = bench.solve(point, gap)
-        local = 2e-2 + variation - np.average(variation, weights=found.line_load)
-        even = bench.solve(bench.point(Creepage(2e-2)), gap).dissipation
-        told = f"{what}: dissipation of strips that slide, as xi + g - <g>,"
-        agree(told, found.dissipation, even * local / 2e-2, 0.03)
+    for case, gap in fixture.gaps.items():
+        solution = fixture.solve(point, gap)
+        local = 2e-2 + variation - np.average(variation, weights=solution.line_load)
+        even = fixture.solve(fixture.point(Creepage(2e-2)), gap).dissipation
+        agree(
+            f"{case}: dissipation of sliding strips, compared with xi + g - <g>,",
+            solution.dissipation,
+            even * local / 2e-2,
+            0.03,
+        )
         shifted = replace(point, creepage=Creepage(2e-2, variation=variation + 0.01))
-        told = f"{what}: dissipation after a constant was added to the variation"
-        agree(told, bench.solve(shifted, gap).dissipation, found.dissipation, 1e-6)
+        agree(
+            f"{case}: dissipation after a constant was added to the variation",
+            fixture.solve(shifted, gap).dissipation,
+            solution.dissipation,
+            1e-6,
+        )
 
 
-@CAPABILITIES.promised_in("wearsim.types.OperatingPoint")
-def bearing_torque(bench: ContactBench) -> None:
-    """The bearing torque is carried, by the creepage that is returned, or the roller skids."""
-    case = bench.case
-    radius = np.full(bench.grid.strips, case.roller_radius)
-    most = case.friction * case.normal_force * case.roller_radius
+@CAPABILITIES.specified_in("wearsim.types.OperatingPoint")
+def bearing_torque(fixture: ContactFixture) -> None:
+    """The returned creepage balances the bearing torque; a torque that cannot be carried raises."""
+    case = fixture.case
+    radius = np.full(fixture.grid.strips, case.roller_radius)
+    bound = case.friction * case.normal_force * case.roller_radius
 
-    def driven(part: float) -> OperatingPoint:
-        return bench.point(Creepage(0.0), bearing_torque=part * most, rolling_radius=radius)
+    def driven(fraction: float) -> ContactSolution:
+        return fixture.solve(
+            fixture.point(Creepage(0.0), bearing_torque=fraction * bound, rolling_radius=radius)
+        )
 
-    if refuses(bench, "bearing_torque", lambda: bench.solve(driven(0.4))):
+    if _is_refused(fixture, "bearing_torque", lambda: driven(0.4)):
         return
-    for part in (0.4, -0.2, 0.0):
-        found = bench.solve(driven(part))
-        carried = -case.roller_radius * found.force_x
-        told = f"the torque carried with {part:g} mu N R at the bearing"
-        agree(told, carried, part * most, case.tolerance, most)
-        again = bench.solve(bench.point(Creepage(found.longitudinal_creepage)))
-        told = "force_x at the longitudinal_creepage that the balance of torque found"
-        agree(told, again.force_x, found.force_x, case.tolerance, most / case.roller_radius)
+    for fraction in (0.4, -0.2, 0.0):
+        solution = driven(fraction)
+        agree(
+            f"the torque carried with {fraction:g} mu N R at the bearing",
+            -case.roller_radius * solution.force_x,
+            fraction * bound,
+            case.tolerance,
+            bound,
+        )
+        agree(
+            "force_x at the longitudinal_creepage of the torque balance",
+            fixture.solve(fixture.point(Creepage(solution.longitudinal_creepage))).force_x,
+            solution.force_x,
+            case.tolerance,
+            bound / case.roller_radius,
+        )
     try:
-        bench.solve(driven(1.2))
+        driven(1.2)
     except ContactError:
         return
-    raise PromiseBroken("a torque of 1.2 mu N R, at which the roller skids, has an answer")
+    raise ConformanceError("a torque of 1.2 mu N R, at which the roller skids, has a solution")
 
 
-@CAPABILITIES.promised_in("wearsim.types.OperatingPoint")
-def local_friction(bench: ContactBench) -> None:
-    """Strips that slide dissipate by their own friction."""
-    case, creepage = bench.case, Creepage(2e-2)
-    friction = case.friction * np.where(bench.grid.y > 0.0, 1.5, 0.5)
-    asked = bench.point(creepage, friction=friction)
-    if refuses(bench, "local_friction", lambda: bench.solve(asked)):
+@CAPABILITIES.specified_in("wearsim.types.OperatingPoint")
+def local_friction(fixture: ContactFixture) -> None:
+    """Sliding strips dissipate in proportion to their local friction."""
+    mu, creepage = fixture.case.friction, Creepage(2e-2)
+    friction = mu * np.where(fixture.grid.y > 0.0, 1.5, 0.5)
+    varied = fixture.point(creepage, friction=friction)
+    if _is_refused(fixture, "local_friction", lambda: fixture.solve(varied)):
         return
-    even = bench.point(friction=np.full(bench.grid.strips, case.friction))
-    told = "dissipation where every strip has the same friction, against one value,"
-    agree(told, bench.solve(even).dissipation, bench.solution.dissipation, 1e-9)
-    sliding = bench.solve(bench.point(creepage)).dissipation * friction / case.friction
-    told = "dissipation of strips that slide, in proportion to their own friction,"
-    agree(told, bench.solve(asked).dissipation, sliding, 0.03)
+    agree(
+        "dissipation with the same friction on every strip, compared with one value,",
+        fixture.solve(fixture.point(friction=np.full(fixture.grid.strips, mu))).dissipation,
+        fixture.solution.dissipation,
+        1e-9,
+    )
+    agree(
+        "dissipation of sliding strips, in proportion to their friction,",
+        fixture.solve(varied).dissipation,
+        fixture.solve(fixture.point(creepage)).dissipation * friction / mu,
+        0.03,
+    )
 
 
-@CAPABILITIES.promised_in("wearsim.plugins.ContactModel.friction_points")
-def friction_field(bench: ContactBench) -> None:
-    """Friction is asked for within the contact, and points that slide dissipate by their own."""
-    case, model = bench.case, bench.model
-    whole = np.full((7, bench.grid.strips), case.friction)
-    if refuses(bench, "friction_field", lambda: bench.solve(bench.point(friction=whole))):
-        refuses(
-            bench,
-            "friction_field",
-            lambda: model.friction_points(bench.gap, case.curvature, bench.point()),
-        )
+@CAPABILITIES.specified_in("wearsim.plugins.ContactModel.friction_points")
+def friction_field(fixture: ContactFixture) -> None:
+    """Friction points are inside the contact; sliding points dissipate by their local friction."""
+    mu, curvature, model = fixture.case.friction, fixture.case.curvature, fixture.model
+    uniform = np.full((7, fixture.grid.strips), mu)
+
+    def points() -> tuple[FloatArray, FloatArray]:
+        return model.friction_points(fixture.gap, curvature, fixture.point())
+
+    if _is_refused(
+        fixture, "friction_field", lambda: fixture.solve(fixture.point(friction=uniform))
+    ):
+        _is_refused(fixture, "friction_field", points)
         return
-    x, y = model.friction_points(bench.gap, case.curvature, bench.point())
-    agree("y of the friction points", y, bench.grid.y, 0.0)
+    x, y = points()
+    agree("y of the friction points", y, fixture.grid.y, 0.0)
     require(
         x.ndim == 2 and x.shape[1] == len(y), f"x has the shape {x.shape}, not (points, strips)"
     )
-    require(bool((np.diff(x, axis=0) <= 0.0).all()), "x does not fall from the leading edge on")
-    outside = bench.solution.half_length == 0.0
-    require(not x[:, outside].any(), "x is not 0 outside the contact")
-    even = np.full(x.shape, case.friction)
+    require((np.diff(x, axis=0) <= 0.0).all(), "x does not decrease from the leading edge")
+    require(not x[:, fixture.solution.half_length == 0.0].any(), "x is not 0 outside the contact")
+    even = np.full(x.shape, mu)
     for carried in (False, True):
-        found = bench.solve(bench.point(friction=even, friction_carried=carried))
-        told = f"power of one friction at all points, {'carried' if carried else 'staying'},"
-        agree(told, found.power, bench.solution.power, 0.01)
-    strips = case.friction * np.where(y > 0.0, 1.5, 0.5) * np.ones_like(x)
-    found = bench.solve(bench.point(Creepage(2e-2), friction=strips))
-    sliding = bench.solve(bench.point(Creepage(2e-2))).dissipation * strips[0] / case.friction
-    told = "dissipation of points that slide, in proportion to their own friction,"
-    agree(told, found.dissipation, sliding, 0.03)
-    many, _ = model.friction_points_batch(bench.gap[None], case.curvature, [bench.point()])
-    agree("friction_points_batch of one contact", many, x[None], 1e-12)
+        agree(
+            f"power of uniform friction at all points, {'carried' if carried else 'stationary'},",
+            fixture.solve(fixture.point(friction=even, friction_carried=carried)).power,
+            fixture.solution.power,
+            0.01,
+        )
+    friction = mu * np.where(y > 0.0, 1.5, 0.5) * np.ones_like(x)
+    agree(
+        "dissipation of sliding points, in proportion to their friction,",
+        fixture.solve(fixture.point(Creepage(2e-2), friction=friction)).dissipation,
+        fixture.solve(fixture.point(Creepage(2e-2))).dissipation * friction[0] / mu,
+        0.03,
+    )
+    batch, _ = model.friction_points_batch(fixture.gap[None], curvature, [fixture.point()])
+    agree("friction_points_batch of one contact", batch, x[None], 1e-12)
 
 
-@CAPABILITIES.promised_in("wearsim.plugins.ContactModel.fields")
-def fields(bench: ContactBench) -> None:
-    """Pressure rises to its peak; pressure, traction and power add up to load, force and power."""
-    case, points = bench.case, 801
+@CAPABILITIES.specified_in("wearsim.plugins.ContactModel.fields")
+def fields(fixture: ContactFixture) -> None:
+    """Pressure, traction and power density integrate to load, force and power of the solution."""
+    case, points = fixture.case, 801
 
-    def ask(point: OperatingPoint, solution: ContactSolution) -> Any:
-        return bench.model.fields(solution, bench.gap, case.curvature, point, points)
+    def solve(point: OperatingPoint, solution: ContactSolution) -> Any:
+        return fixture.model.fields(solution, fixture.gap, case.curvature, point, points)
 
-    if refuses(bench, "fields", lambda: ask(bench.point(), bench.solution)):
+    if _is_refused(fixture, "fields", lambda: solve(fixture.point(), fixture.solution)):
         return
     for creepage in (Creepage(1e-3), Creepage(4e-4), Creepage(2e-4, -3e-4)):
-        point = bench.point(creepage)
-        solution = bench.solve(point)
-        found = ask(point, solution)
-        require(found.x.shape == (points, bench.grid.strips), f"x has the shape {found.x.shape}")
-        agree("y of the fields", found.y, bench.grid.y, 0.0)
-        agree("the leading edge x[-1]", found.x[-1], solution.half_length, 0.02)
-        agree("the greatest pressure", found.pressure.max(), solution.peak_pressure, 0.02)
+        point = fixture.point(creepage)
+        solution = fixture.solve(point)
+        inside = solve(point, solution)
+        require(
+            inside.x.shape == (points, fixture.grid.strips), f"x has the shape {inside.x.shape}"
+        )
+        agree("y of the fields", inside.y, fixture.grid.y, 0.0)
+        agree("the leading edge x[-1]", inside.x[-1], solution.half_length, 0.02)
+        agree("the largest pressure", inside.pressure.max(), solution.peak_pressure, 0.02)
         force = float(np.hypot(solution.force_x, solution.force_y))
         for name, total, tolerance, size in (
             ("pressure", case.normal_force, 0.02, 0.0),
@@ -226,8 +259,88 @@ def fields(bench: ContactBench) -> None:
             ("traction_y", solution.force_y, 0.02, force),
             ("power_density", solution.power, 0.05, 0.0),
         ):
-            values = getattr(found, name)
-            summed = float(np.trapezoid(values, found.x, axis=0).sum()) * bench.grid.spacing
-            agree(f"the sum of {name} over the points", summed, total, tolerance, size)
-        sliding = np.hypot(found.slip_x, found.slip_y)[found.adhesion]
-        require(not sliding.any(), "points that adhere slip")
+            lines = np.trapezoid(getattr(inside, name), inside.x, axis=0)
+            integral = float(lines.sum()) * fixture.grid.spacing
+            agree(f"the integral of {name}", integral, total, tolerance, size)
+        slip = np.hypot(inside.slip_x, inside.slip_y)[inside.adhesion]
+        require(not slip.any(), "points in adhesion have slip")
+
+
+def _pass_loop(fixture: ContactFixture) -> PassLoop:
+    """Return two alternating rollers with a spring, a lagging term, tilt and spin."""
+    case, y, shape = fixture.case, fixture.grid.y, (2, fixture.grid.strips)
+    overlap = fixture.solution.approach - float(fixture.gap.min())
+    # the greatest wear of a pass is 1e-4 of the approach
+    factor = 1e-4 * overlap * case.rolling_speed / float(fixture.solution.dissipation.max())
+    ramp = np.linspace(-1.0, 1.0, _PASSES)
+    return PassLoop(
+        order=np.array([0, 1]),
+        first_pass=4,
+        base_load=case.normal_force * (1.0 + 0.05 * ramp),
+        creepage=np.stack([1e-3 * (1.0 + 0.1 * ramp), 2e-4 * ramp], axis=1),
+        friction=case.friction * (1.0 - 0.1 * ramp),
+        tilt=1e-5 * ramp,
+        spin=0.05 * ramp,
+        stiffness=0.1 * case.normal_force / overlap,
+        nominal_gap=np.array([fixture.gaps["fresh"], fixture.gaps["off centre"]]),
+        from_apex=np.array([y, y - 0.05 * case.width]),
+        longitudinal_curvature=case.curvature,
+        rolling_speed=case.rolling_speed,
+        slip_base=np.zeros(shape),
+        spin_arm=np.array([y, y]),
+        slip_rates=np.zeros(2),
+        wear=factor * np.array([1.0, 0.5, 0.0]),
+        term_rates=np.array([[20.0, 0.1, 0.2]]),
+        similar=False,
+        terms=np.array([[0.5, 1.0]]),
+        cylinder_depth=np.zeros(fixture.grid.strips),
+        roller_depth=np.zeros(shape),
+        line_load=np.zeros(shape),
+        anchor=np.zeros(shape),
+        anchor_gap=np.zeros(shape),
+        approach=np.zeros(2),
+        anchor_approach=np.zeros(2),
+        energy=np.zeros(2),
+    )
+
+
+def _run_single_solves(fixture: ContactFixture, loop: PassLoop) -> None:
+    """Run the passes of `loop` by single solves, as specified in `PassLoop`."""
+    for p in range(_PASSES):
+        g = int(loop.order[(loop.first_pass + p) % len(loop.order)])
+        unworn = loop.nominal_gap[g] + loop.tilt[p] * loop.from_apex[g]
+        gap = unworn + loop.cylinder_depth + loop.roller_depth[g]
+        descent = float(gap.min() - unworn.min())
+        load = float(loop.base_load[p] + loop.terms[:, g].sum() - loop.stiffness * descent)
+        longitudinal, lateral = loop.creepage[p].tolist()
+        point = fixture.point(
+            Creepage(longitudinal, lateral, float(loop.spin[p])),
+            normal_force=load,
+            friction=float(loop.friction[p]),
+        )
+        solution = fixture.solve(point, gap)
+        energy_per_area = solution.dissipation / loop.rolling_speed
+        loop.cylinder_depth += loop.wear[0] * energy_per_area
+        loop.roller_depth[g] += loop.wear[1 + g] * energy_per_area
+        gain, rate = loop.term_rates[:, 0], loop.term_rates[:, 1 + g]
+        loop.terms[:, g] += rate * (gain * solution.power - loop.terms[:, g])
+        loop.energy[g] += solution.power
+        loop.line_load[g], loop.approach[g] = solution.line_load, solution.approach
+
+
+@CAPABILITIES.specified_in("wearsim.plugins.PassLoop")
+def pass_loop(fixture: ContactFixture) -> None:
+    """The compiled loop over passes gives the same state as single solves."""
+    fast, slow = _pass_loop(fixture), _pass_loop(fixture)
+    if _is_refused(fixture, "pass_loop", lambda: fixture.model.pass_loop(fast)):
+        return
+    solves = fixture.model.pass_loop(fast)
+    _run_single_solves(fixture, slow)
+    require(0 < solves <= _PASSES, f"pass_loop returns {solves} full solves in {_PASSES} passes")
+    for name in ("cylinder_depth", "roller_depth", "line_load", "approach", "energy", "terms"):
+        agree(
+            f"{name} after {_PASSES} passes of the loop, compared with single solves,",
+            getattr(fast, name),
+            getattr(slow, name),
+            1e-5,
+        )

@@ -1,26 +1,71 @@
-"""What an author calls: tests of a contact model, a random input, a wear law or a load."""
+"""Test functions for plugin authors: contact models, random inputs, wear laws and loads."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import cache
+from typing import TypeVar
 
 from wearsim.plugins import ContactModelSpec, LoadSpec, RandomInputSpec, WearLawSpec
 from wearsim.testing import loads, random_inputs
-from wearsim.testing.checks import Checks
-from wearsim.testing.contact_bench import ContactBench, ContactCase
+from wearsim.testing.checks import Check, Checks
+from wearsim.testing.contact_balances import BALANCES
+from wearsim.testing.contact_behaviour import BEHAVIOUR
 from wearsim.testing.contact_capabilities import CAPABILITIES
-from wearsim.testing.contact_manners import MANNERS
-from wearsim.testing.contact_pass_loop import PASS_LOOP
-from wearsim.testing.contact_sums import SUMS
-from wearsim.testing.items import Tests, tests_of
-from wearsim.testing.loads import LoadBench
-from wearsim.testing.random_bench import RandomBench
-from wearsim.testing.specs import Chosen, found, spec_checks
-from wearsim.testing.wear_laws import WEAR_LAW, WearLawBench
+from wearsim.testing.contact_fixtures import ContactCase, ContactFixture
+from wearsim.testing.loads import LoadFixture
+from wearsim.testing.random_inputs import RandomInputFixture
+from wearsim.testing.specs import ConfiguredSpec, resolve, spec_checks
+from wearsim.testing.wear_laws import WEAR_LAW, WearLawFixture
 from wearsim.units import Kind
 
-CONTACT_MODEL: Checks[ContactBench] = Checks(spec_checks(), SUMS, MANNERS, CAPABILITIES, PASS_LOOP)
+F = TypeVar("F")
+Tests = Callable[[Check[F]], None]
+CONTACT_MODEL: Checks[ContactFixture] = Checks(spec_checks(), BALANCES, BEHAVIOUR, CAPABILITIES)
 NOTHING: Mapping[str, str] = {}
+
+
+def build_tests(checks: Checks[F], build: Callable[[], F], without: Mapping[str, str]) -> Tests[F]:
+    """Return a parametrised pytest function with one item per check.
+
+    Parameters
+    ----------
+    checks : Checks
+        The checks.
+    build : callable
+        Returns the fixture; called by the first check, so that collection costs nothing.
+    without : mapping of str to str
+        Names of checks to skip, with the reason.
+
+    Raises
+    ------
+    ValueError
+        If a skipped check does not exist.
+    """
+    import pytest  # noqa: PLC0415  (a dependency of the author's tests, not of wearsim)
+
+    if unknown := [name for name in without if name not in checks.names]:
+        raise ValueError(f"no check is named '{unknown[0]}'; there are: {', '.join(checks.names)}")
+    fixture = cache(build)
+
+    @pytest.mark.parametrize(
+        "check",
+        [
+            pytest.param(
+                check,
+                id=check.name,
+                marks=[pytest.mark.skip(reason=without[check.name])]
+                if check.name in without
+                else [],
+            )
+            for check in checks
+        ],
+    )
+    def test(check: Check[F]) -> None:
+        __tracebackhide__ = True
+        check(fixture())
+
+    return test
 
 
 def contact_model_tests(
@@ -28,30 +73,32 @@ def contact_model_tests(
     options: Mapping[str, object] = NOTHING,
     case: ContactCase | None = None,
     without: Mapping[str, str] = NOTHING,
-) -> Tests[ContactBench]:
-    """Return tests of a contact model, one per promise.
+) -> Tests[ContactFixture]:
+    """Return tests of a contact model, one item per requirement.
 
     Parameters
     ----------
     spec : ContactModelSpec or str
-        What its hook yields, or the name of an installed one.
+        The spec that the hook yields, or the name of an installed one.
     options : mapping of str to object
-        Its options as a scenario would write them, quantities with their units.
+        Its options as written in a scenario, quantities with their units.
     case : ContactCase, optional
-        The contact to start from; by default the test rig's.
+        The base contact; by default that of the test rig.
     without : mapping of str to str
-        Checks that are left out, by name, and why; they are reported as skipped.
+        Names of checks to skip, with the reason.
 
     Returns
     -------
     callable
-        A parametrised test, to be bound to a name that begins with ``test``.
+        A parametrised test; bind it to a name that begins with ``test``.
     """
-
-    def build() -> ContactBench:
-        return ContactBench(Chosen(found(ContactModelSpec, spec), options), case or ContactCase())
-
-    return tests_of(CONTACT_MODEL, build, without)
+    return build_tests(
+        CONTACT_MODEL,
+        lambda: ContactFixture(
+            ConfiguredSpec(resolve(ContactModelSpec, spec), options), case or ContactCase()
+        ),
+        without,
+    )
 
 
 def random_input_tests(
@@ -62,49 +109,53 @@ def random_input_tests(
     files: Mapping[str, str] = NOTHING,
     marginal: tuple[RandomInputSpec | str, Mapping[str, object]] | None = None,
     without: Mapping[str, str] = NOTHING,
-) -> Tests[RandomBench]:
-    """Return tests of a random input, one per promise that its role makes.
+) -> Tests[RandomInputFixture]:
+    """Return tests of a random input, one item per requirement on its role.
 
     Parameters
     ----------
     spec : RandomInputSpec or str
-        What its hook yields, or the name of an installed one.
+        The spec that the hook yields, or the name of an installed one.
     options : mapping of str to object
-        Its options as a scenario would write them.
+        Its options as written in a scenario.
     kind : Kind, optional
-        What it stands for, so that values have a unit; nothing for a plain number.
+        Kind of quantity, which determines the unit; None for a plain number.
     files : mapping of str to str
         Content of the files that the options name.
     marginal : tuple of spec and options, optional
-        Distribution at any one point or time; for a field and a process.
+        Marginal distribution of a field or a process.
     without : mapping of str to str
-        As of `contact_model_tests`.
+        See `contact_model_tests`.
 
     Returns
     -------
     callable
-        As of `contact_model_tests`.
+        See `contact_model_tests`.
     """
-    own = found(RandomInputSpec, spec)
+    resolved = resolve(RandomInputSpec, spec)
 
-    def build() -> RandomBench:
-        chosen = Chosen(own, options, kind, files)
+    def build() -> RandomInputFixture:
+        configured = ConfiguredSpec(resolved, options, kind, files)
         if marginal is None:
-            return RandomBench(chosen)
+            return RandomInputFixture(configured)
         name, values = marginal
-        return RandomBench(chosen, Chosen(found(RandomInputSpec, name), values, kind, files))
+        return RandomInputFixture(
+            configured, ConfiguredSpec(resolve(RandomInputSpec, name), values, kind, files)
+        )
 
-    return tests_of(random_inputs.BY_ROLE[own.role], build, without)
+    return build_tests(random_inputs.BY_ROLE[resolved.role], build, without)
 
 
 def wear_law_tests(
     spec: WearLawSpec | str,
     options: Mapping[str, object] = NOTHING,
     without: Mapping[str, str] = NOTHING,
-) -> Tests[WearLawBench]:
-    """Return tests of a wear law, one per promise; parameters as of `contact_model_tests`."""
-    return tests_of(
-        WEAR_LAW, lambda: WearLawBench(Chosen(found(WearLawSpec, spec), options)), without
+) -> Tests[WearLawFixture]:
+    """Return tests of a wear law, one item per requirement; see `contact_model_tests`."""
+    return build_tests(
+        WEAR_LAW,
+        lambda: WearLawFixture(ConfiguredSpec(resolve(WearLawSpec, spec), options)),
+        without,
     )
 
 
@@ -115,26 +166,26 @@ def load_tests(
     files: Mapping[str, str] = NOTHING,
     duration: float = 3600.0,
     without: Mapping[str, str] = NOTHING,
-) -> Tests[LoadBench]:
-    """Return tests of a load or of a term, one per promise that its role makes.
+) -> Tests[LoadFixture]:
+    """Return tests of a load or a load term, one item per requirement on its role.
 
     Parameters
     ----------
     spec, options, without
-        As of `contact_model_tests`.
+        See `contact_model_tests`.
     files : mapping of str to str
         Content of the files that the options name.
     duration : float
-        Time over which a load without a span is looked at, and a term followed [s].
+        Time interval for a load without a span and for a load term [s].
 
     Returns
     -------
     callable
-        As of `contact_model_tests`.
+        See `contact_model_tests`.
     """
-    own = found(LoadSpec, spec)
-
-    def build() -> LoadBench:
-        return LoadBench(Chosen(own, options, files=files), duration)
-
-    return tests_of(loads.BY_ROLE[own.role], build, without)
+    resolved = resolve(LoadSpec, spec)
+    return build_tests(
+        loads.BY_ROLE[resolved.role],
+        lambda: LoadFixture(ConfiguredSpec(resolved, options, files=files), duration),
+        without,
+    )

@@ -1,219 +1,208 @@
-"""What any load, and any term added to one, keeps."""
+"""Conformance tests of loads and of terms added to them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from wearsim.plugins import Load, LoadSpec, LoadTerm
 from wearsim.testing.checks import Checks, agree, require
-from wearsim.testing.specs import Chosen, spec_checks
+from wearsim.testing.specs import Fixture, spec_checks
 from wearsim.types import FloatArray
 
 _SAMPLES = 200_000
 _PARTS = ((0.0, 1.0), (0.1, 0.35), (0.5, 0.5001), (0.999, 1.0))
+_STEPS = 1000
 
 
 @dataclass(frozen=True)
-class LoadBench:
-    """A load, or a term, with options.
+class LoadFixture(Fixture[LoadSpec]):
+    """A load or a load term under test.
 
     Parameters
     ----------
-    chosen : Chosen
+    configured : ConfiguredSpec
         Its spec and options.
     duration : float
-        Time over which a load that is known at all times is looked at, and a term followed [s].
+        Time interval for a load without a span and for a load term [s].
     """
 
-    chosen: Chosen[LoadSpec]
     duration: float = 3600.0
-
-    def __str__(self) -> str:
-        return str(self.chosen)
-
-    def fresh(self) -> Any:
-        """Return a new load or term."""
-        return self.chosen.spec.factory(self.chosen.options)
-
-    @cached_property
-    def load(self) -> Any:
-        """One load or term for all checks."""
-        return self.fresh()
 
     @cached_property
     def intervals(self) -> list[tuple[float, float]]:
-        """Intervals of time at which the load is known [s]."""
-        first, last = self.load.span or (0.0, self.duration)
+        """Time intervals at which the load is known [s]."""
+        first, last = self.instance.span or (0.0, self.duration)
         return [(first + a * (last - first), first + b * (last - first)) for a, b in _PARTS]
 
     def forces(self, start: float, stop: float) -> FloatArray:
-        """Return the load in the middle of many equal parts of an interval [N]."""
-        middles = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
-        forces: FloatArray = self.load.force(start + (stop - start) * middles)
+        """Return the load at the midpoints of equal parts of an interval [N]."""
+        midpoints = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
+        forces: FloatArray = self.instance.force(start + (stop - start) * midpoints)
         return forces
 
+    @cached_property
+    def term_state(self) -> tuple[FloatArray, FloatArray, float]:
+        """States of a term for three rollers, their powers [W], and the largest state."""
+        power = np.array([0.0, 0.05, 0.2])
+        start = self.instance.advance(np.zeros(3), power[::-1].copy(), 0.2 * self.duration)
+        return np.asarray(start), power, float(np.abs(start).max())
 
-ANY: Checks[LoadBench] = Checks(spec_checks())
-BASE: Checks[LoadBench] = Checks()
-TERM: Checks[LoadBench] = Checks()
-_LOAD = "wearsim.plugins.Load"
+
+ANY: Checks[LoadFixture] = Checks(spec_checks())
+BASE: Checks[LoadFixture] = Checks()
+TERM: Checks[LoadFixture] = Checks()
 
 
-@ANY.promised_in("wearsim.plugins.LoadSpec")
-def role_is_what_the_factory_builds(bench: LoadBench) -> None:
+@ANY.specified_in("wearsim.plugins.LoadSpec")
+def factory_matches_role(fixture: LoadFixture) -> None:
     """The factory of a base builds a Load, that of a term a LoadTerm."""
-    role = bench.chosen.spec.role
-    wanted = Load if role == "base" else LoadTerm
-    built = type(bench.load).__name__
+    role = fixture.configured.spec.role
+    required = Load if role == "base" else LoadTerm
     require(
-        isinstance(bench.load, wanted), f"{role} needs a {wanted.__name__}, and {built} is none"
+        isinstance(fixture.instance, required),
+        f"{role} requires a {required.__name__}, not a {type(fixture.instance).__name__}",
     )
 
 
-@BASE.promised_in("wearsim.plugins.Load.span")
-def span_is_a_stretch_of_time(bench: LoadBench) -> None:
-    """The span is None or goes from a first to a last time; the stiffness is not negative."""
-    span = bench.load.span
-    told = f"the span is {span}, neither None nor a first and a last time"
-    require(span is None or (len(span) == 2 and span[0] < span[1]), told)
-    require(bench.load.stiffness >= 0.0, f"the stiffness is {bench.load.stiffness:g} N/m")
+@BASE.specified_in("wearsim.plugins.Load.span")
+def span_is_an_interval(fixture: LoadFixture) -> None:
+    """The span is None or a first and a last time; the stiffness is not negative."""
+    span, stiffness = fixture.instance.span, fixture.instance.stiffness
+    require(
+        span is None or (len(span) == 2 and span[0] < span[1]),
+        f"the span is {span}, neither None nor a first and a last time",
+    )
+    require(stiffness >= 0.0, f"the stiffness is {stiffness:g} N/m")
 
 
-@BASE.promised_in("wearsim.plugins.Load.force")
-def force_is_the_same_however_it_is_asked(bench: LoadBench) -> None:
-    """The force is finite, shaped as the times, and the same for each time however it is asked."""
-    times = np.linspace(*bench.intervals[0], 60)
-    kept = times.copy()
-    forces = np.array(bench.load.force(times))
-    require(np.array_equal(times, kept), "force changes the times it is given")
+@BASE.specified_in("wearsim.plugins.Load.force")
+def force_is_elementwise(fixture: LoadFixture) -> None:
+    """The force is finite, has the shape of the times, and depends on each time individually."""
+    times = np.linspace(*fixture.intervals[0], 60)
+    original = times.copy()
+    forces = np.array(fixture.instance.force(times))
+    require(np.array_equal(times, original), "force changes its input")
     require(forces.shape == times.shape, f"force has the shape {forces.shape}, not {times.shape}")
-    require(bool(np.isfinite(forces).all()), "force is not finite")
-    square = bench.fresh().force(times.reshape(6, 10))
-    require(np.array_equal(square, forces.reshape(6, 10)), "times of shape (6, 10) differ")
+    require(np.isfinite(forces).all(), "force is not finite")
+    reshaped = fixture.fresh().force(times.reshape(6, 10))
+    require(
+        np.array_equal(reshaped, forces.reshape(6, 10)),
+        "the force at times of shape (6, 10) differs",
+    )
 
 
-@BASE.promised_in("wearsim.plugins.Load.mean")
-def mean_is_that_of_the_force(bench: LoadBench) -> None:
-    """The mean is exact: that of the force, and of the means of its parts."""
-    for start, stop in bench.intervals:
-        forces = bench.forces(start, stop)
-        size = 1e-3 * float(np.ptp(forces))
-        told = f"the mean from {start:g} to {stop:g} s, against that of the force,"
-        agree(told, bench.load.mean(start, stop), forces.mean(), 1e-6, 1e3 * size)
+@BASE.specified_in("wearsim.plugins.Load.mean")
+def mean_matches_force(fixture: LoadFixture) -> None:
+    """The mean is exact: it equals the mean of the force, and of the means of sub-intervals."""
+    load = fixture.instance
+    for start, stop in fixture.intervals:
+        forces = fixture.forces(start, stop)
+        name, mean = f"the mean from {start:g} to {stop:g} s", load.mean(start, stop)
+        agree(f"{name}, compared with the force,", mean, forces.mean(), 1e-6, float(np.ptp(forces)))
         middle = start + 0.3 * (stop - start)
-        parts = 0.3 * bench.load.mean(start, middle) + 0.7 * bench.load.mean(middle, stop)
-        told = f"the mean from {start:g} to {stop:g} s, against those of its parts,"
-        agree(told, bench.load.mean(start, stop), parts, 1e-7)
+        parts = 0.3 * load.mean(start, middle) + 0.7 * load.mean(middle, stop)
+        agree(f"{name}, compared with its sub-intervals,", mean, parts, 1e-7)
 
 
-@BASE.promised_in("wearsim.plugins.Load.deviation")
-def deviation_is_that_of_the_force(bench: LoadBench) -> None:
-    """The deviation is exact: that of the force."""
-    for start, stop in bench.intervals:
-        forces = bench.forces(start, stop)
-        told = f"the deviation from {start:g} to {stop:g} s, against that of the force,"
-        # mean squares of a short part of a long log cancel to some 1e-6 of the force
-        size = 5e-3 * float(np.abs(forces).max())
-        agree(told, bench.load.deviation(start, stop), forces.std(), 1e-3, size)
-
-
-@BASE.promised_in("wearsim.plugins.Load.extremes")
-def extremes_hold_the_force(bench: LoadBench) -> None:
-    """The force lies between its extremes, and reaches them."""
-    for start, stop in bench.intervals:
-        forces = bench.forces(start, stop)
-        low, high = bench.load.extremes(start, stop)
-        told = f"from {start:g} to {stop:g} s the extremes are {low:.9g} to {high:.9g} N"
-        # those of the default are sampled, and may just miss a peak
-        room = 1e-3 * float(np.ptp(forces)) + 1e-9 * float(np.abs(forces).max())
-        least, most = float(forces.min()), float(forces.max())
-        told += f" where the force goes from {least:.9g} to {most:.9g} N"
-        require(low <= least + room and high >= most - room, told)
-        require(low >= least - room and high <= most + room, told)
-
-
-def _states(bench: LoadBench) -> tuple[FloatArray, FloatArray]:
-    """Return the states that a term reaches from nothing, and powers [W], one per roller."""
-    power = np.array([0.0, 0.05, 0.2])
-    start = bench.load.advance(np.zeros(3), power[::-1].copy(), 0.2 * bench.duration)
-    return np.asarray(start), power
-
-
-@TERM.promised_in("wearsim.plugins.LoadTerm.advance")
-def two_half_steps_are_one(bench: LoadBench) -> None:
-    """A term advanced in two steps is where one step takes it, and no time changes nothing."""
-    state, power = _states(bench)
-    for part in (1e-3, 0.1, 1.0):
-        time = part * bench.duration
-        whole = bench.load.advance(state, power, time)
-        half = bench.load.advance(bench.load.advance(state, power, 0.5 * time), power, 0.5 * time)
-        size = float(np.abs(state).max())
+@BASE.specified_in("wearsim.plugins.Load.deviation")
+def deviation_matches_force(fixture: LoadFixture) -> None:
+    """The deviation is exact: it equals the standard deviation of the force."""
+    for start, stop in fixture.intervals:
+        forces = fixture.forces(start, stop)
         agree(
-            f"two steps of {0.5 * time:g} s, against one of {time:g} s,", half, whole, 1e-10, size
+            f"the deviation from {start:g} to {stop:g} s, compared with the force,",
+            fixture.instance.deviation(start, stop),
+            forces.std(),
+            1e-3,
+            # cancellation in mean squares of a short part of a long log: some 1e-6 of the force
+            5e-3 * float(np.abs(forces).max()),
         )
-    still = bench.load.advance(state, power, 0.0)
-    agree("the state after no time", still, state, 1e-12)
 
 
-@TERM.promised_in("wearsim.plugins.LoadTerm.mean_force")
-def mean_force_follows_the_state(bench: LoadBench) -> None:
-    """The mean force of an interval is that of the state, which is the force, as it advances."""
-    state, power = _states(bench)
-    steps = 1000
+@BASE.specified_in("wearsim.plugins.Load.extremes")
+def extremes_bound_force(fixture: LoadFixture) -> None:
+    """The extremes are the smallest and the largest force."""
+    for start, stop in fixture.intervals:
+        forces = fixture.forces(start, stop)
+        extremes = fixture.instance.extremes(start, stop)
+        sampled = float(forces.min()), float(forces.max())
+        # the default implementation samples the force and can miss a peak slightly
+        slack = 1e-3 * float(np.ptp(forces)) + 1e-9 * float(np.abs(forces).max())
+        require(
+            all(abs(a - b) <= slack for a, b in zip(extremes, sampled, strict=True)),
+            f"from {start:g} to {stop:g} s the extremes are {extremes[0]:.9g} to"
+            f" {extremes[1]:.9g} N, and the force varies from {sampled[0]:.9g} to"
+            f" {sampled[1]:.9g} N",
+        )
+
+
+@TERM.specified_in("wearsim.plugins.LoadTerm.advance")
+def two_half_steps_equal_one(fixture: LoadFixture) -> None:
+    """Two half steps of a term equal one step, and a step of zero duration changes nothing."""
+    term, (state, power, size) = fixture.instance, fixture.term_state
     for part in (1e-3, 0.1, 1.0):
-        time = part * bench.duration
-        total, now = np.zeros_like(state), bench.load.advance(state, power, 0.5 * time / steps)
-        for _ in range(steps):
-            total = total + now / steps
-            now = bench.load.advance(now, power, time / steps)
-        # the middles of equal steps leave an error in the square of a step over the term's memory
-        told = f"the mean force of {time:g} s, against the advancing state,"
-        size = float(np.abs(state).max())
-        agree(told, bench.load.mean_force(state, power, time), total, 1e-3, size)
-        after = bench.load.advance(state, power, 0.25 * time)
-        parts = 0.25 * bench.load.mean_force(state, power, 0.25 * time)
-        parts = parts + 0.75 * bench.load.mean_force(after, power, 0.75 * time)
-        told = f"the mean force of {time:g} s, against those of its parts,"
-        agree(told, bench.load.mean_force(state, power, time), parts, 1e-10, size)
+        time = part * fixture.duration
+        halves = term.advance(term.advance(state, power, 0.5 * time), power, 0.5 * time)
+        name = f"two steps of {0.5 * time:g} s, compared with one of {time:g} s,"
+        agree(name, halves, term.advance(state, power, time), 1e-10, size)
+    agree("the state after zero time", term.advance(state, power, 0.0), state, 1e-12)
 
 
-@TERM.promised_in("wearsim.plugins.LoadTerm")
-def rollers_go_by_themselves(bench: LoadBench) -> None:
-    """Every roller has its own number, that depends on no other's."""
-    state, power = _states(bench)
-    kept = state.copy(), power.copy()
+@TERM.specified_in("wearsim.plugins.LoadTerm.mean_force")
+def mean_force_matches_state(fixture: LoadFixture) -> None:
+    """The mean force of an interval equals the mean of the state, which is the force."""
+    term, (state, power, size) = fixture.instance, fixture.term_state
+    for part in (1e-3, 0.1, 1.0):
+        time = part * fixture.duration
+        total, current = np.zeros_like(state), term.advance(state, power, 0.5 * time / _STEPS)
+        for _ in range(_STEPS):
+            total = total + current / _STEPS
+            current = term.advance(current, power, time / _STEPS)
+        name, mean = f"the mean force over {time:g} s", term.mean_force(state, power, time)
+        # the midpoint rule has an error in the square of a step over the time constant
+        agree(f"{name}, compared with the advancing state,", mean, total, 1e-3, size)
+        later = term.advance(state, power, 0.25 * time)
+        parts = 0.25 * term.mean_force(state, power, 0.25 * time)
+        parts = parts + 0.75 * term.mean_force(later, power, 0.75 * time)
+        agree(f"{name}, compared with its sub-intervals,", mean, parts, 1e-10, size)
+
+
+@TERM.specified_in("wearsim.plugins.LoadTerm")
+def rollers_are_independent(fixture: LoadFixture) -> None:
+    """The value of a roller does not depend on the other rollers."""
+    state, power, _ = fixture.term_state
+    original = state.copy(), power.copy()
     for name in ("advance", "mean_force"):
-        together = np.asarray(getattr(bench.load, name)(state, power, bench.duration))
+        together = np.asarray(getattr(fixture.instance, name)(state, power, fixture.duration))
         require(together.shape == (3,), f"{name} has the shape {together.shape} for 3 rollers")
-        require(bool(np.isfinite(together).all()), f"{name} is not finite")
-        unchanged = np.array_equal(state, kept[0]) and np.array_equal(power, kept[1])
-        require(unchanged, f"{name} changes what it is given")
-        fresh = bench.fresh()
-        alone = [getattr(fresh, name)(state[k : k + 1], power[k : k + 1], bench.duration)[0]
-                 for k in range(3)]  # fmt: skip
-        require(np.array_equal(together, alone), f"{name} of one roller depends on the others")
+        require(np.isfinite(together).all(), f"{name} is not finite")
+        require(np.array_equal((state, power), original), f"{name} changes its input")
+        compute = getattr(fixture.fresh(), name)
+        separate = [
+            compute(state[k : k + 1], power[k : k + 1], fixture.duration)[0] for k in range(3)
+        ]
+        require(np.array_equal(together, separate), f"{name} of one roller depends on the others")
 
 
-@TERM.promised_in("wearsim.plugins.LoadTerm.lag")
-def lag_is_a_first_order_lag(bench: LoadBench) -> None:
-    """A term that says it is a first-order lag is one, with that gain and time constant."""
-    lag = bench.load.lag()
+@TERM.specified_in("wearsim.plugins.LoadTerm.lag")
+def lag_parameters_match(fixture: LoadFixture) -> None:
+    """A term with a `lag` is a first-order lag with this gain and time constant."""
+    lag = fixture.instance.lag()
     if lag is None:
         return
     gain, constant = lag
     require(constant > 0.0, f"the time constant is {constant:g} s")
-    state, power = _states(bench)
+    state, power, _ = fixture.term_state
     for time in (0.1 * constant, constant, 5.0 * constant):
-        rest, left = gain * power, np.exp(-time / constant)
-        told = f"after {time:g} s, by a lag of {gain:g} N/W and {constant:g} s,"
-        expected = rest + (state - rest) * left
-        agree(f"the state {told}", bench.load.advance(state, power, time), expected, 1e-9)
-        mean = rest + (state - rest) * (1.0 - left) * constant / time
-        agree(f"the mean force {told}", bench.load.mean_force(state, power, time), mean, 1e-9)
+        rest, decay = gain * power, np.exp(-time / constant)
+        when = f"after {time:g} s, for a lag of {gain:g} N/W and {constant:g} s,"
+        expected = rest + (state - rest) * decay
+        agree(f"the state {when}", fixture.instance.advance(state, power, time), expected, 1e-9)
+        mean = rest + (state - rest) * (1.0 - decay) * constant / time
+        agree(f"the mean force {when}", fixture.instance.mean_force(state, power, time), mean, 1e-9)
 
 
 BY_ROLE = {"base": Checks(ANY, BASE), "term": Checks(ANY, TERM)}

@@ -1,33 +1,42 @@
-"""What every spec promises, and how the kit gets from a name and raw options to the thing."""
+"""Specs under test: options, instances, and the requirements common to all specs."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from wearsim.plugins import Options, Quantity, Spec, registry
+from wearsim.plugins import (
+    ContactModelSpec,
+    LoadSpec,
+    Options,
+    Quantity,
+    RandomInputSpec,
+    WearLawSpec,
+    registry,
+)
 from wearsim.testing.checks import Checks, require
 
 if TYPE_CHECKING:
     from wearsim.units import Kind
 
-S = TypeVar("S", bound=Spec)
+S = TypeVar("S", ContactModelSpec, WearLawSpec, LoadSpec, RandomInputSpec)
 
 
 @dataclass(frozen=True)
-class Chosen(Generic[S]):
-    """A spec with options as a scenario would write them.
+class ConfiguredSpec(Generic[S]):
+    """A spec with options as written in a scenario.
 
     Parameters
     ----------
     spec : Spec
-        What a plugin yields.
+        The spec that the hook yields.
     raw : mapping of str to object
         Its options, quantities with their units: ``{"stiffness": "690 N/mm"}``.
     kind : Kind, optional
-        What a random input stands for; nothing for a plain number.
+        Kind of quantity of a random input; None for a plain number.
     files : mapping of str to str
         Content of the files that the options name.
     """
@@ -46,45 +55,67 @@ class Chosen(Generic[S]):
         return self.spec.options.model_validate(dict(self.raw), context=context)
 
     def __str__(self) -> str:
-        told = ", ".join(f"{key} = {value!r}" for key, value in self.raw.items())
-        return f"{self.spec.kind} '{self.spec.name}'" + (f" with {told}" if told else "")
+        options = ", ".join(f"{key} = {value!r}" for key, value in self.raw.items())
+        return f"{self.spec.kind} '{self.spec.name}'" + (f" with {options}" if options else "")
 
 
-def found(kind: type[S], spec: S | str) -> S:
-    """Return a spec, looked up among the installed plugins where it is given by name."""
+@dataclass(frozen=True)
+class Fixture(Generic[S]):
+    """A configured spec under test.
+
+    Parameters
+    ----------
+    configured : ConfiguredSpec
+        The spec and its options.
+    """
+
+    configured: ConfiguredSpec[S]
+
+    def __str__(self) -> str:
+        return str(self.configured)
+
+    def fresh(self) -> Any:
+        """Return a new instance."""
+        return self.configured.spec.factory(self.configured.options)
+
+    @cached_property
+    def instance(self) -> Any:
+        """The instance that all checks share: earlier calls must not change later results."""
+        return self.fresh()
+
+
+def resolve(kind: type[S], spec: S | str) -> S:
+    """Return a spec; a name is looked up among the installed plugins."""
     return registry().get(kind, spec) if isinstance(spec, str) else spec
 
 
 def spec_checks() -> Checks[Any]:
-    """Return what every spec promises; its bench has a `chosen`."""
+    """Return the checks of any spec; their fixtures have an attribute `configured`."""
     checks: Checks[Any] = Checks()
 
-    @checks.promised_in("wearsim.plugins.Spec")
-    def spec_says_what_it_is(bench: Any) -> None:
-        """A spec has a name of lower-case words, and one line that says what it is."""
-        spec = bench.chosen.spec
+    @checks.specified_in("wearsim.plugins.Spec")
+    def spec_is_complete(fixture: Any) -> None:
+        """A spec has a name of lower-case words and a summary of one line."""
+        spec = fixture.configured.spec
         require(
-            re.fullmatch(r"[a-z][a-z0-9]*(-[a-z0-9]+)*", spec.name) is not None,
-            f"the name {spec.name!r} is not made of lower-case words joined by hyphens",
+            re.fullmatch(r"[a-z][a-z0-9]*(-[a-z0-9]+)*", spec.name),
+            f"the name {spec.name!r} does not consist of lower-case words joined by hyphens",
         )
+        require(spec.summary.strip() and "\n" not in spec.summary, "the summary is not one line")
         require(
-            bool(spec.summary.strip()) and "\n" not in spec.summary, "the summary is not one line"
-        )
-        references = spec.references
-        require(
-            isinstance(references, tuple) and all(isinstance(item, str) for item in references),
-            "the references are not a tuple of texts",
+            isinstance(spec.references, tuple)
+            and all(isinstance(item, str) for item in spec.references),
+            "the references are not a tuple of strings",
         )
 
-    @checks.promised_in("wearsim.plugins.Options")
-    def options_refuse_what_they_do_not_know(bench: Any) -> None:
-        """Options refuse keys that they do not know, and do not change."""
-        model = bench.chosen.spec.options
+    @checks.specified_in("wearsim.plugins.Options")
+    def options_reject_unknown_keys(fixture: Any) -> None:
+        """Options reject unknown keys and are immutable."""
+        model = fixture.configured.spec.options
         require(issubclass(model, Options), f"{model.__name__} is not derived from Options")
-        config = model.model_config
         require(
-            config.get("extra") == "forbid" and bool(config.get("frozen")),
-            f"{model.__name__} takes keys that it does not know, or can be changed",
+            model.model_config.get("extra") == "forbid" and model.model_config.get("frozen"),
+            f"{model.__name__} accepts unknown keys, or its values can be changed",
         )
 
     return checks

@@ -1,15 +1,12 @@
-"""What any wear law keeps, on a contact whose strips are known in closed form."""
+"""Conformance tests of wear laws, on a contact known in closed form."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from wearsim.plugins import BODIES, Body, WearLaw, WearLawSpec
 from wearsim.testing.checks import Checks, agree, require
-from wearsim.testing.specs import Chosen, spec_checks
+from wearsim.testing.specs import Fixture, spec_checks
 from wearsim.types import ContactSolution, FloatArray, Grid
 
 _SPEED = 2.618
@@ -18,16 +15,16 @@ _HALF_WIDTH, _HALF_LENGTH = 1.5e-3, 1.3e-4
 
 
 def sliding_contact(strips: int, speed: float = _SPEED, slides: float = 1.0) -> ContactSolution:
-    """Return a Hertzian ellipse that slides, cut into strips.
+    """Return a sliding Hertzian ellipse, divided into strips.
 
     Parameters
     ----------
     strips : int
-        Over twice the patch's width, so that half of them lie outside it.
+        Number of strips over twice the patch's width; half of them are outside the patch.
     speed : float
         Rolling speed [m/s].
     slides : float
-        Part of the creepage that it slides with; at 0 it is loaded and nothing slides.
+        Slip as a fraction of the creepage; 0 is a loaded contact without slip.
     """
     grid = Grid.spanning(-2.0 * _HALF_WIDTH, 2.0 * _HALF_WIDTH, strips)
     inside = np.maximum(1.0 - (grid.y / _HALF_WIDTH) ** 2, 0.0)
@@ -50,109 +47,99 @@ def sliding_contact(strips: int, speed: float = _SPEED, slides: float = 1.0) -> 
     )
 
 
-@dataclass(frozen=True)
-class WearLawBench:
-    """A wear law with options."""
-
-    chosen: Chosen[WearLawSpec]
-
-    def __str__(self) -> str:
-        return str(self.chosen)
-
-    def fresh(self) -> WearLaw:
-        """Return a new wear law."""
-        return self.chosen.spec.factory(self.chosen.options)
-
-    @cached_property
-    def law(self) -> WearLaw:
-        """One law for all checks."""
-        return self.fresh()
+class WearLawFixture(Fixture[WearLawSpec]):
+    """A wear law under test."""
 
     def depth(self, body: Body, contact: ContactSolution, speed: float = _SPEED) -> FloatArray:
         """Return the depth of one pass [m]."""
-        return self.law.depth_per_pass(body, contact, speed)
+        return np.asarray(self.instance.depth_per_pass(body, contact, speed))
 
 
-WEAR_LAW: Checks[WearLawBench] = Checks(spec_checks())
+WEAR_LAW: Checks[WearLawFixture] = Checks(spec_checks())
 _DEPTH = "wearsim.plugins.WearLaw.depth_per_pass"
 
 
-@WEAR_LAW.promised_in("wearsim.plugins.WearLawSpec")
-def factory_builds_a_wear_law(bench: WearLawBench) -> None:
+@WEAR_LAW.specified_in("wearsim.plugins.WearLawSpec")
+def factory_builds_a_wear_law(fixture: WearLawFixture) -> None:
     """The factory builds a WearLaw."""
-    require(isinstance(bench.law, WearLaw), f"{type(bench.law).__name__} is no WearLaw")
+    law = fixture.instance
+    require(isinstance(law, WearLaw), f"{type(law).__name__} is not a WearLaw")
 
 
-@WEAR_LAW.promised_in(_DEPTH)
-def depth_is_never_negative(bench: WearLawBench) -> None:
-    """The depth has the strips' shape, is finite and never negative."""
+@WEAR_LAW.specified_in(_DEPTH)
+def depth_is_never_negative(fixture: WearLawFixture) -> None:
+    """The depth has the shape of the strips, is finite and never negative."""
     contact = sliding_contact(200)
     for body in BODIES:
-        depth = np.asarray(bench.depth(body, contact))
+        depth = fixture.depth(body, contact)
         require(depth.shape == contact.y.shape, f"{body}: the depth has the shape {depth.shape}")
-        require(bool(np.isfinite(depth).all()), f"{body}: the depth is not finite")
+        require(np.isfinite(depth).all(), f"{body}: the depth is not finite")
         require(float(depth.min()) >= 0.0, f"{body}: the depth falls to {depth.min():.3g} m")
 
 
-@WEAR_LAW.promised_in(_DEPTH)
-def nothing_wears_outside_the_contact(bench: WearLawBench) -> None:
-    """Nothing wears where nothing touches."""
+@WEAR_LAW.specified_in(_DEPTH)
+def no_wear_outside_contact(fixture: WearLawFixture) -> None:
+    """The depth is zero where the line load is zero."""
     contact = sliding_contact(200)
-    outside = contact.line_load == 0.0
     for body in BODIES:
-        most = float(bench.depth(body, contact)[outside].max())
-        require(most == 0.0, f"{body}: {most:.3g} m wear off where nothing touches")
+        largest = float(fixture.depth(body, contact)[contact.line_load == 0.0].max())
+        require(largest == 0.0, f"{body}: the depth outside the contact is up to {largest:.3g} m")
 
 
-@WEAR_LAW.promised_in("wearsim.plugins.WearLaw")
-def nothing_wears_where_nothing_slides(bench: WearLawBench) -> None:
-    """Nothing wears where nothing is dissipated."""
+@WEAR_LAW.specified_in("wearsim.plugins.WearLaw")
+def no_wear_without_dissipation(fixture: WearLawFixture) -> None:
+    """The depth is zero where the dissipation is zero."""
     contact = sliding_contact(200, slides=0.0)
     for body in BODIES:
-        most = float(bench.depth(body, contact).max())
-        require(most == 0.0, f"{body}: {most:.3g} m wear off a contact that dissipates nothing")
+        largest = float(fixture.depth(body, contact).max())
+        require(largest == 0.0, f"{body}: the depth without dissipation is up to {largest:.3g} m")
 
 
-@WEAR_LAW.promised_in("wearsim.plugins.WearLaw.depth_per_dissipation")
-def linear_law_is_linear(bench: WearLawBench) -> None:
-    """A depth per dissipation, where given, is the depth over the dissipation of any contact."""
+@WEAR_LAW.specified_in("wearsim.plugins.WearLaw.depth_per_dissipation")
+def linear_factor_matches_depth(fixture: WearLawFixture) -> None:
+    """The depth per dissipation, if given, is the depth over the dissipation of any contact."""
     for body in BODIES:
         for speed in (_SPEED, 3.0 * _SPEED):
-            factor = bench.law.depth_per_dissipation(body, speed)
+            factor = fixture.instance.depth_per_dissipation(body, speed)
             if factor is None:
                 continue
             require(np.isfinite(factor) and factor >= 0.0, f"{body}: the factor is {factor}")
             for slides in (1.0, 0.3):
                 contact = sliding_contact(200, speed, slides)
-                depth = bench.depth(body, contact, speed)
-                told = f"{body}, V = {speed:g} m/s: the depth, by depth_per_dissipation,"
-                agree(told, depth, factor * contact.dissipation, 1e-12)
+                agree(
+                    f"{body}, V = {speed:g} m/s: the depth, compared with depth_per_dissipation,",
+                    fixture.depth(body, contact, speed),
+                    factor * contact.dissipation,
+                    1e-12,
+                )
 
 
-@WEAR_LAW.promised_in(_DEPTH)
-def depth_does_not_depend_on_the_strips(bench: WearLawBench) -> None:
-    """The depth at a place is the same however fine the strips are."""
+@WEAR_LAW.specified_in(_DEPTH)
+def depth_independent_of_strips(fixture: WearLawFixture) -> None:
+    """The depth at a position does not depend on the width of the strips."""
     coarse, fine = sliding_contact(400), sliding_contact(1600)
     for body in BODIES:
-        own = bench.depth(body, coarse)
-        found = np.interp(coarse.y, fine.y, bench.depth(body, fine))
-        # a law may have a threshold, beside which one strip falls on the other side
-        apart = float(np.abs(own - found).sum())
-        told = f"{body}: the depth of 400 strips is not that of 1600, by {apart:.3g} m in all"
-        require(apart <= 0.02 * float(own.sum()), told)
+        depth = fixture.depth(body, coarse)
+        refined = np.interp(coarse.y, fine.y, fixture.depth(body, fine))
+        # a law can have a threshold, next to which one strip differs
+        difference = float(np.abs(depth - refined).sum())
+        require(
+            difference <= 0.02 * float(depth.sum()),
+            f"{body}: the depths of 400 and 1600 strips differ by {difference:.3g} m in total",
+        )
 
 
-@WEAR_LAW.promised_in(_DEPTH)
-def depth_has_the_same_bits_twice(bench: WearLawBench) -> None:
-    """The same contact wears the same bits, and is left as it was."""
-    contact = sliding_contact(200)
+@WEAR_LAW.specified_in(_DEPTH)
+def depth_is_reproducible(fixture: WearLawFixture) -> None:
+    """The same contact has the same depth bit for bit, and is not changed."""
+    contact, original = sliding_contact(200), sliding_contact(200)
     for body in BODIES:
-        first = np.array(bench.depth(body, contact))
-        bench.depth(body, sliding_contact(200, slides=0.5))
-        require(np.array_equal(first, bench.depth(body, contact)), f"{body}: a second call differs")
-        anew = bench.fresh().depth_per_pass(body, contact, _SPEED)
-        require(np.array_equal(first, anew), f"{body}: a new law differs")
-    same = sliding_contact(200)
+        first = fixture.depth(body, contact).copy()
+        fixture.depth(body, sliding_contact(200, slides=0.5))
+        repeated = fixture.depth(body, contact)
+        require(np.array_equal(first, repeated), f"{body}: a second call differs")
+        repeated = fixture.fresh().depth_per_pass(body, contact, _SPEED)
+        require(np.array_equal(first, repeated), f"{body}: a new law differs")
     for name in ("half_length", "line_load", "dissipation"):
-        unchanged = np.array_equal(getattr(contact, name), getattr(same, name))
-        require(unchanged, f"depth_per_pass changes the {name} that it is given")
+        unchanged = np.array_equal(getattr(contact, name), getattr(original, name))
+        require(unchanged, f"depth_per_pass changes the {name} of its input")

@@ -1,4 +1,4 @@
-"""Every random input that is installed keeps what its role promises; those that do not are told."""
+"""Conformance tests of the installed random inputs, and of mutants of them."""
 
 from __future__ import annotations
 
@@ -11,17 +11,16 @@ from wearsim.models.random.distributions import Disc, DiscOptions
 from wearsim.models.random.friction_fields import White, WhiteOptions
 from wearsim.models.random.processes import OrnsteinUhlenbeck, OrnsteinUhlenbeckOptions
 from wearsim.plugins import Distribution, Options, RandomInputSpec, registry
-from wearsim.testing import PromiseBroken, random_input_tests
-from wearsim.testing.random_bench import RandomBench
-from wearsim.testing.random_inputs import BY_ROLE
-from wearsim.testing.specs import Chosen
+from wearsim.testing import ConformanceError, random_input_tests
+from wearsim.testing.random_inputs import BY_ROLE, RandomInputFixture
+from wearsim.testing.specs import ConfiguredSpec
 from wearsim.units import ANGLE, FORCE
 
 FILES = {"loads.csv": "value [N]\n280\n300\n300\n340\n", "table.csv":
          "probability, value [N]\n0, 250\n0.3, 290\n1, 350\n"}  # fmt: skip
 LOAD = {"kind": FORCE, "files": FILES}
 FRICTION = {"marginal": ("uniform", {"low": 0.08, "high": 0.12})}
-GIVEN = {
+TESTED = {
     "maxent": [
         ({"support": ["0 N", "inf"], "mean": "307 N", "std": "32 N"}, LOAD),
         ({"support": ["-inf", "inf"], "mean": "307 N", "std": "32 N"}, LOAD),
@@ -48,14 +47,14 @@ GIVEN = {
     ],
 }
 
-for name, cases in GIVEN.items():
-    for number, (options, more) in enumerate(cases):
+for name, cases in TESTED.items():
+    for number, (options, keywords) in enumerate(cases):
         item = f"test_{name.replace('-', '_')}_{number}"
-        globals()[item] = random_input_tests(name, options, **more)
+        globals()[item] = random_input_tests(name, options, **keywords)
 
 
-def test_that_every_random_input_is_put_to_the_test():
-    assert set(GIVEN) == set(registry().names(RandomInputSpec))
+def test_all_installed_random_inputs_are_tested():
+    assert set(TESTED) == set(registry().names(RandomInputSpec))
 
 
 class Flat(Distribution):
@@ -77,25 +76,25 @@ def uniform():
     return Flat()
 
 
-def bench(thing, role="scalar", **changes):
-    spec = {"name": "mutant", "options": Options, "summary": "breaks a promise"} | changes
-    made = RandomInputSpec(factory=lambda options: thing(), role=role, **spec)
-    return RandomBench(Chosen(made))
+def fixture(input_class, role="scalar", **changes):
+    spec = {"name": "mutant", "options": Options, "summary": "violates a requirement"} | changes
+    spec = RandomInputSpec(factory=lambda options: input_class(), role=role, **spec)
+    return RandomInputFixture(ConfiguredSpec(spec))
 
 
 def flat(**members):
-    return type("Spoilt", (Flat,), members)
+    return type("Mutant", (Flat,), members)
 
 
-class Counting(Flat):
-    asked = 0
+class Drifting(Flat):
+    calls = 0
 
     def quantile(self, probability):
-        self.asked += 1
-        return super().quantile(probability) * (1.0 + 1e-15 * self.asked)
+        self.calls += 1
+        return super().quantile(probability) * (1.0 + 1e-15 * self.calls)
 
 
-class Writing(Flat):
+class ChangesInput(Flat):
     def quantile(self, probability):
         found = super().quantile(probability)
         if np.ndim(probability):
@@ -109,7 +108,7 @@ class Slack(Disc):
 
 
 def slack(**members):
-    return type("Spoilt", (Slack,), members)
+    return type("Mutant", (Slack,), members)
 
 
 class Noise(White):
@@ -118,10 +117,10 @@ class Noise(White):
 
 
 def noise(**members):
-    return type("Spoilt", (Noise,), members)
+    return type("Mutant", (Noise,), members)
 
 
-class Grounded(Noise):
+class UnknownFrame(Noise):
     def __init__(self):
         super().__init__()
         self.frame = "ground"
@@ -134,107 +133,108 @@ class Wander(OrnsteinUhlenbeck):
 
 
 def wander(**members):
-    return type("Spoilt", (Wander,), members)
+    return type("Mutant", (Wander,), members)
 
 
-def standing(field, x, y, uniforms):
+def _uniform_in_space(field, x, y, uniforms):
     return field.marginal.quantile(np.full(x.shape, 0.3))
 
 
 MUTANTS = {
     "scalar": {
-        "spec-says-what-it-is": [],
-        "options-refuse-what-they-do-not-know": [],
-        "role-is-what-the-factory-builds": [Slack],
-        "quantile-rises-within-the-support": [
+        "spec-is-complete": [],
+        "options-reject-unknown-keys": [],
+        "factory-matches-role": [Slack],
+        "quantile-rises-within-support": [
             flat(support=(2.1, 4.0)),
             flat(quantile=lambda self, p: 4.0 - 2.0 * p, support=(4.0, 2.0)),
             flat(quantile=lambda self, p: 2.0 + 2.0 * p + 0.5 * np.sin(6 * np.pi * p)),
             flat(quantile=lambda self, p: np.where(p == 0.5, np.nan, 2.0 + 2.0 * p)),
         ],
-        "quantile-takes-any-shape": [flat(quantile=lambda self, p: np.ravel(2.0 + 2.0 * p))],
-        "quantile-has-the-same-bits-twice": [Counting, Writing],
-        "mean-and-std-are-those-of-the-quantiles": [flat(mean=3.01), flat(std=0.6)],
-        "cdf-and-pdf-belong-to-the-quantiles": [
+        "quantile-keeps-shape": [flat(quantile=lambda self, p: np.ravel(2.0 + 2.0 * p))],
+        "quantile-is-reproducible": [Drifting, ChangesInput],
+        "mean-and-std-match-quantile": [flat(mean=3.01), flat(std=0.6)],
+        "cdf-and-pdf-match-quantile": [
             flat(cdf=lambda self, value: 0.5 * (value - 2.01)),
             flat(pdf=lambda self, value: np.full_like(value, 0.51)),
         ],
     },
     "joint": {
         "components-are-named": [slack(components=("yaw", "yaw")), slack(mean=(0.0,))],
-        "joint-draws-keep-mean-and-reach": [
+        "joint-draws-match-mean-and-reach": [
             slack(reach=(1e-3, 1e-3)),
             slack(mean=(1e-4, 0.0)),
             slack(values=lambda self, uniform: uniform[:, :1]),
         ],
-        "joint-draws-have-the-same-bits-alone": [
+        "joint-draws-independent-of-batch": [
             slack(values=lambda self, uniform: uniform * len(uniform))
         ],
     },
     "field": {
-        "field-stays-in-its-marginal": [
-            Grounded,
-            noise(values=standing),
+        "field-matches-marginal": [
+            UnknownFrame,
+            noise(values=_uniform_in_space),
             noise(
                 values=lambda self, x, y, u: (
                     self.marginal.quantile(u(0, x.size)).reshape(x.shape) * 1.05
                 )
             ),
         ],
-        "field-has-the-same-bits-twice": [noise(values=standing)],
-        "field-tells-which-grids-are-too-coarse": [
+        "field-is-reproducible": [noise(values=_uniform_in_space)],
+        "field-reports-coarse-grids": [
             noise(unresolved=lambda self, along, across: "too coarse"),
             noise(unresolved=lambda self, along, across: False),
         ],
     },
     "process": {
-        "path-begins-with-the-shorter-one": [
+        "longer-path-extends-shorter": [
             wander(path=lambda self, points, u: self.marginal.quantile(u(0, points)[::-1])),
             wander(path=lambda self, points, u: np.full(points, 3.0)),
         ],
-        "process-stays-in-its-marginal": [
+        "process-matches-marginal": [
             wander(path=lambda self, points, u: 2.0 + 2.5 * u(0, points)),
             wander(path=lambda self, points, u: np.full(points, 3.0)),
         ],
     },
 }
-OF_ALL = set(list(MUTANTS["scalar"])[:3])
+COMMON = set(list(MUTANTS["scalar"])[:3])
 CASES = [
-    pytest.param(role, name, thing, id=f"{name}-{number}")
+    pytest.param(role, name, input_class, id=f"{name}-{number}")
     for role, checks in MUTANTS.items()
-    for name, things in checks.items()
-    for number, thing in enumerate(things)
+    for name, classes in checks.items()
+    for number, input_class in enumerate(classes)
 ]
 
 
-@pytest.mark.parametrize(("role", "name", "thing"), CASES)
-def test_that_a_broken_promise_is_told(role, name, thing):
-    with pytest.raises(PromiseBroken, match="random input 'mutant': "):
-        BY_ROLE[role][name](bench(thing, role))
+@pytest.mark.parametrize(("role", "name", "input_class"), CASES)
+def test_violations_are_reported(role, name, input_class):
+    with pytest.raises(ConformanceError, match="random input 'mutant': "):
+        BY_ROLE[role][name](fixture(input_class, role))
 
 
 @pytest.mark.parametrize(
-    ("role", "thing"), [("scalar", Flat), ("joint", Slack), ("field", Noise), ("process", Wander)]
+    ("role", "input_class"),
+    [("scalar", Flat), ("joint", Slack), ("field", Noise), ("process", Wander)],
 )
-def test_that_what_mutants_are_made_of_keeps_every_promise(role, thing):
+def test_base_classes_of_the_mutants_conform(role, input_class):
     for check in BY_ROLE[role]:
-        check(bench(thing, role))
+        check(fixture(input_class, role))
 
 
-def test_that_every_check_has_a_random_input_that_fails_it():
+def test_every_check_has_a_failing_random_input():
     for role, checks in MUTANTS.items():
-        assert set(BY_ROLE[role].names) == set(checks) | OF_ALL
+        assert set(BY_ROLE[role].names) == set(checks) | COMMON
 
 
 @pytest.mark.parametrize("change", [{"name": "Flat"}, {"summary": "two\nlines"}])
-def test_that_a_broken_spec_is_told(change):
-    with pytest.raises(PromiseBroken):
-        BY_ROLE["scalar"]["spec-says-what-it-is"](bench(Flat, **change))
+def test_invalid_specs_are_reported(change):
+    with pytest.raises(ConformanceError):
+        BY_ROLE["scalar"]["spec-is-complete"](fixture(Flat, **change))
 
 
-def test_that_open_options_are_told():
-    loose = SimpleNamespace(chosen=SimpleNamespace(spec=SimpleNamespace(
+def test_mutable_options_are_reported():
+    loose = SimpleNamespace(configured=SimpleNamespace(spec=SimpleNamespace(
         options=type("Loose", (Options,), {"model_config": {"frozen": False}}))))  # fmt: skip
-    check = BY_ROLE["scalar"]["options-refuse-what-they-do-not-know"]
-    with pytest.raises(PromiseBroken, match="can be changed"):
+    check = BY_ROLE["scalar"]["options-reject-unknown-keys"]
+    with pytest.raises(ConformanceError, match="can be changed"):
         check(loose)

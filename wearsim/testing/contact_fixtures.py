@@ -1,4 +1,4 @@
-"""The contacts on which a contact model is put to the test."""
+"""Contacts for the conformance tests of contact models."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from wearsim.plugins import Capabilities, ContactModel, ContactModelSpec
-from wearsim.testing.specs import Chosen
+from wearsim.testing.specs import Fixture
 from wearsim.types import (
     ContactSolution,
     Creepage,
@@ -27,7 +27,7 @@ STRIPS = ("half_length", "line_load", "dissipation")
 
 @dataclass(frozen=True)
 class ContactCase:
-    """The contact that the checks start from: by default a steel roller on a steel cylinder.
+    """The base contact of the checks: by default a steel roller on a steel cylinder.
 
     Parameters
     ----------
@@ -40,15 +40,15 @@ class ContactCase:
     rolling_speed : float
         V [m/s].
     materials : tuple of Material
-        The cylinder's and the roller's.
+        Materials of cylinder and roller.
     width : float
-        Width of the strips together [m]; the contact must lie within, also when it is a fifth of
-        a crown's patch off centre.
+        Total width of the strips [m]; it must contain the contact, also if the contact is off
+        centre by a fifth of the width of a crown's patch.
     strips : int
-        Their number; convergence is looked at with two and four times as many.
+        Number of strips; convergence is checked with two and four times as many.
     tolerance : float
-        Relative error with which balances must hold: round-off for closed forms, more for a model
-        that integrates over points.
+        Relative error allowed in the balances: round-off for closed forms, more for a model that
+        integrates over points.
     """
 
     normal_force: float = 300.0
@@ -72,16 +72,17 @@ class ContactCase:
         return Grid.spanning(-0.5 * self.width, 0.5 * self.width, times * self.strips)
 
     def gap(self, grid: Grid, centre: float = 0.0, groove: float = 0.0) -> FloatArray:
-        """Return the gap of a crown whose apex lies at `centre` on a shallow groove, (strips,).
+        """Return the gap of a crown over a shallow groove, shape (strips,) [m].
 
         Parameters
         ----------
         grid : Grid
             The strips.
         centre : float
-            Position of the apex as a part of the width.
+            Position of the crown's apex as a fraction of the width.
         groove : float
-            Depth of the groove, beside the apex, as a part of the gap at an eighth of the width.
+            Depth of the groove next to the apex, as a fraction of the gap at an eighth of the
+            width.
         """
         y = grid.y - centre * self.width
         depth = groove * (0.125 * self.width) ** 2 / (2.0 * self.crown_radius)
@@ -100,60 +101,56 @@ CREEPAGES = {
 
 
 @dataclass(frozen=True)
-class ContactBench:
-    """A contact model with options, and the contacts that it is asked to solve.
+class ContactFixture(Fixture[ContactModelSpec]):
+    """A contact model under test, and the contacts to solve.
 
     Parameters
     ----------
-    chosen : Chosen
+    configured : ConfiguredSpec
         The model's spec and options.
     case : ContactCase
-        The contact to start from.
+        The base contact.
     """
 
-    chosen: Chosen[ContactModelSpec]
     case: ContactCase = field(default_factory=ContactCase)
 
-    def __str__(self) -> str:
-        return str(self.chosen)
-
     def fresh(self, grid: Grid | None = None) -> ContactModel:
-        """Return a new model, prepared for `grid`, by default that of the case."""
-        model = self.chosen.spec.factory(self.chosen.options)
+        """Return a new model, prepared for `grid`, by default the grid of the case."""
+        model: ContactModel = super().fresh()
         model.prepare(self.grid if grid is None else grid, self.case.materials)
         return model
 
     @cached_property
     def grid(self) -> Grid:
-        """The case's strips."""
+        """The strips of the case."""
         return self.case.grid()
 
-    @cached_property
+    @property
     def model(self) -> ContactModel:
-        """One model for all checks: what it was asked before must not matter."""
-        return self.fresh()
+        """The model that all checks share."""
+        return self.instance  # type: ignore[no-any-return]
 
     @property
     def capabilities(self) -> Capabilities:
-        """What the model says that it can take."""
+        """The capabilities that the model claims."""
         return self.model.capabilities
 
-    @cached_property
+    @property
     def gap(self) -> FloatArray:
-        """The gap of a crown in the middle of the strips [m]."""
-        return self.case.gap(self.grid)
+        """Gap of a crown in the middle of the strips [m]."""
+        return self.gaps["fresh"]
 
     @cached_property
     def gaps(self) -> Mapping[str, FloatArray]:
-        """Gaps of several kinds [m]: fresh, off centre and worn."""
+        """Gaps by description: fresh, off centre and worn [m]."""
         return {
-            "fresh": self.gap,
+            "fresh": self.case.gap(self.grid),
             "off centre": self.case.gap(self.grid, centre=0.05),
             "worn": self.case.gap(self.grid, centre=-0.02, groove=0.3),
         }
 
     def point(self, creepage: Creepage | None = None, **changes: Any) -> OperatingPoint:
-        """Return the case's operating point with a creepage and other values of its own."""
+        """Return the operating point of the case with another creepage and other values."""
         case = self.case
         point = OperatingPoint(
             case.normal_force, case.rolling_speed, creepage or Creepage(1e-3), case.friction
@@ -167,27 +164,31 @@ class ContactBench:
         wear_compliance: FloatArray | None = None,
         warm: ContactSolution | None = None,
     ) -> ContactSolution:
-        """Solve one contact with the shared model; by default the fresh one in the middle."""
-        own = self.gap if gap is None else gap
-        asked = self.point() if point is None else point
-        return self.model.solve(own, self.case.curvature, asked, wear_compliance, warm)
+        """Solve one contact with the shared model, by default the base contact."""
+        return self.model.solve(
+            self.gap if gap is None else gap,
+            self.case.curvature,
+            point or self.point(),
+            wear_compliance,
+            warm,
+        )
 
     @cached_property
     def solution(self) -> ContactSolution:
-        """The solved contact of the case."""
+        """The solution of the base contact."""
         return self.solve()
 
     @cached_property
     def solutions(self) -> Mapping[str, tuple[OperatingPoint, ContactSolution]]:
-        """Contacts on all gaps and with all creepages, by what they are."""
+        """Operating points and solutions of all gaps with all creepages, by description."""
         return {
-            f"{name}, {how}": (point, self.solve(point, gap))
-            for name, gap in self.gaps.items()
-            for how, point in ((how, self.point(creep)) for how, creep in CREEPAGES.items())
+            f"{shape}, {slip}": (point, self.solve(point, gap))
+            for shape, gap in self.gaps.items()
+            for slip, point in ((slip, self.point(creep)) for slip, creep in CREEPAGES.items())
         }
 
     @property
     def sliding_power(self) -> float:
-        """Power of the whole load sliding at the case's creepage [W]; a size to measure against."""
+        """Power of the whole load sliding at the base creepage [W], a scale for differences."""
         case = self.case
         return case.friction * case.normal_force * case.rolling_speed * 1e-3
