@@ -17,7 +17,7 @@ from wearsim.errors import ResultsFileError
 from wearsim.results import (
     DissipationData,
     DissipationResult,
-    is_dissipation,
+    kind_of,
     open_dissipation,
     open_results,
     read_dissipation,
@@ -83,7 +83,7 @@ def test_that_every_bit_of_a_study_comes_back(tmp_path, count, kept):
     assert found.variables.keys() == data.variables.keys()
     for name, array in data.variables.items():
         assert found.variables[name].tobytes() == array.tobytes(), name
-    assert is_dissipation(path)
+    assert kind_of(path) == "dissipation"
 
 
 def test_that_equal_studies_give_equal_files(tmp_path):
@@ -117,7 +117,7 @@ def test_that_statistics_stand_in_the_file_for_other_readers(study_file):
 def test_that_the_wrong_kind_of_file_is_told_in_a_line(study_file, tmp_path):
     run_file = tmp_path / "run.h5"
     write_results(run_file, some_run())
-    assert not is_dissipation(run_file)
+    assert kind_of(run_file) == "run"
     with pytest.raises(ResultsFileError) as caught:
         open_results(study_file)
     assert str(caught.value) == (
@@ -165,7 +165,7 @@ def test_that_a_study_that_is_not_as_written_is_told(study_file, change, complai
 def test_that_a_truncated_study_is_told(study_file):
     study_file.write_bytes(study_file.read_bytes()[:-100])
     with pytest.raises(ResultsFileError, match="is truncated"):
-        is_dissipation(study_file)
+        kind_of(study_file)
 
 
 def test_that_each_word_of_a_study_names_its_variable(study_file):

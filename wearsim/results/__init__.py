@@ -8,7 +8,7 @@ from wearsim.results.ensemble.reader import read_ensemble
 from wearsim.results.ensemble.result import EnsembleResult, open_ensemble
 from wearsim.results.ensemble.writer import EnsembleFile
 from wearsim.results.io.overwrite_guard import check_output, refuse_inputs, same_file
-from wearsim.results.io.reader import is_dissipation, kind_of, read_dissipation, read_results
+from wearsim.results.io.reader import kind_of, read_dissipation, read_results
 from wearsim.results.io.writer import write_results
 from wearsim.results.run.data import RunData
 from wearsim.results.run.result import Result, open_results
@@ -24,7 +24,6 @@ __all__ = [
     "RunData",
     "check_output",
     "export_csv",
-    "is_dissipation",
     "kind_of",
     "open_dissipation",
     "open_ensemble",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path, PurePosixPath
 from typing import Any, TypeAlias
@@ -33,10 +34,8 @@ _UNITS = {"m": ("um", 1e-6), "m^3": ("mm^3", 1e-9), "s": ("min", 60.0), "Pa": ("
     "N/m": ("N/mm", 1e3)
 }
 _IN_MM = {"y", "width", "half_length"}  # other lengths are written in um
-_DEPTHS = {"cylinder_depth_profile", "roller_depth_profile"}
 _SCALARS = ("steps", "solves", "depth_error", "volume_error", "control")
 _BLOCK = 16384  # realisations in memory at a time
-_OTHER_INPUTS = "inputs"  # folder for input files that cannot keep their path
 
 
 def _unit(name: str, unit: str) -> Unit:
@@ -141,11 +140,8 @@ def _path_in_folder(path: str, used: Iterable[str]) -> str:
     if inside and str(pure) not in used:
         return str(pure)
     name = pure.name.replace("..", "_").replace(":", "_") or "file"
-    new, number = f"{_OTHER_INPUTS}/{name}", 1
-    while new in used:
-        number += 1
-        new = f"{_OTHER_INPUTS}/{number}-{name}"
-    return new
+    prefixes = itertools.chain([""], (f"{number}-" for number in itertools.count(2)))
+    return next(new for prefix in prefixes if (new := f"inputs/{prefix}{name}") not in used)
 
 
 def _ensemble_tables(result: EnsembleResult) -> dict[str, Iterable[str]]:
@@ -235,7 +231,7 @@ def _records(raw: RunData, name: str) -> Iterator[Column]:
     """Yield y, and a column for every record and contact."""
     yield from _columns("y", raw.static["y"], ("y",), "y")
     dims = ("y", *VARIABLES[name].dims[1:-1])
-    quantity = "depth" if name in _DEPTHS else name
+    quantity = "depth" if name.endswith("depth_profile") else name
     for passes, array in zip(raw.records["record_passes"], raw.records[name], strict=True):
         title = f"{quantity} at {passes:.12g} passes"
         yield from _columns(name, np.moveaxis(array, -1, 0), dims, title)

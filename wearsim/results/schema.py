@@ -109,11 +109,11 @@ def with_random_inputs(schema: Schema, inputs: Sequence[Mapping[str, str]]) -> S
     -------
     Schema
     """
-    drawn = {}
-    for item in inputs:
-        rollers = ("roller",) if item.get("rollers") == "each" else ()
-        key, dims = item["key"], ("realisation", *rollers)
-        drawn[key] = Variable(key, dims, item["unit"], "drawn value", "record")
+    dims = {"": ("realisation",), "each": ("realisation", "roller")}
+    drawn = by_name(
+        Variable(item["key"], dims[item.get("rollers", "")], item["unit"], "drawn value", "record")
+        for item in inputs
+    )
     return replace(schema, variables={**schema.variables, **drawn})
 
 

@@ -35,8 +35,9 @@ class StudyResult(Generic[Data]):
         """The scenario, parsed from the text and the files stored with the results."""
         from wearsim.scenario import parse_scenario  # noqa: PLC0415  (reading results needs none)
 
-        raw = self.raw
-        return parse_scenario(raw.scenario_text, raw.scenario_file, raw.files.__getitem__)
+        return parse_scenario(
+            self.raw.scenario_text, self.raw.scenario_file, self.raw.files.__getitem__
+        )
 
     @property
     def title(self) -> str:

@@ -89,8 +89,8 @@ class DissipationResult(StudyResult[DissipationData]):
         points : int
             Approximate number of points, evenly spaced in the logarithm of the sample size.
         """
-        counts = np.geomspace(1, self.count, min(points, self.count)).round().astype(np.int64)
-        return converge(self.power, np.unique(counts))
+        counts = np.geomspace(1, self.count, min(points, self.count)).round()
+        return converge(self.power, np.unique(counts.astype(np.int64)))
 
 
 def summaries(variables: Arrays) -> dict[str, Summary]:
@@ -106,7 +106,7 @@ def summaries(variables: Arrays) -> dict[str, Summary]:
 
 
 def as_numbers(found: dict[str, Summary]) -> dict[str, Any]:
-    """Return summaries ready for JSON, with None for estimates that are not finite."""
+    """Return estimates ready for JSON, with None where they are not finite."""
     return {name: _finite(asdict(summary)) for name, summary in found.items()}
 
 

@@ -6,16 +6,6 @@ from collections.abc import Mapping, Sequence
 
 from wearsim.results.schema import Axis, Schema, Variable, by_name, with_random_inputs
 
-FORMAT = "wearsim-dissipation"
-VERSION = 1
-
-AXES: Mapping[str, Axis] = by_name(
-    (
-        Axis("realisation", "realisation of the random inputs", 0),
-        Axis("kept", "realisation whose dissipation per strip is stored", 0),
-    )
-)
-
 _DRAW = ("realisation",)
 _STRIPS = ("y",)
 _PER_LENGTH = "dissipated power per axial length"
@@ -54,13 +44,17 @@ VARIABLES: Mapping[str, Variable] = by_name(
         ),
     )
 )
-"""Variables by name."""
 
 DISSIPATION = Schema(
-    FORMAT,
-    VERSION,
+    "wearsim-dissipation",
+    1,
     "realisations of one contact, from `wearsim dissipation`",
-    AXES,
+    by_name(
+        (
+            Axis("realisation", "realisation of the random inputs", 0),
+            Axis("kept", "realisation whose dissipation per strip is stored", 0),
+        )
+    ),
     VARIABLES,
 )
 """Schema without the random inputs, which differ between studies."""

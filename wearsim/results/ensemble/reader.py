@@ -90,5 +90,8 @@ def _parts(path: Path, file: h5py.File) -> EnsembleFileParts:
         for row in np.flatnonzero(status == FAILED).tolist()
     }
     data = EnsembleData(**attributes, **state, variables=arrays, status=status, errors=errors)
-    state_extents = hdf5_read.extents(file[hdf5_write.CHECKPOINT], state_slots.PLACES)
-    return EnsembleFileParts(data, extents | state_extents, number)
+    return EnsembleFileParts(
+        data,
+        extents | hdf5_read.extents(file[hdf5_write.CHECKPOINT], state_slots.PLACES),
+        number,
+    )

@@ -15,10 +15,10 @@ from wearsim.results.ensemble.reader import read_ensemble
 from wearsim.results.ensemble.schema import DONE, OBSERVABLES, QUANTILES, kept_profiles
 from wearsim.results.study_result import StudyResult
 from wearsim.types import FloatArray, IntArray
-from wearsim.uq.estimation.control_variate import Control
 from wearsim.uq.estimation.estimates import Design, Estimate, estimate
 from wearsim.uq.estimation.intervals import Interval
 from wearsim.uq.estimation.moments import summarise
+from wearsim.uq.estimation.standard_errors import Control
 from wearsim.uq.sampling.plans import REPLICATES
 
 if TYPE_CHECKING:
@@ -225,8 +225,13 @@ class EnsembleResult(StudyResult[EnsembleData]):
         return self._estimate(self.independent(name, record)[1], probabilities)
 
     def _estimate(self, values: FloatArray, probabilities: tuple[float, ...]) -> Estimate:
-        replicate = self.numbers[self._independent] % REPLICATES
-        return estimate(values, probabilities, self.design, replicate, self._control)
+        return estimate(
+            values,
+            probabilities,
+            self.design,
+            self.numbers[self._independent] % REPLICATES,
+            self._control,
+        )
 
     @property
     def design(self) -> Design:
@@ -241,8 +246,8 @@ class EnsembleResult(StudyResult[EnsembleData]):
         if self.design != "control-variate":
             return None
         known = self.raw.control
-        error = known["std"] / np.sqrt(known["draws"])
-        return Control(self.values("control"), known["mean"], error)
+        mean_error = known["std"] / np.sqrt(known["draws"])
+        return Control(self.values("control"), known["mean"], mean_error)
 
     def estimate_for(self, target: Target) -> Estimate:
         """Return the estimate to which a target applies."""
@@ -337,8 +342,9 @@ class EnsembleResult(StudyResult[EnsembleData]):
             group: np.column_stack([v.reshape(self.count, -1) for of, v in drawn if of == group])
             for group in groups
         }
-        found = first_order(self.at_end(name), numbers)
-        return {group: (index, None) for group, index in found.items()}
+        return {
+            group: (index, None) for group, index in first_order(self.at_end(name), numbers).items()
+        }
 
     def statistics(self) -> dict[str, FloatArray]:
         """Return the variables of the file that are estimates, by name."""
@@ -348,8 +354,8 @@ class EnsembleResult(StudyResult[EnsembleData]):
             found[f"{name}_mean"], found[f"{name}_std"] = course.mean, course.std
             found[f"{name}_quantiles"] = np.array([course.quantiles[p] for p in QUANTILES])
         band = self.band()
-        profile = {part: getattr(band, part) for part in ("mean", "std", "low", "high")}
-        return found | {f"depth_profile_{part}": values for part, values in profile.items()}
+        parts = ("mean", "std", "low", "high")
+        return found | {f"depth_profile_{part}": getattr(band, part) for part in parts}
 
     def is_constant(self, name: str) -> bool:
         """Return whether an observable is equal in all realisations, within rounding."""

@@ -10,9 +10,6 @@ import numpy as np
 
 from wearsim.results.schema import Axis, Schema, Variable, by_name, with_random_inputs
 
-FORMAT = "wearsim-ensemble"
-VERSION = 1
-
 PENDING, DONE, FAILED = 0, 1, 2
 """Values of the status of a realisation."""
 ERROR_BYTES = 400
@@ -20,15 +17,6 @@ ERROR_BYTES = 400
 QUANTILES = (0.025, 0.05, 0.25, 0.5, 0.75, 0.95, 0.975)
 """Probabilities of the quantiles stored in the file."""
 MOST_KEPT = 4_000_000  # stored numbers of worn profiles, 32 MB
-
-AXES: Mapping[str, Axis] = by_name(
-    (
-        Axis("realisation", "realisation of the random inputs", 0),
-        Axis("record", "record of a test; record 0 is the start of the run", 0),
-        Axis("roller", "roller; identical rollers are merged"),
-        Axis("kept", "realisation whose worn profile is stored", 0),
-    )
-)
 
 _DRAW = ("realisation",)
 _HISTORY = ("realisation", "record")
@@ -135,10 +123,17 @@ STATISTICS: Mapping[str, Variable] = by_name(
 """Estimates over the realisations; nan until the ensemble is finished."""
 
 ENSEMBLE = Schema(
-    FORMAT,
-    VERSION,
+    "wearsim-ensemble",
+    1,
     "an ensemble of wear tests, from `wearsim ensemble`",
-    AXES,
+    by_name(
+        (
+            Axis("realisation", "realisation of the random inputs", 0),
+            Axis("record", "record of a test; record 0 is the start of the run", 0),
+            Axis("roller", "roller; identical rollers are merged"),
+            Axis("kept", "realisation whose worn profile is stored", 0),
+        )
+    ),
     {**STATIC, "quantile": _QUANTILE, **_OUTCOMES, **OBSERVABLES, **STATISTICS},
 )
 """Schema without the random inputs, which differ between studies, and the control variate."""
@@ -159,9 +154,8 @@ def ensemble_schema(inputs: Sequence[Mapping[str, str]], control: Mapping[str, A
     Schema
     """
     schema = with_random_inputs(ENSEMBLE, inputs)
-    if not control:
-        return schema
-    return replace(schema, variables={**schema.variables, "control": _CONTROL})
+    last = {"control": _CONTROL} if control else {}
+    return replace(schema, variables={**schema.variables, **last})
 
 
 def is_row(variable: Variable) -> bool:

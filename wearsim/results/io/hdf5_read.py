@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import h5py
@@ -48,24 +46,6 @@ class Extent:
     def at(self, row: int) -> int:
         """Return the position of a row in the file."""
         return self.offset + row * self.row_bytes
-
-
-@contextmanager
-def opened(path: Path) -> Iterator[h5py.File]:
-    """Open an HDF5 file for reading, without a lock since its structure never changes.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Raises
-    ------
-    OSError
-        If it is not HDF5, or truncated.
-    """
-    with h5py.File(path, "r", locking=False) as file:
-        yield file
 
 
 def get_text(dataset: h5py.Dataset) -> str:

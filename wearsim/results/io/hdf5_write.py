@@ -84,8 +84,6 @@ class SparseImage:
             done += _PAGE - inside
 
 
-SIGNATURE = b"\x89HDF\r\n\x1a\n"
-
 CHECKPOINT, INPUTS, ABOUT, SCENARIO, FILES = "checkpoint", "inputs", "about", "scenario", "files"
 
 ERRORS = "surrogatepass"  # so that every Python string can be stored
@@ -93,8 +91,6 @@ ERRORS = "surrogatepass"  # so that every Python string can be stored
 _LABEL_LENGTH = 1000  # an attribute holds 64 kB at most
 
 _SCALAR = h5s.create(h5s.SCALAR)
-
-_ORDERED = h5p.CRT_ORDER_TRACKED | h5p.CRT_ORDER_INDEXED
 
 _number = itertools.count()
 
@@ -122,8 +118,7 @@ def file_image(content: Content) -> bytes:
     with _new_file(name.encode(), access) as file:
         _put_content(file, content)
         h5f.flush(file)
-        image: bytes = file.get_file_image()
-    return image
+        return bytes(file.get_file_image())
 
 
 def sparse_image(content: Content) -> SparseImage:
@@ -158,7 +153,7 @@ def sparse_image(content: Content) -> SparseImage:
 def _new_file(name: bytes, access: Any) -> Iterator[Any]:
     access.set_fclose_degree(h5f.CLOSE_STRONG)
     creation = h5p.create(h5p.FILE_CREATE)
-    creation.set_link_creation_order(_ORDERED)
+    creation.set_link_creation_order(h5p.CRT_ORDER_TRACKED | h5p.CRT_ORDER_INDEXED)
     creation.set_obj_track_times(False)
     file = h5f.create(name, h5f.ACC_TRUNC, creation, access)
     try:
@@ -184,10 +179,9 @@ def _put_labels(file: Any, content: Content) -> None:
     for name, value in content.attributes.items():
         if isinstance(value, str):
             _put_attribute(file, name, value[:_LABEL_LENGTH])
-        elif isinstance(value, bool | np.bool_):
-            _put_attribute(file, name, int(value))  # netCDF has no booleans
-        elif isinstance(value, int | float | np.number):
-            _put_attribute(file, name, value)
+        elif isinstance(value, int | float | np.number | np.bool_):
+            is_bool = isinstance(value, bool | np.bool_)
+            _put_attribute(file, name, int(value) if is_bool else value)  # netCDF has no booleans
 
 
 def _put_variables(file: Any, content: Content, lengths: Mapping[str, int]) -> None:
@@ -196,12 +190,18 @@ def _put_variables(file: Any, content: Content, lengths: Mapping[str, int]) -> N
     datasets: dict[str, Any] = {}
     for axis in schema.axes.values():
         numbers = np.arange(axis.first, axis.first + lengths[axis.name])
-        scales[axis.name] = _put_array(file, axis.name, numbers)
-        _describe(scales[axis.name], "1", axis.long_name)
+        scales[axis.name] = _put_array(
+            file, axis.name, numbers, units="1", long_name=axis.long_name
+        )
     for name, variable in schema.variables.items():
-        put = _reserve if name in content.reserved else _put_array
-        dataset = put(file, name, content.variables[name])
-        _describe(dataset, variable.unit, variable.long_name)
+        dataset = _put_array(
+            file,
+            name,
+            content.variables[name],
+            name in content.reserved,
+            units=variable.unit,
+            long_name=variable.long_name,
+        )
         (scales if variable.dims == (name,) else datasets)[name] = dataset
     for name, scale in scales.items():
         h5ds.set_scale(scale, name.encode())
@@ -211,11 +211,11 @@ def _put_variables(file: Any, content: Content, lengths: Mapping[str, int]) -> N
 
 
 def _put_inputs(group: Any, content: Content) -> None:
-    _put_text(group, SCENARIO, content.scenario_text)
-    _put_text(group, ABOUT, json.dumps(content.attributes, default=as_plain))
+    _put_array(group, SCENARIO, _text(content.scenario_text))
+    _put_array(group, ABOUT, _text(json.dumps(content.attributes, default=as_plain)))
     files = _group(group, FILES)
     for number, (path, text) in enumerate(content.files.items()):
-        _put_attribute(_put_text(files, str(number), text), "path", path)
+        _put_array(files, str(number), _text(text), path=path)
 
 
 def _group(group: Any, name: str) -> Any:
@@ -224,72 +224,50 @@ def _group(group: Any, name: str) -> Any:
     return h5g.create(group, name.encode(), gcpl=creation)
 
 
-def _describe(dataset: Any, unit: str, long_name: str) -> None:
-    _put_attribute(dataset, "units", unit)
-    _put_attribute(dataset, "long_name", long_name)
-
-
-def _put_array(group: Any, name: str, array: npt.NDArray[Any]) -> Any:
-    array = np.asarray(array, order="C")
+def _put_array(
+    group: Any, name: str, array: npt.NDArray[Any], reserved: bool = False, **labels: str
+) -> Any:
+    """Write an array, or only allocate its space, which leaves a hole in the file."""
+    kind = _type_of(array.dtype)
     space = h5s.create_simple(array.shape) if array.ndim else _SCALAR
-    dataset = h5d.create(group, name.encode(), _type_of(array.dtype), space, _creation())
-    if array.size:
-        dataset.write(h5s.ALL, h5s.ALL, array)
-    return dataset
-
-
-def _reserve(group: Any, name: str, array: npt.NDArray[Any]) -> Any:
-    """Allocate the space of an array without writing it, which leaves a hole in the file."""
-    creation = _creation().copy()
-    creation.set_alloc_time(h5d.ALLOC_TIME_EARLY)
-    creation.set_fill_time(h5d.FILL_TIME_NEVER)
-    space = h5s.create_simple(array.shape)
-    return h5d.create(group, name.encode(), _type_of(array.dtype), space, creation)
-
-
-def _put_text(group: Any, name: str, text: str) -> Any:
-    content, kind = _text(text)
-    dataset = h5d.create(group, name.encode(), kind, _SCALAR, _creation())
-    dataset.write(h5s.ALL, h5s.ALL, content, kind)
+    dataset = h5d.create(group, name.encode(), kind, space, _creation(reserved))
+    if array.size and not reserved:
+        dataset.write(h5s.ALL, h5s.ALL, np.asarray(array, order="C"), kind)
+    for label, text in labels.items():
+        _put_attribute(dataset, label, text)
     return dataset
 
 
 def _put_attribute(target: Any, name: str, value: object) -> None:
-    if isinstance(value, str):
-        content, kind = _text(value)
-    else:
-        content = np.asarray(value)
-        kind = _type_of(content.dtype)
+    content = _text(value) if isinstance(value, str) else np.asarray(value)
+    kind = _type_of(content.dtype)
     h5a.create(target, name.encode(), kind, _SCALAR).write(content, kind)
 
 
-def _text(text: str) -> tuple[npt.NDArray[Any], Any]:
-    """Return a text as an array with its HDF5 type of fixed length, up to 4 GB without a heap."""
+def _text(text: str) -> npt.NDArray[Any]:
+    """Return a text as an array of fixed length, which needs no heap and may have up to 4 GB."""
     content = text.encode("utf-8", ERRORS)
-    size = len(content) + 1
-    return np.array(content, f"S{size}"), _text_type(size)
-
-
-@lru_cache(maxsize=256)
-def _text_type(size: int) -> Any:
-    kind = h5t.C_S1.copy()
-    kind.set_size(size)
-    kind.set_cset(h5t.CSET_UTF8)
-    kind.set_strpad(h5t.STR_NULLTERM)
-    return kind
+    return np.array(content, f"S{len(content) + 1}")
 
 
 @lru_cache(maxsize=256)
 def _type_of(dtype: np.dtype[Any]) -> Any:
     if dtype.kind == "S":
-        return _text_type(dtype.itemsize)
+        kind = h5t.C_S1.copy()
+        kind.set_size(dtype.itemsize)
+        kind.set_cset(h5t.CSET_UTF8)
+        kind.set_strpad(h5t.STR_NULLTERM)
+        return kind
     if dtype.kind not in "biuf":
         raise ValueError(f"an array of {dtype} cannot be stored")
     return h5t.py_create(dtype, logical=True)
 
 
-@lru_cache(maxsize=1)
-def _creation() -> Any:
+@lru_cache(maxsize=2)
+def _creation(reserved: bool) -> Any:
     creation = h5p.create(h5p.DATASET_CREATE)
     creation.set_obj_track_times(False)
+    if reserved:
+        creation.set_alloc_time(h5d.ALLOC_TIME_EARLY)
+        creation.set_fill_time(h5d.FILL_TIME_NEVER)
     return creation

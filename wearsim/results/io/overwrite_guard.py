@@ -9,8 +9,8 @@ from pathlib import Path
 from wearsim.errors import ResultsFileError
 from wearsim.results.io.file_lock import refuse_if_locked
 
-OTHER_KINDS = (".png", ".pdf", ".svg", ".toml", ".csv")
-"""Suffixes of figures, scenarios and tables, which are refused for results files."""
+# suffixes of figures, scenarios and tables, which are refused for results files
+_OTHER_KINDS = (".png", ".pdf", ".svg", ".toml", ".csv")
 
 
 def refuse_inputs(
@@ -72,7 +72,7 @@ def check_output(path: str | Path, force: bool, inputs: Iterable[Path] = ()) -> 
     refuse_inputs(path, inputs)
     target, suffix = Path(path).resolve(), Path(path).suffix
     folder = target.parent
-    if suffix.lower() in OTHER_KINDS:
+    if suffix.lower() in _OTHER_KINDS:
         raise ResultsFileError(
             f"{path}: no results file ends in {suffix}; choose another name with -o, such as"
             f" {Path(path).with_suffix('.h5').name}"

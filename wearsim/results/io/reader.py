@@ -21,6 +21,7 @@ from wearsim.results.schema import Schema, axis_lengths
 if TYPE_CHECKING:
     import h5py
 
+_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _SMALLEST = 96  # bytes: no HDF5 file is shorter
 # exceptions of h5py, json and numpy on damaged content
 _DAMAGE = (OSError, RuntimeError, ValueError, TypeError, KeyError, AttributeError, OverflowError)
@@ -80,11 +81,6 @@ def kind_of(path: str | Path) -> FileKind:
     return read_file(path, lambda file: _kind(path, file)[0])
 
 
-def is_dissipation(path: str | Path) -> bool:
-    """Return whether a results file holds a dissipation study; raises as `read_results`."""
-    return kind_of(path) == "dissipation"
-
-
 def read_file(path: str | Path, take: Callable[[h5py.File], Stored]) -> Stored:
     """Open a file and return what `take` reads from it.
 
@@ -100,19 +96,22 @@ def read_file(path: str | Path, take: Callable[[h5py.File], Stored]) -> Stored:
     ResultsFileError
         As `read_results`.
     """
-    from wearsim.results.io import hdf5_read, hdf5_write  # noqa: PLC0415  (h5py takes 0.2 s to import)
+    import h5py  # noqa: PLC0415  (takes 0.2 s to import)
 
-    _check_signature(path, hdf5_write.SIGNATURE)
+    _check_signature(path)
     try:
-        with hdf5_read.opened(Path(path)) as file:
+        # no lock is needed: the structure of a file never changes
+        with h5py.File(path, "r", locking=False) as file:
             return take(file)
     except _DAMAGE as error:
         if "truncated" in str(error):
             raise ResultsFileError(truncated(path)) from error
-        raise ResultsFileError(f"{path}: is damaged ({_first_line(error)})") from error
+        text = str(error.args[0]) if isinstance(error, KeyError) and error.args else str(error)
+        reason = next(iter(text.splitlines()), type(error).__name__)
+        raise ResultsFileError(f"{path}: is damaged ({reason})") from error
 
 
-def _check_signature(path: str | Path, signature: bytes) -> None:
+def _check_signature(path: str | Path) -> None:
     try:
         with Path(path).open("rb") as file:
             start = file.read(_SMALLEST)
@@ -122,7 +121,7 @@ def _check_signature(path: str | Path, signature: bytes) -> None:
         raise ResultsFileError(f"{path}: cannot be read ({error.strerror})") from error
     if not start:
         raise ResultsFileError(f"{path}: is empty")
-    if not (start.startswith(signature) or signature.startswith(start)):
+    if not (start.startswith(_SIGNATURE) or _SIGNATURE.startswith(start)):
         raise ResultsFileError(f"{path}: is not a results file of wearsim, not even HDF5")
     if len(start) < _SMALLEST:
         raise ResultsFileError(truncated(path))
@@ -131,11 +130,6 @@ def _check_signature(path: str | Path, signature: bytes) -> None:
 def truncated(path: str | Path) -> str:
     """Return the error message on a truncated file."""
     return f"{path}: is truncated: its end is missing, as after a copy that was cut short"
-
-
-def _first_line(error: Exception) -> str:
-    text = str(error.args[0]) if isinstance(error, KeyError) and error.args else str(error)
-    return next(iter(text.splitlines()), type(error).__name__)
 
 
 def _kind(path: str | Path, file: h5py.File) -> tuple[FileKind, Schema, str]:
@@ -229,10 +223,13 @@ def read_attributes(
     attributes: dict[str, Any] = json.loads(hdf5_read.get_text(file[about]))
     names = data.attribute_names()
     check_complete(path, {*attributes, *optional}, names)
-    datasets = [file[files][str(number)] for number in range(len(file[files]))]
     return {name: attributes[name] for name in names if name in attributes} | {
         "scenario_text": hdf5_read.get_text(file[scenario]),
-        "files": {hdf5_read.get_label(item, "path"): hdf5_read.get_text(item) for item in datasets},
+        "files": {
+            hdf5_read.get_label(item, "path"): hdf5_read.get_text(item)
+            for number in range(len(file[files]))
+            for item in [file[f"{files}/{number}"]]
+        },
     }
 
 

@@ -83,7 +83,10 @@ def differences(one: RunData, other: RunData) -> list[str]:
 
 
 def _identical(one: npt.NDArray[Any] | None, other: npt.NDArray[Any] | None) -> bool:
-    if one is None or other is None:
-        return False
-    same_type = one.dtype == other.dtype and one.shape == other.shape
-    return same_type and one.tobytes() == other.tobytes()
+    return (
+        one is not None
+        and other is not None
+        and one.dtype == other.dtype
+        and one.shape == other.shape
+        and one.tobytes() == other.tobytes()
+    )

@@ -30,8 +30,8 @@ class Result(StudyResult[RunData]):
     def __repr__(self) -> str:
         passes, total = float(self.passes[-1]), self.raw.total_passes
         done = f"{passes:.12g}" if self.finished else f"{passes:.12g} of {total:.12g}"
-        depth = float(np.max(self.depth[-1]))
-        return f"<Result '{self.title}': {done} roller passes, depth {depth * 1e6:.4g} um>"
+        depth = float(np.max(self.depth[-1])) * 1e6
+        return f"<Result '{self.title}': {done} roller passes, depth {depth:.4g} um>"
 
     def values(self, name: str) -> npt.NDArray[Any]:
         """Return a variable of the results file, axes of length one dropped as above.
@@ -210,10 +210,12 @@ class Result(StudyResult[RunData]):
         last.update({name: last[name].max(axis=0) for name in per_roller})
         # the estimated errors apply to the deeper body and to the volume of both bodies
         deepest = np.maximum(last["depth"], last["roller_depth"])
-        multiplicity = self.raw.static["multiplicity"]
-        volume = last["worn_volume"] + multiplicity @ self.raw.history["roller_worn_volume"][-1]
-        below = np.asarray(self.depth_below_nominal[-1])
-        below_nominal = {"depth_below_nominal_m": _number(below)} if self.start_height.any() else {}
+        rollers = self.raw.static["multiplicity"] @ self.raw.history["roller_worn_volume"][-1]
+        below_nominal = (
+            {"depth_below_nominal_m": _number(np.asarray(self.depth_below_nominal[-1]))}
+            if self.start_height.any()
+            else {}
+        )
         return {
             "passes": _number(last["passes"]),
             "time_s": _number(last["time"]),
@@ -230,7 +232,9 @@ class Result(StudyResult[RunData]):
             "depth_error_m": _number(last["depth_error"]),
             "volume_error_m3": _number(last["volume_error"]),
             "relative_depth_error": _number(_relative(last["depth_error"], deepest)),
-            "relative_volume_error": _number(_relative(last["volume_error"], volume)),
+            "relative_volume_error": _number(
+                _relative(last["volume_error"], last["worn_volume"] + rollers)
+            ),
         }
 
 
@@ -241,8 +245,7 @@ def _number(values: npt.NDArray[Any]) -> Number:
 
 def _relative(error: FloatArray, value: FloatArray) -> FloatArray:
     worn = value > 0.0
-    relative: FloatArray = worn * error / (value + ~worn)  # without division by zero
-    return relative
+    return np.asarray(worn * error / (value + ~worn))  # without division by zero
 
 
 def open_results(path: str | Path) -> Result:

@@ -6,9 +6,7 @@ from collections.abc import Mapping
 
 from wearsim.results.schema import Axis, Schema, Variable, by_name
 
-FORMAT = "wearsim-run"
-VERSION = 1
-
+# every axis except y, whose coordinate is a variable
 AXES: Mapping[str, Axis] = by_name(
     (
         Axis("step", "row of the history; row 0 is the start of the run", 0),
@@ -18,7 +16,6 @@ AXES: Mapping[str, Axis] = by_name(
         Axis("realisation", "realisation of the random inputs"),
     )
 )
-"""Every axis except y, whose coordinate is a variable."""
 
 _UNWORN = ("station", "roller", "realisation", "y")
 _STEP = ("step",)
@@ -113,6 +110,5 @@ VARIABLES: Mapping[str, Variable] = by_name(
         Variable("dissipation", _CONTACT, "W/m", "dissipated power per axial length", "record"),
     )
 )
-"""Variables by name."""
 
-RUN = Schema(FORMAT, VERSION, "a wear test, from `wearsim run`", AXES, VARIABLES)
+RUN = Schema("wearsim-run", 1, "a wear test, from `wearsim run`", AXES, VARIABLES)
