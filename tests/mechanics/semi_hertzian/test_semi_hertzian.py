@@ -7,12 +7,13 @@ from hypothesis import strategies as st
 
 from tests.mechanics.slender.test_influence import direct
 from wearsim.mechanics.hertz.ellipse import hertz
-from wearsim.mechanics.semi_hertzian.contact_level import contact_levels, first_contacts
-from wearsim.mechanics.semi_hertzian.kik_piotrowski import (
+from wearsim.mechanics.semi_hertzian.penetration import (
     CONVERGED,
     NO_CONVERGENCE,
     NOT_FINITE,
     TOO_FINE,
+    contact_levels,
+    first_contacts,
 )
 from wearsim.mechanics.semi_hertzian.solver import (
     ANALYN,

@@ -1,4 +1,4 @@
-"""How the elastic constants of two bodies combine in contact."""
+"""Combined elastic constants of two bodies in contact."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class ElasticPair:
     contact_modulus : float
         E* [Pa], 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2; equals G/(1 - nu).
     dundurs : float
-        Dundurs' second constant beta, the normal-tangential coupling that is neglected.
+        Dundurs' second constant beta; the normal-tangential coupling it causes is neglected.
     """
 
     shear_modulus: float
@@ -30,7 +30,7 @@ class ElasticPair:
 
 
 def combine(first: Material, second: Material) -> ElasticPair:
-    """Combine two materials for contact (eq. 6 of the paper, DOI 10.1016/j.wear.2004.11.012).
+    """Return the combined constants of two bodies (eq. 6 of DOI 10.1016/j.wear.2004.11.012).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Hertz contact of two bodies with paraboloidal gap, exact, for any ratio of curvatures."""
+"""Exact Hertz contact of two bodies with a paraboloidal gap, for any ratio of curvatures."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def elliptic_integrals(complement: float) -> tuple[float, float]:
     Returns
     -------
     first, d_integral : float
-        K and D; E follows as K - e^2 D. Neither loses digits towards the circle, where e = 0.
+        K and D; E = K - e^2 D. Neither loses accuracy near the circle, where e = 0.
 
     Notes
     -----
@@ -70,13 +70,12 @@ def elliptic_integrals(complement: float) -> tuple[float, float]:
     """
     mean, root = 1.0, complement
     # sum of 2^(n-1) c_n^2/e^2 with c_0 = e and c_1 = (1 - k')/2, where e^2 = (1 - k')(1 + k')
-    total = 0.5
-    weight = 1.0
+    total, weight = 0.5, 1.0
     half_difference_squared = 0.25 * (1.0 - complement) / (1.0 + complement)  # over e^2
     for _ in range(40):
         total += weight * half_difference_squared
         mean, root = 0.5 * (mean + root), math.sqrt(mean * root)
-        # the two may stay one rounding apart for ever
+        # the difference of the two may never fall below one rounding error
         if abs(mean - root) <= 4e-16 * mean:
             break
         weight *= 2.0
@@ -88,7 +87,7 @@ def elliptic_integrals(complement: float) -> tuple[float, float]:
 
 @kernel
 def axis_ratio(curvature_ratio: float) -> float:
-    """Return b/a of the patch, major axis below, from the ratio of the greater curvature to it.
+    """Return the ratio of minor to major semi-axis of the patch.
 
     Parameters
     ----------
@@ -98,7 +97,7 @@ def axis_ratio(curvature_ratio: float) -> float:
     Returns
     -------
     float
-        Minor over major semi-axis k', solving (K - D)/(k'^2 D) = `curvature_ratio` by secants.
+        k', the solution of (K - D)/(k'^2 D) = `curvature_ratio` by the secant method.
 
     Notes
     -----
@@ -107,7 +106,7 @@ def axis_ratio(curvature_ratio: float) -> float:
     target = math.log(curvature_ratio)
     if target <= 0.0:
         return 1.0
-    old, new = 0.0, -0.6 * target  # logarithms of k'; the slope is -1.5 at the circle, -2 far off
+    old, new = 0.0, -0.6 * target  # ln k'; the slope is -1.5 at the circle and -2 far from it
     old_value = -target
     for _ in range(60):
         first, d_integral = elliptic_integrals(math.exp(new))
@@ -126,7 +125,7 @@ def axis_ratio(curvature_ratio: float) -> float:
 def hertz_ellipse(
     curvature_x: float, curvature_y: float, normal_force: float, contact_modulus: float
 ) -> tuple[float, float, float, float]:
-    """Return a, b [m], p0 [Pa] and approach [m] of the gap ``A x^2 + B y^2``, as `hertz` does.
+    """Return a, b [m], p0 [Pa] and approach [m] for the gap ``A x^2 + B y^2``, as `hertz` does.
 
     Parameters
     ----------
@@ -143,7 +142,7 @@ def hertz_ellipse(
 
 @kernel
 def ellipse_shape(curvature_x: float, curvature_y: float) -> tuple[float, float, float]:
-    """Return what the curvatures alone decide: b/a with the major axis below, and its K and D.
+    """Return the shape of the ellipse, which depends on the curvatures only: k', K and D.
 
     Parameters
     ----------
@@ -167,14 +166,14 @@ def ellipse_under(
     normal_force: float,
     contact_modulus: float,
 ) -> tuple[float, float, float, float]:
-    """Return a, b [m], p0 [Pa] and approach [m] of an ellipse whose shape is known.
+    """Return a, b [m], p0 [Pa] and approach [m] of an ellipse of known shape.
 
     Parameters
     ----------
     curvature_x, curvature_y, normal_force, contact_modulus : float
         As for `hertz`.
     shape : tuple of float
-        As `ellipse_shape` returns it.
+        From `ellipse_shape`.
 
     Returns
     -------
@@ -189,6 +188,27 @@ def ellipse_under(
     if curvature_x <= curvature_y:
         return major, minor, peak, approach
     return minor, major, peak, approach
+
+
+@kernel
+def prescribed_ellipse(
+    a: float, b: float, normal_force: float, contact_modulus: float
+) -> tuple[float, float]:
+    """Return p0 [Pa] and approach [m] of a patch with prescribed semi-axes, as `given_ellipse`.
+
+    Parameters
+    ----------
+    a, b, normal_force, contact_modulus : float
+        As for `given_ellipse`.
+
+    Returns
+    -------
+    peak_pressure, approach : float
+    """
+    major, minor = max(a, b), min(a, b)
+    first, _ = elliptic_integrals(minor / major)
+    peak = 1.5 * normal_force / (math.pi * major * minor)
+    return peak, 1.5 * normal_force * first / (math.pi * contact_modulus * major)
 
 
 def hertz(
@@ -226,14 +246,14 @@ def hertz(
     ):
         if not (value > 0.0 and math.isfinite(value)):
             raise ValueError(f"{name} must be positive and finite, got {value!r}")
-    a, b, peak, approach = hertz_ellipse(
+    ellipse = hertz_ellipse(
         float(curvature_x), float(curvature_y), float(normal_force), float(contact_modulus)
     )
-    return HertzContact(a, b, peak, approach, float(normal_force))
+    return HertzContact(*ellipse, float(normal_force))
 
 
 def given_ellipse(a: float, b: float, normal_force: float, contact_modulus: float) -> HertzContact:
-    """Return the Hertz pressure and approach of a patch whose semi-axes are prescribed.
+    """Return the Hertz contact of a patch with prescribed semi-axes.
 
     Parameters
     ----------
@@ -246,8 +266,5 @@ def given_ellipse(a: float, b: float, normal_force: float, contact_modulus: floa
     -------
     HertzContact
     """
-    major, minor = max(a, b), min(a, b)
-    first, _ = elliptic_integrals(minor / major)
-    peak = 1.5 * normal_force / (math.pi * major * minor)
-    approach = 1.5 * normal_force * first / (math.pi * contact_modulus * major)
-    return HertzContact(a, b, peak, approach, normal_force)
+    ellipse = prescribed_ellipse(float(a), float(b), float(normal_force), float(contact_modulus))
+    return HertzContact(a, b, *ellipse, normal_force)

@@ -1,4 +1,4 @@
-"""Parabolas fitted to a measured gap, and the Hertzian contact on them."""
+"""Least-squares parabola of a measured gap, and the Hertz contact on it."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from wearsim.types import FloatArray
 
 CONVERGED, NOT_CONVERGED, NO_CURVATURE, TOO_FEW_STRIPS, LEAVES_STRIPS = range(5)
 
-ROUND_OFF = 4e-15  # of the gap's greatest height: how far a parabola may lie from its own fit
+ROUND_OFF = 4e-15  # of the greatest height of the gap: tolerance of `is_parabola`
 
-HOLLOW = 1.0  # what ln(b'/b) counts for at most, and in the hollow of a groove
+HOLLOW = 1.0  # upper bound of ln(b'/b), and its value in the concave part of a groove
 
 
 @kernel
@@ -26,23 +26,21 @@ def fit_parabola(
     y, gap : ndarray, shape (strips,)
         Position and gap [m].
     centre, half_width : float
-        Centre and half-width b [m] of the stretch that counts.
+        Centre and half-width b [m] of the fitted section.
 
     Returns
     -------
     curvature, vertex, height : float
         B [1/m], yc [m] and w0 [m]; the last two are nan where B is not positive.
     used : int
-        Strips with weight; fewer than three fix no parabola.
+        Number of strips with positive weight; a parabola requires at least three.
     """
-    m0 = m1 = m2 = m3 = m4 = 0.0
-    s0 = s1 = s2 = 0.0
-    used = 0
-    nearest = 0
+    m0 = m1 = m2 = m3 = m4 = s0 = s1 = s2 = 0.0
+    used = nearest = 0
     for i in range(1, len(y)):
         if abs(y[i] - centre) < abs(y[nearest] - centre):
             nearest = i
-    shift = gap[nearest]  # the heights' common part would only cost digits
+    shift = gap[nearest]  # heights relative to it are more accurate
     for i in range(len(y)):
         t = (y[i] - centre) / half_width
         weight = 1.0 - t * t
@@ -77,9 +75,9 @@ def fit_parabola(
 def fit_centred(
     y: FloatArray, gap: FloatArray, centre: float, half_width: float, tolerance: float
 ) -> tuple[float, float, float, int]:
-    """Move the stretch of `fit_parabola` until it is centred on the vertex it finds.
+    """Fit a parabola over a section that is centred on the vertex of the fit.
 
-    Parameters and returns are those of `fit_parabola`, with a status in place of the count.
+    Parameters and returned values are those of `fit_parabola`, with a status instead of the count.
     """
     last, last_shift = centre, 0.0
     for _ in range(100):
@@ -91,8 +89,8 @@ def fit_centred(
         shift = (vertex - centre) / half_width
         if abs(shift) <= tolerance:
             return curvature, vertex, height, CONVERGED
-        # the secant rule: in a hollow groove the vertex moves faster than the stretch, and going
-        # after it would run away from the middle
+        # secant method: in a concave groove the vertex moves faster than the section, so that a
+        # fixed-point iteration diverges
         moved = (centre - last) / half_width
         step = shift if moved == 0.0 else -shift * moved / (shift - last_shift)
         last, last_shift = centre, shift
@@ -106,7 +104,7 @@ def is_parabola(
 ) -> bool:
     """Return whether the gap is ``height + curvature (y - centre)^2`` to round-off.
 
-    Then any stretch of it fits the same parabola, and one fit serves every patch.
+    In that case the fit over any section is the same parabola, and one fit serves every patch.
 
     Parameters
     ----------
@@ -125,14 +123,14 @@ def is_parabola(
 
 @kernel
 def strips_within(y: FloatArray, centre: float, half_width: float) -> int:
-    """Return how many strips lie within `half_width` [m] of `centre` [m].
+    """Return the number of strips within `half_width` of `centre`.
 
     Parameters
     ----------
     y : ndarray, shape (strips,)
         Position [m].
     centre, half_width : float
-        The stretch [m].
+        Centre and half-width of the section [m].
     """
     count = 0
     for i in range(len(y)):
@@ -150,12 +148,12 @@ def hertz_on_profile(
     tolerance: float,
     limit: int,
 ) -> tuple[float, float, float, float, int, int]:
-    """Find the Hertz patch whose fitted parabola is the one that makes it.
+    """Find the Hertz patch that is consistent with the parabola fitted over it.
 
-    The parabola fitted over a patch of half-width b, centred on the parabola's own vertex, makes
-    a Hertz patch of half-width b'. The b that equals b' is approached from the widest patch inside
-    the strips, at most to 0.6 b, and then by regula falsi (Illinois) on ln(b'/b). A gap that is a
-    parabola already gives its patch at once.
+    The parabola fitted over a patch of half-width b, centred on its own vertex, has a Hertz patch
+    of half-width b'. b = b' is solved by reducing b from the widest patch inside the strips, to no
+    less than 0.6 b at a time, and then by the regula falsi (Illinois rule) on ln(b'/b). A gap that
+    is a parabola needs one fit only.
 
     Parameters
     ----------
@@ -167,16 +165,16 @@ def hertz_on_profile(
         N [N] and E* [Pa].
     tolerance : float
         Greatest ln(b'/b), and a tenth of the greatest shift of the centre over b, at which the
-        patch is consistent; a shift is felt in second order only.
+        patch is consistent; the effect of a shift is of second order.
     limit : int
-        Greatest number of patches tried.
+        Greatest number of iterations.
 
     Returns
     -------
     curvature, half_width, centre, height : float
         B [1/m], b [m], yc [m] and the fitted gap at yc [m].
     iterations, status : int
-        Status is one of `CONVERGED`, `NOT_CONVERGED`, `NO_CURVATURE`, `TOO_FEW_STRIPS` and
+        The status is one of `CONVERGED`, `NOT_CONVERGED`, `NO_CURVATURE`, `TOO_FEW_STRIPS` and
         `LEAVES_STRIPS`.
 
     Notes
@@ -185,8 +183,8 @@ def hertz_on_profile(
     """
     centre = 0.5 * (y[0] + y[-1])
     width = 0.5 * (y[-1] - y[0]) * len(y) / max(len(y) - 1, 1)
-    low, low_value = 0.0, 0.0  # ln b, ln(b'/b) where b is too small; value 0 while unknown
-    high, high_value = 0.0, 0.0
+    # ln b and ln(b'/b) at both ends of the bracket; the value is 0 while an end is unknown
+    low = low_value = high = high_value = 0.0
     side = 0  # the end that moved last
     curvature, height = math.nan, math.nan
     for iteration in range(1, limit + 1):
@@ -195,12 +193,12 @@ def hertz_on_profile(
         if status == CONVERGED:
             centre = vertex
             found = hertz_ellipse(curvature_x, curvature, normal_force, contact_modulus)[1]
-            enough = found <= width and strips_within(y, centre, found) >= 3
-            if iteration == 1 and enough and is_parabola(y, gap, curvature, centre, height):
+            sufficient = found <= width and strips_within(y, centre, found) >= 3
+            if iteration == 1 and sufficient and is_parabola(y, gap, curvature, centre, height):
                 return curvature, found, centre, height, iteration, CONVERGED
             value = min(math.log(found / width), HOLLOW)
         elif status != TOO_FEW_STRIPS and high_value != 0.0:
-            # the stretch lies in the hollow of a groove, where no patch would end: it is too narrow
+            # the section lies in the concave part of a groove, where no patch ends: too narrow
             found, value = math.inf, HOLLOW
         else:
             return curvature, width, vertex, height, iteration, status
@@ -215,7 +213,7 @@ def hertz_on_profile(
             low_value *= 0.5 if side < 0 else 1.0
             high, high_value, side = here, value, -1
         if low_value != 0.0 and high - low <= tolerance:
-            # either b' answers b steeply here, or it jumps and no patch agrees with its parabola
+            # b' is either a steep function of b here, or it jumps and no patch is consistent
             agrees = status == CONVERGED and abs(value) < 1e4 * tolerance
             status = CONVERGED if agrees else NO_CURVATURE
             return curvature, found, centre, height, iteration, status

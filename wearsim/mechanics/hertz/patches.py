@@ -1,4 +1,4 @@
-"""Hertz patches of many gaps at once, and the strips each of them covers."""
+"""Hertz patches of a batch of gaps, and the strips that each patch covers."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wearsim.mechanics.hertz.ellipse import ellipse_shape, ellipse_under, elliptic_integrals
+from wearsim.mechanics.hertz.ellipse import ellipse_shape, ellipse_under, prescribed_ellipse
 from wearsim.mechanics.hertz.parabola_fit import (
     CONVERGED,
     LEAVES_STRIPS,
@@ -22,16 +22,16 @@ from wearsim.mechanics.hertz.parabola_fit import (
 from wearsim.mechanics.numerics.jit import kernel
 from wearsim.types import FloatArray, IntArray
 
-NO_GAP, NO_LOAD = 20, 21  # statuses beside those of `hertz`
+NO_GAP, NO_LOAD = 20, 21  # statuses in addition to those of `parabola_fit`
 
-_INSIDE = 1.0 - 1e-9  # of the half-width: a grid cut to the patch holds it
+_INSIDE = 1.0 - 1e-9  # of the half-width: the patch may end exactly at the edge of the grid
 
 
 class Bodies(NamedTuple):
-    """What all contacts of a batch share.
+    """Constants of a batch of contacts.
 
-    Strips (strips,) and their width [m], A [1/m], E* [Pa], semi-axes of a prescribed patch [m], 0
-    for Hertz's own, and the fit's tolerance and greatest number of tries.
+    Positions of the strips (strips,) and their width [m], A [1/m], E* [Pa], semi-axes of a
+    prescribed patch [m], 0 for the Hertz ellipse, tolerance and iteration limit of the fit.
     """
 
     y: FloatArray
@@ -45,9 +45,9 @@ class Bodies(NamedTuple):
 
 
 class Patches(NamedTuple):
-    """The patches, one number per contact: a, b [m], a/b, p0 [Pa], approach, centre [m], the rest.
+    """Patches of a batch of contacts, all (contacts,): lengths [m], p0 [Pa] and a/b.
 
-    Patches of one shape have the same a/b to the bit, whatever their size.
+    Patches of the same shape have bitwise equal a/b, independent of their size.
     """
 
     a: FloatArray
@@ -64,7 +64,7 @@ class Patches(NamedTuple):
 def fit_within(
     y: FloatArray, gap: FloatArray, spacing: float, tolerance: float
 ) -> tuple[float, float, float, float, int]:
-    """Fit a parabola to as much of the gap as lies evenly about its vertex.
+    """Fit a parabola over the widest section that is symmetric about its vertex.
 
     Parameters
     ----------
@@ -76,9 +76,9 @@ def fit_within(
     Returns
     -------
     curvature, centre, height, half_width : float
-        B [1/m], yc [m], the fitted gap there and the half-width that counted [m].
+        B [1/m], yc [m], the fitted gap there and the half-width of the section [m].
     status : int
-        One of those of `hertz_on_profile`.
+        As of `hertz_on_profile`.
     """
     middle, span = 0.5 * (y[0] + y[-1]), 0.5 * spacing * len(y)
     _, vertex, _, used = fit_parabola(y, gap, middle, span)
@@ -95,13 +95,13 @@ def find_patches(
 ) -> None:
     """Find the patch of every contact as `hertz_on_profile` and `hertz` do.
 
-    Contacts that follow one another with the same gap share its fit, if it is a parabola, and
-    those with the same fitted curvature the shape of their ellipses: only the size is their own.
+    Successive contacts with the same gap share its fit if the gap is a parabola, and those with the
+    same fitted curvature share the shape of their ellipse and differ in its size only.
 
     Parameters
     ----------
     bodies : Bodies
-        What they share.
+        Constants of the contacts.
     gaps : ndarray, shape (rows, strips)
         Gaps [m].
     row : ndarray of int, shape (contacts,)
@@ -115,47 +115,43 @@ def find_patches(
     middle = 0.5 * (y[0] + y[-1])
     width = 0.5 * (y[-1] - y[0]) * len(y) / max(len(y) - 1, 1)
     given = bodies.given_a > 0.0
-    first_edge = y[0] - 0.5 * bodies.spacing
-    last_edge = y[-1] + 0.5 * bodies.spacing
-    met, exact, fit_status = -1, False, CONVERGED
-    whole, vertex, bottom = math.nan, math.nan, math.nan
+    first_edge, last_edge = y[0] - 0.5 * bodies.spacing, y[-1] + 0.5 * bodies.spacing
+    fitted, exact, fit_status = -1, False, CONVERGED
+    fit_curvature, vertex, bottom = math.nan, math.nan, math.nan
     shaped, shape = math.nan, (math.nan, math.nan, math.nan)
     for k in range(len(row)):
         gap, force = gaps[row[k]], normal_force[k]
-        if row[k] != met:
-            met = row[k]
-            if not _finite(gap):
+        if row[k] != fitted:
+            fitted = row[k]
+            if not np.isfinite(gap).all():
                 exact, fit_status = False, NO_GAP
             elif given:
-                whole, vertex, bottom, _, fit_status = fit_within(
+                fit_curvature, vertex, bottom, _, fit_status = fit_within(
                     y, gap, bodies.spacing, bodies.tolerance
                 )
             else:
                 fit = fit_centred(y, gap, middle, width, 10.0 * bodies.tolerance)
-                whole, vertex, bottom = fit[0], fit[1], fit[2]
-                exact = fit[3] == CONVERGED and is_parabola(y, gap, whole, vertex, bottom)
+                fit_curvature, vertex, bottom = fit[0], fit[1], fit[2]
+                exact = fit[3] == CONVERGED and is_parabola(y, gap, fit_curvature, vertex, bottom)
                 fit_status = CONVERGED
-        status = fit_status
-        if not (force > 0.0 and force < math.inf):
-            status = NO_LOAD
+        status = fit_status if 0.0 < force < math.inf else NO_LOAD
         patches.status[k], patches.iterations[k] = status, 0
         if status != CONVERGED:
             continue
         centre, height = vertex, bottom
         if given:
-            a, b, peak, approach = _given_ellipse(bodies, force)
+            a, b = bodies.given_a, bodies.given_b
+            peak, approach = prescribed_ellipse(a, b, force, modulus)
             ratio = a / b
         else:
-            settled = False
-            curvature = whole
+            solved, curvature, iterations = False, fit_curvature, 1
             a = b = peak = approach = math.nan
-            iterations = 1
             if exact:
                 if curvature != shaped:
                     shape, shaped = ellipse_shape(curvature_x, curvature), curvature
                 a, b, peak, approach = ellipse_under(curvature_x, curvature, shape, force, modulus)
-                settled = b <= width and strips_within(y, centre, b) >= 3
-            if not settled:
+                solved = b <= width and strips_within(y, centre, b) >= 3
+            if not solved:
                 curvature, b, centre, height, iterations, status = hertz_on_profile(
                     y, gap, curvature_x, force, modulus, bodies.tolerance, bodies.limit
                 )
@@ -177,25 +173,6 @@ def find_patches(
 
 
 @kernel
-def _finite(gap: FloatArray) -> bool:
-    total = 0.0
-    for value in gap:
-        total += value - value  # nan for what is not finite
-    return total == 0.0
-
-
-@kernel
-def _given_ellipse(bodies: Bodies, force: float) -> tuple[float, float, float, float]:
-    """Return the prescribed patch with its pressure and approach, as `given_ellipse` does."""
-    a, b = bodies.given_a, bodies.given_b
-    major, minor = max(a, b), min(a, b)
-    first, _ = elliptic_integrals(minor / major)
-    peak = 1.5 * force / (math.pi * major * minor)
-    approach = 1.5 * force * first / (math.pi * bodies.contact_modulus * major)
-    return a, b, peak, approach
-
-
-@kernel
 def cut_into_strips(
     bodies: Bodies,
     a: float,
@@ -207,7 +184,7 @@ def cut_into_strips(
     middle: FloatArray,
     coverage: FloatArray,
 ) -> tuple[int, int]:
-    """Cut one patch into the strips, as far as each is covered.
+    """Fill half-length, line load and coverage of the strips of one patch.
 
     Parameters
     ----------
@@ -217,15 +194,14 @@ def cut_into_strips(
         Semi-axes and centre of the patch [m], and its load [N].
     half_length, line_load, middle, coverage : ndarray, shape (strips,)
         Overwritten: a(y) at the middle of the covered part [m], mean of q(y) over the strip [N/m],
-        distance of that middle from the centre [m] and the part of the strip that is covered.
+        distance of that middle from the centre [m] and the covered fraction of the strip.
 
     Returns
     -------
     first, stop : int
-        The first strip with contact, and the one after the last.
+        The first strip in contact, and the one after the last.
     """
-    y, spacing = bodies.y, bodies.spacing
-    strips = len(y)
+    y, spacing, strips = bodies.y, bodies.spacing, len(bodies.y)
     first, stop = strips, 0
     lower = y[0] - 0.5 * spacing - centre
     for j in range(strips):
@@ -253,7 +229,7 @@ def half_lengths(bodies: Bodies, patches: Patches, normal_force: FloatArray) -> 
     Parameters
     ----------
     bodies, patches : Bodies, Patches
-        As `find_patches` leaves them.
+        As for `find_patches`, which fills the patches.
     normal_force : ndarray, shape (contacts,)
         N [N].
 

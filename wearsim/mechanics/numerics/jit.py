@@ -1,4 +1,4 @@
-"""The one place for numba's options, and for the arrays that they make kernels take."""
+"""Compilation options of the kernels, the disk cache, and the arrays that kernels accept."""
 
 from __future__ import annotations
 
@@ -16,70 +16,60 @@ from wearsim.types import FloatArray
 P = ParamSpec("P")
 R = TypeVar("R")
 
-# a kernel is never handed to C, which is what the second wrapper would be for
+# kernels are never passed to C code, for which numba would compile a second wrapper
 _OPTIONS = {"nopython": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile `function` with numba, cached on disk wherever a cache can be kept.
+    """Compile `function` with numba and cache it on disk where possible.
 
-    No fastmath and no parallel reduction: a resumed run must equal an unbroken one bit for bit.
+    No fastmath and no parallel reduction: a resumed run must equal an unbroken run bit for bit.
     Every kernel is called with one signature only (C-contiguous float64 arrays, floats, ints), so
-    that processes starting together write the same cache entries.
+    that processes that start at the same time write identical cache entries.
     """
-    compiled: Callable[P, R] = _cached(_dispatcher(function))
-    return compiled
+    return _compiled(function)
 
 
 def inlined_kernel(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile `function` as `kernel` does, and put its code in the place of every call.
+    """Compile `function` as `kernel` does and inline it into every caller.
 
-    For the little that an inner loop calls: a loop with a call left in it is not vectorised.
+    For small functions called in an inner loop: a loop that contains a call is not vectorised.
     """
-    compiled: Callable[P, R] = _cached(_dispatcher(function, forceinline=True))
-    return compiled
+    return _compiled(function, forceinline=True)
 
 
-def _cached(compiled: Any) -> Any:
-    """Return what compiles a function, cached on disk wherever a cache can be kept."""
+def _compiled(function: Callable[P, R], **options: bool) -> Callable[P, R]:
+    """Return the dispatcher of a function; numba's own where its internals have changed."""
+    compiled: Any
     try:
-        compiled.enable_caching()
-    except RuntimeError:
-        pass  # neither the source tree nor the user's cache folder can be written: compile afresh
-    else:
-        _renew_with_any_kernel(compiled)
-    return compiled
+        from wearsim.mechanics.numerics.kernel_dispatcher import Whole  # noqa: PLC0415  (imports numba's internals)
 
-
-def _dispatcher(function: Callable[P, R], **options: bool) -> Any:
-    """Return what compiles a function, in half the time where numba is built as it was."""
-    try:
-        from wearsim.mechanics.numerics.kernel_dispatcher import Whole  # noqa: PLC0415  (may not be there)
-
-        return Whole(function, targetoptions=_OPTIONS | options)
+        compiled = Whole(function, targetoptions=_OPTIONS | options)
     except (ImportError, AttributeError, TypeError):
         plain: Any = numba.njit
-        return plain(error_model="numpy", **options)(function)
-
-
-def own_array(array: FloatArray) -> FloatArray:
-    """Return a contiguous copy that can be written to: kernels are compiled for such alone."""
-    return np.array(array, dtype=np.float64, order="C")
-
-
-def _renew_with_any_kernel(compiled: Any) -> None:
-    """Make the cache stale when any kernel's source changes, not the function's own file alone.
-
-    A kernel holds compiled copies of those it calls; numba does not look at their files.
-    """
+        compiled = plain(error_model="numpy", **options)(function)
+    try:
+        compiled.enable_caching()
+    except RuntimeError:  # neither the source tree nor the user's cache folder is writable
+        return compiled  # type: ignore[no-any-return]
+    # a kernel contains compiled copies of the kernels it calls, whose files numba does not check
     cache_file = getattr(compiled._cache, "_cache_file", None)
     if cache_file is not None:
         cache_file._source_stamp = (cache_file._source_stamp, _sources())
+    return compiled  # type: ignore[no-any-return]
+
+
+def own_array(array: FloatArray) -> FloatArray:
+    """Return a writable contiguous copy, the only kind of array that kernels accept."""
+    return np.array(array, dtype=np.float64, order="C")
 
 
 @cache
 def _sources() -> str:
-    """Return a digest of all kernels' sources."""
+    """Return a digest of all Python files under `wearsim/mechanics`, at any depth.
+
+    It is part of the cache key, so that a change of any kernel recompiles all kernels.
+    """
     digest = sha256()
     for path in sorted(Path(__file__).parents[1].rglob("*.py")):
         digest.update(path.read_bytes())

@@ -1,9 +1,10 @@
-"""How numba compiles kernels: each one that Python calls as a whole, with all those that it calls.
+"""Numba dispatchers that optimise a kernel once, together with the kernels that it calls.
 
-By itself numba optimises every function for the machine, wraps it for Python, saves it, and copies
-it into its callers to be optimised once more, layer upon layer. Kernels call kernels several layers
-deep, and Python calls few of them. So one that another calls is only translated for LLVM here
-(`Part`), and optimised once, within what Python calls (`Whole`). That halves a first run's time.
+By default numba optimises each function, generates its machine code and Python wrapper, saves it,
+and copies it into its callers, where it is optimised again. Kernels call each other several levels
+deep, and Python calls few of them. Here a kernel that is called by another kernel is only
+translated to LLVM's intermediate representation (`Part`) and optimised once, within the kernel that
+Python calls (`Whole`). This halves the compilation time.
 """
 
 from __future__ import annotations
@@ -23,50 +24,50 @@ from numba.core.typed_passes import AnnotateTypes
 
 
 class Whole(CPUDispatcher):
-    """A kernel as Python calls it: machine code of itself and of all kernels that it calls."""
+    """Dispatcher for calls from Python: machine code of the kernel and all kernels it calls."""
 
-    #: whether numba is built otherwise than what follows, and compiles kernels in its own way
+    #: whether numba's internals differ from those used here, so that its own compiler is used
     plain = False
 
     @cached_property
     def part(self) -> Part:
-        """The same kernel as other kernels call it."""
+        """Dispatcher of the same kernel for calls from other kernels."""
         options = self.targetoptions | {"no_cpython_wrapper": True}
         return Part(self.py_func, self.locals, options, _PartCompiler)
 
     @property
     def _numba_type_(self) -> Any:
-        """What a kernel finds that names this one."""
+        """Type of a reference to this kernel in another kernel."""
         return types.Dispatcher(self if Whole.plain else self.part)
 
     def compile(self, sig: Any) -> Any:
-        """Compile for the types of `sig`, or read what was compiled before."""
+        """Compile for the signature `sig`, or load it from the cache."""
         with _no_collection():
             if not Whole.plain:
                 try:
                     return super().compile(sig)
                 except (AttributeError, TypeError, NotImplementedError):
-                    Whole.plain = True  # what a kernel lacks is a NumbaError
+                    Whole.plain = True  # an error in a kernel would be a NumbaError
             return super().compile(sig)
 
 
 class Part(CPUDispatcher):
-    """A kernel as other kernels call it: LLVM's code, to become a piece of theirs."""
+    """Dispatcher for calls from other kernels: LLVM code without machine code."""
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
-        """Return how it is called: a number written into a call is no type of its own."""
+        """Return the call template, with literal arguments typed as ordinary numbers."""
         plain = tuple(types.unliteral(arg) for arg in args)
         return super().get_call_template(plain, {k: types.unliteral(v) for k, v in kws.items()})
 
     def add_overload(self, cres: Any) -> None:
-        """Take in what was compiled; without machine code, a bare object stands for its address."""
+        """Register a compiled signature, with a placeholder object as its entry point."""
         place = object()
         self.targetctx.insert_user_function(place, cres.fndesc, [cres.library])
         self.overloads[tuple(cres.signature.args)] = cres._replace(entry_point=place)
 
 
 class _PartLibrary(JITCodeLibrary):
-    """LLVM's code of a kernel and of those it calls, left as it is for the callers to optimise."""
+    """LLVM code of a kernel and its callees, not optimised here."""
 
     def _optimize_final_module(self) -> None:
         pass
@@ -77,7 +78,7 @@ class _PartLibrary(JITCodeLibrary):
 
 @register_pass(mutates_CFG=False, analysis_only=True)
 class _LeaveToCallers(AnalysisPass):
-    """Have the function's code put in a `_PartLibrary`, and none made for the machine."""
+    """Compiler pass that emits the function into a `_PartLibrary` without machine code."""
 
     _name = "leave_to_callers"
 
@@ -85,14 +86,14 @@ class _LeaveToCallers(AnalysisPass):
         super().__init__()  # type: ignore[no-untyped-call]
 
     def run_pass(self, state: Any) -> bool:
-        new_library: Any = _PartLibrary  # numba's own have no types
+        new_library: Any = _PartLibrary  # the base class is not typed
         state.library = new_library(state.targetctx.codegen(), state.func_id.func_qualname)
         state.flags.no_compile = True
         return False
 
 
 class _PartCompiler(CompilerBase):
-    """Numba's own compiler, but for the end."""
+    """Numba's default compiler with `_LeaveToCallers` instead of code generation."""
 
     def define_pipelines(self) -> list[Any]:
         pipeline = DefaultPassBuilder.define_nopython_pipeline(self.state)
@@ -103,7 +104,7 @@ class _PartCompiler(CompilerBase):
 
 @contextmanager
 def _no_collection() -> Iterator[None]:
-    """Keep Python's collector of garbage out: it takes a tenth of the time, for nothing."""
+    """Disable Python's garbage collector, which takes a tenth of the compilation time."""
     collecting = gc.isenabled()
     gc.disable()
     try:

@@ -1,9 +1,9 @@
-"""Dense linear algebra small enough to own: the same bits whatever the BLAS and its threads.
+"""Dense LU factorisation, with results that do not depend on the BLAS library and its threads.
 
-A system is stored by its columns: ``matrix[j, i]`` is what unknown j contributes to equation i.
-So every inner loop runs along a row in memory, and a row is a column of the system. Inner loops
-that do not start at 0 count in unsigned numbers: numba then need not look out for negative indices,
-and they are vectorised, which makes them three times faster.
+A system is stored by columns: ``matrix[j, i]`` is the coefficient of unknown j in equation i. Every
+inner loop thus runs along a row in memory, which is a column of the system. Inner loops that do not
+start at 0 have unsigned indices: numba then omits the handling of negative indices, and the loops
+are vectorised, which makes them three times faster.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ import numpy as np
 from wearsim.mechanics.numerics.jit import kernel
 from wearsim.types import FloatArray, IntArray
 
-PANEL = 4  # unknowns taken off together; the loops over a panel's rows are written out for four
+PANEL = 4  # unknowns eliminated together; the loops over the rows of a panel are unrolled
 
 
 @kernel
 def _pivot(matrix: FloatArray, size: int, k: int, order: IntArray) -> bool:
-    """Exchange equations so that unknown `k` has its greatest coefficient in the k-th."""
+    """Exchange equations to bring the greatest coefficient of unknown `k` into the k-th one."""
     best = k
     for i in range(k + 1, size):
         if abs(matrix[k, i]) > abs(matrix[k, best]):
@@ -26,16 +26,13 @@ def _pivot(matrix: FloatArray, size: int, k: int, order: IntArray) -> bool:
     if best != k:
         order[k], order[best] = order[best], order[k]
         for j in range(size):
-            held = matrix[j, k]
-            matrix[j, k] = matrix[j, best]
-            matrix[j, best] = held
-    sound: bool = abs(matrix[k, k]) > 0.0
-    return sound
+            matrix[j, k], matrix[j, best] = matrix[j, best], matrix[j, k]
+    return bool(abs(matrix[k, k]) > 0.0)
 
 
 @kernel
-def _take_off_four(matrix: FloatArray, size: int, start: int) -> None:
-    """Take a full panel's four unknowns off all that follow."""
+def _eliminate_panel(matrix: FloatArray, size: int, start: int) -> None:
+    """Eliminate the four unknowns of a full panel from all later columns."""
     s1, s2, s3 = start + 1, start + 2, start + 3
     r0, r1, r2, r3 = matrix[start], matrix[s1], matrix[s2], matrix[s3]
     p0, p1, p2, p3 = 1.0 / r0[start], 1.0 / r1[s1], 1.0 / r2[s2], 1.0 / r3[s3]
@@ -57,16 +54,16 @@ def factor_in_place(matrix: FloatArray, size: int, order: IntArray) -> bool:
     Parameters
     ----------
     matrix : ndarray, shape (>= size, >= size)
-        The system by columns; receives its factors.
+        The system by columns; overwritten with its factors.
     size : int
         Number of unknowns.
     order : ndarray of int, shape (>= size,)
-        Receives the order in which the equations are taken.
+        Filled: the order of the equations after pivoting.
 
     Returns
     -------
     bool
-        False if a pivot vanished or is not a number.
+        False if a pivot is zero or not a number.
     """
     for i in range(size):
         order[i] = i
@@ -81,7 +78,7 @@ def factor_in_place(matrix: FloatArray, size: int, order: IntArray) -> bool:
             if not _pivot(matrix, size, k, order):
                 return False
         if stop < size:
-            _take_off_four(matrix, size, start)
+            _eliminate_panel(matrix, size, start)
     return True
 
 
@@ -89,7 +86,7 @@ def factor_in_place(matrix: FloatArray, size: int, order: IntArray) -> bool:
 def _subtract_rows(
     matrix: FloatArray, start: int, stop: int, first: int, last: int, solution: FloatArray
 ) -> None:
-    """Take the rows of a panel, times its unknowns, off the entries from `first` to `last`."""
+    """Subtract the rows of a panel times its unknowns from the entries `first` to `last`."""
     if stop - start == PANEL:
         r0, r1, r2, r3 = matrix[start], matrix[start + 1], matrix[start + 2], matrix[start + 3]
         x0, x1, x2, x3 = (
@@ -116,11 +113,11 @@ def solve_factored(
     Parameters
     ----------
     matrix, size, order
-        As `factor_in_place` left them.
+        As filled by `factor_in_place`.
     right : ndarray, shape (>= size,)
         Right-hand side.
     solution : ndarray, shape (>= size,)
-        Receives the solution; another array than `right`.
+        Filled: the solution; must not be the array `right`.
     """
     for k in range(size):
         solution[k] = right[order[k]]
@@ -149,7 +146,7 @@ def _combine_rows(
     order: IntArray,
     inverse: FloatArray,
 ) -> None:
-    """Take the inverse's rows from `first` to `last`, times entries of row `i`, off its own row."""
+    """Subtract the inverse's rows `first` to `last`, times entries of row `i`, from its row."""
     row, p = inverse[order[i]], first
     while p + 3 < last:
         f0, f1, f2, f3 = matrix[i, p], matrix[i, p + 1], matrix[i, p + 2], matrix[i, p + 3]
@@ -167,19 +164,18 @@ def _combine_rows(
 
 @kernel
 def invert_factored(matrix: FloatArray, size: int, order: IntArray, inverse: FloatArray) -> None:
-    """Fill the inverse of a factored system, by columns as the system is.
+    """Fill the inverse of a factored system, stored by columns like the system.
 
     Parameters
     ----------
     matrix, size, order
-        As `factor_in_place` left them.
+        As filled by `factor_in_place`.
     inverse : ndarray, shape (>= size, >= size)
-        Receives in row c how the unknowns follow equation c's right-hand side.
+        Filled: row c is the derivative of the unknowns by the right-hand side of equation c.
     """
     for i in range(size):
         row = inverse[order[i]]
-        for j in range(size):
-            row[j] = 0.0
+        row[:size] = 0.0
         row[i] = 1.0
         _combine_rows(matrix, size, i, 0, i, order, inverse)
     for i in range(size - 1, -1, -1):

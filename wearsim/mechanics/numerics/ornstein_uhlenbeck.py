@@ -1,4 +1,4 @@
-"""The recursion of a first-order process in discrete time."""
+"""Recursion of a stationary first-order Gauss-Markov process (discrete Ornstein-Uhlenbeck)."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from wearsim.types import FloatArray
 
 @kernel
 def filter_noise(noise: FloatArray, memory: float) -> FloatArray:
-    """Return z_0 = w_0, z_k+1 = r z_k + sqrt(1 - r^2) w_k+1: unit variance at every step.
+    """Return z_0 = w_0, z_k+1 = r z_k + sqrt(1 - r^2) w_k+1, which has unit variance throughout.
 
     Parameters
     ----------
     noise : ndarray, shape (points,)
-        Independent normal scores w.
+        Independent standard normal values w.
     memory : float
         Correlation r of neighbouring values.
 

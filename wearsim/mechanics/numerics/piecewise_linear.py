@@ -1,4 +1,4 @@
-"""A quantity that is linear between samples, with its exact integrals."""
+"""Piecewise linear function of time with exact integrals."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from wearsim.types import FloatArray
 
 
 class PiecewiseLinear:
-    """A quantity over time, linear between its samples, the first and last of which bound it.
+    """Function of time that is linear between its samples, defined from the first to the last.
 
     Parameters
     ----------
     time : ndarray, shape (samples,)
-        Times, rising [s].
+        Increasing times [s].
     value : ndarray, shape (samples,)
-        The quantity at those times.
+        Values at those times.
     """
 
     def __init__(self, time: FloatArray, value: FloatArray) -> None:
@@ -34,15 +34,15 @@ class PiecewiseLinear:
 
     def _integrals(self, time: float) -> tuple[float, float]:
         """Return the integrals of the value and of its square from the first sample to `time`."""
-        # plain numbers: a step asks for few of them, but many times
+        # Python floats, which are faster than arrays for the few values of a step
         k = min(max(int(self.time.searchsorted(time)) - 1, 0), len(self.time) - 2)
         start, stop = float(self.time[k]), float(self.time[k + 1])
         first, last = float(self.value[k]), float(self.value[k + 1])
         part = min(max((time - start) / (stop - start), 0.0), 1.0)
         here, duration = first + (last - first) * part, time - start
-        area = 0.5 * duration * (first + here)
         square = duration * (first * first + first * here + here * here) / 3.0
-        return float(self._area[k]) + area, float(self._square[k]) + square
+        area = float(self._area[k]) + 0.5 * duration * (first + here)
+        return area, float(self._square[k]) + square
 
     def mean(self, start: float, stop: float) -> float:
         """Return the exact mean between two times [s]."""

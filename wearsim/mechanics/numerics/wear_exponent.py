@@ -1,4 +1,4 @@
-"""How the wear of strips follows their line load: ratios and exponents, contact by contact."""
+"""Dependence of wear on the line load: ratios and exponents of every strip."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ import numpy as np
 from wearsim.mechanics.numerics.jit import kernel
 from wearsim.types import FloatArray
 
-LEAST_EXPONENT = 0.4  # wear goes as q^(1/2) in adhesion, and where its rate is at rest
-MIN_LOG_CHANGE = 1e-7  # relative change of a line load from which an exponent can be read
+LEAST_EXPONENT = 0.4  # wear is proportional to q^(1/2) in adhesion and at a steady wear rate
+MIN_LOG_CHANGE = 1e-7  # least relative change of a line load for the estimate of an exponent
 
 
 @kernel
 def ratio_to_load(wear: FloatArray, line_load: FloatArray) -> FloatArray:
-    """Return wear over line load, carried on into strips without load.
+    """Return wear over line load, interpolated and extrapolated to strips without load.
 
     Parameters
     ----------
@@ -23,7 +23,7 @@ def ratio_to_load(wear: FloatArray, line_load: FloatArray) -> FloatArray:
     Returns
     -------
     ndarray, shape (contacts, strips)
-        Linear between loaded strips, and constant beyond them [m/(N/m)].
+        Ratio [m/(N/m)], linear between loaded strips and constant beyond them.
     """
     contacts, n = wear.shape
     ratio = np.empty((contacts, n))
@@ -53,18 +53,18 @@ def estimate_exponents(
     greatest: float,
     exponents: FloatArray,
 ) -> None:
-    """Read from two solutions of the same contacts with which exponent wear follows the line load.
+    """Estimate the exponent of wear as a power of the line load from two solutions.
 
     Parameters
     ----------
     load, new_load : ndarray, shape (contacts, strips)
-        Line loads of the two [N/m].
+        Line loads of the two solutions [N/m].
     wear, new_wear : ndarray, shape (contacts, strips)
-        Wear of the two, in one unit.
+        Wear of the two solutions, in the same unit.
     greatest : float
-        The greatest exponent that is believed.
+        Upper bound of the exponents.
     exponents : ndarray, shape (contacts, strips)
-        Changed where the load did.
+        Updated in strips whose load has changed.
     """
     for k in range(load.shape[0]):
         for i in range(load.shape[1]):

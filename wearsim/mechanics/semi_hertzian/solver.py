@@ -1,21 +1,21 @@
 """Semi-Hertzian contact of strips: Kik-Piotrowski, Ayasse-Chollet (STRIPES) and ANALYN.
 
-Each is a foundation of springs. Strip i carries ``q_i = k_i (H_i - z_i)``, where z is the gap and
-H_i the level below which the strip is in contact (`contact_levels`), over the half-length
-``a_i = sqrt(l_i (H_i - z_i))``. They differ in stiffness k, in l, and in the part of the bodies'
-overlap that deformation leaves to contact:
+Each method is a foundation of springs. Strip i has the line load ``q_i = k_i (H_i - z_i)``, where z
+is the gap and H_i the level below which the strip is in contact (`contact_levels`), and the
+half-length ``a_i = sqrt(l_i (H_i - z_i))``. The methods differ in the stiffness k, in l, and in the
+fraction of the bodies' overlap that remains after deformation:
 
-=============== ======================== ====== =====================
-                k                        l      part of the overlap
-=============== ======================== ====== =====================
-Kik-Piotrowski  one for all strips       2/kx   0.55
+=============== ======================== ====== =======================
+                k                        l      fraction of the overlap
+=============== ======================== ====== =======================
+Kik-Piotrowski  equal for all strips     2/kx   0.55
 Ayasse-Chollet  Hertz, local curvature   Hertz  Hertz, first contact
 ANALYN          Hertz, local curvature   Hertz  Hertz, strip by strip
-=============== ======================== ====== =====================
+=============== ======================== ====== =======================
 
-With Hertz's ellipse of the curvatures A and B, of semi-axes a and b, approach d and pressure p0,
-these are ``k = pi p0 a/(2 B b^2)``, ``l = a^2/(B b^2)`` and ``B b^2/d``, functions of B/A alone
-but for their scales E* and 1/A.
+For the Hertz ellipse of the curvatures A and B, with semi-axes a and b, approach d and pressure p0,
+these are ``k = pi p0 a/(2 B b^2)``, ``l = a^2/(B b^2)`` and ``B b^2/d``: functions of B/A, scaled
+by E* and 1/A.
 """
 
 from __future__ import annotations
@@ -27,34 +27,35 @@ import numpy as np
 
 from wearsim.mechanics.hertz.ellipse import hertz
 from wearsim.mechanics.numerics.jit import kernel
-from wearsim.mechanics.semi_hertzian.contact_level import first_contacts, solve_foundation
-from wearsim.mechanics.semi_hertzian.kik_piotrowski import (
+from wearsim.mechanics.semi_hertzian.penetration import (
     CONVERGED,
     NO_CONVERGENCE,
     NOT_FINITE,
+    first_contacts,
+    solve_foundation,
     solve_virtual_penetration,
 )
 from wearsim.types import FloatArray
 
 KIK_PIOTROWSKI, AYASSE_CHOLLET, ANALYN = range(3)
 
-FLATTEST, SHARPEST = -20.0, 10.0  # ln(B/A) between which the table serves
+FLATTEST, SHARPEST = -20.0, 10.0  # range of ln(B/A) of the table
 
 STEP = 1.0 / 32.0
 
-LIMIT, PLAIN = 200, 12  # repetitions, and how many of them go the whole way
+LIMIT, UNDAMPED = 200, 12  # iterations, and those without damping
 
-TOLERANCE = 1e-11  # of the approach: how well the gap that wear opens agrees with its contact
+TOLERANCE = 1e-11  # of the approach: change of the gap in an iteration
 
 
 @cache
 def local_hertz_table() -> FloatArray:
-    """Tabulate Hertz's foundation by ln(B/A) = FLATTEST, FLATTEST + STEP, ..., SHARPEST.
+    """Tabulate the foundation of Hertz at ln(B/A) = FLATTEST, FLATTEST + STEP, ..., SHARPEST.
 
     Returns
     -------
     ndarray, shape (nodes, 3)
-        ln of k/E*, ln of l A, and the part of the overlap B b^2/d.
+        ln of k/E*, ln of l A, and the fraction of the overlap B b^2/d.
     """
     rows = []
     for ratio in np.exp(np.arange(FLATTEST, SHARPEST + 0.5 * STEP, STEP)):
@@ -69,14 +70,14 @@ def local_hertz_table() -> FloatArray:
 
 @kernel
 def read_local_hertz(table: FloatArray, ratio: float) -> tuple[float, float, float]:
-    """Return k/E*, l A and the part of the overlap where B/A is `ratio`, by cubic interpolation.
+    """Return k/E*, l A and the fraction of the overlap for B/A = `ratio`, by cubic interpolation.
 
     Parameters
     ----------
     table : ndarray, shape (nodes, 3)
         From `local_hertz_table`.
     ratio : float
-        B/A; beyond the table its end counts.
+        B/A; values beyond the table are replaced by its end.
     """
     end = table.shape[0] - 1.0
     position = min(max((np.log(ratio) - FLATTEST) / STEP, 0.0), end)
@@ -94,36 +95,6 @@ def read_local_hertz(table: FloatArray, ratio: float) -> tuple[float, float, flo
 
 
 @kernel
-def hertz_springs(
-    curvature: FloatArray,
-    longitudinal_curvature: float,
-    contact_modulus: float,
-    local_hertz: FloatArray,
-    stiffness: FloatArray,
-    length: FloatArray,
-    reach: FloatArray,
-) -> None:
-    """Fill what Hertz's ellipse of the local curvatures says of every strip.
-
-    Parameters
-    ----------
-    curvature : ndarray, shape (strips,)
-        B [1/m].
-    longitudinal_curvature, contact_modulus : float
-        2 A [1/m], E* [Pa].
-    local_hertz : ndarray, shape (nodes, 3)
-        From `local_hertz_table`.
-    stiffness, length, reach : ndarray, shape (strips,)
-        Filled: k [N/m^2], l [m], and the part of the overlap that deformation leaves.
-    """
-    for i in range(len(curvature)):
-        ratio = 2.0 * curvature[i] / longitudinal_curvature
-        spring, square, reach[i] = read_local_hertz(local_hertz, ratio)
-        stiffness[i] = contact_modulus * spring
-        length[i] = 2.0 * square / longitudinal_curvature
-
-
-@kernel
 def solve_semi_hertzian(
     variant: int,
     gap: FloatArray,
@@ -137,11 +108,11 @@ def solve_semi_hertzian(
     line_load: FloatArray,
     half_length: FloatArray,
 ) -> tuple[int, int, float]:
-    """Solve a normal contact, with the gap that wear opens while the contact carries its load.
+    """Solve a normal contact with wear compliance.
 
-    Everything, curvatures and first contact points too, is taken from the gap in contact,
-    `gap + compliance line_load`, which is found by repetition; each repetition carries the load.
-    Where it has not settled soon, it goes half the way each time.
+    Curvatures and first contact points are those of the gap including wear,
+    `gap + compliance line_load`, which is found by fixed-point iteration; every iterate carries the
+    load. After `UNDAMPED` iterations the change of the gap is halved.
 
     Parameters
     ----------
@@ -161,7 +132,7 @@ def solve_semi_hertzian(
     Returns
     -------
     status, iterations : int
-        `CONVERGED`, `TOO_FINE`, `NO_CONVERGENCE` or `NOT_FINITE`; repetitions.
+        `CONVERGED`, `TOO_FINE`, `NO_CONVERGENCE` or `NOT_FINITE`; iterations.
     approach : float
         Approach from gap zero [m].
 
@@ -207,15 +178,11 @@ def solve_semi_hertzian(
             length[:] = 2.0 / longitudinal_curvature
         else:
             smoothed_curvature(opened, depth, approach, spacing, curvature)
-            hertz_springs(
-                curvature,
-                longitudinal_curvature,
-                contact_modulus,
-                local_hertz,
-                stiffness,
-                length,
-                reach,
-            )
+            for i in range(n):
+                ratio = 2.0 * curvature[i] / longitudinal_curvature
+                spring, square, reach[i] = read_local_hertz(local_hertz, ratio)
+                stiffness[i] = contact_modulus * spring
+                length[i] = 2.0 * square / longitudinal_curvature
         if not rigid > opened.min():
             rigid = opened.min() + approach
         rigid = solve_foundation(
@@ -237,7 +204,7 @@ def solve_semi_hertzian(
         for i in range(n):
             worn = gap[i] + compliance[i] * line_load[i]
             change = max(change, abs(worn - opened[i]))
-            opened[i] += (1.0 if iteration <= PLAIN else 0.5) * (worn - opened[i])
+            opened[i] += (1.0 if iteration <= UNDAMPED else 0.5) * (worn - opened[i])
         if not change < np.inf or not rigid < np.inf:
             return NOT_FINITE, iteration, rigid
         if not wears or change <= TOLERANCE * approach:
@@ -247,20 +214,20 @@ def solve_semi_hertzian(
     return NO_CONVERGENCE, LIMIT, rigid
 
 
-SEEN = 1.5  # approaches: how deep into the gap the curvature is taken from
+DEPTH = 1.5  # approaches: height above the lowest gap up to which the parabola is fitted
 
-LEAST, GREATEST = 0.125, 100.0  # of the curvature that is as deep at the patch's half-width as it
+LEAST, GREATEST = 0.125, 100.0  # bounds of the curvature, over that of `patch_curvature`
 
-SINGULAR = 1e-9  # of the determinant's first term: too few strips to tell a parabola
+SINGULAR = 1e-9  # of the first term of the determinant: too few strips for a parabola
 
 
 @kernel
 def patch_curvature(depth: FloatArray, spacing: float) -> tuple[float, float]:
-    """Return half-width and curvature of the parabola that is as deep and wide as a contact.
+    """Return half-width and curvature of the parabola equivalent to the depth of a contact.
 
-    The half-width b is that of the parabolic depth whose mean square, weighted by depth, is the
-    contact's: 0.6 (sum of depth)^2/(sum of depth^2) in strips. It knows no edges and changes
-    smoothly, and two patches alike have the half-width of one of them, twice.
+    A parabolic depth of half-width b has the same ratio of squared sum to sum of squares:
+    b = 0.6 (sum of depth)^2/(sum of depth^2) in strips. b does not depend on the edges of the
+    contact, is a smooth function of the gap, and is twice as large for two equal patches.
 
     Parameters
     ----------
@@ -285,37 +252,36 @@ def patch_curvature(depth: FloatArray, spacing: float) -> tuple[float, float]:
 
 @kernel
 def curvature_at(
-    gap: FloatArray, i: int, bottom: float, seen: float, window: float, spacing: float
+    gap: FloatArray, i: int, bottom: float, limit: float, window: float, spacing: float
 ) -> float:
-    """Return B at strip i by least squares; nan where there are too few strips for a parabola.
+    """Return B at strip i by least squares; nan if there are too few strips for a parabola.
 
-    Each strip of the window counts by 1 - (distance/window)^2, and by how far the highest gap on
-    the way to it lies below `bottom + seen`.
+    Each strip of the window has the weight 1 - (distance/window)^2 times the depth of the highest
+    gap between it and strip i below `bottom + limit`.
 
     Parameters
     ----------
     gap : ndarray, shape (strips,)
         Gap [m].
     i : int
-        The strip.
-    bottom, seen : float
-        Lowest gap, and how far above it the gap counts [m].
+        Number of the strip.
+    bottom, limit : float
+        Lowest gap, and height above it up to which the gap is fitted [m].
     window, spacing : float
         Half-width of the window, and width of a strip [m].
     """
     n = len(gap)
-    m0 = m1 = m2 = m3 = m4 = 0.0
-    s0 = s1 = s2 = 0.0
+    m0 = m1 = m2 = m3 = m4 = s0 = s1 = s2 = 0.0
     share = spacing / window
     for side in range(2):
         step = 2 * side - 1
         ridge, t, j = gap[i] - bottom, 0.0, i
-        while 0 <= j < n and ridge < seen and t * t < 1.0:
+        while 0 <= j < n and ridge < limit and t * t < 1.0:
             height = gap[j] - bottom
             ridge = max(ridge, height)
-            weight = (1.0 - t * t) * max(seen - ridge, 0.0)
+            weight = (1.0 - t * t) * max(limit - ridge, 0.0)
             if j == i:
-                weight *= 0.5  # comes from either side
+                weight *= 0.5  # visited from both sides
             first, second = weight * t, weight * t * t
             m0 += weight
             m1 += first
@@ -327,9 +293,8 @@ def curvature_at(
             s2 += second * height
             t += step * share
             j += step
-    whole = m0 * m2 * m4
     det = m0 * (m2 * m4 - m3 * m3) - m1 * (m1 * m4 - m2 * m3) + m2 * (m1 * m3 - m2 * m2)
-    if not det > SINGULAR * whole:
+    if not det > SINGULAR * (m0 * m2 * m4):
         return np.nan
     square = m0 * (m2 * s2 - m3 * s1) - m1 * (m1 * s2 - m2 * s1) + s0 * (m1 * m3 - m2 * m2)
     return square / det / window**2
@@ -339,12 +304,12 @@ def curvature_at(
 def smoothed_curvature(
     gap: FloatArray, depth: FloatArray, approach: float, spacing: float, curvature: FloatArray
 ) -> None:
-    """Fill the lateral curvature B [1/m] that a gap has, as contact feels it.
+    """Fill the lateral curvature B [1/m] of a gap, smoothed over the size of the contact.
 
-    At every strip a parabola is fitted to the gap over the half-width of the contact to either
-    side (`patch_curvature`), as deep as 1.5 approaches and no further than ridges let one see.
-    With B_p the curvature of a parabola as deep at its edge as the contact, B is held between
-    B_p/8, below which a stretch is as flat as the patch can tell, and 100 B_p.
+    At every strip a parabola is fitted to the gap over the half-width of the contact on either side
+    (`patch_curvature`), up to the height of 1.5 approaches and not beyond ridges. B is limited to
+    the range from B_p/8 to 100 B_p, with the curvature B_p of the equivalent parabola: below the
+    lower bound a section is effectively flat over the patch.
 
     Parameters
     ----------
@@ -356,11 +321,11 @@ def smoothed_curvature(
         Filled: B [1/m].
     """
     window, typical = patch_curvature(depth, spacing)
-    bottom, seen = gap.min(), SEEN * approach
+    bottom, limit = gap.min(), DEPTH * approach
     for i in range(len(gap)):
-        found = typical
-        if gap[i] - bottom < seen:
-            found = curvature_at(gap, i, bottom, seen, window, spacing)
-            if np.isnan(found):
-                found = typical
-        curvature[i] = min(max(found, LEAST * typical), GREATEST * typical)
+        fitted = np.nan
+        if gap[i] - bottom < limit:
+            fitted = curvature_at(gap, i, bottom, limit, window, spacing)
+        if np.isnan(fitted):
+            fitted = typical
+        curvature[i] = min(max(fitted, LEAST * typical), GREATEST * typical)

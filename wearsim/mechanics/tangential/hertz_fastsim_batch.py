@@ -191,7 +191,9 @@ def _load_weighted_mean(values: FloatArray, line_load: FloatArray) -> float:
 
 
 @kernel
-def _fill_creepage(k: int, bodies: Bodies, inputs: ContactInputs, line_load: FloatArray, work: Workspace) -> None:
+def _fill_creepage(
+    k: int, bodies: Bodies, inputs: ContactInputs, line_load: FloatArray, work: Workspace
+) -> None:
     """Spread the mean creepage over the strips, as `Creepage` says."""
     strips, mean = len(bodies.y), inputs.longitudinal[k]
     varied = len(inputs.variation) > 0
@@ -342,7 +344,13 @@ def _accumulate(count: int, part: Sums, weight: float, first: int, total: Sums) 
 
 @kernel
 def _fill_results(
-    k: int, bodies: Bodies, theory: Theory, inputs: ContactInputs, results: ContactResults, work: Workspace, total: Sums
+    k: int,
+    bodies: Bodies,
+    theory: Theory,
+    inputs: ContactInputs,
+    results: ContactResults,
+    work: Workspace,
+    total: Sums,
 ) -> None:
     """Turn the sums along the strips into the solution of contact `k`."""
     eta, phi, speed = inputs.lateral[k], inputs.spin[k], inputs.rolling_speed

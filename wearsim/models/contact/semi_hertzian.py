@@ -11,7 +11,7 @@ from wearsim.errors import ContactError
 from wearsim.mechanics.hertz.elasticity import ElasticPair, combine
 from wearsim.mechanics.numerics.jit import own_array
 from wearsim.mechanics.semi_hertzian import solver as kernels
-from wearsim.mechanics.semi_hertzian.kik_piotrowski import (
+from wearsim.mechanics.semi_hertzian.penetration import (
     CONVERGED,
     NO_CONVERGENCE,
     NOT_FINITE,
@@ -61,9 +61,9 @@ class SemiHertzian(ContactModel):
 
     What the variants need of the profile's shape, its lateral curvature, is smoothed by one rule:
     a least-squares parabola over the half-width of the contact to either side
-    (`mechanics.semi_hertzian_curvature`). Several patches are solved together for one approach;
+    (`mechanics.semi_hertzian.solver`). Several patches are solved together for one approach;
     each penetrates from its own first contact point, until they grow together
-    (`mechanics.semi_hertzian_levels`). With a wear compliance all this is taken from the gap that
+    (`mechanics.semi_hertzian.penetration`). With a wear compliance all this is taken from the gap that
     wear leaves, not from the one before.
 
     Parameters
