@@ -1,4 +1,4 @@
-"""Made-up ensembles of any size, so that these tests stand on the results room alone."""
+"""Synthetic ensembles of any size, which need only the results package."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ INPUTS = [
 
 
 def some_header(asked: int = 20, **changes: object) -> EnsembleData:
-    """Return what is known before the first realisation; `changes` replaces fields."""
+    """Return the data known before the first realisation; `changes` replaces fields."""
     values: dict[str, object] = {
         "scenario_text": SCENARIO,
         "scenario_file": "scenarios/rig.toml",
@@ -52,7 +52,7 @@ def some_header(asked: int = 20, **changes: object) -> EnsembleData:
 
 
 def some_static(strips: int = STRIPS) -> Arrays:
-    """Return what all realisations have in common."""
+    """Return the arrays common to all realisations."""
     return {
         "y": 1e-3 * np.arange(strips),
         "multiplicity": np.ones(ROLLERS),
@@ -62,7 +62,7 @@ def some_static(strips: int = STRIPS) -> Arrays:
 
 
 def some_outcome(number: int, strips: int = STRIPS, error: str = "") -> Outcome:
-    """Return what became of a realisation, which depends on its number alone."""
+    """Return an outcome that depends only on the number of the realisation."""
     random = np.random.default_rng(number)
     drawn: dict[str, float | np.ndarray] = {
         "load.normal_force": random.random(),
@@ -88,7 +88,7 @@ def some_statistics(path: Path) -> Arrays:
 
 
 def without_state(path: Path) -> bytes:
-    """Return the bytes of a file, but for the two places of its state."""
+    """Return the bytes of a file, with the two slots of its state set to zero."""
     import h5py
 
     content = bytearray(path.read_bytes())

@@ -1,4 +1,4 @@
-"""Run as a process: writes ensembles and kills itself at every stage, as an outage would."""
+"""Separate process that writes ensembles and kills itself at every stage."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ from wearsim.results import EnsembleFile, Outcome
 from wearsim.results.ensemble.schema import DONE
 from wearsim.results.io import atomic_write
 
-ASKED, STRIPS = 5, 60
+COUNT, STRIPS = 5, 60
 BATCHES = ([3, 0, 1], [4, 2])
 FAILED = (1, 4)
-SMALL_CHUNK = 400  # two writes to a profile, so that a kill may leave half of one
+SMALL_CHUNK = 400  # two writes per profile, so that a kill can leave half of one
 
 
 def outcome(number: int, fails: bool) -> Outcome:
-    """Return a realisation of the ensemble that is killed."""
+    """Return a realisation of the killed ensemble."""
     error = f"realisation {number} lost contact" if fails else ""
     return some_outcome(number, STRIPS, error)
 
 
 def create(path: Path) -> None:
     """Write an ensemble of pending realisations."""
-    EnsembleFile.create(path, some_header(ASKED), some_static(STRIPS)).close()
+    EnsembleFile.create(path, some_header(COUNT), some_static(STRIPS)).close()
 
 
-def go_on(path: Path, batches: Iterable[list[int]] = BATCHES) -> None:
-    """Put what is not there yet, a state after each batch, then what has failed once more."""
+def continue_writing(path: Path, batches: Iterable[list[int]] = BATCHES) -> None:
+    """Write missing realisations, with a state after each batch, then repeat the failed ones."""
     with EnsembleFile.open(path) as file:
         for batch in batches:
             missing = [number for number in batch if not file.status[number]]
@@ -45,7 +45,7 @@ def go_on(path: Path, batches: Iterable[list[int]] = BATCHES) -> None:
 
 
 def kill_while(work: Callable[[], None], at: int) -> int:
-    """Fork, and kill the child at its call number `at` of the seam; return the signal."""
+    """Fork, kill the child at call number `at` of the write hook, and return the signal."""
     child = os.fork()
     if child:
         return os.WTERMSIG(os.waitpid(child, 0)[1])
@@ -61,7 +61,7 @@ def kill_while(work: Callable[[], None], at: int) -> int:
 
 
 def stages_of(work: Callable[[], None]) -> list[str]:
-    """Return every call of the seam, in order."""
+    """Return all calls of the write hook, in order."""
     seen: list[str] = []
     atomic_write.on_write_stage = seen.append
     work()
@@ -70,15 +70,15 @@ def stages_of(work: Callable[[], None]) -> list[str]:
 
 
 def kill_at_stages(kind: str, start: Path | None, work: Callable[[Path], None]) -> None:
-    """Kill the work on a copy of a file, or on none, and say where and how.
+    """Kill the work on a copy of `start`, or without a file; print file, signal and stage.
 
-    At every call of the seam, or at the first, the middle and the last of each stage.
+    The kills are at every call of the write hook, or at the first, middle and last of each stage.
     """
     stages = stages_of(lambda: work(whole))
     for at, name in enumerate(stages):
         calls = [number for number, stage in enumerate(stages) if stage == name]
         chosen = every or at in {calls[0], calls[len(calls) // 2], calls[-1]}
-        if chosen and name.startswith("before"):  # after an "after" comes a "before" at once
+        if chosen and name.startswith("before"):  # a "before" follows each "after" at once
             target = folder / f"{kind}-{at}.h5"
             if start:
                 shutil.copy(start, target)
@@ -92,5 +92,5 @@ if __name__ == "__main__":
     create(fresh)
     kill_at_stages("create", None, create)
     atomic_write._CHUNK = SMALL_CHUNK
-    kill_at_stages("rows", fresh, lambda path: go_on(path, BATCHES[:1]))
-    go_on(whole)
+    kill_at_stages("rows", fresh, lambda path: continue_writing(path, BATCHES[:1]))
+    continue_writing(whole)

@@ -1,4 +1,4 @@
-"""Run as a process: overwrites one file per stage and kills itself there, as an outage would."""
+"""Separate process that overwrites one file per stage and kills itself at that stage."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from wearsim.results.io import atomic_write, writer
 
 
 def stages_of_a_write(path: Path) -> list[str]:
-    """Return every call of the seam, in order; a stage may come more than once."""
+    """Return all calls of the write hook, in order; a stage may occur more than once."""
     seen: list[str] = []
     atomic_write.on_write_stage = seen.append
     writer.write_results(path, some_run(seed=2, strips=400, records=20))
@@ -21,7 +21,7 @@ def stages_of_a_write(path: Path) -> list[str]:
 
 
 def kill_while_writing(path: Path, at: int) -> int:
-    """Fork, and kill the child at its call number `at` of the seam; return the signal."""
+    """Fork, kill the child at call number `at` of the write hook, and return the signal."""
     child = os.fork()
     if child:
         return os.WTERMSIG(os.waitpid(child, 0)[1])
@@ -42,7 +42,7 @@ if __name__ == "__main__":
     for number, name in enumerate(stages):
         target = folder / f"{number}.h5"
         atomic_write.on_write_stage = lambda stage: None
-        if number % 2 == 0:  # over an old file, and where there is none
+        if number % 2 == 0:  # with and without an old file
             writer.write_results(target, some_run(seed=1))
         killed_by = kill_while_writing(target, number)
         sys.stdout.write(f"{number},{killed_by},{name}\n")

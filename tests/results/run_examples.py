@@ -1,4 +1,4 @@
-"""Made-up runs of any size, so that these tests stand on the results room alone."""
+"""Synthetic runs of any size, which need only the results package."""
 
 from __future__ import annotations
 
@@ -70,10 +70,10 @@ def _random_arrays(random: np.random.Generator, lengths: dict[str, int]) -> Arra
 
 
 def some_checkpoint(seed: int = 0, strips: int = 7, count: int = 0) -> Arrays:
-    """Return arrays of every kind a state may hold."""
+    """Return arrays of every type that a state may contain."""
     random = np.random.default_rng(seed + 1)
-    many = {f"shadow_contact_{k}": random.random(strips) for k in range(count)}
-    return many | {
+    extra = {f"coarse_contact_{k}": random.random(strips) for k in range(count)}
+    return extra | {
         "passes": np.asarray(1234.5),
         "steps": np.asarray(17),
         "stable": np.asarray(True),

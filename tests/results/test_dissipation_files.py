@@ -1,4 +1,4 @@
-"""The file of a dissipation study: every bit back, and told apart from that of a run."""
+"""The file of a dissipation study: round trip, statistics, refused files."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def study_file(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize(("count", "kept"), [(40, 30), (1, 1)])
-def test_that_every_bit_of_a_study_comes_back(tmp_path, count, kept):
+def test_study_is_read_back_bit_for_bit(tmp_path, count, kept):
     path, data = tmp_path / "study.h5", some_study(count, kept)
     write_results(path, data)
     found = read_dissipation(path)
@@ -86,25 +86,25 @@ def test_that_every_bit_of_a_study_comes_back(tmp_path, count, kept):
     assert kind_of(path) == "dissipation"
 
 
-def test_that_equal_studies_give_equal_files(tmp_path):
+def test_equal_studies_give_equal_files(tmp_path):
     one, other = tmp_path / "one.h5", tmp_path / "other.h5"
     write_results(one, some_study())
     write_results(other, some_study())
     assert one.read_bytes() == other.read_bytes()
 
 
-def test_that_xarray_opens_a_study_with_named_dimensions_and_units(study_file):
+def test_xarray_opens_study_with_dimensions_and_units(study_file):
     with xarray.open_dataset(study_file, engine="h5netcdf") as dataset:
         assert dataset.sizes == {"realisation": 40, "kept": 30, "y": 9}
         assert dataset["power"].attrs["units"] == "W"
         assert dataset["load.normal_force"].attrs["units"] == "N"
         assert dataset["dissipation"].dims == ("kept", "y")
-        assert dataset["realisation"].values[0] == 0  # as everywhere else
+        assert dataset["realisation"].values[0] == 0
         assert dataset.attrs["format"] == "wearsim-dissipation"
         assert dataset.attrs["mean_problem_power"] == 0.1 + 0.2
 
 
-def test_that_statistics_stand_in_the_file_for_other_readers(study_file):
+def test_statistics_are_stored_in_the_file(study_file):
     with h5py.File(study_file) as file:
         about = json.loads(file["inputs/about"][()])
         power = file["power"][()]
@@ -114,7 +114,7 @@ def test_that_statistics_stand_in_the_file_for_other_readers(study_file):
     assert quantiles[0.025]["low"] is None  # 40 realisations are too few
 
 
-def test_that_the_wrong_kind_of_file_is_told_in_a_line(study_file, tmp_path):
+def test_wrong_kind_of_file_raises_one_line_error(study_file, tmp_path):
     run_file = tmp_path / "run.h5"
     write_results(run_file, some_run())
     assert kind_of(run_file) == "run"
@@ -132,52 +132,52 @@ def _newer(file: h5py.File) -> None:
     file.attrs["format_version"] = 2
 
 
-def _lacking(file: h5py.File) -> None:
+def _without_power(file: h5py.File) -> None:
     del file["power"]
 
 
-def _lacking_a_draw(file: h5py.File) -> None:
+def _without_drawn_values(file: h5py.File) -> None:
     del file["load.normal_force"]
 
 
-def _of_wrong_shape(file: h5py.File) -> None:
+def _with_wrong_shape(file: h5py.File) -> None:
     del file["power"]
     file["power"] = np.zeros(3)
 
 
 @pytest.mark.parametrize(
-    ("change", "complaint"),
+    ("change", "message"),
     [
         (_newer, "was written by a newer wearsim (format 2, this one reads up to 1)"),
-        (_lacking, "is damaged (lacks power)"),
-        (_lacking_a_draw, "is damaged (lacks load.normal_force)"),
-        (_of_wrong_shape, "is damaged ("),
+        (_without_power, "is damaged (lacks power)"),
+        (_without_drawn_values, "is damaged (lacks load.normal_force)"),
+        (_with_wrong_shape, "is damaged ("),
     ],
 )
-def test_that_a_study_that_is_not_as_written_is_told(study_file, change, complaint):
+def test_altered_study_is_refused(study_file, change, message):
     with h5py.File(study_file, "r+") as file:
         change(file)
     with pytest.raises(ResultsFileError) as caught:
         open_dissipation(study_file)
-    assert str(caught.value).startswith(f"{study_file}: {complaint}")
+    assert str(caught.value).startswith(f"{study_file}: {message}")
 
 
-def test_that_a_truncated_study_is_told(study_file):
+def test_truncated_study_is_refused(study_file):
     study_file.write_bytes(study_file.read_bytes()[:-100])
     with pytest.raises(ResultsFileError, match="is truncated"):
         kind_of(study_file)
 
 
-def test_that_each_word_of_a_study_names_its_variable(study_file):
+def test_study_properties_return_their_variables(study_file):
     result = open_dissipation(study_file)
-    for word in ("power", "y", "dissipation"):
-        assert getattr(result, word).tobytes() == result.values(word).tobytes()
+    for name in ("power", "y", "dissipation"):
+        assert getattr(result, name).tobytes() == result.values(name).tobytes()
     assert list(result.inputs) == ["load.normal_force", "friction.coefficient"]
     assert (result.count, result.finished, result.raw.asked) == (40, False, 50)
     assert set(VARIABLES) < set(result.raw.variables)
 
 
-def test_that_convergence_ends_at_the_summary():
+def test_convergence_ends_at_the_summary():
     result = DissipationResult(some_study(count=500, kept=1))
     found, power = result.convergence(50), result.summaries["power"]
     assert found.count[0] == 1
@@ -187,7 +187,7 @@ def test_that_convergence_ends_at_the_summary():
     assert found.std_error[-1] == power.std_error
 
 
-def test_that_a_study_is_told_in_a_line():
+def test_repr_of_study():
     assert re.fullmatch(
         r"<DissipationResult 'a contact': 40 of 50 realisations, power [\d.]+ W, std [\d.]+ W>",
         repr(DissipationResult(some_study())),

@@ -1,4 +1,4 @@
-"""An ensemble as CSV: every number at its place, in the unit of its head."""
+"""Export of an ensemble as CSV: values, units and existing files."""
 
 from __future__ import annotations
 
@@ -9,20 +9,19 @@ import pytest
 
 from tests.report.made_up_ensembles import made_up
 from wearsim.errors import ResultsFileError
-from wearsim.results import csv_export as ensemble_export
-from wearsim.results import export_csv
+from wearsim.results import csv_export, export_csv
 
 
 def read(path):
-    """Return the columns of a table by their heads."""
+    """Return the columns of a table by their titles."""
     with path.open() as file:
         head, *rows = csv.reader(file)
     return dict(zip(head, np.array(rows, dtype=float).T, strict=True))
 
 
 @pytest.mark.parametrize("block", [7, 10_000])
-def test_that_every_realisation_is_a_row_whatever_the_blocks(tmp_path, monkeypatch, block):
-    monkeypatch.setattr(ensemble_export, "_BLOCK", block)
+def test_every_realisation_is_a_row_for_any_block_size(tmp_path, monkeypatch, block):
+    monkeypatch.setattr(csv_export, "_BLOCK", block)
     result = made_up(30, failed=[4, 9], pending=3)
     export_csv(result, tmp_path)
     found = read(tmp_path / "realisations.csv")
@@ -45,7 +44,7 @@ def test_that_every_realisation_is_a_row_whatever_the_blocks(tmp_path, monkeypat
         np.testing.assert_allclose(good[title], values, rtol=1e-11)
 
 
-def test_that_courses_and_profile_are_those_of_the_result(tmp_path):
+def test_courses_and_profile_equal_those_of_the_result(tmp_path):
     result = made_up(30)
     export_csv(result, tmp_path)
     found, course = read(tmp_path / "courses.csv"), result.course("width")
@@ -63,7 +62,7 @@ def test_that_courses_and_profile_are_those_of_the_result(tmp_path):
     np.testing.assert_allclose(profile["depth low [um]"], band.low * 1e6, rtol=1e-11)
 
 
-def test_that_failures_are_told_with_their_errors(tmp_path):
+def test_failures_are_exported_with_their_errors(tmp_path):
     result = made_up(3, failed=[0, 1, 2])
     written = [path.name for path in export_csv(result, tmp_path)]
     assert written == ["realisations.csv", "failures.csv", "scenario.toml"]
@@ -73,7 +72,7 @@ def test_that_failures_are_told_with_their_errors(tmp_path):
     assert rows[1:] == [[str(number), text] for number, text in result.errors.items()]
 
 
-def test_that_no_file_is_replaced(tmp_path):
+def test_existing_tables_are_not_replaced(tmp_path):
     (tmp_path / "courses.csv").write_text("mine")
     with pytest.raises(ResultsFileError, match=r"courses\.csv: already exists"):
         export_csv(made_up(3), tmp_path)

@@ -1,4 +1,4 @@
-"""The file of an ensemble: every bit back, for any reader, and whatever is wrong with it told."""
+"""The file of an ensemble: round trip, xarray, refused files, use of memory and disk."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def ensemble_file(tmp_path: Path) -> Path:
     return path
 
 
-def _complaint(path: Path) -> str:
+def _error_of(path: Path) -> str:
     with pytest.raises(ResultsFileError) as caught:
         read_ensemble(path)
     text = str(caught.value)
@@ -59,7 +59,7 @@ def _complaint(path: Path) -> str:
     return text.removeprefix(f"{path}: ")
 
 
-def test_that_every_bit_of_an_ensemble_comes_back(ensemble_file):
+def test_ensemble_is_read_back_bit_for_bit(ensemble_file):
     data, header = read_ensemble(ensemble_file), some_header()
     changed = {"wall_seconds": 2.5, "warnings": ["slow"], "statistics": {"a": [1.5]}}
     for item in fields(EnsembleData):
@@ -76,7 +76,7 @@ def test_that_every_bit_of_an_ensemble_comes_back(ensemble_file):
             assert data.variables[name][number].tobytes() == np.asarray(value).tobytes(), name
 
 
-def test_that_rows_of_failed_realisations_are_nan_but_for_what_was_drawn(ensemble_file):
+def test_rows_of_failed_realisations_keep_only_drawn_values(ensemble_file):
     variables = read_ensemble(ensemble_file).variables
     for name, value in some_outcome(5, error=ERROR).drawn.items():
         assert variables[name][5].tobytes() == np.asarray(value).tobytes()
@@ -84,7 +84,7 @@ def test_that_rows_of_failed_realisations_are_nan_but_for_what_was_drawn(ensembl
         assert np.isnan(variables[name][5]).all(), name
 
 
-def test_that_a_column_is_one_record_of_every_realisation(ensemble_file, monkeypatch):
+def test_column_is_one_record_of_every_realisation(ensemble_file, monkeypatch):
     data = read_ensemble(ensemble_file)
     depth = data.variables["depth"]
     for record in (0, RECORDS - 1, -1):
@@ -94,7 +94,7 @@ def test_that_a_column_is_one_record_of_every_realisation(ensemble_file, monkeyp
     np.testing.assert_array_equal(data.variables.rows("depth", 3, 6), depth[3:6])
 
 
-def test_that_a_long_error_is_cut_between_two_characters(tmp_path):
+def test_long_error_is_cut_between_two_characters(tmp_path):
     path = tmp_path / "ensemble.h5"
     long, surrogate = "x" + "µ" * 300, "half \ud800"
     with EnsembleFile.create(path, some_header(), some_static()) as file:
@@ -106,7 +106,7 @@ def test_that_a_long_error_is_cut_between_two_characters(tmp_path):
     assert errors[2] == "half ?"
 
 
-def test_that_a_control_variate_has_a_variable_of_its_own(tmp_path):
+def test_control_variate_is_stored_as_a_variable(tmp_path):
     path, control = tmp_path / "ensemble.h5", {"mean": 1.5, "std": 0.1, "draws": 1000000}
     outcome = some_outcome(0)
     outcome.scalars["control"] = 1.25
@@ -117,7 +117,7 @@ def test_that_a_control_variate_has_a_variable_of_its_own(tmp_path):
     assert data.variables["control"][0] == 1.25
 
 
-def test_that_xarray_opens_an_ensemble_with_named_dimensions_and_units(ensemble_file):
+def test_xarray_opens_ensemble_with_dimensions_and_units(ensemble_file):
     statistics = some_statistics(ensemble_file)
     with EnsembleFile.open(ensemble_file) as file:
         file.put_statistics(statistics)
@@ -142,18 +142,18 @@ def test_that_xarray_opens_an_ensemble_with_named_dimensions_and_units(ensemble_
         assert dataset["status"].values[:7].tolist() == [DONE] * 4 + [PENDING, FAILED, PENDING]
         assert all({"units", "long_name"} <= set(found.attrs) for found in dataset.values())
         assert dataset.attrs["format"] == "wearsim-ensemble"
-        assert "finished" not in dataset.attrs  # it would not change
+        assert "finished" not in dataset.attrs  # an attribute could not be updated
         for name, array in statistics.items():
             np.testing.assert_array_equal(dataset[name].values, array)
 
 
-def test_that_statistics_are_nan_until_they_are_made(ensemble_file):
+def test_statistics_are_nan_before_they_are_written(ensemble_file):
     variables = read_ensemble(ensemble_file).variables
     assert np.isnan(variables["width_quantiles"]).all()
     assert np.isnan(variables["depth_profile_low"]).all()
 
 
-def test_that_every_kind_of_file_is_told_from_the_others(ensemble_file, tmp_path):
+def test_kinds_of_files_are_distinguished(ensemble_file, tmp_path):
     run, study = tmp_path / "run.h5", tmp_path / "study.h5"
     write_results(run, some_run())
     write_results(study, some_study())
@@ -169,45 +169,45 @@ def test_that_every_kind_of_file_is_told_from_the_others(ensemble_file, tmp_path
             f"{ensemble_file}: holds an ensemble of wear tests, from `wearsim ensemble`; what is"
             f" needed is {needed}"
         )
-    assert _complaint(run).startswith("holds a wear test, from `wearsim run`; what is needed is an")
+    assert _error_of(run).startswith("holds a wear test, from `wearsim run`; what is needed is an")
     with pytest.raises(ResultsFileError, match="holds a wear test"):
         EnsembleFile.open(run)
 
 
-def test_that_missing_and_foreign_files_are_told(tmp_path):
+def test_missing_and_foreign_files_are_refused(tmp_path):
     path = tmp_path / "a.h5"
-    assert _complaint(path) == "there is no such file"
+    assert _error_of(path) == "there is no such file"
     path.write_bytes(b"y [mm],z [um]\n0,1\n" * 99)
-    assert _complaint(path) == "is not a results file of wearsim, not even HDF5"
+    assert _error_of(path) == "is not a results file of wearsim, not even HDF5"
 
 
-def test_that_a_truncated_ensemble_is_told_at_any_length(ensemble_file):
+def test_ensemble_truncated_at_any_length_is_refused(ensemble_file):
     content = ensemble_file.read_bytes()
     size = len(content)
     near = {1, 95, 96, 97, 2048, size - 4096, size - 8, size - 1}
     for length in sorted(near | set(range(100, size, size // 40))):
         ensemble_file.write_bytes(content[:length])
-        assert _complaint(ensemble_file).startswith("is truncated"), length
+        assert _error_of(ensemble_file).startswith("is truncated"), length
 
 
 def _newer(file: h5py.File) -> None:
     file.attrs["format_version"] = 2
 
 
-def _lacking(file: h5py.File) -> None:
+def _incomplete(file: h5py.File) -> None:
     del file["depth"], file["checkpoint/state_1"]
 
 
-def _lacking_a_draw(file: h5py.File) -> None:
+def _without_drawn_values(file: h5py.File) -> None:
     del file["creepage.yaw"]
 
 
-def _of_wrong_shape(file: h5py.File) -> None:
+def _with_wrong_shape(file: h5py.File) -> None:
     del file["depth"]
     file["depth"] = np.zeros((20, 1))
 
 
-def _of_wrong_type(file: h5py.File) -> None:
+def _with_wrong_type(file: h5py.File) -> None:
     del file["depth"]
     file["depth"] = np.zeros((20, RECORDS), np.float32)
 
@@ -217,7 +217,7 @@ def _compressed(file: h5py.File) -> None:
     file.create_dataset("depth", data=np.zeros((20, RECORDS)), compression="gzip")
 
 
-def _of_unknown_status(file: h5py.File) -> None:
+def _with_unknown_status(file: h5py.File) -> None:
     file["status"][7] = 9
 
 
@@ -227,29 +227,29 @@ def _without_state(file: h5py.File) -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "complaint"),
+    ("change", "message"),
     [
         (_newer, "was written by a newer wearsim (format 2, this one reads up to 1)"),
-        (_lacking, "is damaged (lacks depth, checkpoint/state_1)"),
-        (_lacking_a_draw, "is damaged (lacks creepage.yaw)"),
-        (_of_wrong_shape, "is damaged (depth has 1 along record, others have 4)"),
-        (_of_wrong_type, "is damaged (depth is stored as float32)"),
+        (_incomplete, "is damaged (lacks depth, checkpoint/state_1)"),
+        (_without_drawn_values, "is damaged (lacks creepage.yaw)"),
+        (_with_wrong_shape, "is damaged (depth has 1 along record, others have 4)"),
+        (_with_wrong_type, "is damaged (depth is stored as float32)"),
         (_compressed, "is damaged (/depth is not in one piece, as after h5repack)"),
-        (_of_unknown_status, "is damaged (a realisation has the status 9)"),
+        (_with_unknown_status, "is damaged (a realisation has the status 9)"),
         (_without_state, "is damaged (its state is not sound in either place)"),
     ],
 )
-def test_that_an_ensemble_that_is_not_as_written_is_told(ensemble_file, change, complaint):
+def test_altered_ensemble_is_refused(ensemble_file, change, message):
     with h5py.File(ensemble_file, "r+") as file:
         change(file)
-    assert _complaint(ensemble_file).startswith(complaint)
+    assert _error_of(ensemble_file).startswith(message)
     before = ensemble_file.read_bytes()
     with pytest.raises(ResultsFileError):
         EnsembleFile.open(ensemble_file)
     assert ensemble_file.read_bytes() == before
 
 
-def test_that_a_file_that_changes_under_the_reader_is_told(ensemble_file, tmp_path):
+def test_file_changed_after_opening_is_refused(ensemble_file, tmp_path):
     data = read_ensemble(ensemble_file)
     other = tmp_path / "other.h5"
     EnsembleFile.create(other, some_header(), some_static()).close()
@@ -265,7 +265,7 @@ def test_that_a_file_that_changes_under_the_reader_is_told(ensemble_file, tmp_pa
         data.variables["depth"]
 
 
-def test_that_a_million_realisations_take_no_memory_and_no_disk_before_they_are_done(tmp_path):
+def test_pending_realisations_take_no_memory_and_no_disk(tmp_path):
     path, million = tmp_path / "ensemble.h5", 10**6
     header, static = some_header(million), some_static(500)
     EnsembleFile.create(tmp_path / "small.h5", some_header(10), static).close()  # loads h5py
@@ -278,7 +278,7 @@ def test_that_a_million_realisations_take_no_memory_and_no_disk_before_they_are_
     tracemalloc.stop()
     numbers = million * len(OBSERVABLES) * RECORDS
     assert path.stat().st_size > 8 * numbers
-    assert peak < 0.1 * 8 * numbers  # numbering the realisations takes most of it
+    assert peak < 0.1 * 8 * numbers  # mostly the numbers of the realisations
     assert path.stat().st_blocks * 512 < 0.1 * 8 * numbers
     assert data.done.tolist() == [3, million - 1]
     for number in data.done:

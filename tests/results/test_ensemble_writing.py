@@ -1,4 +1,4 @@
-"""An ensemble's file as it grows: any order, killed at any moment, one writer, many readers."""
+"""Writing of an ensemble file: any order, kills at any moment, one writer, many readers."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from wearsim.results.ensemble.schema import DONE, OBSERVABLES, PENDING
 from wearsim.results.io import atomic_write
 
 HERE = Path(__file__).parent
-ASKED = 12
+COUNT = 12
 FAILED = {2, 3, 9}
 
 
@@ -41,37 +41,37 @@ def _outcomes(numbers, failed=FAILED):
 
 
 def _new(path: Path, **changes: object) -> EnsembleFile:
-    return EnsembleFile.create(path, some_header(ASKED, **changes), some_static())
+    return EnsembleFile.create(path, some_header(COUNT, **changes), some_static())
 
 
-def test_that_order_and_batches_leave_no_trace_in_the_file(tmp_path):
+def test_file_does_not_depend_on_order_and_batches(tmp_path):
     contents = set()
-    for seed, size in ((0, ASKED), (1, 1), (2, 3), (3, 5), (4, 2)):
+    for seed, size in ((0, COUNT), (1, 1), (2, 3), (3, 5), (4, 2)):
         path = tmp_path / f"{seed}.h5"
-        order = np.random.default_rng(seed).permutation(ASKED)
+        order = np.random.default_rng(seed).permutation(COUNT)
         with _new(path) as file:
-            for start in range(0, ASKED, size):
+            for start in range(0, COUNT, size):
                 file.put(_outcomes(order[start : start + size].tolist()))
                 file.put_state({"wall_seconds": float(start)})
         with EnsembleFile.open(path) as file:
-            file.put_statistics(some_statistics_of(tmp_path))
+            file.put_statistics(_statistics_for(tmp_path))
         contents.add(hashlib.sha256(without_state(path)).hexdigest())
     assert len(contents) == 1
 
 
-def some_statistics_of(folder: Path):
+def _statistics_for(folder: Path):
     path = folder / "shapes.h5"
     if not path.exists():
         _new(path).close()
     return some_statistics(path)
 
 
-def test_that_a_failed_realisation_done_again_leaves_no_trace(tmp_path):
+def test_repeated_failed_realisation_gives_the_same_file(tmp_path):
     once, twice = tmp_path / "once.h5", tmp_path / "twice.h5"
     with _new(once) as file:
-        file.put(_outcomes(range(ASKED), failed={9}))
+        file.put(_outcomes(range(COUNT), failed={9}))
     with _new(twice) as file:
-        file.put(_outcomes(range(ASKED)))
+        file.put(_outcomes(range(COUNT)))
     with EnsembleFile.open(twice) as file:
         file.clear([3, 2])
         assert np.flatnonzero(file.status == PENDING).tolist() == [2, 3]
@@ -83,7 +83,7 @@ def test_that_a_failed_realisation_done_again_leaves_no_trace(tmp_path):
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork and SIGKILL")
 @pytest.mark.parametrize("extent", ["each stage", pytest.param("all", marks=pytest.mark.slow)])
-def test_file_of_killed_ensemble_goes_on_bit_for_bit(tmp_path, extent):
+def test_killed_ensemble_is_continued_bit_for_bit(tmp_path, extent):
     environment = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
     done = subprocess.run(
         [sys.executable, str(HERE / "killed_ensemble_writer.py"), str(tmp_path), extent],
@@ -95,19 +95,19 @@ def test_file_of_killed_ensemble_goes_on_bit_for_bit(tmp_path, extent):
     lines = [line.split(",") for line in done.stdout.splitlines()]
     assert {int(killed_by) for _, killed_by, _ in lines} == {signal.SIGKILL}
     whole = without_state(tmp_path / "whole.h5")
-    counts, is_there = set(), False
+    counts, exists = set(), False
     for name, _, stage in lines:
         path = tmp_path / name
-        is_there = is_there or stage == "before fsync folder" or name.startswith("rows")
-        assert path.exists() == is_there
-        if not is_there:
-            killed.create(path)  # what the kill left behind is in nobody's way
+        exists = exists or stage == "before fsync folder" or name.startswith("rows")
+        assert path.exists() == exists
+        if not exists:
+            killed.create(path)  # remains of the killed process do not matter
         counts.add(_check_rows(path))
-        killed.go_on(path)
+        killed.continue_writing(path)
         is_same = without_state(path) == whole  # pytest takes long to show how files differ
         assert is_same, name
-    found = {(0, 0), (1, 1), (2, 1), (2, 0), (3, 0)}  # done and failed, as they were put
-    assert counts == found if extent == "all" else {(0, 0)} < counts <= found
+    expected = {(0, 0), (1, 1), (2, 1), (2, 0), (3, 0)}  # done and failed, after each operation
+    assert counts == expected if extent == "all" else {(0, 0)} < counts <= expected
 
 
 def _check_rows(path: Path) -> tuple[int, int]:
@@ -123,7 +123,7 @@ def _check_rows(path: Path) -> tuple[int, int]:
     return len(data.done), len(data.failed)
 
 
-def test_that_a_state_torn_at_any_byte_leaves_the_one_before(tmp_path):
+def test_partly_written_state_leaves_the_previous_one(tmp_path):
     path = tmp_path / "a.h5"
     with _new(path) as file:
         file.put_state({"wall_seconds": 1.0})
@@ -132,23 +132,23 @@ def test_that_a_state_torn_at_any_byte_leaves_the_one_before(tmp_path):
         file.put_state({"wall_seconds": 2.0, "finished": True})
     after = path.read_bytes()
     changed = np.flatnonzero(np.frombuffer(before, "u1") != np.frombuffer(after, "u1"))
-    for at in (*changed[:20], *changed[20::9]):  # the bytes before it are new, the rest is old
+    for at in (*changed[:20], *changed[20::9]):  # bytes before it are new, the others old
         path.write_bytes(after[:at] + before[at:])
         data = read_ensemble(path)
         assert (data.wall_seconds, data.finished) == (1.0, False), at
         assert data.notes == some_header().notes
     path.write_bytes(after[: changed[5]] + before[changed[5] :])
-    with EnsembleFile.open(path) as file:  # goes on over the torn one
+    with EnsembleFile.open(path) as file:  # overwrites the damaged one
         file.put_state({"wall_seconds": 3.0})
     assert read_ensemble(path).wall_seconds == 3.0
 
 
-def test_that_a_second_writer_is_refused(tmp_path):
+def test_second_writer_is_refused(tmp_path):
     path = tmp_path / "a.h5"
     busy = f"{path}: is being written by another process"
     with _new(path) as file:
         file.put(_outcomes([1]))
-        for _ in range(2):  # reading it here does not let go of the lock
+        for _ in range(2):  # reading in this process does not release the lock
             read_ensemble(path)
             for take in (EnsembleFile.open, _new, partial(check_output, force=True)):
                 with pytest.raises(ResultsFileError) as caught:
@@ -161,15 +161,15 @@ def test_that_a_second_writer_is_refused(tmp_path):
     assert (read_ensemble(path).status == PENDING).all()
 
 
-def test_that_an_ensemble_takes_the_place_of_a_file_of_another_kind(tmp_path):
+def test_ensemble_replaces_a_file_of_another_kind(tmp_path):
     path = tmp_path / "a.h5"
     write_results(path, some_run())
     _new(path).close()
-    assert read_ensemble(path).asked == ASKED
+    assert read_ensemble(path).asked == COUNT
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere HDF5 waits for the lock")
-def test_that_anyone_reads_a_file_while_it_is_written(tmp_path):
+def test_file_is_readable_while_it_is_written(tmp_path):
     path = tmp_path / "a.h5"
     with _new(path) as file:
         for number in range(4):
@@ -184,7 +184,7 @@ def test_that_anyone_reads_a_file_while_it_is_written(tmp_path):
 
 
 @pytest.mark.parametrize("full_at", ["write", "fsync", "open", "rename"])
-def test_that_a_full_disk_is_told_in_a_line_and_costs_no_row(tmp_path, monkeypatch, full_at):
+def test_full_disk_raises_one_line_error_and_loses_no_row(tmp_path, monkeypatch, full_at):
     path, other = tmp_path / "a.h5", tmp_path / "b.h5"
 
     def fill(stage: str) -> None:
@@ -216,8 +216,8 @@ def test_that_a_full_disk_is_told_in_a_line_and_costs_no_row(tmp_path, monkeypat
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="there is no limit on the size of files")
-def test_that_a_disk_that_is_full_indeed_is_told_in_a_line(tmp_path):
-    """A limit on the size of files stands for the disk: HDF5 itself must not meet it."""
+def test_limit_on_file_size_raises_one_line_error(tmp_path):
+    """A limit on the file size represents a full disk, which HDF5 itself must not meet."""
     code = (
         "import resource, sys; from pathlib import Path\n"
         "from ensemble_examples import *\n"
@@ -233,13 +233,13 @@ def test_that_a_disk_that_is_full_indeed_is_told_in_a_line(tmp_path):
         cwd=HERE,
         env=os.environ | {"PYTHONPATH": str(HERE.parents[1])},
     )
-    told = f"wearsim.errors.ResultsFileError: {path}: cannot be written (File too large)"
-    assert done.stderr.splitlines()[-1] == told
+    message = f"wearsim.errors.ResultsFileError: {path}: cannot be written (File too large)"
+    assert done.stderr.splitlines()[-1] == message
     assert "Exception ignored" not in done.stderr
     assert list(tmp_path.iterdir()) == []
 
 
-def test_that_a_file_that_may_not_be_written_is_told(tmp_path, monkeypatch):
+def test_read_only_file_is_refused(tmp_path, monkeypatch):
     path = tmp_path / "a.h5"
     _new(path).close()
 
@@ -252,45 +252,43 @@ def test_that_a_file_that_may_not_be_written_is_told(tmp_path, monkeypatch):
         EnsembleFile.open(path)
 
 
-def _lacking(outcome):
+def _incomplete(outcome):
     del outcome.observables["width"]
 
 
-def _unknown(outcome):
+def _with_unknown(outcome):
     outcome.scalars["speed"] = 1.0
 
 
-def _one_number_for_all_records(outcome):
+def _with_scalar_depth(outcome):
     outcome.observables["depth"] = 1.0
 
 
 @pytest.mark.parametrize(
-    ("spoil", "complaint"),
+    ("change", "message"),
     [
-        (_lacking, r"realisation 4: missing values \['width'\], unknown values \[\]"),
-        (_unknown, r"realisation 4: missing values \[\], unknown values \['speed'\]"),
-        (_one_number_for_all_records, r"realisation 4: depth has the shape \(\), expected \(4,\)"),
+        (_incomplete, r"realisation 4: missing values \['width'\], unknown values \[\]"),
+        (_with_unknown, r"realisation 4: missing values \[\], unknown values \['speed'\]"),
+        (_with_scalar_depth, r"realisation 4: depth has the shape \(\), expected \(4,\)"),
     ],
 )
-def test_that_an_outcome_that_does_not_fit_is_refused_before_anything_is_written(
-    tmp_path, spoil, complaint
-):
+def test_inconsistent_outcome_is_refused_and_not_written(tmp_path, change, message):
     path, outcome = tmp_path / "a.h5", some_outcome(4)
-    spoil(outcome)
+    change(outcome)
     with _new(path) as file:
         before = path.read_bytes()
-        with pytest.raises(ValueError, match=complaint):
+        with pytest.raises(ValueError, match=message):
             file.put([some_outcome(0), outcome])
         assert path.read_bytes() == before
 
 
-def test_that_a_realisation_is_put_once(tmp_path):
+def test_realisation_is_written_only_once(tmp_path):
     with _new(tmp_path / "a.h5") as file:
         file.put(_outcomes([1]))
         for again in ([1], [0, 1], [5, 5]):
             with pytest.raises(ValueError, match="are there already"):
                 file.put(_outcomes(again))
-        for outside in (-1, ASKED):
+        for outside in (-1, COUNT):
             with pytest.raises(ValueError, match="there is no realisation"):
                 file.put([replace(some_outcome(0), number=outside)])
             with pytest.raises(ValueError, match="there is no realisation"):
@@ -299,7 +297,7 @@ def test_that_a_realisation_is_put_once(tmp_path):
             file.status[0] = DONE
 
 
-def test_that_profiles_beyond_those_kept_are_left_out(tmp_path, monkeypatch):
+def test_profiles_beyond_the_kept_ones_are_not_stored(tmp_path, monkeypatch):
     monkeypatch.setattr("wearsim.results.ensemble.schema.MOST_KEPT", 27)
     path = tmp_path / "a.h5"
     bare = replace(some_outcome(5), profile=None)
@@ -314,7 +312,7 @@ def test_that_profiles_beyond_those_kept_are_left_out(tmp_path, monkeypatch):
     np.testing.assert_array_equal(data.variables["depth"][4], some_outcome(4).observables["depth"])
 
 
-def test_that_a_state_that_does_not_fit_is_refused(tmp_path):
+def test_inconsistent_state_is_refused(tmp_path):
     with _new(tmp_path / "a.h5") as file:
         with pytest.raises(ValueError, match="a state has the fields"):
             file.put_state({"depth": 1.0})
@@ -324,7 +322,7 @@ def test_that_a_state_that_does_not_fit_is_refused(tmp_path):
     assert read_ensemble(tmp_path / "a.h5").statistics["count"] == 3
 
 
-def test_that_statistics_and_static_arrays_that_do_not_fit_are_refused(tmp_path):
+def test_inconsistent_statistics_and_static_are_refused(tmp_path):
     path = tmp_path / "a.h5"
     with _new(path) as file:
         with pytest.raises(ValueError, match="depth is not a statistic"):
@@ -338,8 +336,8 @@ def test_that_statistics_and_static_arrays_that_do_not_fit_are_refused(tmp_path)
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_that_the_examples_put_all_there_is(tmp_path):
-    """Else the tests above would pass over what they leave out."""
+def test_examples_contain_all_variables(tmp_path):
+    """Otherwise the tests above would not cover the missing variables."""
     outcome = some_outcome(0)
     assert outcome.observables.keys() == OBSERVABLES.keys()
     assert set(outcome.scalars) == set(SCALARS)

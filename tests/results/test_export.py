@@ -1,4 +1,4 @@
-"""The export: engineers' units in the headers, nothing overwritten, nothing out of the folder."""
+"""Export of runs as CSV: engineering units, no overwriting, no files outside the folder."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def _header(path: Path) -> list[str]:
     return path.read_text(encoding="utf-8").splitlines()[0].split(",")
 
 
-def test_that_a_run_is_exported_in_engineers_units(tmp_path: Path) -> None:
+def test_run_is_exported_in_engineering_units(tmp_path: Path) -> None:
     folder = tmp_path / "made" / "here"
     result = Result(some_run())
     files = export_csv(result, folder)
@@ -62,7 +62,7 @@ def test_that_a_run_is_exported_in_engineers_units(tmp_path: Path) -> None:
     assert (folder / "load.csv").read_text(encoding="utf-8") == LOG
 
 
-def test_that_exported_columns_read_back_in_si(tmp_path: Path) -> None:
+def test_exported_columns_are_read_back_in_si(tmp_path: Path) -> None:
     result = Result(some_run(steps=9))
     export_csv(result, tmp_path)
     wanted = {"time": "s", "depth": "m", "worn_volume": "m^3", "peak_pressure": "Pa"}
@@ -75,7 +75,7 @@ def test_that_exported_columns_read_back_in_si(tmp_path: Path) -> None:
     np.testing.assert_allclose(columns["depth at 4000 passes"], result.profiles[-1], rtol=1e-11)
 
 
-def test_that_each_roller_has_a_column(tmp_path: Path) -> None:
+def test_each_roller_has_a_column(tmp_path: Path) -> None:
     result = Result(some_run(rollers=2, realisations=2))
     export_csv(result, tmp_path)
     header = _header(tmp_path / "history.csv")
@@ -93,13 +93,13 @@ def test_that_each_roller_has_a_column(tmp_path: Path) -> None:
     np.testing.assert_allclose(values[:, 1:], loads / 1e3, rtol=1e-11)
 
 
-def test_that_rollers_that_do_not_wear_have_no_profiles(tmp_path: Path) -> None:
+def test_profiles_of_unworn_rollers_are_not_exported(tmp_path: Path) -> None:
     data = some_run()
     data.records["roller_depth_profile"][:] = 0.0
     assert tmp_path / "roller_depth_profiles.csv" not in export_csv(Result(data), tmp_path)
 
 
-def test_that_nothing_is_overwritten(tmp_path: Path) -> None:
+def test_existing_files_are_not_overwritten(tmp_path: Path) -> None:
     (tmp_path / "line_load.csv").write_text("precious")
     with pytest.raises(ResultsFileError, match=r"line_load\.csv: already exists"):
         export_csv(Result(some_run()), tmp_path)
@@ -108,7 +108,7 @@ def test_that_nothing_is_overwritten(tmp_path: Path) -> None:
         export_csv(Result(some_run()), tmp_path / "line_load.csv" / "folder")
 
 
-def test_that_no_input_file_leaves_the_folder_or_takes_anothers_place(tmp_path: Path) -> None:
+def test_input_files_stay_inside_the_folder_under_new_names(tmp_path: Path) -> None:
     folder = tmp_path / "out"
     names = [
         "data/load.csv",

@@ -1,4 +1,4 @@
-"""The result: a user's words, and the end state."""
+"""Properties and final state of a run's result."""
 
 from __future__ import annotations
 
@@ -16,31 +16,31 @@ from wearsim.scenario import load_scenario
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 
 
-def test_that_axes_of_length_one_are_dropped() -> None:
+def test_axes_of_length_one_are_dropped() -> None:
     result = Result(some_run(steps=5, records=3, strips=7))
     assert result.depth.shape == result.normal_force.shape == result.passes.shape == (5,)
     assert result.profiles.shape == result.roller_profiles.shape == (3, 7)
     assert result.line_load.shape == result.dissipation.shape == (3, 7)
     assert result.y.shape == (7,)
-    many = Result(some_run(rollers=2, realisations=4))
-    assert many.depth.shape == (5, 4)
-    assert many.normal_force.shape == (5, 2, 4)
-    assert many.line_load.shape == (3, 2, 4, 7)
+    batch = Result(some_run(rollers=2, realisations=4))
+    assert batch.depth.shape == (5, 4)
+    assert batch.normal_force.shape == (5, 2, 4)
+    assert batch.line_load.shape == (3, 2, 4, 7)
 
 
-def test_that_the_axes_of_time_and_place_stay() -> None:
+def test_axes_of_step_record_and_y_are_kept() -> None:
     result = Result(some_run(steps=1, records=1, strips=1))
     assert result.depth.shape == result.time.shape == (1,)
     assert result.profiles.shape == (1, 1)
 
 
-def test_that_each_word_names_its_variable() -> None:
+def test_result_properties_return_their_variables() -> None:
     result = Result(some_run(seed=3, rollers=2))
-    words = {"profiles": "cylinder_depth_profile", "roller_profiles": "roller_depth_profile"}
-    for name in (*VARIABLES, *words):
+    variables = {"profiles": "cylinder_depth_profile", "roller_profiles": "roller_depth_profile"}
+    for name in (*VARIABLES, *variables):
         if hasattr(Result, name):
             np.testing.assert_array_equal(
-                getattr(result, name), result.raw.variables[words.get(name, name)].squeeze()
+                getattr(result, name), result.raw.variables[variables.get(name, name)].squeeze()
             )
     assert len([name for name in VARIABLES if hasattr(Result, name)]) == 23
     np.testing.assert_array_equal(
@@ -48,7 +48,7 @@ def test_that_each_word_names_its_variable() -> None:
     )
 
 
-def test_that_the_end_state_is_ready_for_json() -> None:
+def test_final_state_is_ready_for_json() -> None:
     result = Result(some_run(rollers=3))
     final = json.loads(json.dumps(result.final, allow_nan=False))
     assert final == result.final
@@ -58,30 +58,30 @@ def test_that_the_end_state_is_ready_for_json() -> None:
     deepest = max(result.depth[-1], np.max(result.roller_depth[-1]))
     assert final["relative_depth_error"] == result.depth_error[-1] / deepest
     rollers = np.sum(result.raw.static["multiplicity"] * result.roller_worn_volume[-1])
-    whole = result.worn_volume[-1] + rollers
-    assert final["relative_volume_error"] == pytest.approx(result.volume_error[-1] / whole)
+    total = result.worn_volume[-1] + rollers
+    assert final["relative_volume_error"] == pytest.approx(result.volume_error[-1] / total)
 
 
-def test_that_several_realisations_give_lists() -> None:
+def test_final_state_of_several_realisations_has_lists() -> None:
     result = Result(some_run(rollers=3, realisations=2))
     assert result.final["depth_m"] == result.depth[-1].tolist()
     assert result.final["peak_pressure_Pa"] == result.peak_pressure[-1].max(axis=0).tolist()
     assert isinstance(result.final["time_s"], float)
 
 
-def test_that_nothing_worn_has_no_relative_error() -> None:
+def test_relative_error_without_wear_is_zero() -> None:
     data = some_run()
     data.history["depth"][:] = 0.0
     data.history["depth_error"][:] = 0.0
     assert Result(data).final["relative_depth_error"] == 0.0
 
 
-def test_that_steps_are_those_taken() -> None:
+def test_steps_are_the_accepted_steps() -> None:
     assert Result(some_run()).steps == 17
     assert Result(some_run(checkpoint={})).steps == 4
 
 
-def test_that_the_scenario_is_read_from_the_file_alone(tmp_path: Path) -> None:
+def test_scenario_is_parsed_from_the_results_file_alone(tmp_path: Path) -> None:
     scenario = load_scenario(SCENARIOS / "rig-logged-load.toml", {"friction.coefficient": 0.2})
     data = some_run(
         scenario_text=scenario.text, scenario_file=scenario.file, files=dict(scenario.files)
@@ -93,7 +93,7 @@ def test_that_the_scenario_is_read_from_the_file_alone(tmp_path: Path) -> None:
     assert result.path == tmp_path / "run.h5"
 
 
-def test_that_a_result_cannot_be_reassigned() -> None:
+def test_attributes_of_a_result_are_read_only() -> None:
     result = Result(some_run(notes=["a"], warnings=["b"]))
     assert (result.notes, result.warnings, result.path) == (("a",), ("b",), None)
     assert (result.model, result.stepper, result.finished) == ("slender", "implicit", False)
@@ -101,7 +101,7 @@ def test_that_a_result_cannot_be_reassigned() -> None:
         result.depth = result.width  # type: ignore[misc]
 
 
-def test_that_a_run_is_told_in_a_line() -> None:
+def test_repr_of_run() -> None:
     result = Result(some_run())
     depth = result.depth[-1] * 1e6
     assert repr(result) == f"<Result 'a rig': 4000 of 1350000 roller passes, depth {depth:.4g} um>"
@@ -110,7 +110,7 @@ def test_that_a_run_is_told_in_a_line() -> None:
     )
 
 
-def test_that_drawn_values_are_had_by_their_key() -> None:
+def test_drawn_values_are_returned_by_scenario_key() -> None:
     drawn = {"creepage.yaw": {"values": [1e-3, 2e-3], "unit": "rad"}}
     assert Result(some_run(drawn=drawn)).drawn == {"creepage.yaw": (1e-3, 2e-3)}
     assert Result(some_run()).drawn == {}

@@ -1,4 +1,4 @@
-"""Reading: every bit back, by us and by xarray; and every way a file can be wrong."""
+"""Reading of run files: round trip, xarray, and messages on missing, foreign or damaged files."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def run_file(tmp_path: Path) -> Path:
     return path
 
 
-def _complaint(path: Path) -> str:
+def _error_of(path: Path) -> str:
     with pytest.raises(ResultsFileError) as caught:
         read_results(path)
     message = str(caught.value)
@@ -56,7 +56,7 @@ def _complaint(path: Path) -> str:
         {"tolerance": st.floats(allow_nan=False), "finished": st.booleans()}
     ),
 )
-def test_that_every_bit_comes_back(
+def test_run_is_read_back_bit_for_bit(
     tmp_path: Path,
     lengths: dict[str, int],
     texts: dict[str, str],
@@ -72,7 +72,7 @@ def test_that_every_bit_comes_back(
     assert list(found.files) == list(data.files)
 
 
-def test_that_texts_beyond_the_limit_of_an_attribute_come_back(tmp_path: Path) -> None:
+def test_texts_longer_than_an_attribute_are_read_back(tmp_path: Path) -> None:
     long = "0,300\n" * 50_000
     data = some_run(
         scenario_text=long,
@@ -85,7 +85,7 @@ def test_that_texts_beyond_the_limit_of_an_attribute_come_back(tmp_path: Path) -
     assert differences(data, read_results(tmp_path / "run.h5")) == []
 
 
-def test_that_numpy_numbers_may_stand_for_plain_ones(tmp_path: Path) -> None:
+def test_numpy_scalars_are_stored_as_numbers(tmp_path: Path) -> None:
     data = some_run(
         total_passes=np.float64(0.1), finished=np.True_, seed=np.int64(3), tolerance=np.float32(0.5)
     )
@@ -94,7 +94,7 @@ def test_that_numpy_numbers_may_stand_for_plain_ones(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("rollers", [1, 3])
-def test_that_xarray_opens_a_file_with_named_dimensions(tmp_path: Path, rollers: int) -> None:
+def test_xarray_opens_run_with_named_dimensions(tmp_path: Path, rollers: int) -> None:
     path = tmp_path / "run.h5"
     data = some_run(rollers=rollers, realisations=2)
     write_results(path, data)
@@ -113,50 +113,50 @@ def test_that_xarray_opens_a_file_with_named_dimensions(tmp_path: Path, rollers:
         assert dataset.attrs["title"] == "a rig"
 
 
-def test_that_no_dimension_is_phony(run_file: Path) -> None:
+def test_all_dimensions_have_names(run_file: Path) -> None:
     with h5netcdf.File(run_file, "r") as file:  # raises on a dimension with no name
         assert set(file.dimensions) == {*AXES, "y"}
         assert all(variable.dimensions for variable in file.variables.values())
 
 
-def test_that_reading_a_file_changes_nothing(run_file: Path) -> None:
+def test_reading_leaves_the_file_unchanged(run_file: Path) -> None:
     before = run_file.read_bytes()
     run_file.chmod(0o444)
     read_results(run_file)
     assert run_file.read_bytes() == before
 
 
-def test_that_a_missing_file_is_told(tmp_path: Path) -> None:
-    assert _complaint(tmp_path / "no.h5") == "there is no such file"
-    assert _complaint(tmp_path) == "cannot be read (Is a directory)"
+def test_missing_file_is_refused(tmp_path: Path) -> None:
+    assert _error_of(tmp_path / "no.h5") == "there is no such file"
+    assert _error_of(tmp_path) == "cannot be read (Is a directory)"
 
 
 @pytest.mark.parametrize("content", [b"y [mm],z [um]\n0,1\n", b"\x89PNG\r\n\x1a\n" + bytes(99)])
-def test_that_a_foreign_file_is_told(tmp_path: Path, content: bytes) -> None:
+def test_foreign_file_is_refused(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "foreign.h5"
     path.write_bytes(content)
-    assert _complaint(path) == "is not a results file of wearsim, not even HDF5"
+    assert _error_of(path) == "is not a results file of wearsim, not even HDF5"
 
 
-def test_that_a_truncated_file_is_told_at_any_length(run_file: Path) -> None:
+def test_file_truncated_at_any_length_is_refused(run_file: Path) -> None:
     content = run_file.read_bytes()
     size = len(content)
     run_file.write_bytes(b"")
-    assert _complaint(run_file) == "is empty"
+    assert _error_of(run_file) == "is empty"
     near = {1, 7, 8, 9, 47, 48, 95, 96, 97, 511, 512, 513, 2048, size - 4096, size - 8, size - 1}
     for length in sorted(near | set(range(100, size, size // 40))):
         run_file.write_bytes(content[:length])
-        assert _complaint(run_file).startswith("is truncated"), length
+        assert _error_of(run_file).startswith("is truncated"), length
 
 
-def test_that_hdf5_of_another_kind_is_told(tmp_path: Path) -> None:
+def test_hdf5_of_another_program_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "other.h5"
     with h5py.File(path, "w") as file:
         file["depth"] = [1.0]
-    assert _complaint(path) == "is HDF5, but not a results file of wearsim"
+    assert _error_of(path) == "is HDF5, but not a results file of wearsim"
     with h5py.File(path, "w") as file:
         file.attrs["format"] = [1, 2]
-    assert _complaint(path) == "is HDF5, but not a results file of wearsim"
+    assert _error_of(path) == "is HDF5, but not a results file of wearsim"
 
 
 def _newer(file: h5py.File) -> None:
@@ -164,16 +164,16 @@ def _newer(file: h5py.File) -> None:
     del file["depth"]
 
 
-def _lacking(file: h5py.File) -> None:
+def _incomplete(file: h5py.File) -> None:
     del file["depth"], file["checkpoint"], file["inputs/about"]
 
 
-def _of_wrong_shape(file: h5py.File) -> None:
+def _with_wrong_shape(file: h5py.File) -> None:
     del file["depth"]
     file["depth"] = np.zeros((2, 1))
 
 
-def _about(text: str) -> Callable[[h5py.File], None]:
+def _with_about(text: str) -> Callable[[h5py.File], None]:
     def change(file: h5py.File) -> None:
         del file["inputs/about"]
         file["inputs"].create_dataset("about", data=np.bytes_(text + " "))
@@ -182,23 +182,23 @@ def _about(text: str) -> Callable[[h5py.File], None]:
 
 
 @pytest.mark.parametrize(
-    ("change", "complaint"),
+    ("change", "message"),
     [
         (_newer, "was written by a newer wearsim (format 2, this one reads up to 1)"),
-        (_lacking, "is damaged (lacks depth, inputs/about, checkpoint)"),
-        (_of_wrong_shape, "is damaged (depth has 2 along step, others have 5)"),
-        (_about("{"), "is damaged (Expecting property name"),
-        (_about("[]"), "is damaged (lacks scenario_file, title"),
+        (_incomplete, "is damaged (lacks depth, inputs/about, checkpoint)"),
+        (_with_wrong_shape, "is damaged (depth has 2 along step, others have 5)"),
+        (_with_about("{"), "is damaged (Expecting property name"),
+        (_with_about("[]"), "is damaged (lacks scenario_file, title"),
     ],
 )
-def test_that_a_file_that_is_not_as_written_is_told(
-    run_file: Path, change: Callable[[h5py.File], None], complaint: str
+def test_altered_file_is_refused(
+    run_file: Path, change: Callable[[h5py.File], None], message: str
 ) -> None:
     with h5py.File(run_file, "r+") as file:
         change(file)
-    assert _complaint(run_file).startswith(complaint)
+    assert _error_of(run_file).startswith(message)
 
 
-def test_that_the_results_room_loads_without_hdf5() -> None:
+def test_results_package_imports_without_h5py() -> None:
     code = "import sys, wearsim.results; sys.exit('h5py' in sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True)

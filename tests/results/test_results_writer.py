@@ -1,4 +1,4 @@
-"""Writing: whole or not at all, whatever happens on the way."""
+"""Atomic writing: after a failure or a kill at any stage the old or the new file is complete."""
 
 from __future__ import annotations
 
@@ -33,16 +33,16 @@ def _all_calls(folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return calls
 
 
-def test_that_the_seam_is_called_around_every_stage(
+def test_write_hook_is_called_around_every_stage(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     calls = _all_calls(tmp_path, monkeypatch)
     expected = [f"{when} {stage}" for stage in atomic_write.STAGES for when in ("before", "after")]
     assert list(dict.fromkeys(calls)) == expected
-    assert calls.count("before write") > 1  # a fault may strike a half-written file
+    assert calls.count("before write") > 1  # so that a failure can hit a half-written file
 
 
-def test_that_a_failure_at_any_stage_leaves_the_old_file_or_the_new(
+def test_failure_at_any_stage_leaves_old_or_new_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "run.h5"
@@ -67,7 +67,7 @@ def test_that_a_failure_at_any_stage_leaves_the_old_file_or_the_new(
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork and SIGKILL")
-def test_that_a_kill_at_any_stage_leaves_the_old_file_or_the_new(tmp_path: Path) -> None:
+def test_kill_at_any_stage_leaves_old_or_new_file(tmp_path: Path) -> None:
     environment = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
     done = subprocess.run(
         [sys.executable, str(HERE / "killed_writer.py"), str(tmp_path)],
@@ -89,14 +89,12 @@ def test_that_a_kill_at_any_stage_leaves_the_old_file_or_the_new(tmp_path: Path)
             assert differences(read_results(path), OLD) == []
         else:
             assert not path.exists()
-        write_results(path, NEW)  # what the kill left behind is in nobody's way
+        write_results(path, NEW)  # remains of the killed process do not matter
         assert differences(read_results(path), NEW) == []
         assert not path.with_name(f"{number}.h5.part").exists()
 
 
-def test_that_a_full_disk_is_told_in_a_line(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_full_disk_raises_one_line_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "run.h5"
     write_results(path, OLD)
 
@@ -111,7 +109,7 @@ def test_that_a_full_disk_is_told_in_a_line(
     assert differences(read_results(path), OLD) == []
 
 
-def test_that_a_link_stays_a_link(tmp_path: Path) -> None:
+def test_symbolic_link_is_kept(tmp_path: Path) -> None:
     (tmp_path / "disk").mkdir()
     target, link = tmp_path / "disk" / "run.h5", tmp_path / "run.h5"
     link.symlink_to(target)
@@ -121,14 +119,14 @@ def test_that_a_link_stays_a_link(tmp_path: Path) -> None:
     assert differences(read_results(target), NEW) == []
 
 
-def test_that_equal_runs_give_equal_files_at_any_time(tmp_path: Path) -> None:
+def test_equal_runs_give_equal_files_at_any_time(tmp_path: Path) -> None:
     write_results(tmp_path / "one.h5", some_run(seed=4, rollers=2))
-    time.sleep(1.1)  # the time stamps of HDF5, of which there are none, count seconds
+    time.sleep(1.1)  # time stamps of HDF5 would count seconds; none are written
     write_results(tmp_path / "two.h5", some_run(seed=4, rollers=2))
     assert (tmp_path / "one.h5").read_bytes() == (tmp_path / "two.h5").read_bytes()
 
 
-def test_that_variables_that_do_not_fit_are_refused(tmp_path: Path) -> None:
+def test_inconsistent_variables_are_refused(tmp_path: Path) -> None:
     history = some_run().history
     for broken in (
         {name: array for name, array in history.items() if name != "depth"},
@@ -143,7 +141,7 @@ def test_that_variables_that_do_not_fit_are_refused(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_that_an_existing_file_is_only_replaced_when_asked(tmp_path: Path) -> None:
+def test_existing_file_is_replaced_only_with_force(tmp_path: Path) -> None:
     path = tmp_path / "run.h5"
     check_output(path, force=False)
     path.write_bytes(b"precious")
@@ -153,7 +151,7 @@ def test_that_an_existing_file_is_only_replaced_when_asked(tmp_path: Path) -> No
     check_output(path, force=True)
 
 
-def test_that_an_output_that_cannot_be_written_is_told_before_the_run(
+def test_unwritable_output_is_refused_before_the_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with pytest.raises(ResultsFileError, match="is a folder"):
@@ -170,12 +168,12 @@ def test_that_an_output_that_cannot_be_written_is_told_before_the_run(
 
 
 @pytest.mark.parametrize("name", ["run.png", "run.PDF", "run.svg", "run.toml", "run.csv"])
-def test_that_a_name_of_another_kind_of_file_is_refused(tmp_path: Path, name: str) -> None:
+def test_suffix_of_another_kind_of_file_is_refused(tmp_path: Path, name: str) -> None:
     with pytest.raises(ResultsFileError, match=r"no results file ends in .*, such as run\.h5"):
         check_output(tmp_path / name, force=True)
 
 
-def test_that_an_input_is_never_replaced_by_whatever_name(tmp_path: Path) -> None:
+def test_input_is_never_replaced_under_any_name(tmp_path: Path) -> None:
     log, link = tmp_path / "log.h5", tmp_path / "link.h5"
     log.write_text("precious")
     link.hardlink_to(log)
@@ -183,5 +181,6 @@ def test_that_an_input_is_never_replaced_by_whatever_name(tmp_path: Path) -> Non
         with pytest.raises(ResultsFileError, match=f"the scenario is read from {log}"):
             check_output(name, force=True, inputs=[tmp_path / "a.toml", log])
     with pytest.raises(ResultsFileError, match="the scenario is read from"):
-        check_output(tmp_path / "b.h5", force=False, inputs=[tmp_path / "b.h5"])  # not there yet
+        # the output does not exist yet
+        check_output(tmp_path / "b.h5", force=False, inputs=[tmp_path / "b.h5"])
     check_output(tmp_path / "other.h5", force=True, inputs=[log])
