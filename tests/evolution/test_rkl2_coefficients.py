@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wearsim.evolution.steppers.rkl2 import FEWEST, legendre_stages, reach, stages_for
+from wearsim.evolution.steppers.rkl2 import MIN_STAGES, legendre_stages, reach, stages_for
 
 COUNTS = (2, 3, 4, 5, 8, 17, 60)
 
@@ -44,6 +44,6 @@ def test_that_all_that_decays_within_reach_falls_without_a_change_of_sign(count)
 
 @pytest.mark.parametrize("count", COUNTS)
 def test_that_no_stage_is_wasted(count):
-    assert stages_for(0.999 * reach(count)) == max(count, FEWEST)
+    assert stages_for(0.999 * reach(count)) == max(count, MIN_STAGES)
     assert stages_for(1.001 * reach(count)) == count + 1
-    assert stages_for(0.0) == FEWEST
+    assert stages_for(0.0) == MIN_STAGES

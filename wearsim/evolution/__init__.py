@@ -1,1 +1,1 @@
-"""The incremental solver: problem, state, steppers, step-size control and the loop."""
+"""Evolution of wear: problem, state, steppers, error control and integration."""

@@ -1,4 +1,4 @@
-"""What may differ from contact to contact: the inputs of one contact, as columns."""
+"""Inputs of the contacts of a wear problem, stored as columns."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class ContactInputs:
 
     @classmethod
     def uniform(cls, contacts: int, realisations: int = 1, **values: float) -> ContactInputs:
-        """Return inputs that are the same everywhere; those that are not named are zero."""
+        """Return inputs that are equal for all contacts; zero where no value is given."""
         shape = (contacts, realisations)
         return cls(*(np.full(shape, values.get(item.name, 0.0)) for item in fields(cls)))
 
@@ -55,9 +55,26 @@ class ContactInputs:
         filled = {name: np.array(np.broadcast_to(array, shape)) for name, array in values.items()}
         return replace(self, **filled)
 
+    def with_value_of(self, item: Varying, roller: IntArray, value: FloatArray) -> ContactInputs:
+        """Return these inputs with the value of a process at the contacts it acts on.
+
+        Parameters
+        ----------
+        item : Varying
+        roller : ndarray of int, shape (contacts,)
+            Roller of each contact.
+        value : ndarray
+            Value of the process; broadcasts to (contacts, realisations).
+        """
+        chosen = np.isin(roller, item.rollers)[:, None]
+        return self.with_values({item.name: np.where(chosen, value, getattr(self, item.name))})
+
 
 Redraw: TypeAlias = Callable[[ContactInputs, int], ContactInputs]
-"""Draws the inputs of single passes: from those of each pass's roller, and the first pass."""
+"""Function that draws the inputs of single passes.
+
+Its arguments are the inputs of each pass's roller and the number of the first pass.
+"""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The loop: one step after another until the test is done; it prints nothing and writes nothing."""
+"""Integration of a wear test: one step after another until the test ends."""
 
 from __future__ import annotations
 
@@ -27,14 +27,15 @@ def evolve(
     ----------
     problem : WearProblem
     state : WearState
-        Where to start.
+        State at the start.
     stepper : Stepper
     stop : float
-        Passes at which the test ends.
+        Passes at the end of the test.
     next_record : callable
-        Passes of the first record after given passes; a pass-by-pass stepper stops there.
+        Returns the passes of the first record after given passes; a pass-by-pass stepper stops
+        there.
     max_steps : int
-        Steps after which the run is given up; passes solved one by one do not count.
+        Greatest number of steps; passes solved one by one do not count.
 
     Raises
     ------
@@ -53,7 +54,7 @@ def evolve(
 
 
 def too_many_steps(steps: int, passes: float, stop: float, state: Mapping[str, Any]) -> StepError:
-    """Return the error of a test that has taken all the steps it may."""
+    """Return the error of a test that has reached the greatest number of steps."""
     return StepError(
         f"{steps} steps have reached pass {passes:.0f} of {stop:.0f};"
         " raise evolution.max_steps or evolution.tolerance",
@@ -62,5 +63,5 @@ def too_many_steps(steps: int, passes: float, stop: float, state: Mapping[str, A
 
 
 def not_finite(passes: float, state: Mapping[str, Any]) -> StepError:
-    """Return the error of a test that has reached a value which is not finite."""
+    """Return the error of a test with a value that is not finite."""
     return StepError(f"a value is not finite after pass {passes:.0f}", dict(state))

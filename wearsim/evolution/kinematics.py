@@ -1,4 +1,4 @@
-"""How rollers run on a cylinder, and the law of a problem in which nothing wears."""
+"""Kinematics of rollers on a cylinder, and the wear law of a problem without wear."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from wearsim.types import ContactSolution, FloatArray
 
 @dataclass(frozen=True)
 class Kinematics:
-    """How the rollers run on the cylinder.
+    """Radii, speed and number of the rollers on the cylinder.
 
     Parameters
     ----------
@@ -22,7 +22,7 @@ class Kinematics:
     rolling_speed : float
         Rolling velocity V [m/s].
     multiplicity : ndarray of int, shape (rollers,)
-        Physical rollers behind each roller of the problem; alike ones are merged.
+        Physical rollers represented by each roller of the problem; identical ones are merged.
     """
 
     cylinder_radius: float
@@ -39,8 +39,7 @@ class Kinematics:
     @cached_property
     def pass_rate(self) -> float:
         """Roller passes per second, all rollers together."""
-        turns = self.rolling_speed / (2.0 * np.pi * self.cylinder_radius)
-        return self.physical_rollers * turns
+        return self.physical_rollers * (self.rolling_speed / (2.0 * np.pi * self.cylinder_radius))
 
     @cached_property
     def longitudinal_curvature(self) -> float:
@@ -49,12 +48,12 @@ class Kinematics:
 
     @cached_property
     def roller_share(self) -> float:
-        """Times a point of one roller is rolled over, per pass of all rollers."""
+        """Overrollings of a point of one roller per pass of all rollers."""
         return self.cylinder_radius / self.roller_radius / self.physical_rollers
 
 
 class NoWear(WearLaw):
-    """The law of a problem in which nothing wears, such as a contact by itself."""
+    """Wear law of a problem without wear, such as a single contact."""
 
     def depth_per_pass(
         self, body: Body, solution: ContactSolution, rolling_speed: float

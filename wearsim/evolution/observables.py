@@ -1,4 +1,4 @@
-"""What is observed of a worn profile, defined once."""
+"""Observables of a worn profile: depth, width, volume, centroid, oscillation."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def depth(worn: FloatArray) -> FloatArray:
 def width(y: FloatArray, worn: FloatArray, threshold: float) -> float:
     """Return the extent of the groove where it is deeper than `threshold` [m].
 
-    The crossing is interpolated between strips, so that the width grows smoothly.
+    The crossing is interpolated linearly between strips, so that the width grows continuously.
     """
     above = np.flatnonzero(worn > threshold)
     if len(above) == 0:
@@ -35,28 +35,27 @@ def width(y: FloatArray, worn: FloatArray, threshold: float) -> float:
 def worn_volume(worn: FloatArray, spacing: float, radius: float) -> FloatArray:
     """Return the worn volume of a body of revolution, 2 pi R times the worn area [m^3].
 
-    First order in depth over radius: the volume for which Archard's balance with energy is exact.
+    First order in depth over radius: the volume for which Archard's wear law holds exactly.
     """
     volume: FloatArray = 2.0 * np.pi * radius * worn.sum(axis=-1) * spacing
     return volume
 
 
 def centroid(y: FloatArray, worn: FloatArray) -> float:
-    """Return the axial position of the worn area's centre [m], or 0 where nothing is worn."""
+    """Return the axial position of the worn area's centroid [m], or 0 without wear."""
     total = worn.sum()
     return float(np.dot(y, worn) / total) if total > 0.0 else 0.0
 
 
 def oscillation(line_load: FloatArray) -> float:
-    """Return how much a line load jumps from strip to strip, relative to its peak.
+    """Return the strip-to-strip oscillation of a line load, relative to its peak.
 
-    The median over the loaded strips of the second difference's size: a smooth contact gives
-    O(dy^2), loads that alternate between strips give order one. The median leaves the contact's
-    edges and honest kinks out of account.
+    It is the median over the loaded strips of the size of the second difference: O(dy^2) for a
+    smooth contact, of order one for loads that alternate between strips. The median excludes the
+    edges of the contact and single kinks of the profile.
     """
     loaded = np.flatnonzero(line_load > 0.0)
     if len(loaded) < 3:
         return 0.0
-    inside = line_load[loaded[0] : loaded[-1] + 1]
-    second = np.abs(np.diff(inside, n=2))
+    second = np.abs(np.diff(line_load[loaded[0] : loaded[-1] + 1], n=2))
     return float(np.median(second) / line_load.max())

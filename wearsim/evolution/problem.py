@@ -1,85 +1,82 @@
-"""A problem: everything about a wear test that does not change while it runs."""
+"""Wear problem: the part of a wear test that does not change from step to step."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import overload
+from typing import Any, overload
 
 import numpy as np
 
-from wearsim.contact_batch import BatchSolution, OperatingPoints, rows_of
+from wearsim.contact_batch import BatchSolution, rows_of
 from wearsim.evolution.batch.per_realisation import (
-    each_between,
     mean_along,
-    one_of,
     per_strip,
     sum_along,
     sum_in_order,
+    values_between,
 )
 from wearsim.evolution.contact_inputs import ContactInputs, Redraw, Varying
 from wearsim.evolution.kinematics import Kinematics
 from wearsim.plugins import BODIES, Body, ContactModel, Load, LoadTerm, WearLaw
-from wearsim.types import (
-    ContactSolution,
-    Creepage,
-    FloatArray,
-    Grid,
-    IntArray,
-    Number,
-    OperatingPoint,
-)
+from wearsim.types import ContactSolution, FloatArray, Grid, IntArray, Number
 
 
 @dataclass(frozen=True)
 class WearProblem:
-    """A wear test, ready to be stepped.
+    """A wear test without its state: bodies, contact model, loads, wear law and contact inputs.
 
-    Contacts are numbered (station, contact, realisation). A roller has one contact, or several
-    that stand for the passes it makes with inputs drawn anew: each counts by its weight.
+    Contacts are numbered (station, contact, realisation). A roller has one contact. Where inputs
+    are drawn at every pass it has several, the nodes of a quadrature over its passes, each with a
+    weight.
 
     Parameters
     ----------
     grid : Grid
-        The strips.
+        Strips across the track.
     model : ContactModel
-        Prepared for the grid.
+        Contact model, prepared for the grid.
     law : WearLaw
+        Wear law of both bodies.
     load : Load
+        Normal load of every roller over time.
     terms : mapping of str to LoadTerm
         Terms added to the load, in a fixed order.
     kinematics : Kinematics
+        Radii, speed and number of rollers.
     flat_gap : ndarray, shape (stations, rollers, realisations, strips)
         Gap of rollers without tilt before wear [m].
     from_apex : ndarray, shape (rollers, strips)
-        Axial distance from each roller's apex [m].
+        Axial distance of each strip from the roller's apex [m].
     inputs : ContactInputs
         Inputs of every contact.
     roller : ndarray of int, shape (contacts,)
-        The roller that makes each contact.
+        Roller of each contact.
     weight : ndarray, shape (contacts,)
-        Part of its roller's passes that each contact stands for.
+        Fraction of its roller's passes that each contact represents.
     half : ndarray of int, shape (contacts,)
-        0 or 1: which half of a roller's contacts each belongs to; either is a quadrature by itself.
+        0 or 1: the half of its roller's contacts that a contact belongs to. Each half is a
+        quadrature too.
     tilt_shifts : bool
         A tilt moves the contact over the crown.
     free : bool
-        Rollers find their creepage from the bearing torque.
+        The creepage of the rollers follows from the bearing torque.
     slip_profile : ndarray, shape (rollers, strips), optional
-        Differential slip of the unworn bodies without tilt; worn depth adds to it. Without it
+        Differential slip of the unworn bodies without tilt, to which worn depth adds. If absent,
         creepage varies with spin alone.
     varying : sequence of Varying
-        Inputs that follow processes in time.
+        Inputs that are random processes in time.
     redraw : callable, optional
         Draws the inputs of single passes, see `Redraw`.
     expectation : WearProblem, optional
-        The same problem with contacts that stand for passes drawn one by one, to record by.
+        The same problem with quadrature nodes instead of passes drawn one by one, for records.
     iteration_tolerance : float
-        Relative change of wear and loads below which the iterations of an implicit step end.
+        Relative change of wear and loads below which an implicit step has converged.
     stacked : tuple of WearProblem
-        The problem of each realisation where several are stepped together, with its own loads, wear
-        factors and paths in time. Empty: all realisations share those of this problem.
+        The problem of each realisation where several tests are stepped together: each has its own
+        loads, wear factors and paths in time. Empty if all realisations share those of this
+        problem.
     """
 
     grid: Grid
@@ -105,32 +102,31 @@ class WearProblem:
 
     @cached_property
     def shape(self) -> tuple[int, int, int]:
-        """Leading axes: stations, contacts, realisations."""
+        """Leading axes of contact arrays: stations, contacts, realisations."""
         stations, _, realisations = self.flat_gap.shape[:3]
         return stations, len(self.roller), realisations
 
     @cached_property
     def rollers(self) -> int:
-        """Number of rollers of the problem."""
+        """Number of rollers of the problem; identical physical rollers are merged."""
         return len(self.kinematics.multiplicity)
 
     @property
     def has_nodes(self) -> bool:
-        """Whether a roller's passes are stood for by several contacts."""
+        """Whether several quadrature nodes represent the passes of a roller."""
         return len(self.roller) > self.rollers
 
     @cached_property
-    def _roller_each(self) -> bool:
-        """Whether every contact is a roller's only one, in the order of the rollers."""
+    def _one_contact_per_roller(self) -> bool:
         return np.array_equal(self.roller, np.arange(self.rollers))
 
     def at_contacts(self, values: FloatArray) -> FloatArray:
-        """Return the values of the roller of each contact, (S, R, ...) to (S, C, ...)."""
-        return values if self._roller_each else values[:, self.roller]
+        """Return the value of each contact's roller: (S, R, ...) to (S, C, ...)."""
+        return values if self._one_contact_per_roller else values[:, self.roller]
 
     @cached_property
     def halved(self) -> WearProblem:
-        """The problem with the first half of every roller's contacts in the place of all."""
+        """The problem with the first half of the contacts of every roller."""
         chosen = np.flatnonzero(self.half == 0)
         return replace(
             self,
@@ -142,13 +138,12 @@ class WearProblem:
 
     @cached_property
     def contacts(self) -> tuple[tuple[int, int, int], ...]:
-        """Station, contact and realisation of every contact, in their order."""
-        stations, contacts, realisations = (range(count) for count in self.shape)
-        return tuple((s, c, v) for s in stations for c in contacts for v in realisations)
+        """Station, contact and realisation of every contact, last axis fastest."""
+        return tuple(np.ndindex(self.shape))
 
     @cached_property
     def bodies(self) -> IntArray:
-        """The station and the roller that each contact touches, shape (stations * contacts, 2)."""
+        """Station and roller in each contact, shape (stations * contacts, 2)."""
         stations, contacts, _ = self.shape
         station, contact = np.divmod(np.arange(stations * contacts), contacts)
         return np.stack([station, self.roller[contact]], axis=1)
@@ -166,33 +161,32 @@ class WearProblem:
         return gap
 
     @cached_property
-    def _nominal_least(self) -> FloatArray:
-        """Least gap of each contact before wear, shape (stations, contacts, realisations) [m]."""
-        least: FloatArray = self.nominal_gap.min(axis=-1)
-        return least
-
-    @cached_property
     def spin(self) -> FloatArray:
         """Spin of every contact, shape (contacts, realisations) [1/m]."""
-        spin: FloatArray = self.inputs.tilt / self.kinematics.roller_radius
-        return spin
+        return self.inputs.tilt / self.kinematics.roller_radius
+
+    @cached_property
+    def input_columns(self) -> dict[str, Any]:
+        """Creepages, spin and friction by their name in `OperatingPoints`, shape (contacts,)."""
+        inputs = self.inputs
+        columns = {
+            "longitudinal": inputs.longitudinal,
+            "lateral": inputs.yaw,
+            "spin": self.spin,
+            "friction": inputs.friction,
+        }
+        return {n: np.broadcast_to(column, self.shape).ravel() for n, column in columns.items()}
 
     @cached_property
     def cylinder_share(self) -> FloatArray:
-        """Part of all passes that each contact makes, shape (contacts,)."""
+        """Fraction of all passes made by each contact, shape (contacts,)."""
         kinematics = self.kinematics
         share = kinematics.multiplicity[self.roller] * self.weight
         return np.asarray(share / kinematics.physical_rollers)
 
     @cached_property
-    def _physical_contacts(self) -> FloatArray:
-        """Physical rollers behind each contact, to go with (stations, contacts, realisations)."""
-        each: FloatArray = self.cylinder_share * self.kinematics.physical_rollers
-        return each[None, :, None]
-
-    @cached_property
     def stiffness(self) -> Number:
-        """What the load loses per descent [N/m]."""
+        """Loss of load per descent of the roller [N/m]."""
         each = [problem.load.stiffness for problem in self.stacked]
         return np.array(each) if each else self.load.stiffness
 
@@ -201,36 +195,32 @@ class WearProblem:
         """Whether a load falls as its roller descends."""
         return bool(np.any(self.stiffness))
 
-    @cached_property
-    def has_feedback(self) -> bool:
-        """Whether a load depends on what the contacts do."""
-        return self.has_spring or bool(self.terms)
+    def force(self, time: Number) -> FloatArray:
+        """Return the load at a time [s] before feedback, one or one per realisation [N]."""
+        loads = [problem.load for problem in self.stacked or (self,)]
+        times = np.broadcast_to(time, len(loads))[:, None]
+        return np.array([load.force(own)[0] for load, own in zip(loads, times, strict=True)])
 
-    def force(self, time: Number) -> Number:
-        """Return the load at a time [s] [N]."""
-        if not self.stacked:
-            return float(self.load.force(np.array([time]))[0])
-        times = np.broadcast_to(time, len(self.stacked))[:, None]
-        forces = [
-            problem.load.force(own)[0] for problem, own in zip(self.stacked, times, strict=True)
-        ]
-        return np.array(forces)
-
-    def mean_load(self, start: Number, stop: Number) -> Number:
-        """Return the exact mean of the load between two times [s] [N]."""
-        if not self.stacked:
-            return self.load.mean(one_of(start), one_of(stop))
-        return each_between([problem.load.mean for problem in self.stacked], start, stop)
+    def mean_load(self, start: Number, stop: Number) -> FloatArray:
+        """Return the exact mean of the load between two times [s], as `force` [N]."""
+        problems = self.stacked or (self,)
+        return values_between([problem.load.mean for problem in problems], start, stop)
 
     def deviations(self, start: Number, stop: Number) -> list[tuple[str, tuple[int, ...], Number]]:
-        """Return what varies between two times [s]: field, rollers and standard deviation."""
-        problems, everyone = self.stacked or (self,), tuple(range(self.rollers))
-        load = each_between([problem.load.deviation for problem in problems], start, stop)
-        found: list[tuple[str, tuple[int, ...], Number]] = [("normal_force_offset", everyone, load)]
-        for k, item in enumerate(self.varying):
-            paths = [problem.varying[k].path.deviation for problem in problems]
-            found.append((item.name, item.rollers, each_between(paths, start, stop)))
-        return found
+        """Return field, rollers and standard deviation of all that varies between two times [s]."""
+        problems = self.stacked or (self,)
+        load = values_between([problem.load.deviation for problem in problems], start, stop)
+        return [
+            ("normal_force_offset", tuple(range(self.rollers)), load),
+            *(
+                (
+                    item.name,
+                    item.rollers,
+                    values_between([p.varying[k].path.deviation for p in problems], start, stop),
+                )
+                for k, item in enumerate(self.varying)
+            ),
+        ]
 
     def at_time(self, start: Number, stop: Number) -> WearProblem:
         """Return the problem with every process at its mean between two times [s]."""
@@ -238,35 +228,29 @@ class WearProblem:
             return self
         inputs, problems = self.inputs, self.stacked or (self,)
         for k, item in enumerate(self.varying):
-            chosen = np.isin(self.roller, item.rollers)[:, None]
-            mean = each_between([problem.varying[k].path.mean for problem in problems], start, stop)
-            values = np.where(chosen, mean, getattr(inputs, item.name))
-            inputs = inputs.with_values({item.name: values})
+            mean = values_between([p.varying[k].path.mean for p in problems], start, stop)
+            inputs = inputs.with_value_of(item, self.roller, mean)
         return replace(self, inputs=inputs, varying=())
 
     def single_passes(self, rollers: IntArray, first: int, times: FloatArray) -> WearProblem:
-        """Return a problem whose contacts are passes number `first` on.
+        """Return a problem whose contacts are single passes.
 
         Parameters
         ----------
         rollers : ndarray of int, shape (passes,)
-            Which roller makes each pass.
+            Roller that makes each pass.
         first : int
             Number of the first pass.
         times : ndarray, shape (passes,)
-            When each is made [s].
+            Time of each pass [s].
         """
         inputs = self.inputs.at(rollers)
         for item in self.varying:
-            chosen = np.isin(rollers, item.rollers)[:, None]
-            now = item.path.at(times)[:, None]
-            inputs = inputs.with_values(
-                {item.name: np.where(chosen, now, getattr(inputs, item.name))}
-            )
+            inputs = inputs.with_value_of(item, rollers, item.path.at(times)[:, None])
         if self.redraw is not None:
             inputs = self.redraw(inputs, first)
-        alone = np.ones(len(rollers))
-        return replace(self, inputs=inputs, roller=rollers, weight=alone, varying=())
+        weight = np.ones(len(rollers))
+        return replace(self, inputs=inputs, roller=rollers, weight=weight, varying=())
 
     @overload
     def time(self, passes: float) -> float: ...
@@ -283,117 +267,12 @@ class WearProblem:
         return self.nominal_gap + cylinder_depth + self.at_contacts(roller_depth)
 
     def descent(self, gap: FloatArray) -> FloatArray:
-        """Return how far each contact's roller has sunk into worn material, shape (S, C, N) [m].
+        """Return the descent of each contact's roller into worn material, shape (S, C, N) [m].
 
-        It is the rise of the least gap: rigid bodies would approach by that much. On one track it
+        It is the rise of the least gap, by which rigid bodies would approach. On one track it
         equals the worn depth.
         """
-        risen: FloatArray = gap.min(axis=-1) - self._nominal_least
-        return risen
-
-    def _variation(
-        self,
-        roller: int | IntArray,
-        spin: float | FloatArray,
-        cylinder_depth: FloatArray,
-        roller_depth: FloatArray,
-    ) -> FloatArray | None:
-        """Return how creepage varies over the strips, last axis strips, or None for spin alone.
-
-        The tilt counts once in differential slip: as the shift of the contact away from the apex,
-        or, where it shifts nothing, as the spin's -phi y.
-        """
-        if self.slip_profile is None:
-            return None
-        kinematics = self.kinematics
-        variation: FloatArray = (
-            self.slip_profile[roller]
-            + roller_depth / kinematics.roller_radius
-            - cylinder_depth / kinematics.cylinder_radius
-        )
-        return variation if self.tilt_shifts else variation - spin * self.from_apex[roller]
-
-    def points(
-        self, loads: FloatArray, cylinder_depth: FloatArray, roller_depth: FloatArray
-    ) -> Sequence[OperatingPoint]:
-        """Return the operating point of every contact.
-
-        Parameters
-        ----------
-        loads : ndarray, shape (stations, contacts, realisations)
-            Loads [N].
-        cylinder_depth, roller_depth : ndarray
-            Worn depths as in `WearState` [m].
-        """
-        if self.free:
-            return [
-                self.point(
-                    c,
-                    v,
-                    float(loads[s, c, v]),
-                    cylinder_depth[s, 0, v],
-                    roller_depth[0, self.roller[c], v],
-                )
-                for s, c, v in self.contacts
-            ]
-        variation = self._variation(
-            self.roller[None, :, None],
-            self.spin[None, :, :, None],
-            cylinder_depth,
-            self.at_contacts(roller_depth),
-        )
-        if variation is not None:
-            strips = self.grid.strips
-            variation = np.broadcast_to(variation, (*self.shape, strips)).reshape(-1, strips)
-        longitudinal, lateral, spin, friction = self._columns
-        return OperatingPoints(
-            normal_force=loads.ravel(),
-            longitudinal=longitudinal,
-            lateral=lateral,
-            spin=spin,
-            friction=friction,
-            rolling_speed=self.kinematics.rolling_speed,
-            variation=variation,
-        )
-
-    @cached_property
-    def _columns(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Both creepages, spin and friction of the contacts in their order, (contacts,) each."""
-        inputs = self.inputs
-        longitudinal, lateral, spin, friction = (
-            np.broadcast_to(column, self.shape).ravel()
-            for column in (inputs.longitudinal, inputs.yaw, self.spin, inputs.friction)
-        )
-        return longitudinal, lateral, spin, friction
-
-    def point(
-        self,
-        contact: int,
-        realisation: int,
-        load: float,
-        cylinder_depth: FloatArray,
-        roller_depth: FloatArray,
-    ) -> OperatingPoint:
-        """Return the operating point of one contact at its worn depths, shape (strips,) [m]."""
-        kinematics, inputs, place = self.kinematics, self.inputs, (contact, realisation)
-        spin, radius = float(self.spin[place]), None
-        if self.free:
-            s = self.from_apex[self.roller[contact]]
-            radius = kinematics.roller_radius - s * s / (2.0 * kinematics.crown_radius)
-            radius = radius - roller_depth
-        return OperatingPoint(
-            normal_force=load,
-            rolling_speed=kinematics.rolling_speed,
-            creepage=Creepage(
-                float(inputs.longitudinal[place]),
-                float(inputs.yaw[place]),
-                spin,
-                self._variation(int(self.roller[contact]), spin, cylinder_depth, roller_depth),
-            ),
-            friction=float(inputs.friction[place]),
-            bearing_torque=float(inputs.bearing_torque[place]) if self.free else None,
-            rolling_radius=radius,
-        )
+        return np.asarray(gap.min(axis=-1) - self.nominal_gap.min(axis=-1))
 
     def values_of(self, contacts: Sequence[ContactSolution], name: str) -> FloatArray:
         """Return the field `name` of all contacts, with the axes of `shape` first."""
@@ -403,53 +282,63 @@ class WearProblem:
         return values.reshape(self.shape + values.shape[1:])
 
     def wear_per_pass(self, contacts: Sequence[ContactSolution]) -> tuple[FloatArray, FloatArray]:
-        """Return the depth one pass of each contact wears off either body, where it touches.
+        """Return the depth worn off either body by one pass of each contact, where it touches.
 
         Returns
         -------
         cylinder, roller : ndarray, shape (stations, contacts, realisations, strips)
             Depth per pass of that contact [m].
         """
-        dissipation = self.values_of(contacts, "dissipation")
-        cylinder, roller = (self._depth_per_pass(body, contacts, dissipation) for body in BODIES)
-        return cylinder, roller
+        return self._depths(contacts, dict.fromkeys(BODIES, 1.0))
 
-    def _depth_per_pass(
-        self,
-        body: Body,
-        contacts: Sequence[ContactSolution],
-        dissipation: FloatArray,
-        times: Number = 1.0,
-    ) -> FloatArray:
-        """Return the depth one pass of each contact wears off `body` [m], `times` over."""
-        factor, speed = self.wear_factors[body], self.kinematics.rolling_speed
-        if factor is None:
-            depths = np.array([self.law.depth_per_pass(body, c, speed) for c in contacts])
-            return times * depths.reshape(dissipation.shape)
-        if isinstance(factor, float) and factor == 0.0:
-            return np.zeros(dissipation.shape)
-        return (times * per_strip(factor)) * dissipation
+    def wear_parts(
+        self, contacts: Sequence[ContactSolution], passes: Number
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the contribution of each contact to the wear of the bodies over some passes [m].
+
+        Returns
+        -------
+        cylinder, roller : ndarray, shape (stations, contacts, realisations, strips)
+        """
+        shares, length = self.wear_shares, per_strip(passes)
+        return self._depths(contacts, {body: shares[body] * length for body in BODIES})
+
+    def _depths(
+        self, contacts: Sequence[ContactSolution], passes: Mapping[Body, Number]
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the depth that `passes` passes of each contact wear off either body [m]."""
+        dissipation, speed = self.values_of(contacts, "dissipation"), self.kinematics.rolling_speed
+        found = []
+        for body in BODIES:
+            factor = self.wear_factors[body]
+            if factor is None:
+                depths = np.array([self.law.depth_per_pass(body, c, speed) for c in contacts])
+                found.append(passes[body] * depths.reshape(dissipation.shape))
+            elif isinstance(factor, float) and factor == 0.0:
+                found.append(np.zeros(dissipation.shape))
+            else:
+                found.append((passes[body] * per_strip(factor)) * dissipation)
+        return found[0], found[1]
 
     @cached_property
     def wear_factors(self) -> dict[Body, Number | None]:
-        """Depth per pass over dissipation of either body [m/(W/m)] where wear is linear in it."""
-        return {body: self._wear_factor(body) for body in BODIES}
-
-    def _wear_factor(self, body: Body) -> Number | None:
+        """Depth per pass and dissipation of either body [m/(W/m)]; None if wear is not linear."""
         problems, speed = self.stacked or (self,), self.kinematics.rolling_speed
-        factors = [problem.law.depth_per_dissipation(body, speed) for problem in problems]
-        known = [factor for factor in factors if factor is not None]
-        if len(known) < len(factors):
-            return None
-        return np.array(known) if self.stacked else known[0]
+        factors: dict[Body, Number | None] = {}
+        for body in BODIES:
+            all_factors = [problem.law.depth_per_dissipation(body, speed) for problem in problems]
+            known = [factor for factor in all_factors if factor is not None]
+            linear = len(known) == len(all_factors)
+            factors[body] = (np.array(known) if self.stacked else known[0]) if linear else None
+        return factors
 
     def shared_wear(
         self, cylinder: FloatArray, roller: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return depth per roller pass of the bodies, from that of the contacts.
+        """Return depth per roller pass of the bodies, from `wear_per_pass` of the contacts.
 
-        Every station of the cylinder is worn by all contacts in turn, every roller by its own at
-        all stations.
+        Every station of the cylinder is worn by all contacts in turn, every roller by its own
+        contacts at all stations.
 
         Returns
         -------
@@ -462,9 +351,9 @@ class WearProblem:
 
     @cached_property
     def wear_shares(self) -> dict[Body, FloatArray]:
-        """Part that a pass of each contact has in the wear of either body per roller pass.
+        """Passes of each contact over a point of either body per roller pass.
 
-        To go with (stations, contacts, realisations, strips).
+        Broadcast to (stations, contacts, realisations, strips).
         """
         own = self.weight * self.kinematics.roller_share / self.shape[0]
         shares: dict[Body, FloatArray] = {"cylinder": self.cylinder_share, "roller": own}
@@ -473,41 +362,24 @@ class WearProblem:
     def sum_of_parts(
         self, cylinder: FloatArray, roller: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the wear of the bodies from each contact's own part in it, as `shared_wear`."""
-        return sum_along(cylinder, axis=1), sum_along(self.sum_of_roller(roller), axis=0)
-
-    def wear_parts(
-        self, contacts: Sequence[ContactSolution], passes: Number
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return each contact's own part in the wear of the bodies over some passes [m].
-
-        Returns
-        -------
-        cylinder, roller : ndarray, shape (stations, contacts, realisations, strips)
-        """
-        dissipation, length = self.values_of(contacts, "dissipation"), per_strip(passes)
-        cylinder, roller = (
-            self._depth_per_pass(body, contacts, dissipation, self.wear_shares[body] * length)
-            for body in BODIES
-        )
-        return cylinder, roller
+        """Return the wear of the bodies, shapes as `shared_wear`, from that of `wear_parts`."""
+        return sum_along(cylinder, axis=1), sum_along(self._sum_of_roller(roller), axis=0)
 
     def per_roller(self, values: FloatArray) -> FloatArray:
         """Return the weighted mean over each roller's contacts, (S, C, ...) to (S, R, ...)."""
         if not self.has_nodes:
             return values
-        weighted = values * self.weight.reshape(1, -1, *(1,) * (values.ndim - 2))
-        return self.sum_of_roller(weighted)
+        return self._sum_of_roller(values * self.weight.reshape(1, -1, *(1,) * (values.ndim - 2)))
 
-    def sum_of_roller(self, values: FloatArray) -> FloatArray:
+    def _sum_of_roller(self, values: FloatArray) -> FloatArray:
         """Return the sum over each roller's contacts, (S, C, ...) to (S, R, ...)."""
-        if self._roller_each:
+        if self._one_contact_per_roller:
             return values
-        found = [values[:, self.roller == r].sum(axis=1) for r in range(self.rollers)]
-        return np.stack(found, axis=1)
+        sums = [values[:, self.roller == r].sum(axis=1) for r in range(self.rollers)]
+        return np.stack(sums, axis=1)
 
     def total_power(self, power: FloatArray) -> FloatArray:
         """Return the power of all physical rollers, shape (N,) [W], from (S, C, N)."""
-        rollers = sum_in_order(power * self._physical_contacts, axis=1)
-        total: FloatArray = mean_along(rollers, axis=0)[0]
-        return total
+        physical_contacts = (self.cylinder_share * self.kinematics.physical_rollers)[None, :, None]
+        total = sum_in_order(power * physical_contacts, axis=1)
+        return np.asarray(mean_along(total, axis=0)[0])

@@ -1,4 +1,4 @@
-"""The state of a wear test: everything that evolves, and so exactly what a checkpoint holds."""
+"""State of a wear test: all that changes from step to step, the content of a checkpoint."""
 
 from __future__ import annotations
 
@@ -10,21 +10,22 @@ import numpy as np
 import numpy.typing as npt
 
 from wearsim.contact_batch import BatchSolution, rows_of
+from wearsim.evolution.operating_points import operating_points
 from wearsim.evolution.problem import WearProblem
 from wearsim.types import ContactSolution, FloatArray, IntArray, Number
 
-SIGMAS = 2.0  # of the scatter that draws at every pass leave, counted as error
+SIGMAS = 2.0  # standard deviations of the sampling scatter that are counted as error
 Contacts: TypeAlias = Sequence[ContactSolution]
 Depths: TypeAlias = tuple[FloatArray, FloatArray]
-"""Of cylinder and rollers, shapes as in `WearState` [m]."""
+"""Depths of cylinder and rollers, shapes as in `WearState` [m]."""
 _CONTACT = "contact_"
-_TWINS = ("coarse_step_solution", "half_quadrature_solution")
+_AUXILIARY = ("coarse_step_solution", "half_quadrature_solution")
 _SCALARS = ("passes", "step", "steps", "rejected", "solves", "full_solves")
 
 
 @dataclass(frozen=True)
 class IndividualCounts:
-    """Where tests stand that are stepped together and go each its own way.
+    """Progress of tests that are stepped together with individual steps.
 
     Parameters
     ----------
@@ -37,16 +38,13 @@ class IndividualCounts:
     passes: FloatArray
     solves: IntArray
 
-    def at(self, numbers: IntArray) -> IndividualCounts:
-        """Return those of some tests."""
-        return IndividualCounts(self.passes[numbers], self.solves[numbers])
-
 
 @dataclass(frozen=True)
 class WearState:
     """A wear test after some roller passes.
 
-    Leading axes are (station, roller, realisation); a profile has length one where it is shared.
+    Leading axes are (station, roller, realisation). The axis of rollers has length one for the
+    cylinder, that of stations has length one for the rollers.
 
     Parameters
     ----------
@@ -59,32 +57,40 @@ class WearState:
     terms : ndarray, shape (terms, rollers, realisations)
         State of each load term.
     contacts : sequence of ContactSolution
-        The last solution of every contact.
+        Last solution of every contact, in the order of `WearProblem.contacts`.
     energy : ndarray, shape (realisations,)
         Dissipated energy of all rollers [J].
-    depth_error, volume_error : ndarray, shape (realisations,)
-        Estimated error of depth, on either body [m], and of the volume worn off both [m^3] so far.
+    depth_error : ndarray, shape (realisations,)
+        Error estimate of the worn depth, the greater of both bodies [m].
+    volume_error : ndarray, shape (realisations,)
+        Error estimate of the volume worn off both bodies [m^3].
     quadrature : ndarray, shape (2, realisations)
-        Part of those errors that the quadrature over inputs drawn at every pass has made.
+        Part of these errors due to the quadrature over inputs drawn at every pass: in depth [m]
+        and volume [m^3].
     scatter : ndarray, shape (2, realisations)
-        Variance of depth [m^2] and volume [m^6] from test to test that such draws leave.
+        Variance between tests due to these draws: of depth [m^2] and volume [m^6].
     step : float
-        Passes the step-size control proposes next; 0 where it has yet to choose.
-    steps, rejected, solves, full_solves : int
-        Steps taken and refused, contact solves of the steps taken, and passes solved in full.
+        Length of the next step proposed by the step-size control [passes]; 0 before the first.
+    steps, rejected : int
+        Steps taken and rejected.
+    solves : int
+        Contact solves of the steps taken.
+    full_solves : int
+        Passes solved in full, not by the chord method, in a per-pass run.
     loop_strips : ndarray, shape (3, stations, rollers, realisations, strips), optional
-        What the compiled per-pass loop carries: line load, and the line load [N/m] and gap [m]
-        where the factorisation in use was made.
+        Memory of the compiled per-pass loop: line load [N/m], and line load [N/m] and gap [m] of
+        the last factorisation.
     loop_contacts : ndarray, shape (3, stations, rollers, realisations), optional
-        Approach now, and there [m], and the sum of the dissipated powers of all passes [W].
-    shadow : WearState, optional
-        The same test stepped twice as coarsely; what sets the two apart is the error estimate.
-    coarse : WearState, optional
-        The shadow with half the contacts that stand for inputs drawn at every pass.
+        Memory of the compiled per-pass loop: approach [m], approach of the last factorisation [m],
+        and the sum of the dissipated powers of all passes [W].
+    coarse_step_solution : WearState, optional
+        The same test with steps of twice the length; the difference is the error estimate.
+    half_quadrature_solution : WearState, optional
+        The coarse-step solution with half the quadrature nodes per roller.
     decay : ndarray, shape (realisations,), optional
-        Greatest rate at which wear flattens a profile, where last measured [1/pass].
+        Greatest decay rate of a profile by wear, last measurement [1/pass].
     individual : IndividualCounts, optional
-        In place of `passes` and `solves` where the realisations are tests that go each its own way.
+        Replaces `passes` and `solves` if the realisations are tests with individual steps.
     """
 
     passes: float
@@ -111,7 +117,7 @@ class WearState:
 
     @property
     def passes_done(self) -> Number:
-        """Passes done: one number, or one for each realisation that goes its own way."""
+        """Roller passes done: one number, or one per realisation with individual steps."""
         return self.passes if self.individual is None else self.individual.passes
 
     @property
@@ -123,94 +129,97 @@ class WearState:
 
     @property
     def depths(self) -> Depths:
-        """Worn depths of cylinder and rollers."""
+        """Worn depths of cylinder and rollers [m]."""
         return self.cylinder_depth, self.roller_depth
 
+    @property
+    def auxiliary(self) -> dict[str, Any]:
+        """The coarse-step and half-quadrature solutions that exist, by field name."""
+        states = {name: getattr(self, name) for name in _AUXILIARY}
+        return {name: state for name, state in states.items() if state is not None}
+
     def replaced(self, **others: Any) -> WearState:
-        """Return the state with other fields: as `replace`, which takes ten times as long."""
+        """Return the state with some fields replaced, in a tenth of the time of `replace`."""
         state = object.__new__(WearState)
         state.__dict__.update(self.__dict__, **others)
         return state
 
-    def advanced_to(self, now: Number, solves: IntArray | None = None, **others: Any) -> WearState:
-        """Return the state with other passes done, and whatever else is new.
+    def advanced_to(
+        self, passes: Number, solves: IntArray | None = None, **others: Any
+    ) -> WearState:
+        """Return the state with other passes done, and other fields replaced.
 
         Parameters
         ----------
-        now : float or ndarray, shape (realisations,)
+        passes : float or ndarray, shape (realisations,)
             Passes done.
         solves : ndarray of int, shape (realisations,), optional
-            Further solves.
+            Contact solves to add.
         **others
             Other fields.
         """
         if self.individual is None:
             count = self.solves if solves is None else self.solves + int(solves.sum())
-            return self.replaced(passes=float(now), solves=count, **others)
+            return self.replaced(passes=float(passes), solves=count, **others)
         counts = self.individual.solves if solves is None else self.individual.solves + solves
-        return self.replaced(individual=IndividualCounts(np.asarray(now), counts), **others)
+        individual = IndividualCounts(np.asarray(passes), counts)
+        return self.replaced(individual=individual, **others)
 
     def solves_since(self, before: WearState) -> IntArray:
-        """Return the contact solves since an earlier state, of all or of each realisation."""
+        """Return the contact solves since an earlier state, per realisation or in total."""
         if self.individual is None or before.individual is None:
             return np.array(self.solves - before.solves)
         return self.individual.solves - before.individual.solves
 
     @property
     def irreducible(self) -> FloatArray:
-        """The errors of depth and volume that shorter steps would not lessen, (2, realisations)."""
-        total: FloatArray = self.quadrature + SIGMAS * np.sqrt(self.scatter)
-        return total
+        """Errors of depth [m] and volume [m^3] not due to step size, shape (2, realisations)."""
+        return np.asarray(self.quadrature + SIGMAS * np.sqrt(self.scatter))
 
     def to_arrays(self) -> dict[str, npt.NDArray[np.generic]]:
         """Return the whole state as named arrays, for a checkpoint."""
         arrays: dict[str, npt.NDArray[np.generic]] = {
             item.name: np.asarray(getattr(self, item.name))
             for item in fields(self)
-            if item.name not in {"contacts", "individual", *_TWINS}
+            if item.name not in {"contacts", "individual", *_AUXILIARY}
             and getattr(self, item.name) is not None
         }
         for item in fields(ContactSolution):
             arrays[_CONTACT + item.name] = np.array(rows_of(self.contacts, item.name))
-        for name in _TWINS:
-            twin = getattr(self, name)
-            if twin is not None:
-                arrays.update({f"{name}_{key}": a for key, a in twin.to_arrays().items()})
+        for name, state in self.auxiliary.items():
+            arrays.update({f"{name}_{key}": a for key, a in state.to_arrays().items()})
         return arrays
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, npt.NDArray[np.generic]]) -> WearState:
-        """Rebuild a state from what `to_arrays` returned."""
-        values: dict[str, object] = {}
-        for twin in _TWINS:
-            start = f"{twin}_"
-            part = {name[len(start) :]: a for name, a in arrays.items() if name.startswith(start)}
-            if part:
-                values[twin] = cls.from_arrays(part)
-            arrays = {name: a for name, a in arrays.items() if not name.startswith(start)}
-        known = {item.name for item in fields(cls)}  # of older files some are no longer kept
-        for name, array in arrays.items():
-            if name in _SCALARS:
-                values[name] = array.item()
-            elif name in known:
-                values[name] = np.array(array)
-        contact = {
-            name[len(_CONTACT) :]: array
+        """Return the state stored in the result of `to_arrays`."""
+        known = {item.name for item in fields(cls)}  # files of older versions hold further names
+        values: dict[str, Any] = {
+            name: array.item() if name in _SCALARS else np.array(array)
             for name, array in arrays.items()
-            if name.startswith(_CONTACT)
+            if name in known
         }
-        for name in ("quadrature", "scatter"):  # files of version 0.1.0 have none
+        for name in ("quadrature", "scatter"):  # absent from files of version 0.1.0
             values.setdefault(name, np.zeros((2, len(arrays["depth_error"]))))
-        count = len(contact["power"])
+        for name in _AUXILIARY:
+            part = _with_prefix(arrays, f"{name}_")
+            if part:
+                values[name] = cls.from_arrays(part)
+        columns = _with_prefix(arrays, _CONTACT)
         values["contacts"] = tuple(
-            ContactSolution(**_unpack({name: column[k] for name, column in contact.items()}))
-            for k in range(count)
+            ContactSolution(**{name: _unpacked(column[k]) for name, column in columns.items()})
+            for k in range(len(columns["power"]))
         )
-        return cls(**values)  # type: ignore[arg-type]
+        return cls(**values)
 
 
-def _unpack(values: dict[str, Any]) -> dict[str, Any]:
-    return {n: v.item() if v.ndim == 0 else np.array(v) for n, v in values.items()}
+def _unpacked(value: npt.NDArray[Any]) -> Any:
+    return value.item() if value.ndim == 0 else np.array(value)
+
+
+def _with_prefix(arrays: Mapping[str, npt.NDArray[Any]], prefix: str) -> dict[str, Any]:
+    """Return the arrays whose names begin with a prefix, by the rest of their names."""
+    return {n.removeprefix(prefix): a for n, a in arrays.items() if n.startswith(prefix)}
 
 
 def as_batch(contacts: Contacts, shape: tuple[int, ...]) -> BatchSolution:
@@ -234,15 +243,15 @@ def widened(array: FloatArray, strips: int) -> FloatArray:
 
 
 def widened_state(state: WearState, y: FloatArray, strips: int) -> WearState:
-    """Return a state on strips added on both sides, unworn and without load.
+    """Return a state with strips added on both sides, unworn and without load.
 
     Parameters
     ----------
     state : WearState
-    y : ndarray, shape (wider strips,)
+    y : ndarray, shape (strips of the wider grid,)
         Position of all strips [m].
     strips : int
-        How many are added on each side.
+        Number of strips added on each side.
     """
     contacts = tuple(
         replace(
@@ -255,40 +264,33 @@ def widened_state(state: WearState, y: FloatArray, strips: int) -> WearState:
         for contact in state.contacts
     )
     loop = state.loop_strips
-    shadow, coarse = (
-        None if twin is None else widened_state(twin, y, strips)
-        for twin in (state.coarse_step_solution, state.half_quadrature_solution)
-    )
-    return replace(
-        state,
+    return state.replaced(
         cylinder_depth=widened(state.cylinder_depth, strips),
         roller_depth=widened(state.roller_depth, strips),
         contacts=contacts,
         loop_strips=None if loop is None else widened(loop, strips),
-        coarse_step_solution=shadow,
-        half_quadrature_solution=coarse,
+        **{name: widened_state(part, y, strips) for name, part in state.auxiliary.items()},
     )
 
 
 def fresh_state(problem: WearProblem) -> WearState:
-    """Solve the fresh contacts and return the state before the first pass."""
+    """Return the state before the first pass, with the contacts of the unworn bodies solved."""
     problem = problem.at_time(0.0, 0.0)
     stations, _, realisations = problem.shape
     n = problem.grid.strips
     cylinder_depth = np.zeros((stations, 1, realisations, n))
     roller_depth = np.zeros((1, problem.rollers, realisations, n))
-    terms = np.zeros((len(problem.terms), problem.rollers, realisations))
     loads = np.broadcast_to(problem.force(0.0) + problem.inputs.normal_force_offset, problem.shape)
     contacts = problem.model.solve_batch(
         problem.nominal_gap,
         problem.kinematics.longitudinal_curvature,
-        problem.points(loads, cylinder_depth, roller_depth),
+        operating_points(problem, loads, cylinder_depth, roller_depth),
     )
     return WearState(
         passes=0.0,
         cylinder_depth=cylinder_depth,
         roller_depth=roller_depth,
-        terms=terms,
+        terms=np.zeros((len(problem.terms), problem.rollers, realisations)),
         contacts=contacts,
         energy=np.zeros(realisations),
         depth_error=np.zeros(realisations),
@@ -300,9 +302,9 @@ def fresh_state(problem: WearProblem) -> WearState:
 
 
 def fresh_stacked_state(problem: WearProblem) -> WearState:
-    """Return the fresh state of tests that are joined in a problem and go each its own way."""
+    """Return the fresh state of stacked tests with individual steps."""
     state = fresh_state(problem)
     count = problem.shape[2]
-    solves = np.full(count, state.solves // count)
-    state = replace(state, solves=0, individual=IndividualCounts(np.zeros(count), solves))
+    individual = IndividualCounts(np.zeros(count), np.full(count, state.solves // count))
+    state = replace(state, solves=0, individual=individual)
     return replace(state, coarse_step_solution=state)

@@ -119,7 +119,7 @@ def test_that_an_explicit_expectation_of_that_length_is_unstable():
         "evolution__nodes": 16,
         "creepage__misalignment": ALL_PER_PASS["creepage__misalignment"],
     }
-    with pytest.raises(StepError, match="exceeds the limit of stability"):
+    with pytest.raises(StepError, match="exceeds the stability limit"):
         end_of(scenario_of(**inputs))
     result = wearsim.run(scenario_of(evolution__allow_unstable=True, **inputs))
     assert any(text.startswith("unstable") for text in result.warnings)

@@ -1,1 +1,1 @@
-"""Wear tests that are stepped together."""
+"""Wear tests that are stepped together as realisations of one problem."""

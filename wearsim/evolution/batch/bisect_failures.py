@@ -1,4 +1,4 @@
-"""Work on many at once, divided where it fails until what fails stands alone."""
+"""Bisection of a batch to isolate failures."""
 
 from __future__ import annotations
 
@@ -13,29 +13,28 @@ T = TypeVar("T")
 def bisect_failures(
     work: Callable[[IntArray], T], places: IntArray
 ) -> tuple[list[tuple[IntArray, T]], dict[int, Exception]]:
-    """Do something with all places at once, or with halves of them where it raises.
+    """Process a batch, and its halves recursively where that raises.
 
     Parameters
     ----------
     work : callable
-        Takes some of the places. What it makes of each must not depend on the others.
+        Processes a part of the batch. Its result for a place must not depend on the others.
     places : ndarray of int, shape (places,)
-        At least one.
+        The batch, not empty.
 
     Returns
     -------
     done : list of tuple
-        Places and what was made of them, in their order.
+        Places and result of each part, in their order.
     failed : dict of int to Exception
-        What was raised at single places.
+        Exception of each place that fails when processed individually.
     """
     try:
         return [(places, work(places))], {}
-    except Exception as error:  # whatever it is, it must end what it befell and nothing else
+    except Exception as error:  # any exception ends the test that raised it and no other
         if len(places) == 1:
             return [], {int(places[0]): error}
     middle = len(places) // 2
-    (first, failed), (second, others) = (
-        bisect_failures(work, part) for part in (places[:middle], places[middle:])
-    )
+    first, failed = bisect_failures(work, places[:middle])
+    second, others = bisect_failures(work, places[middle:])
     return first + second, failed | others

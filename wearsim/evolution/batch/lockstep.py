@@ -1,11 +1,12 @@
-"""Tests stepped together, each at its own pace: one sweep is one try of every test.
+"""Tests stepped together with individual step lengths.
 
-What a test does is the same to the bit whatever tests are stepped beside it.
+The results of a test are the same to the bit for any batch that it is stepped in.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
@@ -24,16 +25,16 @@ from wearsim.evolution.error_control.step_doubling import Attempt, first_steps
 from wearsim.evolution.error_control.step_size import Trial
 from wearsim.evolution.integrate import not_finite, too_many_steps
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import fresh_stacked_state
+from wearsim.evolution.state import WearState, fresh_stacked_state
 from wearsim.evolution.steppers.backward_euler import ImplicitStepper
 from wearsim.evolution.steppers.base import Stepper
 from wearsim.types import FloatArray, IntArray
 
 
 def can_step_together(problem: WearProblem, stepper: Stepper) -> bool:
-    """Tell whether a test can be stepped together with others that are `alike`.
+    """Return whether a test can be stepped together with `compatible` ones.
 
-    It takes implicit steps: those of other steppers differ from test to test in more than length.
+    Only implicit steps can: those of other steppers differ between tests in more than length.
     """
     return isinstance(stepper, ImplicitStepper) and can_be_stacked(problem)
 
@@ -43,26 +44,26 @@ Path: TypeAlias = tuple[Stack, Stack, Stack]
 
 
 class Lockstep:
-    """Tests that are stepped together, numbered as their problems are given.
+    """Tests that are stepped together, numbered in the order of their problems.
 
     Parameters
     ----------
     problems : sequence of WearProblem
-        Alike, and such as can go together.
+        Compatible problems that can be stacked.
     stepper : ImplicitStepper
     stop : float
-        Passes at which the tests end.
+        Passes at the end of the tests.
     max_steps : int
-        Steps after which a test is given up.
+        Greatest number of steps of a test.
 
     Attributes
     ----------
     stack : Stack, optional
-        The tests that are under way, if any.
+        The tests in progress, if any.
     steps, rejected : ndarray of int, shape (all tests,)
-        Steps taken and refused.
+        Steps taken and rejected.
     failures : dict of int to Exception
-        What ended the tests that failed, by number.
+        Errors of the tests that failed, by number.
     """
 
     def __init__(
@@ -78,21 +79,21 @@ class Lockstep:
             np.arange(len(problems)),
         )
         if done:
-            numbers = np.concatenate([found for found, _ in done])
-            state = stacked_states([found for _, found in done])
+            numbers = np.concatenate([part for part, _ in done])
+            state = stacked_states([part for _, part in done])
             self.stack = Stack(numbers, problem_of(problem, numbers), state)
             steps = np.full(len(numbers), stepper.forced_step or 0.0)
             if not stepper.forced_step:
                 steps = first_steps(self.stack.problem, state)
-            for number, step in zip(numbers.tolist(), steps.tolist(), strict=True):
-                self._trials[number] = self._trial(step)
+            each = zip(numbers.tolist(), steps.tolist(), strict=True)
+            self._trials = {number: self._trial(step) for number, step in each}
 
     def _trial(self, proposed: float) -> Trial:
         forced = bool(self.stepper.forced_step)
         return Trial(proposed, self.stepper.control, self.stepper.order, forced, dict)
 
     def fail(self, failures: dict[int, Exception]) -> None:
-        """End tests, by number."""
+        """End tests, by number, with the errors given."""
         self.failures.update(failures)
         self._end(list(failures))
 
@@ -102,9 +103,9 @@ class Lockstep:
             self.stack = self.stack.at(kept) if kept.size else None
 
     def sweep(self) -> Path | None:
-        """Try one step of every test under way; return those that stand, if any.
+        """Try one step of every test in progress; return the accepted ones, if any.
 
-        Tests that end by it, or fail, are no longer under way.
+        Tests that reach their end or fail are removed from `stack`.
         """
         steps = self._proposed()
         if self.stack is None:
@@ -117,18 +118,24 @@ class Lockstep:
             return self.stepper.attempt(some.problem, some.state, steps[places], self.stop, scheme)
 
         done, failed = bisect_failures(attempt, np.arange(len(steps)))
-        self.fail(self._refused(stack, failed, steps))
-        tried = [(places, one, self._standing(stack, places, one, steps)) for places, one in done]
-        tried = [(places, one, ok) for places, one, ok in tried if ok.size]
-        if not tried:
+        self._reject(stack, failed, steps)
+        accepted: list[tuple[IntArray, WearState, WearState]] = []
+        for places, tried in done:
+            columns = stack.numbers[places], tried.excess, steps[places]
+            each = zip(*(column.tolist() for column in columns), strict=True)
+            chosen = np.flatnonzero([self._trials[n].accepts(over, step) for n, over, step in each])
+            if chosen.size:
+                half, end = state_of(tried.half, chosen), state_of(tried.end, chosen)
+                accepted.append((places[chosen], half, end))
+        if not accepted:
             return None
-        stood = stack.at(np.concatenate([places[ok] for places, _, ok in tried]))
-        half = stacked_states([state_of(one.half, ok) for _, one, ok in tried])
-        end = stacked_states([state_of(one.end, ok) for _, one, ok in tried])
-        return self._taken((stood, stood.moved_to(half), stood.moved_to(end)))
+        start = stack.at(np.concatenate([places for places, _, _ in accepted]))
+        half = stacked_states([half for _, half, _ in accepted])
+        end = stacked_states([end for _, _, end in accepted])
+        return self._continue((start, replace(start, state=half), replace(start, state=end)))
 
     def _proposed(self) -> FloatArray:
-        """Return the length of the step that each test tries [passes]; end those with none."""
+        """Return the length of each test's next trial step [passes]; end tests without one."""
         steps: list[float] = []
         failures: dict[int, Exception] = {}
         for number, passes in [] if self.stack is None else self.stack.progress:
@@ -141,43 +148,24 @@ class Lockstep:
         self.fail(failures)
         return np.array(steps)
 
-    def _refused(
-        self, stack: Stack, failed: dict[int, Exception], steps: FloatArray
-    ) -> dict[int, Exception]:
-        """Take note of tries that failed, by place; return the errors that end a test."""
+    def _reject(self, stack: Stack, failed: dict[int, Exception], steps: FloatArray) -> None:
+        """Shorten the steps that failed, by place; end tests that cannot continue."""
         ending: dict[int, Exception] = {}
         for place, error in failed.items():
             number = int(stack.numbers[place])
-            try:
-                if not isinstance(error, (StepError, ContactError)):
-                    raise error
-                self._trials[number].refuse(error, float(steps[place]))
-            except Exception as final:
-                ending[number] = final
-        return ending
+            if isinstance(error, (StepError, ContactError)) and not self.stepper.forced_step:
+                self._trials[number].reject(error, float(steps[place]))
+            else:
+                ending[number] = error
+        self.fail(ending)
 
-    def _standing(
-        self, stack: Stack, places: IntArray, tried: Attempt, steps: FloatArray
-    ) -> IntArray:
-        """Return which of the tries at some places stand."""
-        stands = [
-            self._trials[number].stands(over, step)
-            for number, over, step in zip(
-                stack.numbers[places].tolist(),
-                tried.excess.tolist(),
-                steps[places].tolist(),
-                strict=True,
-            )
-        ]
-        return np.flatnonzero(stands)
-
-    def _taken(self, path: Path) -> Path | None:
-        """Go on from the steps that stand; return those that led to finite values."""
+    def _continue(self, path: Path) -> Path | None:
+        """Continue from accepted steps; return those that led to finite values."""
         end = path[-1]
         depth, energy = end.state.cylinder_depth, end.state.energy
-        sound = np.isfinite(depth).all(axis=(0, 1, 3)) & np.isfinite(energy)
+        finite = np.isfinite(depth).all(axis=(0, 1, 3)) & np.isfinite(energy)
         failures: dict[int, Exception] = {}
-        for (number, passes), ok in zip(end.progress, sound, strict=True):
+        for (number, passes), ok in zip(end.progress, finite, strict=True):
             trial = self._trials[number]
             self.steps[number] += 1
             self.rejected[number] += trial.rejected
@@ -185,11 +173,11 @@ class Lockstep:
             if not ok:
                 failures[number] = not_finite(passes, {})
         if self.stack is not None:
-            self.stack = self.stack.with_others(end)
+            self.stack = self.stack.with_states_of(end)
         self.fail(failures)
         self._end([number for number, passes in end.progress if passes >= self.stop])
         if not failures:
             return path
-        kept = np.flatnonzero(sound)
+        kept = np.flatnonzero(finite)
         start, half, end = (one.at(kept) for one in path)
         return (start, half, end) if kept.size else None

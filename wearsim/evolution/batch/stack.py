@@ -1,4 +1,4 @@
-"""Tests side by side as the realisations of one problem: joined, and taken apart again."""
+"""Wear tests stacked as the realisations of one problem, and selections of them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from wearsim.evolution.contact_inputs import ContactInputs
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import IndividualCounts, WearState
 from wearsim.plugins import BODIES
-from wearsim.types import FloatArray, IntArray
+from wearsim.types import IntArray
 
 #: axis of the realisations in the arrays of a `WearState`
 _AXES = {
@@ -25,14 +25,15 @@ _AXES = {
     "quadrature": 1,
     "scatter": 1,
 }
-_SAME_ARRAYS = ("from_apex", "roller", "weight", "half", "slip_profile")
+_RADII = ("cylinder_radius", "roller_radius", "crown_radius", "rolling_speed")
+_ARRAYS = ("from_apex", "roller", "weight", "half", "slip_profile")
 
 
 def can_be_stacked(problem: WearProblem) -> bool:
-    """Tell whether a test can be stepped together with others that are like it.
+    """Return whether a test can be stepped together with compatible ones.
 
-    Load terms, a bearing torque, inputs drawn at every pass, several stations and wear laws that
-    are not linear in the dissipation take one test at a time.
+    Tests with load terms, a bearing torque, inputs drawn at every pass, several stations or a wear
+    law that is not linear in the dissipation are stepped one at a time.
     """
     linear = all(problem.wear_factors[body] is not None for body in BODIES)
     plain = not (problem.free or problem.terms or problem.has_nodes or problem.redraw)
@@ -40,89 +41,86 @@ def can_be_stacked(problem: WearProblem) -> bool:
 
 
 def compatible(one: WearProblem, other: WearProblem) -> bool:
-    """Tell whether two tests that can be joined can be so with each other."""
+    """Return whether two tests that can be stacked can share a stack.
+
+    They share grid, model, kinematics and the arrays that do not depend on the realisation.
+    """
     first, second = one.kinematics, other.kinematics
-    radii = ("cylinder_radius", "roller_radius", "crown_radius", "rolling_speed")
+    pairs = [(getattr(one, name), getattr(other, name)) for name in _ARRAYS]
+    pairs.append((first.multiplicity, second.multiplicity))
     varying = [[(item.name, item.rollers) for item in problem.varying] for problem in (one, other)]
     return (
-        all(getattr(one, name) is getattr(other, name) for name in ("grid", "model"))
-        and all(
-            getattr(one, name) == getattr(other, name)
-            for name in ("tilt_shifts", "iteration_tolerance")
-        )
-        and all(_equal(getattr(one, name), getattr(other, name)) for name in _SAME_ARRAYS)
-        and all(getattr(first, name) == getattr(second, name) for name in radii)
-        and _equal(first.multiplicity, second.multiplicity)
+        one.grid is other.grid
+        and one.model is other.model
+        and one.tilt_shifts == other.tilt_shifts
+        and one.iteration_tolerance == other.iteration_tolerance
+        and all(a is b if a is None or b is None else np.array_equal(a, b) for a, b in pairs)
+        and all(getattr(first, name) == getattr(second, name) for name in _RADII)
         and varying[0] == varying[1]
     )
 
 
-def _equal(one: FloatArray | None, other: FloatArray | None) -> bool:
-    if one is None or other is None:
-        return one is other
-    return np.array_equal(one, other)
-
-
 def stacked_problem(problems: Sequence[WearProblem]) -> WearProblem:
-    """Return one problem of which the tests, which are compatible, are the realisations."""
-    inputs = [problem.inputs for problem in problems]
-    joined = ContactInputs(
-        *(
-            np.concatenate([getattr(one, item.name) for one in inputs], axis=1)
-            for item in fields(ContactInputs)
-        )
+    """Return one problem whose realisations are the given tests, which are compatible."""
+    columns = (
+        np.concatenate([getattr(problem.inputs, item.name) for problem in problems], axis=1)
+        for item in fields(ContactInputs)
     )
     gaps = np.concatenate([problem.flat_gap for problem in problems], axis=2)
-    return replace(problems[0], flat_gap=gaps, inputs=joined, stacked=tuple(problems))
+    inputs = ContactInputs(*columns)
+    return replace(problems[0], flat_gap=gaps, inputs=inputs, stacked=tuple(problems))
 
 
 def problem_of(problem: WearProblem, numbers: IntArray) -> WearProblem:
-    """Return the problem with some of its realisations, in that order."""
-    inputs = ContactInputs(
-        *(
-            np.take(getattr(problem.inputs, item.name), numbers, axis=1)
-            for item in fields(ContactInputs)
-        )
+    """Return the problem of some realisations, by number and in that order."""
+    columns = (
+        np.take(getattr(problem.inputs, item.name), numbers, axis=1)
+        for item in fields(ContactInputs)
     )
-    stacked = tuple(problem.stacked[number] for number in numbers) if problem.stacked else ()
-    gap = np.take(problem.flat_gap, numbers, axis=2)
-    return replace(problem, flat_gap=gap, inputs=inputs, stacked=stacked)
+    return replace(
+        problem,
+        flat_gap=np.take(problem.flat_gap, numbers, axis=2),
+        inputs=ContactInputs(*columns),
+        stacked=tuple(problem.stacked[number] for number in numbers) if problem.stacked else (),
+    )
 
 
 def state_of(state: WearState, numbers: IntArray) -> WearState:
-    """Return the state of some realisations, in that order."""
-    taken: dict[str, Any] = {
+    """Return the state of some realisations, by number and in that order."""
+    arrays: dict[str, Any] = {
         name: np.take(getattr(state, name), numbers, axis=axis) for name, axis in _AXES.items()
     }
-    shadow = state.coarse_step_solution
+    coarse, counts = state.coarse_step_solution, state.individual
+    if counts is not None:
+        counts = IndividualCounts(counts.passes[numbers], counts.solves[numbers])
     return replace(
         state,
-        **taken,
+        **arrays,
         contacts=state.batch.at(numbers),
-        coarse_step_solution=None if shadow is None else state_of(shadow, numbers),
-        individual=None if state.individual is None else state.individual.at(numbers),
+        coarse_step_solution=None if coarse is None else state_of(coarse, numbers),
+        individual=counts,
     )
 
 
 def stacked_states(states: Sequence[WearState]) -> WearState:
-    """Return the states of tests that go each its own way as the realisations of one."""
-    joined: dict[str, Any] = {
+    """Return the states of tests with individual steps as realisations of one state."""
+    arrays: dict[str, Any] = {
         name: np.concatenate([getattr(state, name) for state in states], axis=axis)
         for name, axis in _AXES.items()
     }
     first, *others = (state.batch for state in states)
-    each = [state.individual for state in states if state.individual is not None]
-    shadows = [
+    counts = [state.individual for state in states if state.individual is not None]
+    coarse = [
         state.coarse_step_solution for state in states if state.coarse_step_solution is not None
     ]
     return replace(
         states[0],
-        **joined,
+        **arrays,
         contacts=first.joined_with(*others),
-        coarse_step_solution=stacked_states(shadows) if len(shadows) == len(states) else None,
+        coarse_step_solution=stacked_states(coarse) if len(coarse) == len(states) else None,
         individual=IndividualCounts(
-            np.concatenate([one.passes for one in each]),
-            np.concatenate([one.solves for one in each]),
+            np.concatenate([item.passes for item in counts]),
+            np.concatenate([item.solves for item in counts]),
         ),
     )
 
@@ -134,10 +132,11 @@ class Stack:
     Parameters
     ----------
     numbers : ndarray of int, shape (tests,)
-        Which they are.
+        Numbers of the tests.
     problem : WearProblem
+        Their stacked problem.
     state : WearState
-        Theirs; each goes its own way.
+        Their states, with individual steps.
     """
 
     numbers: IntArray
@@ -146,7 +145,7 @@ class Stack:
 
     @property
     def progress(self) -> list[tuple[int, float]]:
-        """Number and roller passes done of each test."""
+        """Number of each test and the roller passes done."""
         passes: list[float] = np.asarray(self.state.passes_done).tolist()
         return list(zip(self.numbers.tolist(), passes, strict=True))
 
@@ -157,15 +156,17 @@ class Stack:
         problem, state = problem_of(self.problem, places), state_of(self.state, places)
         return Stack(self.numbers[places], problem, state)
 
-    def moved_to(self, state: WearState) -> Stack:
-        """Return the same tests at another state."""
-        return replace(self, state=state)
+    def with_states_of(self, others: Stack) -> Stack:
+        """Return these tests with the states of some of them replaced.
 
-    def with_others(self, others: Stack) -> Stack:
-        """Return these tests, some of them at the state that they have in another stack."""
+        Parameters
+        ----------
+        others : Stack
+            Some of the tests, with their new states.
+        """
         if np.array_equal(self.numbers, others.numbers):
-            return self.moved_to(others.state)
+            return replace(self, state=others.state)
         order, place = np.arange(len(self.numbers)), np.argsort(self.numbers)
         at = place[np.searchsorted(self.numbers, others.numbers, sorter=place)]
         order[at] = len(order) + np.arange(len(at))
-        return self.moved_to(state_of(stacked_states([self.state, others.state]), order))
+        return replace(self, state=state_of(stacked_states([self.state, others.state]), order))

@@ -1,1 +1,1 @@
-"""Error estimates of steps, and the step size."""
+"""Error estimates and step-size control."""

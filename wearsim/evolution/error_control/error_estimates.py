@@ -1,4 +1,4 @@
-"""What the error of a step is measured by, for every stepper that takes many passes at once."""
+"""Error estimates of steps over many passes."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import Depths, WearState
 from wearsim.evolution.steppers.single_step import solve_present
 from wearsim.evolution.steppers.wear_increment import WearIncrement
-from wearsim.types import BoolArray, FloatArray, Number
+from wearsim.types import FloatArray, Number
 
-DEPTH_EXPONENT, VOLUME_EXPONENT = 0.5, 0.75  # below those of any groove: 2/3 to 1, and about 1
+DEPTH_EXPONENT, VOLUME_EXPONENT = 0.5, 0.75  # lower bounds; grooves grow with 2/3 to 1, about 1
 Step: TypeAlias = Callable[[WearProblem, WearState, Number], WearState]
-COVER = 1.5  # of what is estimated; half as much for safety
-FIRST_ORDER_COVER = 2.0  # the twin of a first-order scheme is off by little more than it tells
-DEEP = 0.5  # depths are compared where the groove is deeper than this part of its depth
+"""Function from a problem, a state and a number of passes to the state after them."""
+COVER = 1.5  # safety factor on an error estimate
+FIRST_ORDER_COVER = 2.0  # the same for a scheme of first order, whose estimate is hardly too large
+DEEP = 0.5  # depths are compared where the groove is deeper than this part of its greatest depth
 DEPTHS = ("cylinder_depth", "roller_depth")
 
 
 def greatest_depth(state: WearState) -> FloatArray:
     """Return the greatest worn depth of either body, shape (realisations,) [m]."""
-    found: FloatArray = np.maximum(*(getattr(state, name).max(axis=(0, 1, 3)) for name in DEPTHS))
-    return found
+    return np.asarray(np.maximum(*(worn.max(axis=(0, 1, 3)) for worn in state.depths)))
 
 
 def total_worn_volume(problem: WearProblem, state: WearState) -> FloatArray:
@@ -41,54 +41,50 @@ def volume_of(problem: WearProblem, depths: Depths) -> FloatArray:
     kinematics, spacing = problem.kinematics, problem.grid.spacing
     cylinder = worn_volume(depths[0], spacing, kinematics.cylinder_radius)
     rollers = worn_volume(depths[1][0], spacing, kinematics.roller_radius)
-    mean: FloatArray = mean_along(mean_along(cylinder, axis=1), axis=0)[0, 0]
-    return mean + sum_in_order(kinematics.multiplicity[:, None] * rollers, axis=0)
+    mean = mean_along(mean_along(cylinder, axis=1), axis=0)[0, 0]
+    return np.asarray(mean + sum_in_order(kinematics.multiplicity[:, None] * rollers, axis=0))
 
 
-def apart(one: WearState, other: WearState) -> Depths:
-    """Return how far the depths of two states lie apart."""
+def depth_difference(one: WearState, other: WearState) -> Depths:
+    """Return the difference of the depths of two states."""
     return one.cylinder_depth - other.cylinder_depth, one.roller_depth - other.roller_depth
 
 
-def grooves(state: WearState) -> tuple[BoolArray, BoolArray]:
-    """Return where cylinder and rollers are deep, shapes as of the depths."""
+def greatest_where_deep(state: WearState, depths: Depths) -> FloatArray:
+    """Return the greatest absolute depth where `state` is worn deep, shape (realisations,) [m]."""
     cylinder, roller = (
-        worn >= DEEP * worn.max(axis=(0, 1, 3), keepdims=True) for worn in state.depths
+        np.where(worn >= DEEP * worn.max(axis=(0, 1, 3), keepdims=True), np.abs(depth), 0.0)
+        for worn, depth in zip(state.depths, depths, strict=True)
     )
-    return cylinder, roller
+    return np.asarray(np.maximum(cylinder.max(axis=(0, 1, 3)), roller.max(axis=(0, 1, 3))))
 
 
-def greatest_in(deep: tuple[BoolArray, BoolArray], depths: Depths) -> FloatArray:
-    """Return the greatest size of depths where grooves are deep, shape (realisations,) [m]."""
-    cylinder, roller = (
-        np.where(here, np.abs(depth), 0.0).max(axis=(0, 1, 3))
-        for here, depth in zip(deep, depths, strict=True)
-    )
-    greatest: FloatArray = np.maximum(cylinder, roller)
-    return greatest
+def state_difference(problem: WearProblem, one: WearState, other: WearState) -> FloatArray:
+    """Return the difference of two states in depth [m] and volume [m^3], shape (2, realisations).
 
-
-def depth_between(one: WearState, other: WearState) -> FloatArray:
-    """Return how far two states lie apart where the first is deep, shape (realisations,) [m]."""
-    return greatest_in(grooves(one), apart(one, other))
+    The difference in depth is the greatest where the first state is worn deep.
+    """
+    depth = greatest_where_deep(one, depth_difference(one, other))
+    volume = np.abs(total_worn_volume(problem, one) - total_worn_volume(problem, other))
+    return np.array([depth, volume])
 
 
 def variation_bias(
     problem: WearProblem, end: WearState, first: Number, passes: Number
 ) -> Depths | None:
-    """Return what a step leaves out where load and processes vary within it.
+    """Return the wear that a step misses where load and processes vary within it.
 
-    The step takes their exact means, but wear is no linear function of them. Half the second
-    difference of the wear at the mean and a standard deviation to either side, on the profile of
-    the step's end, is the bias that the variance makes.
+    The step takes their exact means, but wear is not linear in them. The bias due to the variance
+    is half the second difference of the wear at the mean and one standard deviation to either
+    side, on the profile of the step's end.
 
     Parameters
     ----------
     problem : WearProblem
     end : WearState
-        The state at the step's end.
+        State at the step's end.
     first, passes : float or ndarray, shape (realisations,)
-        Where the step began, and its length [passes].
+        Start and length of the step [passes].
 
     Returns
     -------
@@ -96,29 +92,27 @@ def variation_bias(
         Depth to add, shapes as in `WearState` [m]; None where nothing varies.
     """
     start, stop = problem.time(first), problem.time(first + passes)
+    deviations = [item for item in problem.deviations(start, stop) if np.count_nonzero(item[2])]
+    if not deviations:
+        return None
     here = problem.at_time(start, stop)
+    loads = problem.values_of(end.contacts, "line_load").sum(axis=-1) * problem.grid.spacing
     mean: WearIncrement | None = None
     bias: Depths | None = None
-    loads: FloatArray | None = None
-    for name, rollers, deviation in problem.deviations(start, stop):
-        if not np.count_nonzero(deviation):
-            continue
-        if loads is None:
-            carried = problem.values_of(end.contacts, "line_load").sum(axis=-1)
-            loads = carried * problem.grid.spacing
+    for name, rollers, deviation in deviations:
         values = loads if name == "normal_force_offset" else getattr(here.inputs, name)
         values = values.reshape(-1, values.shape[-1])
-        felt = deviation > 1e-9 * np.abs(values).max(axis=0)
-        if not felt.any():
+        significant = deviation > 1e-9 * np.abs(values).max(axis=0)
+        if not significant.any():
             continue
         # a load and a friction coefficient are never below zero
         bounded = name in {"normal_force_offset", "friction"}
-        most = 0.9 * values.min(axis=0) if bounded else np.inf
-        size = np.where(felt, np.minimum(deviation, most), 0.0)
-        mean = mean if mean is not None else _worn_at(here, end, loads, {}, passes)
+        greatest = 0.9 * values.min(axis=0) if bounded else np.inf
+        size = np.where(significant, np.minimum(deviation, greatest), 0.0)
         shift = np.where(np.isin(problem.roller, rollers)[:, None], size, 0.0)
+        mean = mean or _shifted_wear(here, end, loads, {}, passes)
         less, more = (
-            _worn_at(here, end, loads, {name: sign * shift}, passes) for sign in (-1.0, 1.0)
+            _shifted_wear(here, end, loads, {name: sign * shift}, passes) for sign in (-1.0, 1.0)
         )
         own = (
             0.5 * (less.cylinder - 2.0 * mean.cylinder + more.cylinder),
@@ -131,7 +125,7 @@ def variation_bias(
 def variation_error(
     problem: WearProblem, end: WearState, first: Number, passes: Number
 ) -> FloatArray:
-    """Return the size of `variation_bias`, whose parameters these are, with a factor for safety.
+    """Return the size of `variation_bias`, whose parameters these are, with a safety factor.
 
     Returns
     -------
@@ -141,50 +135,48 @@ def variation_error(
     bias = variation_bias(problem, end, first, passes)
     if bias is None:
         return np.zeros((2, problem.shape[2]))
-    biased = _worn_further(end, bias)
-    volumes = np.abs(total_worn_volume(problem, biased) - total_worn_volume(problem, end))
-    return COVER * np.array([depth_between(end, biased), volumes])
+    return COVER * state_difference(problem, end, _with_added_depths(end, bias))
 
 
-def biased_coarse_solution(end: WearState, twin: WearState, bias: Depths | None) -> WearState:
-    """Return the twin of a test with the bias that the variation within a step makes.
+def biased_coarse_solution(end: WearState, coarse: WearState, bias: Depths | None) -> WearState:
+    """Return the coarse-step solution with the bias of the variation within a step.
 
-    It is worn into the twin's profile, where the wear to come forgets it as it would in the test.
-    Its sign is the one that takes the two further apart, so that it hides no other error.
+    The bias is added to the profile of the coarse-step solution, where further wear reduces it as
+    it would in the test. Its sign is chosen so that it increases the difference of the two
+    solutions and cannot cancel another error.
 
     Parameters
     ----------
-    end, twin : WearState
-        The test and its twin after the step.
+    end, coarse : WearState
+        The test and its coarse-step solution after the step.
     bias : tuple of ndarray, optional
-        As `variation_bias` returns it.
+        Result of `variation_bias`.
     """
     if bias is None:
-        return twin
+        return coarse
     along = sum(
         sum_in_order((a * b).sum(axis=-1), axis=axis).sum(axis=0)
-        for axis, a, b in zip((0, 1), apart(twin, end), bias, strict=True)
+        for axis, a, b in zip((0, 1), depth_difference(coarse, end), bias, strict=True)
     )
     sign = np.where(along < 0.0, -1.0, 1.0)[:, None]
-    return _worn_further(twin, (sign * bias[0], sign * bias[1]))
+    return _with_added_depths(coarse, (sign * bias[0], sign * bias[1]))
 
 
-def _worn_further(state: WearState, depths: Depths) -> WearState:
-    """Return `state` with depths added to those of cylinder and rollers."""
+def _with_added_depths(state: WearState, depths: Depths) -> WearState:
     return state.replaced(
         cylinder_depth=state.cylinder_depth + depths[0],
         roller_depth=state.roller_depth + depths[1],
     )
 
 
-def _worn_at(
+def _shifted_wear(
     problem: WearProblem,
     end: WearState,
     loads: FloatArray,
     shifts: dict[str, FloatArray],
     passes: Number,
 ) -> WearIncrement:
-    """Return what passes on the profiles of `end` wear off with loads and inputs shifted."""
+    """Return the wear of some passes on the profiles of `end` with loads and inputs shifted."""
     values = {
         name: getattr(problem.inputs, name) + shift
         for name, shift in shifts.items()
@@ -196,7 +188,7 @@ def _worn_at(
 
 
 def half_quadrature_start(problem: WearProblem, state: WearState) -> WearState:
-    """Return the twin of a test whose rollers have half the contacts, where it has yet to begin."""
+    """Return the initial half-quadrature solution: `state` with half the nodes per roller."""
     chosen = set(np.flatnonzero(problem.half == 0))
     contacts = zip(problem.contacts, state.contacts, strict=True)
     return replace(
@@ -211,60 +203,54 @@ def with_pass_errors(
     problem: WearProblem,
     start: WearState,
     end: WearState,
-    whole: WearState,
+    coarse: WearState,
     step: Step,
     passes: Number,
 ) -> WearState:
-    """Return `end` with what the draws at every pass of a step make uncertain.
+    """Return `end` with the error estimates due to inputs drawn at every pass.
 
-    A twin of the test is stepped beside it with half the contacts of each roller. What sets it
-    apart from the same steps with all of them, with all that wear has forgotten of earlier
-    differences, is the estimate of the quadrature's error. What the draws of so many passes leave
-    to chance scatters the volume, and the depth as much.
+    The error of the quadrature is estimated by the difference to a solution with half the nodes
+    per roller and the same steps as `coarse`. The draws of a finite number of passes scatter the
+    volume, and the depth in proportion.
 
     Parameters
     ----------
     problem : WearProblem
     start, end : WearState
         The test before and after the step.
-    whole : WearState
-        The test stepped as the twin is.
+    coarse : WearState
+        Solution after the step, by the same steps as the half-quadrature solution.
     step : callable
-        Takes a problem, a state and a number of passes to the state after them.
+        Scheme of the half-quadrature solution, see `Step`.
     passes : float
         Length of the step.
     """
     if not problem.has_nodes:
         return end
-    halved = problem.halved
-    coarse = step(
-        halved, start.half_quadrature_solution or half_quadrature_start(problem, start), passes
-    )
+    half = start.half_quadrature_solution or half_quadrature_start(problem, start)
+    half = step(problem.halved, half, passes)
     volume = total_worn_volume(problem, end)
     variance = start.scatter[1] + _volume_variance(problem, end, passes)
     depth = np.square(greatest_depth(end) / np.where(volume > 0.0, volume, 1.0)) * variance
-    volumes = np.abs(total_worn_volume(problem, whole) - total_worn_volume(problem, coarse))
     return replace(
         end,
-        quadrature=np.array([depth_between(whole, coarse), volumes]),
+        quadrature=state_difference(problem, coarse, half),
         scatter=np.array([depth, variance]),
-        half_quadrature_solution=coarse,
+        half_quadrature_solution=half,
     )
 
 
 def _volume_variance(problem: WearProblem, end: WearState, passes: Number) -> FloatArray:
-    """Return the variance of the volume that so many passes wear, shape (realisations,) [m^6]."""
+    """Return the variance of the volume worn in some passes, shape (realisations,) [m^6]."""
     kinematics, spacing = problem.kinematics, problem.grid.spacing
     cylinder, roller = problem.wear_per_pass(end.contacts)
     ratio = kinematics.roller_share * kinematics.physical_rollers
     volume = worn_volume(cylinder, spacing, kinematics.cylinder_radius)
     volume = volume + worn_volume(roller * ratio, spacing, kinematics.roller_radius)
-    # what differs from roller to roller is no chance
-    chance = volume - problem.per_roller(volume)[:, problem.roller]
-    variance: FloatArray = (
-        (problem.cylinder_share[None, :, None] * chance**2).sum(axis=1).max(axis=0)
-    )
-    return passes * variance
+    # differences between the means of the rollers are not random
+    deviation = volume - problem.per_roller(volume)[:, problem.roller]
+    share = problem.cylinder_share[None, :, None]
+    return np.asarray(passes * (share * deviation**2).sum(axis=1).max(axis=0))
 
 
 def excess(
@@ -276,10 +262,10 @@ def excess(
     stop: float,
     reached: FloatArray | None = None,
 ) -> FloatArray:
-    """Return what a step adds to the errors over what it may add, shape (realisations,).
+    """Return the error that a step adds relative to its allowance, shape (realisations,).
 
-    Wear forgets, and its errors make room again: where `reached` tells them, all of them together
-    may also be what a first step might have added.
+    Wear reduces earlier errors. If `reached` is given, a step is also within its allowance where
+    the total error is within that of a first step.
 
     Parameters
     ----------
@@ -292,19 +278,19 @@ def excess(
     stop : float
         Passes at the end of the test.
     reached : ndarray, shape (2, realisations), optional
-        Error of depth [m] and volume [m^3] after the step, at most `added` and what was before.
+        Error of depth [m] and volume [m^3] after the step, at most `added` and the error before.
     """
     worst = np.zeros(problem.shape[2])
     parts = np.broadcast_to(end.passes_done / stop, worst.shape).tolist()
     sizes = greatest_depth(end), total_worn_volume(problem, end)
-    # what no shorter step would take away must not shorten it
+    # errors that a shorter step would not reduce must not shorten it
     reducible = np.array([start.depth_error, start.volume_error]) - start.irreducible
     arrays = reducible, added, reducible + added if reached is None else reached
     for kind, exponent in enumerate((DEPTH_EXPONENT, VOLUME_EXPONENT)):
-        columns = (column.tolist() for column in (sizes[kind], *(a[kind] for a in arrays)))
+        columns = (a[kind].tolist() for a in (sizes, *arrays))
         for v, (part, size, before, error, total) in enumerate(zip(parts, *columns, strict=True)):
             if size > 0.0:
                 allowed = control.allowance(size, exponent, before, part)
-                anew = control.allowance(size, exponent, 0.0, part)
-                worst[v] = max(worst[v], min(error / allowed, total / anew))
+                allowed_first = control.allowance(size, exponent, 0.0, part)
+                worst[v] = max(worst[v], min(error / allowed, total / allowed_first))
     return worst

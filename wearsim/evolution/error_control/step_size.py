@@ -1,4 +1,4 @@
-"""Step-size control: how long the next step may be, given the error of the last."""
+"""Step-size control: length of the next step from the error of the last."""
 
 from __future__ import annotations
 
@@ -10,27 +10,27 @@ from typing import Any
 from wearsim.errors import ContactError, StepError
 from wearsim.evolution.steppers.base import fitted
 
-FLOOR = 0.02  # of the budget: what a step may always add, so that a run never stalls
+MIN_BUDGET = 0.02  # part of the error budget that a step may always add, so that a run never stalls
 
 
 @dataclass(frozen=True)
 class StepControl:
-    """Holds the error that each step adds to a part of what the tolerance leaves.
+    """Control of the error that each step adds, by the budget that the tolerance leaves.
 
-    Wear forgets: a groove that is too deep in one place carries less load there, so that errors of
-    shape die out while the groove deepens. Hence a budget that is absolute in depth, and spent
-    against the error that is there now, not against the sum of all that was.
+    Wear reduces earlier errors: a groove that is too deep in one place carries less load there, so
+    that errors of shape decay while the groove deepens. The budget is therefore absolute in depth
+    and is compared with the present error, not with the sum of all errors made.
 
     Parameters
     ----------
     tolerance : float
-        Relative error asked of the final depth and worn volume.
+        Required relative error of the final depth and worn volume.
     share : float
-        Part of the tolerance that one step may spend.
+        Part of the tolerance that one step may use.
     safety : float
         Part of its allowance that the next step aims at.
     shrink, grow : float
-        Bounds on the change from one step to the next.
+        Bounds on the ratio of successive steps.
     """
 
     tolerance: float
@@ -39,7 +39,7 @@ class StepControl:
     shrink: float = 0.2
     grow: float = 5.0
 
-    def allowance(self, reached: float, exponent: float, spent: float, part: float) -> float:
+    def allowance(self, reached: float, exponent: float, error: float, part: float) -> float:
         """Return the error that a step may add.
 
         Parameters
@@ -47,17 +47,17 @@ class StepControl:
         reached : float
             Depth or volume at the step's end.
         exponent : float
-            Lower bound of the exponent with which it will grow to the end.
-        spent : float
+            Lower bound of the exponent of its growth to the end of the test.
+        error : float
             Its estimated error before the step.
         part : float
             Part of all passes done at the step's end.
         """
         budget = self.tolerance * reached / math.pow(part, exponent)
-        return self.share * max(budget - spent, FLOOR * budget)
+        return self.share * max(budget - error, MIN_BUDGET * budget)
 
     def next_step(self, step: float, excess: float, order: int = 1) -> float:
-        """Return the next step where this one's error was `excess` times its allowance.
+        """Return the next step length after a step whose error was `excess` times its allowance.
 
         The error that a step adds grows as the step to the power order + 1.
         """
@@ -67,32 +67,31 @@ class StepControl:
         return step * min(self.grow, max(self.shrink, factor))
 
 
-SMALLEST_STEP = 1e-6  # passes; a whole groove may be worn in ten
-
-_SMALLEST_PART = 1e-8  # of the passes done: with shorter steps a test would never end
+SMALLEST_STEP = 1e-6  # passes; some wear factors wear a whole groove in ten passes
+_SMALLEST_PART = 1e-8  # of the passes done; with shorter steps a test would not end
 
 
 class Trial:
-    """One test's way to its next step.
+    """Search for the length of the next step of a test.
 
     Parameters
     ----------
     proposed : float
-        Passes of the first try.
+        Length of the first trial step [passes].
     control : StepControl
     order : int
-        Of the scheme.
+        Order of the scheme.
     forced : bool
-        Whether every step is as long as proposed, whatever its error.
+        Whether every step has the proposed length, for any error.
     state : callable
-        Returns the state that the step is to leave, as named arrays, for an error.
+        Returns the state at the start of the step as named arrays, for an error.
 
     Attributes
     ----------
     proposed : float
-        Passes of the next try, or of the next step once one stands.
+        Length of the next trial step, or of the next step after an accepted one [passes].
     rejected : int
-        Tries that did not stand.
+        Trial steps rejected.
     """
 
     def __init__(
@@ -109,7 +108,7 @@ class Trial:
         self._cause: StepError | ContactError | None = None
 
     def step(self, passes: float, stop: float) -> float:
-        """Return the length of the next try from `passes`, which ends at `stop` at the latest.
+        """Return the length of the next trial step from `passes` to `stop` at the latest.
 
         Raises
         ------
@@ -128,20 +127,21 @@ class Trial:
         left = stop - passes
         return min(self.proposed, left) if self._forced else fitted(self.proposed, left)
 
-    def refuse(self, failure: StepError | ContactError, step: float) -> None:
-        """Take note that a step could not be made; a forced one must, and its error is raised."""
+    def reject(self, failure: StepError | ContactError, step: float) -> None:
+        """Propose a shorter step after one that failed; raise the failure of a forced step."""
         if self._forced:
             raise failure
         self._cause, self.proposed = failure, 0.2 * step
         self.rejected += 1
 
-    def stands(self, excess: float, step: float) -> bool:
-        """Tell whether a step with such an excess of error stands; propose the next."""
+    def accepts(self, excess: float, step: float) -> bool:
+        """Return whether a step with such an excess of error is accepted; propose the next."""
+        if self._forced:
+            return True
         chosen = self._control.next_step(step, excess, self._order)
-        if self._forced or excess <= 1.0:
-            if not self._forced:
-                # a step cut short by the stop says little about how long the next may be
-                self.proposed = max(chosen, self.proposed) if step < self.proposed else chosen
+        if excess <= 1.0:
+            # a step cut short by the stop says little about the length of the next
+            self.proposed = max(chosen, self.proposed) if step < self.proposed else chosen
             return True
         self.rejected += 1
         self.proposed = min(chosen, 0.7 * step)

@@ -1,1 +1,1 @@
-"""Schemes that advance a wear test by one step."""
+"""Time integration schemes for a wear test."""

@@ -1,4 +1,4 @@
-"""What every stepper promises to the loop."""
+"""Interface of the steppers."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from wearsim.evolution.state import WearState
 
 @dataclass(frozen=True)
 class Advance:
-    """One step that stands.
+    """One accepted step.
 
     Parameters
     ----------
     path : tuple of WearState
-        The states the step went through, its start first and its end last.
+        States at the start of the step, at intermediate points if any, and at its end.
     warning : str, optional
-        What the user should know about this step.
+        Message to the user about this step.
     """
 
     path: tuple[WearState, ...]
@@ -31,10 +31,10 @@ class Advance:
 
 
 class Stepper(ABC):
-    """Advances a wear test; all that a later step depends on is in the `WearState`."""
+    """Time integration scheme; a step depends on nothing but problem and `WearState`."""
 
-    #: whether every pass is a step by itself: the run then pauses where a record is due, and the
-    #: number of steps is the test's own
+    #: whether every pass is a step: the run then stops at every record, and the number of steps
+    #: does not depend on the records
     pass_by_pass = False
 
     @abstractmethod
@@ -51,11 +51,14 @@ class Stepper(ABC):
 
     @abstractmethod
     def side_step(self, problem: WearProblem, state: WearState, passes: float) -> WearState:
-        """Return the state `passes` passes later, for a record on the way; nothing follows it."""
+        """Return the state `passes` passes later, for a record between two steps.
+
+        The integration does not continue from the state returned.
+        """
 
 
 def fitted(step: float, left: float) -> float:
-    """Return a step that does not leave a sliver before the stop `left` passes away."""
+    """Return a step length that leaves no very short step before the stop, `left` passes ahead."""
     if step >= left:
         return left
     return 0.5 * left if step > 0.5 * left else step

@@ -1,4 +1,4 @@
-"""The per-pass stepper: every roller pass by itself, the truth the others are measured against."""
+"""Per-pass stepper: every roller pass solved individually, the reference for other steppers."""
 
 from __future__ import annotations
 
@@ -7,22 +7,23 @@ from dataclasses import replace
 
 import numpy as np
 
+from wearsim.evolution.operating_points import operating_point
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.base import Advance, Stepper
 from wearsim.evolution.steppers.single_step import present_loads, solve_present
-from wearsim.plugins import PassLoop
+from wearsim.plugins import BODIES, PassLoop
 from wearsim.types import ContactSolution, FloatArray, IntArray
 
-CHUNK = 20_000  # passes between looks at the clock, the user and the records
+CHUNK = 20_000  # passes between checks for records, progress and interruption
 SLOW_CHUNK = 200  # the same where the loop is not compiled
 
 
 class PerPassStepper(Stepper):
-    """Applies every roller pass by itself, in compiled code where the problem allows it.
+    """Stepper that applies every roller pass individually, in compiled code if possible.
 
-    The rollers take turns. Alike rollers that are merged share their profile: each pass by one of
-    them wears it by its share.
+    The rollers pass in turn. Identical rollers that are merged share their profile: each pass by
+    one of them wears it by its share.
     """
 
     pass_by_pass = True
@@ -36,30 +37,27 @@ class PerPassStepper(Stepper):
         chunk = CHUNK if is_compiled(problem) else SLOW_CHUNK
         end = _run(problem, state, min(math.ceil(stop - state.passes), chunk))
         if is_compiled(problem):
-            # for the eye only: the compiled loop goes on from what it carries itself
+            # for output only: the compiled loop continues from its own memory
             end = replace(end, contacts=solve_present(problem, end, present_loads(problem, end)))
         return Advance(path=(state, end))
 
 
 def _run(problem: WearProblem, state: WearState, count: int) -> WearState:
-    """Run `count` passes, in compiled code where the problem allows it."""
+    """Run `count` passes, in compiled code if possible."""
     end = (_run_compiled if is_compiled(problem) else _run_in_python)(problem, state, count)
     return replace(end, passes=state.passes + count, steps=state.steps + count)
 
 
 def is_compiled(problem: WearProblem) -> bool:
-    """Tell whether the model's compiled loop covers all that the problem asks for."""
-    linear = all(
-        problem.law.depth_per_dissipation(body, problem.kinematics.rolling_speed) is not None
-        for body in ("cylinder", "roller")
-    )
+    """Return whether the contact model has a compiled loop that covers the problem."""
+    linear = all(problem.wear_factors[body] is not None for body in BODIES)
     lags = all(term.lag() is not None for term in problem.terms.values())
     prescribed = not problem.free and problem.shape[0] == 1
     return problem.model.capabilities.pass_loop and linear and lags and prescribed
 
 
 def turn_order(problem: WearProblem) -> IntArray:
-    """Return which roller of the problem makes each pass of one turn, shape (physical rollers,)."""
+    """Return the roller of each pass of one turn, shape (physical rollers,)."""
     multiplicity = problem.kinematics.multiplicity.astype(np.int64)
     return np.repeat(np.arange(len(multiplicity), dtype=np.int64), multiplicity)
 
@@ -67,9 +65,9 @@ def turn_order(problem: WearProblem) -> IntArray:
 def _passes(
     problem: WearProblem, state: WearState, count: int
 ) -> tuple[IntArray, FloatArray, WearProblem]:
-    """Return roller, load before feedback [N] and the problem of each of the next passes.
+    """Return roller, load before feedback [N] and problem of each of the next passes.
 
-    A pass sees the load and the processes of its middle.
+    The load and the processes of a pass are those at its middle.
     """
     first, order = int(state.passes), turn_order(problem)
     rollers = order[(first + np.arange(count)) % len(order)]
@@ -81,7 +79,10 @@ def _passes(
 
 
 def _term_rates(problem: WearProblem) -> FloatArray:
-    """Return each term's gain and, per roller, the part of the way to rest that a pass goes."""
+    """Return each term's gain [N/W] and, per roller, its relaxation per pass.
+
+    The relaxation is the fraction of the distance to equilibrium covered in one pass.
+    """
     kinematics = problem.kinematics
     own_pass = kinematics.physical_rollers / kinematics.multiplicity / kinematics.pass_rate
     rates = np.zeros((len(problem.terms), 1 + len(own_pass)))
@@ -92,38 +93,36 @@ def _term_rates(problem: WearProblem) -> FloatArray:
 
 
 def _slip_base(problem: WearProblem) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the variation of creepage on unworn bodies, its fall per spin, and per worn depth."""
-    kinematics, nothing = problem.kinematics, np.zeros_like(problem.from_apex)
+    """Return the fields `slip_base`, `spin_arm` and `slip_rates` of `PassLoop`."""
+    kinematics, zeros = problem.kinematics, np.zeros_like(problem.from_apex)
     if problem.slip_profile is None:
-        return nothing, np.repeat(problem.grid.y[None], len(nothing), axis=0), np.zeros(2)
+        return zeros, np.repeat(problem.grid.y[None], len(zeros), axis=0), np.zeros(2)
     rates = np.array([1.0 / kinematics.roller_radius, 1.0 / kinematics.cylinder_radius])
-    arm = nothing if problem.tilt_shifts else np.ascontiguousarray(problem.from_apex)
+    arm = zeros if problem.tilt_shifts else np.ascontiguousarray(problem.from_apex)
     return np.ascontiguousarray(problem.slip_profile), arm, rates
 
 
 def _wear_rates(problem: WearProblem) -> FloatArray:
     """Return depth per pass and dissipation over V: the cylinder's, then each roller's."""
-    kinematics = problem.kinematics
-    speed = kinematics.rolling_speed
-    cylinder = problem.law.depth_per_dissipation("cylinder", speed) or 0.0
-    roller = problem.law.depth_per_dissipation("roller", speed) or 0.0
+    kinematics, speed = problem.kinematics, problem.kinematics.rolling_speed
+    cylinder, roller = (problem.law.depth_per_dissipation(body, speed) or 0.0 for body in BODIES)
     ratio = kinematics.cylinder_radius / kinematics.roller_radius
     return speed * np.array([cylinder, *(roller * ratio / kinematics.multiplicity)])
 
 
 def _run_compiled(problem: WearProblem, state: WearState, count: int) -> WearState:
     """Run `count` passes of every realisation in the model's compiled loop."""
-    shape = (*problem.shape, problem.grid.strips)
-    strips = state.loop_strips.copy() if state.loop_strips is not None else np.zeros((3, *shape))
-    carried = np.zeros((3, *problem.shape))
-    if state.loop_contacts is not None:
-        carried = state.loop_contacts.copy()
+    strips, carried = state.loop_strips, state.loop_contacts
+    strips = np.zeros((3, *problem.shape, problem.grid.strips)) if strips is None else strips.copy()
+    carried = np.zeros((3, *problem.shape)) if carried is None else carried.copy()
     cylinder, roller = state.cylinder_depth.copy(), state.roller_depth.copy()
     terms, energy = state.terms.copy(), state.energy.copy()
     full_solves = state.full_solves
     slip_base, spin_arm, slip_rates = _slip_base(problem)
     _, force, passes = _passes(problem, state, count)
     inputs, lever = passes.inputs, 1.0 if problem.tilt_shifts else 0.0
+    # every physical roller dissipates all the time, one pass per turn of the cylinder
+    turn = problem.kinematics.physical_rollers / problem.kinematics.pass_rate
     for v in range(problem.shape[2]):
         loop = PassLoop(
             order=turn_order(problem),
@@ -159,8 +158,6 @@ def _run_compiled(problem: WearProblem, state: WearState, count: int) -> WearSta
         cylinder[0, 0, v], roller[0, :, v] = loop.cylinder_depth, loop.roller_depth
         strips[:, 0, :, v] = loop.line_load, loop.anchor, loop.anchor_gap
         carried[:, 0, :, v] = loop.approach, loop.anchor_approach, loop.energy
-        # every physical roller dissipates all the time, one pass per turn of the cylinder
-        turn = problem.kinematics.physical_rollers / problem.kinematics.pass_rate
         energy[v] = float(loop.energy.sum()) * turn
     return replace(
         state,
@@ -176,8 +173,8 @@ def _run_compiled(problem: WearProblem, state: WearState, count: int) -> WearSta
 
 
 def _run_in_python(problem: WearProblem, state: WearState, count: int) -> WearState:
-    """Run `count` passes by solving every one in full: slow, and right for any plugin."""
-    kinematics = problem.kinematics
+    """Run `count` passes by solving every one in full: slow, but for any plugin."""
+    kinematics, speed = problem.kinematics, problem.kinematics.rolling_speed
     rollers, force, passes = _passes(problem, state, count)
     cylinder, roller = state.cylinder_depth.copy(), state.roller_depth.copy()
     terms, energy = state.terms.copy(), state.energy.copy()
@@ -186,26 +183,26 @@ def _run_in_python(problem: WearProblem, state: WearState, count: int) -> WearSt
     )
     turn = kinematics.physical_rollers / kinematics.pass_rate
     for number, r in enumerate(rollers):
-        own_pass = turn / float(kinematics.multiplicity[r])
+        multiplicity = float(kinematics.multiplicity[r])
+        ratio = kinematics.cylinder_radius / kinematics.roller_radius
+        ratio /= multiplicity * problem.shape[0]
         for s, _, v in np.ndindex((problem.shape[0], 1, problem.shape[2])):
             unworn = passes.nominal_gap[s, number, v]
             gap = unworn + cylinder[s, 0, v] + roller[0, r, v]
             load = float(force[number, v]) + float(terms[:, r, v].sum())
             load -= problem.load.stiffness * float(gap.min() - unworn.min())
-            point = passes.point(number, v, load, cylinder[s, 0, v], roller[0, r, v])
-            contact = problem.model.solve(
+            point = operating_point(passes, (number, v), load, cylinder[s, 0, v], roller[0, r, v])
+            contacts[s, r, v] = contact = problem.model.solve(
                 gap, kinematics.longitudinal_curvature, point, None, contacts[s, r, v]
             )
-            contacts[s, r, v] = contact
-            speed = kinematics.rolling_speed
-            ratio = kinematics.cylinder_radius / kinematics.roller_radius
-            ratio /= float(kinematics.multiplicity[r]) * problem.shape[0]
             cylinder[s, 0, v] += problem.law.depth_per_pass("cylinder", contact, speed)
             roller[0, r, v] += ratio * problem.law.depth_per_pass("roller", contact, speed)
             energy[v] += contact.power * turn / problem.shape[0]
             power = np.array([contact.power])
             for t, term in enumerate(problem.terms.values()):
-                terms[t, r, v] = term.advance(terms[t, r : r + 1, v], power, own_pass)[0]
+                value = terms[t, r : r + 1, v]
+                terms[t, r, v] = term.advance(value, power, turn / multiplicity)[0]
+    solves = count * problem.shape[2] * problem.shape[0]
     return replace(
         state,
         cylinder_depth=cylinder,
@@ -213,6 +210,6 @@ def _run_in_python(problem: WearProblem, state: WearState, count: int) -> WearSt
         terms=terms,
         energy=energy,
         contacts=tuple(contacts[index] for index in problem.contacts),
-        full_solves=state.full_solves + count * problem.shape[2] * problem.shape[0],
-        solves=state.solves + count * problem.shape[2] * problem.shape[0],
+        full_solves=state.full_solves + solves,
+        solves=state.solves + solves,
     )

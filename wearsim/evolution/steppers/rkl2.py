@@ -1,4 +1,4 @@
-"""Weights of the Runge-Kutta-Legendre scheme of second order."""
+"""Stabilised explicit stepper: Runge-Kutta-Legendre method of second order."""
 
 from __future__ import annotations
 
@@ -25,16 +25,21 @@ from wearsim.evolution.steppers.spectral_radius import decay_rates
 from wearsim.evolution.steppers.wear_increment import WearIncrement
 from wearsim.types import FloatArray
 
-FEWEST = 3  # two are of little accuracy for what decays within a step
+MIN_STAGES = 3  # with two, profiles that decay within a step are inaccurate
+SAFETY = 1.2  # on the greatest decay rate, which is estimated and may grow within the step
+
+#: change of the state in a step or in a part of it: depth of cylinder and rollers [m], and the
+#: power of every contact times the part of the step it lasted [W]
+Change: TypeAlias = tuple[FloatArray, FloatArray, FloatArray]
 
 
 class Stage(NamedTuple):
-    """Weights of one stage; the step's start has 1 - last - before_last.
+    """Weights of one stage; the step's start has the weight 1 - last - before_last.
 
     Parameters
     ----------
     last, before_last : float
-        Weights of the two stages before.
+        Weights of the two previous stages.
     rate, start_rate : float
         Parts of the step taken at the rate of the last stage, and at that of the start.
     """
@@ -46,25 +51,25 @@ class Stage(NamedTuple):
 
 
 def reach(count: int) -> float:
-    """Return the longest stable step of `count` stages, times the greatest rate of decay.
+    """Return the longest stable step of `count` stages, times the greatest decay rate.
 
-    It grows with the square of the stages, where as many steps of Euler's method reach 2 each.
+    It grows with the square of the number of stages; steps of Euler's method reach 2 each.
     """
     return 0.5 * (count * count + count - 2)
 
 
 def stages_for(decay: float) -> int:
-    """Return the least number of stages whose `reach` is `decay`, `FEWEST` at least."""
-    return max(FEWEST, math.ceil(0.5 * (math.sqrt(9.0 + 8.0 * decay) - 1.0)))
+    """Return the least number of stages whose `reach` is `decay`, `MIN_STAGES` at least."""
+    return max(MIN_STAGES, math.ceil(0.5 * (math.sqrt(9.0 + 8.0 * decay) - 1.0)))
 
 
 @lru_cache(maxsize=256)
 def legendre_stages(count: int) -> tuple[Stage, ...]:
     """Return the weights of `count` stages, two at least; the last stage is the step's end.
 
-    The scheme's stability polynomial is a shifted Legendre polynomial: what decays fast falls by
-    about half in a step, without change of sign. Chebyshev's reaches 1.3 times as far, but lets
-    much more of it stand, and the kink that a contact's edge makes then sends ripples over the
+    The stability polynomial of the scheme is a shifted Legendre polynomial: profiles that decay
+    fast are halved in a step, without change of sign. Chebyshev's polynomial reaches 1.3 times as
+    far but damps them much less, and the kink at a contact's edge then causes ripples on the
     profile.
 
     References
@@ -83,38 +88,31 @@ def legendre_stages(count: int) -> tuple[Stage, ...]:
     return tuple(stages)
 
 
-SAFETY = 1.2  # on the greatest rate of decay, which is estimated and may grow within the step
-
-#: what a step does, or the part of it up to a stage: depth off cylinder and rollers [m], and the
-#: power of every contact times the part of the step it lasted [W]
-Change: TypeAlias = tuple[FloatArray, FloatArray, FloatArray]
-
-
 class StabilisedStepper(StepDoublingStepper):
-    """Takes Runge-Kutta-Legendre steps of second order, which ask nothing of a model but solutions.
+    """Stepper of second order for any contact model: Runge-Kutta-Legendre method.
 
-    A step of s stages reaches s^2/4 as far as a stable step of Euler's method. The greatest rate
-    of decay, measured at the start of each step, tells how many stages there must be.
+    A step of s stages is stable up to s^2/4 times the stability limit of Euler's method. The
+    number of stages follows from the greatest decay rate at the start of each step.
 
-    The twin lies three times the error of the test apart from it. All of that is claimed: where
-    strips that enter the contact leave kinks in time the order falls towards the first, and the
-    two lie apart by just that error.
+    For a scheme of second order the difference to the coarse-step solution is three times the
+    error of the test. It is not divided by three: strips that enter the contact cause kinks in
+    time, which reduce the order towards one, and then the difference equals the error.
     """
 
     order = 2
 
     def scheme(self, problem: WearProblem, state: WearState) -> Step:
-        """Return a step for the rates of decay at `state`."""
+        """Return a step for the decay rates at `state`."""
         return partial(stabilised_step, decay=decay_rates(problem, state))
 
 
 def stabilised_step(
     problem: WearProblem, state: WearState, passes: float, decay: FloatArray
 ) -> WearState:
-    """Step over `passes` passes in as many stages as the rate of decay asks for.
+    """Step over `passes` passes with the number of stages that the decay rate requires.
 
-    Every stage is an explicit step on the profiles of the one before, weighted with those before
-    it. Wear and energy take the same weights, so that Archard's balance holds to round-off.
+    Every stage is an explicit step on the profiles of the previous one, combined with earlier
+    stages. Wear and energy have the same weights, so that Archard's wear law holds to round-off.
 
     Parameters
     ----------
@@ -123,7 +121,7 @@ def stabilised_step(
     passes : float
         Length of the step.
     decay : ndarray, shape (realisations,)
-        Greatest rate of decay [1/pass].
+        Greatest decay rate [1/pass].
     """
     here = problem.at_time(problem.time(state.passes), problem.time(state.passes + passes))
     stages = legendre_stages(stages_for(SAFETY * float(decay.max()) * passes))
@@ -159,30 +157,29 @@ def _rate(
     change: Change,
     solve: Callable[[WearProblem, WearState, FloatArray], Contacts] = solve_present,
 ) -> tuple[Contacts, Change]:
-    """Return the contacts on the profiles of a stage, and what the whole step would do by them.
+    """Return the contacts on the profiles of a stage, and the change in a whole step with them.
 
-    The load is the mean over the step, but for its feedback of the descent, which is the stage's.
+    The load is the mean over the step, with the spring force at the descent of the stage.
 
     Parameters
     ----------
     here : WearProblem
-        With every process at its mean over the step.
+        Problem with every process at its mean over the step.
     state : WearState
-        The step's start, with contacts nearby.
+        State at the step's start, with contacts for the solver to start from.
     passes : float
         Length of the step.
     change : Change
-        From the start to the stage.
+        Change from the start to the stage.
     solve : callable
         Solves the contacts on the profiles of a state under given loads.
     """
-    cylinder, roller = state.cylinder_depth + change[0], state.roller_depth + change[1]
-    power = here.values_of(state.contacts, "power")
-    loads = mean_loads(here, state, passes, ((cylinder, roller),), power)
-    stage = replace(state, cylinder_depth=cylinder, roller_depth=roller)
+    depths = state.cylinder_depth + change[0], state.roller_depth + change[1]
+    loads = mean_loads(here, state, passes, (depths,), here.values_of(state.contacts, "power"))
+    stage = replace(state, cylinder_depth=depths[0], roller_depth=depths[1])
     contacts = solve(here, stage, loads)
-    wearing = WearIncrement(here, contacts, passes)
-    return contacts, (wearing.cylinder, wearing.roller, here.values_of(contacts, "power"))
+    wear = WearIncrement(here, contacts, passes)
+    return contacts, (*wear.depths, here.values_of(contacts, "power"))
 
 
 def _sum(*terms: tuple[float, Change]) -> Change:

@@ -33,8 +33,10 @@ class WearIncrement:
 
     Attributes
     ----------
+    depths : tuple of ndarray
+        Depths of cylinder and rollers worn in the step, shapes as in `WearState` [m].
     cylinder, roller : ndarray
-        Depth worn in the step, shapes as in `WearState` [m].
+        The two depths.
     exponents : ndarray, shape (stations, contacts, realisations, strips), optional
         Exponent e of every strip, to be set before the first use of compliance or offset. If
         absent it is 1, which is exact in full sliding.
@@ -42,7 +44,8 @@ class WearIncrement:
 
     def __init__(self, problem: WearProblem, contacts: Contacts, passes: Number) -> None:
         self._parts = problem.wear_parts(contacts, passes)
-        self.cylinder, self.roller = problem.sum_of_parts(*self._parts)
+        self.depths = problem.sum_of_parts(*self._parts)
+        self.cylinder, self.roller = self.depths
         self.exponents: FloatArray | None = None
         self.problem, self.contacts = problem, contacts
 
@@ -74,7 +77,7 @@ class WearIncrement:
     @property
     def opening(self) -> FloatArray:
         """Gap that the step opens, shape (stations, contacts, realisations, strips) [m]."""
-        return self._opening(self.cylinder, self.roller)
+        return self._opening(*self.depths)
 
     def _opening(self, cylinder: FloatArray, roller: FloatArray) -> FloatArray:
         return cylinder + self.problem.at_contacts(roller)
@@ -103,8 +106,13 @@ class WearIncrement:
             self.exponents = np.ones((*problem.shape, problem.grid.strips))
         else:
             self.exponents = old.exponents.copy()
-        loads = rows_of(old.contacts, "line_load"), rows_of(self.contacts, "line_load")
-        wear = ((w._parts[0] + w._parts[1]).reshape(loads[0].shape) for w in (old, self))
+        load, new_load = rows_of(old.contacts, "line_load"), rows_of(self.contacts, "line_load")
         linear = problem.wear_factors["cylinder"] is not None
-        greatest = MAX_LINEAR_EXPONENT if linear else MAX_EXPONENT
-        estimate_exponents(*loads, *wear, greatest, self.exponents.reshape(loads[0].shape))
+        estimate_exponents(
+            load,
+            new_load,
+            (old._parts[0] + old._parts[1]).reshape(load.shape),
+            (self._parts[0] + self._parts[1]).reshape(load.shape),
+            MAX_LINEAR_EXPONENT if linear else MAX_EXPONENT,
+            self.exponents.reshape(load.shape),
+        )

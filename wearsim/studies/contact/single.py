@@ -9,6 +9,7 @@ from time import perf_counter
 import numpy as np
 
 from wearsim.errors import WearsimError
+from wearsim.evolution.operating_points import operating_point
 from wearsim.plugins import ContactModel
 from wearsim.scenario import Scenario, described_model
 from wearsim.studies.run.assemble import bare_problem, load_range
@@ -143,7 +144,7 @@ def _problem(
     load = scenario.load.build()
     problem = bare_problem(scenario, model, load, grid, [0], np.ones(1), profile)
     unworn = np.zeros(grid.strips)
-    point = problem.point(0, 0, force, unworn, unworn)
+    point = operating_point(problem, (0, 0), force, unworn, unworn)
     return problem.nominal_gap[0, 0, 0], problem.kinematics.longitudinal_curvature, point
 
 
