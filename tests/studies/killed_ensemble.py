@@ -16,7 +16,7 @@ from tests.studies.ensemble_cases import small, unlike
 from wearsim.results import open_ensemble
 from wearsim.results.io import atomic_write
 from wearsim.scenario import Scenario
-from wearsim.studies.ensemble import grid as ensemble_grid
+from wearsim.studies.ensemble import realisation
 from wearsim.studies.ensemble.api import ensemble, resume_ensemble
 from wearsim.studies.ensemble.driver import EnsembleWork
 
@@ -79,7 +79,7 @@ def kill_at_moments(scenario: Scenario, count: int, folder: Path, times: int) ->
 
 if __name__ == "__main__":
     EnsembleWork._batch_size = lambda self: 1
-    ensemble_grid.PROBES = 3  # each kill starts anew
+    realisation.GRID_REALISATIONS = 3  # each kill starts anew
     mode, where = sys.argv[1], Path(sys.argv[2])
     tests = small(passes=400, contact__strips=31)
     if mode == "stages":

@@ -1,1 +1,1 @@
-"""What people do with runs: solve one contact, replay a wear test."""
+"""Studies of single contacts, wear tests and ensembles of wear tests."""

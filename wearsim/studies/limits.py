@@ -1,4 +1,4 @@
-"""What a study of realisations is asked for, checked before anything is drawn."""
+"""Checks of a study of realisations before any input is drawn."""
 
 from __future__ import annotations
 
@@ -8,29 +8,29 @@ from wearsim.errors import Mistake, ScenarioError
 from wearsim.scenario import Scenario
 
 MOST_BYTES = 4_000_000_000
-"""Memory that the numbers of a study may take."""
+"""Memory limit for the results of a study."""
 
-# numbers per realisation, as measured: of the solution and its statistics, and of each drawn value
+# measured: numbers stored per realisation, and per random input of a realisation
 _NUMBERS, _NUMBERS_OF_A_DRAW = 20, 3
 
 
 def checked_count(scenario: Scenario, realisations: int) -> int:
-    """Return how many realisations there will be.
+    """Return the number of realisations as an int.
 
     Parameters
     ----------
     scenario : Scenario
     realisations : int
-        As asked for.
+        As requested.
 
     Raises
     ------
     TypeError
-        If the one is no scenario, or the other no whole number.
+        If `scenario` is not a Scenario, or `realisations` not a whole number.
     ValueError
-        If there would be none.
+        If `realisations` is below 1.
     ScenarioError
-        If their numbers do not fit into memory.
+        If the results would not fit into memory.
     """
     if not isinstance(scenario, Scenario):
         raise TypeError(
@@ -43,16 +43,24 @@ def checked_count(scenario: Scenario, realisations: int) -> int:
         raise TypeError(what) from None
     if count < 1:
         raise ValueError(f"realisations must be 1 or more, got {count}")
-    each = bytes_of_each(scenario)
-    if count * each > MOST_BYTES:
-        what = f"would take {count * each / 1e9:,.4g} GB of memory, {each} bytes each"
-        most = f"at most {MOST_BYTES // each}, which take {MOST_BYTES / 1e9:g} GB"
-        problem = Mistake("", "realisations", what, str(count), most)
-        raise ScenarioError(scenario.file, [problem])
+    size = bytes_per_realisation(scenario)
+    if count * size > MOST_BYTES:
+        what = f"would take {count * size / 1e9:,.4g} GB of memory, {size} bytes each"
+        most = f"at most {MOST_BYTES // size}, which take {MOST_BYTES / 1e9:g} GB"
+        raise ScenarioError(scenario.file, [Mistake("", "realisations", what, str(count), most)])
     return count
 
 
-def bytes_of_each(scenario: Scenario) -> int:
-    """Return how much memory a realisation takes, but for P_l(y), of which only some are kept."""
+def bytes_per_realisation(scenario: Scenario) -> int:
+    """Return the memory of a realisation without P_l(y), which is kept for some of them only."""
     drawn = sum(len(item.keys) for item in scenario.random if item.role != "field")
     return 8 * (_NUMBERS + _NUMBERS_OF_A_DRAW * drawn)
+
+
+def nothing_random(what: str) -> Mistake:
+    """Return the mistake of a scenario without effective random inputs."""
+    expected = (
+        "a distribution instead of a value, such as friction.coefficient ="
+        ' {distribution = "maxent", support = [0, "inf"], mean = 0.1, std = 0.02}'
+    )
+    return Mistake("", "", what, None, expected)

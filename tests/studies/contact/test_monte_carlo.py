@@ -18,7 +18,7 @@ from wearsim.studies.contact.batch import Realisations
 from wearsim.studies.contact.draws import draw_contacts
 from wearsim.studies.contact.monte_carlo import dissipation
 from wearsim.studies.contact.single import solve_contact, study_contact
-from wearsim.studies.limits import bytes_of_each
+from wearsim.studies.limits import bytes_per_realisation
 
 # mean and std [W]: converged, from another program
 PAPERS = {"no angles": (NO_ANGLES, 0.0739, 0.040), "all random": ({}, 0.1058, 0.047)}
@@ -326,7 +326,7 @@ def test_that_what_is_not_kept_still_counts(monkeypatch):
     np.testing.assert_array_equal(
         part.values("dissipation_high"), np.quantile(whole.dissipation[:100], 0.975, axis=0)
     )
-    assert "P_l(y) of the first 100 of 300 realisations is kept" in part.warnings[0]
+    assert "P_l(y) of the first 100 of 300 realisations is stored" in part.warnings[0]
 
 
 def test_that_statistics_of_the_strips_are_those_of_the_realisations():
@@ -470,7 +470,7 @@ def test_that_the_memory_of_a_realisation_is_not_underrated(monkeypatch):
 
     peak(100)  # compiled, and every module imported
     each = (peak(90_000) - peak(30_000)) / 60_000
-    assert 0.5 * bytes_of_each(scenario) < each < 1.25 * bytes_of_each(scenario)
+    assert 0.5 * bytes_per_realisation(scenario) < each < 1.25 * bytes_per_realisation(scenario)
 
 
 @pytest.mark.parametrize(("mx", "my"), [(16, 24), (16, 400), (400, 24)])

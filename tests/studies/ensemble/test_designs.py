@@ -11,7 +11,7 @@ from wearsim.errors import Interrupted
 from wearsim.studies.ensemble.api import ensemble
 from wearsim.studies.ensemble.compare import compare, have_same_draws
 from wearsim.studies.ensemble.designs import parse_plan, sources, whole_count
-from wearsim.studies.ensemble.interim_analyses import checkpoints
+from wearsim.studies.ensemble.designs import interim_sizes
 from wearsim.studies.ensemble.sweep import path_of, sweep
 from wearsim.studies.run.draws import Drawer
 
@@ -37,14 +37,14 @@ def test_that_an_unknown_plan_is_told_with_those_there_are():
 
 
 def test_that_looks_rise_to_the_last_realisation():
-    assert checkpoints("sobol", 1000) == [64, 128, 256, 512, 1000]
-    looks = checkpoints("monte-carlo", 1000)
+    assert interim_sizes("sobol", 1000) == [64, 128, 256, 512, 1000]
+    looks = interim_sizes("monte-carlo", 1000)
     assert looks[0] == 64
     assert looks[-1] == 1000
     assert (np.diff(looks) > 0).all()
-    assert checkpoints("monte-carlo", 10) == [10]
+    assert interim_sizes("monte-carlo", 10) == [10]
     # a greater limit changes none of them
-    assert checkpoints("monte-carlo", 5000)[: len(looks) - 1] == looks[:-1]
+    assert interim_sizes("monte-carlo", 5000)[: len(looks) - 1] == looks[:-1]
 
 
 @pytest.mark.parametrize("plan", ["monte-carlo", "sobol"])
@@ -95,7 +95,7 @@ def test_that_a_sweep_goes_on_where_it_was_stopped(tmp_path):
 
     values, path = ["8e-4", "1e-3", "1.2e-3"], tmp_path / "creep.h5"
     answers = iter([False] * 4 + [True])
-    with pytest.raises(Interrupted, match=r"not begun: 1.2e-3; the same command once more"):
+    with pytest.raises(Interrupted, match=r"not started: 1.2e-3; repeat the command"):
         sweep(
             scenario_of_value, values, 3, path, stop_requested=lambda: next(answers, True), **SERIAL
         )
@@ -145,8 +145,8 @@ def test_that_of_two_runs_one_is_deeper_or_it_is_open():
     row = compare(runs, ["a", "b"]).rows[1]
     assert row.deeper.value == float(depths[1] > depths[0])
     errors = sum(float(run.depth_error[-1]) for run in runs)
-    assert row.apart.value == pytest.approx(depths[1] - depths[0])
-    assert row.apart.half_width == pytest.approx(errors)
+    assert row.difference.value == pytest.approx(depths[1] - depths[0])
+    assert row.difference.half_width == pytest.approx(errors)
     same = compare([runs[0], runs[0]], ["a", "b"]).rows[1].deeper
     assert (same.value, same.low, same.high) == (0.5, 0.0, 1.0)
 

@@ -139,14 +139,14 @@ def test_that_failed_realisations_alone_run_once_more(tmp_path, monkeypatch):
     from wearsim.studies.ensemble.realisation import RealisationRunner
 
     whole = ensemble(small(), 8, tmp_path / "whole.h5", **SERIAL)
-    run = RealisationRunner._member
+    run = RealisationRunner._prepare
 
     def failing(self, number, *rest):
         if number in {2, 5}:
             raise wearsim.errors.StepError("no step is short enough")
         return run(self, number, *rest)
 
-    monkeypatch.setattr(RealisationRunner, "_member", failing)
+    monkeypatch.setattr(RealisationRunner, "_prepare", failing)
     path = tmp_path / "failing.h5"
     assert sorted(ensemble(small(), 8, path, **SERIAL).errors) == [2, 5]
     assert resume_ensemble(path, **SERIAL).failed == 2  # no more than asked for
@@ -156,7 +156,7 @@ def test_that_failed_realisations_alone_run_once_more(tmp_path, monkeypatch):
             raise wearsim.errors.StepError("was done before")
         return run(self, number, *rest)
 
-    monkeypatch.setattr(RealisationRunner, "_member", failing_if_done_again)
+    monkeypatch.setattr(RealisationRunner, "_prepare", failing_if_done_again)
     again = resume_ensemble(path, failed=True, **SERIAL)
     assert unlike(again, whole) == []
 
@@ -166,14 +166,14 @@ def test_that_a_kill_while_failed_ones_run_once_more_costs_nothing(tmp_path, mon
 
     monkeypatch.setattr(ensemble_work.EnsembleWork, "_batch_size", lambda self: 1)
     whole = ensemble(small(), 6, tmp_path / "whole.h5", **SERIAL)
-    run = RealisationRunner._member
+    run = RealisationRunner._prepare
 
     def failing(self, number, *rest):
         if number in {2, 4}:
             raise wearsim.errors.StepError("no step is short enough")
         return run(self, number, *rest)
 
-    monkeypatch.setattr(RealisationRunner, "_member", failing)
+    monkeypatch.setattr(RealisationRunner, "_prepare", failing)
     path = tmp_path / "failing.h5"
     ensemble(small(), 6, path, **SERIAL)
 
@@ -182,30 +182,30 @@ def test_that_a_kill_while_failed_ones_run_once_more_costs_nothing(tmp_path, mon
             raise SystemExit  # as a kill would: nothing after it is written
         return run(self, number, *rest)
 
-    monkeypatch.setattr(RealisationRunner, "_member", killed)
+    monkeypatch.setattr(RealisationRunner, "_prepare", killed)
     with pytest.raises(SystemExit):
         resume_ensemble(path, failed=True, **SERIAL)
     assert not open_ensemble(path).finished
-    monkeypatch.setattr(RealisationRunner, "_member", run)
+    monkeypatch.setattr(RealisationRunner, "_prepare", run)
     assert unlike(resume_ensemble(path, **SERIAL), whole) == []
 
 
 def test_that_failed_ones_count_for_the_target_once_they_have_run(tmp_path, monkeypatch):
     from wearsim.studies.ensemble.realisation import RealisationRunner
 
-    monkeypatch.setattr("wearsim.studies.ensemble.interim_analyses.FEWEST", 32)
+    monkeypatch.setattr("wearsim.studies.ensemble.designs.FIRST_ANALYSIS", 32)
     whole = ensemble(small(), 90, tmp_path / "whole.h5", until="depth.mean 8%", **SERIAL)
-    run = RealisationRunner._member
+    run = RealisationRunner._prepare
 
     def failing(self, number, *rest):
         if number % 9 == 0:
             raise wearsim.errors.StepError("no step is short enough")
         return run(self, number, *rest)
 
-    monkeypatch.setattr(RealisationRunner, "_member", failing)
+    monkeypatch.setattr(RealisationRunner, "_prepare", failing)
     path = tmp_path / "failing.h5"
     ensemble(small(), 90, path, until="depth.mean 8%", **SERIAL)
-    monkeypatch.setattr(RealisationRunner, "_member", run)
+    monkeypatch.setattr(RealisationRunner, "_prepare", run)
     again = resume_ensemble(path, failed=True, **SERIAL)
     estimate = again.estimate("depth").mean
     assert again.finished
@@ -217,7 +217,7 @@ def test_that_failed_ones_count_for_the_target_once_they_have_run(tmp_path, monk
 def test_that_a_value_that_is_not_finite_fails_its_realisation_alone(tmp_path, monkeypatch):
     from wearsim.studies.ensemble import realisation as member
 
-    observed = member.observed
+    observed = member.observe
 
     def spoilt(group):
         found = observed(group)
@@ -226,7 +226,7 @@ def test_that_a_value_that_is_not_finite_fails_its_realisation_alone(tmp_path, m
                 one.rows[-1]["peak_pressure"] = np.nan
         return found
 
-    monkeypatch.setattr(member, "observed", spoilt)
+    monkeypatch.setattr(member, "observe", spoilt)
     result = ensemble(small(), 3, tmp_path / "e.h5", **SERIAL)
     assert result.errors == {1: "peak_pressure is not finite at record 2"}
     assert result.finished
@@ -240,10 +240,10 @@ def test_that_a_straggler_holds_no_more_than_a_few_back(tmp_path, monkeypatch):
 
     def watched(self, outcomes):
         taken(self, outcomes)
-        greatest.append(len(self._held))
+        greatest.append(len(self._deferred))
 
     monkeypatch.setattr(EnsembleWork, "_take", watched)
-    monkeypatch.setattr("wearsim.studies.ensemble.interim_analyses.FEWEST", 4)
+    monkeypatch.setattr("wearsim.studies.ensemble.designs.FIRST_ANALYSIS", 4)
 
     class Late:
         """Has the first batch done last."""
@@ -265,12 +265,12 @@ def test_that_a_straggler_holds_no_more_than_a_few_back(tmp_path, monkeypatch):
 def test_that_a_plugins_mistake_ends_one_realisation_alone(tmp_path, monkeypatch):
     from wearsim.studies.ensemble.realisation import RealisationRunner
 
-    run = RealisationRunner._member
+    run = RealisationRunner._prepare
 
     def failing(self, number, *rest):
         return run(self, number, *rest) if number != 1 else 1 / 0
 
-    monkeypatch.setattr(RealisationRunner, "_member", failing)
+    monkeypatch.setattr(RealisationRunner, "_prepare", failing)
     result = ensemble(small(), 3, tmp_path / "e.h5", **SERIAL)
     assert result.errors == {1: "ZeroDivisionError: division by zero"}
 
@@ -390,10 +390,10 @@ def test_that_inputs_without_effect_are_told(tmp_path):
 
 
 def test_that_nothing_random_is_refused(tmp_path):
-    with pytest.raises(ScenarioError, match="no random input tells one test from another"):
+    with pytest.raises(ScenarioError, match="no random input differs between realisations"):
         ensemble(scenario_of(), 4, tmp_path / "e.h5")
     averaged = scenario_of(friction__coefficient={**FRICTION, "persistence": "per-pass"})
-    with pytest.raises(ScenarioError, match="drawn anew at every pass average out"):
+    with pytest.raises(ScenarioError, match="drawn at every pass are averaged"):
         ensemble(averaged, 4, tmp_path / "e.h5")
 
 

@@ -59,7 +59,7 @@ def test_that_a_log_that_falls_to_nothing_is_refused_before_the_run(tmp_path):
     scenario = wearsim.load_scenario(
         SCENARIOS / "rig-450min.toml", overrides={"load": {"kind": "recorded", "file": str(log)}}
     )
-    with pytest.raises(ScenarioError, match="the load falls to nothing"):
+    with pytest.raises(ScenarioError, match="the load falls to zero"):
         plan(scenario)
 
 

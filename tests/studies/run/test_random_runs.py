@@ -267,7 +267,7 @@ def test_that_the_strips_hold_the_groove_of_a_creepage_about_zero(law):
 
 def test_that_nodes_are_refused_where_there_is_nothing_to_expect():
     for changes in ({}, {"evolution__stepper": "per-pass", **ALL_PER_PASS}):
-        with pytest.raises(ScenarioError, match="no expectation over passes"):
+        with pytest.raises(ScenarioError, match="without an expectation over passes"):
             assemble_problem(scenario_of(evolution__nodes=16, **changes))
 
 

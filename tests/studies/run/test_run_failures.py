@@ -49,7 +49,7 @@ class Press:
 
 PLACES = [
     (implicit, "implicit_step"),  # three in a step: two halves, and the twin's whole
-    (recorder, "at_record"),
+    (recorder, "take_side_step"),
     (recorder, "record_row"),
     (recorder, "history_row"),
 ]
@@ -76,7 +76,7 @@ def test_that_an_interrupt_anywhere_in_a_step_leaves_the_step_before(
     scenario, unbroken = nine_records
     with monkeypatch.context() as patch:
         patch.setattr(module, name, Press(getattr(module, name), at, late))
-        with pytest.raises(Interrupted, match=r"stopped at pass \d+ of 6000; go on with"):
+        with pytest.raises(Interrupted, match=r"stopped at pass \d+ of 6000; continue with"):
             replay.run(scenario, path)
     stopped = open_results(path)
     assert not stopped.finished
@@ -110,7 +110,7 @@ def test_that_an_interrupt_while_writing_leaves_a_file_that_goes_on(
     for at in (*in_the_midst, *at_the_end):
         with monkeypatch.context() as patch:
             patch.setattr(atomic_write, "on_write_stage", Press(lambda _: None, at))
-            with pytest.raises(Interrupted, match="go on with"):
+            with pytest.raises(Interrupted, match="continue with"):
                 replay.run(scenario, path, force=True)
         assert list(path.parent.iterdir()) == [path]
         if at % 3 == 0:
@@ -284,7 +284,7 @@ def test_that_other_software_is_told_once(path: Path) -> None:
     told = _warnings(path)
     assert len(told) == 2
     assert (
-        f"this file was written with numpy 1.0 and goes on with {now}: the last digits may"
+        f"this file was written with numpy 1.0 and continues with {now}: the last digits may"
         " differ from those of an unbroken run"
     ) in told
 
@@ -301,5 +301,5 @@ def test_that_another_plugin_of_the_same_name_is_told(
     (told,) = _warnings(path)
     assert told == (
         f"this file was written with the contact model 'slender' of {distribution} {number} and"
-        " goes on with wearsim: the last digits may differ from those of an unbroken run"
+        " continues with wearsim: the last digits may differ from those of an unbroken run"
     )

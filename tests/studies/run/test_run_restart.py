@@ -73,7 +73,7 @@ def test_that_a_run_in_memory_equals_its_file(stepper: str, path: Path) -> None:
 
 def test_that_a_stopped_run_says_where_it_stands(path: Path) -> None:
     scenario = short()
-    with pytest.raises(replay.Interrupted, match=rf"of 6000; go on with: wearsim resume {path}"):
+    with pytest.raises(replay.Interrupted, match=rf"of 6000; continue with: wearsim resume {path}"):
         replay.run(scenario, path, stop_requested=lambda: True)
     stopped = open_results(path)
     assert not stopped.finished
@@ -186,7 +186,7 @@ def test_that_an_extension_in_parts_equals_an_unbroken_one(
 def test_that_a_test_cannot_end_before_it_stands(path: Path) -> None:
     replay.run(short(), path)
     before = path.read_bytes()
-    with pytest.raises(replay.ResultsFileError, match=r"stands at 2 min already.*past 1\.5 min"):
+    with pytest.raises(replay.ResultsFileError, match=r"already reached 2 min.*past 1\.5 min"):
         replay.resume(path, until=90.0)
     assert path.read_bytes() == before
 

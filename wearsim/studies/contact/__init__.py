@@ -1,1 +1,1 @@
-"""One contact, and Monte Carlo studies of one contact."""
+"""Single contacts, and Monte Carlo studies of a contact."""

@@ -1,4 +1,4 @@
-"""A friction field in realisations of a contact: its own numbers, at the model's own points."""
+"""Friction field of a contact, evaluated at the points of the contact model."""
 
 from __future__ import annotations
 
@@ -15,6 +15,8 @@ from wearsim.scenario import RandomInput, Scenario
 from wearsim.types import FloatArray
 from wearsim.uq.sampling.philox import Stream
 
+_MAX_POINTS = 2**20  # upper limit of the search for a sufficient number
+
 
 class LocalFriction:
     """The friction field of a scenario.
@@ -29,7 +31,7 @@ class LocalFriction:
     Raises
     ------
     CapabilityError
-        If the model takes no friction field, or not with rollers that find their own creepage.
+        If the model supports no friction field, or the creepage is not prescribed.
     """
 
     def __init__(self, scenario: Scenario, model: ContactModel, item: RandomInput) -> None:
@@ -39,51 +41,51 @@ class LocalFriction:
         self._stream = Stream(scenario.seed, item.name, "field")
         if not model.capabilities.friction_field:
             raise CapabilityError(
-                f"{scenario.file}: contact model '{scenario.contact.model}' cannot take friction"
-                f" that differs within the contact, {item.name} with distribution ="
-                f" '{item.kind}'; choose {_able_models()}"
+                f"{scenario.file}: contact model '{scenario.contact.model}' does not support"
+                f" friction that varies within the contact, {item.name} with distribution ="
+                f" '{item.kind}'; choose {_supporting_models()}"
             )
         if scenario.creepage.drive != "creepage":
             raise CapabilityError(
-                f"{scenario.file}: a friction field, {item.name}, needs prescribed creepage; set"
+                f"{scenario.file}: a friction field, {item.name}, requires prescribed creepage; set"
                 " creepage.drive = 'creepage', or give the friction a distribution"
             )
 
     def check(self, x: FloatArray, spacing: float) -> None:
-        """Refuse points that do not resolve the field.
+        """Check that points resolve the field.
 
         Parameters
         ----------
         x : ndarray, shape (points, strips)
-            Where friction is taken in the longest contact [m].
+            Positions along rolling in the longest contact [m].
         spacing : float
             Width of a strip [m].
 
         Raises
         ------
         ScenarioError
-            If they are too far apart.
+            If the points are too far apart.
         """
-        # the march begins at the leading edge, where there is no point yet, and ends in one at the
-        # trailing edge
+        # the first point is one spacing behind the leading edge, the last at the trailing edge
         along = float(2.0 * np.abs(x).max() / len(x))
-        wrong = self._field.unresolved(along, spacing)
-        if wrong is not None:
+        mistake = self._field.unresolved(along, spacing)
+        if mistake is not None:
             table, key = self._item.name.split(".", 1)
             remedy = finer_grid(self._scenario, self._field, len(x), along, spacing)
-            problem = Mistake(table, key, wrong, self._item.describe(), remedy)
-            raise ScenarioError(self._scenario.file, [problem])
+            raise ScenarioError(
+                self._scenario.file, [Mistake(table, key, mistake, self._item.describe(), remedy)]
+            )
 
     def put(
         self, points: OperatingPoints, x: FloatArray, y: FloatArray, first: int
     ) -> OperatingPoints:
-        """Return the points of some realisations on end, each with its own friction.
+        """Return the operating points of consecutive realisations with their local friction.
 
         Parameters
         ----------
         points : OperatingPoints
         x : ndarray, shape (contacts, points, strips)
-            Where friction is asked for, from the leading edge on [m].
+            Positions along rolling, from the leading edge [m].
         y : ndarray, shape (strips,)
             Axial position [m].
         first : int
@@ -91,26 +93,23 @@ class LocalFriction:
         """
         friction = np.empty_like(x)
         for row in range(len(x)):
-            own = partial(self._stream.uniforms, realisation=first + row)
-            friction[row] = self._field.values(x[row], y, own)
+            uniforms = partial(self._stream.uniforms, realisation=first + row)
+            friction[row] = self._field.values(x[row], y, uniforms)
         carried = self._field.frame != "contact"
         return replace(points, friction=friction, friction_carried=carried)
 
 
-def _able_models() -> str:
-    """Return the models that take a friction field, as a user would choose them."""
+def _supporting_models() -> str:
+    """Return the settings of the models that support a friction field."""
     specs = [registry().get(ContactModelSpec, name) for name in registry().names(ContactModelSpec)]
-    able = [f"'{spec.name}'" for spec in specs if spec.capabilities.friction_field]
-    return f"contact.model = {' or '.join(able)}" if able else "another distribution"
-
-
-_MOST = 2**20  # points that are tried
+    names = [f"'{spec.name}'" for spec in specs if spec.capabilities.friction_field]
+    return f"contact.model = {' or '.join(names)}" if names else "another distribution"
 
 
 def finer_grid(
     scenario: Scenario, friction: FrictionField, points: int, along: float, across: float
 ) -> str:
-    """Return the settings with which a grid resolves a friction field.
+    """Return the settings for which a grid resolves a friction field.
 
     Parameters
     ----------
@@ -124,34 +123,30 @@ def finer_grid(
     Returns
     -------
     str
-        "contact.my = 124": of either direction that is too coarse, the key and its least value.
+        "contact.my = 124": key and least value for either direction that is too coarse.
     """
     choice = scenario.contact
     settings = []
     if friction.unresolved(along, 0.0) is not None:
         needed = _least(points, lambda count: friction.unresolved(along * points / count, 0.0))
-        named = hasattr(choice.options, "mx")
-        settings.append(f"contact.mx = {needed}" if named else f"{needed} points along rolling")
+        has_key = hasattr(choice.options, "mx")
+        settings.append(f"contact.mx = {needed}" if has_key else f"{needed} points along rolling")
     if friction.unresolved(0.0, across) is not None:
         strips = choice.strips or getattr(choice.options, "my", None)
-        key = "contact.strips" if choice.strips else "contact.my"
         if strips is None:
             settings.append("more contact.strips")
         else:
             needed = _least(strips, lambda count: friction.unresolved(0.0, across * strips / count))
-            settings.append(f"{key} = {needed}")
+            settings.append(f"contact.{'strips' if choice.strips else 'my'} = {needed}")
     return " and ".join(settings)
 
 
-def _least(count: int, wrong: Callable[[int], str | None]) -> int:
-    """Return the least count beyond a wrong one that is not wrong."""
-    refused, taken = count, 2 * count
-    while wrong(taken) is not None and taken < _MOST:
-        refused, taken = taken, 2 * taken
-    while taken - refused > 1:
-        middle = (refused + taken) // 2
-        if wrong(middle) is None:
-            taken = middle
-        else:
-            refused = middle
-    return taken
+def _least(count: int, unresolved: Callable[[int], str | None]) -> int:
+    """Return the least resolving count above one that does not resolve, by bisection."""
+    low, high = count, 2 * count
+    while unresolved(high) is not None and high < _MAX_POINTS:
+        low, high = high, 2 * high
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (low, middle) if unresolved(middle) is None else (middle, high)
+    return high

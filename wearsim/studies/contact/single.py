@@ -1,8 +1,7 @@
-"""One contact by itself: the first roller of a scenario on its cylinder, as it stands."""
+"""Study of one contact: the first roller of a scenario on its cylinder."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter
 
@@ -12,9 +11,8 @@ from wearsim.errors import WearsimError
 from wearsim.evolution.operating_points import operating_point
 from wearsim.plugins import ContactModel
 from wearsim.scenario import Scenario, described_model
-from wearsim.studies.run.assemble import bare_problem, load_range
-from wearsim.studies.run.choose_stepper import check_model
-from wearsim.studies.run.grid import contact_centres, fresh_patch, profile_grid
+from wearsim.studies.run.assemble import check_model, load_range, problem_at_means
+from wearsim.studies.run.grid import contact_centres, fresh_patch, profile_grid, suggested_grid
 from wearsim.types import (
     ContactFields,
     ContactSolution,
@@ -24,18 +22,18 @@ from wearsim.types import (
     Profile,
 )
 
-_FEWEST = 5  # strips that tell an error
+_FEWEST = 5  # minimum number of strips for an error estimate
 
 
 @dataclass(frozen=True)
 class ContactStudy:
-    """A solved contact and what was solved.
+    """A solved contact and its problem.
 
     Parameters
     ----------
     solution : ContactSolution
     fields : ContactFields, optional
-        The inside of the contact, where asked for.
+        Tractions and slip inside the contact, if requested.
     gap : ndarray, shape (strips,)
         Gap of the undeformed bodies [m].
     grid : Grid
@@ -43,14 +41,14 @@ class ContactStudy:
     model : str
         Name of the contact model.
     described_model : str
-        The same with its options.
+        Name and options of the contact model.
     grid_error : float, optional
-        What half as many strips change of the power, as a part of it: more than these are off.
-        None where that was not asked for, or the model has no answer on those.
+        Relative change of the power with half as many strips, an upper estimate of the error. None
+        where it was not requested, or the coarse grid has no solution.
     seconds : float, optional
-        What the contact took, once compiled [s]; None where that was not asked for.
+        Time of a solution without compilation [s]; None where it was not requested.
     notes : tuple of str
-        What a user should know.
+        Notes for the user.
     """
 
     solution: ContactSolution
@@ -66,20 +64,18 @@ class ContactStudy:
 
 
 def _grid(scenario: Scenario, model: ContactModel, load: float, profile: Profile | None) -> Grid:
-    """Return strips that suit the contact: the model's choice, or the profile's whole width."""
+    """Return the strips of the scenario, of the profile's whole width, or of the model's choice."""
     choice, centre = scenario.contact, contact_centres(scenario)[0]
     if choice.centre is not None:
         centre = choice.centre
-    patch = fresh_patch(scenario, load)
+    half_width = fresh_patch(scenario, load).b
     if choice.width is None and profile is not None:
-        return profile_grid(profile, patch.b, choice.strips)
+        return profile_grid(profile, half_width, choice.strips)
     if choice.width is None and choice.strips is None:
-        curvature = 1.0 / scenario.cylinder.radius + 1.0 / scenario.roller.radius
-        materials = scenario.cylinder.material, scenario.roller.material
-        grid = model.suggest_grid(1.0 / scenario.roller.crown_radius, curvature, load, materials)
+        grid = suggested_grid(scenario, model, load)
         if grid is not None:
             return Grid(grid.y + centre, grid.spacing)
-    width = choice.width if choice.width is not None else 2.4 * patch.b
+    width = choice.width if choice.width is not None else 2.4 * half_width
     return Grid.spanning(centre - 0.5 * width, centre + 0.5 * width, choice.strips or 121)
 
 
@@ -94,13 +90,13 @@ def study_contact(
     Parameters
     ----------
     scenario : Scenario
-        A run's or a single contact's.
+        A scenario of a run or of a single contact.
     profile : Profile, optional
-        The cylinder's profile, in place of the scenario's.
+        The cylinder's profile, instead of the scenario's.
     with_fields : bool
         Also return tractions and slip inside the contact.
     with_error : bool
-        Also solve it again, to time it, and on half as many strips.
+        Also time a second solution, and solve with half as many strips.
 
     Returns
     -------
@@ -111,7 +107,7 @@ def study_contact(
     ContactError
         If the contact has no solution.
     CapabilityError
-        If the model cannot do what is asked.
+        If the model does not support the scenario.
     """
     model = scenario.contact.build()
     check_model(scenario, model)
@@ -121,17 +117,22 @@ def study_contact(
     gap, curvature, point = _problem(scenario, model, grid, force, profile)
     solution = model.solve(gap, curvature, point)
     fields = model.fields(solution, gap, curvature, point) if with_fields else None
-    name = scenario.contact.model
+    error, seconds = None, None
+    if with_error:
+        error = _grid_error(scenario, grid, force, profile, solution.power)
+        start = perf_counter()
+        model.solve(gap, curvature, point)
+        seconds = perf_counter() - start
     return ContactStudy(
         solution,
         fields,
         gap,
         grid,
         point,
-        name,
-        described_model(name, scenario.text),
-        _grid_error(scenario, grid, force, profile, solution.power) if with_error else None,
-        _seconds(lambda: model.solve(gap, curvature, point)) if with_error else None,
+        scenario.contact.model,
+        described_model(scenario.contact.model, scenario.text),
+        error,
+        seconds,
         scenario.notes,
     )
 
@@ -142,7 +143,7 @@ def _problem(
     """Prepare a model for strips; return gap [m], curvature along rolling [1/m] and the point."""
     model.prepare(grid, (scenario.cylinder.material, scenario.roller.material))
     load = scenario.load.build()
-    problem = bare_problem(scenario, model, load, grid, [0], np.ones(1), profile)
+    problem = problem_at_means(scenario, model, load, grid, [0], np.ones(1), profile)
     unworn = np.zeros(grid.strips)
     point = operating_point(problem, (0, 0), force, unworn, unworn)
     return problem.nominal_gap[0, 0, 0], problem.kinematics.longitudinal_curvature, point
@@ -151,7 +152,7 @@ def _problem(
 def _grid_error(
     scenario: Scenario, grid: Grid, force: float, profile: Profile | None, power: float
 ) -> float | None:
-    """Return what half as many strips change of the power, as a part of it."""
+    """Return the relative change of the power with half as many strips."""
     ends = grid.y[0] - 0.5 * grid.spacing, grid.y[-1] + 0.5 * grid.spacing
     if grid.strips < 2 * _FEWEST or power == 0.0:
         return None
@@ -161,12 +162,6 @@ def _grid_error(
     except WearsimError:
         return None
     return abs(solution.power / power - 1.0)
-
-
-def _seconds(function: Callable[[], object]) -> float:
-    start = perf_counter()
-    function()
-    return perf_counter() - start
 
 
 def solve_contact(scenario: Scenario, profile: Profile | None = None) -> ContactSolution:

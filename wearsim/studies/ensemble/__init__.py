@@ -1,1 +1,1 @@
-"""Ensembles: a whole wear test for each realisation of the random inputs."""
+"""Ensembles: a wear test for each realisation of the random inputs."""

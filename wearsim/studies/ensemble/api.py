@@ -1,26 +1,43 @@
-"""An ensemble of whole wear tests: run it, stop it anywhere, and go on from its file."""
+"""Ensembles of whole wear tests: start, stop and resume."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
 
-from wearsim.errors import ResultsFileError, ScenarioError
-from wearsim.results import EnsembleFile, EnsembleResult, check_output, open_ensemble, read_ensemble
+import numpy as np
+
+from wearsim.errors import CapabilityError, ScenarioError
+from wearsim.results import (
+    EnsembleData,
+    EnsembleFile,
+    EnsembleResult,
+    check_output,
+    open_ensemble,
+    read_ensemble,
+)
 from wearsim.results.ensemble.schema import OBSERVABLES
 from wearsim.scenario import Scenario, parse_scenario, require_run
-from wearsim.studies.ensemble.designs import EnsemblePlan, check_plan, parse_plan, whole_count
-from wearsim.studies.ensemble.driver import EnsembleWork
-from wearsim.studies.ensemble.grid import shared_grid
-from wearsim.studies.ensemble.metadata import header_of, nothing_random, static_of
-from wearsim.studies.ensemble.progress import EnsembleProgress
-from wearsim.studies.ensemble.realisation import RealisationRunner
+from wearsim.studies.ensemble.control_variate import control_of
+from wearsim.studies.ensemble.designs import (
+    BASE_PLANS,
+    EnsemblePlan,
+    check_plan,
+    parse_plan,
+    whole_count,
+)
+from wearsim.studies.ensemble.driver import EnsembleProgress, EnsembleWork
+from wearsim.studies.ensemble.realisation import RealisationRunner, shared_grid
 from wearsim.studies.execution.factory import executor
-from wearsim.studies.limits import checked_count
-from wearsim.studies.run.draws import Drawer
-from wearsim.studies.run.provenance import changed_origins, missing_plugins
-from wearsim.types import Grid
+from wearsim.studies.limits import checked_count, nothing_random
+from wearsim.studies.run.assemble import assemble_problem
+from wearsim.studies.run.draws import Drawer, units_of
+from wearsim.studies.run.provenance import changed_origins, check_plugins, origin_of
+from wearsim.studies.run.recorder import RecordSchedule
+from wearsim.types import FloatArray, Grid
 from wearsim.uq.estimation.stopping_rule import Target
 
 Watcher = Callable[[EnsembleProgress], None]
@@ -40,33 +57,34 @@ def ensemble(
     stop_requested: Callable[[], bool] | None = None,
     on_notice: Callable[[str], None] | None = None,
 ) -> EnsembleResult:
-    """Run a whole wear test for each of many realisations of a scenario's random inputs.
+    """Run a whole wear test for each realisation of a scenario's random inputs.
 
     Parameters
     ----------
     scenario : Scenario
     realisations : int
-        How many, at most.
+        Maximum number of realisations.
     output : path
-        Results file, which grows as realisations finish.
+        Results file, extended as realisations finish.
     plan : str, optional
         "monte-carlo", "latin-hypercube", "sobol", "control-variate" or "saltelli"; by default the
         scenario's.
     until : str, optional
-        What to reach before that, "depth.mean 1%": 95 % confidence of an estimate.
+        Target that ends the ensemble early, such as "depth.mean 1%": the relative half-width of the
+        95 % confidence interval of an estimate.
     workers : int, optional
-        How many realisations run at a time; by default as many as there are processors.
+        Number of realisations run at the same time; by default the number of processors.
     scheduler : str
         "processes", "threads", "serial", "dask", or the address of a Dask scheduler.
     force : bool
         Overwrite an existing file.
     on_progress : callable, optional
-        Told how far it has come.
+        Called with the progress after every batch.
     stop_requested : callable, optional
-        Asked after every batch; True ends the study there, and what is out then is run again by
+        Called after every batch; True stops the ensemble. Unfinished realisations are run by
         `resume_ensemble`.
     on_notice : callable, optional
-        Told that a worker was lost, or that a cluster has none.
+        Called with a message when a worker is lost, or a cluster has no workers.
 
     Returns
     -------
@@ -75,36 +93,36 @@ def ensemble(
     Raises
     ------
     ScenarioError, CapabilityError, ResultsFileError
-        If the study cannot start. A realisation that fails is kept with its error.
+        If the study cannot start. A realisation that fails is stored with its error.
     TypeError, ValueError
-        If an argument is none of those above.
+        If an argument is invalid.
     WorkerError
-        If workers break down again and again.
+        If workers fail repeatedly.
     Interrupted
-        If it was stopped; `resume_ensemble` goes on from the file.
+        If it was stopped; `resume_ensemble` continues from the file.
     """
-    asked = checked(scenario, realisations, plan, until)
+    request = checked_request(scenario, realisations, plan, until)
     path = Path(output)
     check_output(path, force, scenario.paths)
     with executor(scheduler, workers, tell=on_notice) as pool:
         grid = shared_grid(scenario)
-        header = header_of(scenario, asked.plan, asked.realisations, asked.target, grid)
-        with EnsembleFile.create(path, header, static_of(scenario, grid)) as file:
-            members = RealisationRunner(scenario, asked.plan, asked.realisations, grid)
-            EnsembleWork(file, members, asked.target, pool, on_progress, stop_requested).finish()
+        header = _header(scenario, request, grid)
+        with EnsembleFile.create(path, header, _static(scenario, grid)) as file:
+            runner = RealisationRunner(scenario, request.plan, request.realisations, grid)
+            EnsembleWork(file, runner, request.target, pool, on_progress, stop_requested).finish()
     return open_ensemble(path)
 
 
-class Asked(NamedTuple):
-    """What is asked of an ensemble, and can be had.
+class EnsembleRequest(NamedTuple):
+    """A request for an ensemble that has been checked.
 
     Parameters
     ----------
     plan : str
     realisations : int
-        At most.
+        Maximum number of realisations.
     target : Target, optional
-        What ends it before that.
+        Target that ends the ensemble early.
     """
 
     plan: EnsemblePlan
@@ -112,8 +130,10 @@ class Asked(NamedTuple):
     target: Target | None
 
 
-def checked(scenario: Scenario, realisations: int, plan: str | None, until: str | None) -> Asked:
-    """Return what is asked of an ensemble, or refuse it; parameters and errors as of `ensemble`."""
+def checked_request(
+    scenario: Scenario, realisations: int, plan: str | None, until: str | None
+) -> EnsembleRequest:
+    """Check the arguments of an ensemble; parameters and errors as in `ensemble`."""
     checked_count(scenario, realisations)
     require_run(scenario)
     chosen = parse_plan(plan or scenario.sampling.plan)
@@ -122,27 +142,30 @@ def checked(scenario: Scenario, realisations: int, plan: str | None, until: str 
     drawer = Drawer(scenario, "monte-carlo")
     by_pass = any(item.persistence == "per-pass" for item in scenario.random)
     if not drawer.groups and not (by_pass and scenario.evolution.stepper == "per-pass"):
-        raise ScenarioError(scenario.file, [nothing_random(scenario)])
-    return Asked(chosen, whole_count(chosen, drawer.groups, realisations), target)
+        what = "no random input differs between realisations"
+        if scenario.random:
+            what += ': inputs drawn at every pass are averaged unless stepper = "per-pass"'
+        raise ScenarioError(scenario.file, [nothing_random(what)])
+    return EnsembleRequest(chosen, whole_count(chosen, drawer.groups, realisations), target)
 
 
 def parse_target(text: str) -> Target:
-    """Return what is to be reached.
+    """Return the target of a text.
 
     Parameters
     ----------
     text : str
-        As `Target.parse` reads it.
+        In the form of `Target.parse`.
 
     Raises
     ------
     ValueError
-        If it cannot be read, or nothing of the kind is observed.
+        If it cannot be read, or names no observable of an ensemble.
     """
     target = Target.parse(text)
     if target.observable not in OBSERVABLES:
         raise ValueError(
-            f"'{text}' asks for '{target.observable}', which is not followed, expected one of"
+            f"'{text}' names '{target.observable}', which is not an observable, expected one of"
             f" {', '.join(OBSERVABLES)}"
         )
     return target
@@ -158,14 +181,14 @@ def resume_ensemble(
     stop_requested: Callable[[], bool] | None = None,
     on_notice: Callable[[str], None] | None = None,
 ) -> EnsembleResult:
-    """Go on with an ensemble from its file alone; it ends bit for bit as if unbroken.
+    """Continue an ensemble from its file; the result is bit for bit that of an unbroken one.
 
     Parameters
     ----------
     file : path
         Results file of an ensemble that was stopped, or finished.
     failed : bool
-        Run the realisations that failed once more, and no others.
+        Run the failed realisations again, and no others.
     workers, scheduler, on_progress, stop_requested, on_notice
         As in `ensemble`.
 
@@ -176,31 +199,102 @@ def resume_ensemble(
     Raises
     ------
     ResultsFileError
-        If the file cannot be read, needs a plugin that is not there, or is being written.
+        If the file cannot be read, needs a plugin that is not installed, or is being written.
     WorkerError, Interrupted
         As in `ensemble`.
     """
     path = Path(file)
     data = read_ensemble(path)
-    missing = missing_plugins(data.plugins)
-    if missing:
-        raise ResultsFileError(
-            f"{path}: the ensemble needs {' and '.join(missing)}, which is not installed here;"
-            " install it and resume again"
-        )
+    check_plugins(path, data)
     if data.finished and not (failed and len(data.failed)):
         return open_ensemble(path)
     scenario = parse_scenario(data.scenario_text, data.scenario_file, data.files.__getitem__)
-    plan = parse_plan(data.plan)
     target = Target.parse(data.until) if data.until else None
     grid = Grid(data.variables["y"], data.strip_width)
-    members = RealisationRunner(scenario, plan, data.asked, grid)
+    runner = RealisationRunner(scenario, parse_plan(data.plan), data.asked, grid)
     with executor(scheduler, workers, tell=on_notice) as pool, EnsembleFile.open(path) as opened:
-        work = EnsembleWork(opened, members, target, pool, on_progress, stop_requested)
+        work = EnsembleWork(opened, runner, target, pool, on_progress, stop_requested)
         for text in changed_origins(data, scenario):
             work.warn(text)
         if failed:
-            work.run_again()
+            work.run_failed_again()
         else:
             work.finish()
     return open_ensemble(path)
+
+
+def _header(scenario: Scenario, request: EnsembleRequest, grid: Grid) -> EnsembleData:
+    """Return the content of an ensemble's file before its first realisation.
+
+    Raises
+    ------
+    ScenarioError, CapabilityError
+        If the scenario cannot run, or the plan has no control variate for it.
+    """
+    drawer = Drawer(scenario, BASE_PLANS[request.plan], request.realisations)
+    units = units_of(scenario)
+    drawn = [item for item in scenario.random if item.name in drawer.groups]
+    averaged = tuple(item for item in scenario.random if item.name not in drawer.groups)
+    # a scenario that cannot run is refused before anything is written
+    _, _, stepper = assemble_problem(replace(scenario, random=averaged), grid)
+    return EnsembleData(
+        **origin_of(scenario),
+        finished=False,
+        wall_seconds=0.0,
+        created=datetime.now(UTC).isoformat(timespec="seconds"),
+        notes=list(scenario.notes),
+        stepper=stepper,
+        tolerance=scenario.evolution.tolerance,
+        width_threshold=scenario.outputs.width_threshold,
+        total_passes=float(scenario.total_passes),
+        total_time=scenario.total_time,
+        strip_width=grid.spacing,
+        plan=request.plan,
+        asked=request.realisations,
+        until="" if request.target is None else str(request.target),
+        inputs=[
+            {
+                "key": key,
+                "unit": units[key],
+                "input": item.name,
+                "rollers": "each" if item.persistence == "per-roller" else "",
+            }
+            for item in drawn
+            for key in item.keys
+        ],
+        groups=[
+            {
+                "name": item.name,
+                "role": item.role,
+                "persistence": item.persistence,
+                "text": item.describe(),
+            }
+            for item in drawn
+        ],
+        control=_control(drawer) if request.plan == "control-variate" else {},
+    )
+
+
+def _control(drawer: Drawer) -> dict[str, float]:
+    """Return the moments of the control variate, and the number of draws they are from."""
+    control = control_of(drawer)
+    if control is None:
+        raise CapabilityError(
+            f"{drawer.scenario.file}: the control variate is a depth in closed form, which needs a"
+            " wear law linear in the dissipation; choose another plan, such as monte-carlo"
+        )
+    return control._asdict()
+
+
+def _static(scenario: Scenario, grid: Grid) -> dict[str, FloatArray]:
+    """Return the arrays that are common to all realisations."""
+    stop = float(scenario.total_passes)
+    passes = RecordSchedule.of(scenario, stop).all_records(
+        stop, scenario.evolution.stepper == "per-pass"
+    )
+    return {
+        "y": grid.y,
+        "multiplicity": np.ones(scenario.operation.rollers),
+        "record_passes": passes,
+        "record_time": passes / scenario.pass_rate,
+    }

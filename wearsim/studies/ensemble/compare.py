@@ -1,4 +1,4 @@
-"""Runs and ensembles side by side: how deep each wears, and how surely one wears deeper."""
+"""Comparison of runs and ensembles at the ends of their tests."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from wearsim.uq.estimation.mann_whitney import Paired, paired, superiority
 from wearsim.uq.sampling.plans import REPLICATES
 
 QUANTILES = (0.05, 0.5, 0.95)
-_SAME_LENGTH = 1e-9  # what rounding leaves between the ends of tests of one length
+_ROUND_OFF = 1e-9  # relative difference of the ends of tests of equal length
 _ERRORS = {"depth": "depth_error", "worn_volume": "volume_error"}
 
 Comparable: TypeAlias = Result | EnsembleResult
@@ -24,37 +24,36 @@ Comparable: TypeAlias = Result | EnsembleResult
 
 @dataclass(frozen=True)
 class Compared:
-    """One of what is compared.
+    """One run or ensemble of a comparison.
 
     Parameters
     ----------
     label : str
-        What it is called.
     kind : str
         "run" or "ensemble".
     count : int
-        Realisations that are draws by themselves; of Saltelli's plan fewer than were run.
+        Independent realisations; in Saltelli's plan fewer than were run.
     done, failed, asked : int
-        Realisations that ended well, that failed, and that were asked for at most.
+        Numbers of realisations: successful, failed, and maximum.
     finished : bool
-        Whether all that was asked for is done.
+        Whether the run or ensemble is complete.
     passes, time : float
         Roller passes and simulated time at which it is compared [s].
     value : Interval
-        Mean with its confidence interval; of a run its value with its stated error.
+        Mean with its confidence interval; for a run its value with its estimated error.
     std : Interval, optional
-        Standard deviation, of an ensemble.
+        Standard deviation of an ensemble.
     quantiles : tuple of (float, Interval)
-        Of an ensemble.
+        Quantiles of an ensemble.
     deeper : Interval, optional
-        Probability that it has more of the observable than the first, one test against another;
-        None for the first.
+        Probability that a test of it has a greater observable than one of the first; None for the
+        first.
     paired : Paired, optional
-        The same, realisation by realisation, where both have the same random numbers.
-    apart : Interval, optional
-        Of two runs, how much more this one has than the first, with the stated errors of both.
+        Comparison by realisation, if both have the same random numbers.
+    difference : Interval, optional
+        Difference of two runs, this one minus the first, with the estimated errors of both.
     values : ndarray, shape (count,)
-        Every realisation, rising.
+        Values of the realisations, ascending.
     """
 
     label: str
@@ -71,18 +70,18 @@ class Compared:
     quantiles: tuple[tuple[float, Interval], ...]
     deeper: Interval | None
     paired: Paired | None
-    apart: Interval | None
+    difference: Interval | None
     values: FloatArray
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Runs and ensembles side by side.
+    """Comparison of runs and ensembles.
 
     Parameters
     ----------
     observable : str
-        What is compared at the end of the tests.
+        Observable that is compared at the end of the tests.
     rows : list of Compared
         In the order given.
     """
@@ -92,9 +91,9 @@ class Comparison:
 
     @property
     def equally_long(self) -> bool:
-        """Whether all tests are compared after as many passes and as long a time."""
+        """Whether all tests are compared at the same passes and time."""
         ends = np.array([(row.passes, row.time) for row in self.rows])
-        return bool(np.allclose(ends, ends[0], rtol=_SAME_LENGTH, atol=0.0))
+        return bool(np.allclose(ends, ends[0], rtol=_ROUND_OFF, atol=0.0))
 
 
 def compare(
@@ -107,7 +106,7 @@ def compare(
     results : sequence of Result or EnsembleResult
         Two or more.
     labels : sequence of str
-        What each is called.
+        One for each result.
     observable : str
         "depth", "width", "worn_volume", "dissipated_energy" or another that all have.
 
@@ -118,12 +117,16 @@ def compare(
     Raises
     ------
     ValueError
-        If there are fewer than two, one has no realisations, or lacks the observable.
+        If there are fewer than two results, or one has no realisations or lacks the observable.
     """
     if len(results) < 2:
         raise ValueError("there must be two or more to compare")
     for label, result in zip(labels, results, strict=True):
-        _check(label, result, observable)
+        if observable not in observables_of(result):
+            known = ", ".join(observables_of(result))
+            raise ValueError(f"{label} has no '{observable}'; it has {known}")
+        if isinstance(result, EnsembleResult) and result.count == 0:
+            raise ValueError(f"{label} has no successful realisation")
     rows = [
         _row(label, result, observable, results[0] if number else None)
         for number, (label, result) in enumerate(zip(labels, results, strict=True))
@@ -132,22 +135,14 @@ def compare(
 
 
 def observables_of(result: Comparable) -> tuple[str, ...]:
-    """Return what can be compared of a run or an ensemble."""
+    """Return the observables of a run or an ensemble that can be compared."""
     if isinstance(result, EnsembleResult):
         return result.observables
     return ("depth", "width", "worn_volume", "roller_depth", "dissipated_energy", "power")
 
 
-def _check(label: str, result: Comparable, observable: str) -> None:
-    if observable not in observables_of(result):
-        known = ", ".join(observables_of(result))
-        raise ValueError(f"{label} has no '{observable}'; it has {known}")
-    if isinstance(result, EnsembleResult) and result.count == 0:
-        raise ValueError(f"{label} has no realisation that ended well")
-
-
 def _values(result: Comparable, observable: str) -> tuple[IntArray, FloatArray]:
-    """Return numbers and end values of independent tests."""
+    """Return numbers and final values of independent tests."""
     if isinstance(result, EnsembleResult):
         return result.independent(observable)
     return np.zeros(1, np.int64), np.array([float(np.max(result.values(observable)[-1]))])
@@ -172,10 +167,12 @@ def _row(label: str, result: Comparable, observable: str, first: Comparable | No
             quantiles=(),
             deeper=deeper,
             paired=None,
-            apart=_apart(result, first, observable) if isinstance(first, Result) else None,
+            difference=_difference(result, first, observable)
+            if isinstance(first, Result)
+            else None,
             values=values,
         )
-    found = result.estimate(observable, probabilities=QUANTILES)
+    estimate = result.estimate(observable, probabilities=QUANTILES)
     return Compared(
         label=label,
         kind="ensemble",
@@ -186,12 +183,12 @@ def _row(label: str, result: Comparable, observable: str, first: Comparable | No
         finished=result.finished,
         passes=float(result.record_passes[-1]),
         time=float(result.record_time[-1]),
-        value=found.mean,
-        std=found.std,
-        quantiles=found.quantiles,
+        value=estimate.mean,
+        std=estimate.std,
+        quantiles=estimate.quantiles,
         deeper=deeper,
         paired=_paired(result, first, observable),
-        apart=None,
+        difference=None,
         values=np.sort(values),
     )
 
@@ -199,14 +196,14 @@ def _row(label: str, result: Comparable, observable: str, first: Comparable | No
 def _deeper(result: Comparable, first: Comparable, observable: str) -> Interval:
     """Return the probability that one has more of the observable than the other.
 
-    A run is one test, held against every realisation of an ensemble. Of two runs one has more for
-    sure, or it is open where their stated errors overlap.
+    A run is compared with every realisation of an ensemble. Between two runs it is 0 or 1, or
+    undetermined where their estimated errors overlap.
     """
     if isinstance(result, Result) and isinstance(first, Result):
-        apart = _apart(result, first, observable)
-        if apart.low <= 0.0 <= apart.high:
+        difference = _difference(result, first, observable)
+        if difference.low <= 0.0 <= difference.high:
             return Interval(0.5, 0.0, 1.0)
-        certain = float(apart.value > 0.0)
+        certain = float(difference.value > 0.0)
         return Interval(certain, certain, certain)
     values, others = _values(result, observable)[1], _values(first, observable)[1]
     if isinstance(result, EnsembleResult) and isinstance(first, EnsembleResult):
@@ -215,35 +212,34 @@ def _deeper(result: Comparable, first: Comparable, observable: str) -> Interval:
     return paired(values, others).share
 
 
-def _apart(result: Result, first: Result, observable: str) -> Interval:
-    """Return how much more one run has than another, their stated errors added."""
-    mine, its = (_of_run(run, observable) for run in (result, first))
-    return Interval(mine.value - its.value, mine.low - its.high, mine.high - its.low)
+def _difference(result: Result, first: Result, observable: str) -> Interval:
+    """Return how much more one run has than another, with the sum of their estimated errors."""
+    one, other = (_of_run(run, observable) for run in (result, first))
+    return Interval(one.value - other.value, one.low - other.high, one.high - other.low)
 
 
 def _paired(result: EnsembleResult, first: Comparable | None, observable: str) -> Paired | None:
-    """Return how tests with the same random numbers differ, where there are any."""
+    """Return the comparison of tests with the same random numbers, where there are any."""
     if not isinstance(first, EnsembleResult) or not have_same_draws(result, first):
         return None
-    (numbers, values), (others, theirs) = (_values(one, observable) for one in (result, first))
-    both, mine, yours = np.intersect1d(numbers, others, assume_unique=True, return_indices=True)
+    (numbers, values), (others, firsts) = (_values(one, observable) for one in (result, first))
+    both, own, its = np.intersect1d(numbers, others, assume_unique=True, return_indices=True)
     if len(both) == 0:
         return None
     plan: Design = "sobol" if result.plan == "sobol" else "monte-carlo"
-    return paired(values[mine], theirs[yours], plan, both % REPLICATES)
+    return paired(values[own], firsts[its], plan, both % REPLICATES)
 
 
 def _of_run(result: Result, observable: str) -> Interval:
-    """Return a run's value and what it says of its error; no width where it does not tell."""
-    value = float(_values(result, observable)[1][0])
-    error = 0.0
+    """Return a run's value with its estimated error, or with zero width if there is none."""
+    value, error = float(_values(result, observable)[1][0]), 0.0
     if observable in _ERRORS:
         error = float(np.max(result.values(_ERRORS[observable])[-1]))
     return Interval(value, value - error, value + error)
 
 
 def have_same_draws(one: EnsembleResult, other: EnsembleResult) -> bool:
-    """Tell whether realisation k of two ensembles has the same random numbers."""
+    """Return whether realisations of the same number have the same random numbers."""
     plans = [
         "monte-carlo" if result.plan == "control-variate" else result.plan
         for result in (one, other)
@@ -252,8 +248,11 @@ def have_same_draws(one: EnsembleResult, other: EnsembleResult) -> bool:
         [{item[name] for item in getattr(result.raw, kind)} for result in (one, other)]
         for kind, name in (("inputs", "key"), ("groups", "name"))
     )
-    # strata depend on the number of realisations, and Saltelli's rows on that of the inputs
-    sizes = [one.asked, other.asked] if plans[0] == "latin-hypercube" else [0, 0]
-    rows = groups if plans[0] == "saltelli" else [set(), set()]
-    same = plans[0] == plans[1] and sizes[0] == sizes[1] and rows[0] == rows[1]
-    return same and one.raw.seed == other.raw.seed and bool(keys[0] & keys[1])
+    return (
+        plans[0] == plans[1]
+        # strata depend on the number of realisations, and Saltelli's rows on that of the inputs
+        and (plans[0] != "latin-hypercube" or one.asked == other.asked)
+        and (plans[0] != "saltelli" or groups[0] == groups[1])
+        and one.raw.seed == other.raw.seed
+        and bool(keys[0] & keys[1])
+    )

@@ -1,4 +1,4 @@
-"""The plans of an ensemble: which draws each of its realisations takes."""
+"""Sampling plans of ensembles, and the sample sizes of their interim analyses."""
 
 from __future__ import annotations
 
@@ -20,11 +20,15 @@ BASE_PLANS: Mapping[EnsemblePlan, PlanName] = {
     "control-variate": "monte-carlo",
     "saltelli": "monte-carlo",
 }
-"""The plan by which numbers are drawn."""
+"""Plan of the underlying random numbers."""
+
+FIRST_ANALYSIS = 64  # smallest sample size with reliable intervals; a power of two for Sobol
+
+ANALYSIS_RATIO = 1.1  # fewer analyses make it less likely that one of them stops by chance
 
 
 def parse_plan(name: str) -> EnsemblePlan:
-    """Return the plan of a name.
+    """Return the plan with a name.
 
     Raises
     ------
@@ -40,8 +44,9 @@ def parse_plan(name: str) -> EnsemblePlan:
 def sources(plan: EnsemblePlan, groups: Sequence[str], realisation: int) -> dict[str, int]:
     """Return the number of the draw that each input takes in a realisation.
 
-    All take that of the realisation, but in Saltelli's plan: there d + 2 realisations on end share
-    two draws A and B of d inputs. They are A, B, and A with one input after the other from B.
+    It is the number of the realisation, except in Saltelli's plan: there d + 2 consecutive
+    realisations share two draws A and B of d inputs. They are A, B, and A with each input in turn
+    replaced by that of B.
 
     Parameters
     ----------
@@ -53,6 +58,7 @@ def sources(plan: EnsemblePlan, groups: Sequence[str], realisation: int) -> dict
     Returns
     -------
     dict of str to int
+        Empty where all inputs take the draw of the realisation.
 
     Notes
     -----
@@ -69,42 +75,66 @@ def sources(plan: EnsemblePlan, groups: Sequence[str], realisation: int) -> dict
 
 
 def passes_of(plan: EnsemblePlan, groups: Sequence[str], realisation: int) -> int:
-    """Return whose draws at every pass a realisation takes: in Saltelli's plan a row shares them.
+    """Return the number of the per-pass draws of a realisation.
 
-    What differs within a row is then what is exchanged, and no chance besides.
+    In Saltelli's plan they are the same within a row, so that its realisations differ only in the
+    inputs that are replaced.
     """
     return realisation // (len(groups) + 2) if plan == "saltelli" else realisation
 
 
-def whole_count(plan: EnsemblePlan, groups: Sequence[str], asked: int) -> int:
-    """Return how many realisations a plan makes of those asked for: Saltelli's go in whole rows."""
+def whole_count(plan: EnsemblePlan, groups: Sequence[str], realisations: int) -> int:
+    """Return the number of realisations of a plan, which is rounded up to whole Saltelli rows."""
     if plan != "saltelli":
-        return asked
+        return realisations
     size = len(groups) + 2
-    return size * max(-(-asked // size), 1)
+    return size * max(-(-realisations // size), 1)
 
 
 def check_plan(scenario: Scenario, plan: EnsemblePlan, until: str) -> None:
-    """Refuse what a plan cannot do.
+    """Check that a plan supports the target and the correlations of an ensemble.
 
     Raises
     ------
     ScenarioError
-        If an ensemble that cannot grow is to stop at a target, or Saltelli's inputs depend on each
-        other.
+        If a target is given for a plan of fixed size, or inputs of Saltelli's plan are correlated.
     """
-    problems = []
+    mistakes = []
     if until and plan in {"latin-hypercube", "saltelli"}:
-        why = {
-            "latin-hypercube": "a Latin hypercube cannot grow: its strata are as many as its"
-            " realisations",
+        what = {
+            "latin-hypercube": "a Latin hypercube cannot grow: the number of its strata is that of"
+            " its realisations",
             "saltelli": "Saltelli's plan is for sensitivity, and its size is chosen beforehand",
         }[plan]
         expected = "monte-carlo, sobol or control-variate; or no --until"
-        problems.append(Mistake("sampling", "plan", why, f'"{plan}" with --until', expected))
+        mistakes.append(Mistake("sampling", "plan", what, f'"{plan}" with --until', expected))
     if plan == "saltelli" and scenario.sampling.correlation:
-        what = "Saltelli's plan draws every input by itself, and these are correlated"
+        what = "Saltelli's plan draws the inputs independently, and these are correlated"
         expected = "no correlation, or another plan"
-        problems.append(Mistake("sampling", "correlation", what, None, expected))
-    if problems:
-        raise ScenarioError(scenario.file, problems)
+        mistakes.append(Mistake("sampling", "correlation", what, None, expected))
+    if mistakes:
+        raise ScenarioError(scenario.file, mistakes)
+
+
+def interim_sizes(plan: EnsemblePlan, maximum: int) -> list[int]:
+    """Return the sample sizes at which an estimate is compared with its target.
+
+    They do not depend on the order in which realisations finish, so that neither does the final
+    sample size. Those of Sobol's plan are powers of two times the first.
+
+    Parameters
+    ----------
+    plan : str
+    maximum : int
+        Maximum number of realisations, which is the last size.
+
+    Returns
+    -------
+    list of int
+        Ascending.
+    """
+    sizes = [FIRST_ANALYSIS]
+    while sizes[-1] < maximum:
+        growth = 2.0 if plan == "sobol" else ANALYSIS_RATIO
+        sizes.append(max(int(growth * sizes[-1]), sizes[-1] + 1))
+    return [size for size in sizes if size < maximum] + [maximum]

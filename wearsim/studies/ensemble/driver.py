@@ -1,4 +1,4 @@
-"""The work on an ensemble: batches go out, outcomes come in, and each goes into the file."""
+"""Execution of an ensemble: distribution of realisations, storage of outcomes, stopping rule."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import islice
 
 import numpy as np
@@ -14,121 +14,206 @@ import numpy as np
 from wearsim.errors import Interrupted, WorkerError
 from wearsim.results import EnsembleFile, EnsembleResult, Outcome
 from wearsim.results.ensemble.schema import DONE, FAILED, PENDING
-from wearsim.studies.ensemble.interim_analyses import checkpoints, judged
-from wearsim.studies.ensemble.progress import EnsembleProgress
+from wearsim.studies.ensemble.designs import interim_sizes
 from wearsim.studies.ensemble.realisation import RealisationRunner
 from wearsim.studies.execution.base import Executor
-from wearsim.uq.estimation.intervals import UNKNOWN
+from wearsim.uq.estimation.intervals import UNKNOWN, Interval
 from wearsim.uq.estimation.stopping_rule import Target
 
-SECONDS = 4.0  # that a batch should take; of twenty tests each costs a third more than of forty
+SECONDS = 4.0  # duration of a batch; a test costs a third more in batches of 20 than of 40
 MOST_IN_BATCH = 256
-AHEAD = 3  # batches for each worker that may be beyond the next mark
+AHEAD = 3  # batches for each worker that may be beyond the next interim analysis
 BETWEEN_ESTIMATES = 0.5  # s
 DEFAULT_TARGET = Target.parse("depth.mean 1%")
 
 
-class EnsembleWork:
-    """Runs what is pending in an ensemble's file.
+@dataclass(frozen=True)
+class EnsembleProgress:
+    """Progress of an ensemble.
 
-    Which realisations an ensemble ends with depends on their outcomes alone: an estimate is held
-    against its target at numbers of realisations that are fixed beforehand, and what lies beyond
-    them is not written before they are passed.
+    Parameters
+    ----------
+    done, failed, asked : int
+        Numbers of realisations: successful, failed, and maximum.
+    rate : float
+        Realisations per second in this process.
+    left : float
+        Estimated time until the maximum number is reached [s]; nan where unknown.
+    what : str
+        Name of the estimate, "depth.mean".
+    estimate : Interval
+        Its current value.
+    workers : str
+        Description of the workers, "2 processes".
+    """
+
+    done: int
+    failed: int
+    asked: int
+    rate: float
+    left: float
+    what: str
+    estimate: Interval
+    workers: str
+
+
+def ensemble_warnings(result: EnsembleResult, target: Target | None, reached: bool) -> list[str]:
+    """Return warnings about a finished ensemble.
+
+    Parameters
+    ----------
+    result : EnsembleResult
+    target : Target, optional
+    reached : bool
+        Whether the target was reached.
+
+    Returns
+    -------
+    list of str
+    """
+    warnings = []
+    if result.count:
+        deepest = np.maximum(result.at_end("depth"), result.at_end("roller_depth"))
+        beyond = int((result.values("depth_error") > result.raw.tolerance * deepest).sum())
+        if beyond:
+            warnings.append(
+                f"the estimated error of depth exceeds the tolerance in {beyond} of {result.count}"
+                " realisations; lower evolution.tolerance"
+            )
+        if result.numbers[-1] >= result.kept:
+            warnings.append(
+                f"only the profiles of the first {result.kept} realisations are stored; the mean"
+                " profile and its band are computed from them"
+            )
+    if result.scenario.sampling.correlation:
+        warnings.append(
+            "some inputs are correlated: the sensitivity to one of them includes the effect of the"
+            " inputs correlated with it, so that the parts may add up to more than the total"
+        )
+    if result.plan == "control-variate" and result.failed:
+        warnings.append(
+            f"{result.failed} realisations failed, and the mean of the control variate includes"
+            " them: estimates are those of plain Monte Carlo"
+        )
+    processes = [item["name"] for item in result.raw.groups if item["role"] == "process"]
+    if processes and result.plan in {"sobol", "latin-hypercube"}:
+        warnings.append(
+            f"{' and '.join(processes)} follow random processes, whose paths are sampled by plain"
+            f" Monte Carlo: {result.plan} applies to the other inputs only"
+        )
+    if target is not None and not reached:
+        warnings.append(f"{target} was not reached by {result.asked} realisations")
+    return warnings
+
+
+class EnsembleWork:
+    """Execution of the pending realisations of an ensemble's file.
+
+    The final set of realisations depends on their outcomes only: an estimate is compared with its
+    target at predefined sample sizes, and outcomes beyond the next size are written after it.
 
     Parameters
     ----------
     file : EnsembleFile
         Open for writing.
-    members : RealisationRunner
+    runner : RealisationRunner
     target : Target, optional
-        What ends the ensemble early.
+        Target that ends the ensemble early.
     pool : Executor
     on_progress : callable, optional
-        Told how far it has come.
+        Called with the progress after every batch.
     stop_requested : callable, optional
-        Asked after every batch.
+        Called after every batch; True stops the work.
     """
 
     def __init__(
         self,
         file: EnsembleFile,
-        members: RealisationRunner,
+        runner: RealisationRunner,
         target: Target | None,
         pool: Executor,
         on_progress: Callable[[EnsembleProgress], None] | None,
         stop_requested: Callable[[], bool] | None,
     ) -> None:
-        self.file, self.members, self.target, self.pool = file, members, target, pool
-        self.tell = on_progress or (lambda progress: None)
+        self.file, self.runner, self.target, self.pool = file, runner, target, pool
+        self.on_progress = on_progress or (lambda progress: None)
         self.stop_requested = stop_requested or (lambda: False)
-        self.asked = len(file.status)
-        self.begun, self.before = time.monotonic(), file.data.wall_seconds
-        # what was judged of a finished ensemble is judged anew
+        self.total = len(file.status)
+        self.started, self.before = time.monotonic(), file.data.wall_seconds
+        # the warnings of a finished ensemble are derived again when it finishes
         self.warnings = [] if file.data.finished else list(file.data.warnings)
-        self._marks = checkpoints(members.plan, self.asked) if target else []
-        self._limit = self._marks[0] if self._marks else self.asked
-        self._held: dict[int, Outcome] = {}
+        self._sizes = interim_sizes(runner.plan, self.total) if target else []
+        self._deferred: dict[int, Outcome] = {}
         self._stopping = self._reached = False
         self._ahead = AHEAD * max(pool.workers, 1)
         self._run, self._rate = 0, 0.0
-        self._shown, self._estimate = -math.inf, UNKNOWN
+        self._estimated, self._estimate = -math.inf, UNKNOWN
 
     def warn(self, text: str) -> None:
-        """Keep a warning with the results."""
+        """Store a warning with the results."""
         if text not in self.warnings:
             self.warnings.append(text)
 
     def finish(self) -> None:
-        """Run all that is pending.
+        """Run all pending realisations.
 
         Raises
         ------
         Interrupted
-            If it was stopped before the end.
+            If the work was stopped before the end.
         """
-        self._pass_marks()
+        self._analyse()
         while not (self._is_complete() or self._stopping):
-            self._run_through(self._pending())
+            self._run_batches(self._pending())
         if not self._is_complete():
             self._write_state(finished=False)
             raise self._interrupted()
-        self._close()
+        result = self._result()
+        if result.count:
+            self.file.put_statistics(result.statistics())
+        for text in ensemble_warnings(result, self.target, self._reached):
+            self.warn(text)
+        self._write_state(finished=True, statistics=result.final_estimates())
 
-    def run_again(self) -> None:
-        """Run the realisations that failed once more; raises as `finish`.
+    def run_failed_again(self) -> None:
+        """Run the failed realisations again; raises as `finish`.
 
-        A finished ensemble is finished anew. Of one that is not, what is pending stays so.
+        A finished ensemble is finished again. In an unfinished one pending realisations remain
+        pending.
         """
         numbers = np.flatnonzero(self.file.status == FAILED).tolist()
         finished = self.file.data.finished
-        self._write_state(finished=False)  # before anything is cleared, or a kill would lose it
+        self._write_state(finished=False)  # first, so that a kill leaves a file to be resumed
         self.file.clear(numbers)
         if finished:
             self.finish()
             return
-        self._limit, self._marks = self.asked, []
-        self._run_through(numbers)
+        self._sizes = []
+        self._run_batches(numbers)
         self._write_state(finished=False)
         if (self.file.status[numbers] == PENDING).any():
             raise self._interrupted()
 
-    def _run_through(self, numbers: Iterable[int]) -> None:
-        """Send numbers out in batches until there are no more, or a stop is asked for."""
+    @property
+    def _limit(self) -> int:
+        """Sample size of the next interim analysis, or the maximum after the last one."""
+        return self._sizes[0] if self._sizes else self.total
+
+    def _run_batches(self, numbers: Iterable[int]) -> None:
+        """Run realisations in batches until all are done or a stop is requested."""
         try:
-            with closing(self.pool.results(self.members, self._batches(numbers))) as found:
-                for _, outcomes in found:
+            with closing(self.pool.results(self.runner, self._batches(numbers))) as results:
+                for _, outcomes in results:
                     self._take(outcomes)
-                    self._stopping = self._stopping or self.stop_requested()
-                    self._tell_progress()
                     if self._stopping or self._reached:
-                        return  # what is out is left; it will be run again if it is needed
+                        return  # unfinished batches are abandoned, and run again if needed
         except WorkerError as error:
             self._run_singly(error)
         except KeyboardInterrupt:
             self._stopping = True
 
     def _run_singly(self, error: WorkerError) -> None:
-        """Find which of the realisations that workers died of is at fault, and let it fail."""
+        """Run the realisations of a lost batch individually, and fail those that fail again."""
         suspects = [n for n in error.realisations if self.file.status[n] == PENDING]
         if not suspects:
             raise error
@@ -136,86 +221,75 @@ class EnsembleWork:
             if self._stopping:
                 return
             try:
-                found = self.pool.results(self.members, iter([[number]]))
-                outcomes = [outcome for _, some in found for outcome in some]
+                results = self.pool.results(self.runner, iter([[number]]))
+                outcomes = [outcome for _, some in results for outcome in some]
             except WorkerError:
-                text = "the worker that ran it died each time: out of memory, or killed"
+                text = "the worker process ended in every attempt: out of memory, or killed"
                 outcomes = [Outcome(number=number, error=text)]
             self._take(outcomes)
-            self._stopping = self.stop_requested()
-            self._tell_progress()
 
     def _pending(self) -> Iterator[int]:
-        """Yield pending realisations, no further beyond the next mark than keeps workers busy."""
+        """Yield pending realisations, as far beyond the next analysis as keeps workers busy."""
         for number in np.flatnonzero(self.file.status == PENDING):
             if self._reached or number >= self._limit + self._ahead:
                 return
-            if number not in self._held:
+            if number not in self._deferred:
                 yield int(number)
 
     def _batches(self, numbers: Iterable[int]) -> Iterator[list[int]]:
-        """Yield batches of numbers; which of them share one changes nothing."""
+        """Yield batches of numbers; results do not depend on their composition."""
         remaining = iter(numbers)
         while batch := list(islice(remaining, self._batch_size())):
             yield batch
 
     def _batch_size(self) -> int:
-        """Return as many as take `SECONDS`, and no more than let all workers end together."""
+        """Return the batch size for `SECONDS`, limited so that all workers end together."""
         workers = max(self.pool.workers, 1)
-        left = self.asked - int((self.file.status != PENDING).sum())
-        fair = -(-left // (2 * workers))
-        most = max(min(fair, MOST_IN_BATCH), 1)
+        left = self.total - int((self.file.status != PENDING).sum())
+        most = max(min(-(-left // (2 * workers)), MOST_IN_BATCH), 1)
         size = int(np.clip(SECONDS * self._rate / workers, 1, most))
         self._ahead = AHEAD * workers * size
         return size
 
     def _take(self, outcomes: Sequence[Outcome]) -> None:
-        """Write outcomes, those beyond the next mark later."""
+        """Write outcomes, or defer those beyond the next analysis; report the progress."""
         now = [item for item in outcomes if item.number < self._limit]
-        self._held.update({item.number: item for item in outcomes if item.number >= self._limit})
+        self._deferred |= {item.number: item for item in outcomes if item.number >= self._limit}
         self._run += len(outcomes)
-        self._rate = self._run / max(time.monotonic() - self.begun, 1e-9)
+        self._rate = self._run / max(time.monotonic() - self.started, 1e-9)
         if now and not self._reached:
             self.file.put(now)
-        self._pass_marks()
+        self._analyse()
+        self._stopping = self._stopping or self.stop_requested()
+        self._report_progress()
 
-    def _pass_marks(self) -> None:
-        """Go on to the next mark for as long as all realisations before this one are there."""
-        while self._marks and not self._reached:
+    def _analyse(self) -> None:
+        """Compare the estimate with the target at every interim size that is complete."""
+        while self.target and self._sizes and not self._reached:
             if (self.file.status[: self._limit] == PENDING).any():
                 return
-            if self.target and self.target.reached(self._result().estimate_for(self.target)):
+            if self.target.reached(self._result().estimate_for(self.target)):
                 self._reached = True
                 return
-            self._marks = self._marks[1:]
-            self._limit = self._marks[0] if self._marks else self.asked
-            due = sorted(number for number in self._held if number < self._limit)
+            self._sizes = self._sizes[1:]
+            due = sorted(number for number in self._deferred if number < self._limit)
             if due:
-                self.file.put([self._held.pop(number) for number in due])
+                self.file.put([self._deferred.pop(number) for number in due])
 
     def _is_complete(self) -> bool:
         return self._reached or not (self.file.status == PENDING).any()
 
     def _result(self) -> EnsembleResult:
-        """Return what is in the file by now."""
+        """Return the present content of the file."""
         data = replace(self.file.data, status=self.file.status.copy())
         return EnsembleResult(data, self.file.path)
-
-    def _close(self) -> None:
-        """Write what is only known at the end."""
-        result = self._result()
-        if result.count:
-            self.file.put_statistics(result.statistics())
-        for text in judged(result, self.target, self._reached):
-            self.warn(text)
-        self._write_state(finished=True, statistics=result.told_estimates())
 
     def _write_state(self, finished: bool, statistics: object = None) -> None:
         self.file.put_state(
             {
                 "finished": finished,
                 "warnings": self.warnings,
-                "wall_seconds": self.before + time.monotonic() - self.begun,
+                "wall_seconds": self.before + time.monotonic() - self.started,
                 "statistics": statistics or {},
             }
         )
@@ -223,26 +297,23 @@ class EnsembleWork:
     def _interrupted(self) -> Interrupted:
         done = int((self.file.status != PENDING).sum())
         return Interrupted(
-            f"stopped after {done} of {self.asked} realisations; go on with: wearsim resume"
+            f"stopped after {done} of {self.total} realisations; continue with: wearsim resume"
             f" {self.file.path}"
         )
 
-    def _tell_progress(self) -> None:
-        status = self.file.status
+    def _report_progress(self) -> None:
+        status, target, now = self.file.status, self.target or DEFAULT_TARGET, time.monotonic()
         done, failed = int((status == DONE).sum()), int((status == FAILED).sum())
-        target = self.target or DEFAULT_TARGET
-        now = time.monotonic()
-        if done and now - self._shown > BETWEEN_ESTIMATES:
-            self._shown = now
+        if done and now - self._estimated > BETWEEN_ESTIMATES:
+            self._estimated = now
             self._estimate = target.interval(self._result().estimate_for(target))
-        left = self.asked - done - failed
-        self.tell(
+        self.on_progress(
             EnsembleProgress(
                 done=done,
                 failed=failed,
-                asked=self.asked,
+                asked=self.total,
                 rate=self._rate,
-                left=left / self._rate if self._rate else math.nan,
+                left=(self.total - done - failed) / self._rate if self._rate else math.nan,
                 what=target.what,
                 estimate=self._estimate,
                 workers=self.pool.describe,

@@ -1,4 +1,4 @@
-"""One member of an ensemble: a whole wear test of one realisation, and what is kept of it."""
+"""Realisations of an ensemble: their common strips, and their runs."""
 
 from __future__ import annotations
 
@@ -13,16 +13,57 @@ from wearsim.errors import WearsimError
 from wearsim.plugins import ContactModel
 from wearsim.results import Outcome
 from wearsim.scenario import Scenario, parse_scenario
-from wearsim.studies.ensemble.batch import Observed, RealisationRun, Row, grouped, observed
+from wearsim.studies.ensemble.batch import RealisationRun, RunObservations, batch_groups, observe
 from wearsim.studies.ensemble.control_variate import closed_form_depths
 from wearsim.studies.ensemble.designs import BASE_PLANS, EnsemblePlan, passes_of, sources
 from wearsim.studies.run.assemble import assemble_problem, prepared_model, strips_of_run
-from wearsim.studies.run.draws import Drawer, Draws
+from wearsim.studies.run.draws import Drawer
 from wearsim.types import FloatArray, Grid
+
+GRID_REALISATIONS = 64  # realisations that determine the strips, whatever the ensemble's size
+WIDTH_MARGIN = 1.05  # width of the strips over that of the widest of these realisations
+
+
+def shared_grid(scenario: Scenario) -> Grid:
+    """Return strips for the realisations of an ensemble, independent of their number.
+
+    The strips cover those of the first realisations and have their median width. A realisation
+    that needs wider coverage is run on separate strips.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        A scenario with random inputs.
+
+    Raises
+    ------
+    WearsimError
+        If no strips fit any of the first realisations; the error is that of the first one.
+    """
+    drawer, grids, error = Drawer(scenario, "monte-carlo"), [], None
+    for number in range(GRID_REALISATIONS):
+        try:
+            grids.append(strips_of_run(drawer.draw(number)))
+        except WearsimError as failure:
+            error = error or failure
+    if not grids:
+        raise error or AssertionError
+    spacing = float(np.median([grid.spacing for grid in grids]))
+    edges = np.array([_edges(grid) for grid in grids])
+    low, high = float(edges[:, 0].min()), float(edges[:, 1].max())
+    strips = int(np.ceil(WIDTH_MARGIN * (high - low) / spacing))
+    strips += (strips + 1) % 2
+    middle, half = 0.5 * (low + high), 0.5 * strips * spacing
+    return Grid.spanning(middle - half, middle + half, strips)
+
+
+def _edges(grid: Grid) -> tuple[float, float]:
+    """Return the positions of the outer edges of strips [m]."""
+    return float(grid.y[0]) - 0.5 * grid.spacing, float(grid.y[-1]) + 0.5 * grid.spacing
 
 
 class RealisationRunner:
-    """Runs realisations of a scenario by their numbers; it can be sent to another process.
+    """Runs of realisations of a scenario by number; can be sent to another process.
 
     Parameters
     ----------
@@ -32,7 +73,7 @@ class RealisationRunner:
     total : int
         Realisations of the whole ensemble.
     grid : Grid
-        Strips that all members share, unless they do not fit.
+        Strips of all realisations that fit on them.
     """
 
     def __init__(self, scenario: Scenario, plan: EnsemblePlan, total: int, grid: Grid) -> None:
@@ -41,9 +82,9 @@ class RealisationRunner:
         self._prepared: tuple[object, ContactModel] | None = None
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what is sent: not what was made of it here, which each process makes anew."""
-        made = {"scenario", "drawer"}
-        kept = {name: value for name, value in self.__dict__.items() if name not in made}
+        """Return the attributes to be sent, without those that each process derives from them."""
+        derived = {"scenario", "drawer", "_prepared"}
+        kept = {name: value for name, value in self.__dict__.items() if name not in derived}
         return {**kept, "_prepared": None}
 
     @cached_property
@@ -53,11 +94,11 @@ class RealisationRunner:
 
     @cached_property
     def drawer(self) -> Drawer:
-        """What draws the inputs."""
+        """Sampler of the random inputs."""
         return Drawer(self.scenario, BASE_PLANS[self.plan], self.total)
 
     def __call__(self, numbers: Sequence[int]) -> list[Outcome]:
-        """Run realisations; what fails is told in its outcome.
+        """Run realisations; the outcome of one that fails holds its error.
 
         Parameters
         ----------
@@ -69,84 +110,69 @@ class RealisationRunner:
             In the same order.
         """
         outcomes: dict[int, Outcome] = {}
-        members = []
+        runs = []
         for number in numbers:
             drawn: dict[str, float | FloatArray] = {}
             try:
-                members.append(self._member(number, drawn))
-            except Exception as error:  # it ends this realisation and no other
-                outcomes[number] = Outcome(number=number, drawn=drawn, error=told(error))
-        for group in grouped(members):
-            for member, found in zip(group, observed(group), strict=True):
-                outcomes[member.number] = self._outcome(member, found)
+                runs.append(self._prepare(number, drawn))
+            except Exception as error:  # an error fails this realisation only
+                outcomes[number] = Outcome(number=number, drawn=drawn, error=_error_text(error))
+        for group in batch_groups(runs):
+            for run, observations in zip(group, observe(group), strict=True):
+                outcomes[run.number] = self._outcome(run, observations)
         return [outcomes[number] for number in numbers]
 
-    def _member(self, number: int, drawn: dict[str, float | FloatArray]) -> RealisationRun:
-        """Draw a realisation, whose values are left in `drawn`, and make it ready to be run."""
+    def _prepare(self, number: int, drawn: dict[str, float | FloatArray]) -> RealisationRun:
+        """Return the run of a realisation, and add the values of its random inputs to `drawn`."""
         groups = self.drawer.groups
-        taken = sources(self.plan, groups, number)
-        draws = self.drawer.draw(number, taken, passes_of(self.plan, groups, number))
+        draws = self.drawer.draw(
+            number, sources(self.plan, groups, number), passes_of(self.plan, groups, number)
+        )
         drawn.update({**draws.values, **draws.time_means})
-        own = strips_of_run(draws)
-        grid = self.grid if covers(self.grid, own) else own
+        grid = strips_of_run(draws)
+        (low, high), (first, last) = _edges(self.grid), _edges(grid)
+        margin = 1e-9 * self.grid.spacing
+        if low <= first + margin and high >= last - margin:
+            grid = self.grid
         model = self._model(draws.scenario, grid)
         problem, stepper, _ = assemble_problem(draws.scenario, grid, draws, model)
         return RealisationRun(number, drawn, draws, problem, stepper)
 
     def _model(self, scenario: Scenario, grid: Grid) -> ContactModel:
-        """Return the contact model for the strips: one for all members that can share it."""
-        materials = scenario.cylinder.material, scenario.roller.material
-        key = scenario.contact, materials
+        """Return the contact model prepared for the strips, shared by realisations if possible."""
         if grid is not self.grid:
             return prepared_model(scenario, grid)
+        key = scenario.contact, (scenario.cylinder.material, scenario.roller.material)
         if self._prepared is None or self._prepared[0] != key:
             self._prepared = key, prepared_model(scenario, grid)
         return self._prepared[1]
 
-    def _outcome(self, member: RealisationRun, found: Observed | Exception) -> Outcome:
-        number, drawn = member.number, dict(member.drawn)
-        if isinstance(found, Exception):
-            return Outcome(number=number, drawn=drawn, error=told(found))
-        spoilt = not_finite(found.rows)
-        if spoilt:
-            return Outcome(number=number, drawn=drawn, error=spoilt)
-        worn, grid = found.profile, member.problem.grid
+    def _outcome(self, run: RealisationRun, observations: RunObservations | Exception) -> Outcome:
+        drawn = dict(run.drawn)
+        if isinstance(observations, Exception):
+            return Outcome(number=run.number, drawn=drawn, error=_error_text(observations))
+        rows, scalars = observations.rows, dict(observations.scalars)
+        for number, row in enumerate(rows):
+            for name, value in row.items():
+                if not math.isfinite(value):
+                    error = f"{name} is not finite at record {number}"
+                    return Outcome(number=run.number, drawn=drawn, error=error)
+        if self.plan == "control-variate":
+            columns = {key: value[None] for key, value in run.draws.values.items()}
+            scalars["control"] = float(closed_form_depths(self.scenario, columns, 1)[0])
+        profile, grid = observations.profile, run.problem.grid
         if grid is not self.grid:
-            worn = np.interp(self.grid.y, grid.y, worn, left=0.0, right=0.0)
-        rows = found.rows
+            profile = np.interp(self.grid.y, grid.y, profile, left=0.0, right=0.0)
         return Outcome(
-            number=number,
+            number=run.number,
             drawn=drawn,
             observables={name: np.array([row[name] for row in rows]) for name in rows[0]},
-            scalars={**found.scalars, **self._control(member.draws)},
-            profile=worn,
+            scalars=scalars,
+            profile=profile,
         )
 
-    def _control(self, draws: Draws) -> dict[str, float]:
-        """Return the control variate of a realisation, where the plan has one."""
-        if self.plan != "control-variate":
-            return {}
-        columns = {key: value[None] for key, value in draws.values.items()}
-        return {"control": float(closed_form_depths(self.scenario, columns, 1)[0])}
 
-
-def covers(grid: Grid, other: Grid) -> bool:
-    """Tell whether strips reach as far as others on both sides."""
-    ends = [np.array([g.y[0] - 0.5 * g.spacing, g.y[-1] + 0.5 * g.spacing]) for g in (grid, other)]
-    slack = 1e-9 * grid.spacing
-    return bool(ends[0][0] <= ends[1][0] + slack and ends[0][1] >= ends[1][1] - slack)
-
-
-def told(error: Exception) -> str:
-    """Return what is told of an error; one that nobody foresaw with its kind."""
+def _error_text(error: Exception) -> str:
+    """Return the message of an error, after its type if wearsim did not raise it deliberately."""
     kind = type(error).__name__
     return str(error) or kind if isinstance(error, WearsimError) else f"{kind}: {error}"
-
-
-def not_finite(rows: Sequence[Row]) -> str:
-    """Return what is said of a test that has come to a value which is not finite, or nothing."""
-    for number, row in enumerate(rows):
-        for name, value in row.items():
-            if not math.isfinite(value):
-                return f"{name} is not finite at record {number}"
-    return ""

@@ -1,16 +1,21 @@
-"""One ensemble for each of several values of a key, all with the same random numbers."""
+"""Sweep over the values of a key: an ensemble for each, with common random numbers."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from wearsim.errors import Interrupted, ResultsFileError
 from wearsim.results import EnsembleResult, check_output, read_ensemble
 from wearsim.scenario import Scenario
-from wearsim.studies.ensemble.api import Asked, checked, ensemble, resume_ensemble
+from wearsim.studies.ensemble.api import (
+    EnsembleRequest,
+    checked_request,
+    ensemble,
+    resume_ensemble,
+)
 
 
 def sweep(
@@ -22,26 +27,26 @@ def sweep(
     on_value: Callable[[str, Path], None] | None = None,
     **options: Any,
 ) -> list[EnsembleResult]:
-    """Run an ensemble for each of several values, each to a file of its own.
+    """Run an ensemble for each of several values, each with a separate file.
 
-    Draws have the names of their inputs as addresses, so that realisation k is the same test in all
-    of them but for the value: what differs between the ensembles is not left to chance. An ensemble
-    that an earlier go has begun is gone on with.
+    Random numbers are addressed by the names of the inputs, so that a realisation differs between
+    the ensembles in the value only: differences are not affected by sampling. Unfinished ensembles
+    of an earlier call are continued.
 
     Parameters
     ----------
     scenario_of : callable
         Returns the scenario with one of the values.
     values : sequence of str
-        As they stand in the names of the files.
+        As written in the names of the files.
     realisations : int
-        Of each ensemble.
+        Number of realisations of each ensemble.
     output : path
-        ``FILE.h5`` stands for ``FILE-VALUE.h5``.
+        ``FILE.h5``, for files ``FILE-VALUE.h5``.
     on_value : callable, optional
-        Told value and file before each ensemble.
+        Called with value and file before each ensemble.
     **options
-        Of `ensemble`.
+        Options of `ensemble`.
 
     Returns
     -------
@@ -50,62 +55,55 @@ def sweep(
     Raises
     ------
     ResultsFileError
-        If a file exists, or would be that of two values.
+        If a file exists, or is that of two values.
     ScenarioError, CapabilityError, TypeError, ValueError
-        As `ensemble`; what can be known beforehand, before the first one runs.
+        As in `ensemble`; those known from the arguments before the first one runs.
     Interrupted
-        If it was stopped, telling the values that are left.
+        If it was stopped, with the values that are left.
     """
     scenarios = [scenario_of(value) for value in values]
     paths = [path_of(output, value) for value in values]
-    force = options.get("force", False)
     same = [path for path in paths if paths.count(path) > 1]
     if same:
-        raise ResultsFileError(f"{same[0]}: would be the file of two values; write them apart")
-    begun = []
+        raise ResultsFileError(
+            f"{same[0]}: would be the file of two values; write them differently"
+        )
+    force, resumed = options.get("force", False), []
     for scenario, path in zip(scenarios, paths, strict=True):
-        asked = checked(scenario, realisations, options.get("plan"), options.get("until"))
-        begun.append(_is_part(path, scenario, asked, force))
-        if not begun[-1]:
+        request = checked_request(scenario, realisations, options.get("plan"), options.get("until"))
+        resumed.append(not force and path.exists() and _matches(path, scenario, request))
+        if not resumed[-1]:
             check_output(path, force, scenario.paths)
-    found: list[EnsembleResult] = []
-    for value, scenario, path, is_part in zip(values, scenarios, paths, begun, strict=True):
+    run_options = {key: options[key] for key in options.keys() - {"plan", "until", "force"}}
+    results: list[EnsembleResult] = []
+    for value, scenario, path, is_resumed in zip(values, scenarios, paths, resumed, strict=True):
         if on_value is not None:
             on_value(value, path)
         try:
-            if is_part:
-                found.append(resume_ensemble(path, **_of_work(options)))
+            if is_resumed:
+                results.append(resume_ensemble(path, **run_options))
             else:
-                found.append(ensemble(scenario, realisations, path, **options))
+                results.append(ensemble(scenario, realisations, path, **options))
         except Interrupted as stop:
-            left = values[len(found) + 1 :]
-            rest = f"; not begun: {', '.join(left)}" if left else ""
-            again = "; the same command once more goes on with the sweep"
-            raise Interrupted(f"{stop}{rest}{again}") from stop
-    return found
+            left = values[len(results) + 1 :]
+            rest = f"; not started: {', '.join(left)}" if left else ""
+            raise Interrupted(f"{stop}{rest}; repeat the command to continue the sweep") from stop
+    return results
 
 
-def _is_part(path: Path, scenario: Scenario, asked: Asked, force: bool) -> bool:
-    """Tell whether a file is that of a value from an earlier go at the same sweep."""
-    if force or not path.exists():
-        return False
+def _matches(path: Path, scenario: Scenario, request: EnsembleRequest) -> bool:
+    """Return whether a file is that of the same ensemble."""
     try:
         data = read_ensemble(path)
-    except ResultsFileError:  # whatever it is, it stays
+    except ResultsFileError:  # another kind of file, which is not overwritten
         return False
-    until = "" if asked.target is None else str(asked.target)
-    mine = (scenario.sha256, asked.plan, asked.realisations, until)
-    return mine == (data.sha256, data.plan, data.asked, data.until)
-
-
-def _of_work(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the options of an ensemble that say how it is run, not what it is."""
-    what = {"plan", "until", "force"}
-    return {name: value for name, value in options.items() if name not in what}
+    until = "" if request.target is None else str(request.target)
+    requested = (scenario.sha256, request.plan, request.realisations, until)
+    return requested == (data.sha256, data.plan, data.asked, data.until)
 
 
 def path_of(output: str | Path, value: str) -> Path:
-    """Return the file of one value: 'out/test.h5' and '250 N' make 'out/test-250N.h5'."""
+    """Return the file of one value: 'out/test.h5' and '250 N' give 'out/test-250N.h5'."""
     path = Path(output)
     joined = re.sub(r"\s+(?=[A-Za-z])", "", value.strip())  # a number and its unit
     plain = re.sub(r"\s+", "_", joined.replace("/", "_per_").replace("%", "percent"))

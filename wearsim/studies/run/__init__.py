@@ -1,1 +1,1 @@
-"""A wear test: assembled from a scenario, stepped, recorded and resumed."""
+"""Wear tests: assembly from a scenario, run, records and restart."""

@@ -1,4 +1,4 @@
-"""Turns a scenario into a problem that can be stepped."""
+"""Construction of a wear problem and its stepper from a scenario."""
 
 from __future__ import annotations
 
@@ -6,54 +6,103 @@ from dataclasses import replace
 
 import numpy as np
 
-from wearsim.errors import Mistake, ScenarioError
+from wearsim.errors import CapabilityError, Mistake, ScenarioError
 from wearsim.evolution.contact_inputs import ContactInputs
 from wearsim.evolution.error_control.error_estimates import half_quadrature_start, total_worn_volume
+from wearsim.evolution.error_control.step_size import StepControl
 from wearsim.evolution.kinematics import Kinematics, NoWear
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import fresh_state
+from wearsim.evolution.steppers.backward_euler import ImplicitStepper
 from wearsim.evolution.steppers.base import Stepper
+from wearsim.evolution.steppers.forward_euler import ExplicitStepper
+from wearsim.evolution.steppers.per_pass import PerPassStepper
+from wearsim.evolution.steppers.rkl2 import StabilisedStepper
 from wearsim.evolution.steppers.single_step import explicit_step
 from wearsim.plugins import ContactModel, Load
 from wearsim.scenario import Scenario, require_run
-from wearsim.studies.run.choose_stepper import build_stepper, check_model, chosen_stepper
 from wearsim.studies.run.draws import Draws, draw
-from wearsim.studies.run.grid import Drawn, run_grid
-from wearsim.studies.run.pass_quadrature import MOST_NODES, fewest_nodes, redrawing, with_nodes
+from wearsim.studies.run.grid import InputMaxima, run_grid
+from wearsim.studies.run.pass_quadrature import MAX_NODES, minimum_nodes, redrawing, with_nodes
 from wearsim.types import FloatArray, Grid, Profile
 
-SETTLED = 1e-3  # of the tolerance: what the iterations of one step may leave
-SETTLED_RANGE = 1e-8, 1e-5
+ITERATION_FRACTION = 1e-3  # convergence criterion of a step's iterations, over the tolerance
+ITERATION_RANGE = 1e-8, 1e-5
+
+
+def check_model(scenario: Scenario, model: ContactModel) -> None:
+    """Raise CapabilityError if the contact model does not support the scenario's creepage."""
+    creepage = scenario.creepage
+    needs = {
+        "bearing_torque": ("creepage.drive = 'free'", creepage.drive == "free"),
+        "creepage_variation": ("creepage.differential_slip = true", creepage.differential_slip),
+    }
+    for capability, (setting, needed) in needs.items():
+        if needed and not getattr(model.capabilities, capability):
+            raise CapabilityError(
+                f"{scenario.file}: contact model '{scenario.contact.model}' does not support"
+                f" {setting}; choose another contact.model"
+            )
+
+
+def chosen_stepper(scenario: Scenario, model: ContactModel, contacts: int) -> str:
+    """Return the name of a scenario's stepper; "auto" depends on the contact model.
+
+    Raises
+    ------
+    CapabilityError
+        If the scenario requires implicit steps and the model does not support them.
+    """
+    compliant = model.capabilities.wear_compliance
+    able = compliant and (contacts == 1 or model.capabilities.coupled)
+    name = scenario.evolution.stepper
+    if name == "auto":
+        return "implicit" if able else "stabilised"
+    if name == "implicit" and not able:
+        several = " of several contacts that wear one body" if compliant else ""
+        raise CapabilityError(
+            f"{scenario.file}: contact model '{scenario.contact.model}' takes no wear compliance"
+            f"{several}; set evolution.stepper = 'stabilised' or 'per-pass', or choose another"
+            " contact.model"
+        )
+    return name
+
+
+def build_stepper(scenario: Scenario, name: str) -> Stepper:
+    """Return the stepper called `name` with the scenario's tolerance and step."""
+    evolution = scenario.evolution
+    unused = {
+        "step": name == "per-pass" and evolution.step is not None,
+        "allow_unstable": name != "explicit" and evolution.allow_unstable,
+    }
+    mistakes = [
+        Mistake("evolution", key, f'has no meaning with stepper = "{name}"')
+        for key, is_set in unused.items()
+        if is_set
+    ]
+    if mistakes:
+        raise ScenarioError(scenario.file, mistakes)
+    control = StepControl(evolution.tolerance)
+    forced = float(evolution.step) if evolution.step is not None else None
+    if name == "implicit":
+        return ImplicitStepper(control, forced)
+    if name == "stabilised":
+        return StabilisedStepper(control, forced)
+    if name == "explicit":
+        return ExplicitStepper(control, forced, evolution.allow_unstable)
+    return PerPassStepper()
 
 
 def merged_rollers(draws: Draws) -> tuple[list[int], FloatArray]:
-    """Return the first of each kind of roller, and how many are alike."""
+    """Return the first roller of each group of identical ones, and the sizes of the groups."""
     scenario = draws.scenario
-    creepage, numbers = scenario.creepage, range(scenario.operation.rollers)
-    if draws.tells_rollers_apart:
-        return list(numbers), np.ones(len(numbers))
-    rows = list(
-        zip(
-            scenario.per_roller(scenario.roller.offset),
-            scenario.per_roller(creepage.yaw),
-            scenario.per_roller(creepage.tilt),
-            strict=True,
-        )
-    )
+    creepage, count = scenario.creepage, scenario.operation.rollers
+    if draws.rollers_differ:
+        return list(range(count)), np.ones(count)
+    settings = scenario.roller.offset, creepage.yaw, creepage.tilt
+    rows = list(zip(*(scenario.per_roller(value) for value in settings), strict=True))
     kinds = list(dict.fromkeys(rows))
-    counts = np.array([float(rows.count(kind)) for kind in kinds])
-    return [rows.index(kind) for kind in kinds], counts
-
-
-def kinematics(scenario: Scenario, multiplicity: FloatArray) -> Kinematics:
-    """Return how the rollers run on the cylinder."""
-    return Kinematics(
-        cylinder_radius=scenario.cylinder.radius,
-        roller_radius=scenario.roller.radius,
-        crown_radius=scenario.roller.crown_radius,
-        rolling_speed=scenario.rolling_speed,
-        multiplicity=multiplicity,
-    )
+    return [rows.index(kind) for kind in kinds], np.array([float(rows.count(k)) for k in kinds])
 
 
 def start_height(profile: Profile | None, grid: Grid) -> FloatArray:
@@ -61,11 +110,6 @@ def start_height(profile: Profile | None, grid: Grid) -> FloatArray:
     if profile is None:
         return np.zeros_like(grid.y)
     return np.interp(grid.y, profile.y, profile.height)
-
-
-def from_apex(scenario: Scenario, grid: Grid, roller: int) -> FloatArray:
-    """Return the axial distance from one roller's apex, shape (strips,) [m]."""
-    return np.asarray(grid.y - scenario.per_roller(scenario.roller.offset)[roller])
 
 
 def flat_gap(scenario: Scenario, s: FloatArray, height: FloatArray) -> FloatArray:
@@ -77,7 +121,7 @@ def flat_gap(scenario: Scenario, s: FloatArray, height: FloatArray) -> FloatArra
     s : ndarray, shape (..., strips)
         Distance from the roller's apex [m].
     height : ndarray, shape (strips,)
-        As `start_height` returns it [m].
+        Initial height of the cylinder, from `start_height` [m].
     """
     return s * s / (2.0 * scenario.roller.crown_radius) - height
 
@@ -85,8 +129,7 @@ def flat_gap(scenario: Scenario, s: FloatArray, height: FloatArray) -> FloatArra
 def slip_profile(scenario: Scenario, s: FloatArray, height: FloatArray) -> FloatArray:
     """Return the differential slip without tilt before wear.
 
-    s^2/(2 R_crown R_roller), s from the roller's apex, and the start profile's height over
-    R_cylinder.
+    s^2/(2 R_crown R_roller), s from the roller's apex, and the initial height over R_cylinder.
 
     Parameters
     ----------
@@ -97,49 +140,29 @@ def slip_profile(scenario: Scenario, s: FloatArray, height: FloatArray) -> Float
     return slip + height / scenario.cylinder.radius
 
 
-def mean_inputs(scenario: Scenario, rollers: list[int]) -> ContactInputs:
-    """Return the inputs of some rollers as the scenario gives them."""
-    creepage = scenario.creepage
-    alike = ContactInputs.uniform(
-        len(rollers),
-        friction=scenario.friction.coefficient,
-        longitudinal=creepage.longitudinal or 0.0,
-        bearing_torque=creepage.bearing_torque or 0.0,
-    )
-    angles = {
-        name: np.array(scenario.per_roller(value))[rollers][:, None]
-        for name, value in (("yaw", creepage.yaw), ("tilt", creepage.tilt))
-    }
-    return alike.with_values(angles)
-
-
 def load_range(scenario: Scenario, load: Load, stop: float) -> tuple[float, float]:
     """Return the least and greatest load up to `stop` [s], before any feedback [N].
 
     Raises
     ------
     ScenarioError
-        If the load is not known for the whole time, or falls to nothing.
+        If the load is not defined for the whole time, or is not positive.
     """
+    kind = scenario.load.kind
     if load.span is not None and (load.span[0] > 0.0 or load.span[1] < stop * (1.0 - 1e-9)):
-        problem = Mistake(
+        mistake = Mistake(
             "load",
-            scenario.load.kind,
+            kind,
             "the log does not cover the test",
             f"{load.span[0] / 60.0:.6g} to {load.span[1] / 60.0:.6g} min",
             f"0 to {stop / 60.0:.6g} min; log longer or shorten operation.duration",
         )
-        raise ScenarioError(scenario.file, [problem])
+        raise ScenarioError(scenario.file, [mistake])
     low, high = load.extremes(0.0, stop)
     if low <= 0.0 and not scenario.load.terms:
-        problem = Mistake(
-            "load",
-            scenario.load.kind,
-            "the load falls to nothing, and contact with it",
-            f"{low:.6g} N",
-            "a load above zero at all times",
-        )
-        raise ScenarioError(scenario.file, [problem])
+        what = "the load falls to zero or below, and contact is lost"
+        mistake = Mistake("load", kind, what, f"{low:.6g} N", "a load above zero at all times")
+        raise ScenarioError(scenario.file, [mistake])
     return low, high
 
 
@@ -155,18 +178,18 @@ def assemble_problem(
     ----------
     scenario : Scenario
     grid : Grid, optional
-        Strips of an earlier part of the run, in place of the scenario's choice.
+        Strips of an earlier part of the run, instead of the scenario's choice.
     draws : Draws, optional
-        Of the scenario's random inputs, where they are drawn already.
+        Values of the scenario's random inputs, if already drawn.
     model : ContactModel, optional
-        From `prepared_model`, where it is there already; with a grid alone.
+        A model from `prepared_model`; requires `grid`.
 
     Raises
     ------
     ScenarioError
-        If the scenario lacks what a run needs.
+        If the scenario lacks values that a run requires.
     CapabilityError
-        If the contact model cannot do what is asked.
+        If the contact model does not support the scenario.
     """
     require_run(scenario)
     draws = draws if draws is not None else draw(scenario)
@@ -177,20 +200,20 @@ def assemble_problem(
     name = chosen_stepper(scenario, chosen, 2 if draws.passes else len(first))
     stepper = build_stepper(scenario, name)
     if scenario.evolution.nodes is not None and (stepper.pass_by_pass or not draws.passes):
-        what = "has no meaning where no expectation over passes is taken"
+        what = "has no meaning without an expectation over passes"
         raise ScenarioError(scenario.file, [Mistake("evolution", "nodes", what)])
     grid = grid if grid is not None else strips_of_run(draws)
     if model is None:
         chosen.prepare(grid, (scenario.cylinder.material, scenario.roller.material))
-    problem = bare_problem(
+    problem = problem_at_means(
         scenario, chosen, load, grid, first, multiplicity, scenario.cylinder.profile
     )
     problem = with_draws(problem, draws, first)
     if draws.passes and stepper.pass_by_pass:
-        nodes = with_nodes(problem, scenario, draws.passes, fewest_nodes(draws.passes))
+        nodes = with_nodes(problem, scenario, draws.passes, minimum_nodes(draws.passes))
         problem = replace(problem, redraw=redrawing(scenario, draws.passes), expectation=nodes)
     elif draws.passes:
-        problem = with_enough_nodes(problem, draws)
+        problem = with_converged_nodes(problem, draws)
     return problem, stepper, name
 
 
@@ -202,26 +225,21 @@ def prepared_model(scenario: Scenario, grid: Grid) -> ContactModel:
 
 
 def strips_of_run(draws: Draws) -> Grid:
-    """Return the strips that a run's draws and the end of its test call for."""
+    """Return the strips for the random inputs and the final groove of a run."""
     scenario = draws.scenario
     greatest = load_range(scenario, scenario.load.build(), scenario.total_time)[1]
     greatest += draws.range_of("normal_force_offset", 0.0)[1]
-    drawn = Drawn(
-        yaw=_reach(draws, "yaw"),
-        tilt=_reach(draws, "tilt"),
-        friction=draws.lasting("friction", scenario.friction.coefficient),
-        longitudinal=draws.lasting("longitudinal", scenario.creepage.longitudinal or 0.0),
+    maxima = InputMaxima(
+        yaw=max(abs(angle) for angle in draws.range_of("yaw", 0.0)),
+        tilt=max(abs(angle) for angle in draws.range_of("tilt", 0.0)),
+        friction=draws.greatest_mean("friction", scenario.friction.coefficient),
+        longitudinal=draws.greatest_mean("longitudinal", scenario.creepage.longitudinal or 0.0),
     )
-    return run_grid(scenario, greatest, drawn)
-
-
-def _reach(draws: Draws, name: str) -> float:
-    """Return the greatest size of an angle that is drawn [rad]."""
-    return max(abs(angle) for angle in draws.range_of(name, 0.0))
+    return run_grid(scenario, greatest, maxima)
 
 
 def with_draws(problem: WearProblem, draws: Draws, rollers: list[int]) -> WearProblem:
-    """Return the problem with what is drawn for its rollers, and with the paths of processes."""
+    """Return the problem with the random inputs of its rollers, and with the paths of processes."""
     values = {name: array[rollers][:, None] for name, array in draws.rollers.items()}
     place = {number: k for k, number in enumerate(rollers)}
     varying = tuple(
@@ -231,32 +249,29 @@ def with_draws(problem: WearProblem, draws: Draws, rollers: list[int]) -> WearPr
     return replace(problem, inputs=problem.inputs.with_values(values), varying=varying)
 
 
-def with_enough_nodes(problem: WearProblem, draws: Draws) -> WearProblem:
-    """Return the problem with nodes for what is drawn at every pass.
+def with_converged_nodes(problem: WearProblem, draws: Draws) -> WearProblem:
+    """Return the problem with quadrature nodes for the inputs that are drawn at every pass.
 
-    Unless the scenario gives their number they are doubled until the wear of the fresh contacts
-    has settled to a part of the tolerance, or there are `MOST_NODES`.
+    Unless the scenario gives their number, they are doubled until the initial wear has converged to
+    half the tolerance, or `MAX_NODES` are reached.
     """
-    scenario = draws.scenario
-    asked, tolerance = scenario.evolution.nodes, scenario.evolution.tolerance
-    count = asked or fewest_nodes(draws.passes)
+    evolution = draws.scenario.evolution
+    count = evolution.nodes or minimum_nodes(draws.passes)
     while True:
-        found = with_nodes(problem, scenario, draws.passes, count)
-        if asked or 2 * count > MOST_NODES:
+        found = with_nodes(problem, draws.scenario, draws.passes, count)
+        if evolution.nodes or 2 * count > MAX_NODES:
             return found
         fresh = fresh_state(found)
-        one, other = (
-            total_worn_volume(problem, explicit_step(found, fresh, 1.0)),
-            total_worn_volume(
-                problem, explicit_step(found.halved, half_quadrature_start(found, fresh), 1.0)
-            ),
+        full = total_worn_volume(problem, explicit_step(found, fresh, 1.0))
+        half = total_worn_volume(
+            problem, explicit_step(found.halved, half_quadrature_start(found, fresh), 1.0)
         )
-        if (np.abs(one - other) <= 0.5 * tolerance * one).all():
+        if (np.abs(full - half) <= 0.5 * evolution.tolerance * full).all():
             return found
         count *= 2
 
 
-def bare_problem(
+def problem_at_means(
     scenario: Scenario,
     model: ContactModel,
     load: Load,
@@ -265,7 +280,7 @@ def bare_problem(
     multiplicity: FloatArray,
     profile: Profile | None,
 ) -> WearProblem:
-    """Return the problem of some rollers on strips, every input as the scenario gives it.
+    """Return the problem of some rollers, every random input at its mean.
 
     Parameters
     ----------
@@ -277,28 +292,46 @@ def bare_problem(
     rollers : list of int
         Numbers of the rollers.
     multiplicity : ndarray, shape (rollers,)
-        Physical rollers behind each.
+        Number of physical rollers that each represents.
     profile : Profile, optional
         The cylinder's profile at the start.
     """
-    s = np.array([from_apex(scenario, grid, r) for r in rollers])
+    creepage, roller, count = scenario.creepage, scenario.roller, len(rollers)
+    offsets = scenario.per_roller(roller.offset)
+    s = np.array([grid.y - offsets[number] for number in rollers])
     height = start_height(profile, grid)
-    creepage, count = scenario.creepage, len(rollers)
+    inputs = ContactInputs.uniform(
+        count,
+        friction=scenario.friction.coefficient,
+        longitudinal=creepage.longitudinal or 0.0,
+        bearing_torque=creepage.bearing_torque or 0.0,
+    )
+    angles = {
+        name: np.array(scenario.per_roller(value))[rollers][:, None]
+        for name, value in (("yaw", creepage.yaw), ("tilt", creepage.tilt))
+    }
+    tolerance = np.clip(ITERATION_FRACTION * scenario.evolution.tolerance, *ITERATION_RANGE)
     return WearProblem(
         grid=grid,
         model=model,
         law=scenario.wear.build() if scenario.wear is not None else NoWear(),
         load=load,
         terms={term.name: term.build() for term in scenario.load.terms},
-        kinematics=kinematics(scenario, multiplicity),
+        kinematics=Kinematics(
+            cylinder_radius=scenario.cylinder.radius,
+            roller_radius=roller.radius,
+            crown_radius=roller.crown_radius,
+            rolling_speed=scenario.rolling_speed,
+            multiplicity=multiplicity,
+        ),
         flat_gap=flat_gap(scenario, s, height)[None, :, None, :],
         from_apex=s,
-        inputs=mean_inputs(scenario, rollers),
+        inputs=inputs.with_values(angles),
         roller=np.arange(count, dtype=np.int64),
         weight=np.ones(count),
         half=np.zeros(count, dtype=np.int64),
         tilt_shifts=creepage.tilt_shifts_contact,
         free=creepage.drive == "free",
         slip_profile=slip_profile(scenario, s, height) if creepage.differential_slip else None,
-        iteration_tolerance=float(np.clip(SETTLED * scenario.evolution.tolerance, *SETTLED_RANGE)),
+        iteration_tolerance=float(tolerance),
     )

@@ -1,16 +1,17 @@
-"""The random inputs of one run: what holds for the test and its rollers, and paths in time."""
+"""Random inputs of one run: values of the test and its rollers, and processes in time."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
 from wearsim.errors import CapabilityError, Mistake, ScenarioError
 from wearsim.evolution.contact_inputs import Varying
 from wearsim.mechanics.numerics.piecewise_linear import PiecewiseLinear
-from wearsim.plugins import JointDistribution, Process, Uniforms
+from wearsim.plugins import JointDistribution, Process
 from wearsim.scenario import RandomInput, Scenario, realise
 from wearsim.scenario.random.model import CONTACT_FIELDS
 from wearsim.types import FloatArray
@@ -18,10 +19,10 @@ from wearsim.uq.sampling.philox import Stream
 from wearsim.uq.sampling.plans import REPLICATES, PlanName
 from wearsim.uq.sampling.sampler import Sampler
 
-LISTED = {"roller.offset", "creepage.yaw", "creepage.tilt"}  # may stand as one value per roller
+LISTED = {"roller.offset", "creepage.yaw", "creepage.tilt"}  # a scenario may give one per roller
 LONGEST_PATH = 5_000_000  # samples of a process
-_EVENLY = np.linspace(0.5, 63.5, 64) / 64.0  # probabilities that stand for a law
-RARE = 1e-7  # part of the passes that may lie beyond what the strips are laid out for
+_MIDPOINTS = np.linspace(0.5, 63.5, 64) / 64.0  # probabilities to average over a distribution
+RARE = 1e-7  # fraction of the passes that may exceed the range of the strips
 
 
 @dataclass(frozen=True)
@@ -31,17 +32,17 @@ class Draws:
     Parameters
     ----------
     scenario : Scenario
-        With what is drawn for a test as a whole in place; the rest at its mean.
+        The scenario with the values drawn for the whole test; other random inputs at their mean.
     rollers : mapping of str to ndarray, shape (rollers,)
-        What is drawn for each roller and has no place in the scenario, by field of `ContactInputs`.
+        Values drawn for each roller that a scenario cannot hold, by field of `ContactInputs`.
     varying : tuple of Varying
         Processes; their rollers are the scenario's.
     passes : tuple of RandomInput
-        What is drawn anew at every pass.
+        Inputs that are drawn at every pass.
     values : mapping of str to ndarray, shape () or (rollers,)
-        All that is drawn for the test and for its rollers, by the scenario's key [SI].
+        All values drawn for the test and for its rollers, by the scenario's key [SI].
     time_means : mapping of str to ndarray, shape () or (rollers,)
-        Mean over the test of what follows a process, by the scenario's key [SI].
+        Means over the test of the processes, by the scenario's key [SI].
     """
 
     scenario: Scenario
@@ -52,22 +53,22 @@ class Draws:
     time_means: Mapping[str, FloatArray] = field(default_factory=dict)
 
     @property
-    def tells_rollers_apart(self) -> bool:
-        """Whether rollers that the scenario calls alike have inputs of their own."""
+    def rollers_differ(self) -> bool:
+        """Whether rollers that are identical in the scenario have different random inputs."""
         count = self.scenario.operation.rollers
         return bool(self.rollers) or any(len(v.rollers) < count for v in self.varying)
 
-    def lasting(self, name: str, mean: float) -> float:
-        """Return the greatest mean size that an input of a contact has over the whole test.
+    def greatest_mean(self, name: str, mean: float) -> float:
+        """Return the greatest mean absolute value of an input of a contact over the whole test.
 
-        What changes its sign wears either way, so that it counts by its size.
+        Inputs that change sign cause wear with either sign, so that their absolute value counts.
 
         Parameters
         ----------
         name : str
             Field of `ContactInputs`.
         mean : float
-            The value where nothing is drawn, which is also the mean of what every pass draws.
+            The value where the input is not random, which is also the mean over the passes.
         """
         sizes = [abs(float(value)) for value in (mean, *self.rollers.get(name, ()))]
         time = self.scenario.total_time
@@ -78,28 +79,28 @@ class Draws:
                 sizes.append(abs(float(found)))
         for random in self.passes:
             if len(random.keys) == 1 and CONTACT_FIELDS[random.keys[0]] == name:
-                values = random.scalar.quantile(_EVENLY)
+                values = random.scalar.quantile(_MIDPOINTS)
                 sizes += [float(np.abs(values).mean())] * _changes_sign(values)
         return max(sizes)
 
     def range_of(self, name: str, mean: float) -> tuple[float, float]:
-        """Return about the least and greatest value that an input of a contact takes.
+        """Return the approximate range of an input of a contact.
 
         Parameters
         ----------
         name : str
             Field of `ContactInputs`.
         mean : float
-            The value where nothing is drawn.
+            The value where the input is not random.
         """
         values = [mean, *self.rollers.get(name, ())]
         for item in self.varying:
             if item.name == name:
                 values += [float(item.path.value.min()), float(item.path.value.max())]
         for random in self.passes:
-            for key, spread in zip(random.keys, _spreads(random), strict=True):
+            for key, limits in zip(random.keys, _ranges(random), strict=True):
                 if CONTACT_FIELDS[key] == name:
-                    values += spread
+                    values += limits
         return min(values), max(values)
 
 
@@ -107,8 +108,8 @@ def _changes_sign(values: FloatArray) -> bool:
     return bool(values.min() < 0.0 < values.max())
 
 
-def _spreads(item: RandomInput) -> list[list[float]]:
-    """Return the range of each value that an input sets; a load's is counted from its mean."""
+def _ranges(item: RandomInput) -> list[list[float]]:
+    """Return the range of each value that an input sets, without the mean of a load."""
     if isinstance(item.distribution, JointDistribution):
         return [[-reach, reach] for reach in item.distribution.reach]
     low, high = item.scalar.quantile(np.array([RARE, 1.0 - RARE]))
@@ -122,7 +123,7 @@ def origin(key: str, mean: float) -> float:
 
 
 def draw(scenario: Scenario) -> Draws:
-    """Draw the random inputs of the realisation that a scenario asks for.
+    """Draw the random inputs of the realisation that is selected in a scenario.
 
     Parameters
     ----------
@@ -135,24 +136,24 @@ def draw(scenario: Scenario) -> Draws:
     Raises
     ------
     ScenarioError
-        If the plan has no single realisation, or a process is far too fast.
+        If the plan does not define single realisations, or the path of a process would be too long.
     CapabilityError
-        If there is a friction field, which is a matter of one contact.
+        If there is a friction field, which requires the study of one contact.
     """
     if scenario.sampling.plan == "latin-hypercube" and scenario.random:
-        problem = Mistake(
+        mistake = Mistake(
             "sampling",
             "plan",
-            "a Latin hypercube belongs to a study of many realisations, and a run takes one",
+            "a Latin hypercube requires a study of many realisations, and a run is one",
             '"latin-hypercube"',
             '"monte-carlo" or "sobol"',
         )
-        raise ScenarioError(scenario.file, [problem])
+        raise ScenarioError(scenario.file, [mistake])
     return Drawer(scenario, scenario.sampling.plan).draw(scenario.sampling.realisation)
 
 
 class Drawer:
-    """Draws the random inputs of a scenario, realisation by realisation.
+    """Sampler of the random inputs of a scenario by realisation.
 
     Parameters
     ----------
@@ -160,16 +161,22 @@ class Drawer:
     plan : str
         Name of a plan of `wearsim.uq.sampling.plans`.
     total : int, optional
-        Realisations of the whole plan, where it needs to know.
+        Realisations of the whole plan, where it depends on their number.
 
     Raises
     ------
     CapabilityError
-        If there is a friction field, which is a matter of one contact.
+        If there is a friction field, which requires the study of one contact.
     """
 
     def __init__(self, scenario: Scenario, plan: PlanName, total: int | None = None) -> None:
-        _refuse_fields(scenario)
+        for item in scenario.random:
+            if item.role == "field":
+                raise CapabilityError(
+                    f"{scenario.file}: {item.name} is a field, {item.kind}, which is resolved"
+                    " within one contact by `wearsim dissipation`; a run takes a distribution with"
+                    " a persistence, such as its marginal"
+                )
         self.scenario = scenario
         self.items = [
             item
@@ -177,20 +184,21 @@ class Drawer:
             if item.role in {"scalar", "joint"} and item.persistence != "per-pass"
         ]
         self._processes = [item for item in scenario.random if item.role == "process"]
-        self._names = {item: _names(item, scenario.operation.rollers) for item in self.items}
-        kinds = {item.name: item for item in self.items}
+        self._names = {
+            item.name: [item.name]
+            if item.persistence == "per-test"
+            else [f"{item.name}@{number}" for number in range(scenario.operation.rollers)]
+            for item in self.items
+        }
         correlations = [
             (one, other, rank)
             for first, second, rank in scenario.sampling.correlation
-            if first in kinds and second in kinds
-            for one, other in zip(
-                self._names[kinds[first]], self._names[kinds[second]], strict=True
-            )
+            if first in self._names and second in self._names
+            for one, other in zip(self._names[first], self._names[second], strict=True)
         ]
-        inputs = [(name, item.dimension) for item in self.items for name in self._names[item]]
         self._sampler = Sampler(
             scenario.seed,
-            inputs,
+            [(name, item.dimension) for item in self.items for name in self._names[item.name]],
             plan,
             total,
             correlations=correlations,
@@ -199,9 +207,9 @@ class Drawer:
 
     @property
     def groups(self) -> list[str]:
-        """Names of the inputs whose draws tell realisations apart; per-pass ones do not."""
-        lasting = {item.name for item in (*self.items, *self._processes)}
-        return [item.name for item in self.scenario.random if item.name in lasting]
+        """Names of the inputs that differ between realisations; without per-pass inputs."""
+        names = {item.name for item in (*self.items, *self._processes)}
+        return [item.name for item in self.scenario.random if item.name in names]
 
     def draw(
         self,
@@ -215,9 +223,9 @@ class Drawer:
         ----------
         realisation : int
         sources : mapping of str to int, optional
-            Number of the realisation whose draw an input takes, where it is another.
+            Number of the realisation from which an input is drawn, where it is another.
         passes : int, optional
-            Number of the realisation whose draws at every pass it takes, where it is another.
+            Number of the realisation from which per-pass inputs are drawn, where it is another.
 
         Returns
         -------
@@ -226,10 +234,10 @@ class Drawer:
         Raises
         ------
         ScenarioError
-            If a value is out of its bounds, or a process is far too fast.
+            If a value is out of its bounds, or the path of a process would be too long.
         """
-        of_passes = realisation if passes is None else passes
-        table = self.scenario.sampling.model_copy(update={"realisation": of_passes})
+        number = realisation if passes is None else passes
+        table = self.scenario.sampling.model_copy(update={"realisation": number})
         scenario = replace(self.scenario, sampling=table)
         if not scenario.random:
             return Draws(scenario)
@@ -242,12 +250,12 @@ class Drawer:
             for key in item.keys
         }
         listed = {
-            key: tuple(float(number) for number in array) if array.ndim else float(array)
+            key: tuple(float(value) for value in array) if array.ndim else float(array)
             for key, array in values.items()
             if array.ndim == 0 or key in LISTED
         }
         means = {item.name: item.mean[0] for item in self.items}
-        paths = {item: _paths(scenario, item, numbers) for item in self._processes}
+        paths = {item: _paths(scenario, item, numbers[item.name]) for item in self._processes}
         return Draws(
             scenario=realise(scenario, listed) if listed else scenario,
             rollers={
@@ -262,12 +270,12 @@ class Drawer:
         )
 
     def columns(self, first: int, count: int) -> dict[str, FloatArray]:
-        """Return what is drawn for whole tests and rollers, in realisations on end.
+        """Return the values drawn for whole tests and rollers in consecutive realisations.
 
         Parameters
         ----------
         first, count : int
-            The first realisation, and how many.
+            The first realisation, and their number.
 
         Returns
         -------
@@ -277,20 +285,21 @@ class Drawer:
         uniforms = self._sampler.uniforms(first, count)
         columns = {}
         for item in self.items:
-            found = np.stack([item.values(uniforms[name]) for name in self._names[item]], axis=1)
+            names = self._names[item.name]
+            found = np.stack([item.values(uniforms[name]) for name in names], axis=1)
             for number, key in enumerate(item.keys):
-                whole = item.persistence == "per-test"
-                columns[key] = found[:, 0, number] if whole else found[:, :, number]
+                single = item.persistence == "per-test"
+                columns[key] = found[:, 0, number] if single else found[:, :, number]
         return columns
 
 
 def drawn_values(scenario: Scenario, draws: Draws) -> dict[str, dict[str, object]]:
-    """Return what is drawn for the test and its rollers, as plain values for a results file.
+    """Return the values drawn for the test and its rollers in the form of a results file.
 
     Parameters
     ----------
     scenario : Scenario
-        The one that was drawn from.
+        The scenario with its random inputs.
     draws : Draws
 
     Returns
@@ -314,24 +323,7 @@ def units_of(scenario: Scenario) -> dict[str, str]:
     }
 
 
-def _names(item: RandomInput, rollers: int) -> list[str]:
-    """Return under which names an input is drawn: its own, or one for each roller."""
-    if item.persistence == "per-test":
-        return [item.name]
-    return [f"{item.name}@{number}" for number in range(rollers)]
-
-
-def _refuse_fields(scenario: Scenario) -> None:
-    for item in scenario.random:
-        if item.role == "field":
-            raise CapabilityError(
-                f"{scenario.file}: {item.name} is a field, {item.kind}, which is resolved within"
-                " one contact by `wearsim dissipation`; a run takes a distribution with a"
-                " persistence, such as its marginal"
-            )
-
-
-def _paths(scenario: Scenario, item: RandomInput, numbers: Mapping[str, int]) -> list[Varying]:
+def _paths(scenario: Scenario, item: RandomInput, realisation: int) -> list[Varying]:
     """Return the paths of a process over the whole test, one or one for each roller."""
     process = item.distribution
     if not isinstance(process, Process):
@@ -339,22 +331,22 @@ def _paths(scenario: Scenario, item: RandomInput, numbers: Mapping[str, int]) ->
     points = int(np.ceil(scenario.total_time / process.spacing)) + 2
     if points > LONGEST_PATH:
         table, key = item.name.rsplit(".", 1)
-        problem = Mistake(
+        mistake = Mistake(
             table,
             key,
             f"the process would take {points:,} steps of {process.spacing:.3g} s over the test",
             None,
-            'a longer correlation_time, or persistence = "per-pass" in place of a process',
+            'a longer correlation_time, or persistence = "per-pass" instead of a process',
         )
-        raise ScenarioError(scenario.file, [problem])
-    everyone = tuple(range(scenario.operation.rollers))
-    groups = [everyone] if item.persistence == "per-test" else [(r,) for r in everyone]
+        raise ScenarioError(scenario.file, [mistake])
+    rollers = tuple(range(scenario.operation.rollers))
+    groups = [rollers] if item.persistence == "per-test" else [(r,) for r in rollers]
     times = process.spacing * np.arange(points, dtype=np.float64)
     stream = Stream(scenario.seed, item.name, "process")
     found = []
     for block, group in enumerate(groups):
-        path = process.path(points, _uniforms(stream, numbers[item.name], block))
-        value = path - origin(item.name, item.mean[0])
+        uniforms = partial(stream.uniforms, realisation=realisation, block=block)
+        value = process.path(points, uniforms) - origin(item.name, item.mean[0])
         found.append(Varying(CONTACT_FIELDS[item.name], group, PiecewiseLinear(times, value)))
     return found
 
@@ -364,7 +356,3 @@ def _means(scenario: Scenario, item: RandomInput, paths: list[Varying]) -> Float
     start = origin(item.name, item.mean[0])
     found = np.array([one.path.mean(0.0, scenario.total_time) + start for one in paths])
     return found if item.persistence == "per-roller" else found[0]
-
-
-def _uniforms(stream: Stream, realisation: int, block: int) -> Uniforms:
-    return lambda first, count: stream.uniforms(first, count, realisation, block)

@@ -1,24 +1,17 @@
-"""What a scenario will run, in words and engineers' units, before it runs."""
+"""Description of the run of a scenario in engineering units, without running it."""
 
 from __future__ import annotations
 
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.scenario import Scenario, described_model
 from wearsim.studies.contact.single import study_contact
-from wearsim.studies.run.assemble import assemble_problem, load_range
-from wearsim.studies.run.choose_stepper import check_model
+from wearsim.studies.run.assemble import assemble_problem, check_model, load_range
 from wearsim.studies.run.grid import fresh_patch
 
-Rows = list[tuple[str, str]]
+TableRows = list[tuple[str, str]]
 
 
-def is_run(scenario: Scenario) -> bool:
-    """Tell whether a scenario describes a whole test and not just one contact."""
-    long = scenario.operation.duration is not None or scenario.operation.passes is not None
-    return long and scenario.wear is not None
-
-
-def _bodies(scenario: Scenario) -> Rows:
+def _bodies(scenario: Scenario) -> TableRows:
     roller, cylinder = scenario.roller, scenario.cylinder
     pair = combine(cylinder.material, roller.material)
     elasticity = (
@@ -49,20 +42,21 @@ def _creepage(scenario: Scenario) -> str:
     return text + (", differential slip" if creepage.differential_slip else "")
 
 
-def _random(scenario: Scenario) -> Rows:
-    """Return a row per random input and, where there are any, one for how they are drawn."""
+def _random(scenario: Scenario) -> TableRows:
+    """Return a row per random input and, where there are any, one for the sampling."""
     if not scenario.random:
         return []
     table = scenario.sampling
-    ties = [f"{first} with {second} {rank:g}" for first, second, rank in table.correlation]
+    pairs = [f"{first} with {second} {rank:g}" for first, second, rank in table.correlation]
     words = [table.plan, f"realisation {table.realisation}"]
-    words += [f"rank correlation of {', '.join(ties)}"] if ties else []
+    words += [f"rank correlation of {', '.join(pairs)}"] if pairs else []
     rows = [(f"random {item.name}", item.describe()) for item in scenario.random]
     return [*rows, ("sampling", ", ".join(words))]
 
 
-def _contact(scenario: Scenario, load: float) -> Rows:
-    patch = fresh_patch(scenario, load)
+def _contact(scenario: Scenario, load: float) -> TableRows:
+    patch, choice = fresh_patch(scenario, load), scenario.contact
+    model = described_model(choice.model, scenario.text)
     size = (
         f"{2e3 * patch.a:.4g} x {2e3 * patch.b:.4g} mm,"
         f" peak pressure {patch.peak_pressure / 1e6:.4g} MPa"
@@ -71,23 +65,23 @@ def _contact(scenario: Scenario, load: float) -> Rows:
         ("friction", f"{scenario.friction.coefficient:.4g}"),
         ("creepage", _creepage(scenario)),
         *_random(scenario),
-        ("contact model", _contact_model(scenario)),
-        ("fresh patch (Hertz)", size),
+        ("contact model", f"{model}: {choice.spec.summary}"),
+        ("initial patch (Hertz)", size),
     ]
 
 
-def _test(scenario: Scenario) -> Rows:
+def _test(scenario: Scenario) -> TableRows:
     problem, _, stepper = assemble_problem(scenario)
     grid, law = problem.grid, scenario.wear
     counts = problem.kinematics.multiplicity
-    alike = ", all alike" if len(counts) == 1 and counts[0] > 1 else ""
-    solved = f"{len(counts)} solved{alike}" if counts.sum() > 1 else "1"
+    identical = ", all identical" if len(counts) == 1 and counts[0] > 1 else ""
+    rollers = f"{counts.sum():.0f} ({len(counts)} solved{identical})"
     strips = (
         f"{grid.strips} of {grid.spacing * 1e3:.4g} mm,"
         f" {grid.y[0] * 1e3:.4g} to {grid.y[-1] * 1e3:.4g} mm"
     )
     return [
-        ("rollers", f"{counts.sum():.0f} ({solved})" if counts.sum() > 1 else "1"),
+        ("rollers", rollers if counts.sum() > 1 else "1"),
         (
             "duration",
             f"{scenario.total_time / 60.0:.6g} min, {scenario.total_passes:,} roller passes",
@@ -98,13 +92,13 @@ def _test(scenario: Scenario) -> Rows:
     ]
 
 
-def plan(scenario: Scenario) -> Rows:
-    """Return what a scenario will run as rows of name and value.
+def plan(scenario: Scenario) -> TableRows:
+    """Return the description of a scenario's run as rows of name and value.
 
     Parameters
     ----------
     scenario : Scenario
-        A run's, or a single contact's.
+        A scenario of a run or of a single contact.
 
     Returns
     -------
@@ -115,21 +109,18 @@ def plan(scenario: Scenario) -> Rows:
     ScenarioError, CapabilityError
         If it cannot run.
     """
-    load, whole = scenario.load.build(), is_run(scenario)
-    low, high = load_range(scenario, load, scenario.total_time if whole else 0.0)
+    load, operation = scenario.load.build(), scenario.operation
+    has_end = operation.duration is not None or operation.passes is not None
+    is_run = has_end and scenario.wear is not None
+    low, high = load_range(scenario, load, scenario.total_time if is_run else 0.0)
     values = f"{low:.4g} N" if low == high else f"{low:.4g} to {high:.4g} N"
     if load.stiffness > 0.0:
         values += f", less {load.stiffness / 1e3:.4g} N/mm of descent"
     values += "".join(f", plus {term.name}" for term in scenario.load.terms)
     rows = [*_bodies(scenario), ("load", f"{scenario.load.kind}, {values}")]
     rows += _contact(scenario, high)
-    if whole:
+    if is_run:
         return rows + _test(scenario)
     check_model(scenario, scenario.contact.build())
     strips = study_contact(scenario).grid.strips
     return [*rows, ("runs as", f"one contact, {strips} strips (no duration or no wear law)")]
-
-
-def _contact_model(scenario: Scenario) -> str:
-    choice = scenario.contact
-    return f"{described_model(choice.model, scenario.text)}: {choice.spec.summary}"

@@ -1,4 +1,4 @@
-"""What a run tells whoever watches it."""
+"""Events of a run, for the callback of `run` and `resume`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 @dataclass(frozen=True)
 class Started:
-    """A run has begun, or goes on from `from_passes`."""
+    """Start of a run, or its continuation from `from_passes`."""
 
     total_passes: float
     total_time: float
@@ -19,7 +19,7 @@ class Started:
 
 @dataclass(frozen=True)
 class Stepped:
-    """A step stands; SI units, `depth` and `depth_error` of the cylinder."""
+    """An accepted step; SI units, `depth` and `depth_error` of the cylinder."""
 
     passes: float
     total_passes: float
@@ -32,14 +32,14 @@ class Stepped:
 
 @dataclass(frozen=True)
 class Warned:
-    """Something the user should know."""
+    """A warning for the user."""
 
     message: str
 
 
 @dataclass(frozen=True)
 class Checkpointed:
-    """The results file is up to date at `passes`."""
+    """A checkpoint in the results file at `passes`."""
 
     path: str
     passes: float
@@ -47,7 +47,7 @@ class Checkpointed:
 
 @dataclass(frozen=True)
 class Finished:
-    """The run is done."""
+    """End of the run."""
 
     wall_seconds: float
 

@@ -1,4 +1,4 @@
-"""Inputs that are drawn anew at every pass: the draws themselves, and nodes that stand for them."""
+"""Inputs drawn at every pass: single draws, and quadrature nodes for the expectation of wear."""
 
 from __future__ import annotations
 
@@ -17,26 +17,22 @@ from wearsim.uq.sampling.gaussian_copula import GaussianCopula
 from wearsim.uq.sampling.philox import Stream
 from wearsim.uq.sampling.sampler import Sampler
 
-MOST_NODES = 128
-GUIDING_POINTS = 2**15
-LEAST_WEIGHT = 0.1  # of an equal weight; a negative one would wear metal on
+MAX_NODES = 128
+REFERENCE_POINTS = 2**15  # Sobol points of the exact means
+LEAST_WEIGHT = 0.1  # of an equal weight; a negative weight would add material
 
 
-def _values(
-    items: Sequence[RandomInput], uniforms: Mapping[str, FloatArray]
-) -> dict[str, FloatArray]:
-    """Return what draws of the inputs set, by field of `ContactInputs`, shape (draws,)."""
-    values = {}
+def _with_values(
+    inputs: ContactInputs, items: Sequence[RandomInput], uniforms: Mapping[str, FloatArray]
+) -> ContactInputs:
+    """Return inputs with drawn values, the same for every roller; loads are added to the load."""
+    columns = {}
     for item in items:
         drawn = item.values(uniforms[item.name])
+        rollers = len(inputs.friction) // len(drawn)
         for column, (key, mean) in enumerate(zip(item.keys, item.mean, strict=True)):
-            values[CONTACT_FIELDS[key]] = drawn[:, column] - origin(key, mean)
-    return values
-
-
-def _placed(inputs: ContactInputs, values: Mapping[str, FloatArray]) -> ContactInputs:
-    """Return inputs with values drawn for each contact, shape (contacts,); loads are added."""
-    columns = {name: array[:, None] for name, array in values.items()}
+            values = np.tile(drawn[:, column] - origin(key, mean), rollers)
+            columns[CONTACT_FIELDS[key]] = values[:, None]
     if "normal_force_offset" in columns:
         columns["normal_force_offset"] = inputs.normal_force_offset + columns["normal_force_offset"]
     return inputs.with_values(columns)
@@ -49,7 +45,7 @@ def _copula(scenario: Scenario, items: Sequence[RandomInput]) -> GaussianCopula:
 
 
 def redrawing(scenario: Scenario, items: Sequence[RandomInput]) -> Redraw:
-    """Return what draws the inputs of single passes, each by the number of its pass."""
+    """Return a function that draws the inputs of single passes by the number of the pass."""
     streams = {item: Stream(scenario.seed, item.name, "pass") for item in items}
     copula, realisation = _copula(scenario, items), scenario.sampling.realisation
 
@@ -59,13 +55,13 @@ def redrawing(scenario: Scenario, items: Sequence[RandomInput]) -> Redraw:
             item.name: stream.rows(first, count, item.dimension, realisation)
             for item, stream in streams.items()
         }
-        return _placed(inputs, _values(items, copula.correlate(uniforms)))
+        return _with_values(inputs, items, copula.correlate(uniforms))
 
     return redraw
 
 
-def fewest_nodes(items: Sequence[RandomInput]) -> int:
-    """Return how many nodes a roller has at least: one number needs few, a plane many."""
+def minimum_nodes(items: Sequence[RandomInput]) -> int:
+    """Return the minimum number of nodes of a roller: 8 in one dimension, 64 in several."""
     return 8 if sum(item.dimension for item in items) == 1 else 64
 
 
@@ -74,54 +70,52 @@ def with_nodes(
 ) -> WearProblem:
     """Return the problem with `count` contacts for each roller, a quadrature over its passes.
 
-    The nodes are scrambled Sobol points. Their weights are the nearest to equal ones that give
-    what the wear would be in full slip, and its moments in the tilt, their exact means: what is
-    left to the points is how wear departs from that.
+    The nodes are scrambled Sobol points. Their weights are the nearest to equal ones that integrate
+    the wear in full slip, and its moments in the tilt, exactly. The quadrature error is then that
+    of the difference between the wear and these functions.
 
     Parameters
     ----------
     problem : WearProblem
         With one contact for each roller.
     scenario : Scenario
-        Gives seed and correlations.
+        Scenario with seed and correlations.
     items : sequence of RandomInput
-        What is drawn at every pass.
+        Inputs that are drawn at every pass.
     count : int
         Nodes of each roller, a multiple of 4.
     """
     names = [(item.name, item.dimension) for item in items]
     sampler, copula = Sampler(scenario.seed, names, "sobol"), _copula(scenario, items)
+    rollers = np.arange(problem.rollers, dtype=np.int64)
 
     def inputs_of(points: int) -> ContactInputs:
-        values = _values(items, copula.correlate(sampler.uniforms(0, points)))
-        roller = np.repeat(np.arange(problem.rollers, dtype=np.int64), points)
-        everywhere = {name: np.tile(array, problem.rollers) for name, array in values.items()}
-        return _placed(problem.inputs.at(roller), everywhere)
+        uniforms = copula.correlate(sampler.uniforms(0, points))
+        return _with_values(problem.inputs.at(np.repeat(rollers, points)), items, uniforms)
 
     force = float(problem.load.force(np.zeros(1))[0])
-    inputs, many = inputs_of(count), inputs_of(GUIDING_POINTS)
+    inputs, reference = inputs_of(count), inputs_of(REFERENCE_POINTS)
     weights = []
     for number in range(problem.rollers):
-        here = _guides(inputs, force, slice(number * count, (number + 1) * count))
-        mean = _guides(
-            many, force, slice(number * GUIDING_POINTS, (number + 1) * GUIDING_POINTS)
-        ).mean(axis=1)
-        # the first points of a Sobol sequence are a quadrature by themselves, as are the others
-        halves = here[:, : count // 2], here[:, count // 2 :]
-        weights += [0.5 * _calibrated(half, mean) for half in halves]
+        values, exact = (
+            _wear_functions(some, force, slice(number * points, (number + 1) * points))
+            for some, points in ((inputs, count), (reference, REFERENCE_POINTS))
+        )
+        # both halves of the points are quadratures too
+        halves = values[:, : count // 2], values[:, count // 2 :]
+        weights += [0.5 * _calibrated(half, exact.mean(axis=1)) for half in halves]
+    second_half = np.arange(count, dtype=np.int64) >= count // 2
     return replace(
         problem,
         inputs=inputs,
-        roller=np.repeat(np.arange(problem.rollers, dtype=np.int64), count),
+        roller=np.repeat(rollers, count),
         weight=np.concatenate(weights),
-        half=np.tile(np.arange(count, dtype=np.int64) >= count // 2, problem.rollers).astype(
-            np.int64
-        ),
+        half=np.tile(second_half, problem.rollers).astype(np.int64),
     )
 
 
-def _guides(inputs: ContactInputs, force: float, part: slice) -> FloatArray:
-    """Return functions of the inputs that wear nearly follows, shape (functions, draws)."""
+def _wear_functions(inputs: ContactInputs, force: float, part: slice) -> FloatArray:
+    """Return functions of the inputs that approximate wear, shape (functions, draws)."""
     load = np.maximum(force + inputs.normal_force_offset[part, 0], 0.0)
     slip = np.hypot(inputs.longitudinal[part, 0], inputs.yaw[part, 0])
     wear, tilt = load * inputs.friction[part, 0] * slip, inputs.tilt[part, 0]
@@ -129,22 +123,24 @@ def _guides(inputs: ContactInputs, force: float, part: slice) -> FloatArray:
     return np.array([one, wear, wear * tilt, wear * tilt**2, tilt, tilt**2, wear * tilt**3])
 
 
-def _calibrated(guides: FloatArray, means: FloatArray) -> FloatArray:
-    """Return the positive weights nearest to equal ones that give the guides their means.
+def _calibrated(values: FloatArray, means: FloatArray) -> FloatArray:
+    """Return the positive weights nearest to equal ones that integrate functions exactly.
 
     Parameters
     ----------
-    guides : ndarray, shape (functions, nodes)
-        In the order of their importance.
+    values : ndarray, shape (functions, nodes)
+        Functions at the nodes, in the order of their importance; the last ones are left out if a
+        weight would be too small.
     means : ndarray, shape (functions,)
+        Exact means.
     """
-    nodes = guides.shape[1]
+    nodes = values.shape[1]
     equal = np.full(nodes, 1.0 / nodes)
-    scale = np.abs(guides).max(axis=1)
-    felt = np.flatnonzero(scale > 0.0)[: max(nodes // 4, 2)]
-    for count in range(len(felt), 1, -1):
-        rows = guides[felt[:count]] / scale[felt[:count], None]
-        missing = means[felt[:count]] / scale[felt[:count]] - rows @ equal
+    scale = np.abs(values).max(axis=1)
+    used = np.flatnonzero(scale > 0.0)[: max(nodes // 4, 2)]
+    for count in range(len(used), 1, -1):
+        rows = values[used[:count]] / scale[used[:count], None]
+        missing = means[used[:count]] / scale[used[:count]] - rows @ equal
         found: FloatArray = equal + rows.T @ (np.linalg.pinv(rows @ rows.T, 1e-10) @ missing)
         if found.min() > LEAST_WEIGHT / nodes:
             return found

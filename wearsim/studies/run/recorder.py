@@ -1,8 +1,11 @@
-"""Keeps the history of a run and its recorded profiles; records never move a step."""
+"""Record schedule, history and recorded profiles of a wear test."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -21,10 +24,102 @@ from wearsim.evolution.steppers.single_step import (
     present_loads,
     solve_present,
 )
-from wearsim.studies.run.output_schedule import RecordSchedule
+from wearsim.scenario import Scenario
+from wearsim.scenario.tables.plain import DEFAULT_RECORDS
 from wearsim.types import FloatArray, Number
 
-Row = dict[str, object]
+_ROUND_OFF = 1e-9
+
+Variables = dict[str, object]
+
+
+@dataclass(frozen=True)
+class RecordSchedule:
+    """Passes of the records, at equal intervals or in a geometric sequence.
+
+    Parameters
+    ----------
+    interval : float
+        Passes between records, or 0 for a geometric sequence.
+    base, count : float
+        In a geometric sequence record k is at base^(k/count) passes.
+    """
+
+    interval: float
+    base: float
+    count: float
+
+    @classmethod
+    def of(cls, scenario: Scenario, base: float) -> RecordSchedule:
+        """Return the schedule of a scenario; `base` is the length of the test [passes].
+
+        When a test is extended, the base remains the length of the first run, so that the sequence
+        of records continues unchanged.
+        """
+        outputs = scenario.outputs
+        count = outputs.records if outputs.records is not None else DEFAULT_RECORDS
+        if outputs.every_passes is not None:
+            return cls(float(outputs.every_passes), base, count)
+        if outputs.every is not None:
+            return cls(outputs.every * scenario.pass_rate, base, count)
+        even = outputs.spacing == "even" or base <= 1.0
+        return cls(base / count if even else 0.0, base, count)
+
+    def next_record(self, passes: float) -> float:
+        """Return the passes of the first record after `passes`."""
+        if self.interval > 0.0:
+            due = (math.floor(passes / self.interval + _ROUND_OFF) + 1) * self.interval
+        else:
+            number = self.count * math.log(max(passes, 1.0)) / math.log(self.base)
+            due = float(self.base ** ((math.floor(number + _ROUND_OFF) + 1) / self.count))
+        # round-off must not move a record at the end of the test to just before it
+        whole = float(round(due))
+        return whole if abs(due - whole) <= 1e-15 * whole and whole > passes else due
+
+    def all_records(self, stop: float, pass_by_pass: bool) -> FloatArray:
+        """Return the passes of all records of a test, from the initial state to the end.
+
+        Parameters
+        ----------
+        stop : float
+            Passes at the end of the test.
+        pass_by_pass : bool
+            Whether every step is one pass, so that records are at whole numbers of passes.
+        """
+        found = [0.0]
+        while found[-1] < stop:
+            found.append(min(self.due_after(found[-1], pass_by_pass), stop))
+        return np.array(found)
+
+    def due_between(
+        self, first: float, last: float, stop: float, pass_by_pass: bool = False
+    ) -> list[tuple[float, bool]]:
+        """Return the records after one state of a test, up to and including the next state.
+
+        Parameters
+        ----------
+        first, last : float
+            Passes of the two states.
+        stop : float
+            Passes at the end of the test, which is always recorded.
+        pass_by_pass : bool
+            As in `all_records`.
+
+        Returns
+        -------
+        list of (float, bool)
+            Passes, and whether the record is at the second state.
+        """
+        found, passes = [], self.due_after(first, pass_by_pass)
+        while passes < last:
+            found.append((passes, False))
+            passes = self.due_after(passes, pass_by_pass)
+        return found + [(last, True)] * (passes == last or last >= stop)
+
+    def due_after(self, passes: float, pass_by_pass: bool) -> float:
+        """Return the passes of the first record after `passes`, whole if `pass_by_pass`."""
+        due = self.next_record(passes)
+        return float(math.ceil(due)) if pass_by_pass else due
 
 
 def history_row(
@@ -33,19 +128,24 @@ def history_row(
     before: WearState | None,
     threshold: float,
     pass_by_pass: bool,
-) -> Row:
+) -> Variables:
     """Return the observables of a state; `threshold` [m] bounds the groove's width."""
     problem, state, loads = present_contacts(problem, state, pass_by_pass)
-    realisations = range(problem.shape[2])
     worn = state.cylinder_depth
-    power = problem.values_of(state.contacts, "power")
-    row: Row = {
+
+    def per_roller(name: str) -> FloatArray:
+        return problem.per_roller(problem.values_of(state.contacts, name))
+
+    return {
         "passes": state.passes_done,
         "time": problem.time(state.passes_done),
         "step_passes": 0.0 if before is None else state.passes_done - before.passes_done,
         "depth": cylinder_depth_of(state),
         "width": np.array(
-            [width(problem.grid.y, worn[:, 0, v].max(axis=0), threshold) for v in realisations]
+            [
+                width(problem.grid.y, worn[:, 0, v].max(axis=0), threshold)
+                for v in range(problem.shape[2])
+            ]
         ),
         "worn_volume": cylinder_volume_of(problem, state),
         "roller_depth": depth(state.roller_depth)[0],
@@ -53,37 +153,26 @@ def history_row(
             state.roller_depth[0], problem.grid.spacing, problem.kinematics.roller_radius
         ),
         "dissipated_energy": state.energy,
-        "power": problem.total_power(power),
+        "power": problem.total_power(problem.values_of(state.contacts, "power")),
         "normal_force": mean_along(problem.per_roller(loads), axis=0)[0],
         "depth_error": state.depth_error,
         "volume_error": state.volume_error,
         "rejected": state.rejected,
         "solves": state.solves,
         "full_solves": state.full_solves,
+        "peak_pressure": per_roller("peak_pressure").max(axis=0),
+        **{
+            name: mean_along(per_roller(name), axis=0)[0]
+            for name in ("approach", "longitudinal_creepage", "adhesion_fraction")
+        },
     }
-    peak = problem.values_of(state.contacts, "peak_pressure")
-    row["peak_pressure"] = problem.per_roller(peak).max(axis=0)
-    for name in ("approach", "longitudinal_creepage", "adhesion_fraction"):
-        values = problem.values_of(state.contacts, name)
-        row[name] = mean_along(problem.per_roller(values), axis=0)[0]
-    return row
 
 
-def at_record(problem: WearProblem, stepper: Stepper, start: WearState, passes: float) -> WearState:
-    """Return the state at `passes`, reached from `start` by a step of its own that leads nowhere.
+def take_side_step(step: Step, problem: WearProblem, state: WearState, passes: Number) -> WearState:
+    """Return the state `passes` later by one side step, or by halves if that step fails.
 
-    A profile interpolated between two steps would not fit its contact: line loads feel a tenth of
-    a micrometre. A side step does, and leaves the run as it is.
-    """
-
-    def step(problem: WearProblem, state: WearState, passes: Number) -> WearState:
-        return stepper.side_step(problem, state, float(passes))
-
-    return stepped_aside(step, problem, start, passes - start.passes).replaced(passes=passes)
-
-
-def stepped_aside(step: Step, problem: WearProblem, state: WearState, passes: Number) -> WearState:
-    """Return the state `passes` later by one side step, or by halves where there is no such step.
+    A profile interpolated between two steps would not fit its contact, since line loads change
+    noticeably with a tenth of a micrometre. The run does not continue from a side step.
 
     Parameters
     ----------
@@ -92,7 +181,7 @@ def stepped_aside(step: Step, problem: WearProblem, state: WearState, passes: Nu
     problem : WearProblem
     state : WearState
     passes : float or ndarray, shape (realisations,)
-        Halved for one test alone: what becomes of it must not hang on others.
+        Halved only for a single test, whose result must not depend on others in its batch.
 
     Raises
     ------
@@ -105,16 +194,16 @@ def stepped_aside(step: Step, problem: WearProblem, state: WearState, passes: Nu
         half = 0.5 * passes
         if np.size(half) > 1 or np.max(half) < SMALLEST_STEP:
             raise
-    return stepped_aside(step, problem, stepped_aside(step, problem, state, half), half)
+    return take_side_step(step, problem, take_side_step(step, problem, state, half), half)
 
 
 def present_contacts(
     problem: WearProblem, state: WearState, pass_by_pass: bool
 ) -> tuple[WearProblem, WearState, FloatArray]:
-    """Return `state` with its contacts at the loads of this moment, their problem, and the loads.
+    """Return `state` with its contacts at the present loads, their problem, and the loads.
 
-    Where every pass draws its inputs one contact says little: contacts that stand for many passes
-    take its place, so that a record holds the same whatever the stepper.
+    If inputs are drawn at every pass, the contacts are those of the quadrature over passes, so that
+    a record does not depend on the stepper.
     """
     if problem.expectation is not None:
         problem, state = problem.expectation, state.replaced(contacts=())
@@ -123,61 +212,67 @@ def present_contacts(
     return problem, state.replaced(contacts=solve(problem, state, loads)), loads
 
 
-def record_row(problem: WearProblem, state: WearState, pass_by_pass: bool) -> Row:
-    """Return the profiles of a state and the contacts at the loads of this moment."""
+def record_row(problem: WearProblem, state: WearState, pass_by_pass: bool) -> Variables:
+    """Return the profiles of a state and the contacts at the present loads."""
     problem, state, _ = present_contacts(problem, state, pass_by_pass)
-    row: Row = {
+    return {
         "record_passes": state.passes,
         "record_time": problem.time(state.passes),
         "cylinder_depth_profile": state.cylinder_depth[:, 0],
         "roller_depth_profile": state.roller_depth[0],
+        **{
+            name: problem.per_roller(problem.values_of(state.contacts, name))
+            for name in ("line_load", "half_length", "dissipation")
+        },
     }
-    for name in ("line_load", "half_length", "dissipation"):
-        row[name] = problem.per_roller(problem.values_of(state.contacts, name))
-    return row
 
 
 def due_states(
     problem: WearProblem, stepper: Stepper, schedule: RecordSchedule, advance: Advance, stop: float
 ) -> list[WearState]:
-    """Return the states that are to be recorded on the way of a step, in their order.
+    """Return the states to be recorded within a step and at its end, in order.
 
     Parameters
     ----------
     problem : WearProblem
     stepper : Stepper
-        Takes the side steps to what falls due within the step.
+        Takes the side steps to records within the step.
     schedule : RecordSchedule
     advance : Advance
         The step.
     stop : float
-        Passes at the end of the test, which is recorded too.
+        Passes at the end of the test, which is always recorded.
     """
-    found = []
-    for first, last in zip(advance.path[:-1], advance.path[1:], strict=True):
-        between, at_end = schedule.due_between(
+
+    def step(problem: WearProblem, state: WearState, passes: Number) -> WearState:
+        return stepper.side_step(problem, state, float(passes))
+
+    return [
+        last
+        if at_end
+        else take_side_step(step, problem, first, due - first.passes).replaced(passes=due)
+        for first, last in pairwise(advance.path)
+        for due, at_end in schedule.due_between(
             first.passes, last.passes, stop, stepper.pass_by_pass
         )
-        found += [at_record(problem, stepper, first, passes) for passes in between]
-        found += [last] if at_end else []
-    return found
+    ]
 
 
 class Recorder:
-    """Collects history and records; what it shows is always that of a whole number of steps.
+    """History and records of a run, always consistent with a whole number of steps.
 
     Parameters
     ----------
     problem : WearProblem
     stepper : Stepper
-        Takes the side steps to what falls due within a step.
+        Takes the side steps to records within a step.
     schedule : RecordSchedule
     threshold : float
         Depth that bounds the groove's width [m].
     state : WearState
-        Where the run stands.
+        The current state.
     history, records : mapping of str to ndarray, optional
-        What an earlier part of the run collected; without it `state` is recorded as the first.
+        Those of an earlier part of the run; without them `state` is recorded first.
     """
 
     def __init__(
@@ -201,22 +296,22 @@ class Recorder:
         self._kept = len(self._history), len(self._records), state
 
     def add(self, advance: Advance, stop: float) -> None:
-        """Take note of a step, and record what fell due on its way or at the end of the test."""
+        """Add a step to the history, and record the states due within it or at its end."""
         start, end = advance.path[0], advance.end
         due = due_states(self.problem, self.stepper, self.schedule, advance, stop)
         pass_by_pass = self.stepper.pass_by_pass
         self._records += [record_row(self.problem, state, pass_by_pass) for state in due]
         self._history.append(history_row(self.problem, end, start, self.threshold, pass_by_pass))
-        # one assignment: an interrupt in the lines above leaves the step before in force
+        # a single assignment: an interrupt before it leaves the previous step current
         self._kept = len(self._history), len(self._records), end
 
     def drop_unfinished(self) -> None:
-        """Forget what an interrupted `add` left behind."""
+        """Remove the rows of an interrupted `add`."""
         del self._history[self._kept[0] :], self._records[self._kept[1] :]
 
     @property
     def state(self) -> WearState:
-        """The state after the last step that was noted."""
+        """The state after the last step that was added."""
         return self._kept[2]
 
     @property
@@ -230,10 +325,10 @@ class Recorder:
         return _columns(self._records)
 
 
-def _rows(columns: Mapping[str, FloatArray]) -> list[Row]:
+def _rows(columns: Mapping[str, FloatArray]) -> list[Variables]:
     count = len(next(iter(columns.values()))) if columns else 0
     return [{name: column[k] for name, column in columns.items()} for k in range(count)]
 
 
-def _columns(rows: list[Row]) -> dict[str, FloatArray]:
+def _columns(rows: list[Variables]) -> dict[str, FloatArray]:
     return {name: np.array([row[name] for row in rows]) for name in rows[0]} if rows else {}

@@ -1,4 +1,4 @@
-"""A wear test from start to end: run it, stop it anywhere, and go on from its file."""
+"""Run of a wear test: start, stop and resume."""
 
 from __future__ import annotations
 
@@ -13,18 +13,15 @@ import numpy as np
 from wearsim.errors import Interrupted, ResultsFileError, SolverError
 from wearsim.evolution.error_control.error_estimates import greatest_depth, total_worn_volume
 from wearsim.evolution.integrate import evolve
-from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import SIGMAS, WearState, fresh_state, widened, widened_state
-from wearsim.evolution.steppers.base import Advance, Stepper
 from wearsim.results import Result, RunData, check_output, kind_of, read_results, write_results
 from wearsim.results.run.schema import VARIABLES
 from wearsim.scenario import Scenario, parse_scenario
 from wearsim.studies.run.assemble import assemble_problem, start_height, strips_of_run
 from wearsim.studies.run.draws import draw, drawn_values
 from wearsim.studies.run.events import Checkpointed, Event, Finished, Started, Stepped, Warned
-from wearsim.studies.run.output_schedule import RecordSchedule
-from wearsim.studies.run.provenance import changed_origins, missing_plugins, origin_of
-from wearsim.studies.run.recorder import Recorder
+from wearsim.studies.run.provenance import changed_origins, check_plugins, origin_of
+from wearsim.studies.run.recorder import Recorder, RecordSchedule
 from wearsim.types import Grid
 
 Watcher = Callable[[Event], None]
@@ -38,7 +35,7 @@ def run(
     on_event: Watcher | None = None,
     stop_requested: Callable[[], bool] | None = None,
 ) -> Result:
-    """Run a wear test from fresh bodies to its end.
+    """Run a wear test from unworn bodies to its end.
 
     Parameters
     ----------
@@ -48,9 +45,9 @@ def run(
     force : bool
         Overwrite an existing file.
     on_event : callable, optional
-        Told what happens, see `wearsim.studies.run.events`.
+        Called with every event, see `wearsim.studies.run.events`.
     stop_requested : callable, optional
-        Asked after every step; True ends the run after a checkpoint.
+        Called after every step; True stops the run after a checkpoint.
 
     Returns
     -------
@@ -61,17 +58,14 @@ def run(
     ScenarioError, CapabilityError, ResultsFileError
         If the run cannot start.
     SolverError
-        If it fails; the file then holds everything up to the last good step.
+        If it fails; the file then holds everything up to the last accepted step.
     Interrupted
-        If it was stopped; `resume` goes on from the file.
+        If it was stopped; `resume` continues from the file.
     """
     path = Path(output) if output is not None else None
     if path is not None:
         check_output(path, force, scenario.paths)
-    problem, stepper, name = assemble_problem(scenario)
-    replay = _RunInProgress(scenario, problem, stepper, name, path, on_event, stop_requested)
-    replay.begin(fresh_state(problem), float(scenario.total_passes))
-    return replay.finish()
+    return _RunInProgress(scenario, path, on_event, stop_requested).finish()
 
 
 def resume(
@@ -81,7 +75,7 @@ def resume(
     on_event: Watcher | None = None,
     stop_requested: Callable[[], bool] | None = None,
 ) -> Result:
-    """Go on with a run from its file alone; the end is the same, bit for bit, as if unbroken.
+    """Continue a run from its file; the result is bit for bit that of an unbroken one.
 
     Parameters
     ----------
@@ -99,7 +93,7 @@ def resume(
     Raises
     ------
     ResultsFileError
-        If the file cannot be read, needs a plugin that is not there, or holds a test that is
+        If the file cannot be read, needs a plugin that is not installed, or holds a test that is
         already past `until`.
     SolverError, Interrupted
         As in `run`.
@@ -107,16 +101,11 @@ def resume(
     path = Path(file)
     if kind_of(path) == "ensemble":
         raise ResultsFileError(
-            f"{path}: holds an ensemble of wear tests, with which resume_ensemble goes on; what is"
-            " needed is a wear test"
+            f"{path}: holds an ensemble of wear tests, which resume_ensemble continues; expected"
+            " a single wear test"
         )
     data = read_results(path)
-    missing = missing_plugins(data.plugins)
-    if missing:
-        raise ResultsFileError(
-            f"{path}: the run needs {' and '.join(missing)}, which is not installed here; install"
-            " it and resume again"
-        )
+    check_plugins(path, data)
     overrides = {"operation.duration": f"{until!r} s"} if until is not None else None
     scenario = parse_scenario(
         data.scenario_text, data.scenario_file, data.files.__getitem__, overrides
@@ -126,28 +115,25 @@ def resume(
     )
     if scenario.total_passes < state.passes:
         raise ResultsFileError(
-            f"{path}: the test stands at {state.passes / scenario.pass_rate / 60.0:.6g} min"
-            f" already, which is past {(until or 0.0) / 60.0:.6g} min; give a later --until"
+            f"{path}: the test has already reached"
+            f" {state.passes / scenario.pass_rate / 60.0:.6g} min, which is past"
+            f" {(until or 0.0) / 60.0:.6g} min; give a later --until"
         )
     if data.finished and scenario.total_passes == state.passes:
         return Result(data, path)
     data, state = _widened(scenario, data, state)
-    grid = Grid(data.static["y"], float(data.checkpoint["spacing"]))
-    problem, stepper, name = assemble_problem(scenario, grid)
-    replay = _RunInProgress(scenario, problem, stepper, name, path, on_event, stop_requested)
-    replay.go_on(data, state)
-    return replay.finish()
+    return _RunInProgress(scenario, path, on_event, stop_requested, data, state).finish()
 
 
 def _widened(scenario: Scenario, data: RunData, state: WearState) -> tuple[RunData, WearState]:
-    """Return data and state on as many more strips as an extended test needs, if any.
+    """Return data and state with additional strips if an extended test needs them.
 
-    The strips that are there stay as they are, so that nothing is interpolated.
+    The present strips are unchanged, so that nothing is interpolated.
     """
     y, spacing = data.static["y"], float(data.checkpoint["spacing"])
     needed = strips_of_run(draw(scenario))
     lacking = 0.5 * (needed.spacing * needed.strips - spacing * len(y))
-    # a little more costs less than a contact that runs off its strips
+    # a surplus strip costs less than a contact that reaches the edge
     strips = int(np.ceil(lacking / spacing)) if lacking > 1e-6 * spacing else 0
     if strips == 0 or scenario.total_passes == data.total_passes:
         return data, state
@@ -161,63 +147,62 @@ def _widened(scenario: Scenario, data: RunData, state: WearState) -> tuple[RunDa
     return data, widened_state(state, wider, strips)
 
 
-#: what a checkpoint holds besides the state
+#: values of a checkpoint that are not part of the state
 _EXTRA = ("record_base", "spacing")
 
 
 class _RunInProgress:
-    """One run in this process: it owns the recorder, the clock and the file."""
+    """A run in this process, with its recorder, clock and file.
+
+    It starts from unworn bodies, or continues from the data and the state of a file.
+    """
+
+    _last_write = 0.0  # duration [s]
 
     def __init__(
         self,
         scenario: Scenario,
-        problem: WearProblem,
-        stepper: Stepper,
-        stepper_name: str,
         path: Path | None,
         on_event: Watcher | None,
         stop_requested: Callable[[], bool] | None,
+        data: RunData | None = None,
+        state: WearState | None = None,
     ) -> None:
-        self.scenario, self.problem = scenario, problem
-        self.stepper, self.stepper_name = stepper, stepper_name
-        self.path = path
-        self.tell: Watcher = on_event or (lambda event: None)
+        grid = None
+        if data is not None:
+            grid = Grid(data.static["y"], float(data.checkpoint["spacing"]))
+        self.scenario, self.path = scenario, path
+        self.problem, self.stepper, self.stepper_name = assemble_problem(scenario, grid)
+        self.on_event: Watcher = on_event or (lambda event: None)
         self.stop_requested = stop_requested or (lambda: False)
         self.stop = float(scenario.total_passes)
         self.origin = origin_of(scenario)
         self.drawn = drawn_values(scenario, draw(scenario))
-        self.warnings: list[str] = []
-        self.created = datetime.now(UTC).isoformat(timespec="seconds")
-        self.wall_before, self.started = 0.0, time.monotonic()
-
-    def begin(self, state: WearState, record_base: float) -> None:
-        """Start from fresh bodies."""
-        self.record_base = record_base
-        self.recorder = self._recorder(state)
-        self._write()
-
-    def go_on(self, data: RunData, state: WearState) -> None:
-        """Start from what a file holds."""
-        self.record_base = float(data.checkpoint["record_base"])
-        self.recorder = self._recorder(state, data)
-        self.warnings, self.created = list(data.warnings), data.created
-        self.wall_before = data.wall_seconds
-        for text in changed_origins(data, self.scenario):
-            self._warn(text)
-
-    def _recorder(self, state: WearState, data: RunData | None = None) -> Recorder:
-        schedule = RecordSchedule.of(self.scenario, self.record_base)
-        threshold = self.scenario.outputs.width_threshold
-        if data is None:
-            return Recorder(self.problem, self.stepper, schedule, threshold, state)
-        return Recorder(
-            self.problem, self.stepper, schedule, threshold, state, data.history, data.records
+        self.warnings: list[str] = [] if data is None else list(data.warnings)
+        now = datetime.now(UTC).isoformat(timespec="seconds")
+        self.created = now if data is None else data.created
+        self.wall_before = 0.0 if data is None else data.wall_seconds
+        self.started = time.monotonic()
+        self.record_base = self.stop if data is None else float(data.checkpoint["record_base"])
+        self.recorder = Recorder(
+            self.problem,
+            self.stepper,
+            RecordSchedule.of(scenario, self.record_base),
+            scenario.outputs.width_threshold,
+            fresh_state(self.problem) if state is None else state,
+            None if data is None else data.history,
+            None if data is None else data.records,
         )
+        if data is None:
+            self._write()
+        else:
+            for text in changed_origins(data, scenario):
+                self._warn(text)
 
     def finish(self) -> Result:
         """Step to the end of the test and return the result."""
         state = self.recorder.state
-        self.tell(
+        self.on_event(
             Started(
                 self.stop,
                 self.problem.time(self.stop),
@@ -227,28 +212,28 @@ class _RunInProgress:
             )
         )
         try:
-            self._step_through()
-            self._judge()
+            self._step_to_end()
+            self._check_errors()
             self._write(finished=True)
         except KeyboardInterrupt:
-            self._interrupted()
+            self._interrupt()
         except SolverError:
-            # nothing is lost: the file keeps the last good step, and the user sees how it got there
+            # the file keeps the last accepted step and the history before the failure
             self.recorder.drop_unfinished()
             self._write()
             raise
-        self.tell(Finished(self._wall()))
+        self.on_event(Finished(self._wall()))
         return Result(self._data(finished=True), self.path)
 
-    def _judge(self) -> None:
-        """Warn where the estimated error has outgrown the tolerance in spite of all."""
+    def _check_errors(self) -> None:
+        """Warn if an estimated error exceeds the tolerance."""
         state, tolerance = self.recorder.state, self.scenario.evolution.tolerance
         sizes = greatest_depth(state), total_worn_volume(self.problem, state)
         errors = state.depth_error, state.volume_error
         for kind, name in enumerate(("depth", "worn volume")):
             parts = [errors[kind], state.quadrature[kind], SIGMAS * np.sqrt(state.scatter[kind])]
-            whole = np.where(sizes[kind] > 0.0, sizes[kind], np.inf)
-            relative, quadrature, scatter = (float((part / whole).max()) for part in parts)
+            size = np.where(sizes[kind] > 0.0, sizes[kind], np.inf)
+            relative, quadrature, scatter = (float((part / size).max()) for part in parts)
             if relative <= tolerance:
                 continue
             remedy = "lower evolution.tolerance or evolution.step"
@@ -256,14 +241,13 @@ class _RunInProgress:
                 remedy = "raise evolution.nodes"
                 if scatter > quadrature:
                     part = scatter / relative
-                    remedy = f"{part:.0%} of it is what draws at so few passes leave to chance"
+                    remedy = f"{part:.0%} of it is sampling scatter of the small number of passes"
             self._warn(
-                f"estimated error of {name}: {100.0 * relative:.2g} % is more than the tolerance"
+                f"estimated error of {name}: {100.0 * relative:.2g} % exceeds the tolerance"
                 f" of {100.0 * tolerance:.2g} %; {remedy}"
             )
 
-    def _step_through(self) -> None:
-        every = self.scenario.outputs.checkpoint_every
+    def _step_to_end(self) -> None:
         written = time.monotonic()
         for advance in evolve(
             self.problem,
@@ -274,56 +258,53 @@ class _RunInProgress:
             self.scenario.evolution.max_steps,
         ):
             self.recorder.add(advance, self.stop)
-            self._report(advance)
+            state = advance.end
+            if advance.warning is not None:
+                self._warn(advance.warning)
+            self.on_event(
+                Stepped(
+                    passes=state.passes,
+                    total_passes=self.stop,
+                    time=self.problem.time(state.passes),
+                    depth=float(state.cylinder_depth.max()),
+                    step_passes=state.passes - advance.path[0].passes,
+                    depth_error=float(state.depth_error.max()),
+                    wall_seconds=self._wall(),
+                )
+            )
             if self.stop_requested() and self.recorder.state.passes < self.stop:
-                self._interrupted()
-            # a slow disk must not hold up the run: at most a fiftieth of the time goes into files
-            if time.monotonic() - written > max(every, 50.0 * self._last_write):
+                self._interrupt()
+            # with a slow disk, at most 2 % of the time is spent on writing
+            every = max(self.scenario.outputs.checkpoint_every, 50.0 * self._last_write)
+            if time.monotonic() - written > every:
                 self._write()
                 written = time.monotonic()
 
-    def _report(self, advance: Advance) -> None:
-        state = advance.end
-        if advance.warning is not None:
-            self._warn(advance.warning)
-        self.tell(
-            Stepped(
-                passes=state.passes,
-                total_passes=self.stop,
-                time=self.problem.time(state.passes),
-                depth=float(state.cylinder_depth.max()),
-                step_passes=state.passes - advance.path[0].passes,
-                depth_error=float(state.depth_error.max()),
-                wall_seconds=self._wall(),
-            )
-        )
-
     def _warn(self, message: str) -> None:
-        """Tell a warning; only the first of a kind is kept, or a long run would keep thousands."""
+        """Report and store a warning, the first of each kind only."""
         kind = message.split(":", maxsplit=1)[0]
         if not any(known.split(":")[0] == kind for known in self.warnings):
             self.warnings.append(message)
-            self.tell(Warned(message))
+            self.on_event(Warned(message))
 
-    def _interrupted(self) -> None:
+    def _interrupt(self) -> None:
+        """Write a checkpoint and raise Interrupted."""
         self.recorder.drop_unfinished()
         self._write()
         passes = self.recorder.state.passes
-        kept = f"go on with: wearsim resume {self.path}" if self.path else "nothing was written"
-        raise Interrupted(f"stopped at pass {passes:.0f} of {self.stop:.0f}; {kept}") from None
+        rest = f"continue with: wearsim resume {self.path}" if self.path else "nothing was written"
+        raise Interrupted(f"stopped at pass {passes:.0f} of {self.stop:.0f}; {rest}") from None
 
     def _wall(self) -> float:
         return self.wall_before + time.monotonic() - self.started
 
-    _last_write = 0.0
-
     def _write(self, finished: bool = False) -> None:
         if self.path is None:
             return
-        begun = time.monotonic()
+        begin = time.monotonic()
         write_results(self.path, self._data(finished))
-        self._last_write = time.monotonic() - begun
-        self.tell(Checkpointed(str(self.path), self.recorder.state.passes))
+        self._last_write = time.monotonic() - begin
+        self.on_event(Checkpointed(str(self.path), self.recorder.state.passes))
 
     def _data(self, finished: bool) -> RunData:
         scenario, problem = self.scenario, self.problem
