@@ -1,4 +1,4 @@
-"""The verb maxent: a law in a table, in blocks, as JSON and as a figure."""
+"""`wearsim maxent`: table, block plot, JSON and figure of a distribution."""
 
 import json
 import re
@@ -10,7 +10,7 @@ from cli_examples import Command
 LOAD = ("maxent", "--support", "0", "inf", "--mean", "307", "--std", "32")
 
 
-def test_that_a_law_is_told_with_its_multipliers_and_quantiles(command: Command) -> None:
+def test_table_has_multipliers_and_quantiles(command: Command) -> None:
     result = command(*LOAD)
     assert result.exit_code == 0
     assert result.stderr == ""
@@ -19,11 +19,11 @@ def test_that_a_law_is_told_with_its_multipliers_and_quantiles(command: Command)
     assert float(rows["l0"]) == pytest.approx(50.4047, rel=5e-6)
     assert float(rows["l1"]) == pytest.approx(-0.2998047, rel=1e-6)
     assert float(rows["l2"]) == pytest.approx(4.88281e-4, rel=5e-6)
-    assert rows["parent normal law"] == "mean 307, standard deviation 32"
+    assert rows["parent normal distribution"] == "mean 307, standard deviation 32"
     assert float(rows["97.5 % quantile"]) == pytest.approx(307.0 + 1.959964 * 32.0, rel=1e-6)
 
 
-def test_that_the_density_is_drawn_in_blocks(command: Command) -> None:
+def test_density_is_plotted_in_blocks(command: Command) -> None:
     lines = command("maxent", "--support", "0", "1", "--mean", "0.5", "--std", "0.35").stdout
     drawn = [line[2:] for line in lines.splitlines() if set(line) & set("▁▂▃▄▅▆▇█")]
     assert len(drawn) == 8
@@ -33,7 +33,7 @@ def test_that_the_density_is_drawn_in_blocks(command: Command) -> None:
     assert top.strip(" ") == top  # and highest at both ends
 
 
-def test_that_json_is_all_there_is(command: Command) -> None:
+def test_json_is_all_of_stdout(command: Command) -> None:
     result = command(*LOAD, "--json")
     data = json.loads(result.stdout)
     assert result.stderr == ""
@@ -44,40 +44,40 @@ def test_that_json_is_all_there_is(command: Command) -> None:
     assert data["warnings"] == []
 
 
-def test_that_negative_limits_and_means_are_taken(command: Command) -> None:
+def test_negative_limits_and_means_are_accepted(command: Command) -> None:
     result = command("maxent", "--support", "-inf", "-1", "--mean", "-3.5", "--json")
     data = json.loads(result.stdout)
     assert (data["family"], data["std"]) == ("exponential", pytest.approx(2.5))
 
 
-def test_that_a_mean_logarithm_gives_a_gamma_law(command: Command) -> None:
+def test_mean_logarithm_gives_a_gamma_distribution(command: Command) -> None:
     arguments = ("maxent", "--support", "0", "inf", "--mean", "2", "--mean-log", "0.1")
     assert json.loads(command(*arguments, "--json").stdout)["family"] == "gamma"
     assert "l2 log x" in command(*arguments).stdout
 
 
-def test_that_a_spike_is_told_on_stderr(command: Command) -> None:
+def test_spike_gives_a_warning(command: Command) -> None:
     result = command("maxent", "--support", "0", "1", "--mean", "1e-3", "--std", "1.1e-3")
     assert result.exit_code == 0
-    assert result.stderr.startswith("warning: the density is least at")
+    assert result.stderr.startswith("warning: the density has a minimum at")
 
 
-def test_that_what_no_law_can_have_is_bad_input_in_one_line(command: Command) -> None:
+def test_infeasible_moments_are_bad_input_in_one_line(command: Command) -> None:
     result = command("maxent", "--support", "0", "inf", "--mean", "307", "--std", "320")
     assert result.exit_code == 2
     assert result.stdout == ""
     (line,) = result.stderr.splitlines()
-    assert line.startswith("error: std 320 is more than mean - low = 307, the most that")
+    assert line.startswith("error: std 320 is more than mean - low = 307, the limit of")
 
 
-def test_that_a_limit_that_is_no_number_is_bad_input(command: Command) -> None:
+def test_limit_that_is_no_number_is_bad_input(command: Command) -> None:
     result = command("maxent", "--support", "0", "wide", "--mean", "307")
     assert result.exit_code == 2
     assert "'wide' is not a number" in result.stderr
 
 
 @pytest.mark.parametrize("known", [("--std", "9e-4"), ("--std", "1.1e-3"), ()])
-def test_that_a_figure_is_drawn_and_an_existing_one_left(
+def test_figure_is_drawn_and_an_existing_one_is_kept(
     command: Command, tmp_path: Path, known: tuple[str, ...]
 ) -> None:
     figure = tmp_path / "law.png"
@@ -89,7 +89,7 @@ def test_that_a_figure_is_drawn_and_an_existing_one_left(
 
 
 @pytest.mark.parametrize(
-    ("known", "told"),
+    ("known", "message"),
     [
         (("--mean", "1e-300", "--std", "1e-301"), "std 1e-301 is too small to be squared"),
         (("--mean", "1e300", "--std", "1e299"), "mean 1e+300 is too large to be squared"),
@@ -98,22 +98,22 @@ def test_that_a_figure_is_drawn_and_an_existing_one_left(
         (("--mean", "nan"), "mean must be finite, got nan"),
     ],
 )
-def test_that_an_error_names_the_options_and_values_as_typed(
-    command: Command, known: tuple[str, ...], told: str
+def test_error_names_options_and_values_as_typed(
+    command: Command, known: tuple[str, ...], message: str
 ) -> None:
     result = command("maxent", "--support", "0", "inf", *known)
     assert result.exit_code == 2
-    assert result.stderr.startswith(f"error: {told}")
+    assert result.stderr.startswith(f"error: {message}")
 
 
 @pytest.mark.parametrize("std", ["0.5", "0.35", "0.7"])
-def test_that_rounding_is_told_as_zero(command: Command, std: str) -> None:
+def test_rounding_errors_are_zero(command: Command, std: str) -> None:
     arguments = ("maxent", "--support", "-1", "1", "--mean", "0", "--std", std)
     data = json.loads(command(*arguments, "--json").stdout)
     assert (data["mean"], data["quantiles"]["0.5"], data["multipliers"]["l1"]) == (0.0, 0.0, 0.0)
     assert "e-1" not in command(*arguments).stdout
 
 
-def test_that_a_small_value_is_told_as_it_is(command: Command) -> None:
+def test_small_value_is_not_rounded(command: Command) -> None:
     arguments = ("maxent", "--support", "0", "inf", "--mean", "1e-14", "--std", "1e-15", "--json")
     assert json.loads(command(*arguments).stdout)["quantiles"]["0.5"] == pytest.approx(1e-14)

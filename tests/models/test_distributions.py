@@ -193,7 +193,7 @@ def test_that_a_bad_table_is_told(text: str, told: str) -> None:
             {"support": ["0 N", "inf"], "mean": "0.3 kN", "std": "320 N"},
             "(numbers in N)",
         ),
-        ("maxent", None, {"support": [0.0, "inf"]}, "alone gives no law"),
+        ("maxent", None, {"support": [0.0, "inf"]}, "alone determines no distribution"),
         ("maxent", None, {"support": [0.0, 1.0], "mean": 0.5, "std": -1.0}, "is out of range"),
         ("lognormal", None, {"mean": 1.0, "factor": 2.0}, "got mean and factor"),
         ("lognormal", None, {}, "expected either mean and std, or median and factor"),

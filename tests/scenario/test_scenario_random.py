@@ -294,7 +294,7 @@ def test_that_correlations_must_go_together(parse: Parse) -> None:
     with pytest.raises(ScenarioError, match=r"\[sampling\] correlation: .*not positive definite"):
         parse(LOAD, WEAR, flat, _sampling(triangle))
     twice = f"correlation = {[[a, b, 0.9], [b, a, 0.9]]}"
-    with pytest.raises(ScenarioError, match=r"\[sampling\] correlation: .*stands twice"):
+    with pytest.raises(ScenarioError, match=r"\[sampling\] correlation: .*is given twice"):
         parse(LOAD, WEAR, flat, _sampling(twice))
 
 

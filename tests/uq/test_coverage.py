@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.special import ndtri
 
-from wearsim.uq.estimation.control_variate import Control
+from wearsim.uq.estimation.standard_errors import Control
 from wearsim.uq.estimation.estimates import estimate
 from wearsim.uq.sampling.plans import REPLICATES, drawing
 

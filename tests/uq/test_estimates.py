@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from wearsim.uq.estimation.control_variate import Control, Controlled
+from wearsim.uq.estimation.standard_errors import Control, Controlled
 from wearsim.uq.estimation.estimates import DESIGNS, estimate
 from wearsim.uq.estimation.intervals import Interval
 from wearsim.uq.estimation.moments import summarise
@@ -154,7 +154,7 @@ def test_that_a_control_of_no_use_is_left_out_and_said(count, control):
     values = values_of(count)
     found = estimate(values, PROBABILITIES, "control-variate", control=Control(control, 2.0))
     assert ends(found) == ends(estimate(values, PROBABILITIES))
-    assert "too few or too alike" in found.method
+    assert "too few or too similar" in found.method
 
 
 @pytest.mark.parametrize(

@@ -62,11 +62,11 @@ def test_that_tied_numbers_stay_strictly_between_0_and_1():
     ("correlations", "told"),
     [
         ([("a", "z", 0.1)], 'cannot correlate "z": no such input, the inputs are a, b, c, two'),
-        ([("a", "two", 0.1)], "cannot correlate two: a draw of it takes 2 numbers"),
+        ([("a", "two", 0.1)], "cannot correlate two: one draw takes 2 numbers"),
         ([("a", "a", 0.1)], "cannot correlate a with itself"),
-        ([("a", "b", 1.2)], "of a with b must lie in -1 to 1, got 1.2"),
-        ([("a", "b", float("nan"))], "must lie in -1 to 1, got nan"),
-        ([("a", "b", 0.1), ("b", "a", 0.1)], "of b with a stands twice"),
+        ([("a", "b", 1.2)], "of a with b must be in -1 to 1, got 1.2"),
+        ([("a", "b", float("nan"))], "must be in -1 to 1, got nan"),
+        ([("a", "b", 0.1), ("b", "a", 0.1)], "of b with a is given twice"),
         ([("a", "b", 1.0)], r"not positive definite \(a with b: 1\)"),
         (
             [("a", "b", 0.9), ("b", "c", 0.9), ("a", "c", -0.9)],

@@ -235,22 +235,34 @@ INFEASIBLE = [
     ((0.0, 1.0), 0.5, 0.5, None, "std 0.5 is not less than sqrt"),
     ((0.0, 1.0), 0.1, 0.4, None, "(high - mean)) = 0.3"),
     ((0.0, 1.0), 0.5, 0.0, None, "std 0 is not above zero"),
-    ((0.0, 1.0), 1.0, 0.1, None, "mean 1 does not lie inside the support [0, 1]"),
-    ((0.0, INF), -1.0, None, None, "mean -1 does not lie inside the support [0, inf)"),
-    ((0.0, INF), None, None, None, "[0, inf) alone gives no law, since it is unbounded"),
-    ((-INF, INF), 3.0, None, None, "mean 3 alone gives no law on (-inf, inf)"),
-    ((0.0, 1.0), None, 0.1, None, "a std alone gives no law"),
-    ((1.0, 1.0), None, None, None, "the support must rise, got 1 to 1"),
-    ((math.nan, 1.0), None, None, None, "the support must rise"),
+    ((0.0, 1.0), 1.0, 0.1, None, "mean 1 is not inside the support [0, 1]"),
+    ((0.0, INF), -1.0, None, None, "mean -1 is not inside the support [0, inf)"),
+    (
+        (0.0, INF),
+        None,
+        None,
+        None,
+        "[0, inf) alone determines no distribution, since it is unbounded",
+    ),
+    ((-INF, INF), 3.0, None, None, "mean 3 alone determines no distribution on (-inf, inf)"),
+    ((0.0, 1.0), None, 0.1, None, "a std alone determines no distribution"),
+    ((1.0, 1.0), None, None, None, "the support must increase, got 1 to 1"),
+    ((math.nan, 1.0), None, None, None, "the support must increase"),
     ((-1.7e308, 1.7e308), None, None, None, "too wide"),
     ((0.0, 1.0), math.nan, 0.1, None, "must be finite"),
     ((0.0, INF), 7.0, None, 2.0, "mean_log 2 is not less than log(mean) = 1.94591"),
     ((0.0, 9.0), 7.0, None, 1.0, "mean_log needs the support [0, inf), got [0, 9]"),
-    ((0.0, INF), 7.0, 1.0, 1.0, "takes the place of the std"),
+    ((0.0, INF), 7.0, 1.0, 1.0, "replaces the std"),
     ((0.0, INF), None, None, 1.0, "mean_log 1 needs the mean too"),
-    ((0.0, INF), -7.0, None, 1.0, "mean -7 does not lie inside"),
-    ((0.0, 1e9), 1.0, 1.1, None, "std 1.1 is more than mean - low = 1, which takes a probability"),
-    ((-1e9, 0.0), -1.0, 1.1, None, "std 1.1 is more than high - mean = 1, which takes"),
+    ((0.0, INF), -7.0, None, 1.0, "mean -7 is not inside"),
+    (
+        (0.0, 1e9),
+        1.0,
+        1.1,
+        None,
+        "std 1.1 is more than mean - low = 1, which requires a probability",
+    ),
+    ((-1e9, 0.0), -1.0, 1.1, None, "std 1.1 is more than high - mean = 1, which requires"),
 ]
 
 
@@ -292,9 +304,9 @@ def test_that_spreads_just_below_the_exponential_law_s_go_over_into_it(short: fl
 
 def test_that_a_spike_at_a_far_limit_is_told() -> None:
     (told,) = maximum_entropy((0.0, 1.0), 1e-3, 1.1e-3).warnings
-    assert "a spike with a probability of 2.1e-07 lies at the end 1" in told
+    assert "a spike with a probability of 2.1e-07 is at the end 1" in told
     (mirrored,) = maximum_entropy((-1.0, 0.0), -1e-3, 1.1e-3).warnings
-    assert "a spike with a probability of 2.1e-07 lies at the end -1" in mirrored
+    assert "a spike with a probability of 2.1e-07 is at the end -1" in mirrored
     assert maximum_entropy((0.0, 1.0), 1e-3, 9e-4).warnings == ()
 
 

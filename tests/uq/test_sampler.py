@@ -79,7 +79,7 @@ def test_that_realisations_before_the_first_are_refused(make):
 @pytest.mark.parametrize(
     ("inputs", "told"),
     [
-        ([("a", 1), ("b", 1), ("a", 2)], "the input a stands twice"),
+        ([("a", 1), ("b", 1), ("a", 2)], "the input a is given twice"),
         ([("a", 0)], "the input a must take 1 or more numbers, got 0"),
         (
             [("creepage.misalignment", 2), ("creepage.tilt", 1)],

@@ -1,1 +1,1 @@
-"""Distributions with closed or tabulated quantile functions."""
+"""Probability distributions with closed or tabulated quantile functions."""

@@ -1,4 +1,4 @@
-"""The gamma law: maximum entropy on [0, inf) where the mean logarithm is known too."""
+"""Gamma distribution: maximum entropy on [0, inf) for a given mean and mean logarithm."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from wearsim.types import FloatArray
 from wearsim.uq.distributions.base import MaxentDistribution
 from wearsim.uq.distributions.quantile_table import InverseTable, Piece, panel_edges
 
-_LARGE = 50.0  # shape from which on differences cancel, and their series do not
+_LARGE = 50.0  # shape above which closed forms cancel and asymptotic series are used
 
 
 class Gamma(MaxentDistribution):
-    """The law on [0, inf) of given mean and mean logarithm.
+    """The gamma distribution of given mean and mean logarithm.
 
     Parameters
     ----------
@@ -32,15 +32,17 @@ class Gamma(MaxentDistribution):
         self.std = mean / math.sqrt(shape)
         rate = shape / mean
         self.multipliers = (math.lgamma(shape) - shape * math.log(rate), rate, 1.0 - shape)
-        # log of the density of log x at its greatest, where x is the mean
-        self._log_top = _log_top_of_gamma(shape)
+        # greatest log density of log x, reached at the mean
+        if shape < _LARGE:
+            self._log_top = shape * math.log(shape) - shape - math.lgamma(shape)
+        else:  # Stirling's series
+            series = 1.0 / 12.0 - 1.0 / (360.0 * shape**2) + 1.0 / (1260.0 * shape**4)
+            self._log_top = 0.5 * math.log(0.5 * shape / math.pi) - series / shape
 
     @cached_property
     def _table(self) -> InverseTable:
+        """Quantiles of log(x/mean)."""
         k = self._shape
-
-        def log_density(y: FloatArray) -> FloatArray:
-            return k * (y - np.expm1(y))
 
         def edges(sign: float) -> FloatArray:
             return sign * panel_edges(
@@ -51,44 +53,35 @@ class Gamma(MaxentDistribution):
                 widest=lambda y: 0.5 + 0.1 * y,
             )
 
-        return InverseTable(
-            [Piece(0.0, 1.0, np.concatenate([edges(-1.0)[:0:-1], edges(1.0)]), log_density)]
-        )
+        both = np.concatenate([edges(-1.0)[:0:-1], edges(1.0)])
+        return InverseTable([Piece(0.0, 1.0, both, lambda y: k * (y - np.expm1(y)))])
 
     def inverse(self, below: FloatArray, above: FloatArray) -> FloatArray:
-        """Return quantiles, shape (draws,), from probabilities below and above them."""
+        """Return quantiles, shape (draws,), from the probabilities below and above them."""
         return self.mean * np.exp(self._table.values(below, above))
 
     def log_density(self, x: FloatArray) -> FloatArray:
-        """Return the log of the density at `x` within the support."""
+        """Return the logarithm of the density at `x`, which must be within the support."""
         y = np.log(np.maximum(x, 1e-300) / self.mean)
         return self._shape * (y - np.expm1(y)) - y + self._log_top - math.log(self.mean)
 
 
-def _log_top_of_gamma(shape: float) -> float:
-    if shape < _LARGE:
-        return shape * math.log(shape) - shape - math.lgamma(shape)
-    # Stirling's series
-    inner = 1.0 / 12.0 - 1.0 / (360.0 * shape**2) + 1.0 / (1260.0 * shape**4)
-    return 0.5 * math.log(0.5 * shape / math.pi) - inner / shape
-
-
 def gamma_shape(gap: float) -> float:
-    """Return the shape k of the gamma law with ``log k - digamma(k) = gap``, above zero."""
+    """Return the shape k of the gamma distribution with ``log k - digamma(k) = gap`` > 0."""
     from scipy.special import digamma, polygamma  # noqa: PLC0415  (slow to import, rarely needed)
 
     root = math.sqrt((gap - 3.0) ** 2 + 24.0 * gap)
     shape = (3.0 - gap + root) / (12.0 * gap)  # within 1.5 %: Minka, Estimating a Gamma, 2002
     for _ in range(20):
-        # Newton's method for 1/k, in which the function is nearly a line
+        # Newton's method for 1/k, in which the function is nearly linear
         if shape > _LARGE:
-            inner = 1.0 / 12.0 - 1.0 / (120.0 * shape**2) + 1.0 / (252.0 * shape**4)
-            found = 0.5 / shape + inner / shape**2
+            series = 1.0 / 12.0 - 1.0 / (120.0 * shape**2) + 1.0 / (252.0 * shape**4)
+            current = 0.5 / shape + series / shape**2
             slope = (0.5 + 1.0 / (6.0 * shape) - 1.0 / (30.0 * shape**3)) / shape**2
         else:
-            found = math.log(shape) - float(digamma(shape))
+            current = math.log(shape) - float(digamma(shape))
             slope = float(polygamma(1, shape)) - 1.0 / shape
-        change = (found - gap) / (slope * shape**2)
+        change = (current - gap) / (slope * shape**2)
         shape = 1.0 / (1.0 / shape - change)
         if abs(change) * shape <= 1e-15:
             break

@@ -1,4 +1,4 @@
-"""The law of maximum entropy: what is known, and nothing else (Shannon 1948, Jaynes 1957)."""
+"""Maximum-entropy distributions for given moments (Shannon 1948, Jaynes 1957)."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from wearsim.uq.distributions.gamma import Gamma
 from wearsim.uq.distributions.truncated_normal import QuadraticExponent, TruncatedNormal, has_parent
 
 _ROUNDING = 1e-12
-_RAREST = 1e-12  # probability of a far end
-_SMALLEST, _LARGEST = 1e-150, 1e150  # sizes whose squares, and their inverses, are numbers
+_RAREST = 1e-12  # least probability of a peak at the far end of the support
+_SMALLEST, _LARGEST = 1e-150, 1e150  # range in which squares and their inverses are finite
 _OTHER_UNIT = "choose a unit in which it lies between 1e-150 and 1e150"
 
 
-class Infeasible(WearsimError, ValueError):  # noqa: N818  (it is what the knowledge is)
-    """No law has the mean and the spread that are asked for, or too little is known."""
+class Infeasible(WearsimError, ValueError):  # noqa: N818  (established term)
+    """No maximum-entropy distribution exists for the given support and moments."""
 
     exit_code = 2
 
@@ -37,19 +37,19 @@ def maximum_entropy(
     std: float | None = None,
     mean_log: float | None = None,
 ) -> MaxentDistribution:
-    """Return the law of maximum entropy: the least certain one that agrees with what is known.
+    """Return the distribution of maximum entropy for a given support and moments.
 
     Parameters
     ----------
     support : tuple of float
-        Least and greatest value that is possible; either may be infinite.
+        Least and greatest possible value; either may be infinite.
     mean : float, optional
         Mean.
     std : float, optional
         Standard deviation; needs the mean.
     mean_log : float, optional
-        Mean of the natural logarithm; needs the support [0, inf) and the mean, and takes the
-        place of the standard deviation.
+        Mean of the natural logarithm, instead of the standard deviation; needs the support
+        [0, inf) and the mean.
 
     Returns
     -------
@@ -59,7 +59,7 @@ def maximum_entropy(
     Raises
     ------
     Infeasible
-        A ValueError that names the limit that is broken.
+        A ValueError that states the violated limit.
     """
     low, high = (float(end) for end in support)
     _check(low, high, mean, std, mean_log)
@@ -75,11 +75,11 @@ def maximum_entropy(
 def _check(
     low: float, high: float, mean: float | None, std: float | None, mean_log: float | None
 ) -> None:
-    """Raise unless a law of maximum entropy exists."""
+    """Raise unless the maximum-entropy distribution exists."""
     if not low < high:
-        raise Infeasible(f"the support must rise, got {low:g} to {high:g}")
+        raise Infeasible(f"the support must increase, got {low:g} to {high:g}")
     if math.isfinite(low) and math.isfinite(high) and math.isinf(high - low):
-        raise Infeasible(f"the support {_interval(low, high)} is too wide for numbers")
+        raise Infeasible(f"the support {_interval(low, high)} is too wide: its width overflows")
     for name, value in (("mean", mean), ("std", std), ("mean_log", mean_log)):
         if value is not None and not math.isfinite(value):
             raise Infeasible(f"{name} must be finite, got {value:g}")
@@ -89,29 +89,31 @@ def _check(
         return
     if mean is None:
         if std is not None:
-            raise Infeasible(f"a std alone gives no law, got std {std:g}; give the mean too")
+            raise Infeasible(
+                f"a std alone determines no distribution, got std {std:g}; give the mean too"
+            )
         if math.isinf(high - low):
             raise Infeasible(
-                f"the support {_interval(low, high)} alone gives no law, since it is unbounded;"
-                " give a mean, or finite limits"
+                f"the support {_interval(low, high)} alone determines no distribution, since it is"
+                " unbounded; give a mean, or finite limits"
             )
         return
     if not low < mean < high:
-        raise Infeasible(f"mean {mean:g} does not lie inside the support {_interval(low, high)}")
-    if std is None:
-        if math.isinf(low) and math.isinf(high):
-            raise Infeasible(
-                f"mean {mean:g} alone gives no law on (-inf, inf); give the std too, or a limit"
-            )
-    else:
+        raise Infeasible(f"mean {mean:g} is not inside the support {_interval(low, high)}")
+    if std is not None:
         _check_spread(low, high, mean, std)
+    elif math.isinf(low) and math.isinf(high):
+        raise Infeasible(
+            f"mean {mean:g} alone determines no distribution on (-inf, inf); give the std too,"
+            " or a limit"
+        )
 
 
 def _check_sizes(low: float, high: float, mean: float | None, std: float | None) -> None:
-    """Raise where a square or its inverse would be no number."""
+    """Raise if a square or its inverse would overflow."""
     sizes = {"std": std, "the width of the support": high - low}
     if mean is not None:
-        sizes |= {"the distance of the mean from the support's end": min(mean - low, high - mean)}
+        sizes |= {"the distance from the mean to the nearer end": min(mean - low, high - mean)}
     for name, size in sizes.items():
         if size is not None and 0.0 < size < _SMALLEST:
             raise Infeasible(f"{name} {size:g} is too small to be squared; {_OTHER_UNIT}")
@@ -122,7 +124,7 @@ def _check_sizes(low: float, high: float, mean: float | None, std: float | None)
 
 
 def _check_spread(low: float, high: float, mean: float, std: float) -> None:
-    """Raise unless some law on the support has this mean and this standard deviation."""
+    """Raise unless a distribution on the support can have this mean and standard deviation."""
     if std <= 0.0:
         raise Infeasible(f"std {std:g} is not above zero")
     below, above = mean - low, high - mean
@@ -134,21 +136,19 @@ def _check_spread(low: float, high: float, mean: float, std: float) -> None:
     if math.isinf(max(below, above)):
         if std > least * (1.0 + _ROUNDING):
             support = _interval(low, high)
-            raise Infeasible(
-                f"{more}, the most that a law of maximum entropy on {support} can have"
-            )
+            raise Infeasible(f"{more}, the limit of a maximum-entropy distribution on {support}")
         return
     limit = math.sqrt(below) * math.sqrt(above)
     if std >= limit * (1.0 - _ROUNDING):
         raise Infeasible(
-            f"std {std:g} is not less than sqrt((mean - low) (high - mean)) = {limit:g}, which no"
-            f" law on {_interval(low, high)} with mean {mean:g} can exceed"
+            f"std {std:g} is not less than sqrt((mean - low) (high - mean)) = {limit:g}, the"
+            f" limit of any distribution on {_interval(low, high)} with mean {mean:g}"
         )
-    weight = _spike(least / (high - low), std / (high - low))[1]
+    weight = _far_peak(least / (high - low), std / (high - low))[1]
     if std > least * (1.0 + _ROUNDING) and least < 0.02 * (high - low) and weight < _RAREST:
         raise Infeasible(
-            f"{more}, which takes a probability of {weight:.0e} at the far end of"
-            f" {_interval(low, high)}, and no test would meet that; lower the std"
+            f"{more}, which requires a probability of {weight:.0e} at the far end of"
+            f" {_interval(low, high)}, too small to occur in any sample; lower the std"
         )
 
 
@@ -158,13 +158,11 @@ def _check_logarithm(
     if mean is None:
         raise Infeasible(f"mean_log {mean_log:g} needs the mean too")
     if std is not None:
-        raise Infeasible(
-            f"mean_log {mean_log:g} takes the place of the std, got std {std:g}; leave one out"
-        )
+        raise Infeasible(f"mean_log {mean_log:g} replaces the std, got std {std:g}; leave one out")
     if (low, high) != (0.0, math.inf):
         raise Infeasible(f"mean_log needs the support [0, inf), got {_interval(low, high)}")
     if not mean > 0.0:
-        raise Infeasible(f"mean {mean:g} does not lie inside the support [0, inf)")
+        raise Infeasible(f"mean {mean:g} is not inside the support [0, inf)")
     if not mean_log < math.log(mean):
         raise Infeasible(f"mean_log {mean_log:g} is not less than log(mean) = {math.log(mean):g}")
 
@@ -175,7 +173,7 @@ def _interval(low: float, high: float) -> str:
 
 
 def _towards_lower(low: float, high: float, mean: float, std: float | None) -> MaxentDistribution:
-    """Return the law whose mean lies nearer the lower end, or in the middle."""
+    """Return the distribution for a mean nearer the lower end, or in the middle."""
     if math.isinf(low):
         assert std is not None
         return TruncatedNormal(low, high, mean, std)
@@ -193,14 +191,14 @@ def _towards_lower(low: float, high: float, mean: float, std: float | None) -> M
 
 
 def _one_peak(low: float, high: float, mean: float, std: float) -> MaxentDistribution:
-    """Return the law that spreads less than the exponential one: cut from a normal parent."""
+    """Return the distribution for a std below the exponential one's: a truncated normal."""
     start = (low - mean) / std
     z, weights = maxent_solver.even_quadrature(
         max(start, -maxent_solver.FAR), min((high - mean) / std, maxent_solver.FAR)
     )
     basis = maxent_solver.Basis(np.stack([z, z * z]), np.array([0.0, 1.0]), np.eye(2))
     slope, bend = maxent_solver.multipliers(weights, [basis], [(0.0, 0.5)])
-    if bend <= 0.0:  # by rounding alone
+    if bend <= 0.0:  # only by rounding
         return Exponential(low, high, slope / std, mean)
     parent = mean - 0.5 * std * slope / bend, std / math.sqrt(2.0 * bend)
     if has_parent(low, high, *parent):
@@ -209,15 +207,15 @@ def _one_peak(low: float, high: float, mean: float, std: float) -> MaxentDistrib
 
 
 def _two_ends(low: float, high: float, mean: float, std: float, fall: float) -> MaxentDistribution:
-    """Return the law that spreads more than the exponential one: dented, with l2 < 0.
+    """Return the distribution for a std above the exponential one's: l2 < 0, with an antimode.
 
-    Its exponent is told by ``t (1 - t)`` and t, t going from 0 to 1 over the support, because
-    both its ends are then exact.
+    The exponent is a combination of ``t (1 - t)`` and t, with t from 0 to 1 over the support, which
+    is exact at both ends.
     """
     width = high - low
     part, spread = (mean - low) / width, std / width
     dent = part * ((high - mean) / width) - spread * spread
-    guess, _ = _spike(part, spread)
+    guess, _ = _far_peak(part, spread)
     t, rest, weights = maxent_solver.graded_quadrature(min(part, dent))
     bases = [
         maxent_solver.Basis(np.stack([t * rest, t]), np.array([dent, part]), np.eye(2)),
@@ -231,13 +229,14 @@ def _two_ends(low: float, high: float, mean: float, std: float, fall: float) -> 
     return QuadraticExponent(low, high, width, bend + top, -bend, bend - top, top)
 
 
-def _spike(part: float, spread: float) -> tuple[tuple[float, float], float]:
-    """Return a guess of the multipliers where a spike at the far end makes up the spread.
+def _far_peak(part: float, spread: float) -> tuple[tuple[float, float], float]:
+    """Return starting multipliers for a density with a peak at the far end, and its probability.
 
-    And the probability of that spike.
+    The density is approximated by an exponential one and a point mass with the prescribed mean and
+    standard deviation.
     """
     weight = 0.5 * part
-    for _ in range(30):  # an exponential law and a point, with the right first two moments
+    for _ in range(30):
         point = spread**2 + part**2 - 2.0 * (part - weight) ** 2 / (1.0 - weight)
         weight = min(max(point, 1e-300), 0.999 * part)
     top = math.log((1.0 - weight) / weight)

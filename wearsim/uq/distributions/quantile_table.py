@@ -1,4 +1,4 @@
-"""Quantiles of a law that is known by its density alone: its integral, inverted once and kept."""
+"""Tabulated quantile function of a distribution that is given by its density."""
 
 from __future__ import annotations
 
@@ -7,30 +7,30 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wearsim.types import FloatArray, IntArray
+from wearsim.types import FloatArray
 
-NOTHING_LEFT = 745.0  # exp(-745) is the least number there is
-_MOST_DROP = 2.0  # of the log density over a panel
-_MOST_BEND = 0.2  # panel's width times the root of the log density's curvature
-_NODES = 0.5 - 0.5 * np.cos(np.pi * np.arange(9) / 8)  # of a panel, from 0 to 1
+MAX_LOG_DROP = 745.0  # exp(-745) is the smallest positive float
+_MAX_PANEL_DROP = 2.0  # change of the log density over a panel
+_MAX_PANEL_BEND = 0.2  # panel width times the square root of the log density's curvature
+_NODES = 0.5 - 0.5 * np.cos(np.pi * np.arange(9) / 8)  # nodes of a panel, from 0 to 1
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(8)
-_CHUNK = 1 << 15  # draws whose panels and coefficients stay in the processor's cache
+_CHUNK = 1 << 15  # draws per block; the panel data of a block fit into the processor's cache
 
 
 @dataclass(frozen=True)
 class Piece:
-    """A part of the support, cut into panels over which the log density is nearly a line.
+    """A part of the support, divided into panels in which the log density is nearly linear.
 
     Parameters
     ----------
     origin : float
-        Where its offsets count from: an end of the support keeps every digit of values near it.
+        Origin of the offsets; at an end of the support, values near it keep full precision.
     scale : float
-        Value per offset.
+        Value per unit of offset.
     edges : ndarray, shape (panels + 1,)
-        Offsets of the panels' edges, rising.
+        Offsets of the panel edges, increasing.
     log_density : callable
-        Log of the density at offsets, up to a constant that all pieces share.
+        Logarithm of the density at offsets, up to a constant common to all pieces.
     """
 
     origin: float
@@ -46,47 +46,47 @@ def panel_edges(
     stop: float,
     widest: Callable[[float], float] = lambda offset: float("inf"),
 ) -> FloatArray:
-    """Return panel edges from offset 0 to `stop`, or to where nothing is left of the density.
+    """Return panel edges from offset 0 to `stop`, or to where the density underflows.
 
     Parameters
     ----------
     slope, curvature : callable
-        First and second derivative of the log density by offset.
+        First and second derivative of the log density with respect to the offset.
     drop : callable
-        How far the log density lies below its greatest value.
+        Difference of the greatest log density and the log density at an offset.
     stop : float
-        Last offset, which may be infinite.
+        Last offset; may be infinite.
     widest : callable, optional
-        Greatest width of a panel that begins at an offset.
+        Greatest width of a panel that starts at an offset.
 
     Returns
     -------
     ndarray, shape (panels + 1,)
     """
     edges = [0.0]
-    while edges[-1] < stop and drop(edges[-1]) < NOTHING_LEFT:
-        here = edges[-1]
-        rate = abs(slope(here)) / _MOST_DROP + abs(curvature(here)) ** 0.5 / _MOST_BEND
-        width = min(stop - here, widest(here), 1.0 / rate if rate > 0.0 else float("inf"))
-        edges.append(stop if here + width >= stop else here + width)
+    while edges[-1] < stop and drop(edges[-1]) < MAX_LOG_DROP:
+        start = edges[-1]
+        rate = abs(slope(start)) / _MAX_PANEL_DROP + abs(curvature(start)) ** 0.5 / _MAX_PANEL_BEND
+        width = min(stop - start, widest(start), 1.0 / rate if rate > 0.0 else float("inf"))
+        edges.append(stop if start + width >= stop else start + width)
     return np.array(edges)
 
 
 class InverseTable:
-    """The quantile function of a density in pieces, to about 1e-13.
+    """Quantile function of a piecewise density, with a relative error of about 1e-13.
 
-    Within a panel, an exponential law that agrees with the density at the panel's edges inverts
-    nearly all of the integral; a polynomial does the rest.
+    Within a panel the cumulative distribution is inverted as that of an exponential density which
+    agrees with the density at the panel's edges, and then corrected by a polynomial.
 
     Parameters
     ----------
     pieces : sequence of Piece
-        In rising order, together the whole support.
+        In increasing order; together they cover the support.
 
     Attributes
     ----------
     log_total : float
-        Log of the density's integral over all pieces, in offsets.
+        Logarithm of the integral of the density over all pieces, in units of offset.
     mean, std : float
         Mean and standard deviation.
     """
@@ -113,21 +113,21 @@ class InverseTable:
         self._below = np.concatenate([[0.0], np.cumsum(self._mass)])
         self._above = np.concatenate([np.cumsum(self._mass[::-1])[::-1], [0.0]])
         self._rise = at_nodes[:, -1] - at_nodes[:, 0]
-        self._rise[np.abs(self._rise) < 1e-8] = 1e-8  # a flat panel
+        self._rise[np.abs(self._rise) < 1e-8] = 1e-8  # a panel with constant density
         self._growth, self._decay = np.expm1(self._rise), np.expm1(-self._rise)
         self._coefficients = self._fit(parts)
         self.mean, self.std = self._moments(local, masses / total / parts.sum(axis=1))
 
     def _fit(self, parts: FloatArray) -> FloatArray:
-        """Return what the exponential law lacks: coefficients, shape (order, panels)."""
+        """Return the coefficients of the polynomial correction, shape (order, panels)."""
         share = np.cumsum(parts, axis=1)[:, :-1] / parts.sum(axis=1)[:, None]
         rest = np.cumsum(parts[:, ::-1], axis=1)[:, -2::-1] / parts.sum(axis=1)[:, None]
         place = _exponential_place(
             share, rest, self._rise[:, None], self._growth[:, None], self._decay[:, None]
         )
-        lack: FloatArray = (_NODES[1:-1] - place) / (place * (1.0 - place))
+        correction: FloatArray = (_NODES[1:-1] - place) / (place * (1.0 - place))
         powers = (2.0 * place - 1.0)[:, :, None] ** np.arange(place.shape[1])
-        solved = np.linalg.solve(powers, lack[:, :, None])[:, :, 0]
+        solved = np.linalg.solve(powers, correction[:, :, None])[:, :, 0]
         return np.ascontiguousarray(solved.T, dtype=np.float64)
 
     def _moments(self, local: FloatArray, mass_per_part: FloatArray) -> tuple[float, float]:
@@ -144,7 +144,7 @@ class InverseTable:
         return float(self._above[self._ends[piece]])
 
     def values(self, below: FloatArray, above: FloatArray) -> FloatArray:
-        """Return quantiles, shape (draws,), from probabilities below and above them."""
+        """Return quantiles, shape (draws,), from the probabilities below and above them."""
         result = np.empty_like(below)
         for first in range(0, len(below), _CHUNK):
             part = slice(first, first + _CHUNK)
@@ -155,12 +155,9 @@ class InverseTable:
         last = len(self._mass) - 1
         panel = np.searchsorted(self._below[1:-1], below, side="right")
         upper = below > 0.5
-        # near the upper end only the probability above tells panels and places apart
+        # near the upper end, only the probability above has sufficient relative precision
         panel[upper] = last - np.searchsorted(self._above[-2:0:-1], above[upper], side="right")
-        return self._in_panel(panel, below, above)
-
-    def _in_panel(self, panel: IntArray, below: FloatArray, above: FloatArray) -> FloatArray:
-        from_below = below <= 0.5
+        from_below = ~upper
         mass = np.maximum(self._mass[panel], 1e-300)
         part = np.where(from_below, below - self._below[panel], above - self._above[panel + 1])
         part = np.clip(part / mass, 0.0, 1.0)
@@ -169,10 +166,10 @@ class InverseTable:
             share, rest, self._rise[panel], self._growth[panel], self._decay[panel]
         )
         centred = 2.0 * place - 1.0
-        lack: FloatArray = self._coefficients[-1][panel]
+        correction: FloatArray = self._coefficients[-1][panel]
         for coefficient in self._coefficients[-2::-1]:
-            lack = lack * centred + coefficient[panel]
-        place = place + place * (1.0 - place) * lack
+            correction = correction * centred + coefficient[panel]
+        place = place + place * (1.0 - place) * correction
         offset = self._start[panel] + self._width[panel] * place
         values: FloatArray = self._origin[panel] + self._scale[panel] * offset
         return values
@@ -181,17 +178,17 @@ class InverseTable:
 def _exponential_place(
     share: FloatArray, rest: FloatArray, rise: FloatArray, growth: FloatArray, decay: FloatArray
 ) -> FloatArray:
-    """Return where an exponential law on (0, 1) has `share` of its mass below, `rest` above.
+    """Return the quantile on (0, 1) with probability `share` below, `rest` above, if exponential.
 
-    Its log density rises by `rise`; `growth` and `decay` are expm1 of that and of its negative.
+    The log density increases by `rise`; `growth` and `decay` are expm1 of `rise` and `-rise`.
     """
-    lower = share < 0.5  # each place is counted from the nearer end, which keeps its digits
-    counted: FloatArray = np.log1p(np.where(lower, share * growth, rest * decay)) / rise
-    return np.where(lower, counted, 1.0 + counted)
+    lower = share < 0.5  # distances from the nearer end avoid cancellation
+    distance: FloatArray = np.log1p(np.where(lower, share * growth, rest * decay)) / rise
+    return np.where(lower, distance, 1.0 + distance)
 
 
 def _node_logs(piece: Piece) -> tuple[FloatArray, FloatArray]:
-    """Return the log density at the panels' nodes, and at Gauss points between each two."""
+    """Return the log density at the panel nodes, and at Gauss points between adjacent nodes."""
     start, width = piece.edges[:-1, None], np.diff(piece.edges)[:, None]
     between = _NODES[:-1, None] + np.diff(_NODES)[:, None] * 0.5 * (1.0 + _GAUSS)
     points = start + width * between.ravel()

@@ -1,4 +1,4 @@
-"""Laws whose log density is a quadratic on the support: normal laws, cut off or turned over."""
+"""Distributions whose log density is quadratic on the support, such as the truncated normal."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from wearsim.types import FloatArray
 from wearsim.uq.distributions.base import MaxentDistribution, Mirrored
 from wearsim.uq.distributions.quantile_table import InverseTable, Piece, panel_edges
 
-_DEEPEST = 5.0  # standard deviations of the parent between its mean and a support that is cut off
-_NARROWEST = 0.03  # support, in standard deviations of the parent
+_DEEPEST = 5.0  # greatest distance of the support from the parent's mean, in parent stds
+_NARROWEST = 0.03  # least width of the support, in parent stds
 
 
 class TruncatedNormal(MaxentDistribution):
-    """A normal law cut off at the ends of a support that is not far out in its tail.
+    """A truncated normal distribution whose support is not far in the tail.
 
     Parameters
     ----------
     low, high : float
         Support; either end may be infinite.
     parent_mean, parent_std : float
-        Mean and standard deviation of the normal law before it is cut.
+        Mean and standard deviation of the normal distribution before truncation.
     """
 
     def __init__(self, low: float, high: float, parent_mean: float, parent_std: float) -> None:
@@ -34,7 +34,7 @@ class TruncatedNormal(MaxentDistribution):
         self._parent = mean, std = parent_mean, parent_std
         start, stop = (low - mean) / std, (high - mean) / std
         self._ends = float(ndtr(start)), float(ndtr(-stop))
-        # from the tail that holds both ends, if one does
+        # in the tail that holds both ends, if there is one, to avoid cancellation
         upper = float(ndtr(-start)) - float(ndtr(-stop))
         self._mass = upper if start > 0.0 else float(ndtr(stop)) - float(ndtr(start))
         self.mean, self.std = self._moments(start, stop)
@@ -58,34 +58,35 @@ class TruncatedNormal(MaxentDistribution):
 
     @property
     def parent(self) -> tuple[float, float]:
-        """Mean and standard deviation of the normal law that it is cut from."""
+        """Mean and standard deviation of the normal distribution before truncation."""
         return self._parent
 
     def inverse(self, below: FloatArray, above: FloatArray) -> FloatArray:
-        """Return quantiles, shape (draws,), from probabilities below and above them."""
+        """Return quantiles, shape (draws,), from the probabilities below and above them."""
         from scipy.special import ndtri  # noqa: PLC0415  (slow to import, and rarely needed)
 
         lower = self._ends[0] + below * self._mass
         upper = self._ends[1] + above * self._mass
-        score = ndtri(np.minimum(lower, upper))  # of the tail that keeps its digits
+        score = ndtri(np.minimum(lower, upper))  # of the smaller tail, to avoid cancellation
         mean, std = self._parent
         return mean + std * np.where(lower < upper, score, -score)
 
     def log_density(self, x: FloatArray) -> FloatArray:
-        """Return the log of the density at `x` within the support."""
+        """Return the logarithm of the density at `x`, which must be within the support."""
         mean, std = self._parent
         return self._log_top - 0.5 * ((x - mean) / std) ** 2
 
 
 class QuadraticExponent(MaxentDistribution):
-    """The law ``exp(-a u - b u^2)``, u counted from the lower end, where no parent serves.
+    """The density ``exp(-a u - b u^2)``, u being the scaled distance from the lower end.
 
-    It is nearly exponential, nearly uniform, or (b < 0) rises towards an end.
+    For cases without usable closed forms: a nearly exponential or nearly uniform density, or one
+    that increases towards an end (b < 0).
 
     Parameters
     ----------
     low, high : float
-        Support; `high` may be infinite where b > 0.
+        Support; `high` may be infinite if b > 0.
     scale : float
         Value per unit of u.
     fall : float
@@ -93,10 +94,10 @@ class QuadraticExponent(MaxentDistribution):
     bend : float
         b.
     from_above : float, optional
-        The coefficient that takes the place of a when u is counted from the upper end down; it
-        cannot be had from a and b where these are great.
+        The coefficient a for distances from the upper end; it cannot be computed from large a and b
+        without cancellation.
     top : float
-        Fall of the log density from the lower to the upper end; needed with `from_above`.
+        Decrease of the log density from the lower to the upper end; needed with `from_above`.
     """
 
     def __init__(
@@ -112,8 +113,6 @@ class QuadraticExponent(MaxentDistribution):
         self.family = "truncated normal" if bend > 0.0 else "exponential of a quadratic"
         self.support, self._scale = (low, high), scale
         self._fall, self._bend, self._from_above, self._top = fall, bend, from_above, top
-        # two peaks: the density falls from the upper end down too
-        self._two_peaks = from_above is not None and from_above > 0.0
         self.mean, self.std = self._table.mean, self._table.std
         l2 = bend / scale**2
         slope = fall / scale
@@ -122,7 +121,7 @@ class QuadraticExponent(MaxentDistribution):
 
     @property
     def parent(self) -> tuple[float, float] | None:
-        """Mean and standard deviation of the normal law that it is cut from, if there is one."""
+        """Mean and standard deviation of the normal distribution before truncation, or None."""
         if self._bend <= 0.0:
             return None
         std = self._scale / math.sqrt(2.0 * self._bend)
@@ -130,32 +129,47 @@ class QuadraticExponent(MaxentDistribution):
 
     @property
     def antimode(self) -> tuple[float, float] | None:
-        """Where inside the support the density is least, and the probability above; or None."""
-        if not self._two_peaks:
+        """Interior minimum of the density, and the probability above it; or None."""
+        if not self._has_two_peaks:
             return None
         least = self.support[0] - 0.5 * self._scale * self._fall / self._bend
         return least, self._table.above_piece(0)
 
-    def _pieces(self) -> list[Piece]:
-        """Return the density from its lower end, and where it has two peaks from its upper one."""
-        low, high = self.support
-        width, scale = (high - low) / self._scale, self._scale
-        if self._from_above is None or not self._two_peaks:
-            return [_rising_from(low, scale, self._fall, self._bend, width)]
-        least, rest = (-0.5 * each / self._bend for each in (self._fall, self._from_above))
-        upper = _falling_from(high, scale, self._from_above, self._bend, rest, self._top)
-        return [_rising_from(low, scale, self._fall, self._bend, least), upper]
+    @property
+    def _has_two_peaks(self) -> bool:
+        """Whether the density also decreases from the upper end down."""
+        return self._from_above is not None and self._from_above > 0.0
 
     @cached_property
     def _table(self) -> InverseTable:
-        return InverseTable(self._pieces())
+        """Quantiles of u, piecewise from both ends if the density has two peaks."""
+        low, high = self.support
+        fall, bend, width = self._fall, self._bend, (high - low) / self._scale
+        above, top = self._from_above, self._top
+
+        def edges(slope: float, stop: float) -> FloatArray:
+            return panel_edges(
+                slope=lambda u: slope + 2.0 * bend * u,
+                curvature=lambda u: 2.0 * bend,
+                drop=lambda u: (slope + bend * u) * u,
+                stop=stop,
+            )
+
+        stop = -0.5 * fall / bend if self._has_two_peaks else width
+        pieces = [Piece(low, self._scale, edges(fall, stop), lambda u: -(fall + bend * u) * u)]
+        if above is not None and self._has_two_peaks:
+            # offsets below zero, from the upper end down
+            offsets = -edges(above, -0.5 * above / bend)[::-1]
+            log_density = lambda v: -top + (above - bend * v) * v  # noqa: E731
+            pieces.append(Piece(high, self._scale, offsets, log_density))
+        return InverseTable(pieces)
 
     def inverse(self, below: FloatArray, above: FloatArray) -> FloatArray:
-        """Return quantiles, shape (draws,), from probabilities below and above them."""
+        """Return quantiles, shape (draws,), from the probabilities below and above them."""
         return self._table.values(below, above)
 
     def log_density(self, x: FloatArray) -> FloatArray:
-        """Return the log of the density at `x` within the support."""
+        """Return the logarithm of the density at `x`, which must be within the support."""
         low, high = self.support
         u = (x - low) / self._scale
         logs = -(self._fall + self._bend * u) * u
@@ -165,39 +179,17 @@ class QuadraticExponent(MaxentDistribution):
         return logs - self._table.log_total - math.log(self._scale)
 
 
-def _edges(fall: float, bend: float, stop: float) -> FloatArray:
-    return panel_edges(
-        slope=lambda u: fall + 2.0 * bend * u,
-        curvature=lambda u: 2.0 * bend,
-        drop=lambda u: (fall + bend * u) * u,
-        stop=stop,
-    )
-
-
-def _rising_from(low: float, scale: float, fall: float, bend: float, stop: float) -> Piece:
-    """Return the piece that counts u from the lower end up."""
-    return Piece(low, scale, _edges(fall, bend, stop), lambda u: -(fall + bend * u) * u)
-
-
-def _falling_from(
-    high: float, scale: float, fall: float, bend: float, stop: float, top: float
-) -> Piece:
-    """Return the piece that counts v from the upper end down, as offsets below zero."""
-    edges = -_edges(fall, bend, stop)[::-1]
-    return Piece(high, scale, edges, lambda v: -top + (fall - bend * v) * v)
-
-
 def cut_normal(
     low: float, high: float, parent_mean: float, parent_std: float
 ) -> MaxentDistribution:
-    """Return a normal law cut off at the ends of a support, wherever that lies.
+    """Return a truncated normal distribution for any support.
 
     Parameters
     ----------
     low, high : float
         Support; either end may be infinite.
     parent_mean, parent_std : float
-        Mean and standard deviation of the normal law before it is cut.
+        Mean and standard deviation of the normal distribution before truncation.
 
     Returns
     -------
@@ -212,6 +204,6 @@ def cut_normal(
 
 
 def has_parent(low: float, high: float, parent_mean: float, parent_std: float) -> bool:
-    """Return whether the parent's closed forms keep their digits on a support above its mean."""
+    """Return whether closed forms are accurate on a support nearer above the parent's mean."""
     deep = low - parent_mean > _DEEPEST * parent_std
     return not deep and high - low > _NARROWEST * parent_std

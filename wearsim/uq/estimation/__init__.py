@@ -1,1 +1,1 @@
-"""Estimates of moments and quantiles, with their intervals."""
+"""Estimates of moments and quantiles with confidence intervals."""

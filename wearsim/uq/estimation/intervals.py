@@ -1,8 +1,9 @@
-"""Estimates with the interval in which the truth lies, as often as the confidence says."""
+"""Estimates with confidence intervals."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from wearsim.uq.estimation.moments import CONFIDENCE
@@ -15,9 +16,9 @@ class Interval:
     Parameters
     ----------
     value : float
-        The estimate, nan where there is none.
+        The estimate; nan if there is none.
     low, high : float
-        Ends of the interval of 95 % confidence, infinite where too little is known.
+        Ends of the 95 % confidence interval; infinite if the sample is insufficient.
     """
 
     value: float
@@ -26,37 +27,60 @@ class Interval:
 
     @property
     def half_width(self) -> float:
-        """Half of what lies between the ends."""
+        """Half the width of the interval."""
         return 0.5 * (self.high - self.low)
 
     def within(self, least: float, greatest: float) -> Interval:
-        """Return the estimate with all its numbers brought into the range they can only have."""
+        """Return the estimate and the interval restricted to the possible range of values."""
         return Interval(
             *(min(max(end, least), greatest) for end in (self.value, self.low, self.high))
         )
 
 
 UNKNOWN = Interval(math.nan, -math.inf, math.inf)
-"""What too few realisations tell."""
+"""Estimate for an insufficient sample."""
 
 
 def t_interval(value: float, error: float, degrees: float) -> Interval:
-    """Return the interval of Student's t about an estimate.
+    """Return the interval of Student's t distribution for an estimate.
 
     Parameters
     ----------
     value, error : float
         The estimate and its standard error.
     degrees : float
-        Degrees of freedom of the error; infinite for the normal law.
+        Degrees of freedom of the error; infinite for the normal distribution.
     """
     reach = error * t_quantile(degrees)
     return Interval(value, value - reach, value + reach)
 
 
 def t_quantile(degrees: float) -> float:
-    """Return how many standard errors an interval reaches to either side, by Student's t."""
+    """Return the ratio of an interval's half-width to the standard error, by Student's t."""
     from scipy.special import ndtri, stdtrit  # noqa: PLC0415  (slow to import)
 
-    chance = 0.5 + 0.5 * CONFIDENCE
-    return float(ndtri(chance) if math.isinf(degrees) else stdtrit(degrees, chance))
+    probability = 0.5 + 0.5 * CONFIDENCE
+    return float(ndtri(probability) if math.isinf(degrees) else stdtrit(degrees, probability))
+
+
+def bisect(
+    outside: Callable[[float], bool], outer: float, inner: float, halvings: int
+) -> tuple[float, float]:
+    """Return the halved interval [outer, inner] that holds the boundary of a set.
+
+    Parameters
+    ----------
+    outside : callable
+        Whether a number is outside the set.
+    outer, inner : float
+        Numbers outside and inside the set.
+    halvings : int
+        Number of halvings.
+    """
+    for _ in range(halvings):
+        middle = 0.5 * (outer + inner)
+        if outside(middle):
+            outer = middle
+        else:
+            inner = middle
+    return outer, inner

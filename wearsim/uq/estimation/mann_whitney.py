@@ -1,4 +1,4 @@
-"""Which of two ensembles has the greater values, and how sure that is."""
+"""Comparison of two ensembles: probability of superiority, and paired differences."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ import numpy as np
 
 from wearsim.types import FloatArray, IntArray
 from wearsim.uq.estimation.estimates import Design, estimate
-from wearsim.uq.estimation.intervals import UNKNOWN, Interval, t_quantile
+from wearsim.uq.estimation.intervals import UNKNOWN, Interval, bisect, t_quantile
 
-FEWEST = 5  # values, of which an error can be told
-_NEAR_CERTAIN = 0.1  # of 0 or 1, where few realisations of one ensemble are among the other's
+FEWEST = 5  # least number of values for an error estimate
+_NEAR_CERTAIN = 0.1  # distance from 0 and 1 below which the interval is widened
 _HALVINGS = 60
 
 
 def superiority(first: FloatArray, second: FloatArray) -> Interval:
-    """Return the chance that a value of one ensemble is greater than one of another.
+    """Return the probability that a value of one ensemble is greater than one of another.
 
     Parameters
     ----------
@@ -27,16 +27,16 @@ def superiority(first: FloatArray, second: FloatArray) -> Interval:
     Returns
     -------
     Interval
-        P(first > second) + P(first = second)/2, between 0 and 1; unknown below 5 values of each.
+        P(first > second) + P(first = second)/2, between 0 and 1; unknown for fewer than 5 values.
 
     Notes
     -----
     The Mann-Whitney statistic, with the error of DeLong, DeLong and Clarke-Pearson, Biometrics 44
-    (1988), DOI 10.2307/2531595, which takes the laws as they are, on the scale of the logit, by
-    Student's t with the degrees of freedom of Brunner and Munzel, Biometrical Journal 42 (2000).
-    Within 0.1 of 0 and 1 that error itself is uncertain, and 0 where no values lie among each
-    other's: the interval is widened there to hold method 5 of Newcombe, Statistics in Medicine 25
-    (2006), DOI 10.1002/sim.2324.
+    (1988), DOI 10.2307/2531595, which assumes no distributions, on the logit scale, by Student's t
+    with the degrees of freedom of Brunner and Munzel, Biometrical Journal 42 (2000). Within 0.1 of
+    0 and 1 that error is uncertain, and 0 if the two ranges do not overlap; there the interval is
+    extended to include that of method 5 of Newcombe, Statistics in Medicine 25 (2006), DOI
+    10.1002/sim.2324.
     """
     n, m = len(first), len(second)
     if min(n, m) < FEWEST:
@@ -59,16 +59,16 @@ def superiority(first: FloatArray, second: FloatArray) -> Interval:
 
 @dataclass(frozen=True)
 class Paired:
-    """How two ensembles with the same random numbers differ, realisation by realisation.
+    """Differences of two ensembles with common random numbers, realisation by realisation.
 
     Parameters
     ----------
     difference : Interval
-        Mean of first less second.
+        Mean of first minus second.
     share : Interval
-        Part of the pairs in which the first is the greater, equal ones by half.
+        Share of the pairs in which the first is greater; equal pairs count one half.
     count : int
-        Pairs.
+        Number of pairs.
     """
 
     difference: Interval
@@ -82,34 +82,34 @@ def paired(
     plan: Design = "monte-carlo",
     replicate: IntArray | None = None,
 ) -> Paired:
-    """Return how two ensembles with common random numbers differ.
+    """Return the differences of two ensembles with common random numbers.
 
     Parameters
     ----------
     first, second : ndarray, shape (n,)
         Values of the same realisations in the same order.
     plan, replicate
-        Of both ensembles, as for `estimate`.
+        Sampling design of both ensembles, as for `estimate`.
 
     Returns
     -------
     Paired
-        The share with the interval of Wilson, Journal of the American Statistical Association 22
-        (1927), DOI 10.1080/01621459.1927.10502953, of independent pairs whatever the plan.
+        The interval of the share is that of Wilson, Journal of the American Statistical
+        Association 22 (1927), DOI 10.1080/01621459.1927.10502953, for independent pairs.
 
     Raises
     ------
     ValueError
-        If the ensembles have not the same number of values.
+        If the ensembles differ in their number of values.
     """
     count = len(first)
     if len(second) != count:
-        raise ValueError(f"pairs need as many values of both, got {count} and {len(second)}")
-    apart = first - second
-    difference = estimate(apart, (), plan, replicate).mean
+        raise ValueError(f"pairs need equally many values, got {count} and {len(second)}")
+    differences = first - second
+    difference = estimate(differences, (), plan, replicate).mean
     if count == 0:
         return Paired(difference, UNKNOWN, 0)
-    share = float((apart > 0.0).mean() + 0.5 * (apart == 0.0).mean())
+    share = float((differences > 0.0).mean() + 0.5 * (differences == 0.0).mean())
     square = t_quantile(math.inf) ** 2 / count
     middle = (share + 0.5 * square) / (1.0 + square)
     reach = math.sqrt(square * (share * (1.0 - share) + 0.25 * square)) / (1.0 + square)
@@ -117,14 +117,14 @@ def paired(
 
 
 def _part_below(values: FloatArray, others: FloatArray) -> FloatArray:
-    """Return the part of `others` below each of `values`, equal ones by half."""
+    """Return the share of `others` below each of `values`; equal ones count one half."""
     ordered = np.sort(others)
     ranks = np.searchsorted(ordered, values, "left") + np.searchsorted(ordered, values, "right")
     return np.asarray(ranks / (2.0 * len(others)))
 
 
 def _newcombe(chance: float, n: int, m: int) -> tuple[float, float]:
-    """Return the chances that are as far off as the error that belongs to each of them allows."""
+    """Return the true probabilities for which `chance` is just within the error."""
     others = 0.5 * (n + m) - 1.0
     reach = t_quantile(math.inf)
 
@@ -134,14 +134,5 @@ def _newcombe(chance: float, n: int, m: int) -> tuple[float, float]:
             true * (1.0 - true) * (1.0 + doubled) / (n * m)
         )
 
-    ends = []
-    for farthest in (0.0, 1.0):
-        outer, inner = farthest, chance
-        for _ in range(_HALVINGS):
-            middle = 0.5 * (outer + inner)
-            if too_far(middle):
-                outer = middle
-            else:
-                inner = middle
-        ends.append(inner)
-    return ends[0], ends[1]
+    low, high = (bisect(too_far, outer, chance, _HALVINGS)[1] for outer in (0.0, 1.0))
+    return low, high

@@ -1,4 +1,4 @@
-"""Estimates from realisations, and how far each of them can be trusted."""
+"""Moments and quantiles of independent realisations, with their standard errors."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import numpy as np
 from wearsim.types import FloatArray, IntArray
 
 CONFIDENCE = 0.95
-_SAME = 1e-9  # spread of values that are all the same, in parts of their size
-_BLOCK = 256  # rows that are summed at once, whatever the batches they come in
-_FAR = 10.0  # standard deviations of a rank beyond which no probability is left
+_SAME = 1e-9  # relative standard deviation below which values are constant
+_BLOCK = 256  # rows summed at once, independent of the batch size
+_FAR = 10.0  # standard deviations of a rank beyond which the probability is negligible
 
 
 @dataclass(frozen=True)
@@ -22,11 +22,11 @@ class Quantile:
     Parameters
     ----------
     probability : float
-        Part of the realisations below it.
+        Probability below it.
     value : float
-        The estimate, linear between order statistics.
+        The estimate, interpolated linearly between order statistics.
     low, high : float
-        Confidence interval; infinite where there are too few realisations for an end.
+        Confidence interval; an end is infinite if there are too few realisations.
     """
 
     probability: float
@@ -37,12 +37,12 @@ class Quantile:
 
 @dataclass(frozen=True)
 class Summary:
-    """What realisations of one number tell; nan where there are too few, or no spread, for it.
+    """Estimates from realisations of one number; nan for too few or constant realisations.
 
     Parameters
     ----------
     count : int
-        Realisations.
+        Number of realisations.
     mean, std : float
         Estimates of mean and standard deviation.
     mean_error, std_error : float
@@ -52,7 +52,7 @@ class Summary:
     least, greatest : float
         Extremes.
     quantiles : tuple of Quantile
-        Those that were asked for.
+        The requested quantiles.
     """
 
     count: int
@@ -67,7 +67,7 @@ class Summary:
 
     @property
     def is_constant(self) -> bool:
-        """Whether the realisations differ by rounding alone; not so where there is but one."""
+        """Whether the realisations differ only by rounding; False for a single one."""
         return is_constant(self.mean, self.std)
 
     def quantile(self, probability: float) -> Quantile:
@@ -82,9 +82,9 @@ class Convergence:
     Parameters
     ----------
     count : ndarray of int, shape (points,)
-        The n.
+        Numbers n of realisations.
     mean, mean_error, std, std_error : ndarray, shape (points,)
-        As of `Summary`.
+        As in `Summary`.
     """
 
     count: IntArray
@@ -95,14 +95,14 @@ class Convergence:
 
 
 def summarise(values: FloatArray, probabilities: tuple[float, ...] = ()) -> Summary:
-    """Return what independent realisations of one number tell.
+    """Return estimates from independent realisations of one number.
 
     Parameters
     ----------
     values : ndarray, shape (realisations,)
         At least one.
     probabilities : tuple of float
-        Of the quantiles wanted.
+        Probabilities of the requested quantiles.
 
     Returns
     -------
@@ -111,14 +111,14 @@ def summarise(values: FloatArray, probabilities: tuple[float, ...] = ()) -> Summ
     Notes
     -----
     The standard error of the standard deviation s is sqrt((m4 - s^4 (n - 3)/(n - 1))/n)/(2 s), m4
-    being the fourth central moment: no law is assumed.
+    being the fourth central moment; it assumes no particular distribution.
     """
     count = len(values)
-    at_end = converge(values, np.array([count]))
+    last = converge(values, np.array([count]))
     deviation = values - float(values.mean())
     second, third = float((deviation**2).mean()), float((deviation**3).mean())
     skewness = math.nan
-    mean, std = float(at_end.mean[0]), float(at_end.std[0])
+    mean, std = float(last.mean[0]), float(last.std[0])
     if count > 2 and second > 0.0 and not is_constant(mean, std):
         skewness = third / second**1.5 * math.sqrt(count * (count - 1.0)) / (count - 2.0)
     ordered = np.sort(values)
@@ -126,8 +126,8 @@ def summarise(values: FloatArray, probabilities: tuple[float, ...] = ()) -> Summ
         count=count,
         mean=mean,
         std=std,
-        mean_error=float(at_end.mean_error[0]),
-        std_error=float(at_end.std_error[0]),
+        mean_error=float(last.mean_error[0]),
+        std_error=float(last.std_error[0]),
         skewness=skewness,
         least=float(ordered[0]),
         greatest=float(ordered[-1]),
@@ -136,14 +136,14 @@ def summarise(values: FloatArray, probabilities: tuple[float, ...] = ()) -> Summ
 
 
 def is_constant(mean: float, std: float, rounding: float = 0.0) -> bool:
-    """Tell whether values differ by no more than rounding.
+    """Return whether values differ by no more than rounding.
 
     Parameters
     ----------
     mean, std : float
-        Of the values; a std of nan, as of a single value, tells nothing.
+        Mean and standard deviation of the values; a std of nan, as of one value, gives False.
     rounding : float
-        What rounding leaves of a value that is zero.
+        Absolute rounding error of values that are zero.
 
     Returns
     -------
@@ -153,24 +153,24 @@ def is_constant(mean: float, std: float, rounding: float = 0.0) -> bool:
 
 
 def converge(values: FloatArray, counts: IntArray) -> Convergence:
-    """Return mean and standard deviation as they settle with the number of realisations.
+    """Return mean and standard deviation as functions of the number of realisations.
 
     Parameters
     ----------
     values : ndarray, shape (realisations,)
-        In the order of the realisations.
+        Values in the order of the realisations.
     counts : ndarray of int, shape (points,)
-        The numbers of realisations to look at, from 1 on.
+        Numbers of realisations, 1 or more.
 
     Returns
     -------
     Convergence
-        Nothing but nan where the spread of a single realisation is asked for.
+        The standard deviation and the errors of a single realisation are nan.
     """
     centre = float(values.mean())
     deviation = values - centre
     n = counts.astype(np.float64)
-    # raw moments about a value nearby, from which the central ones follow without loss
+    # raw moments about a nearby value, which give the central moments without cancellation
     r1, r2, r3, r4 = (np.cumsum(deviation**power)[counts - 1] / n for power in (1, 2, 3, 4))
     second = np.maximum(r2 - r1**2, 0.0)
     fourth = np.maximum(r4 - 4.0 * r1 * r3 + 6.0 * r1**2 * r2 - 3.0 * r1**4, 0.0)
@@ -199,24 +199,24 @@ def _quantile(ordered: FloatArray, probability: float) -> Quantile:
 
 
 def order_ranks(count: int, probability: float, confidence: float = CONFIDENCE) -> tuple[int, int]:
-    """Return between which order statistics a quantile lies, whatever the continuous law.
+    """Return the ranks of the confidence limits of a quantile of any continuous distribution.
 
-    The number of realisations below the quantile is binomial, so that each end is missed with at
-    most half of what the confidence leaves.
+    The number of realisations below the quantile is binomial; the quantile is beyond each limit
+    with a probability of at most (1 - confidence)/2.
 
     Parameters
     ----------
     count : int
-        Realisations.
+        Number of realisations.
     probability : float
-        Of the quantile, between 0 and 1.
+        Probability of the quantile, between 0 and 1.
     confidence : float
         Least probability that the interval holds the quantile.
 
     Returns
     -------
     low, high : int
-        Ranks from 1 on; 0 and `count` + 1 stand for no such order statistic.
+        Ranks from 1 to `count`; 0 and `count` + 1 if there is no such order statistic.
 
     Notes
     -----
@@ -229,14 +229,14 @@ def order_ranks(count: int, probability: float, confidence: float = CONFIDENCE) 
     first = max(math.floor(middle - far) - 1, 0)
     below = np.arange(first, min(math.ceil(middle + far) + 1, count) + 1)
     chance = bdtr(below.astype(np.float64), count, probability)
-    # rank r lies above the quantile with the chance of fewer than r below it
+    # rank r is above the quantile with the probability of fewer than r values below it
     low = first + int(np.searchsorted(chance, miss, side="right"))
     high = first + int(np.searchsorted(chance, 1.0 - miss, side="left")) + 1
     return low, high
 
 
 class RowMoments:
-    """Mean and standard deviation of rows, to the same bits whatever batches they come in.
+    """Mean and standard deviation of rows, bit for bit independent of the batch size.
 
     Parameters
     ----------
@@ -254,7 +254,7 @@ class RowMoments:
         self._merged: tuple[int, FloatArray, FloatArray] = (0, np.zeros(columns), np.zeros(columns))
 
     def add(self, rows: FloatArray) -> None:
-        """Take rows, shape (rows, columns)."""
+        """Add rows, shape (rows, columns)."""
         taken = 0
         while taken < len(rows):
             part = rows[taken : taken + _BLOCK - self._held]
@@ -266,7 +266,7 @@ class RowMoments:
                 self._held = 0
 
     def mean_and_std(self) -> tuple[FloatArray, FloatArray]:
-        """Return the mean and the standard deviation so far, each (columns,); nan for one row."""
+        """Return mean and standard deviation of the rows so far, each (columns,); nan for one."""
         count, mean, square = self._merged
         if self._held:
             count, mean, square = _merge(self._merged, self._waiting[: self._held])
@@ -278,13 +278,13 @@ class RowMoments:
 def _merge(
     so_far: tuple[int, FloatArray, FloatArray], rows: FloatArray
 ) -> tuple[int, FloatArray, FloatArray]:
-    """Return count, mean and sum of squared deviations with `rows` among them."""
+    """Return count, mean and sum of squared deviations with `rows` added."""
     before, mean, square = so_far
     own = rows.mean(axis=0)
     own_square = ((rows - own) ** 2).sum(axis=0)
-    count, apart = before + len(rows), own - mean
+    count, difference = before + len(rows), own - mean
     return (
         count,
-        mean + apart * (len(rows) / count),
-        square + own_square + apart**2 * (before * len(rows) / count),
+        mean + difference * (len(rows) / count),
+        square + own_square + difference**2 * (before * len(rows) / count),
     )

@@ -1,4 +1,4 @@
-"""Quantiles of weighted values, and between which of them the true one lies."""
+"""Quantiles of weighted values, and ranks of their confidence limits."""
 
 from __future__ import annotations
 
@@ -8,26 +8,27 @@ from functools import lru_cache
 import numpy as np
 
 from wearsim.types import FloatArray
+from wearsim.uq.estimation.intervals import bisect
 from wearsim.uq.estimation.moments import CONFIDENCE
 
-_HALVINGS = 50  # of an interval of ranks: to rounding
+_HALVINGS = 50  # of an interval of ranks, down to rounding
 
 
 class WeightedDistribution:
-    """The empirical law of values of which each stands for a part of all.
+    """Empirical distribution of weighted values.
 
     Parameters
     ----------
     values : ndarray, shape (n,)
-        One or more.
+        At least one value.
     weights : ndarray, shape (n,), optional
-        Sum to 1; some may be negative, as those of a control variate. Without them all are 1/n.
+        Weights with the sum 1, 1/n by default; weights of a control variate may be negative.
 
     Notes
     -----
     With equal weights `quantile` is numpy's default (type 7 of Hyndman and Fan, The American
-    Statistician 50 (1996), DOI 10.2307/2684934), and `at` puts the j-th value at j/(n + 1), the
-    mean of what lies below it.
+    Statistician 50 (1996), DOI 10.2307/2684934), and `at` assigns the j-th value to j/(n + 1), the
+    mean probability below it.
     """
 
     def __init__(self, values: FloatArray, weights: FloatArray | None = None) -> None:
@@ -37,12 +38,12 @@ class WeightedDistribution:
         if weights is None:
             self._middle = (np.arange(count) + 0.5) / count - 0.5
         else:
-            # negative weights must not let the law fall
             middle = np.cumsum(weights[order]) - 0.5 * weights[order] - 0.5
+            # negative weights must not decrease the distribution function
             self._middle = np.maximum.accumulate(middle)
 
     def quantile(self, probability: float) -> float:
-        """Return the value that has this part of all below it, linear between values."""
+        """Return the quantile of this probability, interpolated linearly between values."""
         count = len(self.ordered)
         if count == 1:
             return float(self.ordered[0])
@@ -50,11 +51,10 @@ class WeightedDistribution:
         return float(np.interp(probability, heights, self.ordered))
 
     def at(self, level: float) -> float:
-        """Return the value at a mean level, infinite beyond those of the first and the last."""
+        """Return the value at a mean probability; infinite beyond the first and last value."""
         count = len(self.ordered)
         heights = 0.5 + self._middle * (count / (count + 1))
-        # a whole rank must not be lost to rounding
-        slack = 1e-9 / count
+        slack = 1e-9 / count  # for rounding at integer ranks
         if level < heights[0] - slack:
             return -math.inf
         if level > heights[-1] + slack:
@@ -66,25 +66,25 @@ class WeightedDistribution:
 def fractional_ranks(
     count: float, probability: float, confidence: float = CONFIDENCE
 ) -> tuple[float, float]:
-    """Return between which ranks of `count` independent values a quantile lies, as real numbers.
+    """Return the real ranks of the confidence limits of a quantile, for independent values.
 
-    The value of rank r has a part of all below it that follows the beta law of r and count - r + 1;
-    between whole ranks that law is a definition. `order_ranks` has the whole ranks around, which
-    hold the quantile more often than asked for where values are few.
+    The probability below the value of rank r has the beta distribution with the parameters r and
+    count - r + 1; between integer ranks this is a definition. The integer ranks of `order_ranks`
+    enclose these; for small samples they hold the quantile more often than the confidence.
 
     Parameters
     ----------
     count : float
-        Independent values, or as many as the values at hand are worth.
+        Number of independent values, or the effective sample size.
     probability : float
-        Of the quantile, between 0 and 1.
+        Probability of the quantile, between 0 and 1.
     confidence : float
         Probability that the interval holds the quantile.
 
     Returns
     -------
     low, high : float
-        Ranks between 0 and `count` + 1; below 1 or above `count` there is no such value.
+        Ranks between 0 and `count` + 1; there is no value below rank 1 or above rank `count`.
 
     Notes
     -----
@@ -93,14 +93,10 @@ def fractional_ranks(
     from scipy.special import betainc  # noqa: PLC0415  (slow to import, and rarely needed)
 
     def rank(chance: float) -> float:
-        low, high = 0.0, count + 1.0
-        for _ in range(_HALVINGS):
-            middle = 0.5 * (low + high)
-            if betainc(middle, count + 1.0 - middle, probability) > chance:
-                low = middle
-            else:
-                high = middle
-        return 0.5 * (low + high)
+        def too_low(rank: float) -> bool:
+            return bool(betainc(rank, count + 1.0 - rank, probability) > chance)
+
+        return 0.5 * sum(bisect(too_low, 0.0, count + 1.0, _HALVINGS))
 
     miss = 0.5 * (1.0 - confidence)
     return rank(1.0 - miss), rank(miss)

@@ -1,4 +1,4 @@
-"""How precisely an ensemble is to know something before it may stop."""
+"""Stopping rule of an ensemble: target half-widths of confidence intervals."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ from typing import Literal
 from wearsim.uq.estimation.estimates import Estimate
 from wearsim.uq.estimation.intervals import Interval
 
-_FEWEST = 32  # realisations, before which an interval may be narrow by luck
+_FEWEST = 32  # realisations; with fewer, an interval may be narrow by chance
+_STATISTICS: dict[str, Literal["mean", "std"] | float]
+_STATISTICS = {"mean": "mean", "std": "std", "median": 0.5}
 _FORM = re.compile(
     r"(?P<observable>[a-z][a-z_]*)\.(?P<what>mean|std|median|q(?P<percent>\d+(\.\d+)?))"
     r"\s+(?P<width>\d+(\.\d*)?|\.\d+)\s*%"
@@ -19,16 +21,16 @@ _FORM = re.compile(
 
 @dataclass(frozen=True)
 class Target:
-    """A half-width that an interval is to have, in parts of its estimate.
+    """Target half-width of a confidence interval, relative to the estimate.
 
     Parameters
     ----------
     observable : str
-        What is observed: "depth".
+        Name of the observable: "depth".
     statistic : {"mean", "std"} or float
-        What of its law is estimated; a number is the probability of a quantile.
+        Estimated statistic; a number is the probability of a quantile.
     width : float
-        Half-width of the 95 % interval in parts of the estimate.
+        Half-width of the 95 % interval, relative to the estimate.
     """
 
     observable: str
@@ -37,51 +39,47 @@ class Target:
 
     @classmethod
     def parse(cls, text: str) -> Target:
-        """Read a target as the user writes it: "depth.mean 1%", "width.q97.5 5 %".
+        """Return the target of a text such as "depth.mean 1%" or "width.q97.5 5 %".
 
         Raises
         ------
         ValueError
-            If the text is no target.
+            If the text is not a target.
         """
-        found = _FORM.fullmatch(text.strip())
-        if found is None:
+        match = _FORM.fullmatch(text.strip())
+        if match is None:
             raise ValueError(
                 f'cannot read the target "{text}": expected observable.statistic and a half-width,'
                 ' as in "depth.mean 1%"; the statistic is mean, std, median, or a quantile in'
                 " percent, q95"
             )
-        what, width = found["what"], float(found["width"]) / 100.0
+        width = float(match["width"]) / 100.0
         if not width > 0.0:
             raise ValueError(f'the target "{text}" has no width; give one above 0 %')
-        if what == "mean":
-            return cls(found["observable"], "mean", width)
-        if what == "std":
-            return cls(found["observable"], "std", width)
-        probability = 0.5 if what == "median" else float(found["percent"]) / 100.0
-        if not 0.0 < probability < 1.0:
-            raise ValueError(
-                f'the quantile of the target "{text}" must lie above q0 and below q100'
-            )
-        return cls(found["observable"], probability, width)
+        statistic = _STATISTICS.get(match["what"])
+        if statistic is None:
+            statistic = float(match["percent"]) / 100.0
+        if isinstance(statistic, float) and not 0.0 < statistic < 1.0:
+            raise ValueError(f'the quantile of the target "{text}" must be above q0 and below q100')
+        return cls(match["observable"], statistic, width)
 
     @property
     def what(self) -> str:
-        """What is estimated, "depth.mean"."""
+        """Observable and statistic, "depth.mean"."""
         name = self.statistic
         return f"{self.observable}.{name if isinstance(name, str) else f'q{100.0 * name:.12g}'}"
 
     def __str__(self) -> str:
-        """Return the target as `parse` reads it."""
+        """Return the text that `parse` accepts."""
         return f"{self.what} {100.0 * self.width:.12g}%"
 
     @property
     def probabilities(self) -> tuple[float, ...]:
-        """The quantiles that its estimate must have."""
+        """Probabilities of the quantiles that the estimate must include."""
         return () if isinstance(self.statistic, str) else (self.statistic,)
 
     def interval(self, estimate: Estimate) -> Interval:
-        """Return the interval it is about, of an estimate of its observable."""
+        """Return the interval of the statistic from an estimate of the observable."""
         if self.statistic == "mean":
             return estimate.mean
         return (
@@ -89,7 +87,7 @@ class Target:
         )
 
     def achieved(self, estimate: Estimate) -> float:
-        """Return the half-width so far in parts of the estimate, infinite where it is unknown."""
+        """Return the half-width relative to the estimate; infinite if it is unknown."""
         interval = self.interval(estimate)
         if math.isnan(interval.value) or not math.isfinite(interval.half_width):
             return math.inf
@@ -98,9 +96,9 @@ class Target:
         return interval.half_width / abs(interval.value) if interval.value else math.inf
 
     def reached(self, estimate: Estimate) -> bool:
-        """Tell whether it is reached, by 32 realisations or more: fewer may agree by luck.
+        """Return whether the target is reached, with at least 32 realisations.
 
-        An ensemble that stops at once has a narrow interval a little too often by luck alone: it
-        holds the truth in 92 to 95 % of ensembles that stop between 80 and 700 realisations.
+        Stopping as soon as the target is reached favours intervals that are narrow by chance: the
+        coverage is 92 to 95 % for ensembles that stop between 80 and 700 realisations.
         """
         return estimate.count >= _FEWEST and self.achieved(estimate) <= self.width

@@ -1,4 +1,4 @@
-"""Rank correlations between inputs, by a Gaussian copula."""
+"""Rank correlations between inputs by a Gaussian copula."""
 
 from __future__ import annotations
 
@@ -14,29 +14,29 @@ from wearsim.uq.sampling.plans import BELOW_ONE
 Correlation: TypeAlias = tuple[str, str, float]
 """Two inputs and Spearman's rank correlation between them."""
 
-_SMALLEST_PIVOT = 1e-9  # of a correlation matrix; below, it is singular but for round-off
+_MIN_PIVOT = 1e-9  # pivot below which a correlation matrix is singular to rounding
 
 
 class GaussianCopula:
-    """Ties uniform numbers to each other so that their ranks have given correlations.
+    """Transformation of independent uniform numbers to given rank correlations.
 
     Normal scores with the correlation 2 sin(pi rho/6) have the rank correlation rho (Pearson
-    1907). Inputs are taken in the order of their names: the first of those tied together keeps
-    its numbers, each later one is mixed from its own and those before it. Inputs with
-    no correlation keep theirs, bit for bit.
+    1907). Correlated inputs are processed in the order of their names: the first one keeps its
+    numbers, and each later one combines its numbers with those before it. Inputs
+    without correlation keep their numbers bit for bit.
 
     Parameters
     ----------
     correlations : sequence of (str, str, float)
-        Two inputs each and their rank correlation, -1 to 1.
+        Pairs of inputs and their rank correlation, -1 to 1.
     dimensions : mapping of str to int
-        All inputs and how many uniform numbers each takes.
+        Number of uniform numbers of each input, for all inputs.
 
     Raises
     ------
     ValueError
-        If an input is unknown, takes more than one number or is paired with itself, if a pair
-        stands twice or its correlation is out of range, or if no law has all of them together.
+        If an input is unknown, takes more than one number or is paired with itself, if a pair is
+        given twice or its correlation is out of range, or if the matrix is not positive definite.
     """
 
     def __init__(self, correlations: Sequence[Correlation], dimensions: Mapping[str, int]) -> None:
@@ -45,12 +45,14 @@ class GaussianCopula:
             _check(first, second, rank, dimensions)
             pair = (min(first, second), max(first, second))
             if pair in pairs:
-                raise ValueError(f"the correlation of {first} with {second} stands twice; keep one")
+                raise ValueError(
+                    f"the correlation of {first} with {second} is given twice; keep one"
+                )
             pairs[pair] = rank
         self._groups = [(names, _factor(names, pairs)) for names in _groups(pairs)]
 
     def correlate(self, uniforms: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-        """Return uniform numbers with the correlations, from independent ones.
+        """Return correlated uniform numbers from independent ones.
 
         Parameters
         ----------
@@ -61,40 +63,40 @@ class GaussianCopula:
         -------
         dict of str to ndarray, shapes and order as `uniforms`
         """
-        tied = dict(uniforms)
+        correlated = dict(uniforms)
         if self._groups:
             from scipy.special import ndtr, ndtri  # noqa: PLC0415  (slow to import)
 
             for names, factor in self._groups:
                 scores = [ndtri(uniforms[name]) for name in names]
                 for i in range(1, len(names)):
-                    # term by term: a matrix product's bits depend on the size of the batch
+                    # term by term: rounding of a matrix product depends on the batch size
                     mixed = sum(factor[i][j] * scores[j] for j in range(i + 1))
-                    tied[names[i]] = np.clip(ndtr(mixed), 1.0 - BELOW_ONE, BELOW_ONE)
-        return tied
+                    correlated[names[i]] = np.clip(ndtr(mixed), 1.0 - BELOW_ONE, BELOW_ONE)
+        return correlated
 
 
 def _check(first: str, second: str, rank: float, dimensions: Mapping[str, int]) -> None:
-    """Refuse a correlation that cannot be meant."""
+    """Raise a ValueError for an invalid correlation."""
     for name in (first, second):
         if name not in dimensions:
             known = ", ".join(dimensions) or "none"
             raise ValueError(f'cannot correlate "{name}": no such input, the inputs are {known}')
         if dimensions[name] != 1:
             raise ValueError(
-                f"cannot correlate {name}: a draw of it takes {dimensions[name]} numbers, and only"
-                " inputs of one number have a rank; correlate those"
+                f"cannot correlate {name}: one draw takes {dimensions[name]} numbers, and only inputs"
+                " of one number have ranks"
             )
     if first == second:
         raise ValueError(f"cannot correlate {first} with itself; name two inputs")
     if not -1.0 <= rank <= 1.0:
         raise ValueError(
-            f"the rank correlation of {first} with {second} must lie in -1 to 1, got {rank}"
+            f"the rank correlation of {first} with {second} must be in -1 to 1, got {rank}"
         )
 
 
 def _groups(pairs: Mapping[tuple[str, str], float]) -> list[list[str]]:
-    """Return the sets of inputs that are tied together, each in the order of names."""
+    """Return the groups of correlated inputs, each in the order of names."""
     groups: list[set[str]] = []
     for pair in pairs:
         joined = [group for group in groups if group & set(pair)]
@@ -104,7 +106,7 @@ def _groups(pairs: Mapping[tuple[str, str], float]) -> list[list[str]]:
 
 
 def _factor(names: list[str], pairs: Mapping[tuple[str, str], float]) -> list[list[float]]:
-    """Return the rows of Cholesky's factor of the normal scores' correlations."""
+    """Return the rows of the Cholesky factor of the normal scores' correlation matrix."""
     factor: list[list[float]] = []
     for i, name in enumerate(names):
         row: list[float] = []
@@ -113,13 +115,13 @@ def _factor(names: list[str], pairs: Mapping[tuple[str, str], float]) -> list[li
             known = sum(row[k] * factor[j][k] for k in range(j))
             row.append((wanted - known) / factor[j][j])
         pivot = 1.0 - sum(value * value for value in row)
-        if pivot < _SMALLEST_PIVOT:
-            told = ", ".join(
+        if pivot < _MIN_PIVOT:
+            given = ", ".join(
                 f"{a} with {b}: {rank:g}" for (a, b), rank in pairs.items() if a in names
             )
             raise ValueError(
-                "no law has these rank correlations together, since their matrix is not positive"
-                f" definite ({told}); bring them nearer to 0"
+                "the matrix of these rank correlations is not positive definite"
+                f" ({given}); bring them nearer to 0"
             )
         factor.append([*row, math.sqrt(pivot)])
     return factor

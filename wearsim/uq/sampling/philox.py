@@ -1,7 +1,7 @@
-"""Random numbers by address: a counter-based generator that needs no state to be stored.
+"""Counter-based random numbers, addressed without a stored state.
 
-Every number belongs to (seed, input name, purpose, realisation, block, position) and to nothing
-else, so that another order, batch or number of workers, or one more input, changes no draw.
+Each number depends only on (seed, input name, purpose, realisation, block, position): draws do not
+depend on the order, the batch size, the number of workers or the other inputs.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from wearsim.types import FloatArray
 
 Purpose: TypeAlias = Literal["test", "pass", "field", "process", "plan"]
 
-_LANES = 4  # 64-bit words that the generator yields per count
-_STEP = 2.0**-52  # one bit short of a float's 53, so that half a step more is exact, and below 1
+_LANES = 4  # 64-bit words per count of the generator
+_STEP = 2.0**-52  # one bit fewer than a float has, so that (k + 1/2) _STEP is exact and below 1
 
 
 @dataclass(frozen=True)
 class Stream:
-    """The uniform numbers of one input.
+    """Stream of uniform numbers of one input.
 
     Parameters
     ----------
@@ -32,8 +32,8 @@ class Stream:
     name : str
         Name of the input, "load.normal_force".
     purpose : {"test", "pass", "field", "process", "plan"}
-        What they are for: values of whole tests, of single passes, cells of a field, steps of a
-        process, or the inner workings of a sampling plan.
+        Use of the numbers: values of whole tests, of single passes, cells of a field, steps of a
+        process, or permutations and scrambles of a sampling design.
     """
 
     seed: int
@@ -48,14 +48,14 @@ class Stream:
     def words(
         self, first: int, count: int, realisation: int = 0, block: int = 0
     ) -> npt.NDArray[np.uint64]:
-        """Return random words, shape (count,), from position `first` on.
+        """Return random words, shape (count,), starting at position `first`.
 
         Parameters
         ----------
         first, count : int
-            Position of the first, and how many.
+            Position of the first word, and number of words.
         realisation, block : int
-            The rest of the address.
+            Realisation and block of the words.
         """
         counter = np.array([first // _LANES, realisation, block, 0], dtype=np.uint64)
         generator = np.random.Philox(key=self._key, counter=counter)
@@ -63,14 +63,14 @@ class Stream:
         return np.asarray(generator.random_raw(count + skipped)[skipped:], dtype=np.uint64)
 
     def uniforms(self, first: int, count: int, realisation: int = 0, block: int = 0) -> FloatArray:
-        """Return uniform numbers between 0 and 1, both excluded; parameters as of `words`."""
+        """Return uniform numbers between 0 and 1, both excluded; parameters as for `words`."""
         words = self.words(first, count, realisation, block)
         return np.asarray(((words >> np.uint64(12)) + 0.5) * _STEP)
 
     def rows(self, first: int, count: int, dimension: int, realisation: int = 0) -> FloatArray:
-        """Return uniform numbers for draws that take several each, (count, dimension).
+        """Return uniform numbers of draws with several components, (count, dimension).
 
-        Component k of every draw has the block k; other parameters as of `words`.
+        Component k of each draw is taken from block k; other parameters as for `words`.
         """
         columns = [self.uniforms(first, count, realisation, k) for k in range(dimension)]
         return np.stack(columns, axis=1)

@@ -1,7 +1,7 @@
-"""Sampling plans: the uniform numbers that one input takes in each realisation of a study.
+"""Sampling designs: the uniform numbers of one input in each realisation of a study.
 
-Whatever the plan, they follow from the seed and the input's own name and dimension, so that no
-other input, no order and no batch of realisations changes them.
+In each design they depend only on the seed and on the name and dimension of the input, not on other
+inputs, the order or the batch size of the realisations.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Draw: TypeAlias = Callable[[str, int, int, int], FloatArray]
 BELOW_ONE = 1.0 - 2.0**-53
 
 REPLICATES = 8
-"""Independent Sobol sequences of a plan whose estimates need intervals: 7 degrees of freedom."""
+"""Number of independent Sobol sequences for confidence intervals: 7 degrees of freedom."""
 
 
 def monte_carlo(seed: int, name: str, dimension: int, first: int, count: int) -> FloatArray:
@@ -38,9 +38,9 @@ def monte_carlo(seed: int, name: str, dimension: int, first: int, count: int) ->
     name : str
         Name of the input.
     dimension : int
-        How many uniform numbers it takes.
+        Number of uniform numbers per realisation.
     first, count : int
-        The first realisation, and how many.
+        First realisation, and number of realisations.
 
     Returns
     -------
@@ -53,14 +53,14 @@ def monte_carlo(seed: int, name: str, dimension: int, first: int, count: int) ->
 def latin_hypercube(
     seed: int, total: int, name: str, dimension: int, first: int, count: int
 ) -> FloatArray:
-    """Return a part of a Latin hypercube of `total` realisations: one of them in every stratum.
+    """Return realisations of a Latin hypercube of `total` realisations, one per stratum.
 
     Parameters
     ----------
     seed, name, dimension, first, count
-        As of `monte_carlo`.
+        As for `monte_carlo`.
     total : int
-        Realisations of the whole plan, and strata of each component.
+        Number of realisations of the design, and of strata of each component.
 
     Returns
     -------
@@ -70,7 +70,7 @@ def latin_hypercube(
     Raises
     ------
     ValueError
-        If the realisations go beyond `total`.
+        If a realisation is beyond `total`.
 
     Notes
     -----
@@ -78,20 +78,20 @@ def latin_hypercube(
     """
     if first + count > total:
         raise ValueError(
-            f"realisation {first + count - 1} is beyond this latin-hypercube plan, whose total is"
-            f" {total} (counted from 0); plan with a greater total, or take sobol, which has no end"
+            f"realisation {first + count - 1} (counted from 0) is beyond this latin-hypercube plan,"
+            f" whose total is {total}; use a greater total, or sobol, which has no total"
         )
     within = monte_carlo(seed, name, dimension, first, count)
     strata = np.stack(
         [_strata(seed, total, name, k)[first : first + count] for k in range(dimension)], axis=1
     )
-    # the greatest number of a stratum may be rounded up into the next
+    # rounding may move the greatest number of a stratum into the next one
     return np.minimum((strata + within) / total, np.nextafter((strata + 1.0) / total, 0.0))
 
 
 @lru_cache(maxsize=64)
 def _strata(seed: int, total: int, name: str, component: int) -> IntArray:
-    """Return a random order of the strata, by sorting so that no numpy release changes it."""
+    """Return a random order of the strata; sorting makes it independent of numpy's version."""
     words = Stream(seed, name, "plan").words(0, total, block=component)
     order = np.argsort(words, kind="stable").astype(np.int64)
     order.flags.writeable = False
@@ -101,18 +101,18 @@ def _strata(seed: int, total: int, name: str, component: int) -> IntArray:
 def replicated_sobol(
     seed: int, replicates: int, name: str, dimension: int, first: int, count: int
 ) -> FloatArray:
-    """Return points of several independently scrambled Sobol sequences in turn.
+    """Return points of several independently scrambled Sobol sequences, alternately.
 
-    Realisation k has the point k // replicates of the sequence k % replicates: each sequence alone
-    is an unbiased sample, and how far they differ tells the error of all of them together
-    (Owen 1997, DOI 10.1137/S0036142994277468).
+    Realisation k is the point k // replicates of the sequence k % replicates. Each sequence is an
+    unbiased sample, and the differences between them give the error of their mean (Owen 1997, DOI
+    10.1137/S0036142994277468).
 
     Parameters
     ----------
     seed, name, dimension, first, count
-        As of `monte_carlo`.
+        As for `monte_carlo`.
     replicates : int
-        Number of sequences; of one, it is the plain scrambled Sobol sequence.
+        Number of sequences; 1 gives a single scrambled Sobol sequence.
 
     Returns
     -------
@@ -120,36 +120,36 @@ def replicated_sobol(
         Strictly between 0 and 1.
     """
     points = np.empty((count, dimension))
-    for ahead in range(min(replicates, count)):
-        start, replicate = divmod(first + ahead, replicates)
-        own = points[ahead::replicates]
+    for offset in range(min(replicates, count)):
+        start, replicate = divmod(first + offset, replicates)
+        own = points[offset::replicates]
         own[:] = sobol.scrambled(seed, name, dimension, start, len(own), replicate)
     return points
 
 
 def drawing(plan: PlanName, seed: int, total: int | None, replicates: int = 1) -> Draw:
-    """Return how a plan draws one input.
+    """Return the function that draws one input by a sampling design.
 
     Parameters
     ----------
     plan : {"monte-carlo", "latin-hypercube", "sobol"}
-        Name of the plan.
+        Name of the design.
     seed : int
         Seed of the scenario.
     total : int, optional
-        Realisations of the whole plan, needed by "latin-hypercube".
+        Number of realisations of the design; needed by "latin-hypercube".
     replicates : int
-        Independent sequences that "sobol" takes in turn; other plans have none.
+        Number of independent, alternating sequences of "sobol".
 
     Returns
     -------
     callable
-        Of name, dimension, first and count.
+        Function of name, dimension, first and count.
 
     Raises
     ------
     ValueError
-        If the plan is unknown, or `total` is missing or not positive, or `replicates` is not.
+        If the design is unknown, or `total` or `replicates` is missing or not positive.
     """
     if plan not in PLANS:
         raise ValueError(f'unknown sampling plan "{plan}", expected one of {", ".join(PLANS)}')
@@ -162,5 +162,5 @@ def drawing(plan: PlanName, seed: int, total: int | None, replicates: int = 1) -
     if plan == "sobol":
         return lambda *where: replicated_sobol(seed, replicates, *where)
     if total is None:
-        raise ValueError("a latin-hypercube plan needs total, the realisations of the whole plan")
+        raise ValueError("a latin-hypercube plan needs total, the number of its realisations")
     return lambda *where: latin_hypercube(seed, total, *where)

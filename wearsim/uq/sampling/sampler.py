@@ -1,4 +1,4 @@
-"""The sampler of a study: which uniform numbers each input takes in each realisation."""
+"""Sampler of a study: the uniform numbers of all inputs in each realisation."""
 
 from __future__ import annotations
 
@@ -11,32 +11,32 @@ from wearsim.uq.sampling.sobol import slots
 
 
 class Sampler:
-    """Draws all inputs of a study by a plan.
+    """Sampler of all inputs of a study by one sampling design.
 
-    A realisation has its numbers for ever: neither the order nor the batches in which it is asked
-    for change a bit of them, and nor do inputs that are added, left out or named in another order.
+    The numbers of a realisation do not depend on the order or batch size in which realisations are
+    requested, nor on other inputs and the order of the inputs.
 
     Parameters
     ----------
     seed : int
         Seed of the scenario.
     inputs : sequence of (str, int)
-        Name of each input and how many uniform numbers a draw of it takes.
+        Name of each input and number of uniform numbers per draw.
     plan : {"monte-carlo", "latin-hypercube", "sobol"}
-        How the realisations are spread.
+        Sampling design.
     total : int, optional
-        Realisations of the whole plan; needed by "latin-hypercube".
+        Number of realisations of the design; needed by "latin-hypercube".
     correlations : sequence of (str, str, float)
-        Rank correlations between inputs of one number each. They come after the plan: what is
-        tied to another input keeps its law, and is no longer as evenly spread.
+        Rank correlations between inputs of one number each. They are applied to the numbers of the
+        design: a correlated input keeps its distribution, but is less evenly spread.
     replicates : int
-        Independent sequences that "sobol" takes in turn: realisation k is number k // replicates
-        of sequence k % replicates.
+        Number of independent, alternating sequences of "sobol": realisation k is the point
+        k // replicates of the sequence k % replicates.
 
     Raises
     ------
     ValueError
-        If an input, the plan or the correlations cannot be used.
+        If an input, the design or the correlations are invalid.
     """
 
     def __init__(
@@ -55,22 +55,22 @@ class Sampler:
             _refuse_shared_slots(self._dimensions)
 
     def uniforms(self, first: int, count: int) -> dict[str, FloatArray]:
-        """Return the uniform numbers of `count` realisations on end.
+        """Return the uniform numbers of `count` consecutive realisations.
 
         Parameters
         ----------
         first, count : int
-            The first realisation, counted from 0, and how many.
+            First realisation, counted from 0, and number of realisations.
 
         Returns
         -------
         dict of str to ndarray, shape (count, dimension)
-            By input; strictly between 0 and 1.
+            Numbers of each input, strictly between 0 and 1.
 
         Raises
         ------
         ValueError
-            If the plan does not have these realisations.
+            If the design does not have these realisations.
         """
         if first < 0 or count < 0:
             raise ValueError(
@@ -85,11 +85,11 @@ class Sampler:
 
 
 def _dimensions(inputs: Sequence[tuple[str, int]]) -> dict[str, int]:
-    """Return the dimensions by name, having refused what cannot be drawn."""
+    """Return the dimension of each input; raises a ValueError for an invalid input."""
     dimensions: dict[str, int] = {}
     for name, dimension in inputs:
         if name in dimensions:
-            raise ValueError(f"the input {name} stands twice; give each its own name")
+            raise ValueError(f"the input {name} is given twice; use different names")
         if dimension < 1:
             raise ValueError(f"the input {name} must take 1 or more numbers, got {dimension}")
         dimensions[name] = dimension
@@ -97,13 +97,13 @@ def _dimensions(inputs: Sequence[tuple[str, int]]) -> dict[str, int]:
 
 
 def _refuse_shared_slots(dimensions: dict[str, int]) -> None:
-    """Refuse inputs that would get the same dimension of the Sobol sequence."""
+    """Raise a ValueError for inputs that share a dimension of the Sobol sequence."""
     owner: dict[int, str] = {}
     for name, dimension in dimensions.items():
         for slot in slots(name, dimension) or ():
             if slot in owner:
                 raise ValueError(
-                    f"{owner[slot]} and {name} are one quantity, and have one dimension of the"
-                    " Sobol sequence between them; draw only one of them"
+                    f"{owner[slot]} and {name} are one quantity and share a dimension of the Sobol"
+                    " sequence; draw only one of them"
                 )
             owner[slot] = name

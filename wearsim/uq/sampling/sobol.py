@@ -1,10 +1,10 @@
-"""Scrambled Sobol points by name: what an input gets depends on its own name alone.
+"""Scrambled Sobol points that depend on the name of the input, not on the other inputs.
 
-Well-known inputs have fixed dimensions of one Sobol sequence, `SLOTS` for the whole rig and as
-many again for each roller ("creepage.yaw@2"), so that they fill the space together. Any other
-input has the first two dimensions in an order of its own: it is stratified as well, and by chance
-alone against the others. Names hashed into dimensions would meet, and then no choice between
-them could be independent of which other inputs there are.
+Common inputs have fixed dimensions of one Sobol sequence, `SLOTS` for the whole rig and `SLOTS` for
+each roller ("creepage.yaw@2"), so that together they are a low-discrepancy sequence. Any other
+input uses the first two dimensions in a separate random order: it is stratified, but only randomly
+paired with the others. Dimensions derived from hashed names would coincide for some names, and
+resolving such a conflict would depend on the other inputs.
 """
 
 from __future__ import annotations
@@ -36,23 +36,23 @@ SLOT_OF = {
     "load.thermal.time_constant": (10, 1),
     "roller.offset": (11, 1),
 }
-"""First slot of every well-known input, and how many it has."""
+"""First slot of each common input, and its number of slots."""
 
-_ROLLERS = 1000  # scipy knows 21201 dimensions
+_ROLLERS = 1000  # scipy has 21201 dimensions
 _BITS = 32
 _ROUNDS = 4
-_VALUES, _ORDER = 0, 1  # what the words of a key are for
+_VALUES, _ORDER = 0, 1  # uses of a key
 
 
 def slots(name: str, dimension: int) -> range | None:
-    """Return the Sobol dimensions of an input, counted from 0, or None where it has none fixed.
+    """Return the fixed Sobol dimensions of an input, counted from 0, or None.
 
     Parameters
     ----------
     name : str
-        Name of the input, for one roller with its number: "creepage.yaw@2".
+        Name of the input, with the number of a roller: "creepage.yaw@2".
     dimension : int
-        How many uniform numbers it takes.
+        Number of uniform numbers per realisation.
     """
     base, _, roller = name.partition("@")
     slot, width = SLOT_OF.get(base, (0, 0))
@@ -71,8 +71,8 @@ def scrambled(
 ) -> FloatArray:
     """Return the scrambled Sobol points of one input, strictly between 0 and 1.
 
-    Every component is scrambled by itself (Owen 1995, DOI 10.1007/978-1-4612-2552-2_19), so that
-    each point is uniform over the seeds and the points stay a digital net.
+    Each component is scrambled separately (Owen 1995, DOI 10.1007/978-1-4612-2552-2_19), so that
+    each point is uniform over the seeds and the points remain a digital net.
 
     Parameters
     ----------
@@ -81,11 +81,11 @@ def scrambled(
     name : str
         Name of the input.
     dimension : int
-        How many uniform numbers it takes.
+        Number of uniform numbers per realisation.
     first, count : int
-        The first realisation, and how many.
+        First realisation, and number of realisations.
     replicate : int
-        Which of the independent scrambles of the sequence.
+        Number of the independent scramble of the sequence.
 
     Returns
     -------
@@ -93,9 +93,7 @@ def scrambled(
     """
     stop = first + count
     if stop > 2**_BITS:
-        raise ValueError(
-            f"a Sobol plan has {2**_BITS} realisations, {stop} were asked for; take monte-carlo"
-        )
+        raise ValueError(f"a Sobol plan has {2**_BITS} realisations, got {stop}; use monte-carlo")
     fixed = slots(name, dimension)
     words = (
         _padded(seed, name, dimension, first, count, replicate)
@@ -108,7 +106,7 @@ def scrambled(
 
 
 def _sequence(dimensions: int, first: int, count: int) -> Words:
-    """Return the plain Sobol sequence, shape (count, dimensions)."""
+    """Return the unscrambled Sobol sequence, shape (count, dimensions)."""
     from scipy.stats.qmc import Sobol  # noqa: PLC0415  (a second to import)
 
     engine = Sobol(dimensions, scramble=False, bits=_BITS)
@@ -116,16 +114,16 @@ def _sequence(dimensions: int, first: int, count: int) -> Words:
         engine.fast_forward(first)
         points = engine.random(count)
     else:
-        # the first point by itself: scipy warns of a first batch that is no power of two
+        # the first point separately: scipy warns if the first batch is not a power of two
         points = np.concatenate([engine.random(1), engine.random(max(count - 1, 0))])[:count]
     return np.asarray(points * 2.0**_BITS).astype(np.uint32)
 
 
 def _padded(seed: int, name: str, dimension: int, first: int, count: int, replicate: int) -> Words:
-    """Return the first two dimensions of the sequence in a random order for each two components.
+    """Return the first two dimensions of the sequence, in a random order per pair of components.
 
-    The order is a nested scramble of the index: 2^m realisations on end from a multiple of 2^m
-    are as many of the sequence's, and thus a net (Burley 2020, JCGT 9(4)).
+    The order is a nested scramble of the index: 2^m consecutive realisations from a multiple of 2^m
+    are 2^m consecutive points of the sequence, and thus a net (Burley 2020, JCGT 9(4)).
     """
     index = np.arange(first, first + count, dtype=np.uint64).astype(np.uint32)
     words = np.empty((count, dimension), dtype=np.uint32)
@@ -138,7 +136,7 @@ def _padded(seed: int, name: str, dimension: int, first: int, count: int, replic
 
 
 def _second_dimension(index: Words) -> Words:
-    """Return the words of Sobol's second dimension: Pascal's triangle modulo 2 by the index."""
+    """Return the words of Sobol's second dimension: Pascal's triangle modulo 2 times the index."""
     words = np.zeros_like(index)
     direction = 2 ** (_BITS - 1)
     for bit in range(_BITS):
@@ -148,7 +146,7 @@ def _second_dimension(index: Words) -> Words:
 
 
 def reverse_bits(words: Words) -> Words:
-    """Return 32-bit words with their bits in the opposite order."""
+    """Return 32-bit words with their bits reversed."""
     for width, low in ((1, 0x55555555), (2, 0x33333333), (4, 0x0F0F0F0F), (8, 0x00FF00FF)):
         mask, shift = np.uint32(low), np.uint32(width)
         words = (words >> shift & mask) | (words & mask) << shift
@@ -156,18 +154,18 @@ def reverse_bits(words: Words) -> Words:
 
 
 def nested_scramble(words: Words, key: Words) -> Words:
-    """Flip every bit of `words` by a hash of the bits above it: a nested uniform scramble.
+    """Return a nested uniform scramble: each bit is flipped by a hash of the bits above it.
 
-    Sums and products let no bit change those below it, so that on reversed bits they keep the
-    intervals nested (Laine and Karras 2011; Burley 2020, JCGT 9(4)). The first sum alone makes
-    every word uniform over the keys; the rounds make different branches flip independently.
+    In sums and products no bit affects those below it, so that on reversed bits the intervals stay
+    nested (Laine and Karras 2011; Burley 2020, JCGT 9(4)). The first sum makes each word uniform
+    over the keys; the rounds make the flips of different branches independent.
 
     Parameters
     ----------
     words : ndarray of uint32
         Numbers in units of 2^-32, or indices.
     key : ndarray of uint32, shape (rounds, 3)
-        What is added, the even factor and the odd factor of every round.
+        Summand, even factor and odd factor of each round.
 
     Returns
     -------

@@ -1,1 +1,1 @@
-"""Sobol indices."""
+"""Sensitivity analysis: Sobol indices."""

@@ -1,4 +1,4 @@
-"""What polynomials of a few numbers explain of a value, with errors of prediction left-one-out."""
+"""Polynomial regression of a value on a few numbers, with leave-one-out errors."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ import numpy as np
 
 from wearsim.types import FloatArray, IntArray
 
-_DEGREE = 10  # of a polynomial at most
-_TERMS = 120  # at most, the constant among them
-_PER_TERM = 8  # realisations to a term
-_BLOCK = 8192  # rows at once
-_RIDGE = 1e-9  # of the realisations: keeps terms apart that are the same in all of them
+_DEGREE = 10  # greatest degree of a polynomial
+_TERMS = 120  # greatest number of terms, with the constant
+_PER_TERM = 8  # least number of realisations per term
+_BLOCK = 8192  # rows per block
+_RIDGE = 1e-9  # relative regularisation, for terms that are equal in all realisations
 
 
 @dataclass(frozen=True)
 class Fit:
-    """A polynomial, and how well it tells the value of each realisation.
+    """A fitted polynomial and its leave-one-out errors.
 
     Parameters
     ----------
     terms : int
-        Terms, the constant among them.
+        Number of terms, with the constant.
     error : float
-        Mean square of the errors of prediction, each realisation left out in turn.
+        Mean square of the leave-one-out prediction errors.
     residual, leverage : ndarray, shape (n,)
-        What the polynomial leaves, and each realisation's weight in its own prediction.
+        Residual and leverage of each realisation.
     """
 
     terms: int
@@ -39,19 +39,19 @@ class Fit:
 
 
 def fewest_realisations(numbers: int) -> int:
-    """Return how many realisations polynomials of so many numbers and their squares need."""
+    """Return the number of realisations that a fit of so many numbers and their squares needs."""
     return _PER_TERM * (1 + 2 * numbers)
 
 
 def best_fit(scores: FloatArray, values: FloatArray, family: str) -> Fit:
-    """Return the polynomial that predicts best what it has not seen.
+    """Return the polynomial with the least leave-one-out error.
 
     Parameters
     ----------
     scores : ndarray, shape (n, m)
         Normal scores ("hermite") or ranks from -1 to 1 ("legendre").
     values : ndarray, shape (n,)
-        With the mean 0; `fewest_realisations` of them or more.
+        Values with the mean 0; at least `fewest_realisations` of them.
     family : {"hermite", "legendre"}
         The polynomials whose products the terms are.
 
@@ -67,24 +67,24 @@ def best_fit(scores: FloatArray, values: FloatArray, family: str) -> Fit:
         gram += design.T @ design
         moment += design.T @ values[rows]
     lower = np.linalg.cholesky(gram + _RIDGE * count * np.eye(len(powers)))
-    # columns made orthonormal one after the other: the first k of them are those of k terms
-    turn = np.linalg.inv(lower).T
-    slopes = turn.T @ moment
-    left, own = np.empty((count, len(ends))), np.empty((count, len(ends)))
+    # columns orthonormalised successively: the first k of them span the first k terms
+    transform = np.linalg.inv(lower).T
+    slopes = transform.T @ moment
+    residual, leverage = np.empty((count, len(ends))), np.empty((count, len(ends)))
     for rows, design in _designs(scores, powers, family):
-        columns = design @ turn
+        columns = design @ transform
         for k, end in enumerate(ends):
-            left[rows, k] = values[rows] - columns[:, :end] @ slopes[:end]
-            own[rows, k] = (columns[:, :end] ** 2).sum(axis=1)
-    errors = ((left / (1.0 - own)) ** 2).mean(axis=0)
+            residual[rows, k] = values[rows] - columns[:, :end] @ slopes[:end]
+            leverage[rows, k] = (columns[:, :end] ** 2).sum(axis=1)
+    errors = ((residual / (1.0 - leverage)) ** 2).mean(axis=0)
     best = int(np.argmin(errors))
-    return Fit(ends[best], float(errors[best]), left[:, best], own[:, best])
+    return Fit(ends[best], float(errors[best]), residual[:, best], leverage[:, best])
 
 
 def _terms(distinct: list[int], most: int) -> tuple[IntArray, list[int]]:
-    """Return the powers of each term, (terms, m), and where a polynomial may end.
+    """Return the powers of each term, (terms, m), and the possible numbers of terms.
 
-    Terms come by total degree, and of one degree those of fewer numbers first.
+    Terms are ordered by total degree, then by the number of factors.
     """
     width = len(distinct)
     powers, ends = [(0,) * width], list[int]()
@@ -103,9 +103,9 @@ def _terms(distinct: list[int], most: int) -> tuple[IntArray, list[int]]:
 
 
 def _of_degree(degree: int, together: int, width: int) -> Iterator[tuple[int, ...]]:
-    """Yield the powers, of this sum, of all terms in which so many numbers stand."""
+    """Yield the powers of all terms of this degree with so many factors."""
     for chosen in combinations(range(width), together):
-        # where the sum is cut into parts of 1 or more
+        # compositions of the degree into parts of 1 or more
         for cuts in combinations(range(1, degree), together - 1):
             powers = [0] * width
             for number, start, stop in zip(chosen, (0, *cuts), (*cuts, degree), strict=True):
@@ -116,26 +116,25 @@ def _of_degree(degree: int, together: int, width: int) -> Iterator[tuple[int, ..
 def _designs(
     scores: FloatArray, powers: IntArray, family: str
 ) -> Iterator[tuple[slice, FloatArray]]:
-    """Yield the terms of some rows after the other, (rows, terms)."""
-    highest = int(powers.max())
+    """Yield the terms of successive blocks of rows, (rows, terms)."""
     for first in range(0, len(scores), _BLOCK):
         rows = slice(first, first + _BLOCK)
-        ladder = _ladder(scores[rows], highest, family)
-        design = np.ones((ladder.shape[1], len(powers)))
+        degrees = _orthonormal(scores[rows], int(powers.max()), family)
+        design = np.ones((degrees.shape[1], len(powers)))
         for number in range(scores.shape[1]):
-            design *= ladder[powers[:, number], :, number].T
+            design *= degrees[powers[:, number], :, number].T
         yield rows, design
 
 
-def _ladder(x: FloatArray, highest: int, family: str) -> FloatArray:
-    """Return orthonormal polynomials of all degrees, (degrees, rows, m), by their recurrence."""
-    ladder = np.ones((highest + 1, *x.shape))
+def _orthonormal(x: FloatArray, highest: int, family: str) -> FloatArray:
+    """Return orthonormal polynomials of all degrees, (degrees, rows, m), by recurrence."""
+    values = np.ones((highest + 1, *x.shape))
     for degree in range(highest):
-        before = ladder[degree - 1] if degree else 0.0
+        before = values[degree - 1] if degree else 0.0
         if family == "hermite":
             upper, lower = (degree + 1.0) ** 0.5, degree**0.5
         else:
             upper = (degree + 1.0) / ((2.0 * degree + 1.0) * (2.0 * degree + 3.0)) ** 0.5
             lower = degree / ((2.0 * degree + 1.0) * abs(2.0 * degree - 1.0)) ** 0.5
-        ladder[degree + 1] = (x * ladder[degree] - lower * before) / upper
-    return ladder
+        values[degree + 1] = (x * values[degree] - lower * before) / upper
+    return values

@@ -9,10 +9,10 @@ import numpy as np
 
 from wearsim.studies.ensemble.designs import EnsemblePlan
 from wearsim.types import FloatArray
-from wearsim.uq.estimation.control_variate import Control, Controlled
 from wearsim.uq.estimation.estimates import Estimate, estimate
 from wearsim.uq.estimation.intervals import Interval
 from wearsim.uq.estimation.quantiles import WeightedDistribution
+from wearsim.uq.estimation.standard_errors import Control, Controlled
 from wearsim.uq.sampling.plans import REPLICATES
 
 PROBABILITY = 0.95
@@ -69,7 +69,7 @@ def interval_of(found: Estimate, group: str) -> Interval:
 
 
 @dataclass(frozen=True)
-class Truth:
+class Reference:
     """What all tests together tell [m].
 
     Parameters
@@ -82,8 +82,8 @@ class Truth:
     error: float
 
 
-def truths(studies: Sequence[Study]) -> dict[str, Truth]:
-    """Return what all studies together tell, by group.
+def references(studies: Sequence[Study]) -> dict[str, Reference]:
+    """Return what all studies together on_progress, by group.
 
     All tests, however drawn, are weighted so that the closed form has its known mean, which is what
     all cheap draws tell. The standard errors are the jackknife's, one replicate left out each time.
@@ -101,7 +101,7 @@ def truths(studies: Sequence[Study]) -> dict[str, Truth]:
     for group, value in whole.items():
         others = np.array([other[group] for other in left])
         error = float(np.sqrt(share * ((others - others.mean()) ** 2).sum()))
-        found[group] = Truth(value, error)
+        found[group] = Reference(value, error)
     return found
 
 
@@ -140,7 +140,9 @@ class PlanError:
     known: float
 
 
-def plan_error(studies: Sequence[Study], plan: EnsemblePlan, group: str, truth: Truth) -> PlanError:
+def plan_error(
+    studies: Sequence[Study], plan: EnsemblePlan, group: str, truth: Reference
+) -> PlanError:
     """Return how far studies of one size are from the truth.
 
     Parameters
@@ -150,7 +152,7 @@ def plan_error(studies: Sequence[Study], plan: EnsemblePlan, group: str, truth: 
     plan : str
     group : str
         `MEAN` or `QUANTILE`.
-    truth : Truth
+    truth : Reference
     """
     found = [interval_of(study.estimate(plan), group) for study in studies]
     apart = np.array([interval.value / truth.value - 1.0 for interval in found])
