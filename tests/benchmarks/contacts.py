@@ -1,4 +1,4 @@
-"""One contact: Hertz, the mean problem by three routes, slender solves; and many at once."""
+"""Single contacts (Hertz, mean problem, slender contact) and batches of contacts."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ ALONG, CROWN, LOAD = 1 / 0.020 + 1 / 0.025, 0.5, 300.0
 POINT = OperatingPoint(LOAD, 1000 / 60 * 2 * 3.141592653589793 * 0.025, Creepage(1e-3), 0.1)
 PEAK_PRESSURE = 680.22e6  # Pa, of the rig
 EXACT_POWER = 0.0771  # W, exact rolling theory for the mean problem
-FASTSIM_POWER = 0.073873  # W, what FASTSIM tends to in the limit of a long patch
+FASTSIM_POWER = 0.073873  # W, limit of FASTSIM for a long patch
 
 
 class Mean:
-    """The mean problem: the rig's contact, fresh, on strips of a model's choice or given."""
+    """The mean problem: the unworn contact of the rig, on the default or given strips."""
 
     def __init__(self, name: str, strips: int | None = None, **options: Any) -> None:
         spec = registry().get(ContactModelSpec, name)
@@ -41,7 +41,7 @@ class Mean:
         self.gap = grid.y**2 / (2 * CROWN)
 
     def solve(self, warm: ContactSolution | None = None, load: float = LOAD) -> ContactSolution:
-        """Solve it, from nothing or from a solution nearby."""
+        """Solve it, with or without a warm start."""
         point = POINT if load == LOAD else replace(POINT, normal_force=load)
         return self.model.solve(self.gap, ALONG, point, None, warm)
 
@@ -58,28 +58,30 @@ def hertz_rows(effort: Effort) -> list[Row]:
     return [Row("Hertz, the rig", seconds, "", f"{error} in p0, of 680.22 MPa")]
 
 
-ROUTES: dict[str, dict[str, Any]] = {
+VARIANTS: dict[str, dict[str, Any]] = {
     "closed form": {},
     "FASTSIM, work of the rigid slip": {"closed_form": "never"},
-    "FASTSIM, the textbook's element sum": {"closed_form": "never", "dissipation": "element-sum"},
+    "FASTSIM, element sum": {"closed_form": "never", "dissipation": "element-sum"},
 }
-ASKED = {"FASTSIM, work of the rigid slip": "0.1 % in power"}
+TARGETS = {"FASTSIM, work of the rigid slip": "0.1 % in power"}
 
 
 def mean_rows(effort: Effort) -> list[Row]:
-    """Time the mean problem by FASTSIM's three routes, 50 x 50 elements."""
+    """Time the mean problem by the three variants of FASTSIM, 50 x 50 elements."""
     rows = []
-    for route, options in ROUTES.items():
+    for variant, options in VARIANTS.items():
         mean = Mean("hertz-fastsim", kalker="line-limit", **options)
         error = part(mean.solve().power / FASTSIM_POWER - 1)
         seconds = best_short(mean.solve, effort.repetitions)
-        what = f"mean problem, 50 x 50, {route}"
-        rows.append(Row(what, seconds, ASKED.get(route, ""), f"{error} in power, of 0.073873 W"))
+        what = f"mean problem, 50 x 50, {variant}"
+        rows.append(
+            Row(what, seconds, TARGETS.get(variant, ""), f"{error} in power, of 0.073873 W")
+        )
     return rows
 
 
 def draws(contacts: int) -> OperatingPoints:
-    """Draw loads, creepages, yaws and tilts, and friction much as the paper does."""
+    """Draw load, creepage, yaw, tilt and friction similarly to the paper."""
     random = np.random.default_rng(0)
     angle, size = 2 * np.pi * random.random(contacts), 2e-3 * np.sqrt(random.random(contacts))
     return OperatingPoints(
@@ -92,8 +94,8 @@ def draws(contacts: int) -> OperatingPoints:
     )
 
 
-def many_rows(effort: Effort) -> list[Row]:
-    """Time a thousand contacts with spin, solved together; errors are against FASTSIM's limit."""
+def batch_rows(effort: Effort) -> list[Row]:
+    """Time a batch of 1000 contacts with spin; errors are against the limit of FASTSIM."""
     points = draws(1000)
     steps = 400 if not effort.quick else 100
 
@@ -105,41 +107,41 @@ def many_rows(effort: Effort) -> list[Row]:
         power = model.solve_batch(gap, ALONG, points).stack("power").ravel()
         return best(lambda: model.solve_batch(gap, ALONG, points), effort.repetitions), power
 
-    truth = case(steps, steps, "never")[1]
+    reference = case(steps, steps, "never")[1]
     rows = []
-    for what, elements, strips, form, asked in (
+    for what, elements, strips, form, target in (
         ("50 x 50, FASTSIM", 50, 50, "never", "0.1 s, aim 0.02 s"),
         ("12 x 16, FASTSIM", 12, 16, "never", "10 ms, aim 2 ms; 0.2 %"),
         ("24 strips, closed form", 50, 24, "always", ""),
     ):
         seconds, power = case(elements, strips, form)
-        rms = np.sqrt(np.mean((power / truth - 1) ** 2))
-        error = f"{part(power.mean() / truth.mean() - 1)} in mean power, {100 * rms:.2g} % rms"
-        told = f"{error}, against {steps} x {steps}"
-        rows.append(Row(f"1000 contacts with spin at once, {what}", seconds, asked, told))
+        rms = np.sqrt(np.mean((power / reference - 1) ** 2))
+        error = f"{part(power.mean() / reference.mean() - 1)} in mean power, {100 * rms:.2g} % rms"
+        message = f"{error}, against {steps} x {steps}"
+        rows.append(Row(f"1000 contacts with spin at once, {what}", seconds, target, message))
     return rows
 
 
 def tangential_rows(effort: Effort) -> list[Row]:
-    """Time the kernel of strip theory in partial slip with spin, one contact of a batch."""
+    """Time the kernel of strip theory in partial slip with spin, per contact of a batch."""
     rows, batch = [], 200
-    for strips, asked in ((64, "10 us, aim 1 us; 1.5 % rms"), (24, "")):
+    for strips, target in ((64, "10 us, aim 1 us; 1.5 % rms"), (24, "")):
         errors, seconds = [], []
         for case in elliptic_cases("partial")[: 4 if effort.quick else None]:
             arrays, sums = strip_problem(case, strips, 1)
             strip_contacts(*arrays)
             errors.append(sums[SUMS.index("power"), 0] / case.exact.power - 1.0)
-            many, _ = strip_problem(case, strips, batch)
-            seconds.append(best(lambda args=many: strip_contacts(*args), effort.repetitions))
+            copies, _ = strip_problem(case, strips, batch)
+            seconds.append(best(lambda args=copies: strip_contacts(*args), effort.repetitions))
         rms = float(np.sqrt(np.mean(np.square(errors))))
         what = f"strip theory, {strips} strips, partial slip with spin, kernel"
-        told = f"{100 * rms:.2g} % rms of the exact power"
-        rows.append(Row(what, float(np.mean(seconds)) / batch, asked, told))
+        message = f"{100 * rms:.2g} % rms of the exact power"
+        rows.append(Row(what, float(np.mean(seconds)) / batch, target, message))
     return rows
 
 
 def strip_problem(case: Case, strips: int, contacts: int) -> tuple[tuple[Any, ...], np.ndarray]:
-    """Return the arguments of `strip_contacts` for copies of a Hertzian contact, and its sums."""
+    """Return the arguments of `strip_contacts` for copies of a Hertzian contact, and the sums."""
     patch, point, elastic = case.patch, case.point, combine(STEEL, STEEL)
     grid = Grid.spanning(-patch.b, patch.b, strips)
     half = patch.a * np.sqrt(1.0 - (grid.y / patch.b) ** 2)
@@ -148,24 +150,24 @@ def strip_problem(case: Case, strips: int, contacts: int) -> tuple[tuple[Any, ..
     creepage, dissipation = point.creepage, np.empty((contacts, strips))
     sums = np.empty((len(SUMS), contacts))
 
-    def each(values: object) -> np.ndarray:
+    def per_strip(values: object) -> np.ndarray:
         return np.ascontiguousarray(np.broadcast_to(values, (contacts, strips)))
 
-    def own(value: float) -> np.ndarray:
+    def per_contact(value: float) -> np.ndarray:
         return np.full(contacts, value)
 
     arguments = (
-        each(load),
-        each(half),
+        per_strip(load),
+        per_strip(half),
         grid.y,
         grid.spacing,
         strip_elasticity(elastic.contact_modulus, elastic.shear_modulus),
         point.rolling_speed,
-        own(creepage.longitudinal),
-        own(creepage.lateral),
-        own(creepage.spin),
-        each(-creepage.spin * grid.y),
-        each(point.friction),
+        per_contact(creepage.longitudinal),
+        per_contact(creepage.lateral),
+        per_contact(creepage.spin),
+        per_strip(-creepage.spin * grid.y),
+        per_strip(point.friction),
         dissipation,
         sums,
     )
@@ -173,16 +175,16 @@ def strip_problem(case: Case, strips: int, contacts: int) -> tuple[tuple[Any, ..
 
 
 def slender_rows(effort: Effort) -> list[Row]:
-    """Time a slender solve on 81 strips, from nothing and from a neighbour."""
+    """Time a slender solve on 81 strips, with and without a warm start."""
     mean = Mean("slender", strips=81)
     cold = mean.solve()
     error = f"{part(cold.power / EXACT_POWER - 1)} in power, of 0.0771 W"
     peak = f"{part(cold.peak_pressure / PEAK_PRESSURE - 1)} in p0"
     near = mean.solve(load=0.99 * LOAD)
 
-    def row(what: str, asked: str, told: str, warm: ContactSolution | None) -> Row:
+    def row(what: str, target: str, message: str, warm: ContactSolution | None) -> Row:
         seconds = best_short(lambda: mean.solve(warm), effort.repetitions)
-        return Row(f"slender, 81 strips, {what}", seconds, asked, told)
+        return Row(f"slender, 81 strips, {what}", seconds, target, message)
 
     return [
         row("cold", "", error, None),

@@ -1,4 +1,4 @@
-"""The ensembles that are measured: the rig with the paper's scatter, drawn for as long as asked."""
+"""Ensembles of the rig with the random inputs of the paper, for the benchmarks."""
 
 from __future__ import annotations
 
@@ -35,26 +35,27 @@ PAPER: Mapping[str, dict[str, object]] = {
     },
     "creepage.misalignment": {"distribution": "disc", "radius": "2 mrad"},
 }
-"""What the paper gives of its random inputs."""
+"""Random inputs of the paper."""
 
 
 @dataclass(frozen=True)
 class Size:
-    """How much to spend.
+    """Size of the ensembles.
 
     Parameters
     ----------
     tests : int
-        Of each ensemble.
+        Number of tests of each ensemble.
     passes : int, optional
-        Roller passes of a test, with a wear factor that makes up for the fewer; all where None.
+        Roller passes of a shortened test, with a wear factor that is increased in proportion; by
+        default tests are not shortened.
     """
 
     tests: int = 300
     passes: int | None = None
 
     def shortened(self) -> dict[str, object]:
-        """Return what shortens a test of the rig."""
+        """Return the overrides that shorten a test of the rig."""
         if self.passes is None:
             return {}
         whole = wearsim.load_scenario(RIG).total_passes
@@ -65,9 +66,9 @@ class Size:
 
 
 def drawn(persistence: str, size: Size, more: Mapping[str, object] | None = None) -> Scenario:
-    """Return the rig with the paper's inputs, all drawn for a test, a roller or a pass."""
+    """Return the rig with the paper's inputs, drawn per test, per roller or per pass."""
     changes: dict[str, object] = {
-        key: {**law, "persistence": persistence} for key, law in PAPER.items()
+        key: {**given, "persistence": persistence} for key, given in PAPER.items()
     }
     changes |= {"evolution.tolerance": 1e-2, "outputs.records": 1}
     return wearsim.load_scenario(RIG, {**changes, **size.shortened(), **(more or {})})
@@ -83,7 +84,7 @@ class Variation:
 
     @classmethod
     def of(cls, values: FloatArray) -> Variation:
-        """Estimate it, its error from the influence that each realisation has on it."""
+        """Estimate it, with an error from the influence of each realisation."""
         unit, count = values / values.mean() - 1.0, len(values)
         square = float((unit**2).sum()) / (count - 1)
         found = math.sqrt(square)
@@ -98,7 +99,7 @@ class Variation:
 
 
 def end_values(scenario: Scenario, count: int, **options: Any) -> dict[str, FloatArray]:
-    """Run an ensemble and return what its tests end with, by observable; none may fail."""
+    """Run an ensemble and return its final values by observable; no realisation may fail."""
     with TemporaryDirectory() as folder:
         result = ensemble(scenario, count, Path(folder) / "ensemble.h5", **options)
         if result.failed:

@@ -1,6 +1,6 @@
-"""What an ensemble costs, in time and memory, and how exact its members are.
+"""Cost of ensembles in time and memory, and accuracy of their realisations.
 
-``python -m tests.benchmarks.ensembles [truth|cost|memory ...] [--quick] [-o FILE.md]``
+``python -m tests.benchmarks.ensembles [accuracy|cost|memory ...] [--quick] [-o FILE.md]``
 """
 
 from __future__ import annotations
@@ -20,35 +20,35 @@ from wearsim.scenario import Scenario
 from wearsim_bench.measure.machine import this_machine
 from wearsim_bench.measure.timing import timed
 
-MEMBERS = 5
+REALISATIONS = 5
 SHORT = 6000  # passes of a shortened test
 CPUS = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def scenario(quick: bool, more: Mapping[str, object] | None = None) -> Scenario:
-    """Return the rig with all that scatters, shortened where little effort is asked for."""
+    """Return the rig with all random inputs, optionally shortened."""
     changes: dict[str, object] = {"operation.passes": SHORT} if quick else {}
     return wearsim.load_scenario(ALL, {**changes, **(more or {})})
 
 
-def truth(quick: bool) -> list[Row]:
-    """Hold implicit members against tests in which every pass is solved by itself."""
+def accuracy(quick: bool) -> list[Row]:
+    """Compare realisations with the implicit stepper to solving every roller pass."""
     rows = []
-    for number in range(2 if quick else MEMBERS):
+    for number in range(2 if quick else REALISATIONS):
         chosen = {"sampling.realisation": number}
         result = wearsim.run(scenario(quick, chosen))
         exact = {**chosen, "evolution.stepper": "per-pass"}
-        true = wearsim.run(scenario(quick, exact))
+        reference = wearsim.run(scenario(quick, exact))
         depth, volume = (
-            float(getattr(result, name)[-1] / getattr(true, name)[-1]) - 1.0
+            float(getattr(result, name)[-1] / getattr(reference, name)[-1]) - 1.0
             for name in ("depth", "worn_volume")
         )
         stated = float(result.depth_error[-1] / result.depth[-1])
         rows.append(
             Row(
-                f"member {number}, {float(true.depth[-1]) * 1e6:.2f} um by single passes",
+                f"realisation {number}, {float(reference.depth[-1]) * 1e6:.2f} um by single passes",
                 result.raw.wall_seconds,
-                f"single passes: {true.raw.wall_seconds:.3g} s",
+                f"single passes: {reference.raw.wall_seconds:.3g} s",
                 f"depth {part(depth)}, volume {part(volume)} (stated {part(stated)})",
             )
         )
@@ -56,31 +56,31 @@ def truth(quick: bool) -> list[Row]:
 
 
 def cost(quick: bool) -> list[Row]:
-    """Measure the time that tests take against their number, their strips and the workers."""
-    few, many = (2, 4) if quick else (100, 1000)
-    alike = drawn("per-test", Size(passes=SHORT if quick else None))
+    """Measure the time of ensembles for numbers of tests, strips and workers."""
+    small, large = (2, 4) if quick else (100, 1000)
+    identical = drawn("per-test", Size(passes=SHORT if quick else None))
     tight, records = {"evolution.tolerance": 1e-3}, {"outputs.records": 20}
     strips = {count: {"contact.strips": count} for count in (61, 121, 241)}
     cases: list[tuple[str, Scenario, int, int, str]] = [
-        ("", scenario(quick), few, CPUS, ""),
-        ("", scenario(quick), few, 1, ""),
-        (", 61 strips", scenario(quick, strips[61]), few, CPUS, ""),
-        (", 121 strips", scenario(quick, strips[121]), few, CPUS, ""),
-        (", 241 strips", scenario(quick, strips[241]), few, CPUS, ""),
-        (", tolerance 1e-3", scenario(quick, tight), few, CPUS, ""),
-        (", 20 records", scenario(quick, records), few, CPUS, ""),
-        ("", scenario(quick), many, CPUS, "60 s, aim 15 s"),
-        (", rollers alike, one contact", alike, many, CPUS, "60 s, aim 15 s"),
+        ("", scenario(quick), small, CPUS, ""),
+        ("", scenario(quick), small, 1, ""),
+        (", 61 strips", scenario(quick, strips[61]), small, CPUS, ""),
+        (", 121 strips", scenario(quick, strips[121]), small, CPUS, ""),
+        (", 241 strips", scenario(quick, strips[241]), small, CPUS, ""),
+        (", tolerance 1e-3", scenario(quick, tight), small, CPUS, ""),
+        (", 20 records", scenario(quick, records), small, CPUS, ""),
+        ("", scenario(quick), large, CPUS, "60 s, aim 15 s"),
+        (", identical rollers, one contact", identical, large, CPUS, "60 s, aim 15 s"),
     ]
     rows = []
-    for words, made, count, workers, asked in cases:
+    for words, case, count, workers, target in cases:
 
-        def run(made: Scenario = made, count: int = count, workers: int = workers) -> None:
-            end_values(made, count, workers=workers)
+        def run(case: Scenario = case, count: int = count, workers: int = workers) -> None:
+            end_values(case, count, workers=workers)
 
         seconds = timed(run)
-        each = f"{1e3 * seconds * workers / count:.3g} ms of a processor for each"
-        rows.append(Row(f"{count} tests, {_workers(workers)}{words}", seconds, asked, each))
+        per_test = f"{1e3 * seconds * workers / count:.3g} ms of processor time per test"
+        rows.append(Row(f"{count} tests, {_workers(workers)}{words}", seconds, target, per_test))
     return rows
 
 
@@ -89,12 +89,12 @@ def _workers(count: int) -> str:
 
 
 def memory(quick: bool) -> list[Row]:
-    """Measure how much memory ensembles take, by processes of their own."""
+    """Measure the memory of ensembles in separate processes."""
     rows = []
     for count in (300, 3000) if quick else (1000, 1_000_000):
         found = json.loads(
             subprocess.run(
-                [sys.executable, "-m", "tests.benchmarks.million", str(count)],
+                [sys.executable, "-m", "tests.benchmarks.ensemble_memory", str(count)],
                 check=True,
                 capture_output=True,
                 text=True,
@@ -102,7 +102,7 @@ def memory(quick: bool) -> list[Row]:
         )
         rows.append(
             Row(
-                f"{count:,} realisations, closed-form tests, to the file and its statistics",
+                f"{count:,} realisations, closed-form tests, file and statistics",
                 found["seconds"],
                 "500 MB",
                 f"{found['megabytes']:.0f} MB at most, {found['file_megabytes']:.0f} MB on disk",
@@ -112,30 +112,34 @@ def memory(quick: bool) -> list[Row]:
 
 
 PARTS: Mapping[str, tuple[str, Callable[[bool], list[Row]]]] = {
-    "truth": ("RealisationRunner of rig-ensemble beside single passes", truth),
-    "cost": ("What ensembles of rig-ensemble cost", cost),
-    "memory": ("Memory against realisations", memory),
+    "accuracy": ("Realisations of rig-ensemble against single passes", accuracy),
+    "cost": ("Cost of ensembles of rig-ensemble", cost),
+    "memory": ("Memory against the number of realisations", memory),
 }
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Print the tables, and write them where asked."""
+    """Print the tables, and write them to a file if one is named."""
     parser = argparse.ArgumentParser(prog="tests.benchmarks.ensembles", description=__doc__)
-    parser.add_argument("parts", nargs="*", metavar="PART", help="truth, cost or memory; or all")
+    parser.add_argument(
+        "parts", nargs="*", metavar="PART", help="accuracy, cost or memory; by default all"
+    )
     parser.add_argument("--quick", action="store_true", help="shorten everything")
-    parser.add_argument("-o", "--output", type=Path, metavar="FILE.md", help="write them here too")
-    asked = parser.parse_args(arguments)
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="FILE.md", help="also write them to this file"
+    )
+    options = parser.parse_args(arguments)
     text = f"Measured on {this_machine()}.\n"
     sys.stdout.write(text)
-    for name in asked.parts or PARTS:
+    for name in options.parts or PARTS:
         title, rows = PARTS[name]
-        table = "\n" + markdown(title, rows(asked.quick))
+        table = "\n" + markdown(title, rows(options.quick))
         sys.stdout.write(table)
         sys.stdout.flush()
         text += table
-    if asked.output is not None:
-        asked.output.parent.mkdir(parents=True, exist_ok=True)
-        asked.output.write_text(text, encoding="utf-8")
+    if options.output is not None:
+        options.output.parent.mkdir(parents=True, exist_ok=True)
+        options.output.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

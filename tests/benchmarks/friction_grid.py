@@ -1,4 +1,4 @@
-"""Random friction against the grid: a field with a correlation length converges, white does not.
+"""Random friction fields and the grid: convergence with and without a correlation length.
 
 ``python -m tests.benchmarks.friction_grid -o docs/friction-grid.png``
 """
@@ -25,11 +25,11 @@ FIELDS: dict[str, dict[str, Any]] = {
     "white, in the contact": {"distribution": "white"},
 }
 POINTS = (25, 50, 100, 200, 400, 800)
-SLOW = 100  # points along each strip from which carried friction takes too long
+MAX_CARRIED = 100  # points along a strip above which carried friction takes too long
 
 
 def mean_power(field: str, points: int, realisations: int) -> tuple[float, float]:
-    """Return mean power and its standard error [W], on so many points along each strip."""
+    """Return mean power and its standard error [W] for a number of points along each strip."""
     changes = {
         "friction.coefficient": {**FIELDS[field], "marginal": FRICTION},
         "contact.mx": points,
@@ -41,7 +41,7 @@ def mean_power(field: str, points: int, realisations: int) -> tuple[float, float
 
 
 def draw(path: Path, realisations: int) -> None:
-    """Draw the mean power of every field against the points along a strip."""
+    """Plot the mean power of every field against the number of points along a strip."""
     from wearsim.report.parts.saving import save_figure
     from wearsim.report.parts.style import BLUE, GREEN, ORANGE, figure_style, name_axes
 
@@ -52,7 +52,7 @@ def draw(path: Path, realisations: int) -> None:
         figure = Figure(figsize=(6.4, 4.0), layout="constrained")
         axes = figure.add_subplot()
         for field, colour in zip(FIELDS, (BLUE, GREEN, ORANGE), strict=True):
-            points = [p for p in POINTS if "rolling" not in field or p <= SLOW]
+            points = [p for p in POINTS if "rolling" not in field or p <= MAX_CARRIED]
             means = np.array([mean_power(field, p, realisations) for p in points])
             bars = 2.0 * means[:, 1]
             axes.errorbar(points, means[:, 0], bars, color=colour, marker="o", ms=4, label=field)
@@ -71,8 +71,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="tests.benchmarks.friction_grid", description=__doc__)
     parser.add_argument("-o", "--output", type=Path, default=Path("docs/friction-grid.png"))
     parser.add_argument("-n", "--realisations", type=int, default=200)
-    asked = parser.parse_args()
-    draw(asked.output, asked.realisations)
+    options = parser.parse_args()
+    draw(options.output, options.realisations)
 
 
 if __name__ == "__main__":

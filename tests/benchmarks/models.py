@@ -1,8 +1,9 @@
-"""Every contact model beside the exact theory and beside the others, as Markdown tables.
+"""Every contact model against the exact theory and the other models, as Markdown tables.
 
-``python -m tests.benchmarks.models -o out/models.md``. A contact model that is installed from
-elsewhere, as the plugin template's is for this, stands in the tables of worn profiles and whole
-tests with its default options and every choice that changes the normal contact.
+``python -m tests.benchmarks.models -o out/models.md``. Contact models of other
+distributions, such as the plugin template, which is added here, appear in the tables of worn
+profiles and whole tests with their default options and every option that changes the normal
+contact.
 """
 
 from __future__ import annotations
@@ -15,8 +16,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from tests.benchmarks.replays import SCENARIOS
 from tests.benchmarks.table import part
+from tests.benchmarks.wear_tests import SCENARIOS
 from wearsim import load_scenario, run
 from wearsim.errors import WearsimError
 from wearsim.plugins.template import template_folder
@@ -24,9 +25,9 @@ from wearsim.report.text.units import brief
 from wearsim_bench.contact.accuracy import (
     PowerErrors,
     WornErrors,
-    built,
-    drawn_errors,
-    hard_errors,
+    build_model,
+    hard_case_errors,
+    random_case_errors,
     solved,
     worn_errors,
 )
@@ -37,7 +38,7 @@ from wearsim_bench.figures.table import markdown_table
 from wearsim_bench.measure.machine import this_machine
 from wearsim_bench.measure.timing import best_short, timed
 
-#: what is drawn or prescribed, by contact model and options
+#: contact model and options by label
 TANGENTIAL: dict[str, tuple[str, dict[str, Any]]] = {
     "strip, on exact Hertz": ("hertz", {}),
     "fastrip, on exact Hertz": ("hertz", {"tangential": "fastrip"}),
@@ -55,22 +56,22 @@ FAILED = "no: "
 
 
 def normal_models() -> dict[str, tuple[str, dict[str, Any]]]:
-    """Return every registered contact model, with every choice that changes the normal contact."""
+    """Return all registered contact models, with every option that changes the normal contact."""
     return {method.name: (method.model, dict(method.options)) for method in normal_methods()}
 
 
 def drawn_table(repetitions: int) -> str:
-    """Return the errors of the tangential theories on random cases and hard ones."""
+    """Return the errors of the tangential theories on random and on hard cases."""
     lines = []
     for label, (name, options) in TANGENTIAL.items():
-        model = built(name, **options)
+        model = build_model(name, **options)
         case = elliptic_cases("partial")[0]
         seconds = best_short(lambda model=model, case=case: solved(model, case), repetitions)
         cells = [label]
         for kind in ("paper", "partial"):
-            found = drawn_errors(model, kind)
+            found = random_case_errors(model, kind)
             cells += [_spread(found), percent(found.strips)]
-        cells += [_spread(hard_errors(model, LONG)), brief(seconds)]
+        cells += [_spread(hard_case_errors(model, LONG)), brief(seconds)]
         lines.append(cells)
     head = (
         "tangential theory",
@@ -96,7 +97,7 @@ def worn_table() -> str:
     for profile in WORN:
         for label, (name, options) in normal_models().items():
             try:
-                cells = _worn_cells(worn_errors(built(name, **options), profile))
+                cells = _worn_cells(worn_errors(build_model(name, **options), profile))
             except WearsimError as error:
                 cells = [FAILED + str(error).split(";", maxsplit=1)[0], *[""] * 6]
             lines.append([profile.replace("_", " "), label, *cells])
@@ -118,7 +119,7 @@ def _worn_cells(errors: WornErrors) -> list[str]:
 
 
 def whole_table(share: float) -> str:
-    """Return the end of rig-450min with every model, and what it took; `share` shortens it."""
+    """Return the final state and the cost of rig-450min with every model; `share` shortens it."""
     lines = []
     for label, (name, options) in normal_models().items():
         lines.append([label, *_whole_cells(name, options, share)])
@@ -150,8 +151,8 @@ def _whole_cells(name: str, options: dict[str, Any], share: float) -> list[str]:
     ]
 
 
-def report(tell: Callable[[str], object], share: float = 1.0, repetitions: int = 5) -> str:
-    """Measure everything and return the page; `tell` gets each table as soon as it is done."""
+def report(on_progress: Callable[[str], object], share: float = 1.0, repetitions: int = 5) -> str:
+    """Measure everything and return the page; call `on_progress` with each finished table."""
     text = ""
     parts: tuple[tuple[str, Callable[[], str]], ...] = (
         ("Tangential theories on elliptic contacts", lambda: drawn_table(repetitions)),
@@ -160,13 +161,13 @@ def report(tell: Callable[[str], object], share: float = 1.0, repetitions: int =
     )
     for title, measure in parts:
         section = f"## {title}\n\n{measure()}\n"
-        tell(section)
+        on_progress(section)
         text += section
     return text
 
 
 def install_template(folder: Path) -> None:
-    """Put the plugin template on Python's path, as if installed, unless it is installed."""
+    """Add the plugin template to Python's path unless it is installed."""
     if any(point.value == "wearsim_template" for point in entry_points(group="wearsim")):
         return
     info = folder / "wearsim_template-0.1.0.dist-info"
@@ -179,23 +180,25 @@ def install_template(folder: Path) -> None:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Print the page, and write it where asked."""
+    """Print the page, and write it to a file if one is named."""
     parser = argparse.ArgumentParser(prog="tests.benchmarks.models", description=__doc__)
     parser.add_argument("--quick", action="store_true", help="shorten the whole tests")
-    parser.add_argument("-o", "--output", type=Path, metavar="FILE.md", help="write it here too")
-    asked = parser.parse_args(arguments)
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="FILE.md", help="also write it to this file"
+    )
+    options_given = parser.parse_args(arguments)
 
-    def tell(text: str) -> None:
+    def on_progress(text: str) -> None:
         sys.stdout.write(text + "\n")
         sys.stdout.flush()
 
-    tell(f"Measured on {this_machine()}.\n")
+    on_progress(f"Measured on {this_machine()}.\n")
     with TemporaryDirectory() as folder:
         install_template(Path(folder))
-        text = report(tell, *((0.002, 1) if asked.quick else ()))
-    if asked.output is not None:
-        asked.output.parent.mkdir(parents=True, exist_ok=True)
-        asked.output.write_text(text, encoding="utf-8")
+        text = report(on_progress, *((0.002, 1) if options_given.quick else ()))
+    if options_given.output is not None:
+        options_given.output.parent.mkdir(parents=True, exist_ok=True)
+        options_given.output.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Why persistence matters: how tests scatter by how long a draw lasts.
+"""Scatter of wear tests with inputs drawn per test, per roller and per pass.
 
 ``python -m tests.benchmarks.persistence [--quick] [-o FILE.md]``
 """
@@ -18,12 +18,12 @@ from wearsim.types import FloatArray
 
 WHOLE = Size(tests=300)
 QUICK = Size(tests=40, passes=6000)
-SINGLE_PASSES, SINGLE_TESTS = 3000, 40  # of tests in which every pass is solved by itself
+SINGLE_PASSES, SINGLE_TESTS = 3000, 40  # of tests with inputs drawn at every pass
 MEASURED = np.array([28.0, 48.0, 62.0])  # the paper's three tests [um]
 
 
 def spreads(size: Size) -> dict[str, dict[str, FloatArray]]:
-    """Return what ensembles of tests end with, by how long their draws last."""
+    """Return the final values of ensembles of tests by persistence of the inputs."""
     found = {
         "per-test": end_values(drawn("per-test", size), size.tests),
         "per-roller": end_values(drawn("per-roller", size), size.tests),
@@ -37,7 +37,7 @@ def spreads(size: Size) -> dict[str, dict[str, FloatArray]]:
 def table(found: Mapping[str, dict[str, FloatArray]], whole_passes: float) -> str:
     """Return the coefficients of variation as a Markdown table."""
     rows = [
-        "| a draw lasts for | mean power | worn volume | depth | depth / volume | in theory |",
+        "| persistence | mean power | worn volume | depth | depth / volume | in theory |",
         "|---|---|---|---|---|---|",
     ]
     tests = Variation.of(found["per-test"]["worn_volume"]).value
@@ -46,9 +46,9 @@ def table(found: Mapping[str, dict[str, FloatArray]], whole_passes: float) -> st
             Variation.of(found[persistence][name])
             for name in ("mean_power", "worn_volume", "depth")
         )
-        theory = "volume as mean power; depth as its power 2/3"
+        theory = "volume proportional to mean power, depth to its power 2/3"
         if persistence == "per-roller":
-            theory = f"volume as per-test / sqrt(3): {tests / math.sqrt(3.0):.2%}"
+            theory = f"volume: per-test / sqrt(3), {tests / math.sqrt(3.0):.2%}"
         rows.append(
             f"| {persistence.replace('per-', 'a ')} | {power} | {volume} | {depth} |"
             f" {depth.value / volume.value:.3f} | {theory} |"
@@ -57,32 +57,35 @@ def table(found: Mapping[str, dict[str, FloatArray]], whole_passes: float) -> st
     shrunk = math.sqrt(SINGLE_PASSES / whole_passes)
     rows.append(
         f"| a pass, {SINGLE_PASSES:,} passes | | {volume} | | |"
-        f" as per-test / sqrt(passes): {tests / math.sqrt(SINGLE_PASSES):.2%} |"
+        f" per-test / sqrt(passes): {tests / math.sqrt(SINGLE_PASSES):.2%} |"
     )
     rows.append(
-        f"| a pass, {whole_passes:,.0f} passes | | {volume.value * shrunk:.3%} by that law | | | |"
+        f"| a pass, {whole_passes:,.0f} passes | | {volume.value * shrunk:.3%},"
+        " scaled by 1 / sqrt(passes) | | | |"
     )
     depth = Variation.of(found["per-test"]["depth"])
     rows.append(
         f"\nThe paper's three tests, {', '.join(f'{d:.0f}' for d in MEASURED)} um:"
-        f" {MEASURED.std(ddof=1) / MEASURED.mean():.0%}; per-test draws of the inputs alone:"
+        f" {MEASURED.std(ddof=1) / MEASURED.mean():.0%}; inputs drawn per test:"
         f" {depth.value:.0%}."
     )
     return "\n".join(rows) + "\n"
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Print the table, and write it where asked."""
+    """Print the table, and write it to a file if one is named."""
     parser = argparse.ArgumentParser(prog="tests.benchmarks.persistence", description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="shortened tests, and few")
-    parser.add_argument("-o", "--output", type=Path, metavar="FILE.md", help="write it here too")
-    asked = parser.parse_args(arguments)
-    size = QUICK if asked.quick else WHOLE
+    parser.add_argument("--quick", action="store_true", help="fewer and shortened tests")
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="FILE.md", help="also write it to this file"
+    )
+    options = parser.parse_args(arguments)
+    size = QUICK if options.quick else WHOLE
     text = table(spreads(size), float(drawn("per-test", WHOLE).total_passes))
     sys.stdout.write(text)
-    if asked.output is not None:
-        asked.output.parent.mkdir(parents=True, exist_ok=True)
-        asked.output.write_text(text, encoding="utf-8")
+    if options.output is not None:
+        options.output.parent.mkdir(parents=True, exist_ok=True)
+        options.output.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
-"""Speed beside error, as a Markdown table: ``python -m tests.benchmarks.report``.
+"""Speed and error as Markdown tables: ``python -m tests.benchmarks.report``.
 
-A row is added by a function that takes an `Effort` and returns `Row`s, and its name in `TABLES`.
+Rows are added by a function of an `Effort` that returns `Row`s and is listed in `TABLES`.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from tests.benchmarks import contacts, replays, starts, studies
+from tests.benchmarks import contacts, starts, studies, wear_tests
 from tests.benchmarks.table import Effort, Row, markdown
 from wearsim_bench.measure.machine import this_machine
 
@@ -21,47 +21,49 @@ TABLES: dict[str, list[Callable[[Effort], list[Row]]]] = {
         contacts.tangential_rows,
         contacts.slender_rows,
     ],
-    "Many contacts at once": [contacts.many_rows],
+    "Many contacts at once": [contacts.batch_rows],
     "Random inputs": [studies.draw_rows, studies.dissipation_rows, studies.cheapest_rows],
     "Whole tests, in-process, once compiled": [
-        replays.replay_rows,
-        replays.scatter_rows,
-        replays.file_rows,
+        wear_tests.wear_test_rows,
+        wear_tests.scatter_rows,
+        wear_tests.file_rows,
     ],
     "At the shell": [starts.import_rows, starts.run_rows],
 }
 QUICK = Effort(repetitions=1, part=0.005)
 
 
-def report(effort: Effort, tell: Callable[[str], object]) -> str:
-    """Measure everything and return the report; `tell` gets each table as soon as it is done."""
+def report(effort: Effort, on_progress: Callable[[str], object]) -> str:
+    """Measure everything and return the report; call `on_progress` with each finished table."""
     text = f"Measured on {this_machine()}; best of {effort.repetitions}.\n"
     if effort.quick:
         text += "\nShortened tests: these numbers only show that the report works.\n"
-    tell(text)
+    on_progress(text)
     for title, functions in TABLES.items():
         rows = [row for function in functions for row in function(effort)]
         table = "\n" + markdown(title, rows)
-        tell(table)
+        on_progress(table)
         text += table
     return text
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Print the report, and write it where asked."""
+    """Print the report, and write it to a file if one is named."""
     parser = argparse.ArgumentParser(prog="tests.benchmarks.report", description=__doc__)
     parser.add_argument("--quick", action="store_true", help="shorten everything")
-    parser.add_argument("-o", "--output", type=Path, metavar="FILE.md", help="write it here too")
-    asked = parser.parse_args(arguments)
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="FILE.md", help="also write it to this file"
+    )
+    options = parser.parse_args(arguments)
 
-    def tell(text: str) -> None:
+    def on_progress(text: str) -> None:
         sys.stdout.write(text)
         sys.stdout.flush()
 
-    text = report(QUICK if asked.quick else Effort(), tell)
-    if asked.output is not None:
-        asked.output.parent.mkdir(parents=True, exist_ok=True)
-        asked.output.write_text(text, encoding="utf-8")
+    text = report(QUICK if options.quick else Effort(), on_progress)
+    if options.output is not None:
+        options.output.parent.mkdir(parents=True, exist_ok=True)
+        options.output.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

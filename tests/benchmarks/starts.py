@@ -1,4 +1,4 @@
-"""Processes of their own: how soon the command answers."""
+"""Start-up time of the commands, in separate processes."""
 
 from __future__ import annotations
 
@@ -9,38 +9,38 @@ import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from tests.benchmarks.replays import SCENARIOS
 from tests.benchmarks.table import Effort, Row
+from tests.benchmarks.wear_tests import SCENARIOS
 from wearsim_bench.measure.timing import best, timed
 
 WEARSIM = [sys.executable, "-m", "wearsim"]
 
 
 def call(*command: str, **environment: str) -> None:
-    """Run a command to its end, silently."""
+    """Run a command without showing its output."""
     subprocess.run(command, env=os.environ | environment, capture_output=True, check=True)
 
 
 def import_rows(effort: Effort) -> list[Row]:
-    """Time `wearsim --help` and `import wearsim`, Python's own start included."""
+    """Time `wearsim --help` and `import wearsim`, including the start of Python."""
     python = best(lambda: call(sys.executable, "-c", "pass"), effort.repetitions)
     plain = best(lambda: call(sys.executable, "-c", "import wearsim"), effort.repetitions)
     usage = best(lambda: call(*WEARSIM, "--help"), effort.repetitions)
-    own = f"Python alone {python * 1e3:.0f} ms of it"
+    python_only = f"Python alone {python * 1e3:.0f} ms of it"
     return [
-        Row("`wearsim --help`", usage, "0.4 s", own),
-        Row("`import wearsim`", plain, "0.3 s", own),
+        Row("`wearsim --help`", usage, "0.4 s", python_only),
+        Row("`import wearsim`", plain, "0.3 s", python_only),
     ]
 
 
 def run_command(folder: str) -> list[str]:
-    """Return the command of a replay of the rig."""
+    """Return the command that runs the test of the rig."""
     scenario = str(SCENARIOS / "rig-450min.toml")
     return [*WEARSIM, "run", scenario, "-o", str(Path(folder) / "rig.h5"), "--force"]
 
 
 def first_output(folder: str, cache: str) -> float:
-    """Return how long a replay takes to say something [s]."""
+    """Return the time until a run prints its first output [s]."""
     start = time.perf_counter()
     with subprocess.Popen(
         run_command(folder),
@@ -57,15 +57,15 @@ def first_output(folder: str, cache: str) -> float:
 
 
 def run_rows(effort: Effort) -> list[Row]:
-    """Time the first run after an install, and runs after it."""
+    """Time the first run after installation, which compiles, and later runs."""
     with TemporaryDirectory() as folder:
         command = run_command(folder)
         cache = str(Path(folder) / "cache")
         first = timed(lambda: call(*command, NUMBA_CACHE_DIR=cache))
-        heard = min(first_output(folder, cache) for _ in range(effort.repetitions))
+        until_output = min(first_output(folder, cache) for _ in range(effort.repetitions))
         later = best(lambda: call(*command, NUMBA_CACHE_DIR=cache), effort.repetitions)
     return [
         Row("first `wearsim run` after install, compiling", first, "20 s, aim 8 s"),
-        Row("later `wearsim run`, to its first output", heard, "1.5 s"),
+        Row("later `wearsim run`, to its first output", until_output, "1.5 s"),
         Row("later `wearsim run`, to its end", later),
     ]

@@ -9,27 +9,27 @@ from wearsim.report.text.units import brief
 
 @dataclass(frozen=True)
 class Row:
-    """One line of the report: what was measured, what was asked, and the error beside it."""
+    """One line of the report: case, measured time, target and error."""
 
-    what: str
+    case: str
     seconds: float
-    asked: str = ""
+    target: str = ""
     error: str = ""
 
     def __str__(self) -> str:
-        return f"| {self.what} | {brief(self.seconds)} | {self.asked} | {self.error} |"
+        return f"| {self.case} | {brief(self.seconds)} | {self.target} | {self.error} |"
 
 
 @dataclass(frozen=True)
 class Effort:
-    """How much to spend: repetitions of each timing, and the part of a test's passes to run."""
+    """Effort of a measurement: repetitions of each timing, and fraction of a test's passes."""
 
     repetitions: int = 5
     part: float = 1.0
 
     @property
     def quick(self) -> bool:
-        """Whether the numbers only show that the report works."""
+        """Whether tests are shortened, so that the numbers only show that the report works."""
         return self.part < 1.0
 
 
@@ -40,5 +40,5 @@ def part(value: float) -> str:
 
 def markdown(title: str, rows: list[Row]) -> str:
     """Return rows as a Markdown table under a title."""
-    head = "| what | measured | asked | error beside it |\n|---|---|---|---|\n"
+    head = "| case | measured | target | error |\n|---|---|---|---|\n"
     return f"## {title}\n\n{head}" + "".join(f"{row}\n" for row in rows)

@@ -1,6 +1,6 @@
-"""Benchmarks to compare with earlier ones: ``pytest tests/benchmarks --benchmark-enable``.
+"""Benchmarks with pytest-benchmark: ``pytest tests/benchmarks --benchmark-enable``.
 
-Without that option each runs once, so that none falls out of use.
+Without that option each benchmark runs once, as a test.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from tests.benchmarks import (
     ensembles,
     models,
     persistence,
-    replays,
     studies,
     table,
+    wear_tests,
 )
 from tests.benchmarks.report import QUICK, TABLES
 from wearsim.studies.contact.monte_carlo import dissipation
@@ -28,9 +28,9 @@ def test_speed_of_hertz(benchmark):
     assert benchmark(contacts.rig_hertz).peak_pressure == pytest.approx(680.22e6, rel=1e-5)
 
 
-@pytest.mark.parametrize("route", contacts.ROUTES)
-def test_speed_of_the_mean_problem(benchmark, route):
-    mean = contacts.Mean("hertz-fastsim", kalker="line-limit", **contacts.ROUTES[route])
+@pytest.mark.parametrize("variant", contacts.VARIANTS)
+def test_speed_of_the_mean_problem(benchmark, variant):
+    mean = contacts.Mean("hertz-fastsim", kalker="line-limit", **contacts.VARIANTS[variant])
     assert benchmark(mean.solve).power == pytest.approx(contacts.FASTSIM_POWER, rel=0.05)
 
 
@@ -41,9 +41,9 @@ def test_speed_of_a_slender_contact(benchmark, start):
     assert benchmark(mean.solve, warm).power == pytest.approx(contacts.EXACT_POWER, rel=0.02)
 
 
-@pytest.mark.parametrize("name", replays.REPLAYS)
-def test_speed_of_a_replay(benchmark, name):
-    assert benchmark(wearsim.run, replays.scenario(name, QUICK)).finished
+@pytest.mark.parametrize("name", wear_tests.WEAR_TESTS)
+def test_speed_of_a_wear_test(benchmark, name):
+    assert benchmark(wearsim.run, wear_tests.scenario(name, QUICK)).finished
 
 
 def test_speed_of_the_papers_monte_carlo(benchmark):
@@ -52,7 +52,7 @@ def test_speed_of_the_papers_monte_carlo(benchmark):
 
 
 @pytest.mark.slow
-def test_that_the_in_process_rows_of_the_report_hold_numbers():
+def test_rows_of_the_report_have_numbers():
     functions = [
         *TABLES["One contact"],
         *TABLES["Random inputs"],
@@ -61,18 +61,18 @@ def test_that_the_in_process_rows_of_the_report_hold_numbers():
     rows = [row for function in functions for row in function(QUICK)]
     assert all(row.seconds > 0.0 for row in rows)
     text = table.markdown("One contact", rows)
-    assert "| what | measured | asked | error beside it |" in text
+    assert "| case | measured | target | error |" in text
     assert "nan" not in text
 
 
-def test_that_members_of_ensembles_are_held_against_single_passes():
-    rows = ensembles.truth(quick=True)
+def test_realisations_are_compared_to_single_passes():
+    rows = ensembles.accuracy(quick=True)
     assert all(row.seconds > 0.0 for row in rows)
-    assert "nan" not in table.markdown("truth", rows)
+    assert "nan" not in table.markdown("accuracy", rows)
 
 
 @pytest.mark.slow
-def test_that_the_spread_of_tests_is_told_by_how_long_draws_last(monkeypatch):
+def test_scatter_is_tabulated_by_persistence(monkeypatch):
     monkeypatch.setattr(persistence, "SINGLE_PASSES", 200)
     monkeypatch.setattr(persistence, "SINGLE_TESTS", 3)
     text = persistence.table(persistence.spreads(ensemble_cases.Size(4, 1500)), 1.35e6)
@@ -80,12 +80,12 @@ def test_that_the_spread_of_tests_is_told_by_how_long_draws_last(monkeypatch):
     assert "nan" not in text
 
 
-def test_that_the_tables_of_models_hold_every_model():
-    told = []
-    text = models.report(told.append, share=0.0005, repetitions=1)
-    assert [part.splitlines()[0][:3] for part in told] == ["## "] * 3
-    whole = told[2].splitlines()[4:]
+def test_tables_of_models_contain_every_model():
+    tables = []
+    text = models.report(tables.append, share=0.0005, repetitions=1)
+    assert [part.splitlines()[0][:3] for part in tables] == ["## "] * 3
+    whole = tables[2].splitlines()[4:]
     rows = [line for line in whole if line.startswith("|")]
     assert len(rows) == len(models.normal_models())
-    assert models.FAILED not in told[2]
+    assert models.FAILED not in tables[2]
     assert all(label in text for label in models.TANGENTIAL)

@@ -1,1 +1,1 @@
-"""How near contact models come to the exact theory, and the exact theory's own closed forms."""
+"""Accuracy of the contact models against exact theory, and a reference half-space solver."""

@@ -1,9 +1,10 @@
-"""Normal contact of elastic half-spaces, solved exactly but for its grid: to hold models against.
+"""Reference solver for the normal contact of elastic half-spaces, exact up to its grid.
 
 Rectangles of constant pressure, whose displacement is Love's closed form (Love 1929, DOI
 10.1098/rsta.1929.0009; Johnson, Contact Mechanics, 3.26), convolved by FFT; the pressure by
 conjugate gradients on the rectangles in contact (Polonsky and Keer 1999, DOI
-10.1016/S0043-1648(99)00113-1). No strips, no semi-ellipses, nothing of `wearsim`.
+10.1016/S0043-1648(99)00113-1). It uses no strips, no semi-elliptic pressures and no code of
+`wearsim`.
 """
 
 from dataclasses import dataclass
@@ -15,8 +16,8 @@ ITERATIONS = 1000
 
 
 @dataclass(frozen=True)
-class Solved:
-    """Line load q [N/m] and half-length a [m] over y [m]; approach [m]; greatest pressure [Pa]."""
+class Solution:
+    """Line load [N/m] and half-length [m] over y [m]; approach [m]; peak pressure [Pa]."""
 
     y: np.ndarray
     line_load: np.ndarray
@@ -26,7 +27,7 @@ class Solved:
 
 
 def under_rectangle(x, y, width, depth):
-    """Return displacement times pi E* over pressure at (x, y) from a rectangle's middle."""
+    """Return displacement times pi E* over pressure at (x, y) from the centre of a rectangle."""
 
     def corner(u, v):
         return u * np.arcsinh(v / np.abs(u)) + v * np.arcsinh(u / np.abs(v))
@@ -40,12 +41,12 @@ class HalfSpace:
 
     def __init__(self, shape, width, depth, modulus):
         self.shape, self._padded = shape, (2 * shape[0], 2 * shape[1])
-        places = [np.fft.fftfreq(n, 1.0 / n) for n in self._padded]
-        x, y = places[0][:, None] * width, places[1] * depth
+        indices = [np.fft.fftfreq(n, 1.0 / n) for n in self._padded]
+        x, y = indices[0][:, None] * width, indices[1] * depth
         self._response = np.fft.rfft2(under_rectangle(x, y, width, depth) / (np.pi * modulus))
 
     def displacement(self, pressure):
-        """Return the displacement at the middle of every rectangle."""
+        """Return the displacement at the centre of every rectangle."""
         found = np.fft.irfft2(np.fft.rfft2(pressure, self._padded) * self._response, self._padded)
         return found[: self.shape[0], : self.shape[1]]
 
@@ -58,29 +59,29 @@ def pressure_of(gap, load, width, depth, modulus):
     direction, squared, conjugate = np.zeros_like(gap), 1.0, False
     for _ in range(ITERATIONS):
         touching = pressure > 0.0
-        left = space.displacement(pressure) + gap
-        approach = left[touching].mean()
-        left -= approach
-        before, squared = squared, float((left[touching] ** 2).sum())
-        direction = np.where(touching, left + conjugate * squared / before * direction, 0.0)
+        residual = space.displacement(pressure) + gap
+        approach = residual[touching].mean()
+        residual -= approach
+        before, squared = squared, float((residual[touching] ** 2).sum())
+        direction = np.where(touching, residual + conjugate * squared / before * direction, 0.0)
         response = space.displacement(direction)
         response -= response[touching].mean()
-        step = (left * direction)[touching].sum() / (response * direction)[touching].sum()
+        step = (residual * direction)[touching].sum() / (response * direction)[touching].sum()
         old, pressure = pressure, np.maximum(0.0, pressure - step * direction)
-        penetrated = (pressure == 0.0) & (left < 0.0)
+        penetrated = (pressure == 0.0) & (residual < 0.0)
         conjugate = not penetrated.any()
-        pressure[penetrated] -= step * left[penetrated]
+        pressure[penetrated] -= step * residual[penetrated]
         pressure *= unit / pressure.sum()
         if np.abs(pressure - old).sum() < TOLERANCE * pressure.sum():
             return pressure, float(approach)
-    raise RuntimeError("conjugate gradients did not settle")
+    raise RuntimeError("conjugate gradients did not converge")
 
 
 def half_lengths(pressure, x):
-    """Return a(y): where p^2 falls to nothing, linear in x^2 as it is next to the edge.
+    """Return a(y), where p^2, linear in x^2 near the edge, extrapolates to zero.
 
-    The outermost rectangle, which the edge cuts, is left out; a column of less than four ends at
-    its last.
+    The outermost rectangle, which the edge intersects, is not used. A column of fewer than four
+    rectangles ends at the edge of its last one.
     """
     found = np.zeros(pressure.shape[1])
     for j, column in enumerate(pressure[len(x) // 2 :].T):
@@ -100,13 +101,13 @@ def solve(gap, y, curvature, load, modulus, reach, points_along=64):
     Parameters
     ----------
     gap, y : ndarray, shape (points,)
-        Gap on the line x = 0 [m], at the evenly spaced middles y [m] of the rectangles.
+        Gap on the line x = 0 [m], at the evenly spaced centres y [m] of the rectangles.
     curvature, load, modulus : float
-        Relative curvature along rolling [1/m], load [N], E* [Pa].
+        Relative curvature in rolling direction [1/m], load [N], E* [Pa].
     reach : float
-        Half-length of the grid along rolling [m], more than that of the contact.
+        Half-length of the grid in rolling direction [m], greater than that of the contact.
     points_along : int
-        Rectangles along rolling, even.
+        Number of rectangles in rolling direction, even.
     """
     width, depth = 2.0 * reach / points_along, y[1] - y[0]
     x = (np.arange(points_along) + 0.5) * width - reach
@@ -115,7 +116,7 @@ def solve(gap, y, curvature, load, modulus, reach, points_along=64):
     )
     if pressure[0].any() or pressure[:, [0, -1]].any():
         raise ValueError("the contact reaches the edge of the grid")
-    return Solved(
+    return Solution(
         y=y,
         line_load=pressure.sum(axis=0) * width,
         half_length=half_lengths(pressure, x),

@@ -1,4 +1,4 @@
-"""The reference data are whole, and agree with each other."""
+"""Completeness and consistency of the reference data."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ pytestmark = pytest.mark.bench
 
 
 @pytest.mark.parametrize("name", WORN)
-def test_that_a_worn_profile_carries_its_load_and_its_power(name):
+def test_worn_profiles_sum_to_their_load_and_power(name):
     worn = worn_profile(name)
     dy = worn["y"][1] - worn["y"][0]
     assert worn["q"].sum() * dy == pytest.approx(300.0, rel=1e-6)
@@ -26,15 +26,15 @@ def test_that_a_worn_profile_carries_its_load_and_its_power(name):
         ("hard", rows("hard_cases")),
     ],
 )
-def test_that_strips_of_elliptic_cases_add_up_to_their_power(kind, cases):
+def test_strips_of_elliptic_cases_sum_to_their_power(kind, cases):
     y, dissipation = strips_of(kind)
     for strips, case in zip(dissipation, cases, strict=True):
         total = strips.sum() * (y[1] - y[0]) * case["b_m"]
-        # the hard cases are of pure spin and nearly all adhesion too
+        # the hard cases include pure spin and almost full adhesion
         assert total == pytest.approx(case["P_over_V_N"], rel=1.5e-2 if kind == "hard" else 1e-2)
 
 
-def test_that_every_force_does_the_power_that_is_given():
+def test_forces_and_creepages_give_the_stated_power():
     for case in rows("rig_random") + rows("hard_cases"):
         work = -sum(
             case[force] * case[slip]
@@ -43,7 +43,7 @@ def test_that_every_force_does_the_power_that_is_given():
         assert work == pytest.approx(case["P_over_V_N"], rel=2e-2)
 
 
-def test_that_the_mean_problem_slides_fully():
+def test_mean_problem_is_in_full_sliding():
     mean = table("mean_problem")["rows"][0]
     assert mean["P_over_V_N"] == pytest.approx(0.1 * 300.0 * 1e-3, rel=1e-3)
     assert np.max(mean["P_l_over_V_N_per_m"]) > 0.0

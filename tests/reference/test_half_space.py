@@ -1,4 +1,4 @@
-"""The exact half-space solver, against closed forms and against CONTACT."""
+"""The reference half-space solver against closed forms and against CONTACT."""
 
 import numpy as np
 import pytest
@@ -15,12 +15,12 @@ def difference(found, exact):
     return np.abs(found - exact).sum() / np.abs(exact).sum()
 
 
-def test_that_a_square_sinks_as_in_closed_form():
+def test_displacement_at_centre_of_square_is_closed_form():
     middle = half_space.under_rectangle(0.0, 0.0, 2e-3, 2e-3)
     assert middle == pytest.approx(8e-3 * np.log(1.0 + np.sqrt(2.0)), rel=1e-12)
 
 
-def test_that_a_rectangle_far_away_is_a_point_load():
+def test_distant_rectangle_acts_as_point_load():
     space = half_space.HalfSpace((128, 96), 1e-4, 1e-4, MODULUS)
     pressure = np.zeros((128, 96))
     pressure[3, 2] = 1e9
@@ -29,7 +29,7 @@ def test_that_a_rectangle_far_away_is_a_point_load():
 
 
 @pytest.mark.parametrize("across", [45.0, 15.83, 8.495, 3.805, 1.2317])
-def test_that_an_ellipse_is_hertz(across):
+def test_elliptic_contact_equals_hertz(across):
     patch = hertz(45.0, across, 300.0, MODULUS)
     y = (np.arange(200) + 0.5) / 100.0 * 1.15 * patch.b - 1.15 * patch.b
     found = half_space.solve(across * y**2, y, 90.0, 300.0, MODULUS, 1.15 * patch.a)
@@ -42,7 +42,7 @@ def test_that_an_ellipse_is_hertz(across):
 
 @pytest.mark.bench
 @pytest.mark.parametrize("name", WORN)
-def test_that_a_worn_profile_is_that_of_contact(name):
+def test_worn_profile_equals_solution_of_contact(name):
     exact = worn_profile(name)
     edge = np.abs(exact["y"]).max()
     y = (np.arange(400) + 0.5) / 200.0 * edge - edge

@@ -1,11 +1,16 @@
-"""Every contact model against the exact theory: what the tables of the documentation rest on."""
+"""Accuracy of every contact model against the exact theory, as documented in docs/models.md."""
 
 from functools import cache
 
 import pytest
 
 from wearsim.errors import ContactError
-from wearsim_bench.contact.accuracy import built, drawn_errors, hard_errors, worn_errors
+from wearsim_bench.contact.accuracy import (
+    build_model,
+    hard_case_errors,
+    random_case_errors,
+    worn_errors,
+)
 from wearsim_bench.exact_solutions import WORN
 
 pytestmark = pytest.mark.bench
@@ -24,12 +29,12 @@ DRAWN = {
 
 @cache
 def on_profile(name, profile, **options):
-    return worn_errors(built(name, **options), profile)
+    return worn_errors(build_model(name, **options), profile)
 
 
 @pytest.mark.parametrize(("model", "tangential", "kind"), DRAWN)
-def test_that_drawn_contacts_dissipate_like_the_exact_theory(model, tangential, kind):
-    found = drawn_errors(built(model, tangential=tangential), kind)
+def test_power_of_random_contacts_matches_exact_theory(model, tangential, kind):
+    found = random_case_errors(build_model(model, tangential=tangential), kind)
     rms, worst, strips = DRAWN[model, tangential, kind]
     assert found.rms < rms
     assert found.worst < worst
@@ -37,14 +42,14 @@ def test_that_drawn_contacts_dissipate_like_the_exact_theory(model, tangential, 
 
 
 @pytest.mark.parametrize(("tangential", "rms"), [("strip", 5e-3), ("fastrip", 5e-3)])
-def test_that_hard_cases_of_long_contacts_do_so_too(tangential, rms):
-    assert hard_errors(built("hertz", tangential=tangential), 3.0).rms < rms
+def test_power_of_long_hard_cases_matches_exact_theory(tangential, rms):
+    assert hard_case_errors(build_model("hertz", tangential=tangential), 3.0).rms < rms
 
 
 @pytest.mark.parametrize("profile", WORN)
-def test_that_slender_carries_the_line_load_of_the_exact_theory(profile):
+def test_slender_line_load_matches_exact_theory(profile):
     found = on_profile("slender", profile)
-    # the shallow parabola has a kink, where the exact pressure has no bound
+    # the exact pressure is unbounded at the kink of the shallow parabola
     assert found.line_load < (6e-3 if profile == "parabola" else 1e-3)
     assert abs(found.approach) < 1e-4
     assert found.half_length < 5e-3
@@ -54,26 +59,26 @@ def test_that_slender_carries_the_line_load_of_the_exact_theory(profile):
 
 @pytest.mark.parametrize("variant", VARIANTS)
 @pytest.mark.parametrize("profile", [name for name in WORN if name != "hertz"])
-def test_that_slender_is_nearer_than_every_semi_hertzian_variant(profile, variant):
-    ours, other = (
+def test_slender_is_more_accurate_than_semi_hertzian(profile, variant):
+    slender, other = (
         on_profile("slender", profile),
         on_profile("semi-hertzian", profile, variant=variant),
     )
-    assert ours.line_load < 0.1 * other.line_load
-    assert ours.half_length < 0.5 * other.half_length
-    assert abs(ours.approach) < abs(other.approach)
-    for case, error in ours.dissipation.items():
+    assert slender.line_load < 0.1 * other.line_load
+    assert slender.half_length < 0.5 * other.half_length
+    assert abs(slender.approach) < abs(other.approach)
+    for case, error in slender.dissipation.items():
         assert error < 0.5 * other.dissipation[case]
 
 
 @pytest.mark.parametrize("variant", ["ayasse-chollet", "analyn"])
-def test_that_the_variants_with_hertzs_stiffness_recover_hertz(variant):
+def test_variants_with_hertzian_stiffness_recover_hertz(variant):
     found = on_profile("semi-hertzian", "hertz", variant=variant)
     assert found.line_load < 1e-3
     assert abs(found.approach) < 1e-3
 
 
 @pytest.mark.parametrize("name", ["hertz", "hertz-fastsim"])
-def test_that_one_parabola_is_refused_where_none_will_do(name):
+def test_hertz_models_refuse_a_non_parabolic_gap(name):
     with pytest.raises(ContactError, match="Hertz"):
         on_profile(name, "bump_10um")

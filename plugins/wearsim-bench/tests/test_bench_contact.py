@@ -12,16 +12,16 @@ from pydantic import field_validator
 
 import wearsim.plugins as ws
 from tests.benchmarks.models import install_template
-from tests.benchmarks.replays import SCENARIOS
+from tests.benchmarks.wear_tests import SCENARIOS
 from wearsim import load_scenario
 from wearsim.errors import ContactError, PluginError
 from wearsim.models.contact import slender
 from wearsim.models.tangential.options import TangentialOptions
 from wearsim.plugins import ContactModelSpec, manager, registry
 from wearsim.studies.run.grid import fresh_patch, run_grid
-from wearsim_bench.contact.accuracy import built, drawn_errors, errors_of, solved
+from wearsim_bench.contact.accuracy import build_model, errors_of, random_case_errors, solved
 from wearsim_bench.contact.cases import elliptic_cases, worn_cases
-from wearsim_bench.contact.methods import HOST, Method, methods, normal_methods
+from wearsim_bench.contact.methods import COMPARISON_MODEL, Method, methods, normal_methods
 from wearsim_bench.contact.topic import HARD, contact
 from wearsim_bench.contact.worn_profiles import measure
 from wearsim_bench.exact_solutions import rows
@@ -113,7 +113,7 @@ def test_that_every_choice_of_every_option_is_measured():
     for name in registry().names(ContactModelSpec):
         own = [method for method in found if method.model == name]
         options = own[0].spec.options
-        theories = issubclass(options, TangentialOptions) and name != HOST
+        theories = issubclass(options, TangentialOptions) and name != COMPARISON_MODEL
         for key, info in options.model_fields.items():
             values = {info.default, *get_args(info.annotation)}
             if get_args(info.annotation) and not (
@@ -198,7 +198,10 @@ def test_that_the_defaults_are_the_strips_of_a_run_and_of_a_contact(topic):
             elliptic_cases("paper")[0],
             [int(item.setting.split()[0]) for item in default],
         )
-        usual, fewer = case.grid(built("slender")), case.grid(built("slender"), strips[0])
+        usual, fewer = (
+            case.grid(build_model("slender")),
+            case.grid(build_model("slender"), strips[0]),
+        )
         assert [fewer.strips, usual.strips] == strips
         assert case.patch.b / fewer.spacing == pytest.approx(of_run, rel=0.05)
 
@@ -206,11 +209,11 @@ def test_that_the_defaults_are_the_strips_of_a_run_and_of_a_contact(topic):
 def test_that_errors_of_a_group_are_those_of_its_contacts():
     cases = elliptic_cases("paper")
     found = measure("draws", cases, Method("hertz"), 50, 1).errors
-    whole = drawn_errors(built("hertz", my=50), "paper")
+    whole = random_case_errors(build_model("hertz", my=50), "paper")
     assert found["power"] == whole.rms
     assert found["worst_power"] == whole.worst
     assert found["dissipation"] == whole.strips
-    powers = [solved(built("hertz"), case)[0].power for case in cases]
+    powers = [solved(build_model("hertz"), case)[0].power for case in cases]
     exact = [row["P_over_V_N"] for row in rows("rig_random", kind="paper")]
     assert found["worst_power"] == np.abs(np.array(powers) / exact - 1.0).max()
 
@@ -240,7 +243,7 @@ def test_that_more_strips_are_nearer_to_the_exact_theory():
 
 def test_that_a_value_that_is_not_finite_is_an_error():
     case = elliptic_cases("paper")[0]
-    solution, grid = solved(built("hertz"), case)
+    solution, grid = solved(build_model("hertz"), case)
     solution.dissipation[3] = np.nan
     with pytest.raises(ContactError, match="dissipation is not finite"):
         errors_of(solution, grid, case)

@@ -1,7 +1,7 @@
-"""Streams realisations that cost nothing through an ensemble's file, and tells what that takes.
+"""Memory, time and disk space of an ensemble of closed-form tests, which cost no solves.
 
-``python -m tests.benchmarks.million COUNT`` prints JSON. Every test is the closed form of full
-slip, so that what is measured is the way into the file, and from the file into statistics.
+``python -m tests.benchmarks.ensemble_memory COUNT`` prints JSON. Every test is the closed form of
+full slip, so that only writing the file and computing statistics are measured.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class ClosedForm(RealisationRunner):
     """Realisations with the closed-form depth of full slip of rigid bodies."""
 
     def __call__(self, numbers: Sequence[int]) -> list[Outcome]:
-        """Return what realisations on end would wear, in closed form."""
+        """Return the outcomes of consecutive realisations in closed form."""
         first, count = numbers[0], len(numbers)
         columns = self.drawer.columns(first, count)
         depths = closed_form_depths(self.scenario, columns, count)
@@ -47,20 +47,20 @@ class ClosedForm(RealisationRunner):
 def main(count: int) -> None:
     """Run an ensemble of `count` and print its peak memory, time and size."""
     study.RealisationRunner = ClosedForm  # type: ignore[misc]
-    begun = time.perf_counter()
+    start = time.perf_counter()
     with TemporaryDirectory() as folder:
         path = Path(folder) / "many.h5"
         result = study.ensemble(drawn("per-test", Size()), count, path, scheduler="serial")
         if result.count != count:
-            raise RuntimeError(f"{result.count} of {count} realisations ended well")
+            raise RuntimeError(f"{result.count} of {count} realisations succeeded")
         size = path.stat().st_blocks * 512
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024  # kB on Linux
-    told = {
-        "seconds": time.perf_counter() - begun,
+    measured = {
+        "seconds": time.perf_counter() - start,
         "megabytes": peak / 1e6,
         "file_megabytes": size / 1e6,
     }
-    sys.stdout.write(json.dumps(told))
+    sys.stdout.write(json.dumps(measured))
 
 
 if __name__ == "__main__":
