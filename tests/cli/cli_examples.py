@@ -1,4 +1,4 @@
-"""What the shell's tests share: the type of their command, and a scenario that takes no time."""
+"""Type of the command under test, and a short scenario."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Fixtures of the shell: a command that runs in-process, short scenarios, a finished test."""
+"""Fixtures of the command line: an in-process command, a short scenario, a finished run."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from wearsim.cli.app import app
 
 @pytest.fixture
 def command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Command:
-    """Run `wearsim` with arguments, in an empty folder."""
+    """Run `wearsim` with arguments in an empty folder."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("WEARSIM_TRACEBACK", raising=False)
 
@@ -25,7 +25,7 @@ def command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Command:
 
 @pytest.fixture
 def scenario(tmp_path: Path) -> Path:
-    """A run that takes no time."""
+    """A short scenario."""
     path = tmp_path / "short.toml"
     path.write_text(SHORT)
     return path
@@ -44,7 +44,7 @@ def finished_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def finished(finished_once: Path, tmp_path: Path) -> Path:
-    """A finished test's own copy of a results file."""
+    """A copy of the results file of a finished run."""
     path = tmp_path / "short.h5"
     path.write_bytes(finished_once.read_bytes())
     return path

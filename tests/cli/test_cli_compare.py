@@ -1,4 +1,4 @@
-"""`wearsim compare`: wear tests and ensembles side by side."""
+"""`wearsim compare`: comparison of runs and ensembles."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from wearsim.studies.run.run import run
 
 @pytest.fixture(scope="module", autouse=True)
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Two ensembles with the same draws, a run, and what cannot be compared."""
+    """Files of ensembles with the same draws, of runs, and of studies that cannot be compared."""
     path = tmp_path_factory.mktemp("compared")
     ensemble(small(), 30, path / "a.h5", scheduler="serial")
     heavy = small(load__normal_force="400 N")
@@ -41,20 +41,20 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def here(folder: Path, command: Command, monkeypatch: pytest.MonkeyPatch) -> Command:
-    """The command, in the folder of the files."""
+    """The command, run in the folder of the files."""
     monkeypatch.chdir(folder)
     return command
 
 
-def test_that_ensembles_are_told_beside_each_other(here: Command) -> None:
+def test_table_of_two_ensembles(here: Command) -> None:
     result = here("compare", "a.h5", "b.h5")
     assert result.exit_code == 0, result.output
     found = compare([open_ensemble("a.h5"), open_ensemble("b.h5")], ["a", "b"])
     rows = [line.split() for line in result.stdout.splitlines()]
     for row in found.rows:
-        told = next(line for line in rows if line[:1] == [row.label] and len(line) == 6)
-        assert float(told[1]) == pytest.approx(row.value.value * 1e6, rel=1e-2)
-        assert float(told[4]) == pytest.approx(row.quantiles[1][1].value * 1e6, rel=1e-2)
+        cells = next(line for line in rows if line[:1] == [row.label] and len(line) == 6)
+        assert float(cells[1]) == pytest.approx(row.value.value * 1e6, rel=1e-2)
+        assert float(cells[4]) == pytest.approx(row.quantiles[1][1].value * 1e6, rel=1e-2)
     deeper = found.rows[1].deeper
     assert deeper is not None
     assert f"in {100.0 * deeper.value:.1f} % [" in result.stdout
@@ -62,14 +62,14 @@ def test_that_ensembles_are_told_beside_each_other(here: Command) -> None:
     assert "with the same draws" in result.stdout
 
 
-def test_that_a_run_is_told_with_its_stated_error(here: Command) -> None:
+def test_run_is_listed_with_its_error_estimate(here: Command) -> None:
     result = here("compare", "a.h5", "r.h5", "-o", "c.png")
     assert result.exit_code == 0, result.output
     kept = open_results("r.h5")
     rows = [line.split() for line in result.stdout.splitlines()]
-    (told,) = [line for line in rows if line[:1] == ["r"] and line[2:] == ["-"] * 4]
-    assert float(told[1]) == pytest.approx(kept.depth[-1] * 1e6, rel=1e-3)
-    (error,) = [line for line in rows if line[:2] == ["stated", "error"]]
+    (cells,) = [line for line in rows if line[:1] == ["r"] and line[2:] == ["-"] * 4]
+    assert float(cells[1]) == pytest.approx(kept.depth[-1] * 1e6, rel=1e-3)
+    (error,) = [line for line in rows if line[:2] == ["error", "estimate"]]
     low, high = (float(end) for end in error[2].split(".."))
     assert high - low == pytest.approx(2e6 * kept.depth_error[-1], rel=0.1)
     assert Path("c.png").read_bytes().startswith(b"\x89PNG")
@@ -79,50 +79,48 @@ def test_that_a_run_is_told_with_its_stated_error(here: Command) -> None:
     assert here("compare", "a.h5", "r.h5", "-o", "c.png", "--force").exit_code == 0
 
 
-def test_that_json_is_si(here: Command) -> None:
+def test_json_is_in_si_units(here: Command) -> None:
     result = here("compare", "a.h5", "b.h5", "r.h5", "--observable", "worn_volume", "--json")
     assert result.exit_code == 0, result.output
     data = json.loads(result.stdout)
     assert data["observable"] == "worn_volume_m3"
-    first, second, run_too = data["compared"]
+    first, second, of_run = data["compared"]
     assert first["value"]["value"] == open_ensemble("a.h5").estimate("worn_volume").mean.value
     assert first["probability_of_more_than_first"] is None
     assert 0.0 <= second["probability_of_more_than_first"]["value"] <= 1.0
     assert second["paired_with_first"]["mean_difference"]["value"] > 0.0
-    assert (run_too["kind"], run_too["realisations"]) == ("run", 1)
+    assert (of_run["kind"], of_run["realisations"]) == ("run", 1)
 
 
-def test_that_files_of_one_name_are_told_apart_by_their_folders(here: Command) -> None:
+def test_labels_of_equal_file_names_include_the_folder(here: Command) -> None:
     result = here("compare", "a.h5", "other/a.h5")
     assert result.exit_code == 0, result.output
     assert "other/a.h5 deeper than a.h5" in result.stdout
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("arguments", "message"),
     [
-        (["a.h5"], "there is one file, a.h5; name another"),
-        (["a.h5", "a.h5"], "a.h5 is there twice"),
+        (["a.h5"], "there is one file, a.h5; give another one"),
+        (["a.h5", "a.h5"], "a.h5 is given twice"),
         (["a.h5", "d.h5"], "holds realisations of one contact"),
-        (["a.h5", "d.h5"], "runs and ensembles can be compared"),
+        (["a.h5", "d.h5"], "only runs and ensembles can be compared"),
         (["a.h5", "none.h5"], "there is no such file"),
         (["a.h5", "b.h5", "--observable", "dept"], "a has no 'dept', expected one of depth"),
         (["a.h5", "r.h5", "--observable", "mean_power"], "r has no 'mean_power'"),
-        (["a.h5", "b.h5", "-o", "a.gif"], "ends in no kind of figure"),
+        (["a.h5", "b.h5", "-o", "a.gif"], "has no known figure format"),
     ],
 )
-def test_that_what_cannot_be_compared_is_bad_input(
-    here: Command, arguments: list[str], words: str
-) -> None:
+def test_invalid_comparison_is_bad_input(here: Command, arguments: list[str], message: str) -> None:
     result = here("compare", *arguments)
     assert result.exit_code == 2
-    assert words in " ".join(result.stderr.split())
+    assert message in " ".join(result.stderr.split())
     assert result.stdout == ""
 
 
-def test_that_tests_of_unlike_length_are_told(here: Command) -> None:
+def test_unequal_lengths_of_tests_give_a_warning(here: Command) -> None:
     result = here("compare", "a.h5", "short.h5")
-    assert "warning: the tests are not of the same length (a: 3,000 passes" in result.stderr
+    assert "warning: the tests differ in length (a: 3,000 passes" in result.stderr
     rows = " ".join(result.stdout.split())
     assert "ensemble of 30; 3,000 passes, 1.000 min; a.h5" in rows
     assert "run; 2,000 passes" in rows
@@ -133,7 +131,7 @@ def test_that_tests_of_unlike_length_are_told(here: Command) -> None:
     assert "length" not in here("compare", "a.h5", "r.h5").stderr
 
 
-def test_that_failed_and_unfinished_are_told(here: Command) -> None:
+def test_failed_and_unfinished_ensembles_are_marked(here: Command) -> None:
     result = here("compare", "a.h5", "f.h5", "u.h5")
     failing, part = open_ensemble("f.h5"), open_ensemble("u.h5")
     assert 0 < failing.failed < 12
@@ -149,25 +147,26 @@ def test_that_failed_and_unfinished_are_told(here: Command) -> None:
     assert "biased" not in here("compare", "a.h5", "u.h5").stderr
 
 
-def test_that_ties_and_a_single_pair_are_told_as_such(here: Command) -> None:
+def test_ties_and_a_single_pair_of_tests(here: Command) -> None:
     same = here("compare", "a.h5", "other/../a.h5").stdout
-    assert "with the same draws the same in every test" in " ".join(same.split())
-    alike = " ".join(here("compare", "one.h5", "a.h5").stdout.split())
-    assert "with the same draws the same in the one pair of tests" in alike
-    apart = open_ensemble("b.h5").at_end("depth")[0] - open_ensemble("a.h5").at_end("depth")[0]
+    assert "with the same draws equal in all tests" in " ".join(same.split())
+    equal = " ".join(here("compare", "one.h5", "a.h5").stdout.split())
+    assert "with the same draws equal in the only pair of tests" in equal
+    difference = open_ensemble("b.h5").at_end("depth")[0]
+    difference -= open_ensemble("a.h5").at_end("depth")[0]
     pair = " ".join(here("compare", "one.h5", "b.h5").stdout.split())
-    assert f"with the same draws deeper by {apart * 1e6:.4g} um in the one pair of tests" in pair
+    assert f"with the same draws deeper by {difference * 1e6:.4g} um in the only" in pair
     none = " ".join(here("compare", "a.h5", "b.h5", "--observable", "roller_depth").stdout.split())
-    assert "b more than a the same in every test" in none
+    assert "b more than a equal in all tests" in none
 
 
-def test_that_of_two_runs_it_is_said_which_is_deeper_and_by_how_much(here: Command) -> None:
+def test_difference_of_two_runs_beyond_their_errors(here: Command) -> None:
     result = here("compare", "r.h5", "short.h5")
     one, other = open_results("r.h5"), open_results("short.h5")
     by = float(one.depth[-1] - other.depth[-1]) * 1e6
     assert by > 1e6 * (one.depth_error[-1] + other.depth_error[-1])
     rows = " ".join(result.stdout.split())
-    found = re.search(r"short against r shallower by ([\d.]+) um \(stated errors", rows)
+    found = re.search(r"short against r shallower by ([\d.]+) um \(estimated errors", rows)
     assert found is not None
     assert float(found[1]) == pytest.approx(by, rel=1e-3)
     assert "pairs of tests" not in rows
@@ -176,10 +175,10 @@ def test_that_of_two_runs_it_is_said_which_is_deeper_and_by_how_much(here: Comma
     assert item["difference_from_first"]["high"] < 0.0
 
 
-def test_that_of_two_runs_within_their_errors_it_is_open(here: Command) -> None:
+def test_difference_of_two_runs_within_their_errors(here: Command) -> None:
     run(small(evolution__tolerance=5e-3), Path("finer.h5"), force=True)
     rows = " ".join(here("compare", "r.h5", "finer.h5").stdout.split())
-    assert "finer against r open: " in rows
-    assert "apart, within the stated errors" in rows
+    assert "finer against r not significant: " in rows
+    assert "um, within the estimated errors" in rows
     rows = " ".join(here("compare", "r.h5", "other/../r.h5").stdout.split())
-    assert "the same (stated errors" in rows
+    assert "equal (estimated errors" in rows

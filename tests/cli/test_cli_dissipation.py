@@ -1,4 +1,4 @@
-"""`wearsim dissipation`, and what the other verbs do with its file."""
+"""`wearsim dissipation`, and the other verbs on its file."""
 
 from __future__ import annotations
 
@@ -13,8 +13,7 @@ import pytest
 from cli_examples import SCENARIOS, Command
 
 from tests.interruptible import interruptible
-from wearsim.cli.progress.count import CountedLines
-from wearsim.cli.progress.run import Clock
+from wearsim.cli.progress.realisations import CountedLines
 from wearsim.results import open_dissipation
 from wearsim.studies.limits import MOST_BYTES
 
@@ -34,30 +33,30 @@ def studied_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def studied(studied_once: Path, tmp_path: Path) -> Path:
-    """A finished study's own copy of its file."""
+    """A copy of the file of a finished study."""
     path = tmp_path / "study.h5"
     path.write_bytes(studied_once.read_bytes())
     return path
 
 
-def test_that_dissipation_tells_the_power_and_its_spread(command: Command) -> None:
+def test_dissipation_prints_power_and_its_spread(command: Command) -> None:
     result = command("dissipation", PAPER, *SMALL)
     assert result.exit_code == 0, result.output
     found = open_dissipation("paper-monte-carlo-dissipation.h5").summaries["power"]
     assert f"{found.mean:.4f} W" in result.stdout
     for text in (
         "50, monte-carlo, seed 1",
-        "power, 2.5 to 97.5 %",
-        "power, 5 to 95 %",
+        "dissipated power, 2.5 to 97.5 %",
+        "dissipated power, 5 to 95 %",
         "95 % confidence",
-        "inputs at their mean",
+        "inputs at their means",
         "drawn load.normal_force",
         "paper-monte-carlo-dissipation.h5",
     ):
         assert text in result.stdout
 
 
-def test_that_json_is_si_and_all_of_stdout(command: Command) -> None:
+def test_json_is_si_and_all_of_stdout(command: Command) -> None:
     result = command("dissipation", PAPER, *SMALL, "--json", "--quiet", "-o", "a.h5")
     assert result.exit_code == 0
     assert result.stderr == ""
@@ -73,7 +72,7 @@ def test_that_json_is_si_and_all_of_stdout(command: Command) -> None:
     assert (data["realisations"], data["finished"], data["output"]) == (50, True, "a.h5")
 
 
-def test_that_plan_and_seed_reach_the_stored_scenario(command: Command) -> None:
+def test_plan_and_seed_reach_the_stored_scenario(command: Command) -> None:
     result = command(
         "dissipation", PAPER, *SMALL, "--plan", "latin-hypercube", "--seed", 7, "-o", "a.h5"
     )
@@ -85,13 +84,13 @@ def test_that_plan_and_seed_reach_the_stored_scenario(command: Command) -> None:
     assert stored.scenario.sampling.plan == "latin-hypercube"
 
 
-def test_that_an_unknown_plan_is_bad_input(command: Command) -> None:
+def test_unknown_plan_is_bad_input(command: Command) -> None:
     result = command("dissipation", PAPER, "--plan", "sobo")
     assert result.exit_code == 2
     assert "[sampling] plan: unknown choice (did you mean 'sobol'?)" in result.stderr
 
 
-def test_that_a_study_draws_a_figure_and_leaves_existing_files(command: Command) -> None:
+def test_figure_is_drawn_and_existing_files_are_kept(command: Command) -> None:
     arguments = ("dissipation", PAPER, *SMALL, "-o", "a.h5", "--figure", "a.png")
     assert command(*arguments).exit_code == 0
     assert Path("a.png").read_bytes().startswith(b"\x89PNG")
@@ -103,20 +102,20 @@ def test_that_a_study_draws_a_figure_and_leaves_existing_files(command: Command)
     assert command(*arguments, "--force").exit_code == 0
 
 
-def test_that_a_figure_of_no_known_kind_is_bad_input(command: Command) -> None:
+def test_unknown_figure_format_is_bad_input(command: Command) -> None:
     result = command("dissipation", PAPER, "--figure", "a.gif")
     assert result.exit_code == 2
     assert "--figure" in result.stderr
     assert not Path("paper-monte-carlo-dissipation.h5").exists()
 
 
-def test_that_a_scenario_without_random_inputs_is_bad_input(command: Command) -> None:
+def test_scenario_without_random_inputs_is_bad_input(command: Command) -> None:
     result = command("dissipation", SCENARIOS / "mean-contact.toml")
     assert result.exit_code == 2
     assert "no random input acts on the contact" in result.stderr
 
 
-def test_that_show_tells_what_is_in_the_file_of_a_study(command: Command, studied: Path) -> None:
+def test_show_prints_the_content_of_a_study(command: Command, studied: Path) -> None:
     result = command("show", studied)
     assert result.exit_code == 0
     for text in ("50, monte-carlo, seed 1", "random input disc (wearsim", "software", "skewness"):
@@ -126,16 +125,16 @@ def test_that_show_tells_what_is_in_the_file_of_a_study(command: Command, studie
     assert "[creepage.misalignment]" in data["scenario"]
 
 
-def test_that_plot_draws_a_study(command: Command, studied: Path) -> None:
+def test_plot_draws_a_study(command: Command, studied: Path) -> None:
     result = command("plot", studied)
     assert result.exit_code == 0
     assert Path("study.png").read_bytes().startswith(b"\x89PNG")
     refused = command("plot", studied, "-o", "b.png", "--measured", "m.csv")
     assert refused.exit_code == 2
-    assert "goes with a wear test" in refused.stderr
+    assert "requires the file of a wear test" in refused.stderr
 
 
-def test_that_a_study_is_no_wear_test(command: Command, studied: Path) -> None:
+def test_resume_refuses_a_study(command: Command, studied: Path) -> None:
     result = command("resume", studied)
     assert result.exit_code == 2
     assert result.stderr == (
@@ -144,7 +143,7 @@ def test_that_a_study_is_no_wear_test(command: Command, studied: Path) -> None:
     )
 
 
-def test_that_a_signal_ends_a_study_that_keeps_what_is_done(tmp_path: Path) -> None:
+def test_signal_ends_a_study_that_keeps_its_results(tmp_path: Path) -> None:
     slow = ["--set", "contact.mx=400", "--set", "contact.my=400", "-n", "200000", "-o", "a.h5"]
     arguments = interruptible("-m", "wearsim", "dissipation", PAPER, *slow)
     with subprocess.Popen(arguments, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as running:
@@ -153,26 +152,26 @@ def test_that_a_signal_ends_a_study_that_keeps_what_is_done(tmp_path: Path) -> N
             if "200,000 realisations" in line:
                 break
         running.send_signal(signal.SIGINT)
-        said = running.stderr.read()
+        message = running.stderr.read()
     assert running.returncode == 130
-    assert "what is done is kept" in said
-    assert "checkpoint" not in said
-    assert "realisations; they are in a.h5; draw them with: wearsim plot a.h5" in said
+    assert "results are kept" in message
+    assert "checkpoint" not in message
+    assert "realisations; they are in a.h5; draw them with: wearsim plot a.h5" in message
     kept = open_dissipation(tmp_path / "a.h5")
     assert not kept.finished
     assert 0 < kept.count < 200_000
 
 
-def test_that_counted_lines_are_a_second_apart() -> None:
-    times = iter([0.0, 0.0, 0.5, 1.1, 1.2, 2.2])
+def test_counted_lines_are_a_second_apart() -> None:
+    times = iter([0.0, 0.5, 1.1, 1.2, 2.2])
     lines: list[str] = []
-    counted = CountedLines(lines.append, "realisations", Clock(lambda: next(times)))
+    counted = CountedLines(lines.append, "realisations", lambda: next(times))
     for done in (10, 20, 30, 40):
         counted(done, 1040)
     assert lines == ["20 of 1,040 realisations, 56 s left", "40 of 1,040 realisations, 55 s left"]
 
 
-def _own(name: str = "u.toml", **changes: str) -> Path:
+def _changed(name: str = "u.toml", **changes: str) -> Path:
     """Write the paper's scenario, coarse and with changes, into the current folder."""
     text = PAPER.read_text()
     for old, new in changes.values():
@@ -183,8 +182,8 @@ def _own(name: str = "u.toml", **changes: str) -> Path:
     return path
 
 
-def test_that_force_replaces_no_input(command: Command) -> None:
-    scenario = _own()
+def test_force_replaces_no_input(command: Command) -> None:
+    scenario = _changed()
     before = scenario.read_bytes()
     refused = command("dissipation", scenario, *SMALL, "-o", "u.toml", "--force")
     assert refused.exit_code == 2
@@ -195,7 +194,7 @@ def test_that_force_replaces_no_input(command: Command) -> None:
     assert scenario.read_bytes() == before
 
 
-def test_that_force_replaces_no_file_that_the_scenario_reads(command: Command) -> None:
+def test_force_replaces_no_file_that_the_scenario_reads(command: Command) -> None:
     table = '{distribution = "table", file = "samples.csv"}'
     text = PAPER.read_text()
     start = text.index("[friction.coefficient]")
@@ -213,14 +212,14 @@ def test_that_force_replaces_no_file_that_the_scenario_reads(command: Command) -
     assert Path("samples.csv").read_text().startswith("value")
 
 
-def test_that_figure_and_results_have_a_file_each(command: Command) -> None:
+def test_figure_and_results_need_different_files(command: Command) -> None:
     result = command("dissipation", PAPER, *SMALL, "-o", "a.png", "--figure", "./a.png")
     assert result.exit_code == 2
-    assert "is the results file too" in result.stderr
+    assert "is also the results file" in result.stderr
     assert not Path("a.png").exists()
 
 
-def test_that_more_realisations_than_memory_holds_are_bad_input(command: Command) -> None:
+def test_realisations_beyond_memory_are_bad_input(command: Command) -> None:
     result = command("dissipation", PAPER, "-n", 100_000_000_000)
     assert result.exit_code == 2
     told = re.search(r"(\S+) GB of memory, (\d+) bytes each, .* at most (\d+),", result.stderr)
@@ -229,13 +228,13 @@ def test_that_more_realisations_than_memory_holds_are_bad_input(command: Command
     assert int(told[3]) == MOST_BYTES // int(told[2])
 
 
-def test_that_drawn_values_are_told_in_engineers_units(command: Command, studied: Path) -> None:
+def test_drawn_values_are_in_engineering_units(command: Command, studied: Path) -> None:
     rows = command("show", studied).stdout
     yaw = open_dissipation(studied).inputs["creepage.yaw"]
     assert f"mean {yaw.mean() * 1e3:.4g} mrad, std {yaw.std(ddof=1) * 1e3:.4g} mrad" in rows
 
 
-def test_that_an_interval_holds_its_estimate_as_printed(command: Command) -> None:
+def test_printed_interval_contains_its_printed_estimate(command: Command) -> None:
     result = command("dissipation", PAPER, *SMALL[:-1], 1000, "-q", "-o", "a.h5")
     for line in result.stdout.splitlines():
         told = re.search(
@@ -247,10 +246,10 @@ def test_that_an_interval_holds_its_estimate_as_printed(command: Command) -> Non
             assert ends[2] <= high <= ends[3]
             break
     else:
-        pytest.fail("no interval is told")
+        pytest.fail("no interval is printed")
 
 
-def test_that_few_realisations_have_no_interval_and_one_no_confidence(command: Command) -> None:
+def test_few_realisations_have_no_confidence_interval(command: Command) -> None:
     few = command("dissipation", PAPER, *SMALL[:-1], 5, "-q", "-o", "a.h5").stdout
     assert "(95 % confidence: too few realisations)" in few
     assert "?" not in few
@@ -259,7 +258,7 @@ def test_that_few_realisations_have_no_interval_and_one_no_confidence(command: C
     assert " to " not in one
 
 
-def test_that_a_field_is_told_by_what_it_is(command: Command) -> None:
+def test_field_is_described_by_its_parameters(command: Command) -> None:
     field = (
         'friction.coefficient={distribution="gaussian-field", correlation_length="500 um",'
         ' marginal={distribution="uniform", low=0.08, high=0.12}}'
@@ -277,8 +276,8 @@ def test_that_a_field_is_told_by_what_it_is(command: Command) -> None:
     assert shown["random"].keys() == {"friction.coefficient"}
 
 
-def test_that_rounding_is_not_told_as_a_result(command: Command) -> None:
-    _own(angles=("[creepage.misalignment]", "[creepage.none]"))
+def test_rounding_errors_are_shown_as_zero(command: Command) -> None:
+    _changed(angles=("[creepage.misalignment]", "[creepage.none]"))
     text = Path("u.toml").read_text()
     start = text.index("[creepage.none]")
     end = text.find("\n[", start)
@@ -292,7 +291,7 @@ def test_that_rounding_is_not_told_as_a_result(command: Command) -> None:
     assert rows["lateral force"] == ["0", "N", "-", "constant", "-", "-"]
 
 
-def test_that_export_writes_a_study(command: Command, studied: Path) -> None:
+def test_export_writes_a_study(command: Command, studied: Path) -> None:
     result = command("export", studied, "-o", "out")
     assert result.exit_code == 0, result.output
     assert result.stdout.splitlines() == [

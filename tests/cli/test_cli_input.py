@@ -1,4 +1,4 @@
-"""The verbs that read a scenario: check and contact; and those that need none."""
+"""The verbs check, contact, schema and plugins."""
 
 import json
 from dataclasses import replace
@@ -11,7 +11,7 @@ import wearsim.plugins
 from wearsim.plugins.manager import Broken, Registry
 
 
-def test_that_check_tells_what_will_run(command: Command, scenario: Path) -> None:
+def test_check_prints_what_will_run(command: Command, scenario: Path) -> None:
     result = command("check", scenario)
     assert result.exit_code == 0
     assert result.stdout.startswith("ok: a short [test]")
@@ -19,12 +19,12 @@ def test_that_check_tells_what_will_run(command: Command, scenario: Path) -> Non
     assert "implicit" in result.stdout
 
 
-def test_that_check_takes_settings(command: Command, scenario: Path) -> None:
+def test_check_takes_settings(command: Command, scenario: Path) -> None:
     result = command("check", scenario, "--set", "operation.passes=900", "--set", "seed=3")
     assert "900 roller passes" in result.stdout
 
 
-def test_that_check_tells_every_mistake_at_once(command: Command, tmp_path: Path) -> None:
+def test_check_prints_all_mistakes(command: Command, tmp_path: Path) -> None:
     bad = tmp_path / "bad.toml"
     bad.write_text(SHORT.replace('"20 mm"', "20").replace("normal_force", "normal_forse"))
     result = command("check", bad)
@@ -36,14 +36,14 @@ def test_that_check_tells_every_mistake_at_once(command: Command, tmp_path: Path
     assert any("normal_forse: unknown key (did you mean 'normal_force'?)" in line for line in lines)
 
 
-def test_that_check_passes_on_the_notes(command: Command, scenario: Path) -> None:
+def test_check_prints_the_notes(command: Command, scenario: Path) -> None:
     stiff = 'roller.material={youngs_modulus = "800 GPa", poisson_ratio = 0.2}'
     result = command("check", scenario, "--set", stiff)
     assert result.exit_code == 0
     assert "note: the materials' Dundurs constant" in result.stderr
 
 
-def test_that_check_tells_what_is_random(command: Command, scenario: Path) -> None:
+def test_check_describes_random_inputs(command: Command, scenario: Path) -> None:
     load = 'load.normal_force={distribution = "maxent", support = ["0 N", "inf"], mean = "307 N"'
     slack = 'creepage.misalignment={distribution = "disc", radius = "2 mrad"'
     result = command(
@@ -56,13 +56,13 @@ def test_that_check_tells_what_is_random(command: Command, scenario: Path) -> No
     assert "sampling sobol, realisation 0" in rows
 
 
-def test_that_a_setting_without_a_value_is_bad_input(command: Command, scenario: Path) -> None:
+def test_setting_without_a_value_is_bad_input(command: Command, scenario: Path) -> None:
     result = command("check", scenario, "--set", "seed")
     assert result.exit_code == 2
     assert "'seed' is not an override" in result.stderr
 
 
-def test_that_contact_gives_the_mean_contact_in_engineers_units(command: Command) -> None:
+def test_contact_prints_engineering_units(command: Command) -> None:
     result = command("contact", SCENARIOS / "mean-contact.toml")
     assert result.exit_code == 0
     rows = {line[:24].strip(): line[24:].strip() for line in result.stdout.splitlines()}
@@ -74,7 +74,7 @@ def test_that_contact_gives_the_mean_contact_in_engineers_units(command: Command
     assert (float(width), unit) == (pytest.approx(3.0898, rel=3e-3), "mm")
 
 
-def test_that_contact_writes_nothing_but_si_as_json(command: Command) -> None:
+def test_contact_json_is_si_and_all_of_stdout(command: Command) -> None:
     result = command("contact", SCENARIOS / "mean-contact.toml", "--json")
     assert result.stderr == ""
     data = json.loads(result.stdout)
@@ -85,7 +85,7 @@ def test_that_contact_writes_nothing_but_si_as_json(command: Command) -> None:
     assert sum(strips["line_load_N_per_m"]) * spacing == pytest.approx(300.0)
 
 
-def test_that_contact_takes_a_worn_profile(command: Command, tmp_path: Path) -> None:
+def test_contact_takes_a_worn_profile(command: Command, tmp_path: Path) -> None:
     groove = tmp_path / "groove.csv"
     rows = [f"{y},{min(0.0, y * y - 16.0)}" for y in range(-8, 9)]
     groove.write_text("y [mm], height [um]\n" + "\n".join(rows))
@@ -96,9 +96,7 @@ def test_that_contact_takes_a_worn_profile(command: Command, tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize("text", [None, "y [mm], hight [um]\n0,1\n1,1\n"])
-def test_that_a_bad_profile_is_bad_input(
-    command: Command, tmp_path: Path, text: str | None
-) -> None:
+def test_bad_profile_is_bad_input(command: Command, tmp_path: Path, text: str | None) -> None:
     groove = tmp_path / "groove.csv"
     if text is not None:
         groove.write_text(text)
@@ -107,9 +105,7 @@ def test_that_a_bad_profile_is_bad_input(
     assert result.stderr.startswith(f"{groove}: ")
 
 
-def test_that_contact_draws_a_figure_and_leaves_an_existing_one(
-    command: Command, tmp_path: Path
-) -> None:
+def test_contact_draws_a_figure_and_keeps_an_existing_one(command: Command, tmp_path: Path) -> None:
     figure = tmp_path / "contact.png"
     arguments = ("contact", SCENARIOS / "mean-contact.toml", "-o", figure)
     assert command(*arguments).exit_code == 0
@@ -122,25 +118,25 @@ def test_that_contact_draws_a_figure_and_leaves_an_existing_one(
     assert figure.read_bytes().startswith(b"\x89PNG")
 
 
-def test_that_a_figure_of_no_known_kind_is_bad_input(command: Command) -> None:
+def test_unknown_figure_format_is_bad_input(command: Command) -> None:
     result = command("contact", SCENARIOS / "mean-contact.toml", "-o", "contact.jpeg2")
     assert result.exit_code == 2
     assert ".png, .pdf or .svg" in result.stderr
 
 
-def test_that_a_figure_in_no_folder_is_bad_input(command: Command) -> None:
+def test_figure_in_a_missing_folder_is_bad_input(command: Command) -> None:
     result = command("contact", SCENARIOS / "mean-contact.toml", "-o", "nowhere/contact.png")
     assert result.exit_code == 2
-    assert "there is no folder nowhere" in result.stderr
+    assert "folder nowhere does not exist" in result.stderr
 
 
-def test_that_schema_is_json_with_every_table(command: Command) -> None:
+def test_schema_is_json_with_every_table(command: Command) -> None:
     result = command("schema")
     assert result.exit_code == 0
     assert {"roller", "cylinder", "operation"} <= json.loads(result.stdout)["properties"].keys()
 
 
-def test_that_plugins_lists_the_built_ins_one_a_line(command: Command) -> None:
+def test_plugins_lists_one_line_per_plugin(command: Command) -> None:
     result = command("plugins")
     assert result.exit_code == 0
     (line,) = [line for line in result.stdout.splitlines() if line.startswith("slender")]
@@ -148,27 +144,25 @@ def test_that_plugins_lists_the_built_ins_one_a_line(command: Command) -> None:
     assert "wear compliance" in line
 
 
-def test_that_plugins_tells_of_broken_ones(
-    command: Command, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_plugins_reports_broken_plugins(command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     registry = Registry([])
     registry.broken.append(Broken("winkler", "wearsim-winkler", "1.2", "ImportError: no torch"))
     monkeypatch.setattr(wearsim.plugins, "registry", lambda: registry)
-    told = "plugin 'winkler' of wearsim-winkler 1.2 failed to load: ImportError: no torch"
-    assert told in command("plugins").stderr
+    message = "plugin 'winkler' of wearsim-winkler 1.2 failed to load: ImportError: no torch"
+    assert message in command("plugins").stderr
     listed = json.loads(command("plugins", "--json").stdout)
     assert listed["plugins"] == []
     assert listed["broken"][0]["cause"] == "ImportError: no torch"
 
 
-def test_that_plugins_as_json_name_their_distribution_and_capabilities(command: Command) -> None:
+def test_plugins_json_has_distribution_and_capabilities(command: Command) -> None:
     listed = json.loads(command("plugins", "--json").stdout)["plugins"]
     (slender,) = [item for item in listed if item["name"] == "slender"]
     assert (slender["kind"], slender["distribution"]) == ("contact model", "wearsim")
     assert "wear_compliance" in slender["capabilities"]
 
 
-def test_that_a_model_without_fields_still_gets_a_figure(
+def test_figure_of_a_model_without_fields(
     command: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from wearsim.plugins import ContactModelSpec, registry
@@ -184,7 +178,7 @@ def test_that_a_model_without_fields_still_gets_a_figure(
     assert (tmp_path / "c.svg").read_text().count("<svg") == 1
 
 
-def test_that_contact_says_that_random_inputs_stand_at_their_means(command: Command) -> None:
+def test_contact_notes_that_random_inputs_are_at_their_means(command: Command) -> None:
     paper = SCENARIOS / "paper-monte-carlo.toml"
     field = (
         'friction.coefficient={distribution="white", marginal={distribution="uniform", low=0.08,'
@@ -192,14 +186,14 @@ def test_that_contact_says_that_random_inputs_stand_at_their_means(command: Comm
     )
     lines = command("contact", paper, "--set", field).stderr.splitlines()
     assert (
-        "random inputs stand at their means: creepage.longitudinal, creepage.misalignment,"
+        "random inputs are set to their means: creepage.longitudinal, creepage.misalignment,"
         " load.normal_force"
     ) in lines
-    assert "friction.coefficient, a field, stands at the mean of its marginal" in lines
+    assert "random fields are set to the means of their marginals: friction.coefficient" in lines
     assert "means" not in command("contact", SCENARIOS / "mean-contact.toml").stderr
 
 
-def test_that_a_figure_replaces_no_profile(command: Command) -> None:
+def test_figure_replaces_no_profile(command: Command) -> None:
     profile = Path("worn.png")
     profile.write_text("y [mm],height [um]\n-5,0\n0,-1\n5,0\n")
     arguments = ("contact", SCENARIOS / "mean-contact.toml", "--profile", profile)

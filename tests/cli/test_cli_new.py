@@ -1,4 +1,4 @@
-"""The verb that starts something: new plugins from the template, new scenarios that run."""
+"""`wearsim new`: plugins from the template, and scenarios that run."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ FILES = {
 
 
 def alternatives() -> list[tuple[str, str, str]]:
-    """Return table, line and remark of every alternative in the starting scenario."""
+    """Return table, line and remark of every alternative in the starter scenario."""
     found, table = [], ""
     for line in starter_scenario().splitlines():
         if line.startswith("["):
@@ -34,24 +34,24 @@ def alternatives() -> list[tuple[str, str, str]]:
     return found
 
 
-def taken(table: str, line: str, remark: str) -> str:
-    """Return the starting scenario with one alternative taken, as its remark says."""
+def with_alternative(table: str, line: str, remark: str) -> str:
+    """Return the starter scenario with one alternative applied according to its remark."""
     replaced = re.findall(r"instead of (\w+)", remark)
-    beside = re.findall(r'with (\w+ = "[^"]+")', remark)
-    added = [line, *beside]
-    gone = {*replaced, *(item.split(" = ")[0] for item in added)}
+    companions = re.findall(r'with (\w+ = "[^"]+")', remark)
+    added = [line, *companions]
+    removed = {*replaced, *(item.split(" = ")[0] for item in added)}
     lines, here = [], ""
     for text in starter_scenario().splitlines():
         if text.startswith("["):
             here = text[1 : text.index("]")]
             lines.append(text)
             lines += added if here == table else []
-        elif here != table or text.split(" = ")[0] not in gone:
+        elif here != table or text.split(" = ")[0] not in removed:
             lines.append(text)
     return "\n".join(lines)
 
 
-def test_that_a_new_scenario_runs_as_it_stands(command: Command) -> None:
+def test_new_scenario_runs_unchanged(command: Command) -> None:
     written = command("new", "scenario")
     assert (written.exit_code, written.stdout) == (0, "scenario.toml\n")
     assert written.stderr == "next: wearsim run scenario.toml\n"
@@ -60,7 +60,7 @@ def test_that_a_new_scenario_runs_as_it_stands(command: Command) -> None:
     assert "finished: 1,350,000 passes" in done.stdout
 
 
-def test_that_a_new_scenario_replaces_nothing_unasked(command: Command) -> None:
+def test_new_scenario_replaces_files_only_with_force(command: Command) -> None:
     Path("mine.toml").write_text("mine")
     refused = command("new", "scenario", "mine.toml")
     assert (refused.exit_code, Path("mine.toml").read_text()) == (2, "mine")
@@ -69,35 +69,35 @@ def test_that_a_new_scenario_replaces_nothing_unasked(command: Command) -> None:
     assert Path("mine.toml").read_text() == starter_scenario()
 
 
-def test_that_a_scenario_goes_into_a_folder_that_exists(command: Command) -> None:
+def test_folder_of_a_new_scenario_must_exist(command: Command) -> None:
     refused = command("new", "scenario", "no/where.toml")
     assert refused.exit_code == 2
-    assert "there is no folder no" in refused.stderr
+    assert "folder no does not exist" in refused.stderr
 
 
-@pytest.mark.parametrize("asked", [["folder"], ["folder", "--force"]])
-def test_that_a_folder_is_no_scenario(command: Command, asked: list[str]) -> None:
+@pytest.mark.parametrize("arguments", [["folder"], ["folder", "--force"]])
+def test_folder_is_refused_as_a_scenario(command: Command, arguments: list[str]) -> None:
     Path("folder").mkdir()
-    refused = command("new", "scenario", *asked)
+    refused = command("new", "scenario", *arguments)
     assert refused.exit_code == 2
-    told = " ".join(refused.stderr.split())
-    assert "folder is a folder; name a file in it: folder/scenario.toml" in told
+    message = " ".join(refused.stderr.split())
+    assert "folder is a folder; name a file in it: folder/scenario.toml" in message
     assert not list(Path("folder").iterdir())
 
 
-def test_that_what_cannot_be_written_is_told(command: Command) -> None:
+def test_unwritable_files_are_reported(command: Command) -> None:
     Path("file").write_text("mine")
     refused = command("new", "plugin", "sponge", "-d", "file")
     assert (refused.exit_code, Path("file").read_text()) == (2, "mine")
     assert "cannot write to file (Not a directory)" in " ".join(refused.stderr.split())
     name = 300 * "a"  # longer than a file's name may be
-    for asked in (["plugin", name], ["scenario", name, "--force"]):
-        refused = command("new", *asked)
+    for arguments in (["plugin", name], ["scenario", name, "--force"]):
+        refused = command("new", *arguments)
         assert refused.exit_code == 2
-        assert "choose another name or place" in " ".join(refused.stderr.split())
+        assert "choose another name or folder" in " ".join(refused.stderr.split())
 
 
-def test_that_the_starting_scenario_shows_every_key() -> None:
+def test_starter_scenario_shows_every_key() -> None:
     text = starter_scenario()
     sections = dict(zip(*[iter(re.split(r"^\[(\w+)\]", text, flags=re.M)[1:])] * 2, strict=True))
     assert set(sections) == set(TABLES)
@@ -107,16 +107,16 @@ def test_that_the_starting_scenario_shows_every_key() -> None:
 
 
 @pytest.mark.parametrize(("table", "line", "remark"), alternatives())
-def test_that_every_alternative_of_the_starting_scenario_is_right(
+def test_every_alternative_of_the_starter_scenario_is_valid(
     table: str, line: str, remark: str
 ) -> None:
-    text = taken(table, line, remark)
+    text = with_alternative(table, line, remark)
     key, value = next(iter(tomllib.loads(line).items()))
     assert tomllib.loads(text)[table][key] == value
     parse_scenario(text, "new.toml", FILES.__getitem__)
 
 
-def test_that_a_new_plugin_is_the_template_under_another_name(command: Command) -> None:
+def test_new_plugin_is_the_renamed_template(command: Command) -> None:
     done = command("new", "plugin", "soft-layer", "--directory", "plugins")
     assert done.exit_code == 0, done.output
     folder = Path("plugins/wearsim-soft-layer")
@@ -145,7 +145,7 @@ def test_that_a_new_plugin_is_the_template_under_another_name(command: Command) 
 @pytest.mark.parametrize(
     "name", ["Sponge", "soft_layer", "1st", "-a", "a--b", "a-", "", "wearsim-a", "é", "a b", "../a"]
 )
-def test_that_a_plugin_has_a_proper_name(command: Command, name: str) -> None:
+def test_invalid_plugin_name_is_refused(command: Command, name: str) -> None:
     refused = command("new", "plugin", "--", name)
     assert refused.exit_code == 2
     assert "lower-case words" in " ".join(refused.stderr.split())
@@ -163,25 +163,23 @@ def test_that_a_plugin_has_a_proper_name(command: Command, name: str) -> None:
         ("none", "None"),
     ],
 )
-def test_that_a_plugin_takes_no_name_that_its_code_has_a_use_for(
-    command: Command, name: str, taken: str
-) -> None:
+def test_plugin_name_used_in_its_code_is_refused(command: Command, name: str, taken: str) -> None:
     refused = command("new", "plugin", name)
     assert refused.exit_code == 2
-    told = " ".join(refused.stderr.split())
-    assert f"would define the name {taken}," in told
-    assert f"add a word, 'my-{name}'" in told
+    message = " ".join(refused.stderr.split())
+    assert f"would define the name {taken}," in message
+    assert f"add a word, 'my-{name}'" in message
     assert not list(Path().iterdir())
     assert command("new", "plugin", f"my-{name}").exit_code == 0
 
 
-def test_that_a_plugin_takes_no_name_that_is_taken(command: Command) -> None:
+def test_name_of_an_installed_plugin_is_refused(command: Command) -> None:
     refused = command("new", "plugin", "slender")
     assert refused.exit_code == 2
-    assert "a contact model named 'slender' is installed already" in refused.stderr
+    assert "a contact model named 'slender' is already installed" in refused.stderr
 
 
-def test_that_a_plugin_replaces_no_folder(command: Command) -> None:
+def test_new_plugin_replaces_no_folder(command: Command) -> None:
     Path("wearsim-sponge").mkdir()
     refused = command("new", "plugin", "sponge")
     assert refused.exit_code == 2
@@ -189,7 +187,7 @@ def test_that_a_plugin_replaces_no_folder(command: Command) -> None:
     assert not list(Path("wearsim-sponge").iterdir())
 
 
-def test_that_the_template_is_found_installed_or_not(
+def test_template_is_found_installed_or_in_a_clone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert template.template_folder() == ROOT / "plugins" / "wearsim-template"
@@ -197,7 +195,7 @@ def test_that_the_template_is_found_installed_or_not(
     assert template.template_folder() == tmp_path
 
 
-def test_that_the_wheel_holds_what_new_writes() -> None:
+def test_wheel_contains_the_files_of_new() -> None:
     from hatchling.builders.wheel import WheelBuilder
 
     included = WheelBuilder(str(ROOT)).recurse_included_files()
@@ -208,11 +206,11 @@ def test_that_the_wheel_holds_what_new_writes() -> None:
                  "tests/test_winkler.py"):  # fmt: skip
         assert (folder / name).is_file()
         assert f"wearsim/plugin_template/{name}" in files
-    # what an installed package looks in first
+    # first folder searched by an installed package
     assert template._FOLDERS[0].relative_to(ROOT).as_posix() == "wearsim/plugin_template"
 
 
-def test_that_an_editable_install_holds_no_copy_of_it(tmp_path: Path) -> None:
+def test_editable_install_has_no_copy_of_the_template(tmp_path: Path) -> None:
     import zipfile
 
     from hatchling.builders.wheel import WheelBuilder

@@ -34,23 +34,23 @@ def shown_steps(steps: list[tuple[float, float]]) -> list[str]:
     return lines[1:]
 
 
-def test_that_the_first_and_the_last_step_are_always_shown() -> None:
+def test_first_and_last_step_are_always_shown() -> None:
     lines = shown_steps([(0.0, 10.0), (0.1, 500.0), (0.2, 1000.0)])
     assert [line.split(",")[0] for line in lines] == ["pass 10 (1 %)", "pass 1"]
     assert lines[-1].startswith("pass 1,000 (100 %), 1.000 min, depth 1.000 um, step 10")
 
 
-def test_that_lines_are_a_second_apart() -> None:
+def test_lines_are_a_second_apart() -> None:
     lines = shown_steps([(0.01 * k, 1.0 + k) for k in range(350)])
     assert len(lines) == 4
 
 
-def test_that_the_time_left_follows_from_the_passes_done() -> None:
+def test_time_left_follows_from_the_rate_of_passes() -> None:
     (_, line) = shown_steps([(0.0, 10.0), (10.0, 250.0)])
     assert line.endswith(", 30 s left")
 
 
-def test_that_warnings_and_the_end_are_shown() -> None:
+def test_warnings_and_the_end_are_shown() -> None:
     lines: list[str] = []
     watch = PlainLines(lines.append)
     events: list[Event] = [Warned("unstable [step]"), Finished(75.0)]
@@ -59,7 +59,7 @@ def test_that_warnings_and_the_end_are_shown() -> None:
     assert lines == ["warning: unstable [step]", "done in 1 min 15 s"]
 
 
-def test_that_quiet_shows_warnings_alone(capsys: pytest.CaptureFixture[str]) -> None:
+def test_quiet_shows_warnings_only(capsys: pytest.CaptureFixture[str]) -> None:
     with progress.watching(quiet=True) as watch:
         events: list[Event] = [STARTED, step(10.0), Warned("look"), Finished(1.0)]
         for event in events:
@@ -67,7 +67,7 @@ def test_that_quiet_shows_warnings_alone(capsys: pytest.CaptureFixture[str]) -> 
     assert capsys.readouterr() == ("", "warning: look\n")
 
 
-def test_that_a_terminal_gets_a_live_line(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_terminal_shows_a_live_line(monkeypatch: pytest.MonkeyPatch) -> None:
     screen = io.StringIO()
     terminal = Console(file=screen, force_terminal=True, width=140, markup=False, highlight=False)
     monkeypatch.setattr(progress, "console", lambda **_: terminal)
@@ -82,7 +82,7 @@ def test_that_a_terminal_gets_a_live_line(monkeypatch: pytest.MonkeyPatch) -> No
     assert "100 %  1,000 passes  done in 2.0 s" in text
 
 
-def test_that_json_holds_no_number_that_json_has_not() -> None:
+def test_json_has_null_for_nan_and_infinity() -> None:
     import numpy as np
 
     data = {"a": float("nan"), "b": np.array([1.0, np.inf]), "c": (np.int64(3), None)}

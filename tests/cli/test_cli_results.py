@@ -1,4 +1,4 @@
-"""The verbs that read a results file: show, plot and export."""
+"""The verbs show, plot and export."""
 
 import json
 from pathlib import Path
@@ -9,7 +9,7 @@ from cli_examples import SCENARIOS, Command
 from wearsim.results import open_results
 
 
-def test_that_show_tells_what_is_in_a_file(command: Command, finished: Path) -> None:
+def test_show_prints_the_content_of_a_file(command: Command, finished: Path) -> None:
     result = command("show", finished)
     assert result.exit_code == 0
     for words in (
@@ -25,17 +25,15 @@ def test_that_show_tells_what_is_in_a_file(command: Command, finished: Path) -> 
         assert words in result.stdout
 
 
-def test_that_show_tells_where_an_unfinished_test_stands(command: Command, scenario: Path) -> None:
+def test_show_prints_the_progress_of_an_unfinished_run(command: Command, scenario: Path) -> None:
     command("run", scenario, "-q", "--set", "evolution.max_steps=2")
     passes = open_results("short.h5").passes[-1]
     result = command("show", "short.h5")
     assert f"unfinished: pass {passes:,.0f} of 6,000" in result.stdout
-    assert "state so far" in result.stdout
+    assert "current state" in result.stdout
 
 
-def test_that_show_as_json_holds_the_scenario_and_the_software(
-    command: Command, finished: Path
-) -> None:
+def test_show_json_has_scenario_and_software(command: Command, finished: Path) -> None:
     result = command("show", finished, "--json")
     data = json.loads(result.stdout)
     found = open_results(finished)
@@ -45,7 +43,7 @@ def test_that_show_as_json_holds_the_scenario_and_the_software(
     assert len(data["record_passes"]) == len(found.record_passes)
 
 
-def test_that_show_names_the_input_files(command: Command) -> None:
+def test_show_names_the_input_files(command: Command) -> None:
     command(
         "run", SCENARIOS / "rig-logged-load.toml", "-q", "-o", "x.h5",
         "--set", "operation.duration=2 min",
@@ -54,7 +52,7 @@ def test_that_show_names_the_input_files(command: Command) -> None:
 
 
 @pytest.mark.parametrize("verb", ["show", "plot", "resume", "export"])
-def test_that_a_foreign_file_is_bad_input(command: Command, tmp_path: Path, verb: str) -> None:
+def test_foreign_file_is_bad_input(command: Command, tmp_path: Path, verb: str) -> None:
     foreign = tmp_path / "foreign.h5"
     foreign.write_text("not HDF5")
     result = command(verb, foreign, *(["-o", "out"] if verb == "export" else []))
@@ -63,9 +61,7 @@ def test_that_a_foreign_file_is_bad_input(command: Command, tmp_path: Path, verb
     assert result.stdout == ""
 
 
-def test_that_plot_names_its_figure_after_the_file_and_leaves_an_existing_one(
-    command: Command, finished: Path
-) -> None:
+def test_plot_names_its_figure_after_the_file(command: Command, finished: Path) -> None:
     assert command("plot", finished).exit_code == 0
     figure = Path("short.png")
     assert figure.read_bytes().startswith(b"\x89PNG")
@@ -76,16 +72,14 @@ def test_that_plot_names_its_figure_after_the_file_and_leaves_an_existing_one(
     assert figure.read_bytes().startswith(b"\x89PNG")
 
 
-def test_that_plot_puts_measurements_on_top(command: Command, finished: Path) -> None:
+def test_plot_draws_measurements(command: Command, finished: Path) -> None:
     Path("probe.csv").write_text("y [mm], depth [um]\n-1, 0.1\n0, 0.5\n1, 0.1\n")
     result = command("plot", finished, "-o", "x.svg", "--measured", "probe.csv")
     assert result.exit_code == 0
     assert "measured: probe" in Path("x.svg").read_text()
 
 
-def test_that_a_bad_measurement_is_bad_input_and_draws_nothing(
-    command: Command, finished: Path
-) -> None:
+def test_bad_measurement_is_bad_input_and_draws_nothing(command: Command, finished: Path) -> None:
     Path("probe.csv").write_text("y [mm], depth\n-1, 0.1\n0, 0.5\n")
     result = command("plot", finished, "--measured", "probe.csv")
     assert result.exit_code == 2
@@ -93,7 +87,7 @@ def test_that_a_bad_measurement_is_bad_input_and_draws_nothing(
     assert not Path("short.png").exists()
 
 
-def test_that_export_writes_csv_with_units(command: Command, finished: Path) -> None:
+def test_export_writes_csv_with_units(command: Command, finished: Path) -> None:
     result = command("export", finished, "-o", "out")
     assert result.exit_code == 0
     written = [Path(line) for line in result.stdout.splitlines()]

@@ -1,4 +1,4 @@
-"""The verbs that run a test: run and resume."""
+"""The verbs run and resume."""
 
 import json
 import signal
@@ -11,10 +11,10 @@ from cli_examples import SCENARIOS, Command
 from tests.interruptible import interruptible
 from wearsim.errors import Interrupted
 from wearsim.results import open_results
-from wearsim.studies.run import run as replay
+from wearsim.studies.run import run as study
 
 
-def test_that_run_writes_a_file_named_after_the_scenario(command: Command, scenario: Path) -> None:
+def test_results_file_is_named_after_the_scenario(command: Command, scenario: Path) -> None:
     result = command("run", scenario)
     assert result.exit_code == 0
     found = open_results("short.h5")
@@ -25,7 +25,7 @@ def test_that_run_writes_a_file_named_after_the_scenario(command: Command, scena
     assert "short.h5" in result.stdout
 
 
-def test_that_progress_goes_to_stderr_in_plain_lines(command: Command, scenario: Path) -> None:
+def test_progress_goes_to_stderr_in_plain_lines(command: Command, scenario: Path) -> None:
     lines = command("run", scenario).stderr.splitlines()
     assert lines[0] == "running 6,000 passes, 2.000 min, with slender, implicit"
     assert lines[1].startswith("pass ")
@@ -34,13 +34,13 @@ def test_that_progress_goes_to_stderr_in_plain_lines(command: Command, scenario:
     assert len(lines) < 20
 
 
-def test_that_quiet_shows_no_progress(command: Command, scenario: Path) -> None:
+def test_quiet_shows_no_progress(command: Command, scenario: Path) -> None:
     result = command("run", scenario, "--quiet")
     assert result.stderr == ""
     assert "depth" in result.stdout
 
 
-def test_that_json_is_the_end_state_and_all_of_stdout(command: Command, scenario: Path) -> None:
+def test_json_is_the_end_state_and_all_of_stdout(command: Command, scenario: Path) -> None:
     data = json.loads(command("run", scenario, "--json", "-o", "x.h5").stdout)
     found = open_results("x.h5")
     assert data["depth_m"] == found.depth[-1]
@@ -49,7 +49,7 @@ def test_that_json_is_the_end_state_and_all_of_stdout(command: Command, scenario
     assert data["warnings"] == []
 
 
-def test_that_a_file_is_overwritten_only_by_force(command: Command, scenario: Path) -> None:
+def test_file_is_overwritten_only_with_force(command: Command, scenario: Path) -> None:
     Path("short.h5").write_text("mine")
     refused = command("run", scenario)
     assert (refused.exit_code, Path("short.h5").read_text()) == (2, "mine")
@@ -57,22 +57,20 @@ def test_that_a_file_is_overwritten_only_by_force(command: Command, scenario: Pa
     assert open_results("short.h5").finished
 
 
-def test_that_settings_reach_the_stored_scenario(command: Command, scenario: Path) -> None:
+def test_settings_reach_the_stored_scenario(command: Command, scenario: Path) -> None:
     command("run", scenario, "-q", "--set", "load.normal_force=150 N")
     found = open_results("short.h5")
     assert found.normal_force[-1] == pytest.approx(150.0)
     assert '"150 N"' in found.raw.scenario_text
 
 
-def test_that_a_single_contact_cannot_be_run(command: Command) -> None:
+def test_scenario_of_one_contact_cannot_be_run(command: Command) -> None:
     result = command("run", SCENARIOS / "mean-contact.toml")
     assert result.exit_code == 2
     assert "[operation] duration or passes: is needed for a run" in result.stderr
 
 
-def test_that_a_run_that_fails_ends_with_1_and_keeps_its_file(
-    command: Command, scenario: Path
-) -> None:
+def test_failed_run_ends_with_1_and_keeps_its_file(command: Command, scenario: Path) -> None:
     result = command("run", scenario, "-q", "--set", "evolution.max_steps=2")
     assert result.exit_code == 1
     assert result.stderr.startswith("error: 2 steps have reached pass")
@@ -80,20 +78,20 @@ def test_that_a_run_that_fails_ends_with_1_and_keeps_its_file(
     assert not open_results("short.h5").finished
 
 
-def test_that_an_interrupted_run_ends_with_130(
+def test_interrupted_run_ends_with_130(
     command: Command, scenario: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def stopped(*_: object, **__: object) -> None:
         raise Interrupted("stopped at pass 5; go on with: wearsim resume short.h5")
 
-    monkeypatch.setattr(replay, "run", stopped)
+    monkeypatch.setattr(study, "run", stopped)
     result = command("run", scenario)
     assert result.exit_code == 130
     assert result.stderr == "stopped at pass 5; go on with: wearsim resume short.h5\n"
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_that_a_signal_stops_a_run_at_a_checkpoint_that_resume_finishes(
+def test_signal_stops_a_run_that_resume_finishes(
     command: Command, scenario: Path, tmp_path: Path, number: signal.Signals
 ) -> None:
     per_pass = ["--set", "evolution.stepper=per-pass", "--set", "operation.duration=600 min"]
@@ -104,10 +102,10 @@ def test_that_a_signal_stops_a_run_at_a_checkpoint_that_resume_finishes(
             if line.startswith("pass "):
                 break
         running.send_signal(number)
-        said = running.stderr.read()
+        message = running.stderr.read()
     assert running.returncode == 130
-    assert "stopping at a checkpoint" in said
-    assert "wearsim resume short.h5" in said
+    assert "stopping at a checkpoint" in message
+    assert "wearsim resume short.h5" in message
     stopped = open_results("short.h5")
     assert 0 < stopped.passes[-1] < stopped.raw.total_passes
     minutes = stopped.time[-1] / 60.0 + 1.0
@@ -116,50 +114,50 @@ def test_that_a_signal_stops_a_run_at_a_checkpoint_that_resume_finishes(
     assert json.loads(resumed.stdout)["finished"]
 
 
-def test_that_a_second_signal_ends_a_run_at_once(tmp_path: Path) -> None:
+def test_second_signal_ends_a_run_at_once(tmp_path: Path) -> None:
     code = (
         "import os, signal, time\nfrom wearsim.cli.signals import stop_on_signals\n"
         "with stop_on_signals() as stop:\n"
         "    os.kill(os.getpid(), signal.SIGINT)\n"
-        "    assert stop.requested()\n    print('asked', flush=True)\n    time.sleep(60)\n"
+        "    assert stop.requested()\n    print('requested', flush=True)\n    time.sleep(60)\n"
     )
     arguments = interruptible("-c", code)
     quiet = {"stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
     with subprocess.Popen(arguments, **quiet) as running:
         assert running.stdout is not None
-        assert running.stdout.readline() == b"asked\n"
+        assert running.stdout.readline() == b"requested\n"
         running.send_signal(signal.SIGINT)
         assert running.wait() == -signal.SIGINT
 
 
-def test_that_signals_are_given_back_after_a_run(command: Command, scenario: Path) -> None:
+def test_signal_handlers_are_restored_after_a_run(command: Command, scenario: Path) -> None:
     before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
     command("run", scenario, "-q")
     assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
 
 
-def test_that_resume_extends_a_finished_test(command: Command, finished: Path) -> None:
+def test_resume_extends_a_finished_run(command: Command, finished: Path) -> None:
     result = command("resume", finished, "--until", "3 min", "--json")
     assert result.exit_code == 0
     data = json.loads(result.stdout)
     assert data["passes"] == 9000
-    assert result.stderr.startswith("going on from pass 6,000 of 9,000")
+    assert result.stderr.startswith("continuing from pass 6,000 of 9,000")
 
 
 @pytest.mark.parametrize("until", ["3", "3 mm", "-3 min"])
-def test_that_until_must_be_a_time(command: Command, finished: Path, until: str) -> None:
+def test_until_must_be_a_time(command: Command, finished: Path, until: str) -> None:
     result = command("resume", finished, f"--until={until}")
     assert result.exit_code == 2
     assert "--until" in result.stderr
 
 
-def test_that_resume_refuses_to_go_back(command: Command, finished: Path) -> None:
+def test_resume_refuses_an_earlier_end(command: Command, finished: Path) -> None:
     result = command("resume", finished, "--until", "1 min")
     assert result.exit_code == 2
     assert "past 1 min" in result.stderr
 
 
-def test_that_force_replaces_not_the_scenario(command: Command, scenario: Path) -> None:
+def test_force_does_not_replace_the_scenario(command: Command, scenario: Path) -> None:
     before = scenario.read_bytes()
     result = command("run", scenario, "--force", "-o", scenario)
     assert result.exit_code == 2
@@ -167,9 +165,7 @@ def test_that_force_replaces_not_the_scenario(command: Command, scenario: Path) 
     assert scenario.read_bytes() == before
 
 
-def test_that_run_and_show_tell_what_is_drawn_and_what_stays_random(
-    command: Command, scenario: Path
-) -> None:
+def test_run_and_show_print_draws_and_random_inputs(command: Command, scenario: Path) -> None:
     changes = (
         'wear.cylinder.k_over_h={distribution="constant", value="2e-11 1/Pa"}',
         'creepage.yaw={distribution="uniform", low="1 mrad", high="2 mrad"}',
@@ -179,12 +175,12 @@ def test_that_run_and_show_tell_what_is_drawn_and_what_stays_random(
         ),
     )
     settings = [word for text in changes for word in ("--set", text)]
-    told = command("run", scenario, "-q", *settings)
-    assert told.exit_code == 0, told.output
+    done = command("run", scenario, "-q", *settings)
+    assert done.exit_code == 0, done.output
     found = open_results("short.h5")
     yaw = found.drawn["creepage.yaw"]
     assert found.drawn["wear.cylinder.k_over_h"] == (2e-11,)
-    for result in (told, command("show", "short.h5")):
+    for result in (done, command("show", "short.h5")):
         flat = " ".join(result.stdout.split())
         assert f"drawn creepage.yaw {yaw[0] * 1e3:.6g} mrad" in flat
         assert "drawn wear.cylinder.k_over_h 2e-11 1/Pa" in flat

@@ -77,7 +77,7 @@ def test_wrong_usage_is_bad_input(command: Command, arguments: list[str]) -> Non
 
 
 @pytest.mark.parametrize(
-    ("error", "code", "words"),
+    ("error", "code", "message"),
     [
         (PluginError("two plugins"), 2, "error: two plugins\n"),
         (CapabilityError("cannot"), 2, "error: cannot\n"),
@@ -97,7 +97,7 @@ def test_errors_print_one_line_and_set_the_exit_code(
     monkeypatch: pytest.MonkeyPatch,
     error: BaseException,
     code: int,
-    words: str,
+    message: str,
 ) -> None:
     def fail(*_: object) -> None:
         raise error
@@ -105,7 +105,7 @@ def test_errors_print_one_line_and_set_the_exit_code(
     monkeypatch.setattr(wearsim.cli.commands.check, "read_scenario", fail)
     result = command("check", "a.toml")
     assert result.exit_code == code
-    assert result.stderr.startswith(words)
+    assert result.stderr.startswith(message)
     assert "Traceback" not in result.stderr
     assert result.stdout == ""
 

@@ -1,4 +1,4 @@
-"""Ensembles made up in closed form, in no time: depth = a product of powers of what is drawn."""
+"""Synthetic ensembles in closed form: depth as a product of powers of the random inputs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ DEPTH = 20e-6  # of the mean inputs [m]
 INPUTS = {
     "load.normal_force": ("N", 300.0, 30.0),
     "friction.coefficient": ("1", 0.1, 0.02),
-    "roller.offset": ("m", 0.0, 1e-4),  # which has no effect
+    "roller.offset": ("m", 0.0, 1e-4),  # without effect
 }
 ROLLERS = 3
 
@@ -29,7 +29,7 @@ def made_up(
     kept=None,
     seed=1,
 ):
-    """Return an ensemble of which some realisations failed, and the last ones are pending."""
+    """Return an ensemble in which some realisations failed and the last ones are pending."""
     draws = np.random.default_rng(seed)
     drawn = {
         key: mean + spread * std * draws.standard_normal((count, ROLLERS) if unit == "m" else count)

@@ -1,4 +1,4 @@
-"""The figure of a comparison, and how estimates are told with their intervals."""
+"""The figure of a comparison, and estimates with intervals as text."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from tests.report.made_up_ensembles import made_up
 from tests.studies.study_examples import short
 from wearsim.report.figures.ensemble_comparison import MOST_POINTS, comparison_figure
 from wearsim.report.parts.saving import save_figure
-from wearsim.report.text.intervals import cells, part_with_interval, with_interval
+from wearsim.report.text.estimates import cells, part_with_interval, with_interval
 from wearsim.studies.ensemble.compare import compare
-from wearsim.studies.run import run as replay
+from wearsim.studies.run import run as study
 from wearsim.uq.estimation.intervals import UNKNOWN, Interval
 
 
 @pytest.fixture(scope="module")
 def comparison():
-    run = replay.run(short())
+    run = study.run(short())
     results = [made_up(300, scale=0.1), made_up(300, scale=0.12), run]
     return compare(results, ["light", "heavy", "one"])
 
@@ -28,7 +28,7 @@ def curves(axes):
     return {line.get_label().split(" (")[0]: line for line in axes.get_lines()}
 
 
-def test_that_ensembles_are_distribution_functions_and_a_run_a_line(comparison):
+def test_ensembles_are_distribution_functions_and_runs_lines(comparison):
     axes = comparison_figure(comparison, "loads").axes[0]
     drawn = curves(axes)
     light, _, run = comparison.rows
@@ -41,7 +41,7 @@ def test_that_ensembles_are_distribution_functions_and_a_run_a_line(comparison):
     assert error.get_width() == pytest.approx((run.value.high - run.value.low) * 1e6)
 
 
-def test_that_ranges_are_drawn_with_means_and_intervals(comparison):
+def test_ranges_are_drawn_with_means_and_intervals(comparison):
     axes = comparison_figure(comparison).axes[1]
     light = comparison.rows[0]
     lines = [line.get_xdata() for line in axes.get_lines() if (line.get_ydata() == 0).all()]
@@ -60,24 +60,24 @@ def test_that_ranges_are_drawn_with_means_and_intervals(comparison):
     assert labels[1][2] == f"in {share} of pairs of tests"
 
 
-def test_that_few_realisations_have_no_range_and_say_how_many_failed():
+def test_few_realisations_have_no_range():
     rows = [made_up(12, failed=[1, 2]), made_up(12)]
     left, right = comparison_figure(compare(rows, ["few", "more"])).axes
     assert "few (10 of 12, 2 failed)" in [line.get_label() for line in left.get_lines()]
-    assert "5 to 95 %" not in right.get_title(loc="left")
+    assert "5 % to 95 %" not in right.get_title(loc="left")
 
 
-def test_that_of_runs_it_is_drawn_which_is_deeper(comparison):
+def test_runs_are_drawn_with_their_difference(comparison):
     one = comparison.rows[2]
-    other = replay.run(short())
+    other = study.run(short())
     axes = comparison_figure(compare([other, other], ["a", "b"])).axes[1]
-    assert axes.get_title(loc="left") == "Value with its stated error"
-    (_, told) = axes.get_yticklabels()[1].get_text().split("\n", 1)
-    assert told.startswith("the same (stated errors")
-    assert one.apart is None  # of a run against an ensemble
+    assert axes.get_title(loc="left") == "Value and estimated error"
+    (_, text) = axes.get_yticklabels()[1].get_text().split("\n", 1)
+    assert text.startswith("equal (estimated errors")
+    assert one.difference is None  # for a run against an ensemble
 
 
-def test_that_many_realisations_are_drawn_at_fewer_points_of_one_function():
+def test_distribution_functions_have_a_limited_number_of_points():
     results = [made_up(3 * MOST_POINTS), made_up(3 * MOST_POINTS, scale=1.1)]
     found = compare(results, ["a", "b"], "width")
     axes = comparison_figure(found).axes[0]
@@ -88,7 +88,7 @@ def test_that_many_realisations_are_drawn_at_fewer_points_of_one_function():
 
 
 @pytest.mark.parametrize("number", [2, 9])
-def test_that_any_comparison_can_be_drawn(tmp_path, number):
+def test_any_comparison_can_be_drawn(tmp_path, number):
     results = [made_up(1), made_up(20, spread=0.0), *(made_up(30, seed=k) for k in range(number))]
     found = compare(results, [f"{k}" for k in range(len(results))])
     save_figure(comparison_figure(found), tmp_path / "a.png")
@@ -109,17 +109,17 @@ def test_that_any_comparison_can_be_drawn(tmp_path, number):
         (UNKNOWN, "N", "- too few"),
     ],
 )
-def test_that_an_estimate_has_the_digits_that_its_interval_gives_sense_to(found, unit, text):
+def test_digits_of_an_estimate_follow_its_interval(found, unit, text):
     assert with_interval(found, unit) == text
 
 
-def test_that_a_column_has_no_units():
+def test_table_cells_have_no_units():
     assert cells(Interval(21.4873e-6, 21.0e-6, 21.98e-6), "um") == ("21.49", "21.00..21.98")
     assert cells(Interval(3.0, 3.0, 3.0), "N") == ("3.000", "")
     assert cells(UNKNOWN, "N") == ("-", "too few")
 
 
-def test_that_parts_are_told_in_per_cent():
+def test_fractions_are_shown_in_per_cent():
     assert part_with_interval(Interval(0.571, 0.54, 0.6023)) == "57.1 % [54.0, 60.2]"
     assert part_with_interval(Interval(1.0, 1.0, 1.0)) == "100.0 %"
     assert part_with_interval(UNKNOWN) == "-"

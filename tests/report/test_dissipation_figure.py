@@ -1,4 +1,4 @@
-"""The figure of a dissipation study: that it holds what was computed."""
+"""The figure of a dissipation study: drawn data against the results."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ def panel(figure: Figure, title: str):
 
 @pytest.mark.parametrize(
     ("title", "value", "error"),
-    [("Mean power", "mean", "mean_error"), ("Standard deviation", "std", "std_error")],
+    [("Mean dissipated power", "mean", "mean_error"), ("Standard deviation", "std", "std_error")],
 )
-def test_that_estimates_are_drawn_with_their_error(result, title, value, error):
+def test_estimates_are_drawn_with_their_error(result, title, value, error):
     axes, found = panel(dissipation_figure(result), title), result.convergence()
     assert axes.get_lines()[0].get_xdata().tolist() == found.count.tolist()
     np.testing.assert_array_equal(axes.get_lines()[0].get_ydata(), getattr(found, value))
@@ -45,7 +45,7 @@ def test_that_estimates_are_drawn_with_their_error(result, title, value, error):
     assert axes.get_ylabel().endswith("[W]")
 
 
-def test_that_the_density_has_unit_area_and_a_normal_law_beside_it(result):
+def test_density_has_unit_area_and_a_normal_distribution(result):
     axes = panel(dissipation_figure(result), "Density")
     bars = axes.patches
     assert len(bars) == CLASSES
@@ -56,31 +56,33 @@ def test_that_the_density_has_unit_area_and_a_normal_law_beside_it(result):
     assert x[y.argmax()] == pytest.approx(power.mean, rel=0.01)
 
 
-def test_that_realisations_are_drawn_in_engineers_units(result):
-    axes = panel(dissipation_figure(result), f"Power per axial length, {MOST_LINES}")
+def test_realisations_are_drawn_in_engineering_units(result):
+    axes = panel(dissipation_figure(result), f"Dissipated power per length, {MOST_LINES}")
     assert len(axes.get_lines()) == MOST_LINES
     x, y = axes.get_lines()[7].get_data()
     np.testing.assert_allclose(x, result.y * 1e3)
     np.testing.assert_allclose(y, result.dissipation[7] * 1e-3)
 
 
-def test_that_the_band_is_that_of_the_file(result):
-    axes = panel(dissipation_figure(result), "Its mean")
-    mean, alone = axes.get_lines()
+def test_band_is_that_of_the_file(result):
+    axes = panel(dissipation_figure(result), "Mean and")
+    mean, at_means = axes.get_lines()
     np.testing.assert_allclose(mean.get_ydata(), result.values("dissipation_mean") * 1e-3)
-    np.testing.assert_allclose(alone.get_ydata(), result.values("mean_problem_dissipation") * 1e-3)
+    np.testing.assert_allclose(
+        at_means.get_ydata(), result.values("mean_problem_dissipation") * 1e-3
+    )
     heights = axes.collections[0].get_paths()[0].vertices[:, 1]
     assert heights.max() == pytest.approx(result.values("dissipation_high").max() * 1e-3)
 
 
 @pytest.mark.parametrize("count", [1, 2])
-def test_that_few_realisations_have_a_figure_too(tmp_path, count):
+def test_few_realisations_can_be_drawn(tmp_path, count):
     save_figure(dissipation_figure(study(count)), tmp_path / "a.png")
     assert (tmp_path / "a.png").stat().st_size > 10_000
 
 
 def steady(count: int) -> DissipationResult:
-    """Return a study whose realisations are all the same."""
+    """Return a study with equal realisations."""
     mean = {"distribution": "constant", "value": "300 N"}
     changes = {"load.normal_force": mean, "friction.coefficient": 0.1, "contact.mx": 8}
     zero = {"distribution": "disc", "radius": "1e-12 mrad"}
@@ -88,7 +90,7 @@ def steady(count: int) -> DissipationResult:
     return dissipation(load_scenario(PAPER, changes), count)
 
 
-def test_that_no_power_below_zero_is_drawn(result):
+def test_density_is_drawn_above_zero_only(result):
     wide = replace(
         result.raw, variables={**result.raw.variables, "power": result.power - result.power.min()}
     )
@@ -97,7 +99,7 @@ def test_that_no_power_below_zero_is_drawn(result):
     assert axes.get_xlim()[0] == 0.0
 
 
-def test_that_a_constant_power_has_no_density_and_one_curve():
+def test_constant_power_has_no_density_and_one_curve():
     found = steady(300)
     assert found.summaries["power"].is_constant
     figure = dissipation_figure(found)
@@ -105,9 +107,9 @@ def test_that_a_constant_power_has_no_density_and_one_curve():
     assert not density.patches
     assert not density.get_lines()
     assert f"{found.power[0]:.4g}" in density.texts[0].get_text()
-    curves = panel(figure, "Power per axial length, the same in all")
+    curves = panel(figure, "Dissipated power per length, equal in all")
     assert len(curves.get_lines()) == 1
-    low, high = panel(figure, "Mean power").get_ylim()
+    low, high = panel(figure, "Mean dissipated power").get_ylim()
     assert low < 0.0 < found.power[0] < high
     assert high == pytest.approx(2 * found.power[0])
     assert panel(figure, "Standard deviation").get_lines()[0].get_ydata().max() == 0.0

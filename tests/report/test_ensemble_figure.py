@@ -1,4 +1,4 @@
-"""The figure of an ensemble: that it holds what was computed, whatever there is of it."""
+"""The figure of an ensemble: drawn data against the results."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ import pytest
 from matplotlib.colors import to_hex
 
 from tests.report.made_up_ensembles import INPUTS, made_up
-from wearsim.report.figures.ensemble import FEW, ensemble_figure
-from wearsim.report.parts.convergence import settling
+from wearsim.report.figures.ensemble import FEW, convergence_of, ensemble_figure
 from wearsim.report.parts.saving import save_figure
 from wearsim.report.parts.style import GREY
 from wearsim.results import EnsembleResult
@@ -38,8 +37,8 @@ def labelled(axes, label):
     return line
 
 
-def test_that_the_course_holds_median_mean_band_and_a_few_realisations(figure, result):
-    axes, course = panel(figure, "Depth of the groove"), result.course("depth")
+def test_course_has_median_mean_band_and_realisations(figure, result):
+    axes, course = panel(figure, "Depth against"), result.course("depth")
     for label, values in (("median", course.quantiles[0.5]), ("mean", course.mean)):
         np.testing.assert_allclose(labelled(axes, label).get_ydata(), values * 1e6)
         np.testing.assert_allclose(labelled(axes, label).get_xdata(), course.passes / 1e6)
@@ -51,16 +50,16 @@ def test_that_the_course_holds_median_mean_band_and_a_few_realisations(figure, r
     assert heights.max() == pytest.approx(course.quantiles[0.95].max() * 1e6)
 
 
-def test_that_records_over_decades_have_logarithmic_axes(result):
+def test_records_over_decades_have_logarithmic_axes(result):
     passes = np.array([0.0, 10.0, 1e3, 1e4, 1e5, 1e6])
     raw = replace(result.raw, variables={**result.raw.variables, "record_passes": passes})
-    axes = panel(ensemble_figure(EnsembleResult(raw)), "Depth of the groove")
+    axes = panel(ensemble_figure(EnsembleResult(raw)), "Depth against")
     assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
     assert labelled(axes, "median").get_xdata()[0] == 10.0
 
 
-def test_that_the_density_has_unit_area_and_marks_what_was_estimated(figure, result):
-    axes = panel(figure, "Final depth")
+def test_density_has_unit_area_and_marks_the_estimates(figure, result):
+    axes = panel(figure, "Depth at the end")
     area = sum(bar.get_width() * bar.get_height() for bar in axes.patches)
     assert area == pytest.approx(1.0)
     found = result.estimate("depth", -1, (0.05, 0.5, 0.95))
@@ -69,7 +68,7 @@ def test_that_the_density_has_unit_area_and_marks_what_was_estimated(figure, res
     np.testing.assert_allclose(marks, [item.value * 1e6 for item in wanted])
 
 
-def test_that_the_estimate_settles_at_that_of_all(figure, result):
+def test_convergence_ends_at_the_estimate_of_all(figure, result):
     axes, found = panel(figure, "Mean of depth"), result.estimate("depth").mean
     counts, values = axes.get_lines()[0].get_data()
     assert (counts[0], counts[-1]) == (1, 400)
@@ -80,9 +79,9 @@ def test_that_the_estimate_settles_at_that_of_all(figure, result):
 
 
 @pytest.mark.parametrize("plan", ["monte-carlo", "sobol", "saltelli", "control-variate"])
-def test_that_what_settles_is_what_fewer_realisations_would_have_told(plan):
+def test_convergence_equals_estimates_of_fewer_realisations(plan):
     whole, target = made_up(100, plan, failed=[5]), Target.parse("depth.mean 1%")
-    counts, found = settling(whole, target)
+    counts, found = convergence_of(whole, target)
     place = int(np.flatnonzero(counts >= 40)[0])
     last = int(whole.numbers[counts[place] - 1])
     status = np.where(np.arange(100) <= last, whole.raw.status, 0)
@@ -91,7 +90,7 @@ def test_that_what_settles_is_what_fewer_realisations_would_have_told(plan):
     assert found[place] == target.interval(part.estimate_for(target))
 
 
-def test_that_a_target_is_drawn_for_what_it_is_about():
+def test_target_is_drawn_for_its_statistic():
     figure = ensemble_figure(made_up(50, until="width.q95 2%"))
     axes = panel(figure, "95 % quantile of width")
     assert axes.get_ylabel() == "width [mm]"
@@ -100,7 +99,7 @@ def test_that_a_target_is_drawn_for_what_it_is_about():
     assert ends == pytest.approx([0.98 * last, 1.02 * last])
 
 
-def test_that_the_profile_lies_downwards_with_its_band(figure, result):
+def test_profile_is_drawn_downwards_with_its_band(figure, result):
     axes, band = panel(figure, "Worn profile"), result.band()
     line = labelled(axes, "mean")
     np.testing.assert_allclose(line.get_xdata(), band.y * 1e3)
@@ -109,25 +108,25 @@ def test_that_the_profile_lies_downwards_with_its_band(figure, result):
     assert heights.min() == pytest.approx(-band.high.max() * 1e6)
 
 
-def test_that_a_profile_of_some_says_of_how_many():
+def test_profile_of_some_realisations_has_their_number():
     axes = panel(ensemble_figure(made_up(60, kept=20)), "Worn profile")
     assert axes.get_title(loc="left").endswith("of the first 20")
 
 
-def test_that_effects_are_bars_and_those_without_one_are_grey(figure, result):
-    axes, effects = panel(figure, "What moves"), result.sensitivity("depth")
+def test_effects_are_bars_and_insignificant_ones_are_grey(figure, result):
+    axes, effects = panel(figure, "Sobol indices"), result.sensitivity("depth")
     assert {item.name for item in effects} == set(INPUTS)
     assert [item.name for item in effects if item.without_effect] == ["roller.offset"]
     assert len(axes.patches) == len(effects)
     for bar, label, item in zip(axes.patches, axes.get_yticklabels(), effects, strict=True):
         assert bar.get_width() == pytest.approx(100.0 * item.first.value)
         assert (to_hex(bar.get_facecolor()) == GREY) == item.without_effect
-        assert (label.get_text() == f"{item.name} (none seen)") == item.without_effect
+        assert (label.get_text() == f"{item.name} (not significant)") == item.without_effect
 
 
-def test_that_total_indices_are_drawn_where_the_plan_tells_them():
+def test_total_indices_are_drawn_for_saltelli():
     result = made_up(5 * 80, "saltelli")
-    axes = panel(ensemble_figure(result), "What moves")
+    axes = panel(ensemble_figure(result), "Sobol indices")
     drawn = [line for line in axes.get_lines() if line.get_marker() == "D"]
     marks = [line.get_xdata()[0] for line in drawn if len(line.get_xdata())]
     totals = [100.0 * item.total.value for item in result.sensitivity("depth")]
@@ -135,49 +134,49 @@ def test_that_total_indices_are_drawn_where_the_plan_tells_them():
 
 
 @pytest.mark.parametrize(
-    ("example", "told"),
+    ("example", "caption"),
     [
         ({"count": 1}, "1 realisation, monte-carlo"),
         ({"count": 2}, "2 realisations, monte-carlo"),
         ({"count": 5, "failed": [0, 4]}, "3 realisations (2 failed)"),
         ({"count": 30, "pending": 10}, "20 realisations of 30, monte-carlo"),
-        ({"count": 20, "spread": 0.0}, "the same in all"),
+        ({"count": 20, "spread": 0.0}, "equal in all realisations"),
         ({"count": 3, "failed": [0, 1, 2]}, "0 realisations (3 failed)"),
         ({"count": 4, "pending": 4}, "0 realisations of 4"),
     ],
 )
-def test_that_any_ensemble_has_a_figure(tmp_path, example, told):
+def test_any_ensemble_can_be_drawn(tmp_path, example, caption):
     figure = ensemble_figure(made_up(**example))
-    assert told in figure.get_suptitle()
+    assert caption in figure.get_suptitle()
     save_figure(figure, tmp_path / "a.png")
     assert (tmp_path / "a.png").stat().st_size > 10_000
 
 
-def test_that_one_value_has_no_density_and_nothing_that_moves_it():
+def test_constant_depth_has_no_density_and_no_effects():
     figure = ensemble_figure(made_up(20, spread=0.0))
-    (text,) = panel(figure, "Final depth").texts
+    (text,) = panel(figure, "Depth at the end").texts
     assert re.fullmatch(r"20\.00 um in all 20: no density to draw", text.get_text())
-    assert "the same in all" in panel(figure, "What moves").texts[0].get_text()
-    settled = panel(figure, "Mean of depth")
-    low, high = settled.get_ylim()
+    assert "equal in all realisations" in panel(figure, "Sobol indices").texts[0].get_text()
+    convergence = panel(figure, "Mean of depth")
+    low, high = convergence.get_ylim()
     assert low < 0.0
     assert high == pytest.approx(40.0)
 
 
 @pytest.mark.parametrize("number", [2, 19, 20, 71, 72])
-def test_that_figure_and_table_know_the_same_of_bands(number):
+def test_ranges_of_figure_and_table_agree(number):
     result = made_up(number)
     figure = ensemble_figure(result)
     ends = [result.estimate("depth", -1, (p,)).quantile(p) for p in (0.05, 0.95)]
     is_known = all(np.isfinite(end.half_width) for end in ends)
-    assert ("90 % within" in figure.get_suptitle()) == is_known
-    course = panel(figure, "Depth of the groove")
+    assert ("90 % range" in figure.get_suptitle()) == is_known
+    course = panel(figure, "Depth against")
     assert bool(course.collections) == (number >= 20)  # one realisation beyond each end
-    marked = [line.get_label() for line in panel(figure, "Final depth").get_lines()]
-    assert ("5 and 95 %" in marked) == (number >= 20)
+    marked = [line.get_label() for line in panel(figure, "Depth at the end").get_lines()]
+    assert ("5 % and 95 %" in marked) == (number >= 20)
 
 
-def test_that_the_profile_of_a_few_has_the_outermost_of_them():
+def test_profile_of_few_realisations_has_their_extremes():
     result = made_up(5)
     axes = panel(ensemble_figure(result), "Worn profile")
     heights = axes.collections[0].get_paths()[0].vertices[:, 1]

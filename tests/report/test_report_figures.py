@@ -1,4 +1,4 @@
-"""The figures: that they hold what was computed; how they look is for eyes."""
+"""The figures of runs and contacts: drawn data against the results."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +15,7 @@ from wearsim.report.parts.saving import save_figure
 from wearsim.results import Result
 from wearsim.scenario import load_scenario
 from wearsim.studies.contact.single import ContactStudy, study_contact
-from wearsim.studies.run import run as replay
+from wearsim.studies.run import run as study_run
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 SHORT = {"operation.duration": "3 min", "outputs.records": 4}
@@ -24,7 +24,7 @@ SHORT = {"operation.duration": "3 min", "outputs.records": 4}
 @pytest.fixture(scope="module")
 def result() -> Result:
     overrides = {**SHORT, "wear.roller.k_over_h": "1e-11 1/Pa"}
-    return replay.run(load_scenario(SCENARIOS / "rig-450min.toml", overrides))
+    return study_run.run(load_scenario(SCENARIOS / "rig-450min.toml", overrides))
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +37,7 @@ def panel(figure: Figure, title: str) -> object:
     return axes
 
 
-def test_that_profiles_are_drawn_downwards_in_mm_and_um(result: Result) -> None:
+def test_profiles_are_drawn_downwards_in_mm_and_um(result: Result) -> None:
     axes = panel(run_figure(result), "Worn profile")
     lines = axes.get_lines()  # type: ignore[attr-defined]
     assert len(lines) == 5 + 1  # the records, and the roller
@@ -47,13 +47,13 @@ def test_that_profiles_are_drawn_downwards_in_mm_and_um(result: Result) -> None:
     assert lines[5].get_linestyle() == "--"
 
 
-def test_that_unworn_rollers_are_not_drawn() -> None:
-    fresh = replay.run(load_scenario(SCENARIOS / "rig-450min.toml", SHORT))
+def test_unworn_rollers_are_not_drawn() -> None:
+    fresh = study_run.run(load_scenario(SCENARIOS / "rig-450min.toml", SHORT))
     axes = panel(run_figure(fresh), "Worn profile")
     assert len(axes.get_lines()) == 5  # type: ignore[attr-defined]
 
 
-def test_that_measurements_lie_on_top_and_within_the_panel(result: Result) -> None:
+def test_measurements_are_drawn_last_and_within_the_panel(result: Result) -> None:
     probe = Measured("probe", np.array([-9e-3, 9e-3]), np.array([-1e-6, 1e-6]))
     axes = panel(run_figure(result, [probe]), "Worn profile")
     last = axes.get_lines()[-1]  # type: ignore[attr-defined]
@@ -64,36 +64,34 @@ def test_that_measurements_lie_on_top_and_within_the_panel(result: Result) -> No
     assert right >= 9.0
 
 
-def test_that_depth_is_drawn_for_every_worn_step(result: Result) -> None:
+def test_depth_is_drawn_for_every_worn_step(result: Result) -> None:
     axes = panel(run_figure(result), "Depth")
     drawn = axes.get_lines()[-1].get_ydata()  # type: ignore[attr-defined]
     assert drawn[-1] == pytest.approx(result.depth[-1] * 1e6)
 
 
-def test_that_rollers_of_their_own_have_dissipation_of_their_own() -> None:
-    three = replay.run(load_scenario(SCENARIOS / "rig-three-rollers.toml", SHORT))
+def test_different_rollers_have_separate_curves_of_dissipation() -> None:
+    three = study_run.run(load_scenario(SCENARIOS / "rig-three-rollers.toml", SHORT))
     axes = panel(run_figure(three), "Dissipated")
     names = axes.get_legend_handles_labels()[1]  # type: ignore[attr-defined]
     assert names == ["roller 1", "roller 2", "roller 3"]
     assert len(axes.get_lines()) == 5 * 3 + 3  # type: ignore[attr-defined]
 
 
-def test_that_a_logged_load_is_drawn_beside_that_at_the_steps(
+def test_logged_load_is_drawn_with_that_at_the_steps(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    logged = replay.run(load_scenario(SCENARIOS / "rig-logged-load.toml", SHORT))
-    assert len(panel(run_figure(logged), "Load").get_lines()) == 2  # type: ignore[attr-defined]
+    logged = study_run.run(load_scenario(SCENARIOS / "rig-logged-load.toml", SHORT))
+    assert len(panel(run_figure(logged), "Normal force").get_lines()) == 2  # type: ignore[attr-defined]
 
     def fail(self: Result) -> None:
         raise PluginError("not here")
 
     monkeypatch.setattr(Result, "scenario", property(fail))
-    assert len(panel(run_figure(logged), "Load").get_lines()) == 1  # type: ignore[attr-defined]
+    assert len(panel(run_figure(logged), "Normal force").get_lines()) == 1  # type: ignore[attr-defined]
 
 
-def test_that_a_test_stopped_before_its_first_step_can_be_drawn(
-    result: Result, tmp_path: Path
-) -> None:
+def test_run_stopped_before_its_first_step_can_be_drawn(result: Result, tmp_path: Path) -> None:
     raw = result.raw
     fresh = replace(
         raw,
@@ -105,23 +103,24 @@ def test_that_a_test_stopped_before_its_first_step_can_be_drawn(
     assert (tmp_path / "fresh.png").stat().st_size > 10_000
 
 
-def test_that_a_contact_shows_its_hertzian_peak_and_all_panels(study: ContactStudy) -> None:
+def test_contact_has_its_hertzian_peak_and_all_panels(study: ContactStudy) -> None:
     figure = contact_figure(study, "title")
     axes = panel(figure, "Pressure")
     top = float(np.max(axes.collections[0].get_array()))  # type: ignore[attr-defined]
     assert top == pytest.approx(study.solution.peak_pressure / 1e6, rel=2e-3)
-    for title in ("Traction", "Adhesion", "Power density", "Line load", "Dissipation"):
+    for title in ("Traction", "Adhesion", "Dissipated power density", "Line load"):
         panel(figure, title)
+    panel(figure, "Dissipated power per length")
 
 
-def test_that_a_contact_without_fields_shows_its_strips(study: ContactStudy) -> None:
+def test_contact_without_fields_has_strips_only(study: ContactStudy) -> None:
     figure = contact_figure(replace(study, fields=None), "title")
     assert len(figure.axes) == 2
     line = figure.axes[1].get_lines()[0]
     assert np.max(line.get_ydata()) == pytest.approx(study.solution.dissipation.max() / 1e3)
 
 
-def test_that_a_figure_is_saved_whole_or_not_at_all(
+def test_figure_is_written_completely_or_not_at_all(
     study: ContactStudy, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     figure = contact_figure(replace(study, fields=None), "title")
@@ -139,4 +138,4 @@ def test_that_a_figure_is_saved_whole_or_not_at_all(
     assert path.read_text() == "mine"
     save_figure(figure, path)
     assert path.read_bytes().startswith(b"\x89PNG")
-    assert path.stat().st_mode & 0o044  # not private, as a temporary file is
+    assert path.stat().st_mode & 0o044  # readable by others, unlike a temporary file

@@ -1,4 +1,4 @@
-"""What figures and tables are made of: units, patch edges and measured profiles."""
+"""Numbers of figures and tables: units, patch edges and measured profiles."""
 
 import math
 
@@ -28,9 +28,7 @@ from wearsim.report.text.units import brief, count, lapse, shown
         (math.nan, "um", "-"),
     ],
 )
-def test_that_values_are_shown_in_engineers_units(
-    value: float | None, unit: str, text: str
-) -> None:
+def test_values_are_shown_in_engineering_units(value: float | None, unit: str, text: str) -> None:
     assert shown(value, unit) == text
 
 
@@ -38,27 +36,27 @@ def test_that_values_are_shown_in_engineers_units(
     ("seconds", "text"),
     [(0.05, "0.05 s"), (3.21, "3.2 s"), (9.97, "10 s"), (59.7, "1 min 0 s"), (7500.0, "2 h 5 min")],
 )
-def test_that_wall_times_read_well(seconds: float, text: str) -> None:
+def test_wall_times_have_a_suitable_unit(seconds: float, text: str) -> None:
     assert lapse(seconds) == text
 
 
-def test_that_passes_are_counted_with_their_thousands_apart() -> None:
+def test_thousands_of_passes_are_separated() -> None:
     assert count(1.35e6) == "1,350,000"
 
 
 @pytest.mark.parametrize("strips", [24, 51, 101])
-def test_that_the_edges_of_an_ellipse_are_found_within_a_fifth_of_a_strip(strips: int) -> None:
+def test_edges_of_an_ellipse_are_within_a_fifth_of_a_strip(strips: int) -> None:
     y = np.linspace(-2.0, 2.0, strips)
     a = 0.1 * np.sqrt(np.maximum(0.0, 1.0 - ((y - 0.3) / 1.4) ** 2))
     edges = patch_edges(y, a)
     assert edges == pytest.approx((-1.1, 1.7), abs=0.2 * (y[1] - y[0]))
 
 
-def test_that_no_contact_has_no_edges() -> None:
+def test_no_contact_has_no_edges() -> None:
     assert patch_edges(np.linspace(0.0, 1.0, 5), np.zeros(5)) is None
 
 
-def test_that_depth_counts_downwards_and_height_upwards() -> None:
+def test_depth_is_positive_downwards_and_height_upwards() -> None:
     deep = read_measured("# probe\ny [mm]; depth [um]\n-1; 2\n1; 3\n", "a/probe.csv")
     high = read_measured("y [mm], height [um]\n-1, -2\n1, -3\n", "probe.csv")
     assert deep.label == "probe"
@@ -67,7 +65,7 @@ def test_that_depth_counts_downwards_and_height_upwards() -> None:
     assert high.height == pytest.approx(deep.height)
 
 
-def test_that_a_measurement_without_either_is_refused() -> None:
+def test_measurement_without_depth_and_height_is_refused() -> None:
     with pytest.raises(ScenarioError, match="column 'height' is missing"):
         read_measured("y [mm], z [um]\n-1, -2\n1, -3\n", "probe.csv")
 
@@ -76,5 +74,5 @@ def test_that_a_measurement_without_either_is_refused() -> None:
     ("seconds", "text"),
     [(2.5e-6, "2.5 us"), (0.0312, "31.2 ms"), (1.5, "1.5 s"), (84.0, "84 s"), (np.nan, "-")],
 )
-def test_that_a_time_too_short_to_feel_is_told_in_a_unit_that_suits_it(seconds, text):
+def test_short_times_have_a_suitable_unit(seconds, text):
     assert brief(seconds) == text

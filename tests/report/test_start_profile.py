@@ -1,4 +1,4 @@
-"""A test that starts from a measured groove is drawn from that groove on."""
+"""The figure of a run that starts from a worn profile."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from wearsim.report.figures.run import _draw_profiles
 
 
 class Lines:
-    """Stand in for axes: keep what is plotted."""
+    """Replacement of axes that stores the plotted heights."""
 
     def __init__(self):
         self.heights = []
@@ -21,7 +21,7 @@ class Lines:
 
 
 class Colours:
-    """Stand in for the colours of two records."""
+    """Replacement of the colours of two records."""
 
     records = (0, -1)
 
@@ -29,7 +29,7 @@ class Colours:
         return "black"
 
 
-def test_that_profiles_are_drawn_from_the_start_profile_on(tmp_path):
+def test_profiles_are_drawn_from_the_start_profile_on(tmp_path):
     path = tmp_path / "start.csv"
     path.write_text("y [mm], height [um]\n-12, 0\n-3, 0\n0, -9\n3, 0\n12, 0\n")
     scenario = wearsim.load_scenario(

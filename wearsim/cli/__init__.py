@@ -1,1 +1,1 @@
-"""The shell: one module per verb; typer and rich live here and nowhere else."""
+"""Command line: one module per verb; the only package that imports typer and rich."""

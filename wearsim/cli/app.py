@@ -1,4 +1,4 @@
-"""The command `wearsim`: its verbs, and the options that stand before them."""
+"""Command `wearsim`: its verbs and its global options."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ from wearsim.cli.errors import TRACEBACK, Shell
 app = typer.Typer(
     name="wearsim",
     cls=Shell,
-    help="Wear of rolling contacts, stepped through millions of roller passes.",
-    epilog="Exit codes: 0 done, 1 the run failed, 2 bad input, 130 interrupted.",
+    help="Simulate wear of rolling contacts over millions of roller passes.",
+    epilog="Exit codes: 0 success, 1 the computation failed, 2 bad input, 130 interrupted.",
     no_args_is_help=True,
     add_completion=False,
     rich_markup_mode=None,
@@ -42,8 +42,8 @@ for verb in (
 app.add_typer(new)
 
 
-def _show_version(asked: bool) -> None:
-    if asked:
+def _show_version(requested: bool) -> None:
+    if requested:
         from importlib.metadata import version
 
         typer.echo(f"wearsim {version('wearsim')}")
@@ -57,10 +57,11 @@ def options(
         typer.Option("--version", help="Show the version.", callback=_show_version, is_eager=True),
     ] = False,
     traceback: Annotated[
-        bool, typer.Option("--traceback", help=f"Show where an error arose; or set {TRACEBACK}=1.")
+        bool,
+        typer.Option("--traceback", help=f"Show tracebacks of errors; also {TRACEBACK}=1."),
     ] = False,
 ) -> None:
-    """Wear of rolling contacts, stepped through millions of roller passes."""
+    """Simulate wear of rolling contacts over millions of roller passes."""
     if traceback:
         os.environ[TRACEBACK] = "1"
 

@@ -1,37 +1,41 @@
-"""Arguments and options that several verbs take."""
+"""Arguments and options of several verbs, and their checks."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import typer
 
+from wearsim.cli.output import refuse_existing
+
 if TYPE_CHECKING:
+    from wearsim.results import DissipationResult, EnsembleResult, Result
     from wearsim.scenario import Scenario
 
 ScenarioFile: TypeAlias = Annotated[
-    Path, typer.Argument(metavar="SCENARIO", help="A scenario, a TOML file.", show_default=False)
+    Path, typer.Argument(metavar="SCENARIO", help="Scenario, a TOML file.", show_default=False)
 ]
 ResultsFile: TypeAlias = Annotated[
-    Path, typer.Argument(metavar="FILE.h5", help="A results file.", show_default=False)
+    Path, typer.Argument(metavar="FILE.h5", help="Results file.", show_default=False)
 ]
 Settings: TypeAlias = Annotated[
     list[str] | None,
     typer.Option(
         "--set",
         metavar="KEY=VALUE",
-        help="Change a value: load.normal_force='350 N'. May be repeated.",
+        help="Change a value of the scenario: load.normal_force='350 N'. May be repeated.",
         show_default=False,
     ),
 ]
 Json: TypeAlias = Annotated[
-    bool, typer.Option("--json", help="Write one JSON object, in SI, and nothing else.")
+    bool, typer.Option("--json", help="Write one JSON object in SI units instead of tables.")
 ]
 Quiet: TypeAlias = Annotated[bool, typer.Option("--quiet", "-q", help="Show no progress.")]
 Force: TypeAlias = Annotated[
-    bool, typer.Option("--force", "-f", help="Overwrite an output that exists.")
+    bool, typer.Option("--force", "-f", help="Overwrite existing output files.")
 ]
 Figure: TypeAlias = Annotated[
     Path | None,
@@ -39,18 +43,20 @@ Figure: TypeAlias = Annotated[
         "--output", "-o", metavar="FIG", help="Figure: .png, .pdf or .svg.", show_default=False
     ),
 ]
-
-Drawing: TypeAlias = Annotated[
+FigureOption: TypeAlias = Annotated[
     Path | None,
     typer.Option("--figure", metavar="FIG", help="Figure: .png, .pdf or .svg.", show_default=False),
 ]
 Realisations: TypeAlias = Annotated[
-    int, typer.Option("--realisations", "-n", min=1, metavar="N", help="How many realisations.")
+    int, typer.Option("--realisations", "-n", min=1, metavar="N", help="Number of realisations.")
 ]
 Seed: TypeAlias = Annotated[
     int | None,
     typer.Option(
-        min=0, metavar="SEED", help="Seed; by default the scenario's.", show_default=False
+        min=0,
+        metavar="SEED",
+        help="Seed of the random numbers; default: that of the scenario.",
+        show_default=False,
     ),
 ]
 Workers: TypeAlias = Annotated[
@@ -58,7 +64,7 @@ Workers: TypeAlias = Annotated[
     typer.Option(
         min=1,
         metavar="K",
-        help="Realisations that run at a time; by default as many as there are processors.",
+        help="Number of parallel workers; default: the number of processors.",
         show_default=False,
     ),
 ]
@@ -66,28 +72,43 @@ Scheduler: TypeAlias = Annotated[
     str | None,
     typer.Option(
         metavar="WHO",
-        help="Who does the work: processes (the default), threads, serial, dask, or the address"
-        " of a Dask scheduler, tcp://host:port.",
+        help="Where realisations are computed: processes (the default), threads, serial, dask, or"
+        " the address of a Dask scheduler, tcp://host:port.",
         show_default=False,
     ),
 ]
 
 
 def results_option(ending: str) -> Any:
-    """Return the option that names the results file of a study.
+    """Return the option for the name of a results file.
 
     Parameters
     ----------
     ending : str
-        What follows the scenario's name where it is not given, "-ensemble.h5".
+        Added to the name of the scenario in the default name, "-ensemble.h5".
     """
     return typer.Option(
         "--output",
         "-o",
         metavar="FILE.h5",
-        help=f"Results file; by default the scenario's name with {ending}, in the current folder.",
+        help=f"Results file; default: name of the scenario with {ending}, in the current folder.",
         show_default=False,
     )
+
+
+@contextmanager
+def checking(option: str) -> Iterator[None]:
+    """Turn a ValueError into a usage error of an option.
+
+    Raises
+    ------
+    typer.BadParameter
+        With the message of the ValueError.
+    """
+    try:
+        yield
+    except ValueError as error:
+        raise typer.BadParameter(str(error), param_hint=option) from error
 
 
 def read_scenario(path: Path, settings: list[str] | None) -> Scenario:
@@ -96,99 +117,112 @@ def read_scenario(path: Path, settings: list[str] | None) -> Scenario:
     Raises
     ------
     typer.BadParameter
-        If a setting is not of the form key=value.
+        If a setting has not the form key=value.
     ScenarioError
-        With every mistake in the file.
+        With all mistakes in the file.
     """
     from wearsim.scenario import load_scenario, parse_override
 
-    try:
+    with checking("--set"):
         overrides = dict(parse_override(text) for text in settings or [])
-    except ValueError as error:
-        raise typer.BadParameter(str(error), param_hint="--set") from error
     return load_scenario(path, overrides)
 
 
-def check_figure(path: Path, option: str = "-o") -> None:
-    """Raise unless a figure's name ends as a kind of figure does, in a folder that exists.
+def open_any(path: Path) -> Result | DissipationResult | EnsembleResult:
+    """Return the results in a file of any kind.
+
+    Raises
+    ------
+    ResultsFileError
+        If it is no results file, or damaged.
+    """
+    from wearsim.results import kind_of, open_dissipation, open_ensemble, open_results
+
+    openers: dict[str, Callable[[Path], DissipationResult | EnsembleResult]] = {
+        "dissipation": open_dissipation,
+        "ensemble": open_ensemble,
+    }
+    return openers.get(kind_of(path), open_results)(path)
+
+
+def check_figure(path: Path | None, force: bool, option: str = "-o") -> None:
+    """Check the name of a figure, if one is given.
 
     Parameters
     ----------
-    path : Path
+    path : Path, optional
+        Name of the figure.
+    force : bool
+        Whether an existing file may be overwritten.
     option : str
-        The option that named it.
+        Option that gave the name.
 
     Raises
     ------
     typer.BadParameter
-        If it does not.
+        If the format is unknown or the folder does not exist.
+    ResultsFileError
+        If the file exists and `force` is false.
     """
+    if path is None:
+        return
     if path.suffix.lower() not in {".png", ".pdf", ".svg"}:
         raise typer.BadParameter(
-            f"'{path}' ends in no kind of figure, expected .png, .pdf or .svg", param_hint=option
+            f"'{path}' has no known figure format, expected .png, .pdf or .svg", param_hint=option
         )
     if not path.parent.is_dir():
-        raise typer.BadParameter(f"there is no folder {path.parent}", param_hint=option)
+        raise typer.BadParameter(f"folder {path.parent} does not exist", param_hint=option)
+    refuse_existing(path, force, option)
 
 
-def check_drawing(path: Path, output: Path, inputs: Iterable[Path]) -> None:
-    """Raise if a figure would take the place of the results file, or of an input.
+def refuse_same_file(figure: Path | None, output: Path, inputs: Iterable[Path]) -> None:
+    """Refuse a figure that would overwrite the results file or an input.
 
     Parameters
     ----------
-    path : Path
-        The figure, named by --figure.
+    figure : Path, optional
+        Name given by --figure.
     output : Path
-        The results file.
+        Results file.
     inputs : iterable of Path
-        What the scenario is read from.
+        Scenario and the files that it reads.
 
     Raises
     ------
     ResultsFileError, typer.BadParameter
         If it would.
     """
+    if figure is None:
+        return
     from wearsim.results import refuse_inputs, same_file
 
-    refuse_inputs(path, inputs, option="--figure")
-    if same_file(path, output):
+    refuse_inputs(figure, inputs, option="--figure")
+    if same_file(figure, output):
         raise typer.BadParameter(
-            f"{path} is the results file too, as -o says; give them different names",
+            f"{figure} is also the results file given by -o; give them different names",
             param_hint="--figure",
         )
 
 
-def check_workforce(scheduler: str | None, workers: int | None) -> str:
-    """Return who does the work of a study, checked.
-
-    Parameters
-    ----------
-    scheduler : str, optional
-        As given at the shell.
-    workers : int, optional
-        How many.
+def checked_scheduler(scheduler: str | None, workers: int | None) -> str:
+    """Return the scheduler of a study, "processes" by default.
 
     Raises
     ------
     typer.BadParameter
-        If there is no such scheduler, or it cannot have so many workers.
+        If the scheduler is unknown, or cannot have that number of workers.
     """
     from wearsim.studies.execution.factory import check_scheduler
 
     chosen = scheduler or "processes"
-    try:
-        check_scheduler(chosen)
-    except ValueError as error:
-        raise typer.BadParameter(str(error), param_hint="--scheduler") from error
-    try:
-        check_scheduler(chosen, workers)
-    except ValueError as error:
-        raise typer.BadParameter(str(error), param_hint="--workers") from error
+    for option, count in (("--scheduler", None), ("--workers", workers)):
+        with checking(option):
+            check_scheduler(chosen, count)
     return chosen
 
 
 def read_text(path: Path) -> str:
-    """Return the content of a text file that the user names.
+    """Return the content of a text file named by the user.
 
     Raises
     ------
@@ -199,8 +233,8 @@ def read_text(path: Path) -> str:
 
     try:
         return path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise ScenarioError(str(path), [Mistake("", "", "is not text in UTF-8")]) from error
-    except OSError as error:
-        problem = Mistake("", "", f"the file cannot be read ({error.strerror})")
-        raise ScenarioError(str(path), [problem]) from error
+    except (OSError, UnicodeDecodeError) as error:
+        why = "is not text in UTF-8"
+        if isinstance(error, OSError):
+            why = f"the file cannot be read ({error.strerror})"
+        raise ScenarioError(str(path), [Mistake("", "", why)]) from error

@@ -1,4 +1,4 @@
-"""Where text goes: tables and JSON to stdout, everything else to stderr."""
+"""Output of all verbs: tables and JSON on stdout, everything else on stderr."""
 
 from __future__ import annotations
 
@@ -15,29 +15,27 @@ from wearsim.errors import ResultsFileError
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from wearsim.results.study_result import StudyResult
-
-_WIDE = 110  # columns of a table that goes into a file or a pipe
+_WIDTH = 110  # columns of a table in a file or a pipe
 
 
 def console(*, err: bool = False) -> Console:
-    """Return a console that writes text as it stands: no markup, no highlighting."""
+    """Return a console without markup and highlighting."""
     from rich.console import Console
 
     made = Console(stderr=err, markup=False, highlight=False, emoji=False)
     if not made.is_terminal:
-        made.width = _WIDE
+        made.width = _WIDTH
     return made
 
 
 def write_table(title: str, rows: Iterable[tuple[str, str]]) -> None:
-    """Write a table of two columns, what and value, to stdout."""
+    """Write a table with the columns name and value to stdout."""
     from rich import box
     from rich.table import Table
 
     screen = console()
     table = Table(title=title, title_justify="left", show_header=False, box=box.SIMPLE_HEAD)
-    table.min_width = min(len(title), screen.width)  # or a long title would be folded
+    table.min_width = min(len(title), screen.width)  # keeps a long title on one line
     table.add_column(no_wrap=True)
     table.add_column(overflow="fold")
     for row in rows:
@@ -46,17 +44,12 @@ def write_table(title: str, rows: Iterable[tuple[str, str]]) -> None:
 
 
 def write_list(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Write rows to stdout, one line each, their columns aligned under a head."""
+    """Write rows to stdout, one line each, in columns aligned under their heads."""
     lines = [heads, *rows]
     widths = [max(len(line[column]) for line in lines) for column in range(len(heads))]
     for line in lines:
         cells = (cell.ljust(width) for cell, width in zip(line, widths, strict=True))
         typer.echo("  ".join(cells).rstrip())
-
-
-def write_line(text: str) -> None:
-    """Write a line to stdout."""
-    typer.echo(text)
 
 
 def write_json(data: Mapping[str, Any]) -> None:
@@ -65,10 +58,10 @@ def write_json(data: Mapping[str, Any]) -> None:
 
 
 def plain(value: Any) -> Any:
-    """Return a value made of what JSON knows: arrays as lists, paths as text, NaN as null."""
+    """Convert a value to JSON types: arrays to lists, paths to text, NaN to null."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
-    if hasattr(value, "tolist"):  # numpy's arrays and scalars
+    if hasattr(value, "tolist"):  # arrays and scalars of numpy
         return plain(value.tolist())
     if isinstance(value, list | tuple):
         return [plain(item) for item in value]
@@ -84,21 +77,19 @@ def note(text: str) -> None:
     typer.echo(text, err=True)
 
 
-def tell_notes(result: StudyResult[Any]) -> None:
-    """Write what a user should know of a study to stderr."""
-    for text in result.notes:
-        note(f"note: {text}")
-    for text in result.warnings:
-        note(f"warning: {text}")
+def write_notes(notes: Iterable[str], warnings: Iterable[str] = ()) -> None:
+    """Write notes and warnings on a scenario or a study to stderr."""
+    for text in (*(f"note: {text}" for text in notes), *(f"warning: {text}" for text in warnings)):
+        note(text)
 
 
 def refuse_existing(path: Path, force: bool, option: str = "-o") -> None:
-    """Raise unless `path`, which an option named, may be written.
+    """Refuse to overwrite the file named by an option.
 
     Raises
     ------
     ResultsFileError
-        If something stands there and `force` is not set.
+        If the file exists and `force` is false.
     """
     if path.exists() and not force:
         raise ResultsFileError(f"{path} exists; choose another name with {option}, or --force")

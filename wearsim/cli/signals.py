@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM: the first asks a run to stop at a checkpoint, the second ends it at once."""
+"""SIGINT and SIGTERM: the first one stops a run at a checkpoint, the second one at once."""
 
 from __future__ import annotations
 
@@ -15,40 +15,40 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 @dataclass
 class Stop:
-    """Whether the user asked to stop."""
+    """Flag that a signal sets."""
 
-    asked: bool = False
+    received: bool = False
 
     def requested(self) -> bool:
-        """Return whether the user asked to stop."""
-        return self.asked
+        """Return whether a stop is requested."""
+        return self.received
 
 
 @contextmanager
 def stop_on_signals(
-    saying: str = "stopping at a checkpoint; once more to stop at once",
+    message: str = "stopping at a checkpoint; repeat to stop at once",
 ) -> Iterator[Stop]:
-    """Catch SIGINT and SIGTERM for as long as the context lasts.
+    """Catch SIGINT and SIGTERM while the context is open.
 
-    The first signal sets the flag and gives the signals back to the operating system, so that a
-    second one ends the process even while compiled code runs; its results file still opens.
+    The first signal sets the flag and restores the default handlers, so that a second one ends the
+    process even while compiled code runs; the results file remains readable.
 
     Parameters
     ----------
-    saying : str
-        What the user is told at the first.
+    message : str
+        Written to stderr at the first signal.
     """
     stop = Stop()
     before = {number: signal.getsignal(number) for number in _SIGNALS}
 
-    def ask(number: int, frame: Any) -> None:
-        stop.asked = True
+    def handle(number: int, frame: Any) -> None:
+        stop.received = True
         for caught in _SIGNALS:
             signal.signal(caught, signal.SIG_DFL)
-        note(saying)
+        note(message)
 
     for number in _SIGNALS:
-        signal.signal(number, ask)
+        signal.signal(number, handle)
     try:
         yield stop
     finally:

@@ -1,1 +1,1 @@
-"""Figures from a results file or a contact, one module per figure."""
+"""Figures of results, and numbers as text."""

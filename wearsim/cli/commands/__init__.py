@@ -1,1 +1,1 @@
-"""The verbs, one file each."""
+"""Verbs of the command line, one module each."""

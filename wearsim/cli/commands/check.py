@@ -1,17 +1,15 @@
-"""`wearsim check`: all mistakes of a scenario at once, or a table of what will run."""
+"""`wearsim check`: all mistakes of a scenario, or a table of what will run."""
 
 from __future__ import annotations
 
 from wearsim.cli.arguments import ScenarioFile, Settings, read_scenario
-from wearsim.cli.output import note, write_table
+from wearsim.cli.output import write_notes, write_table
 
 
 def check(scenario: ScenarioFile, settings: Settings = None) -> None:
-    """Tell all mistakes of a scenario at once, or what will run."""
+    """Check a scenario: print all mistakes, or a table of what will run."""
     loaded = read_scenario(scenario, settings)
     from wearsim.studies.run.dry_run import plan
 
-    rows = plan(loaded)
-    write_table(f"ok: {loaded.title}", rows)
-    for text in loaded.notes:
-        note(f"note: {text}")
+    write_table(f"ok: {loaded.title}", plan(loaded))
+    write_notes(loaded.notes)

@@ -1,4 +1,4 @@
-"""`wearsim contact`: one contact, its numbers and its figure."""
+"""`wearsim contact`: table, JSON and figure of a single contact."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import typer
 
 from wearsim.cli.arguments import Figure, Force, Json, ScenarioFile, Settings, check_figure
 from wearsim.cli.arguments import read_scenario as load
-from wearsim.cli.output import note, refuse_existing, write_json, write_line, write_table
+from wearsim.cli.output import note, write_json, write_table
 
 if TYPE_CHECKING:
     from wearsim.scenario import Scenario
@@ -35,58 +35,51 @@ def contact(
     json: Json = False,
     force: Force = False,
 ) -> None:
-    """Solve one contact: the first roller at the start of its load."""
-    if figure is not None:
-        check_figure(figure)
-        refuse_existing(figure, force)
+    """Solve one contact: the first roller at the start of the load."""
+    check_figure(figure, force)
     loaded = load(scenario, settings)
-    if figure is not None:
-        _keep_inputs(figure, loaded, profile)
+    from wearsim.results import refuse_inputs
     from wearsim.studies.contact.single import study_contact
 
+    if figure is not None:
+        refuse_inputs(figure, loaded.paths)
+        refuse_inputs(figure, [profile] if profile else [], "the profile")
     has_fields = loaded.contact.spec.capabilities.fields
     study = study_contact(
         loaded, _profile(profile), figure is not None and has_fields, with_error=True
     )
-    notes = [*study.notes, *_means(loaded)]
+    notes = [*study.notes, *_notes_on_means(loaded)]
     if figure is not None and not has_fields:
-        notes.append(f"model '{study.model}' gives no fields; the figure shows its strips alone")
+        notes.append(f"model '{study.model}' gives no fields; the figure shows its strips only")
     if json:
         write_json(_data(loaded, study, notes, figure))
     else:
         from wearsim.cli.render.run_footer import contact_line
 
         write_table(loaded.title, _rows(study))
-        write_line(contact_line(study))
+        typer.echo(contact_line(study))
     if figure is not None:
-        _draw(loaded, study, figure)
+        from wearsim.report.figures.contact import contact_figure
+        from wearsim.report.parts.saving import save_figure
+
+        save_figure(contact_figure(study, loaded.title), figure)
     if not json:
         for text in [*notes, *([f"figure: {figure}"] if figure else [])]:
             note(text)
 
 
-def _keep_inputs(figure: Path, scenario: Scenario, profile: Path | None) -> None:
-    from wearsim.results import refuse_inputs
-
-    refuse_inputs(figure, scenario.paths)
-    if profile is not None:
-        refuse_inputs(figure, [profile], "the profile")
-
-
-def _means(scenario: Scenario) -> list[str]:
-    """Return a note that names the random inputs, which one contact takes at their means."""
+def _notes_on_means(scenario: Scenario) -> list[str]:
+    """Return notes that name the random inputs, which are set to their means."""
     fields = [item.name for item in scenario.random if item.role == "field"]
     others = [item.name for item in scenario.random if item.role != "field"]
-    notes = []
-    if others:
-        notes.append(f"random inputs stand at their means: {', '.join(others)}")
+    notes = [f"random inputs are set to their means: {', '.join(others)}"] if others else []
     if fields:
-        notes.append(f"{', '.join(fields)}, a field, stands at the mean of its marginal")
+        notes.append(f"random fields are set to the means of their marginals: {', '.join(fields)}")
     return notes
 
 
 def _profile(path: Path | None) -> Profile | None:
-    """Return the profile in a CSV, or None where no file is given."""
+    """Return the profile in a CSV, or None if no file is given."""
     if path is None:
         return None
     from wearsim.cli.arguments import read_text
@@ -96,26 +89,23 @@ def _profile(path: Path | None) -> Profile | None:
     return read_profile(InputFile(str(path), read_text(path)))
 
 
-def _draw(scenario: Scenario, study: ContactStudy, path: Path) -> None:
-    from wearsim.report.figures.contact import contact_figure
-    from wearsim.report.parts.saving import save_figure
-
-    save_figure(contact_figure(study, scenario.title), path)
-
-
 def _rows(study: ContactStudy) -> list[tuple[str, str]]:
-    """Return the numbers of a contact, in engineers' units."""
+    """Return the numbers of a contact in engineering units."""
+    import numpy as np
+
     from wearsim.report.parts.patch_size import patch_edges
     from wearsim.report.text.units import NOTHING, shown
 
     point, solution = study.point, study.solution
     edges = patch_edges(solution.y, solution.half_length)
+    rounding = 1e-12 * point.normal_force * study.grid.spacing * study.grid.strips
+    moment = solution.spin_moment if abs(solution.spin_moment) > rounding else 0.0
     return [
         ("contact model", study.described_model),
         ("strips", f"{study.grid.strips} of {shown(study.grid.spacing, 'um')}"),
         ("normal force", shown(point.normal_force, "N")),
         ("rolling speed", shown(point.rolling_speed, "m/s")),
-        ("friction coefficient", shown(_mean_friction(study), "1")),
+        ("friction coefficient", shown(float(np.mean(point.friction)), "1")),
         ("longitudinal creepage", shown(solution.longitudinal_creepage, "1")),
         ("lateral creepage", shown(point.creepage.lateral, "1")),
         ("spin", f"{shown(point.creepage.spin, '1')} 1/m" if point.creepage.spin else "0"),
@@ -125,29 +115,16 @@ def _rows(study: ContactStudy) -> list[tuple[str, str]]:
         ("approach", shown(solution.approach, "um")),
         ("longitudinal force", shown(solution.force_x, "N")),
         ("lateral force", shown(solution.force_y, "N")),
-        ("spin moment", shown(_moment(study), "N mm")),
+        ("spin moment", shown(moment, "N mm")),
         ("dissipated power", shown(solution.power, "W")),
-        ("area in adhesion", shown(solution.adhesion_fraction, "%")),
+        ("adhesion fraction", shown(solution.adhesion_fraction, "%")),
     ]
-
-
-def _mean_friction(study: ContactStudy) -> float:
-    import numpy as np
-
-    return float(np.mean(study.point.friction))
-
-
-def _moment(study: ContactStudy) -> float:
-    """Return the spin moment, or zero where there is nothing but rounding."""
-    moment = study.solution.spin_moment
-    noise = 1e-12 * study.point.normal_force * study.grid.spacing * study.grid.strips
-    return moment if abs(moment) > noise else 0.0
 
 
 def _data(
     scenario: Scenario, study: ContactStudy, notes: list[str], figure: Path | None
 ) -> dict[str, Any]:
-    """Return the contact in SI, its strips included."""
+    """Return the contact and its strips in SI units."""
     from wearsim.report.parts.patch_size import patch_edges
 
     point, solution = study.point, study.solution

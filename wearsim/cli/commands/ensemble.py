@@ -1,14 +1,16 @@
-"""`wearsim ensemble`: a whole wear test for each realisation of the random inputs."""
+"""`wearsim ensemble`: a wear test for each realisation of the random inputs."""
 
 from __future__ import annotations
 
+import re
+from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from wearsim.cli.arguments import (
-    Drawing,
+    FigureOption,
     Force,
     Json,
     Quiet,
@@ -18,26 +20,25 @@ from wearsim.cli.arguments import (
     Seed,
     Settings,
     Workers,
-    check_drawing,
     check_figure,
-    check_workforce,
+    checked_scheduler,
+    checking,
     read_scenario,
+    refuse_same_file,
     results_option,
 )
-from wearsim.cli.output import note, refuse_existing, tell_notes, write_json, write_line
+from wearsim.cli.output import note, write_json, write_notes
 
 if TYPE_CHECKING:
-    from wearsim.cli.sweep_option import Swept
     from wearsim.results import EnsembleResult
-    from wearsim.scenario import Scenario
 
 Output = Annotated[Path | None, results_option("-ensemble.h5")]
 Until = Annotated[
     str | None,
     typer.Option(
         metavar="TARGET",
-        help="Stop as soon as this is known well enough, 'depth.mean 1%': half of its 95 %"
-        " interval, in parts of it. It is first looked at after 64 realisations.",
+        help="Stop when the relative half-width of a 95 % confidence interval is reached,"
+        " 'depth.mean 1%'. First checked after 64 realisations.",
         show_default=False,
     ),
 ]
@@ -45,8 +46,8 @@ Plan = Annotated[
     str | None,
     typer.Option(
         metavar="PLAN",
-        help="monte-carlo, latin-hypercube, sobol, saltelli or control-variate; by default the"
-        " scenario's.",
+        help="Sampling design: monte-carlo, latin-hypercube, sobol, saltelli or control-variate;"
+        " default: that of the scenario.",
         show_default=False,
     ),
 ]
@@ -54,19 +55,22 @@ Sweep = Annotated[
     str | None,
     typer.Option(
         metavar="KEY=V1,V2,...",
-        help="An ensemble for each value, and their comparison: load.normal_force=250N,300N.",
+        help="Run and compare one ensemble per value: load.normal_force=250N,300N.",
         show_default=False,
     ),
 ]
-_ALONE = "this process, one realisation after the other"
-STOPPING = "stopping as soon as the next batch is in; once more to stop at once"
+STOPPING = "stopping after the next batch; repeat to stop at once"
+_NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
+_WITHOUT_SPACE = re.compile(rf"({_NUMBER})([A-Za-zµμ°].*)")
+_QUANTITY = re.compile(rf"({_NUMBER})\s*(\S.*)?")
+_EXAMPLE = "such as load.normal_force=250N,300N,350N"
 
 
 def ensemble(
     scenario: ScenarioFile,
     realisations: Realisations = 1000,
     output: Output = None,
-    figure: Drawing = None,
+    figure: FigureOption = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
     until: Until = None,
@@ -79,202 +83,161 @@ def ensemble(
     quiet: Quiet = False,
 ) -> None:
     """Run a wear test for each realisation of the random inputs."""
-    if figure is not None:
-        check_figure(figure, "--figure")
-        refuse_existing(figure, force, "--figure")
-    options: dict[str, Any] = {
-        "plan": _plan(plan),
-        "until": _until(until),
-        "scheduler": check_workforce(scheduler, workers),
-        "workers": workers,
-        "force": force,
-    }
+    check_figure(figure, force, "--figure")
+    from wearsim.cli.progress.realisations import watching_ensemble
+    from wearsim.cli.signals import stop_on_signals
+    from wearsim.studies.ensemble import api
+    from wearsim.studies.ensemble.designs import parse_plan
+    from wearsim.studies.ensemble.sweep import path_of
+    from wearsim.studies.ensemble.sweep import sweep as run_sweep
+
+    options: dict[str, Any] = {"plan": plan, "until": until, "workers": workers, "force": force}
+    with checking("--plan"):
+        options["plan"] = plan if plan is None else parse_plan(plan)
+    with checking("--until"):
+        if until is not None:
+            api.parse_target(until)
+    options["scheduler"] = checked_scheduler(scheduler, workers)
     texts = [*(settings or []), *([f"seed={seed}"] if seed is not None else [])]
     path = output if output is not None else Path(f"{scenario.stem}-ensemble.h5")
-    if sweep is not None:
-        from wearsim.cli.sweep_option import parse_sweep
-
-        swept = parse_sweep(sweep)
-        if any(text.partition("=")[0].strip() == swept.key for text in texts):
-            raise typer.BadParameter(
-                f"{swept.key} is set besides; leave it to --sweep", param_hint="--set"
-            )
-        _sweep(scenario, texts, swept, realisations, path, figure, options, json, quiet)
-        return
-    loaded = read_scenario(scenario, texts)
-    if figure is not None:
-        check_drawing(figure, path, loaded.paths)
-    _run(loaded, realisations, path, figure, options, json, quiet)
-
-
-def _run(
-    loaded: Scenario,
-    realisations: int,
-    path: Path,
-    figure: Path | None,
-    options: dict[str, Any],
-    json: bool,
-    quiet: bool,
-) -> None:
-    from wearsim.cli.progress.ensemble import watching_ensemble
-    from wearsim.cli.signals import stop_on_signals
-    from wearsim.studies.ensemble.api import ensemble as study
-
-    with stop_on_signals(STOPPING) as stop, watching_ensemble(quiet) as watch:
-        result = study(
-            loaded,
-            realisations,
-            path,
-            on_progress=watch,
-            stop_requested=stop.requested,
-            on_notice=note,
-            **options,
-        )
-    if figure is not None:
-        draw(result, figure)
-    report(result, json, figure, in_words(watch.workers))
-
-
-def _plan(name: str | None) -> str | None:
-    """Return a plan's name, checked."""
-    if name is None:
-        return None
-    from wearsim.studies.ensemble.designs import parse_plan
-
-    try:
-        return parse_plan(name)
-    except ValueError as error:
-        raise typer.BadParameter(str(error), param_hint="--plan") from error
-
-
-def _until(text: str | None) -> str | None:
-    """Return what is to be reached, checked."""
-    if text is None:
-        return None
-    from wearsim.studies.ensemble.api import parse_target
-
-    try:
-        parse_target(text)
-    except ValueError as error:
-        raise typer.BadParameter(str(error), param_hint="--until") from error
-    return text
-
-
-def _sweep(
-    scenario: Path,
-    settings: list[str],
-    swept: Swept,
-    realisations: int,
-    path: Path,
-    figure: Path | None,
-    options: dict[str, Any],
-    json: bool,
-    quiet: bool,
-) -> None:
-    """Run an ensemble for each value, and compare them."""
-    from wearsim.cli.progress.ensemble import watching_ensemble
-    from wearsim.cli.signals import stop_on_signals
-    from wearsim.studies.ensemble.sweep import path_of
-    from wearsim.studies.ensemble.sweep import sweep as study
-
+    if sweep is None:
+        key, files = "", {"": path}
+    else:
+        key, values = parse_sweep(sweep)
+        if any(text.partition("=")[0].strip() == key for text in texts):
+            raise typer.BadParameter(f"{key} is also the key of --sweep", param_hint="--set")
+        files = {value: path_of(path, value) for value in values}
     scenarios = {
-        value: read_scenario(scenario, [*settings, swept.setting(value)]) for value in swept.values
+        value: read_scenario(scenario, [*texts, *([f"{key}={value}"] if key else [])])
+        for value in files
     }
-    if figure is not None:
-        for value, loaded in scenarios.items():
-            check_drawing(figure, path_of(path, value), loaded.paths)
+    for value, file in files.items():
+        refuse_same_file(figure, file, scenarios[value].paths)
 
     def announce(value: str, file: Path) -> None:
         if not quiet:
-            note(f"{swept.key} = {value}: {file}")
+            note(f"{key} = {value}: {file}")
 
     with stop_on_signals(STOPPING) as stop, watching_ensemble(quiet) as watch:
-        results = study(
-            scenarios.__getitem__,
-            swept.values,
-            realisations,
-            path,
-            on_value=announce,
-            on_progress=watch,
-            stop_requested=stop.requested,
-            on_notice=note,
-            **options,
-        )
+        options |= {"on_progress": watch, "stop_requested": stop.requested, "on_notice": note}
+        if key:
+            options["on_value"] = announce
+            results = run_sweep(scenarios.__getitem__, list(files), realisations, path, **options)
+        else:
+            results = [api.ensemble(scenarios[""], realisations, path, **options)]
+    if not key:
+        if figure is not None:
+            from wearsim.cli.commands.plot import draw
+
+            draw(results[0], figure)
+        report(results[0], json, figure, watch.workers)
+        return
     from wearsim.cli.render.comparison_table import report_comparison
 
     for result in results:
-        tell_failures(result)
-        _refuse_nothing(result)
-    report_comparison(results, list(swept.values), "depth", swept.key, figure, json)
+        _end(result)
+    report_comparison(results, list(files), "depth", key, figure, json)
 
 
 def report(result: EnsembleResult, json: bool, figure: Path | None, workers: str = "") -> None:
-    """Write how an ensemble ended to stdout, and what failed to stderr.
+    """Write the estimates of an ensemble to stdout and its failures to stderr.
 
     Parameters
     ----------
     result : EnsembleResult
     json : bool
-        As one JSON object.
+        Whether to write JSON instead of tables.
     figure : Path, optional
-        The figure that was drawn.
+        Figure that was written.
     workers : str
-        Who did the work.
+        Workers that were used, "2 processes".
 
     Raises
     ------
     SolverError
-        If every realisation failed.
+        If all realisations failed.
     """
     from wearsim.cli.render.ensemble_table import as_json, write_ensemble
     from wearsim.cli.render.run_footer import ensemble_line
+    from wearsim.studies.execution.factory import InProcess
 
+    if workers == InProcess.describe:
+        workers = "this process, one realisation at a time"
     if json:
         write_json({**as_json(result), "workers": workers or None, "figure": figure})
     else:
         more = [("results file", str(result.path))]
         more += [("figure", str(figure))] if figure else []
         write_ensemble(result, more, workers)
-        write_line(ensemble_line(result))
-        tell_notes(result)
-    tell_failures(result)
-    _refuse_nothing(result)
+        typer.echo(ensemble_line(result))
+        write_notes(result.notes, result.warnings)
+    _end(result)
 
 
-def tell_failures(result: EnsembleResult) -> None:
-    """Write how many realisations failed, and why the first did, to stderr."""
-    if not result.failed:
-        return
-    from wearsim.report.text.units import count
+def _end(result: EnsembleResult) -> None:
+    """Warn of failed realisations; raise if all failed."""
+    from wearsim.cli.render.ensemble_table import warn_of_failures
+    from wearsim.errors import SolverError
 
-    first, text = next(iter(result.errors.items()))
-    note(
-        f"warning: {count(result.failed)} of {count(result.count + result.failed)} realisations"
-        f" failed, the first of them number {first}: {text}\n"
-        "the same draws fail again unless the scenario or the software changes; after a lack of"
-        " memory, a killed worker or an updated plugin run them again with:"
-        f" wearsim resume {result.path} --failed"
-    )
-
-
-def in_words(workers: str) -> str:
-    """Return who did the work; where one worker does, it is this process whatever was asked for."""
-    from wearsim.studies.execution.factory import InProcess
-
-    return _ALONE if workers == InProcess.describe else workers
-
-
-def _refuse_nothing(result: EnsembleResult) -> None:
-    """End with exit code 1 where not one realisation ended well."""
+    warn_of_failures(result)
     if result.failed and not result.count:
-        from wearsim.errors import SolverError
-
-        raise SolverError(f"{result.path}: no realisation ended well")
+        raise SolverError(f"{result.path}: all realisations failed")
 
 
-def draw(result: EnsembleResult, path: Path) -> None:
-    """Write the figure of an ensemble."""
-    from wearsim.report.figures.ensemble import ensemble_figure
-    from wearsim.report.parts.saving import save_figure
+def parse_sweep(text: str) -> tuple[str, tuple[str, ...]]:
+    """Return the key and the values of a sweep.
 
-    save_figure(ensemble_figure(result), path)
+    Parameters
+    ----------
+    text : str
+        "load.normal_force=250N,300N"; the space before a unit may be left out.
+
+    Returns
+    -------
+    key : str
+        Dotted key.
+    values : tuple of str
+        Two or more different values, with a space before the unit.
+
+    Raises
+    ------
+    typer.BadParameter
+        If there is no key, an empty value, fewer than two values, or two equal ones.
+    """
+    key, equals, listed = text.partition("=")
+    if not equals or not key.strip():
+        raise _sweep_error(f"'{text}' is not a key with values, expected one {_EXAMPLE}")
+    values = tuple(
+        _WITHOUT_SPACE.sub(r"\1 \2", value) if _WITHOUT_SPACE.fullmatch(value) else value
+        for value in map(str.strip, listed.split(","))
+    )
+    if not all(values):
+        raise _sweep_error(f"'{text}' has an empty value, expected values {_EXAMPLE}")
+    if len(values) < 2:
+        raise _sweep_error(f"'{text}' has one value, expected two or more {_EXAMPLE}")
+    for number, value in enumerate(values):
+        for before in values[:number]:
+            if _are_equal(before, value):
+                raise _sweep_error(f"'{before}' and '{value}' are the same value; remove one")
+    return key.strip(), values
+
+
+def _sweep_error(message: str) -> typer.BadParameter:
+    return typer.BadParameter(message, param_hint="--sweep")
+
+
+def _are_equal(one: str, other: str) -> bool:
+    """Return whether two values are equal, also in different units."""
+    matches = [_QUANTITY.fullmatch(value) for value in (one, other)]
+    if matches[0] is None or matches[1] is None:
+        return one == other
+    (first, unit), (second, other_unit) = matches[0].groups(), matches[1].groups()
+    if not (unit and other_unit):
+        return not (unit or other_unit) and float(first) == float(second)
+    from wearsim.units import conversion
+
+    try:
+        factor = conversion(other_unit, unit)
+    except ValueError:  # reported when the scenario is read
+        return one == other
+    return Fraction(first) == Fraction(second) * factor

@@ -1,18 +1,13 @@
-"""`wearsim export`: a results file as CSV."""
+"""`wearsim export`: results as CSV files."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from wearsim.cli.arguments import ResultsFile
-
-if TYPE_CHECKING:
-    from wearsim.results import DissipationResult, EnsembleResult, Result
-    from wearsim.results.io.reader import FileKind
+from wearsim.cli.arguments import ResultsFile, open_any
 
 Folder = Annotated[
     Path,
@@ -23,19 +18,8 @@ Folder = Annotated[
 
 
 def export(file: ResultsFile, output: Folder) -> None:
-    """Write a results file as CSV, units in the headers."""
-    from wearsim.results import (
-        export_csv,
-        kind_of,
-        open_dissipation,
-        open_ensemble,
-        open_results,
-    )
+    """Write a results file as CSV, with units in the headers."""
+    from wearsim.results import export_csv
 
-    openers: dict[FileKind, Callable[[Path], Result | DissipationResult | EnsembleResult]] = {
-        "replay": open_results,
-        "dissipation": open_dissipation,
-        "ensemble": open_ensemble,
-    }
-    for path in export_csv(openers[kind_of(file)](file), output):
+    for path in export_csv(open_any(file), output):
         typer.echo(str(path))

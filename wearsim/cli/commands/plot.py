@@ -1,74 +1,80 @@
-"""`wearsim plot`: the figure of a results file."""
+"""`wearsim plot`: figure of a results file."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from wearsim.cli.arguments import Figure, Force, ResultsFile, check_figure, read_text
-from wearsim.cli.output import note, refuse_existing
+from wearsim.cli.arguments import Figure, Force, ResultsFile, check_figure, open_any, read_text
+from wearsim.cli.output import note
 
-Measured = Annotated[
+if TYPE_CHECKING:
+    from wearsim.report.parts.measured_profiles import Measured
+    from wearsim.results import DissipationResult, EnsembleResult, Result
+
+MeasuredFiles = Annotated[
     list[Path] | None,
     typer.Option(
         "--measured",
         metavar="CSV",
-        help="Measured profile drawn on top: columns 'y [mm]' and 'depth [um]', or 'height [um]'"
-        " with worn material negative. May be repeated.",
+        help="Measured profile to draw as points: columns 'y [mm]' and 'depth [um]', or 'height"
+        " [um]' with worn material negative. May be repeated.",
         show_default=False,
     ),
 ]
 
 
 def plot(
-    file: ResultsFile, figure: Figure = None, measured: Measured = None, force: Force = False
+    file: ResultsFile, figure: Figure = None, measured: MeasuredFiles = None, force: Force = False
 ) -> None:
-    """Draw what a results file holds, whatever made it."""
+    """Draw the figure of a results file of any kind."""
     path = figure if figure is not None else Path(f"{file.stem}.png")
-    check_figure(path)
-    refuse_existing(path, force)
-    from wearsim.results import kind_of, refuse_inputs
+    check_figure(path, force)
+    from wearsim.report.parts.measured_profiles import read_measured
+    from wearsim.results import Result, refuse_inputs
 
     refuse_inputs(path, [file], "the figure")
     refuse_inputs(path, measured or [], "a measured profile")
-    kind = kind_of(file)
-    if kind == "replay":
-        _draw_test(file, path, measured)
-    elif measured:
-        what = "a study of one contact" if kind == "dissipation" else "an ensemble"
+    result = open_any(file)
+    if measured and not isinstance(result, Result):
         raise typer.BadParameter(
-            f"goes with a wear test, and this is {what}", param_hint="--measured"
+            f"requires the file of a wear test; {file} is none", param_hint="--measured"
         )
-    elif kind == "ensemble":
-        _draw_ensemble(file, path)
-    else:
-        _draw_study(file, path)
+    draw(result, path, [read_measured(read_text(csv), str(csv)) for csv in measured or []])
     note(f"figure: {path}")
 
 
-def _draw_study(file: Path, path: Path) -> None:
-    from wearsim.cli.commands.dissipation import draw
-    from wearsim.results import open_dissipation
+def draw(
+    result: Result | DissipationResult | EnsembleResult,
+    path: Path,
+    measured: Sequence[Measured] = (),
+) -> None:
+    """Write the figure of a result.
 
-    draw(open_dissipation(file), path)
-
-
-def _draw_ensemble(file: Path, path: Path) -> None:
-    from wearsim.cli.commands.ensemble import draw
-    from wearsim.results import open_ensemble
-
-    draw(open_ensemble(file), path)
-
-
-def _draw_test(file: Path, path: Path, measured: list[Path] | None) -> None:
-    from wearsim.report.parts.measured_profiles import read_measured
-    from wearsim.results import open_results
-
-    result = open_results(file)
-    profiles = [read_measured(read_text(csv), str(csv)) for csv in measured or []]
-    from wearsim.report.figures.run import run_figure
+    Parameters
+    ----------
+    result : Result, DissipationResult or EnsembleResult
+    path : Path
+        Name of the figure.
+    measured : sequence of Measured
+        Profiles drawn over those of a run.
+    """
     from wearsim.report.parts.saving import save_figure
+    from wearsim.results import DissipationResult, EnsembleResult
 
-    save_figure(run_figure(result, profiles), path)
+    if isinstance(result, EnsembleResult):
+        from wearsim.report.figures.ensemble import ensemble_figure
+
+        figure = ensemble_figure(result)
+    elif isinstance(result, DissipationResult):
+        from wearsim.report.figures.dissipation import dissipation_figure
+
+        figure = dissipation_figure(result)
+    else:
+        from wearsim.report.figures.run import run_figure
+
+        figure = run_figure(result, measured)
+    save_figure(figure, path)

@@ -1,4 +1,4 @@
-"""`wearsim plugins`: what is installed, from where, and what it can do."""
+"""`wearsim plugins`: installed plugins and their capabilities."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from wearsim.cli.arguments import Json
 from wearsim.cli.output import note, write_json, write_list
 
 if TYPE_CHECKING:
-    from wearsim.plugins.manager import Broken, Registered
+    from wearsim.plugins.manager import Registered
 
 _HEADS = ("name", "kind", "distribution", "version", "capabilities", "summary")
 
@@ -18,12 +18,15 @@ def plugins(json: Json = False) -> None:
     from wearsim.plugins import registry
 
     found = registry()
+    entries = [_entry(item) for item in found.all()]
     if json:
-        listed = [_entry(item) for item in found.all()]
-        write_json({"plugins": listed, "broken": [_broken(item) for item in found.broken]})
+        keys = ("entry_point", "distribution", "version", "cause")
+        broken = [{key: getattr(item, key) for key in keys} for item in found.broken]
+        write_json({"plugins": entries, "broken": broken})
         return
-    rows = [{**_entry(item), "capabilities": _words(item)} for item in found.all()]
-    write_list(_HEADS, [[row[head] for head in _HEADS] for row in rows])
+    for entry in entries:
+        entry["capabilities"] = ", ".join(word.replace("_", " ") for word in entry["capabilities"])
+    write_list(_HEADS, [[entry[head] for head in _HEADS] for entry in entries])
     for item in found.broken:
         note(
             f"broken: plugin '{item.entry_point}' of {item.distribution} {item.version}"
@@ -41,16 +44,3 @@ def _entry(item: Registered) -> dict[str, Any]:
         "summary": item.spec.summary,
         "references": list(item.spec.references),
     }
-
-
-def _broken(item: Broken) -> dict[str, str]:
-    return {
-        "entry_point": item.entry_point,
-        "distribution": item.distribution,
-        "version": item.version,
-        "cause": item.cause,
-    }
-
-
-def _words(item: Registered) -> str:
-    return ", ".join(word.replace("_", " ") for word in item.spec.describe())

@@ -1,4 +1,4 @@
-"""`wearsim run`: a wear test from its scenario to its results file."""
+"""`wearsim run`: wear test of a scenario."""
 
 from __future__ import annotations
 
@@ -7,22 +7,21 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from wearsim.cli.arguments import Force, Json, Quiet, ScenarioFile, Settings, read_scenario
-from wearsim.cli.output import note, write_json, write_line, write_table
+from wearsim.cli.arguments import (
+    Force,
+    Json,
+    Quiet,
+    ScenarioFile,
+    Settings,
+    read_scenario,
+    results_option,
+)
+from wearsim.cli.output import write_json, write_notes, write_table
 
 if TYPE_CHECKING:
     from wearsim.results import Result
 
-Output = Annotated[
-    Path | None,
-    typer.Option(
-        "--output",
-        "-o",
-        metavar="FILE.h5",
-        help="Results file; by default the scenario's name with .h5, in the current folder.",
-        show_default=False,
-    ),
-]
+Output = Annotated[Path | None, results_option(".h5")]
 
 
 def run(
@@ -38,19 +37,16 @@ def run(
     path = output if output is not None else Path(f"{scenario.stem}.h5")
     from wearsim.cli.progress.run import watching
     from wearsim.cli.signals import stop_on_signals
-    from wearsim.studies.run import run as replay
+    from wearsim.studies.run import run as study
 
-    for text in loaded.notes:
-        note(f"note: {text}")
+    write_notes(loaded.notes)
     with stop_on_signals() as stop, watching(quiet) as watch:
-        result = replay.run(
-            loaded, path, force=force, on_event=watch, stop_requested=stop.requested
-        )
+        result = study.run(loaded, path, force=force, on_event=watch, stop_requested=stop.requested)
     report(result, json)
 
 
 def report(result: Result, json: bool) -> None:
-    """Write how a run ended to stdout."""
+    """Write the summary of a run to stdout."""
     from wearsim.cli.render.run_footer import run_line
     from wearsim.cli.render.summary import as_json, draws, effort, end_state, standing
 
@@ -59,4 +55,4 @@ def report(result: Result, json: bool) -> None:
         return
     rows = [("test", standing(result)), *draws(result), *end_state(result), *effort(result)]
     write_table(result.title, [*rows, ("results file", str(result.path))])
-    write_line(run_line(result))
+    typer.echo(run_line(result))

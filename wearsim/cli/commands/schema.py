@@ -1,4 +1,4 @@
-"""`wearsim schema`: the JSON Schema of a scenario, for editors."""
+"""`wearsim schema`: JSON Schema of a scenario, for editors."""
 
 from __future__ import annotations
 

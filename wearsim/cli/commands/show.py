@@ -1,11 +1,11 @@
-"""`wearsim show`: what is in a results file, and its end state."""
+"""`wearsim show`: content of a results file."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from wearsim.cli.arguments import Json, ResultsFile
-from wearsim.cli.output import tell_notes, write_json, write_table
+from wearsim.cli.arguments import Json, ResultsFile, open_any
+from wearsim.cli.output import write_json, write_notes, write_table
 
 if TYPE_CHECKING:
     from wearsim.results import DissipationResult, EnsembleResult, Result
@@ -13,71 +13,80 @@ if TYPE_CHECKING:
 
 
 def show(file: ResultsFile, json: Json = False) -> None:
-    """Tell what is in a results file, and its end state."""
-    from wearsim.cli.render.summary import end_state
-    from wearsim.results import kind_of, open_dissipation, open_ensemble, open_results
+    """Show the content of a results file and the end state."""
+    from wearsim.cli.render import dissipation_table, ensemble_table, summary
+    from wearsim.results import DissipationResult, EnsembleResult
 
-    kind = kind_of(file)
-    if kind == "dissipation":
-        _show_study(open_dissipation(file), json)
-        return
-    if kind == "ensemble":
-        _show_ensemble(open_ensemble(file), json)
-        return
-    result = open_results(file)
+    result = open_any(file)
     if json:
-        write_json(_data(result))
+        write_json({**_data(result), **_origin(result.raw)})
         return
-    write_table(result.title, _contents(result))
-    write_table("end state" if result.finished else "state so far", end_state(result))
-    tell_notes(result)
-
-
-def _show_study(result: DissipationResult, json: bool) -> None:
-    from wearsim.cli.render.dissipation_table import as_json, write_spread
-
-    raw = result.raw
-    if json:
-        write_json({**as_json(result), **_origin(raw)})
-        return
-    write_spread(result, _sources(raw))
-    tell_notes(result)
-
-
-def _show_ensemble(result: EnsembleResult, json: bool) -> None:
-    from wearsim.cli.commands.ensemble import tell_failures
-    from wearsim.cli.render.ensemble_table import as_json, write_ensemble
-
-    raw = result.raw
-    if json:
-        write_json({**as_json(result), **_origin(raw)})
-        return
-    groups = [(f"random {item['name']}", item["text"]) for item in raw.groups]
-    write_ensemble(result, [*groups, *_sources(raw)])
-    tell_notes(result)
-    tell_failures(result)
+    if isinstance(result, DissipationResult):
+        dissipation_table.write_spread(result, _sources(result.raw))
+    elif isinstance(result, EnsembleResult):
+        groups = [(f"random {item['name']}", item["text"]) for item in result.raw.groups]
+        ensemble_table.write_ensemble(result, [*groups, *_sources(result.raw)])
+    else:
+        write_table(result.title, _contents(result))
+        title = "end state" if result.finished else "current state"
+        write_table(title, summary.end_state(result))
+    write_notes(result.notes, result.warnings)
+    if isinstance(result, EnsembleResult):
+        ensemble_table.warn_of_failures(result)
 
 
 def _sources(raw: StudyData) -> list[tuple[str, str]]:
-    """Return what the realisations of a study were made from, and with what."""
+    """Return rows on scenario, input files, plugins and software of a study."""
+    plugins = [
+        f"{item['kind']} {item['name']} ({item['distribution']} {item['version']})"
+        for item in raw.plugins
+    ]
     return [
         ("scenario", raw.scenario_file),
         ("input files", ", ".join(raw.files) or "none"),
-        ("plugins", "\n".join(_plugins(raw))),
+        ("plugins", "\n".join(plugins)),
         ("software", ", ".join(f"{name} {number}" for name, number in raw.software.items())),
         ("written", raw.created),
     ]
 
 
-def _plugins(raw: StudyData) -> list[str]:
+def _contents(result: Result) -> list[tuple[str, str]]:
+    """Return rows on how a run was computed."""
+    from wearsim.cli.render.summary import draws, effort, standing
+    from wearsim.report.text.units import count
+
+    first, last = (count(float(result.record_passes[place])) for place in (0, -1))
     return [
-        f"{item['kind']} {item['name']} ({item['distribution']} {item['version']})"
-        for item in raw.plugins
+        ("test", standing(result)),
+        ("contact model", result.described_model),
+        ("stepper", f"{result.stepper}, tolerance {result.raw.tolerance:g}"),
+        ("seed", str(result.raw.seed)),
+        *draws(result),
+        ("records", f"{len(result.record_passes)}, at passes {first} to {last}"),
+        ("strips", str(len(result.y))),
+        *effort(result),
+        *_sources(result.raw),
     ]
 
 
+def _data(result: Result | DissipationResult | EnsembleResult) -> dict[str, Any]:
+    from wearsim.cli.render import dissipation_table, ensemble_table, summary
+    from wearsim.results import DissipationResult, EnsembleResult
+
+    if isinstance(result, DissipationResult):
+        return dissipation_table.as_json(result)
+    if isinstance(result, EnsembleResult):
+        return ensemble_table.as_json(result)
+    return {
+        **summary.as_json(result),
+        "total_passes": result.raw.total_passes,
+        "tolerance": result.raw.tolerance,
+        "record_passes": result.record_passes,
+    }
+
+
 def _origin(raw: StudyData) -> dict[str, Any]:
-    """Return what a file was made from, and with what."""
+    """Return scenario, input files, plugins and software of a study."""
     return {
         "scenario_file": raw.scenario_file,
         "scenario_sha256": raw.sha256,
@@ -87,40 +96,4 @@ def _origin(raw: StudyData) -> dict[str, Any]:
         "software": raw.software,
         "seed": raw.seed,
         "created": raw.created,
-    }
-
-
-def _contents(result: Result) -> list[tuple[str, str]]:
-    from wearsim.cli.render.summary import draws, effort, standing
-    from wearsim.report.text.units import count
-
-    raw = result.raw
-    records = f"{len(result.record_passes)}, at passes {count(float(result.record_passes[0]))} to"
-    return [
-        ("test", standing(result)),
-        ("scenario", raw.scenario_file),
-        ("input files", ", ".join(raw.files) or "none"),
-        ("contact model", result.described_model),
-        ("stepper", f"{result.stepper}, tolerance {raw.tolerance:g}"),
-        ("plugins", "\n".join(_plugins(raw))),
-        ("software", ", ".join(f"{name} {number}" for name, number in raw.software.items())),
-        ("seed", str(raw.seed)),
-        *draws(result),
-        ("written", raw.created),
-        ("records", f"{records} {count(float(result.record_passes[-1]))}"),
-        ("strips", str(len(result.y))),
-        *effort(result),
-    ]
-
-
-def _data(result: Result) -> dict[str, Any]:
-    from wearsim.cli.render.summary import as_json
-
-    raw = result.raw
-    return {
-        **as_json(result),
-        "total_passes": raw.total_passes,
-        **_origin(raw),
-        "tolerance": raw.tolerance,
-        "record_passes": result.record_passes,
     }

@@ -1,1 +1,1 @@
-"""Progress bars."""
+"""Progress of runs and ensembles on stderr."""

@@ -1,4 +1,4 @@
-"""Shows a run's events: a live line on a terminal, occasional plain lines elsewhere."""
+"""Progress of a run: one live line on a terminal, occasional plain lines elsewhere."""
 
 from __future__ import annotations
 
@@ -17,27 +17,34 @@ if TYPE_CHECKING:
 
 Watcher: TypeAlias = Callable[[Event], None]
 BETWEEN_LINES = 1.0  # s
-ROOM_FOR_BAR = 115  # columns
 
 
 @contextmanager
 def watching(quiet: bool) -> Iterator[Watcher]:
-    """Give a watcher for a run's events; everything it shows goes to stderr.
+    """Open a display of the events of a run on stderr.
 
     Parameters
     ----------
     quiet : bool
-        Show warnings alone.
+        Whether to show warnings only.
     """
+    screen = console(err=True)
     if quiet:
         yield _warn
-        return
-    screen = console(err=True)
-    if not screen.is_terminal:
+    elif not screen.is_terminal:
         yield PlainLines(note)
-        return
-    with _bar(screen) as progress:
-        yield LiveLine(progress)
+    else:
+        text = "{task.percentage:3.0f} %  {task.fields[passes]}  {task.fields[details]}"
+        with live_line(screen, text, bar_width=24) as progress:
+            yield LiveLine(progress)
+
+
+def live_line(screen: Console, text: str, bar_width: int, columns: int = 115) -> Progress:
+    """Return a progress display of one line, with a bar if the terminal has enough columns."""
+    from rich.progress import BarColumn, Progress, TextColumn
+
+    bar = [BarColumn(bar_width)] if screen.width >= columns else []
+    return Progress(*bar, TextColumn(text, markup=False), console=screen)
 
 
 def _warn(event: Event) -> None:
@@ -46,56 +53,51 @@ def _warn(event: Event) -> None:
 
 
 class Clock:
-    """Foretells the time a run still takes, from the passes it did since it started.
+    """Estimate of the remaining time of a run, from its rate of passes.
 
     Parameters
     ----------
     now : callable
-        Returns a time [s] that never goes back.
+        Returns a monotonic time [s].
     """
 
     def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
         self.now = now
         self._begun, self._from = now(), 0.0
 
-    def start(self, event: Started) -> None:
-        """Start counting."""
+    def start(self, event: Started) -> str:
+        """Start the clock and return a description of the run."""
         self._begun, self._from = self.now(), event.from_passes
+        passes = f"{count(event.total_passes)} passes"
+        if event.from_passes:
+            passes = f"from pass {count(event.from_passes)} of {passes}"
+        verb = "continuing" if event.from_passes else "running"
+        return (
+            f"{verb} {passes}, {shown(event.total_time, 'min')},"
+            f" with {event.model}, {event.stepper}"
+        )
 
-    def left(self, event: Stepped) -> str:
-        """Return the time left, as words; nothing while too little is done to tell, or all is."""
+    def details(self, event: Stepped) -> str:
+        """Return simulated time, depth, step size and, after 2 % of the passes, the time left."""
+        text = (
+            f"{shown(event.time, 'min')}, depth {shown(event.depth, 'um')},"
+            f" step {count(event.step_passes)}"
+        )
         done, left = event.passes - self._from, event.total_passes - event.passes
         if done < 0.02 * event.total_passes or left <= 0.0:
-            return ""
-        return f", {lapse((self.now() - self._begun) * left / done)} left"
-
-
-def opening(event: Started) -> str:
-    """Return what is said when a run starts."""
-    verb = f"going on from pass {count(event.from_passes)} of" if event.from_passes else "running"
-    return (
-        f"{verb} {count(event.total_passes)} passes, {shown(event.total_time, 'min')},"
-        f" with {event.model}, {event.stepper}"
-    )
-
-
-def details(event: Stepped) -> str:
-    """Return where a run stands, but for its passes."""
-    return (
-        f"{shown(event.time, 'min')}, depth {shown(event.depth, 'um')},"
-        f" step {count(event.step_passes)}"
-    )
+            return text
+        return f"{text}, {lapse((self.now() - self._begun) * left / done)} left"
 
 
 class PlainLines:
-    """Writes a line now and then: the first and the last step always, others a second apart.
+    """Lines for the first step, the last step and, one second apart, steps between.
 
     Parameters
     ----------
     write : callable
-        Takes a line.
+        Writes a line.
     clock : Clock, optional
-        Tells the time.
+        Source of the time.
     """
 
     def __init__(self, write: Callable[[str], None], clock: Clock | None = None) -> None:
@@ -103,45 +105,30 @@ class PlainLines:
         self._written: float | None = None
 
     def __call__(self, event: Event) -> None:
-        """Take note of an event."""
+        """Show an event."""
         if isinstance(event, Started):
-            self._clock.start(event)
-            self._write(opening(event))
+            self._write(self._clock.start(event))
         elif isinstance(event, Stepped):
-            self._step(event)
+            now, last = self._clock.now(), event.passes >= event.total_passes
+            if not last and self._written is not None and now - self._written < BETWEEN_LINES:
+                return
+            self._written = now
+            part = 100.0 * event.passes / event.total_passes
+            details = self._clock.details(event)
+            self._write(f"pass {count(event.passes)} ({part:.0f} %), {details}")
         elif isinstance(event, Warned):
             self._write(f"warning: {event.message}")
         elif isinstance(event, Finished):
             self._write(f"done in {lapse(event.wall_seconds)}")
 
-    def _step(self, event: Stepped) -> None:
-        now, last = self._clock.now(), event.passes >= event.total_passes
-        if not last and self._written is not None and now - self._written < BETWEEN_LINES:
-            return
-        self._written = now
-        part = 100.0 * event.passes / event.total_passes
-        self._write(
-            f"pass {count(event.passes)} ({part:.0f} %), {details(event)}{self._clock.left(event)}"
-        )
-
-
-def _bar(screen: Console) -> Progress:
-    from rich.progress import BarColumn, Progress, TextColumn
-
-    text = "{task.percentage:3.0f} %  {task.fields[passes]}  {task.fields[details]}"
-    columns = [TextColumn(text, markup=False)]
-    if screen.width >= ROOM_FOR_BAR:
-        return Progress(BarColumn(bar_width=24), *columns, console=screen)
-    return Progress(*columns, console=screen)
-
 
 class LiveLine:
-    """Keeps one line up to date.
+    """One line that is updated.
 
     Parameters
     ----------
     progress : rich.progress.Progress
-        Draws the line.
+        Display of the line.
     """
 
     def __init__(self, progress: Progress) -> None:
@@ -149,17 +136,16 @@ class LiveLine:
         self._task = progress.add_task("", total=1.0, passes="", details="")
 
     def __call__(self, event: Event) -> None:
-        """Take note of an event."""
+        """Show an event."""
         if isinstance(event, Started):
-            self._clock.start(event)
-            self._progress.console.print(opening(event))
+            self._progress.console.print(self._clock.start(event))
             self._progress.update(self._task, total=event.total_passes, completed=event.from_passes)
         elif isinstance(event, Stepped):
             self._progress.update(
                 self._task,
                 completed=event.passes,
                 passes=f"{count(event.passes)} passes",
-                details=details(event) + self._clock.left(event),
+                details=self._clock.details(event),
             )
         elif isinstance(event, Warned):
             self._progress.console.print(f"warning: {event.message}")

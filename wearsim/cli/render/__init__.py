@@ -1,1 +1,1 @@
-"""Tables and text for the terminal."""
+"""Tables and text for the terminal, and the data of the JSON output."""

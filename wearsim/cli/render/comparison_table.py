@@ -1,4 +1,4 @@
-"""Runs and ensembles side by side: a table in engineers' units, or a JSON object in SI."""
+"""Comparison of runs and ensembles: tables in engineering units, JSON in SI units."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from wearsim.cli.output import note, write_json, write_list, write_table
+from wearsim.cli.output import note, write_json, write_list, write_notes, write_table
 from wearsim.cli.render.ensemble_table import INTERVAL
 from wearsim.report.text.comparison_words import against, kind, length
-from wearsim.report.text.intervals import cells
+from wearsim.report.text.estimates import cells
 from wearsim.report.text.labels import OBSERVABLES, si_key
 from wearsim.report.text.units import NOTHING, count
 
@@ -23,107 +23,94 @@ def report_comparison(
     results: Sequence[Result | EnsembleResult],
     labels: Sequence[str],
     observable: str,
-    title: str,
+    key: str,
     figure: Path | None,
     json: bool,
 ) -> None:
-    """Compare runs and ensembles, draw it, and write it to stdout.
+    """Compare runs and ensembles, draw the figure, and write the comparison to stdout.
 
     Parameters
     ----------
     results : sequence of Result or EnsembleResult
         Two or more.
     labels : sequence of str
-        What each is called.
+        Labels of the results.
     observable : str
-        What is compared.
-    title : str
-        What tells them apart; may be empty.
+        Quantity to compare.
+    key : str
+        Scenario key in which the results differ; may be empty.
     figure : Path, optional
-        Where to draw it.
+        Name of the figure.
     json : bool
-        As one JSON object.
+        Whether to write JSON instead of tables.
     """
     from wearsim.studies.ensemble.compare import compare
 
     found = compare(results, labels, observable)
+    files = [str(result.path) for result in results]
+    suffix = f"for values of {key}" if key else ""
     if figure is not None:
-        _draw(found, _heading(results, title), figure)
+        from wearsim.report.figures.ensemble_comparison import comparison_figure
+        from wearsim.report.parts.saving import save_figure
+
+        titles = {result.title for result in results}
+        shared = titles.pop() if len(titles) == 1 else ""
+        heading = ", ".join(text for text in (shared, suffix) if text)
+        save_figure(comparison_figure(found, heading), figure)
     if json:
-        files = [str(result.path) for result in results]
-        write_json({**as_json(found, files), "title": title or None, "figure": figure})
+        write_json({**as_json(found, files), "title": key or None, "figure": figure})
     else:
-        _write(found, results, title)
+        _write(found, files, suffix)
         if figure is not None:
             note(f"figure: {figure}")
-    for text in _doubts(found):
-        note(f"warning: {text}")
+    write_notes((), _warnings(found))
 
 
-def _heading(results: Sequence[Result | EnsembleResult], title: str) -> str:
-    """Return what stands above the figure: the tests' title where they share one, and the key."""
-    titles = {result.title for result in results}
-    shared = titles.pop() if len(titles) == 1 else ""
-    return ", ".join([shared] * bool(shared) + [f"for values of {title}"] * bool(title))
-
-
-def _doubts(found: Comparison) -> list[str]:
-    """Return why what is compared may not be alike."""
+def _warnings(found: Comparison) -> list[str]:
+    """Return warnings of unequal lengths of the tests and of failed realisations."""
     texts = []
     if not found.equally_long:
         ends = "; ".join(f"{row.label}: {length(row)}" for row in found.rows)
-        texts.append(
-            f"the tests are not of the same length ({ends}): what differs at their ends is that too"
-        )
+        texts.append(f"the tests differ in length ({ends}), which contributes to the differences")
     texts += [
         f"{count(row.failed)} of the {count(row.done + row.failed)} realisations of {row.label}"
-        " failed: what is told of it is of those that ended well, which may be biased"
+        " failed; estimates from the others may be biased"
         for row in found.rows
         if row.failed
     ]
     return texts
 
 
-def _draw(found: Comparison, title: str, path: Path) -> None:
-    from wearsim.report.figures.ensemble_comparison import comparison_figure
-    from wearsim.report.parts.saving import save_figure
-
-    save_figure(comparison_figure(found, title), path)
-
-
-def _write(found: Comparison, results: Sequence[Result | EnsembleResult], title: str) -> None:
+def _write(found: Comparison, files: Sequence[str], suffix: str) -> None:
     named = OBSERVABLES[found.observable]
-    what = f"{named.words} at the end" + (f", for values of {title}" if title else "")
-    files = [str(result.path) for result in results]
-    told = [(row.label, _told(row, file)) for row, file in zip(found.rows, files, strict=True)]
-    write_table("", [("compared", what), *told])
+    what = f"{named.words} at the end" + (f", {suffix}" if suffix else "")
+    described = [
+        (row.label, f"{kind(row)}; {length(row)}; {file}")
+        for row, file in zip(found.rows, files, strict=True)
+    ]
+    write_table("", [("compared", what), *described])
     probabilities = [p for p, _ in next((row.quantiles for row in found.rows if row.quantiles), ())]
     heads = ["[" + named.unit + "]", "mean", "std", *(f"{100 * p:g} %" for p in probabilities)]
     write_list(heads, [line for row in found.rows for line in _lines(row, named.unit, len(heads))])
     write_table("", [line for row in found.rows[1:] for line in against(found, row)])
 
 
-def _told(row: Compared, file: str) -> str:
-    return f"{kind(row)}; {length(row)}; {file}"
-
-
 def _lines(row: Compared, unit: str, columns: int) -> list[list[str]]:
-    """Return the estimates of one of what is compared, and below them their intervals."""
+    """Return the estimates of a run or an ensemble, and below them their intervals."""
     items = [row.value]
-    items += [row.std] if row.std is not None and row.count > 1 else []
-    items += [interval for _, interval in row.quantiles] if row.count > 1 else []
-    found = [cells(item, unit) for item in items]
-    lines = [[row.label, *(value for value, _ in found)]]
-    if any(interval for _, interval in found):
-        name = "  stated error" if row.kind == "run" else INTERVAL
-        lines.append([name, *(interval for _, interval in found)])
-    return [
-        line + [NOTHING if n == 0 else ""] * (columns - len(line)) for n, line in enumerate(lines)
-    ]
+    if row.count > 1:
+        items += [row.std] if row.std is not None else []
+        items += [interval for _, interval in row.quantiles]
+    values, intervals = zip(*(cells(item, unit) for item in items), strict=True)
+    lines = [[row.label, *values, *[NOTHING] * (columns - 1 - len(items))]]
+    if any(intervals):
+        name = "  error estimate" if row.kind == "run" else INTERVAL
+        lines.append([name, *intervals, *[""] * (columns - 1 - len(items))])
+    return lines
 
 
 def as_json(found: Comparison, files: Sequence[str]) -> dict[str, Any]:
-    """Return a comparison in SI, the first being what the others are held against."""
+    """Return a comparison in SI units; all results are compared with the first."""
     return {
         "observable": si_key(found.observable),
         "same_length": found.equally_long,
@@ -149,7 +136,7 @@ def as_json(found: Comparison, files: Sequence[str]) -> dict[str, Any]:
                 }
                 if row.paired is not None
                 else None,
-                "difference_from_first": asdict(row.apart) if row.apart else None,
+                "difference_from_first": asdict(row.difference) if row.difference else None,
             }
             for row, file in zip(found.rows, files, strict=True)
         ],

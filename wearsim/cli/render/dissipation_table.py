@@ -1,12 +1,12 @@
-"""What realisations of one contact tell: tables in engineers' units, or a JSON object in SI."""
+"""Estimates of a dissipation study: tables in engineering units, JSON in SI units."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
 from wearsim.cli.output import write_list, write_table
-from wearsim.cli.render.drawn_inputs import CONSTANT, drawn_data, drawn_rows
-from wearsim.cli.render.summary import still_random
+from wearsim.cli.render.summary import CONSTANT, Rows, input_data, input_rows, still_random
+from wearsim.report.text.labels import Named
 from wearsim.report.text.units import NOTHING, count, lapse, shown
 from wearsim.uq.estimation.moments import is_constant
 
@@ -14,119 +14,95 @@ if TYPE_CHECKING:
     from wearsim.results import DissipationResult
     from wearsim.uq.estimation.moments import Summary
 
-Rows = list[tuple[str, str]]
-UNITS = {
-    "power": "W",
-    "force_x": "N",
-    "force_y": "N",
-    "spin_moment": "N mm",
-    "normal_force": "N",
-    "peak_pressure": "MPa",
-}
-WORDS = {
-    "power": "dissipated power",
-    "force_x": "longitudinal force",
-    "force_y": "lateral force",
-    "spin_moment": "spin moment",
-    "normal_force": "normal force",
-    "peak_pressure": "peak pressure",
+QUANTITIES = {
+    "power": Named("dissipated power", "W"),
+    "force_x": Named("longitudinal force", "N"),
+    "force_y": Named("lateral force", "N"),
+    "spin_moment": Named("spin moment", "N mm"),
+    "normal_force": Named("normal force", "N"),
+    "peak_pressure": Named("peak pressure", "MPa"),
 }
 _SI = {"W": "W", "N": "N", "N mm": "N_m", "MPa": "Pa"}
-_ROUNDING = 1e-12  # of forces, in parts of the load
+_ROUNDING = 1e-12  # rounding errors of forces, relative to the normal force
 _TOO_FEW = "too few realisations"
 
 
 def write_spread(result: DissipationResult, more: Rows) -> None:
-    """Write what a study found to stdout.
+    """Write the estimates of a study to stdout.
 
     Parameters
     ----------
     result : DissipationResult
     more : list of (str, str)
-        Rows to end with.
+        Last rows.
     """
-    raw = result.raw
+    raw, done = result.raw, count(result.count)
+    words = [raw.plan, f"seed {raw.seed}"]
+    standing = (
+        [done, *words]
+        if result.finished
+        else [f"{done} of {count(raw.asked)}", *words, "unfinished"]
+    )
     rows = [
-        ("realisations", standing(result)),
+        ("realisations", ", ".join(standing)),
         ("contact model", result.described_model),
         ("strips", f"{len(result.y)} of {shown(raw.strip_width, 'um')}"),
     ]
-    rows += [("friction taken at", raw.friction_grid)] if raw.friction_grid else []
-    rows += [("inputs at their mean", f"{shown(result.mean_problem_power, 'W')} dissipated")]
-    write_table(result.title, [*rows, *_power(result.summaries["power"])])
+    rows += [("friction sampled on", raw.friction_grid)] if raw.friction_grid else []
+    rows += [("inputs at their means", f"{shown(result.mean_problem_power, 'W')} dissipated")]
+    write_table(result.title, [*rows, *_power_ranges(result.summaries["power"])])
     heads = ("", "mean", "standard error", "std", "standard error", "skewness")
-    write_list(heads, [_line(name, result) for name in UNITS])
-    effort = f"{lapse(raw.solve_seconds)} for the contacts, {lapse(raw.wall_seconds)} in all"
-    random = [(f"random {name}", text) for name, text in still_random(result).items()]
-    write_table("", [*drawn_rows(raw.inputs, result.inputs), *random, ("wall time", effort), *more])
+    write_list(heads, [_cells(name, result) for name in QUANTITIES])
+    effort = f"{lapse(raw.solve_seconds)} for the contacts, {lapse(raw.wall_seconds)} in total"
+    write_table("", [*input_rows(result), ("wall time", effort), *more])
 
 
-def standing(result: DissipationResult) -> str:
-    """Return how many realisations are done, and how they were drawn."""
-    raw = result.raw
-    done = (
-        count(result.count) if result.finished else f"{count(result.count)} of {count(raw.asked)}"
-    )
-    words = [done, raw.plan, f"seed {raw.seed}"]
-    return ", ".join(words if result.finished else [*words, "unfinished"])
-
-
-def _power(power: Summary) -> Rows:
-    """Return the ranges of the power, each end with its confidence interval."""
+def _power_ranges(power: Summary) -> Rows:
+    """Return rows on quantile ranges of the power, with the confidence intervals of their ends."""
     if power.count == 1 or power.is_constant:
-        same = "" if power.count == 1 else ", the same in all realisations"
-        return [("power", shown(power.mean, "W") + same)]
+        equal = "" if power.count == 1 else ", equal in all realisations"
+        return [("dissipated power", shown(power.mean, "W") + equal)]
     rows = []
     for low, high in ((0.025, 0.975), (0.05, 0.95)):
         ends = [power.quantile(low), power.quantile(high)]
-        values = " to ".join(shown(end.value, "W").removesuffix(" W") for end in ends)
-        sure = _confidence([_interval(end.low, end.high) for end in ends])
-        name = f"power, {100 * low:g} to {100 * high:g} %"
-        rows.append((name, f"{values} W (95 % confidence: {sure})"))
-    least, greatest = shown(power.least, "W").removesuffix(" W"), shown(power.greatest, "W")
-    return [*rows, ("power, least to greatest", f"{least} to {greatest}")]
+        values = " to ".join(_watts(end.value) for end in ends)
+        # as many digits as the quantile, which would else seem to be outside its interval
+        pairs = [(_watts(end.low), _watts(end.high)) for end in ends]
+        intervals = [_TOO_FEW if NOTHING in pair else " to ".join(pair) for pair in pairs]
+        confidence = " and ".join(dict.fromkeys(intervals))
+        name = f"dissipated power, {100 * low:g} to {100 * high:g} %"
+        rows.append((name, f"{values} W (95 % confidence: {confidence})"))
+    extremes = f"{_watts(power.least)} to {shown(power.greatest, 'W')}"
+    return [*rows, ("dissipated power, least to greatest", extremes)]
 
 
-def _interval(low: float, high: float) -> str:
-    # with the digits of the estimate, or it could seem to lie outside
-    ends = [shown(value, "W").removesuffix(" W") for value in (low, high)]
-    return _TOO_FEW if NOTHING in ends else " to ".join(ends)
+def _watts(value: float) -> str:
+    return shown(value, "W").removesuffix(" W")
 
 
-def _confidence(intervals: list[str]) -> str:
-    return intervals[0] if len(set(intervals)) == 1 else " and ".join(intervals)
-
-
-def _rounding(name: str, result: DissipationResult) -> float:
-    """Return what rounding leaves of a force or a moment that is zero, in SI."""
-    load = float(abs(result.values("normal_force")).max())
+def _cells(name: str, result: DissipationResult) -> tuple[str, ...]:
+    """Return mean, standard deviation, their standard errors and skewness of a quantity."""
+    (words, unit), summary = QUANTITIES[name], result.summaries[name]
+    force = float(abs(result.values("normal_force")).max())
     length = result.raw.strip_width * len(result.y)
-    scale = {"force_x": load, "force_y": load, "spin_moment": load * length}
-    return _ROUNDING * scale.get(name, 0.0)
-
-
-def _line(name: str, result: DissipationResult) -> tuple[str, ...]:
-    unit, summary = UNITS[name], result.summaries[name]
-    rounding = _rounding(name, result)
+    scale = {"force_x": force, "force_y": force, "spin_moment": force * length}
+    rounding = _ROUNDING * scale.get(name, 0.0)
     mean = 0.0 if abs(summary.mean) <= rounding else summary.mean
     if is_constant(mean, summary.std, rounding):
-        return (WORDS[name], shown(mean, unit), NOTHING, CONSTANT, NOTHING, NOTHING)
-    errors = (shown(value, unit, 2) for value in (summary.mean_error, summary.std_error))
-    mean_error, std_error = errors
+        return (words, shown(mean, unit), NOTHING, CONSTANT, NOTHING, NOTHING)
     return (
-        WORDS[name],
+        words,
         shown(mean, unit),
-        mean_error,
+        shown(summary.mean_error, unit, 2),
         shown(summary.std, unit),
-        std_error,
+        shown(summary.std_error, unit, 2),
         shown(summary.skewness, "1", 3),
     )
 
 
 def as_json(result: DissipationResult) -> dict[str, Any]:
-    """Return what a study found, in SI."""
+    """Return the estimates of a study in SI units."""
     raw = result.raw
-    found = {f"{name}_{_SI[unit]}": raw.statistics[name] for name, unit in UNITS.items()}
     return {
         "title": result.title,
         "model": raw.model,
@@ -136,8 +112,8 @@ def as_json(result: DissipationResult) -> dict[str, Any]:
         "asked": raw.asked,
         "finished": result.finished,
         "mean_problem_power_W": result.mean_problem_power,
-        **found,
-        "inputs": drawn_data(raw.inputs, result.inputs),
+        **{f"{name}_{_SI[named.unit]}": raw.statistics[name] for name, named in QUANTITIES.items()},
+        "inputs": input_data(result),
         "random": still_random(result),
         "friction_grid": raw.friction_grid or None,
         "strips": {

@@ -1,21 +1,25 @@
-"""The end state of a run: a table in engineers' units, or a JSON object in SI."""
+"""Summary of a run, and rows on its random inputs: tables in engineering units, JSON in SI."""
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from wearsim.report.text.units import count, lapse, shown
+from wearsim.uq.estimation.moments import is_constant
 
 if TYPE_CHECKING:
     from wearsim.results import DissipationResult, EnsembleResult, Result
+    from wearsim.types import FloatArray
 
 Rows = list[tuple[str, str]]
+CONSTANT = "constant"
 
 
-def each(values: Any, unit: str) -> str:
-    """Return one value per roller, or the one value they share."""
+def _by_roller(values: Any, unit: str) -> str:
+    """Return one value per roller, or one value if all are equal."""
     texts = [shown(float(value), unit) for value in np.ravel(values)]
     if len(set(texts)) == 1:
         return texts[0]
@@ -23,42 +27,32 @@ def each(values: Any, unit: str) -> str:
 
 
 def end_state(result: Result) -> Rows:
-    """Return the observables at the end of a run."""
-    depth, error = result.depth[-1], result.depth_error[-1]
-    rows = [
-        ("depth worn since the start", each(depth, "um")),
-        ("depth below nominal", each(result.depth_below_nominal[-1], "um")),
-        ("width", each(result.width[-1], "mm")),
-        ("worn volume", each(result.worn_volume[-1], "mm^3")),
-        ("dissipated energy", each(result.dissipated_energy[-1], "J")),
-        ("power", each(result.power[-1], "W")),
-        ("normal force", each(result.normal_force[-1], "N")),
-        ("peak pressure", each(result.peak_pressure[-1], "MPa")),
+    """Return rows on the observables at the end of a run."""
+    rows = [("depth", _by_roller(result.depth[-1], "um"))]
+    if result.start_height.any():
+        below = _by_roller(result.depth_below_nominal[-1], "um")
+        rows = [("depth worn since the start", rows[0][1]), ("depth below nominal", below)]
+    if np.any(np.asarray(result.roller_depth[-1]) > 0.0):
+        rows.insert(1, ("roller depth", _by_roller(result.roller_depth[-1], "um")))
+    rows += [
+        ("width", _by_roller(result.width[-1], "mm")),
+        ("worn volume", _by_roller(result.worn_volume[-1], "mm^3")),
+        ("dissipated energy", _by_roller(result.dissipated_energy[-1], "J")),
+        ("dissipated power", _by_roller(result.power[-1], "W")),
+        ("normal force", _by_roller(result.normal_force[-1], "N")),
+        ("peak pressure", _by_roller(result.peak_pressure[-1], "MPa")),
     ]
     if result.stepper == "per-pass":
-        rows.append(("error of stepping", "none: every pass was solved by itself"))
-    else:
-        rows.append(("estimated error of depth", _with_part(error, _deepest(result))))
-    if not result.start_height.any():
-        rows[:2] = [("depth", each(depth, "um"))]
-    if np.any(np.asarray(result.roller_depth[-1]) > 0.0):
-        rows.insert(1, ("depth of roller", each(result.roller_depth[-1], "um")))
-    return rows
-
-
-def _deepest(result: Result) -> float:
-    """Return the greatest depth on either body [m], which the error of depth refers to."""
-    return float(max(np.max(result.depth[-1]), np.max(result.roller_depth[-1])))
-
-
-def _with_part(error: Any, depth: Any) -> str:
-    worst, whole = float(np.max(error)), float(np.max(depth))
-    text = shown(worst, "um", 2)
-    return f"{text}, {shown(worst / whole, '%', 2)}" if whole > 0.0 else text
+        return [*rows, ("error of depth", "no stepping error: every roller pass is solved")]
+    error = float(np.max(result.depth_error[-1]))
+    # the error refers to the greatest depth on either body
+    depth = float(max(np.max(result.depth[-1]), np.max(result.roller_depth[-1])))
+    part = f", {shown(error / depth, '%', 2)}" if depth > 0.0 else ""
+    return [*rows, ("estimated error of depth", f"{shown(error, 'um', 2)}{part}")]
 
 
 def draws(result: Result) -> Rows:
-    """Return what was drawn in the place of random inputs, and what stayed random."""
+    """Return rows on the random inputs of a run: drawn values and inputs that vary in time."""
     from wearsim.units import engineers_unit
 
     rows = []
@@ -66,44 +60,81 @@ def draws(result: Result) -> Rows:
         unit, size = engineers_unit(drawn["unit"])
         text = " / ".join(f"{value / size:.6g}" for value in drawn["values"])
         rows.append((f"drawn {key}", text if unit == "1" else f"{text} {unit}"))
-    return rows + [(f"random {name}", text) for name, text in still_random(result).items()]
+    return [*rows, *_random_rows(result)]
+
+
+def input_rows(result: DissipationResult | EnsembleResult) -> Rows:
+    """Return rows on the random inputs of a study: mean and standard deviation of the draws."""
+    from wearsim.units import in_engineers_unit
+
+    rows = []
+    for item in result.raw.inputs if result.count else []:
+        values, unit = result.inputs[item["key"]], item["unit"]
+        mean, std = float(values.mean()), _std(values)
+        text = f"mean {in_engineers_unit(mean, unit, 4)}"
+        if is_constant(mean, std):
+            text = f"{CONSTANT} {in_engineers_unit(mean, unit, 4)}"
+        elif math.isfinite(std):
+            text += f", std {in_engineers_unit(std, unit, 4)}"
+        rows.append((f"drawn {item['key']}", text))
+    return [*rows, *_random_rows(result)]
+
+
+def input_data(result: DissipationResult | EnsembleResult) -> dict[str, Any]:
+    """Return mean and standard deviation of the draws by key, in SI units."""
+    return {
+        item["key"]: {
+            "unit": item["unit"],
+            "mean": result.inputs[item["key"]].mean(),
+            "std": _std(result.inputs[item["key"]]),
+        }
+        for item in (result.raw.inputs if result.count else [])
+    }
+
+
+def _std(values: FloatArray) -> float:
+    return float(values.std(ddof=1)) if values.size > 1 else math.nan
+
+
+def _random_rows(result: Result | DissipationResult | EnsembleResult) -> Rows:
+    return [(f"random {name}", text) for name, text in still_random(result).items()]
 
 
 def still_random(result: Result | DissipationResult | EnsembleResult) -> dict[str, str]:
-    """Return the random inputs that no one drawn value tells, by key and in words.
+    """Return descriptions of the random inputs that are not given by one drawn value, by key.
 
-    They are fields, processes and what is drawn at every pass. The stored scenario tells them;
-    where a plugin of theirs is missing, it cannot be read, and that is told instead.
+    These are fields, processes and inputs drawn at every pass. They are read from the stored
+    scenario; if one of its plugins is not installed, the reason is returned instead.
     """
     from wearsim.errors import PluginError, ScenarioError
-    from wearsim.results import EnsembleResult, Result
+    from wearsim.results import DissipationResult, Result
 
     try:
         random = result.scenario.random
     except (PluginError, ScenarioError) as error:
-        return {"inputs": f"not told, since the scenario cannot be read here: {error}"}
-    if isinstance(result, Result | EnsembleResult):
-        drawn = result.raw.drawn if isinstance(result, Result) else result.inputs
-        told = [item for item in random if not set(item.keys) <= set(drawn)]
+        return {"inputs": f"unknown, since the scenario cannot be read here: {error}"}
+    if isinstance(result, DissipationResult):
+        varying = [item for item in random if item.role in {"field", "process"}]
     else:
-        told = [item for item in random if item.role in {"field", "process"}]
-    return {item.name: item.describe() for item in told}
+        drawn = result.raw.drawn if isinstance(result, Result) else result.inputs
+        varying = [item for item in random if not set(item.keys) <= set(drawn)]
+    return {item.name: item.describe() for item in varying}
 
 
 def effort(result: Result) -> Rows:
-    """Return what the run took."""
-    solves = count(_int(result.solves))
+    """Return rows on the number of steps, the contact solves and the wall time."""
+    solves = count(_last(result.solves))
     if result.stepper == "per-pass":
-        solves += f", {count(_int(result.full_solves))} passes in full"
+        solves += f", {count(_last(result.full_solves))} roller passes solved in full"
     return [
-        ("steps", f"{count(_int(result.steps))}, {count(_int(result.rejected))} refused"),
+        ("steps", f"{count(_last(result.steps))}, {count(_last(result.rejected))} rejected"),
         ("contact solves", solves),
         ("wall time", lapse(result.raw.wall_seconds)),
     ]
 
 
 def standing(result: Result) -> str:
-    """Return how far a run has come."""
+    """Return the passes and the simulated time that a run has reached."""
     passes, total = float(result.passes[-1]), float(result.raw.total_passes)
     time = shown(float(result.time[-1]), "min")
     if result.finished:
@@ -112,13 +143,13 @@ def standing(result: Result) -> str:
     return f"unfinished: pass {count(passes)} of {count(total)} ({part}), {time}"
 
 
-def _int(value: Any) -> int:
-    """Return the last of a history, or the number itself."""
+def _last(value: Any) -> int:
+    """Return the last value of a history, or the number itself."""
     return int(np.ravel(value)[-1])
 
 
 def as_json(result: Result) -> dict[str, Any]:
-    """Return the end state and how it was reached, in SI."""
+    """Return the end state and the effort of a run in SI units."""
     return {
         **result.final,
         "title": result.title,
@@ -127,10 +158,10 @@ def as_json(result: Result) -> dict[str, Any]:
         "tolerance": result.raw.tolerance,
         "strips": len(result.y),
         "finished": bool(result.finished),
-        "steps": _int(result.steps),
-        "rejected": _int(result.rejected),
-        "solves": _int(result.solves),
-        "full_solves": _int(result.full_solves),
+        "steps": _last(result.steps),
+        "rejected": _last(result.rejected),
+        "solves": _last(result.solves),
+        "full_solves": _last(result.full_solves),
         "wall_seconds": result.raw.wall_seconds,
         "drawn": result.raw.drawn,
         "random": still_random(result),

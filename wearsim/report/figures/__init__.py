@@ -1,1 +1,1 @@
-"""Figures, one file for each kind of result."""
+"""Figures, one module for each kind of result."""

@@ -1,4 +1,4 @@
-"""The figure of runs and ensembles side by side."""
+"""Figure of a comparison of runs and ensembles."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from matplotlib.figure import Figure
 
 from wearsim.report.parts.style import BLUE, GREEN, ORANGE, RECORDS, RED, figure_style, name_axes
 from wearsim.report.text.comparison_words import against, realisations
+from wearsim.report.text.estimates import sufficient_for
 from wearsim.report.text.labels import OBSERVABLES, Named
-from wearsim.report.text.quantile_thresholds import enough_for
 
 if TYPE_CHECKING:
     from wearsim.studies.ensemble.compare import Compared, Comparison
 
-FEW = (BLUE, ORANGE, GREEN, RED)
-MOST_POINTS = 2000  # of a distribution function that is drawn
-_ROW = 0.52  # in, height of a row
-_LABEL = 48  # letters in a line of a label
-_INNER, _OUTER = 5.0, 1.4  # widths of the lines of a range
+COLOURS = (BLUE, ORANGE, GREEN, RED)
+MOST_POINTS = 2000  # of a distribution function
+_ROW_HEIGHT = 0.52  # in
+_LINE_LENGTH = 48  # characters in a line of a label
+_THICK, _THIN = 5.0, 1.4
 
 
 def comparison_figure(comparison: Comparison, title: str = "") -> Figure:
@@ -33,37 +33,35 @@ def comparison_figure(comparison: Comparison, title: str = "") -> Figure:
     ----------
     comparison : Comparison
     title : str
-        What is compared.
+        Title of the figure.
 
     Returns
     -------
     Figure
-        Two panels: the distribution function of each ensemble, a run as a line with its error; and
-        mean and ranges of each, one below the other.
+        Two panels: the distribution function of each ensemble and each run as a line with its
+        error; the mean and the 90 % range of each, in rows.
     """
     named, rows = OBSERVABLES[comparison.observable], comparison.rows
+    colours = list(COLOURS[: len(rows)])
+    if len(rows) > len(COLOURS):
+        colours = [to_hex(c) for c in colormaps[RECORDS](np.linspace(0.0, 0.9, len(rows)))]
     with figure_style():
-        height = max(4.6, 1.8 + _ROW * len(rows))
+        height = max(4.6, 1.8 + _ROW_HEIGHT * len(rows))
         figure = Figure(figsize=(13.0, height), layout="constrained")
         left, right = figure.subplots(1, 2)
-        for row, colour in zip(rows, _colours(len(rows)), strict=True):
-            _draw_law(left, row, colour, named)
-        end = f"{named.words} at the end [{named.unit}]"
-        name_axes(left, "Part of the realisations that has less", end, "part [%]")
+        for row, colour in zip(rows, colours, strict=True):
+            _draw_distribution(left, row, colour, named)
+        label = f"{named.words} at the end [{named.unit}]"
+        name_axes(left, "Cumulative distribution", label, "cumulative probability [%]")
         left.set_ylim(0.0, 100.0)
         left.legend(loc="best")
-        _draw_ranges(right, comparison, named)
+        _draw_ranges(right, comparison, colours, named)
+        right.set_xlabel(label)
         figure.suptitle(title, fontsize=10.5)
     return figure
 
 
-def _colours(number: int) -> list[str]:
-    if number <= len(FEW):
-        return list(FEW[:number])
-    return [to_hex(colour) for colour in colormaps[RECORDS](np.linspace(0.0, 0.9, number))]
-
-
-def _draw_law(axes: Axes, row: Compared, colour: str, named: Named) -> None:
+def _draw_distribution(axes: Axes, row: Compared, colour: str, named: Named) -> None:
     """Draw the distribution function of an ensemble, or the value of a run with its error."""
     if row.kind == "run":
         ends = row.value.low * named.per_si, row.value.high * named.per_si
@@ -75,52 +73,52 @@ def _draw_law(axes: Axes, row: Compared, colour: str, named: Named) -> None:
     if len(values) > MOST_POINTS:
         picks = np.unique(np.linspace(0, len(values) - 1, MOST_POINTS).round().astype(np.int64))
     parts = 100.0 * (picks + 1.0) / len(values)
-    # from zero up: the first value is a step too
+    # from zero, since the function rises at the first value too
     across = np.concatenate([values[:1], values[picks]])
     label = f"{row.label} ({realisations(row)})"
     axes.step(across, np.concatenate([[0.0], parts]), where="post", color=colour, label=label)
 
 
-def _draw_ranges(axes: Axes, comparison: Comparison, named: Named) -> None:
-    """Draw mean with its interval, and the range of nine in ten realisations, row by row."""
+def _draw_ranges(axes: Axes, comparison: Comparison, colours: list[str], named: Named) -> None:
+    """Draw mean with interval, median and 90 % range, in rows."""
     rows = comparison.rows
     places = np.arange(len(rows))
-    for place, row, colour in zip(places, rows, _colours(len(rows)), strict=True):
+    for place, row, colour in zip(places, rows, colours, strict=True):
         level = [place, place]
         if _has_range(row):
             ends = [row.quantiles[0][1].value, row.quantiles[-1][1].value]
-            axes.plot(np.array(ends) * named.per_si, level, color=colour, lw=_OUTER)
+            axes.plot(np.array(ends) * named.per_si, level, color=colour, lw=_THIN)
         if row.quantiles:
             middle = dict(row.quantiles)[0.5].value * named.per_si
-            axes.plot([middle], [place], "|", color=colour, ms=13.0, mew=_OUTER)
+            axes.plot([middle], [place], "|", color=colour, ms=13.0, mew=_THIN)
         if np.isfinite([row.value.low, row.value.high]).all():
             ends = [row.value.low, row.value.high]
             axes.plot(
-                np.array(ends) * named.per_si, level, color=colour, lw=_INNER, alpha=0.45,
+                np.array(ends) * named.per_si, level, color=colour, lw=_THICK, alpha=0.45,
                 solid_capstyle="butt",
             )  # fmt: skip
         axes.plot([row.value.value * named.per_si], [place], "o", color=colour, ms=4.5)
-    axes.set_yticks(places, [_told(comparison, row) for row in rows])
+    axes.set_yticks(places, [_label(comparison, row) for row in rows])
     axes.set_ylim(len(rows) - 0.5, -0.5)
     axes.set_xlim(left=min(0.0, axes.get_xlim()[0]))
     axes.grid(visible=False, axis="y")
-    title = ["Mean with its 95 % interval (dot)", "median (bar)"]
-    title += ["5 to 95 % (line)"] if any(_has_range(row) for row in rows) else []
-    if not any(row.quantiles for row in rows):
-        title = ["Value with its stated error"]
-    name_axes(axes, ", ".join(title), f"{named.words} at the end [{named.unit}]", "")
+    title = "Value and estimated error"
+    if any(row.quantiles for row in rows):
+        title = "Mean (dot) with 95 % interval, median (bar)"
+        title += ", 5 % to 95 % (line)" if any(_has_range(row) for row in rows) else ""
+    axes.set_title(title)
 
 
 def _has_range(row: Compared) -> bool:
-    """Tell whether there are enough realisations to draw where nine in ten of them end."""
-    return bool(row.quantiles) and enough_for(row.count, row.quantiles[0][0])
+    """Return whether the sample size is sufficient for the 90 % range."""
+    return bool(row.quantiles) and sufficient_for(row.count, row.quantiles[0][0])
 
 
-def _told(comparison: Comparison, row: Compared) -> str:
-    """Return a row's label, and how it compares with the first."""
+def _label(comparison: Comparison, row: Compared) -> str:
+    """Return the label of a row and its comparison with the first."""
     if row is comparison.rows[0]:
         return row.label
-    told = [text for _, text in against(comparison, row)][:1]
-    if told and told[0].startswith("in "):
-        told = ["more than the first", *told]
-    return "\n".join([row.label, *(fill(line, _LABEL) for line in told)])
+    lines = [text for _, text in against(comparison, row)][:1]
+    if lines and lines[0].startswith("in "):
+        lines = ["more than the first", *lines]
+    return "\n".join([row.label, *(fill(line, _LINE_LENGTH) for line in lines)])

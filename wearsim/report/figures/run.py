@@ -1,4 +1,4 @@
-"""The figure of a wear test: profiles, depth, dissipation and load."""
+"""Figure of a run: profiles, depth, dissipated power and normal force."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
 from wearsim.errors import WearsimError
-from wearsim.report.parts.depth_axes import set_depth_axes
 from wearsim.report.parts.measured_profiles import Measured
 from wearsim.report.parts.style import (
     BLUE,
@@ -24,6 +23,7 @@ from wearsim.report.parts.style import (
     RED,
     figure_style,
     name_axes,
+    set_depth_axes,
 )
 from wearsim.report.text.units import PER_SI, count, pass_unit, shown
 from wearsim.types import FloatArray, IntArray
@@ -39,7 +39,7 @@ MARKS = ("o", "s", "^", "D", "v")
 
 
 def run_figure(result: Result, measured: Sequence[Measured] = ()) -> Figure:
-    """Return the figure of a wear test.
+    """Return the figure of a run.
 
     Parameters
     ----------
@@ -50,7 +50,8 @@ def run_figure(result: Result, measured: Sequence[Measured] = ()) -> Figure:
     Returns
     -------
     Figure
-        Four panels: profiles and dissipation at records, depth against passes, load against time.
+        Four panels: profiles and dissipated power per length at records, depth against roller
+        passes, normal force against time.
     """
     with figure_style():
         figure = Figure(figsize=(11.0, 7.6), layout="constrained")
@@ -65,26 +66,26 @@ def run_figure(result: Result, measured: Sequence[Measured] = ()) -> Figure:
             panels[name].set_xlim(*extent)
         colours.draw_bar(figure, [panels["profiles"], panels["dissipation"]])
         _draw_depth(panels["depth"], result)
-        _draw_load(panels["load"], result)
+        _draw_normal_force(panels["load"], result)
         figure.suptitle(f"{result.title}\n{_caption(result)}", fontsize=10.5)
     return figure
 
 
 def _caption(result: Result) -> str:
-    depth = f"{shown(float(np.max(result.depth[-1])), 'um')} deep"
+    depth = f"depth {shown(float(np.max(result.depth[-1])), 'um')}"
     if result.start_height.any():
         below = shown(float(np.max(result.depth_below_nominal[-1])), "um")
-        depth = f"{depth[:-5]} worn since the start, {below} below nominal"
+        depth = f"{depth} worn since the start, depth below nominal {below}"
     return (
         f"{count(float(result.passes[-1]))} roller passes in"
         f" {shown(float(result.time[-1]), 'min')}: {depth},"
-        f" {shown(float(np.max(result.width[-1])), 'mm')} wide"
+        f" width {shown(float(np.max(result.width[-1])), 'mm')}"
         f" ({result.described_model}, {result.stepper}{'' if result.finished else ', unfinished'})"
     )
 
 
 class _Colours:
-    """Which records are drawn, each in the colour of its passes; the fresh state is black."""
+    """Drawn records and their colours, by roller passes; the start of the run is black."""
 
     def __init__(self, passes: FloatArray) -> None:
         picks = np.linspace(0, len(passes) - 1, min(len(passes), MOST_RECORDS))
@@ -97,8 +98,8 @@ class _Colours:
         self._norm = LogNorm(float(worn[0]), last) if crowded else Normalize(0.0, last / unit)
         self._map = colormaps[RECORDS].reversed()
 
-    def few(self, number: int) -> IntArray:
-        """Return at most so many of the records, the first and the last among them."""
+    def selection(self, number: int) -> IntArray:
+        """Return at most `number` records, the first and the last included."""
         picks = np.linspace(0, len(self.records) - 1, min(len(self.records), number))
         return self.records[np.unique(picks.round().astype(np.int64))]
 
@@ -111,99 +112,90 @@ class _Colours:
         figure.colorbar(mapped, ax=panels, label=self.name, aspect=45, pad=0.02)
 
 
-def _per_roller(values: FloatArray) -> FloatArray:
-    """Return records or steps by roller, (row, roller, ...), where rollers may be left out."""
-    return values if values.ndim == 3 else values[:, None]
-
-
 def _draw_profiles(
     axes: Axes, result: Result, colours: _Colours, measured: Sequence[Measured]
 ) -> None:
     y = result.y * MM
     worn = np.asarray(result.profiles)
-    start = result.start_height
     for record in colours.records:
-        axes.plot(y, (start - worn[record]) * UM, color=colours.of(record), lw=1.1)
-    _draw_rollers(axes, y, _per_roller(np.asarray(result.roller_profiles))[-1])
+        height = (result.start_height - worn[record]) * UM
+        axes.plot(y, height, color=colours.of(record), lw=1.1)
+    rollers = np.atleast_2d(np.asarray(result.roller_profiles)[-1])
+    for number, roller in enumerate(rollers):
+        if roller.max() > 0.0:
+            label = "roller" if len(rollers) == 1 else f"roller {number + 1}"
+            axes.plot(
+                y, -roller * UM, color="black", ls=(0, (4 + 2 * number, 2)), lw=1.0,
+                label=f"{label}, at the end",
+            )  # fmt: skip
     for number, profile in enumerate(measured):
         axes.plot(
             profile.y * MM, profile.height * UM, MARKS[number % len(MARKS)], ms=3.2, mew=0.7,
             mfc="white", mec=RED, label=f"measured: {profile.label}", zorder=5,
         )  # fmt: skip
-    name_axes(axes, "Worn profile of the cylinder", "y [mm]", "height above nominal [um]")
+    title = "Worn profile of the cylinder (black: start of the run)"
+    name_axes(axes, title, "y [mm]", "height above nominal [um]")
     if axes.get_legend_handles_labels()[0]:
         axes.legend(loc="lower right")
 
 
-def _draw_rollers(axes: Axes, y: FloatArray, worn: FloatArray) -> None:
-    """Draw the rollers' own worn profiles at the last record, where there is any wear."""
-    for number, roller in enumerate(worn):
-        if roller.max() > 0.0:
-            label = "roller" if len(worn) == 1 else f"roller {number + 1}"
-            style = (0, (4 + 2 * number, 2))
-            axes.plot(
-                y, -roller * UM, color="black", ls=style, lw=1.0, label=f"{label}, at the end"
-            )
-
-
 def _extent(result: Result, others: Sequence[FloatArray]) -> tuple[float, float]:
-    """Return the part of the track that matters [mm]: where power fell, a margin, and `others`."""
+    """Return the range of y with dissipated power, with a margin, that includes `others` [mm]."""
     power = np.asarray(result.dissipation).reshape(-1, len(result.y)).max(axis=0)
-    touched = result.y[power > 1e-3 * power.max()] if power.max() > 0.0 else result.y
-    first, last = float(touched[0]), float(touched[-1])
+    loaded = result.y[power > 1e-3 * power.max()] if power.max() > 0.0 else result.y
+    first, last = float(loaded[0]), float(loaded[-1])
     margin = 0.08 * (last - first)
     ends = [first - margin, last + margin, *(float(e) for o in others for e in (o.min(), o.max()))]
     return min(ends) * MM, max(ends) * MM
 
 
 def _draw_depth(axes: Axes, result: Result) -> None:
-    """Draw depth against passes: on logarithmic scales where the steps cover two decades."""
     passes, depth = np.asarray(result.passes), np.asarray(result.depth)
     error = np.asarray(result.depth_error)
     drawn, unit, name = set_depth_axes(axes, passes, depth)
     passes, depth, error = passes[drawn], depth[drawn], error[drawn]
-    logarithmic = axes.get_yscale() == "log"
     visible = bool((error > 0.05 * depth).any())
-    said = f"estimated error {shown(float(error[-1]), 'um', 2)} at the end"
+    estimate = f"estimated error {shown(float(error[-1]), 'um', 2)} at the end"
     if visible:
-        low = np.maximum(depth - error, 0.05 * depth) if logarithmic else depth - error
+        low = depth - error
+        if axes.get_yscale() == "log":
+            low = np.maximum(low, 0.05 * depth)
         band = (low * UM, (depth + error) * UM)
-        axes.fill_between(passes / unit, *band, color=ORANGE, alpha=0.35, lw=0, label=said)
-    style = "-o" if len(passes) <= 80 else "-"
-    label = "depth, a dot for each step" if len(passes) <= 80 else "depth"
-    label += "" if visible else f"\n({said})"
+        axes.fill_between(passes / unit, *band, color=ORANGE, alpha=0.35, lw=0, label=estimate)
+    style, label = ("-o", "depth, one dot per step") if len(passes) <= 80 else ("-", "depth")
+    label += "" if visible else f"\n({estimate})"
     axes.plot(passes / unit, depth * UM, style, color=BLUE, ms=2.6, label=label)
-    name_axes(axes, "Depth of the groove", name, "greatest worn depth [um]")
+    title = "Depth worn since the start" if result.start_height.any() else "Depth"
+    name_axes(axes, title, name, "depth [um]")
     axes.legend(loc="upper left")
 
 
 def _draw_dissipation(axes: Axes, result: Result, colours: _Colours) -> None:
     y = result.y * MM
-    power = _per_roller(np.asarray(result.dissipation)) * W_MM
-    rollers = power.shape[1]
-    for record in colours.few(10 if rollers == 1 else 5):
-        for roller in range(rollers):
-            style = STYLES[roller % len(STYLES)]
-            axes.plot(y, power[record, roller], style, color=colours.of(record), lw=1.1)
-    if rollers > 1:
-        for roller in range(rollers):
-            style = STYLES[roller % len(STYLES)]
-            axes.plot([], [], style, color="black", label=f"roller {roller + 1}")
+    power = np.asarray(result.dissipation) * W_MM
+    power = power if power.ndim == 3 else power[:, None]  # (record, roller, strip)
+    styles = [STYLES[roller % len(STYLES)] for roller in range(power.shape[1])]
+    for record in colours.selection(10 if len(styles) == 1 else 5):
+        for line, style in zip(power[record], styles, strict=True):
+            axes.plot(y, line, style, color=colours.of(record), lw=1.1)
+    if len(styles) > 1:
+        for number, style in enumerate(styles, 1):
+            axes.plot([], [], style, color="black", label=f"roller {number}")
         axes.legend(loc="upper right")
-    title = "Dissipated power per axial length (black: fresh)"
+    title = "Dissipated power per length (black: start of the run)"
     name_axes(axes, title, "y [mm]", r"$P_l$ [W/mm]")
     axes.set_ylim(bottom=0.0)
 
 
-def _draw_load(axes: Axes, result: Result) -> None:
+def _draw_normal_force(axes: Axes, result: Result) -> None:
     force = np.asarray(result.normal_force)
     force = force if force.ndim == 2 else force[:, None]
     if np.ptp(force, axis=1).max() < 1e-6 * force.max():
-        force = force[:, :1]  # rollers that carry the same
+        force = force[:, :1]  # the same on all rollers
     rollers, time = force.shape[1], np.asarray(result.time)
     base = _base_load(result)
     if base is not None:
-        axes.plot(base[0] * MIN, base[1], color=GREY, lw=0.8, label="before feedback")
+        axes.plot(base[0] * MIN, base[1], color=GREY, lw=0.8, label="without feedback")
     style = "o-" if base is not None else "-"
     for roller in range(rollers):
         label = "at the steps" if rollers == 1 else f"roller {roller + 1}"
@@ -211,17 +203,17 @@ def _draw_load(axes: Axes, result: Result) -> None:
         axes.plot(time * MIN, force[:, roller], style, color=colour, ms=2.6, label=label)
     if rollers > 1 or base is not None:
         axes.legend(loc="best")
-    name_axes(axes, "Normal force of a roller", "time [min]", "N [N]")
-    if np.ptp(force) < 0.02 * force.max() and base is None:  # a constant must look like one
+    name_axes(axes, "Normal force of one roller", "time [min]", "normal force [N]")
+    if np.ptp(force) < 0.02 * force.max() and base is None:  # shows a constant as such
         axes.set_ylim(0.0, 1.25 * float(force.max()))
     axes.margins(x=0.02)
 
 
 def _base_load(result: Result) -> tuple[FloatArray, FloatArray] | None:
-    """Return times [s] and the load before any feedback [N], where it varies and can be known."""
+    """Return times [s] and the load without feedback [N], or None if constant or unknown."""
     times = np.linspace(0.0, float(result.time[-1]), 2001)
     try:
         force = result.scenario.load.build().force(times)
-    except WearsimError:  # written with a plugin that is not here
+    except WearsimError:  # a plugin of the scenario is not installed
         return None
     return (times, force) if np.ptp(force) > 1e-3 * force.max() else None

@@ -1,1 +1,1 @@
-"""Parts that several figures share."""
+"""Common parts of the figures: style, files, profiles, contact patches."""

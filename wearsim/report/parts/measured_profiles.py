@@ -1,7 +1,8 @@
-"""Measured profiles, to be drawn over computed ones."""
+"""Measured profiles, which are drawn over computed ones."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import PurePath
 
@@ -16,7 +17,7 @@ class Measured:
     Parameters
     ----------
     label : str
-        What it is.
+        Label in the figure.
     y : ndarray, shape (points,)
         Axial position [m].
     height : ndarray, shape (points,)
@@ -34,9 +35,9 @@ def read_measured(text: str, file: str) -> Measured:
     Parameters
     ----------
     text : str
-        The file's content, with the columns y, and depth or height; depth counts downwards.
+        Content of the file: columns y and either depth (positive downwards) or height.
     file : str
-        Its name, for messages and the label.
+        Name of the file, for messages and the label.
 
     Returns
     -------
@@ -45,20 +46,12 @@ def read_measured(text: str, file: str) -> Measured:
     Raises
     ------
     ScenarioError
-        With every mistake in the file.
+        With all mistakes in the file.
     """
-    deep = _has_depth(text)
-    name = "depth" if deep else "height"
-    columns = read_columns(text, file, {"y": "m", name: "m"})
-    height = -columns[name] if deep else columns[name]
-    return Measured(PurePath(file).stem, columns["y"], height)
-
-
-def _has_depth(text: str) -> bool:
-    """Tell whether the header has a column depth and none of height."""
     lines = (line.strip() for line in text.lstrip("\ufeff").splitlines())
     header = next((line for line in lines if line and not line.startswith("#")), "")
-    for mark in "\t;":
-        header = header.replace(mark, ",")
-    names = {cell.split("[")[0].strip() for cell in header.split(",")}
-    return "depth" in names and "height" not in names
+    names = {cell.split("[")[0].strip() for cell in re.split("[\t;,]", header)}
+    name = "depth" if "depth" in names and "height" not in names else "height"
+    columns = read_columns(text, file, {"y": "m", name: "m"})
+    height = -columns[name] if name == "depth" else columns[name]
+    return Measured(PurePath(file).stem, columns["y"], height)

@@ -1,4 +1,4 @@
-"""Size of a contact patch, read from its strips."""
+"""Extent of contact patches across the strips."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from wearsim.types import FloatArray
 
 
 def patch_edges(y: FloatArray, half_length: FloatArray) -> tuple[float, float] | None:
-    """Return where the contact begins and ends across the track [m], or None without contact.
+    """Return the axial positions of the two edges of the contact [m], or None without contact.
 
-    The square of the half-length falls linearly towards an edge of the contact; the edge is where
-    the outermost two strips put its zero, within their own width.
+    Near an edge the square of the half-length decreases linearly; the edge is its zero,
+    extrapolated from the two outermost strips by at most one strip width.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def patch_edges(y: FloatArray, half_length: FloatArray) -> tuple[float, float] |
 
 
 def patches(half_length: FloatArray) -> list[slice]:
-    """Return the strips of every patch of a contact, from side to side.
+    """Return the range of strips of each patch of a contact.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def patches(half_length: FloatArray) -> list[slice]:
 
 
 def _beyond(half_length: FloatArray, strip: int, inwards: int) -> float:
-    """Return how far the contact goes on past a strip's centre, in strips: a half to one."""
+    """Return the distance of the edge from the centre of the outermost strip, in strips."""
     inner = strip + inwards
     if not 0 <= inner < len(half_length):
         return 0.5

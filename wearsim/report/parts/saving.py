@@ -1,4 +1,4 @@
-"""Writes a figure, or a text, whole or not at all."""
+"""Atomic writing of figures and texts: a new file replaces the old one when complete."""
 
 from __future__ import annotations
 
@@ -16,41 +16,41 @@ DPI = 150
 
 
 def save_figure(figure: Figure, path: Path) -> None:
-    """Write a figure beside its place and move it there; the suffix decides the format.
+    """Write a figure; the suffix gives the format.
 
     Parameters
     ----------
     figure : Figure
     path : Path
-        Ends in .png, .pdf or .svg; overwritten where it exists.
+        Ends in .png, .pdf or .svg; an existing file is replaced.
     """
-    with _moved_into(path) as file:
+    with _replacing(path) as file:
         figure.savefig(file, format=path.suffix[1:].lower(), dpi=DPI)
 
 
 def save_text(text: str, path: Path) -> None:
-    """Write a text in UTF-8 beside its place and move it there.
+    """Write a text in UTF-8.
 
     Parameters
     ----------
     text : str
     path : Path
-        Overwritten where it exists.
+        An existing file is replaced.
     """
-    with _moved_into(path) as file:
+    with _replacing(path) as file:
         file.write(text.encode("utf-8"))
 
 
 @contextmanager
-def _moved_into(path: Path) -> Iterator[IO[bytes]]:
-    """Give a file beside a place, and move it there once it is whole."""
+def _replacing(path: Path) -> Iterator[IO[bytes]]:
+    """Open a temporary file in the same folder and rename it to `path` when it is complete."""
     number, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
     try:
         with os.fdopen(number, "wb") as file:
             yield file
         mask = os.umask(0)
         os.umask(mask)
-        Path(name).chmod(0o666 & ~mask)  # mkstemp makes it private
+        Path(name).chmod(0o666 & ~mask)  # mkstemp restricts it to the owner
         Path(name).replace(path)
     except BaseException:
         Path(name).unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""How all figures look."""
+"""Common style and axes of all figures."""
 
 from __future__ import annotations
 
@@ -8,6 +8,10 @@ from typing import Any
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
+from matplotlib.ticker import FuncFormatter
+
+from wearsim.report.text.units import pass_unit
+from wearsim.types import BoolArray, FloatArray
 
 RECORDS = "viridis"
 PRESSURE = "magma"
@@ -38,20 +42,49 @@ _SETTINGS: dict[Any, Any] = {
 
 @contextmanager
 def figure_style() -> Iterator[None]:
-    """Draw with wearsim's settings, and leave everyone else's alone."""
+    """Apply the settings of wearsim to the figures drawn in the context."""
     with mpl.rc_context(_SETTINGS):
         yield
 
 
 def name_axes(axes: Axes, title: str, x: str, y: str) -> None:
-    """Write a panel's title and the labels of its axes."""
+    """Set the title of a panel and the labels of its axes."""
     axes.set_title(title)
     axes.set_xlabel(x)
     axes.set_ylabel(y)
 
 
 def say(axes: Axes, title: str, lines: Sequence[str]) -> None:
-    """Write a panel's title, and a few lines where there is nothing to draw."""
+    """Write lines of text into a panel that has nothing to draw."""
     axes.text(0.5, 0.5, "\n".join(lines), ha="center", va="center", transform=axes.transAxes)
     axes.set_title(title)
     axes.set_axis_off()
+
+
+def set_depth_axes(
+    axes: Axes, passes: FloatArray, depth: FloatArray
+) -> tuple[BoolArray, float, str]:
+    """Set the scales of a panel of depth against passes, logarithmic from two decades of passes on.
+
+    Parameters
+    ----------
+    axes : Axes
+    passes, depth : ndarray, shape (points,)
+        Points to be drawn [1, m].
+
+    Returns
+    -------
+    drawn : ndarray of bool, shape (points,)
+        Points that can be drawn on these scales.
+    unit : float
+        Unit of the axis of passes.
+    name : str
+        Label of the axis of passes.
+    """
+    worn = (passes > 0.0) & (depth > 0.0)
+    if worn.sum() > 3 and passes[worn][-1] > 100.0 * passes[worn][0]:
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        return worn, 1.0, "roller passes"
+    return passes >= 0.0, *pass_unit(float(passes[-1]))

@@ -1,4 +1,4 @@
-"""How the observables of a wear test are called, and in which unit engineers read them."""
+"""Labels and engineering units of the observables of a wear test."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from wearsim.uq.estimation.stopping_rule import Target
 
 
 class Named(NamedTuple):
-    """An observable as it is shown.
+    """Label of an observable.
 
     Parameters
     ----------
     words : str
-        What it is.
+        Name of the quantity.
     unit : str
         A key of `PER_SI`.
     """
@@ -26,28 +26,28 @@ class Named(NamedTuple):
 
     @property
     def label(self) -> str:
-        """The words with the unit, for an axis or the head of a row."""
+        """Name with the unit, for an axis or a table."""
         return f"{self.words} [{self.unit}]"
 
     @property
     def per_si(self) -> float:
-        """One SI unit in the unit that is shown."""
+        """One SI unit in the engineering unit."""
         return PER_SI[self.unit]
 
 
+#: observables of an ensemble by name
 OBSERVABLES: Mapping[str, Named] = {
     "depth": Named("depth", "um"),
     "width": Named("width", "mm"),
     "worn_volume": Named("worn volume", "mm^3"),
     "roller_depth": Named("roller depth", "um"),
-    "total_roller_worn_volume": Named("roller volume", "mm^3"),
-    "dissipated_energy": Named("energy", "J"),
+    "total_roller_worn_volume": Named("total roller worn volume", "mm^3"),
+    "dissipated_energy": Named("dissipated energy", "J"),
     "mean_power": Named("mean power", "W"),
-    "power": Named("power", "W"),
+    "power": Named("dissipated power", "W"),
     "normal_force": Named("normal force", "N"),
     "peak_pressure": Named("peak pressure", "MPa"),
 }
-"""Those that an ensemble follows, by name."""
 
 
 def si_key(name: str) -> str:
@@ -56,10 +56,10 @@ def si_key(name: str) -> str:
 
 
 def statistic_in_words(target: Target) -> str:
-    """Return what a target is about, "mean of depth" or "95 % quantile of width"."""
-    statistic = target.statistic
-    if isinstance(statistic, str):
-        word: str = statistic
-    else:
-        word = "median" if statistic == 0.5 else f"{100.0 * statistic:g} % quantile"
-    return f"{word} of {OBSERVABLES[target.observable].words}"
+    """Return the statistic of a target, "mean of depth" or "95 % quantile of width"."""
+    statistic: str | float = target.statistic
+    if statistic == 0.5:
+        statistic = "median"
+    elif not isinstance(statistic, str):
+        statistic = f"{100.0 * statistic:g} % quantile"
+    return f"{statistic} of {OBSERVABLES[target.observable].words}"

@@ -1,4 +1,4 @@
-"""Numbers of a law of maximum entropy as they are told: what is mere rounding is 0."""
+"""Numbers of a maximum-entropy distribution, with rounding errors set to 0."""
 
 from __future__ import annotations
 
@@ -7,28 +7,26 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from wearsim.uq.distributions.base import MaxentDistribution
 
-ROUNDING = 1e-12
-"""Part of the standard deviation below which a value is rounding."""
+_ROUNDING = 1e-12  # in standard deviations
 
 
 def value(law: MaxentDistribution, number: float) -> float:
-    """Return a value, or 0 where it is rounding: near 0 within a support on both sides of it."""
+    """Return a value, or 0 if it is a rounding error near 0 inside the support."""
     low, high = law.support
-    return 0.0 if low < 0.0 < high and abs(number) < ROUNDING * law.std else number
+    return 0.0 if low < 0.0 < high and abs(number) < _ROUNDING * law.std else number
 
 
 def multipliers(law: MaxentDistribution) -> tuple[float, float, float]:
-    """Return l0, l1 and l2, each 0 where it changes the density by rounding alone."""
+    """Return the multipliers l0, l1 and l2, with 0 for rounding errors of l1 and l2."""
     l0, l1, l2 = law.multipliers
-    of_third = law.std**2 if law.third == "x^2" else 1.0
+    scale = law.std**2 if law.third == "x^2" else 1.0
     return (
         l0,
-        0.0 if abs(l1) * law.std < ROUNDING else l1,
-        0.0 if abs(l2) * of_third < ROUNDING else l2,
+        0.0 if abs(l1) * law.std < _ROUNDING else l1,
+        0.0 if abs(l2) * scale < _ROUNDING else l2,
     )
 
 
 def parent(law: MaxentDistribution) -> tuple[float, float] | None:
-    """Return mean and standard deviation of the parent normal law, if there is one."""
-    found = law.parent
-    return None if found is None else (value(law, found[0]), found[1])
+    """Return mean and standard deviation of the parent normal distribution, if there is one."""
+    return law.parent and (value(law, law.parent[0]), law.parent[1])

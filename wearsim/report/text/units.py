@@ -1,10 +1,10 @@
-"""Numbers as an engineer reads them: SI floats in, "12.34 um" out."""
+"""Numbers in engineering units: SI floats to text such as "12.34 um"."""
 
 from __future__ import annotations
 
 import math
 
-# One SI unit in each engineer's unit; every SI value that is shown passes through here.
+# One SI unit in each engineering unit.
 PER_SI = {
     "1": 1.0,
     "%": 1e2,
@@ -27,12 +27,12 @@ NOTHING = "-"
 
 
 def shown(value: float | None, unit: str, digits: int = 4) -> str:
-    """Return an SI value in an engineer's unit, with that unit.
+    """Return an SI value in an engineering unit, with that unit.
 
     Parameters
     ----------
     value : float or None
-        In SI; None and values that are not finite are shown as a dash.
+        In SI units; None and values that are not finite become a dash.
     unit : str
         A key of `PER_SI`.
     digits : int
@@ -49,22 +49,22 @@ def shown(value: float | None, unit: str, digits: int = 4) -> str:
 
 
 def _significant(value: float, digits: int) -> str:
-    """Write a number with so many digits; exponents only where zeros would hide it."""
-    size = abs(value)
-    if size != 0.0 and not 1e-4 <= size < 1e7:
-        return f"{value:.{digits - 1}e}"
-    rounded = float(f"{value:.{digits - 1}e}")
+    """Format a number with significant digits, very small and large ones with an exponent."""
+    text = f"{value:.{digits - 1}e}"
+    if value != 0.0 and not 1e-4 <= abs(value) < 1e7:
+        return text
+    rounded = float(text)
     exponent = math.floor(math.log10(abs(rounded))) if rounded else 0
     return f"{rounded:.{max(digits - 1 - exponent, 0)}f}" if rounded else "0"
 
 
 def count(value: float) -> str:
-    """Return a number of passes or steps with its thousands apart, "1,350,000"."""
+    """Return a number of passes or steps with separated thousands, "1,350,000"."""
     return f"{value:,.0f}"
 
 
 def pass_unit(greatest: float) -> tuple[float, str]:
-    """Return what passes are divided by to be read easily on an axis, and its name.
+    """Return the unit of an axis of roller passes, and its label.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def pass_unit(greatest: float) -> tuple[float, str]:
 
 
 def lapse(seconds: float) -> str:
-    """Return a wall time that is easy to read: "0.05 s", "12 s", "3 min 20 s", "2 h 5 min"."""
+    """Return a wall time as text: "0.05 s", "12 s", "3 min 20 s", "2 h 5 min"."""
     if not math.isfinite(seconds):
         return NOTHING
     if seconds < 9.95:
@@ -93,7 +93,7 @@ def lapse(seconds: float) -> str:
 
 
 def brief(seconds: float) -> str:
-    """Return a time, long or too short to feel, with three digits: "2.5 us", "84 s"."""
+    """Return a short time with three digits: "2.5 us", "84 s"."""
     if not math.isfinite(seconds):
         return NOTHING
     for unit, scale in (("s", 1.0), ("ms", 1e3)):

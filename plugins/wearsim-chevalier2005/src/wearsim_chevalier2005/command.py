@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from wearsim.cli.arguments import Figure, Force, Json, Quiet, check_figure
-from wearsim.cli.output import console, note, refuse_existing, write_json
+from wearsim.cli.output import console, note, write_json
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -46,10 +46,8 @@ def reproduce(
     quiet: Quiet = False,
 ) -> None:
     """Compute the paper's numbers anew; -o draws its figures too."""
-    if figure is not None:
-        check_figure(figure)
-        refuse_existing(figure, force)
-    from wearsim.cli.progress.count import counting
+    check_figure(figure, force)
+    from wearsim.cli.progress.realisations import counting
     from wearsim_chevalier2005.comparison import compare
     from wearsim_chevalier2005.study import reproduce as study
 
