@@ -9,6 +9,7 @@ import scipy.special
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.mechanics.tangential.kalker_closed_form import closed_form_parabolic
 from wearsim.mechanics.hertz.ellipse import hertz
 from wearsim.mechanics.tangential.fastsim import (
     bound_shape,
@@ -18,7 +19,7 @@ from wearsim.mechanics.tangential.fastsim import (
     new_sums,
     place_of,
 )
-from wearsim.mechanics.tangential.fastsim_closed_form import closed_form, closed_form_parabolic
+from wearsim.mechanics.tangential.fastsim_closed_form import closed_form
 from wearsim.mechanics.tangential.fastsim_fields import (
     element_sum,
     march_fields,

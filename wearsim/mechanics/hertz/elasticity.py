@@ -46,6 +46,6 @@ def combine(first: Material, second: Material) -> ElasticPair:
     g2 = second.youngs_modulus / (2.0 * (1.0 + nu2))
     shear = 1.0 / (0.5 / g1 + 0.5 / g2)
     poisson = shear * (0.5 * nu1 / g1 + 0.5 * nu2 / g2)
-    dundurs = 0.5 * (g1 * (1.0 - 2.0 * nu2) - g2 * (1.0 - 2.0 * nu1))
-    dundurs /= g1 * (1.0 - nu2) + g2 * (1.0 - nu1)
+    difference = 0.5 * (g1 * (1.0 - 2.0 * nu2) - g2 * (1.0 - 2.0 * nu1))
+    dundurs = difference / (g1 * (1.0 - nu2) + g2 * (1.0 - nu1))
     return ElasticPair(shear, poisson, shear / (1.0 - poisson), dundurs)

@@ -41,8 +41,7 @@ class HertzContact:
     def line_load(self, y: FloatArray) -> FloatArray:
         """Return the load per unit of axial length q(y) [N/m] at `y` [m] from the centre."""
         t = np.asarray(y) / self.b
-        peak = 0.75 * self.normal_force / self.b
-        return peak * np.maximum((1.0 - t) * (1.0 + t), 0.0)
+        return 0.75 * self.normal_force / self.b * np.maximum((1.0 - t) * (1.0 + t), 0.0)
 
     def load_below(self, y: FloatArray) -> FloatArray:
         """Return the load [N] carried from the patch's lower end up to `y` [m]: q integrated."""

@@ -185,8 +185,7 @@ def hertz_on_profile(
     width = 0.5 * (y[-1] - y[0]) * len(y) / max(len(y) - 1, 1)
     # ln b and ln(b'/b) at both ends of the bracket; the value is 0 while an end is unknown
     low = low_value = high = high_value = 0.0
-    side = 0  # the end that moved last
-    curvature, height = math.nan, math.nan
+    side, curvature, height = 0, math.nan, math.nan  # the end that moved last, B and w0
     for iteration in range(1, limit + 1):
         curvature, vertex, height, status = fit_centred(y, gap, centre, width, 10.0 * tolerance)
         here = math.log(width)

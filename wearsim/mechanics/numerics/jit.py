@@ -40,14 +40,12 @@ def inlined_kernel(function: Callable[P, R]) -> Callable[P, R]:
 
 def _compiled(function: Callable[P, R], **options: bool) -> Callable[P, R]:
     """Return the dispatcher of a function; numba's own where its internals have changed."""
-    compiled: Any
     try:
         from wearsim.mechanics.numerics.kernel_dispatcher import Whole  # noqa: PLC0415  (imports numba's internals)
 
-        compiled = Whole(function, targetoptions=_OPTIONS | options)
+        compiled: Any = Whole(function, targetoptions=_OPTIONS | options)
     except (ImportError, AttributeError, TypeError):
-        plain: Any = numba.njit
-        compiled = plain(error_model="numpy", **options)(function)
+        compiled = numba.njit(error_model="numpy", forceinline="forceinline" in options)(function)
     try:
         compiled.enable_caching()
     except RuntimeError:  # neither the source tree nor the user's cache folder is writable

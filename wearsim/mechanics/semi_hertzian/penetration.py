@@ -324,8 +324,7 @@ def solve_virtual_penetration(
     Kik and Piotrowski (1996); Piotrowski and Kik (2008), DOI 10.1080/00423110701586444.
     """
     n, longest = len(gap), spacing * np.exp(HIGHEST)
-    bottom = gap.min()
-    points = np.empty(count)
+    bottom, points = gap.min(), np.empty(count)
     mean_depth = even_depth(gap, load / (MEAN_STIFFNESS * contact_modulus))
     found = contact_places(gap, places, count, TOUCHING * mean_depth, points)
     reach[:] = OVERLAP
@@ -352,9 +351,9 @@ def solve_virtual_penetration(
             return CONVERGED, approach, stiffness
         low, high = (low, approach) if error > 0.0 else (approach, high)
         # the load is nearly a power of the approach
-        power = 1.5
-        if old > 0.0 and error != old_error:
-            power = min(max((error - old_error) / np.log(approach / old), 0.5), 4.0)
+        known = old > 0.0 and error != old_error
+        power = (error - old_error) / np.log(approach / old) if known else 1.5
+        power = min(max(power, 0.5), 4.0)
         old, old_error = approach, error
         approach *= np.exp(-error / power)
         if not low < approach < high:

@@ -61,8 +61,8 @@ def local_hertz_table() -> FloatArray:
     for ratio in np.exp(np.arange(FLATTEST, SHARPEST + 0.5 * STEP, STEP)):
         patch = hertz(1.0, float(ratio), 1.0, 1.0)
         rise = ratio * patch.b**2
-        stiffness = 0.5 * pi * patch.peak_pressure * patch.a / rise
-        rows.append((np.log(stiffness), np.log(patch.a**2 / rise), rise / patch.approach))
+        log_stiffness = np.log(0.5 * pi * patch.peak_pressure * patch.a / rise)
+        rows.append((log_stiffness, np.log(patch.a**2 / rise), rise / patch.approach))
     table = np.array(rows)
     table.setflags(write=False)
     return table

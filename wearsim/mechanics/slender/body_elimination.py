@@ -25,13 +25,12 @@ SIDES = 2  # a contact touches a cylinder and a roller
 class DepthSystem(NamedTuple):
     """Factored linear system of the bodies' worn depths.
 
-    `number` is the unknown of each body's strip, -1 for none, (bodies, strips), and `unknowns`
-    their count, (1,). `matrix` is stored by columns, `order` is the order of its equations,
-    `right` its right-hand side and `depth` its solution [m].
+    `number` is the unknown of each body's strip, -1 for none, (bodies, strips). `matrix` is stored
+    by columns, `order` is the order of its equations, `right` its right-hand side and `depth` its
+    solution [m].
     """
 
     number: IntArray
-    unknowns: IntArray
     matrix: FloatArray
     order: IntArray
     right: FloatArray
@@ -45,7 +44,6 @@ def new_depth_system(bodies: IntArray, n: int) -> DepthSystem:
     size = count * n
     return DepthSystem(
         np.empty((count, n), np.int64),
-        np.zeros(1, np.int64),
         np.empty((size, size)),
         np.empty(size, np.int64),
         np.empty(size),
@@ -131,7 +129,6 @@ def factor_depths(
         False if the system is singular.
     """
     count, matrix = _number_unknowns(bodies, shared, index, system.number), system.matrix
-    system.unknowns[0] = count
     for i in range(count):
         matrix[i, :count] = 0.0
         matrix[i, i] = 1.0
@@ -170,7 +167,8 @@ def solve_depths(
         Approach without the bodies' wear, replaced by the one with it [m].
     """
     contacts, n = index.shape
-    count, right, number = system.unknowns[0], system.right, system.number
+    right, number = system.right, system.number
+    count = number.max() + 1
     right[:count] = 0.0
     for k in range(contacts):
         for side in range(SIDES):

@@ -114,8 +114,7 @@ def _add_slope(
 
     The curvature depends on ln q_j through a and, if `chained`, on ln s_j through a and 1/s.
     """
-    wide = slope.shape[1]
-    reach = wide // 2
+    wide, reach = slope.shape[1], slope.shape[1] // 2
     for i in range(max(0, j - reach), min(slope.shape[0], j + reach + 1)):
         by_length = weight * (tangent[abs(i - j)] - value[abs(i - j)])
         slope_part[i, j - i + 2 * reach] += by_length
@@ -235,8 +234,7 @@ def gather_length_slopes(
     for F_k = 1.
     """
     slope, gathered = lengths.slope[k], lengths.gathered
-    wide = slope.shape[1]
-    reach = wide // 2
+    wide, reach = slope.shape[1], slope.shape[1] // 2
     for i in range(max(0, j - reach), min(slope.shape[0], j + reach + 1)):
         moved, start = push * (tangent[abs(i - j)] - value[abs(i - j)]), j - i + reach
         for c in range(wide):

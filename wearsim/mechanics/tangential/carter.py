@@ -1,29 +1,29 @@
-"""One strip in rolling contact: Carter's closed form with creepage in both directions and spin.
+"""Rolling contact of one strip: Carter's closed form with longitudinal and lateral creepage, spin.
 
-With the strip's half-length a, greatest traction bound mu p0, local rigid slip (X, Y + phi x), and
-in place of 2 p0 / a its value for all strips of the contact, since they share the curvature along
-rolling that it stands for,
+Symbols: half-length a, greatest traction bound mu p0, local rigid slip (X, Y + phi x). The ratio
+2 p0 / a is replaced by its mean over all strips of the contact, as it represents the curvature
+along rolling, which is the same for all strips. With
 
     d_x = X E_x a / (2 mu p0),  d_y = Y G_y a / (2 mu p0),  psi = phi G_y a / (2 mu p0),
 
-traction (over -mu) that opposes a direction e of unit length and is taken back where the strip
-adheres, over the length 2 (a - t) from the leading edge,
+consider the traction (over -mu) in a direction e of unit length, reduced where the strip adheres,
+over the length 2 (a - t) from the leading edge,
 
-    e p - (e - psi y^) (p0 / a) sqrt((a - t)^2 - (x - t)^2),
+    e p - (e - psi y^) (p0 / a) sqrt((a - t)^2 - (x - t)^2).
 
-holds the strip still there if e = (d_x / t, d_y / t + psi): that is Carter (Proc. R. Soc. A 112
-(1926), DOI 10.1098/rspa.1926.0100) for lateral creepage and spin too, exact in every stage where e
-is also the direction u of the slip behind. The slip is along (X, Y), and differs from e as E_x does
-from G_y and by spin. To first order in u - e, the equations of the strip are solved by the further
-traction
+The slip vanishes there if e = (d_x / t, d_y / t + psi). This is Carter's solution (Proc. R. Soc. A
+112 (1926), DOI 10.1098/rspa.1926.0100) extended to lateral creepage and spin; it is exact where e
+is also the direction u of the slip behind the adhesion zone. The slip has the direction of (X, Y),
+which differs from e because E_x differs from G_y, and by spin. To first order in u - e, the
+equations of the strip are satisfied by the additional traction
 
     (u - e) [(3/2 - (a + x)/t) p + ((a + x)/t - 1/2) (p0/a) sqrt(...)],  t < a,
     (u - e) [1 - a^2/(2 t^2) - x/t] p,                                t >= a.
 
-Against a numerical solution of the strip's equations the power is good to 0.1 % without spin and
-with psi below 0.1, to 1.5 % with psi = 0.2 (nu = 0.3). Beyond, where spin turns the slip along
-a strip that slides, the direction's mean over the strip is taken by quadrature. There are no fitted
-constants; `SPIN_LIMIT` and `TURNED` only say where one form gives way to another.
+Compared with a numerical solution of the strip's equations, the error of the power is 0.1 % without
+spin and with psi below 0.1, and 1.5 % with psi = 0.2 (nu = 0.3). Where a greater spin turns the
+slip along a sliding strip, the mean direction over the strip is computed by quadrature. There are
+no fitted constants; `SPIN_LIMIT` and `TURNED` are the limits between the two forms.
 """
 
 from __future__ import annotations
@@ -33,19 +33,19 @@ from typing import NamedTuple
 
 from wearsim.mechanics.numerics.jit import kernel
 
-SPIN_LIMIT = 0.9  # psi from which on sliding both ways gains on the partly adhering strip
-TURNED = 0.2  # phi a over the slip from which on the slip's turning along the strip counts
+SPIN_LIMIT = 0.9  # psi above which full sliding in both directions is blended in
+TURNED = 0.2  # phi a over the slip above which the rotation of the slip along the strip is included
 
-# Gauss's rule for the weight sqrt(1 - s^2), of mean 1: nodes cos(k pi/8), weights sin^2/4
+# Gauss quadrature for the weight sqrt(1 - s^2) with mean 1: nodes cos(k pi/8), weights sin^2/4
 _ANGLES = [k * math.pi / 8.0 for k in range(1, 8)]
 _RULE = tuple((math.cos(angle), 0.25 * math.sin(angle) ** 2) for angle in _ANGLES)
 
 
 class StripState(NamedTuple):
-    """How a strip slides: t/a, directions of adhesion e and of slip u, psi, and two weights.
+    """Sliding state of a strip: t/a, directions of adhesion e and of slip u, psi, and two weights.
 
-    `turned` is the part in which a sliding strip follows the slip that turns along it, and
-    `scrubbed` the part in which psi exceeds its limit.
+    `turned` is the weight of the rotation of the slip along a sliding strip, and `scrubbed` the
+    fraction by which psi exceeds its limit.
     """
 
     t: float
@@ -68,9 +68,9 @@ def strip_state(
     modulus_x: float,
     modulus_y: float,
 ) -> StripState:
-    """Return how a strip slides; see `strip_force` for the parameters.
+    """Return the sliding state of a strip; parameters as in `strip_force`.
 
-    Here `steepness` includes the friction coefficient, and is positive.
+    Here `steepness` includes the friction coefficient and is positive.
     """
     per = 1.0 / (steepness * half_length)
     d_x, d_y = slip_x * modulus_x * per, slip_y * modulus_y * per
@@ -96,7 +96,7 @@ def strip_state(
 
 @kernel
 def mean_direction(slip_x: float, slip_y: float, turn: float) -> tuple[float, float, float]:
-    """Return the mean of the direction of (X, Y + phi x) weighted by pressure, and its moment.
+    """Return the pressure-weighted mean of the direction of (X, Y + phi x), and its moment.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def strip_force(
     modulus_x: float,
     modulus_y: float,
 ) -> tuple[float, float, float, float]:
-    """Return the forces of one strip, their moment, and the length that adheres.
+    """Return the forces of one strip, their moment, and the adhesion length.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def strip_force(
     slip_x, slip_y : float
         X and Y, rigid slip per unit of rolling velocity in the middle of the strip.
     spin : float
-        phi [1/m], which adds phi x to Y along the strip.
+        phi [1/m]; the local lateral slip is Y + phi x.
     modulus_x, modulus_y : float
         E_x and G_y [Pa]: E* and G in a long contact.
 
@@ -155,7 +155,7 @@ def strip_force(
     moment : float
         Integral of x times the lateral traction [N]; -(F_x X + F_y Y + phi moment) >= 0.
     adhesion_length : float
-        Length that adheres [m].
+        Length of the adhesion zone [m].
     """
     bound = friction * line_load
     if slip_x == 0.0 and slip_y == 0.0 and spin == 0.0:
@@ -189,7 +189,7 @@ def spin_turns(
     spin: float,
     modulus_y: float,
 ) -> bool:
-    """Tell whether spin may ask for more of a strip than `straight_force`; cheap, and no root.
+    """Return whether spin may require the full `strip_force`; inexpensive, without square root.
 
     Parameters
     ----------
@@ -213,10 +213,10 @@ def straight_force(
     modulus_x: float,
     modulus_y: float,
 ) -> tuple[float, float, float, float]:
-    """Return what `strip_force` does where spin neither turns the slip nor exceeds its limit.
+    """Return the result of `strip_force` if spin neither turns the slip nor exceeds its limit.
 
-    One formula for all stages, without a branch, so that strips are done several at a time: with
-    s = min(t, 1) and r = min(1/t, 1) the weight of u is w = (1 + s^2 - r^2)/2, and
+    One formula without branches covers partial and full sliding, so that the loop over strips is
+    vectorised: with s = min(t, 1) and r = min(1/t, 1) the weight of u is w = (1 + s^2 - r^2)/2, and
 
         F = -mu q [(2 - 3s/2) r^3 d + (1 - w) psi y^ + w u].
 
@@ -230,7 +230,7 @@ def straight_force(
     Returns
     -------
     force_x, force_y, moment, adhesion_length
-        As `strip_force` returns them.
+        As of `strip_force`.
     """
     per = 1.0 / (steepness * half_length)
     d_x, d_y = slip_x * modulus_x * per, slip_y * modulus_y * per

@@ -1,15 +1,14 @@
-"""FaStrip: strip theory where a strip adheres, a march of the traction's direction where it slides.
+"""FaStrip: strip theory in the adhesion zone, integration of the traction's direction in slip.
 
-Sichani, Enblom and Berg (2016), DOI 10.1080/00423114.2016.1156135. They take the direction from
-FASTSIM; here the march knows the strip's own elasticity. Where the strip slides its traction lies
-on the bound and only its direction e may turn. With x = a cos(q), a change of traction strains the
-surface of a plane by (2a sin(q)/G) d/dx, which has to undo what of strip theory's slip S lies
-across the traction, in the direction n:
+Sichani, Enblom and Berg (2016), DOI 10.1080/00423114.2016.1156135, take the direction from FASTSIM;
+here it is integrated with the elasticity of the strip. In the slip zone the traction is equal to
+the bound, and only its direction e may change. With x = a cos(q), a change of traction strains the
+surface of a plane by (2a sin(q)/G) d/dx. This strain cancels the component of strip theory's slip S
+in the direction n normal to the traction:
 
     n . de/dq = -(n . S) / (2 B a sin(q) (nx^2/Gx + ny^2/Gy)).
 
-Where spin leaves nothing adhering in strip theory, FASTSIM's march with its one flexibility takes
-its place.
+Strips without an adhesion zone because of spin are solved by FASTSIM with one flexibility.
 """
 
 from __future__ import annotations
@@ -30,8 +29,7 @@ from wearsim.mechanics.tangential.strip_with_spin import (
 )
 from wearsim.types import FloatArray
 
-# a direction alone turns smoothly: a fifth of the steps that a march of tractions takes will do
-_STEP_RATIO = 5
+_STEP_RATIO = 5  # steps of FASTSIM per step here: the direction alone is a smooth function
 
 
 @kernel
@@ -56,18 +54,18 @@ def fastrip(
     moduli : Moduli
         The amended moduli.
     flexibility : float
-        L [m/Pa] of the march where strip theory has nothing adhering.
+        L [m/Pa] of FASTSIM, for strips without an adhesion zone because of spin.
     points : int
-        Steps along a strip that is left to FASTSIM; a fifth of them along the part that slides.
+        Steps along a strip that is solved by FASTSIM; a fifth of them along a slip zone.
 
     Returns
     -------
     ndarray, shape (4, strips)
-        As `fastsim.march` returns; adhesion is exact but in strips that FASTSIM takes over.
+        As of `fastsim.march`; the adhesion length is exact except in strips solved by FASTSIM.
     """
     sums = new_sums(len(half_length))
     gradient = np.empty(len(half_length))
-    elliptic = points > 0  # always, but a literal would be compiled for by itself
+    elliptic = points > 0  # always true; a literal would be compiled as another signature
     for j in range(len(half_length)):
         gradient[j] = motion.longitudinal[j] / flexibility
         if not (half_length[j] > 0.0 and bound_peak[j] > 0.0):
@@ -87,7 +85,7 @@ def fastrip(
         else:
             strip = strip_of(j, half_length, bound_peak, motion, moduli)
             one_way = motion.lateral == 0.0 or motion.longitudinal[j] == 0.0
-            # what slides one way does not turn, and one step is exact
+            # a slip of constant direction does not turn, so that one step is exact
             steps = 1 if motion.spin == 0.0 and one_way else 1 + points // _STEP_RATIO
             _integrate_adhesion(j, strip, sums)
             _march_slip(j, strip, steps, sums)
@@ -96,7 +94,7 @@ def fastrip(
 
 @kernel
 def _integrate_adhesion(j: int, strip: Strip, sums: Sums) -> None:
-    """Integrate the traction where strip `j` adheres."""
+    """Integrate the traction over the adhesion zone of strip `j`."""
     a, radius = strip.half_length, strip.half_length - strip.shift
     if not radius > 0.0:
         return
@@ -104,7 +102,7 @@ def _integrate_adhesion(j: int, strip: Strip, sums: Sums) -> None:
     cosine = (2.0 * d - a) / a  # x/a where slip begins
     sine = 2.0 * math.sqrt(d * radius) / a
     slides = 2.0 * math.asin(math.sqrt(d / a))
-    # bound less what adhesion takes back, in terms that are small where little slides
+    # bound minus its reduction in adhesion, in terms that are small for a short slip zone
     area = 0.5 * math.pi * d * (2.0 * a - d) - 0.5 * a * a * (slides + sine * cosine)
     lever = (a * sine) ** 3 / 3.0
     back = 0.5 * math.pi * radius * radius
@@ -117,7 +115,7 @@ def _integrate_adhesion(j: int, strip: Strip, sums: Sums) -> None:
 
 @kernel
 def _march_slip(j: int, strip: Strip, steps: int, sums: Sums) -> None:
-    """March the traction's direction through the part of strip `j` that slides."""
+    """Integrate the traction's direction through the slip zone of strip `j`."""
     if not strip.shift > 0.0:
         return
     a = strip.half_length
@@ -149,7 +147,7 @@ def turn_direction(
 ) -> tuple[float, float]:
     """Return the traction's direction e after a step.
 
-    Against a constant slip the tangent of half the angle between them fades exponentially.
+    With a constant slip, the tangent of half the angle between the two decays exponentially.
 
     Parameters
     ----------
@@ -160,7 +158,7 @@ def turn_direction(
     way : float
         Step of q over sin(q) in its middle.
     e_x, e_y : float
-        The direction before.
+        The direction before the step.
     """
     size = math.sqrt(slip_x * slip_x + slip_y * slip_y)
     if not size > 0.0:
@@ -183,35 +181,32 @@ def fastrip_fields(
     moduli: Moduli,
     points: int,
 ) -> FloatArray:
-    """Return the inside of every strip that strip theory holds for; zeros in others.
+    """Return traction and slip fields of the strips that strip theory applies to; zeros in others.
 
     Parameters
     ----------
     half_length, bound_peak, motion, moduli
         As in `fastrip`.
     points : int
-        Points along a strip, evenly spaced from x = a to x = -a; the march steps over them.
+        Points along a strip, evenly spaced from x = a to x = -a, also the steps of the integration.
 
     Returns
     -------
     ndarray, shape (4, points, strips)
         Longitudinal and lateral traction [Pa] and slip over the rolling velocity, which opposes the
-        traction and is zero where the strip adheres; from the leading edge on.
+        traction and is zero in adhesion; from the leading edge on.
     """
     out = np.zeros((4, points, len(half_length)))
     for j in range(len(half_length)):
-        if not (half_length[j] > 0.0 and bound_peak[j] > 0.0):
-            continue
-        if beyond_strip_theory(j, half_length, bound_peak, motion, moduli):
-            continue
-        strip = strip_of(j, half_length, bound_peak, motion, moduli)
-        _fill_fields(j, strip, out)
+        loaded = half_length[j] > 0.0 and bound_peak[j] > 0.0
+        if loaded and not beyond_strip_theory(j, half_length, bound_peak, motion, moduli):
+            _fill_fields(j, strip_of(j, half_length, bound_peak, motion, moduli), out)
     return out
 
 
 @kernel
 def _fill_fields(j: int, strip: Strip, out: FloatArray) -> None:
-    """Put traction and slip of strip `j`, point by point from the leading edge."""
+    """Fill traction and slip of strip `j`, point by point from the leading edge."""
     a, d, rise = strip.half_length, strip.shift, strip.rise
     points = out.shape[1]
     before = math.acos((2.0 * d - a) / a)

@@ -14,10 +14,10 @@ _ROOT_CORNER = 0.2078862249773546  # -zeta(-1/2)
 
 
 class Sums(NamedTuple):
-    """What a march sums up in every strip, and the traction where it stands; all (strips,).
+    """Integrals over every strip and the traction at the current point, all (strips,).
 
     Integrals of the longitudinal and the lateral traction [N/m] and of x times the latter [N],
-    length in adhesion [m], the element sum over V [N/m] and the tractions [Pa].
+    adhesion length [m], the element sum over V [N/m] and the tractions [Pa].
     """
 
     force_x: FloatArray
@@ -39,34 +39,34 @@ def march(
     gradient_spin: float,
     points: int,
 ) -> FloatArray:
-    """March the traction from the leading to the trailing edge of every strip at once.
+    """Integrate the traction from the leading to the trailing edge of all strips together.
 
-    A step of dx adds -gradient dx to the traction; where that exceeds the bound at the new point
-    the traction is scaled back to it. Sums over the points are trapezoidal, corrected at both
-    edges, where the traction vanishes (`end_weights`); the work of the rigid slip follows from
-    them without an error of its own. It is second order in dx: what is left comes from where a
-    strip begins to slide, with either sign, and averages out over strips.
+    A step of dx adds -gradient dx to the traction; if the result exceeds the bound at the new
+    point, the traction is scaled back to the bound. The integrals use the trapezoidal rule with
+    corrections at both edges, where the traction vanishes (`end_weights`). The work of the rigid
+    slip is exact for these integrals. Its error is of second order in dx; the remaining error is
+    caused by the onset of slip, has either sign, and averages out over the strips.
 
     Parameters
     ----------
     half_length : ndarray, shape (strips,)
         a(y) [m]; strips with a = 0 get zeros.
     bound_peak : ndarray, shape (strips,)
-        Friction times the traction bound's pressure at x = 0 [Pa].
+        Traction bound at x = 0 [Pa].
     elliptic : bool
         Whether the bound along the strip is sqrt(1 - x^2/a^2) rather than 1 - x^2/a^2.
     gradient_x : ndarray, shape (strips,)
-        Rise of the longitudinal traction in adhesion, xi/L1 and spin's part over L3 [Pa/m].
+        Gradient of the longitudinal traction in adhesion: xi/L1 plus the spin part over L3 [Pa/m].
     gradient_y, gradient_spin : float
         The same for the lateral traction, eta/L2 [Pa/m], and phi/L3 [Pa/m^2], which multiplies x.
     points : int
-        Steps mx along each strip.
+        Number of steps mx along each strip.
 
     Returns
     -------
     ndarray, shape (4, strips)
         Integral of the longitudinal and of the lateral traction [N/m], integral of x times the
-        lateral traction [N], and length in adhesion [m].
+        lateral traction [N], and adhesion length [m].
 
     Notes
     -----
@@ -89,7 +89,7 @@ def march(
 
 @kernel
 def new_sums(strips: int) -> Sums:
-    """Return room for what the march of so many strips sums up.
+    """Return `Sums` of zeros for a number of strips.
 
     Parameters
     ----------
@@ -102,12 +102,12 @@ def new_sums(strips: int) -> Sums:
 
 @kernel
 def slice_sums(sums: Sums, first: int, stop: int) -> Sums:
-    """Return the room of the strips from `first` to before `stop`.
+    """Return a view of the sums of the strips from `first` to before `stop`.
 
     Parameters
     ----------
     sums : Sums
-        The room of all strips.
+        Sums of all strips.
     first, stop : int
         Number of the first strip, and of the one after the last.
     """
@@ -124,7 +124,7 @@ def slice_sums(sums: Sums, first: int, stop: int) -> Sums:
 
 @kernel
 def stack_sums(sums: Sums) -> FloatArray:
-    """Return the first four of the sums as one array, shape (4, strips)."""
+    """Return forces, moment and adhesion length as one array, shape (4, strips)."""
     out = np.empty((4, len(sums.force_x)))
     out[0], out[1], out[2], out[3] = sums.force_x, sums.force_y, sums.moment, sums.adhesion
     return out
@@ -132,12 +132,12 @@ def stack_sums(sums: Sums) -> FloatArray:
 
 @kernel
 def clear(strips: int, sums: Sums) -> None:
-    """Set the sums of the first strips to zero, as at the leading edge.
+    """Set the sums and tractions of the first strips to zero, as at the leading edge.
 
     Parameters
     ----------
     strips : int
-        How many.
+        Number of strips.
     sums : Sums
         Overwritten.
     """
@@ -149,7 +149,7 @@ def clear(strips: int, sums: Sums) -> None:
 
 @kernel
 def _times_step(strips: int, sums: Sums, half_length: FloatArray, cell: float) -> None:
-    """Turn sums over the points into integrals along the first strips."""
+    """Multiply the sums over points of the first strips by the step, to obtain integrals."""
     for j in range(strips):
         dx = cell * half_length[j]
         sums.force_x[j] *= dx
@@ -170,12 +170,12 @@ def march_into(
     points: int,
     sums: Sums,
 ) -> None:
-    """March as `march` does, into room that is there already.
+    """Integrate as `march` does, into an existing `Sums`.
 
     Parameters
     ----------
     strips : int
-        How many of the strips to march through, the first ones; four at a time go fastest.
+        Number of strips to integrate, the first ones; a multiple of four is fastest.
     half_length, bound_peak, elliptic, gradient_x, gradient_y, gradient_spin, points
         As in `march`.
     sums : Sums
@@ -188,9 +188,8 @@ def march_into(
         shape = bound_shape(place, elliptic)
         sticking, sliding = end_weights(k, points, elliptic)
         for j in range(strips):
-            a = half_length[j]
+            a, bound = half_length[j], shape * bound_peak[j]
             across = gradient_y + gradient_spin * (place + 0.5 * cell) * a
-            bound = shape * bound_peak[j]
             _step(j, place, cell * a, gradient_x[j], across, bound, sticking, sliding, sums)
     _times_step(strips, sums, half_length, cell)
 
@@ -207,22 +206,22 @@ def _step(
     sliding: float,
     sums: Sums,
 ) -> tuple[float, float, float]:
-    """Take strip `j` a step on; return the trial tractions and the factor that held them.
+    """Advance strip `j` by one step; return the trial tractions and their scale factor.
 
     Parameters
     ----------
     j : int
         Number of the strip.
     place, dx : float
-        x/a where the step ends, and its length [m].
+        x/a at the end of the step, and its length [m].
     along, across : float
-        Rise of the tractions over the step [Pa/m].
+        Gradients of the tractions over the step [Pa/m].
     bound : float
-        Traction bound where the step ends [Pa].
+        Traction bound at the end of the step [Pa].
     sticking, sliding : float
-        What the point weighs in the sums, as it adheres or slides.
+        Weight of the point in the sums in adhesion and in slip.
     sums : Sums
-        Brought up to date, but for the work.
+        Updated, except for the work.
     """
     tx = sums.traction_x[j] - along * dx
     ty = sums.traction_y[j] - across * dx
@@ -239,33 +238,33 @@ def _step(
 
 @kernel
 def place_of(step: int, points: int) -> float:
-    """Return x/a where a step ends, from just behind the leading edge to -1.
+    """Return x/a at the end of a step, from just behind the leading edge to -1.
 
     Parameters
     ----------
     step, points : int
-        Number of the step, from 1 on, and steps mx along the strip.
+        Number of the step, from 1, and number of steps mx along the strip.
     """
     return 1.0 - 2.0 / points * step if step < points else -1.0
 
 
 @kernel
 def end_weights(step: int, points: int, elliptic: bool) -> tuple[float, float]:
-    """Return what the traction where a step ends weighs in the sums, as it adheres or slides.
+    """Return the weights of the traction at the end of a step in the sums, in adhesion and slip.
 
-    One everywhere but next to the edges. There the trapezoidal rule cuts a corner, which Euler and
-    Maclaurin give back: h/12 of the first value of a traction that rises evenly, or along the
-    parabola, and -zeta(-1/2) h of one that rises as a root.
+    They are 1 except next to the edges, where the error of the trapezoidal rule is corrected by the
+    Euler-Maclaurin formula: h/12 times the first value of a traction that increases linearly or as
+    the parabola, and -zeta(-1/2) h times that of one that increases as a square root.
 
     Parameters
     ----------
     step, points : int
-        Number of the step, from 1 on, and steps mx along the strip.
+        Number of the step, from 1, and number of steps mx along the strip.
     elliptic : bool
         As in `march`.
     """
     sticking = sliding = 1.0
-    inner = points / max(points - 1.0, 1.0)  # the bound's rise at the edge, over that of its chord
+    inner = points / max(points - 1.0, 1.0)  # slope of the bound at the edge over that of its chord
     corner = _ROOT_CORNER * math.sqrt(inner) if elliptic else inner / 12.0
     if step == 1:
         sticking += 1.0 / 12.0
@@ -293,7 +292,7 @@ def bound_shape(place: float, elliptic: bool) -> float:
 
 @inlined_kernel
 def limit_traction(traction_x: float, traction_y: float, bound: float) -> tuple[bool, float]:
-    """Return whether the traction keeps to the bound, and the factor that holds it there.
+    """Return whether the traction is within the bound, and the factor that scales it to the bound.
 
     Parameters
     ----------
@@ -320,7 +319,7 @@ def march_local(
     lateral: float,
     sums: Sums,
 ) -> None:
-    """March as `march` does under friction that differs from point to point.
+    """Integrate as `march` does with a friction coefficient that varies from point to point.
 
     Parameters
     ----------
@@ -329,15 +328,15 @@ def march_local(
     half_length, elliptic, gradient_x, gradient_y, gradient_spin
         As in `march`.
     bound_peak : ndarray, shape (strips,)
-        The traction bound's pressure at x = 0 [Pa], without friction.
+        Pressure of the traction bound at x = 0 [Pa], without friction.
     friction : ndarray, shape (points, all strips)
-        Friction coefficient where each step ends, from the leading edge on.
+        Friction coefficient at the end of each step, from the leading edge on.
     first : int
-        Where in `friction` the strips begin.
+        Column of `friction` of the first strip.
     longitudinal, lateral : float
-        Flexibilities L1 and L2 [m/Pa], for the element sum alone.
+        Flexibilities L1 and L2 [m/Pa], used for the element sum only.
     sums : Sums
-        Overwritten; `work` is the textbook's element sum over the rolling velocity.
+        Overwritten; `work` is the element sum over the rolling velocity.
     """
     clear(strips, sums)
     points = len(friction)
@@ -347,9 +346,8 @@ def march_local(
         shape = bound_shape(place, elliptic)
         sticking, sliding = end_weights(k, points, elliptic)
         for j in range(strips):
-            a = half_length[j]
+            a, bound = half_length[j], shape * (friction[k - 1, first + j] * bound_peak[j])
             across = gradient_y + gradient_spin * (place + 0.5 * cell) * a
-            bound = shape * (friction[k - 1, first + j] * bound_peak[j])
             tx, ty, scale = _step(
                 j, place, cell * a, gradient_x[j], across, bound, sticking, sliding, sums
             )

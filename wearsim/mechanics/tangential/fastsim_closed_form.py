@@ -1,10 +1,8 @@
-"""FASTSIM's march integrated in closed form, where each traction keeps one direction."""
+"""Closed form of FASTSIM without spin, where the direction of each traction is constant."""
 
 from __future__ import annotations
 
 import math
-
-import numpy as np
 
 from wearsim.mechanics.numerics.jit import kernel
 from wearsim.mechanics.tangential.fastsim import Sums, clear, new_sums, stack_sums
@@ -19,11 +17,11 @@ def closed_form(
     gradient_x: FloatArray,
     gradient_y: float,
 ) -> FloatArray:
-    """Return what `march` tends to without spin, where each traction keeps one direction.
+    """Return the limit of `march` for small steps without spin.
 
-    With G = |gradient| the traction climbs as G s behind the leading edge until it meets the bound,
-    where it stays: at s = 2a - kappa, kappa = G a^2/bound_peak, for the parabolic bound, and at
-    s = 2a/(1 + k^2), k = G a/bound_peak, for the elliptic one.
+    With G = |gradient| the traction increases as G s behind the leading edge until it reaches the
+    bound, and is then equal to it: from s = 2a - kappa, kappa = G a^2/bound_peak, for the parabolic
+    bound, and from s = 2a/(1 + k^2), k = G a/bound_peak, for the elliptic one.
 
     Parameters
     ----------
@@ -33,11 +31,11 @@ def closed_form(
     Returns
     -------
     ndarray, shape (4, strips)
-        As `march` returns, the moment being that of the same tractions.
+        As of `march`; the moment is that of the same tractions.
 
     Notes
     -----
-    Integrated here from the march of Kalker (1982), DOI 10.1080/00423118208968684.
+    Derived from Kalker (1982), DOI 10.1080/00423118208968684.
     """
     sums = new_sums(len(half_length))
     closed_form_into(
@@ -56,12 +54,12 @@ def closed_form_into(
     gradient_y: float,
     sums: Sums,
 ) -> None:
-    """Integrate as `closed_form` does, into room that is there already.
+    """Integrate as `closed_form` does, into an existing `Sums`.
 
     Parameters
     ----------
     strips : int
-        How many of the strips to integrate, the first ones.
+        Number of strips to integrate, the first ones.
     half_length, bound_peak, elliptic, gradient_x, gradient_y
         As in `march`.
     sums : Sums
@@ -72,10 +70,10 @@ def closed_form_into(
         a, peak = half_length[j], bound_peak[j]
         size = math.sqrt(gradient_x[j] * gradient_x[j] + gradient_y * gradient_y)
         if a > 0.0 and size > 0.0 and peak > 0.0:
-            if elliptic:
-                stick, force, moment = _elliptic(a, size, peak)
-            else:
-                stick, force, moment = _parabolic(a, size, peak)
+            slip = _elliptic(a, size, peak) if elliptic else _parabolic(a, size, peak)
+            stick = slip[0]
+            force = 0.5 * size * stick**2 + slip[1]
+            moment = size * stick**2 * (0.5 * a - stick / 3.0) + slip[2]
             sums.force_x[j] = -force * (gradient_x[j] / size)
             sums.force_y[j] = -force * (gradient_y / size)
             sums.moment[j] = -moment * (gradient_y / size)
@@ -86,69 +84,19 @@ def closed_form_into(
 
 @kernel
 def _parabolic(a: float, steep: float, peak: float) -> tuple[float, float, float]:
-    """Return adhesion length, force and moment (x times traction) for the parabolic bound."""
+    """Return adhesion length, force and moment of the slip zone for the parabolic bound."""
     kappa = min(steep * a**2 / peak, 2.0 * a)
-    stick = 2.0 * a - kappa
-    # x = a - s; in adhesion the traction is G s, in slip peak s(2a - s)/a^2
+    # x = a - s; the traction is G s in adhesion and peak s(2a - s)/a^2 in slip
     slip_force = peak * kappa**2 * (3.0 * a - kappa) / (3.0 * a**2)
-    edge = kappa - a  # x where slip starts
-    slip_moment = -0.25 * peak * (a**2 - edge**2) ** 2 / a**2
-    force = 0.5 * steep * stick**2 + slip_force
-    moment = steep * stick**2 * (0.5 * a - stick / 3.0) + slip_moment
-    return stick, force, moment
+    edge = kappa - a  # x at the onset of slip
+    return 2.0 * a - kappa, slip_force, -0.25 * peak * (a**2 - edge**2) ** 2 / a**2
 
 
 @kernel
 def _elliptic(a: float, steep: float, peak: float) -> tuple[float, float, float]:
-    """Return adhesion length, force and moment (x times traction) for the elliptic bound."""
+    """Return adhesion length, force and moment of the slip zone for the elliptic bound."""
     k = steep * a / peak
-    stick = 2.0 * a / (1.0 + k**2)
-    cosine = (k**2 - 1.0) / (k**2 + 1.0)  # x/a where slip starts
+    cosine = (k**2 - 1.0) / (k**2 + 1.0)  # x/a at the onset of slip
     sine = 2.0 * k / (1.0 + k**2)
     slip_force = 0.5 * peak * a * (cosine * sine + math.atan2(cosine, sine) + 0.5 * math.pi)
-    slip_moment = -peak * a**2 * sine**3 / 3.0
-    force = 0.5 * steep * stick**2 + slip_force
-    moment = steep * stick**2 * (0.5 * a - stick / 3.0) + slip_moment
-    return stick, force, moment
-
-
-def closed_form_parabolic(
-    semi_axis_x: float,
-    semi_axis_y: float,
-    normal_force: float,
-    friction: float,
-    creepage: float,
-    flexibility: float,
-    half_length: FloatArray,
-) -> FloatArray:
-    """Return the force per strip of Kalker's ellipse under one creepage, in closed form.
-
-    With kappa = v a^2/(L mu pp), pp = 2N/(pi a b), the same for every strip of half-length A:
-    F = (v/L)(2 A^2 - A kappa + kappa^2/6) where kappa < 2A, else (4/3) mu pp A^3/a^2. The
-    dissipation is V v F.
-
-    Parameters
-    ----------
-    semi_axis_x, semi_axis_y : float
-        a and b [m].
-    normal_force : float
-        N [N].
-    friction : float
-        mu.
-    creepage : float
-        Magnitude v of the creepage.
-    flexibility : float
-        L of its direction [m/Pa].
-    half_length : ndarray, shape (strips,)
-        A = a(y) [m].
-
-    Returns
-    -------
-    ndarray, shape (strips,)
-        Magnitude of the force per unit of axial length [N/m].
-    """
-    peak = friction * 2.0 * normal_force / (math.pi * semi_axis_x * semi_axis_y)
-    bound_peak = peak * (half_length / semi_axis_x) ** 2
-    gradient = np.full_like(half_length, creepage / flexibility)
-    force_x: FloatArray = closed_form(half_length, bound_peak, False, gradient, 0.0)[0]
-    return -force_x
+    return 2.0 * a / (1.0 + k**2), slip_force, -peak * a**2 * sine**3 / 3.0

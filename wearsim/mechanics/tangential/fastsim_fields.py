@@ -1,4 +1,4 @@
-"""The inside of a contact as FASTSIM marches through it, and the textbook's dissipation."""
+"""Traction fields of FASTSIM inside a contact, and the dissipation as a sum over elements."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def march_fields(
     gradient_spin: float,
     points: int,
 ) -> FloatArray:
-    """March as `march` does, and keep what it passes.
+    """Return the traction fields of `march`.
 
     Parameters
     ----------
@@ -29,11 +29,11 @@ def march_fields(
     Returns
     -------
     ndarray, shape (4, points + 1, strips)
-        As `march_local_fields` returns.
+        As of `march_local_fields`.
     """
-    everywhere = np.ones((points, len(half_length)))
+    friction = np.ones((points, len(half_length)))
     return march_local_fields(
-        half_length, bound_peak, everywhere, elliptic, gradient_x, gradient_y, gradient_spin
+        half_length, bound_peak, friction, elliptic, gradient_x, gradient_y, gradient_spin
     )
 
 
@@ -47,7 +47,7 @@ def march_local_fields(
     gradient_y: float,
     gradient_spin: float,
 ) -> FloatArray:
-    """March as `march_local` does, and keep what it passes.
+    """Return the traction fields of `march_local`.
 
     Parameters
     ----------
@@ -57,9 +57,9 @@ def march_local_fields(
     Returns
     -------
     ndarray, shape (4, points + 1, strips)
-        Longitudinal and lateral traction [Pa], and what the bound cut off each of them [Pa]; from
-        the leading edge x = a to the trailing edge x = -a. Slip over the rolling velocity is
-        ``-cut * L / dx`` in each direction, with its flexibility L.
+        Longitudinal and lateral traction, and the excess of each trial traction over the traction
+        bound [Pa]; from the leading edge x = a to the trailing edge x = -a. Slip over the rolling
+        velocity is ``-excess * L / dx`` in each direction, with its flexibility L.
     """
     points, strips = friction.shape
     out = np.zeros((4, points + 1, strips))
@@ -84,14 +84,15 @@ def march_local_fields(
 def element_sum(
     fields: FloatArray, longitudinal: float, lateral: float, rolling_speed: float
 ) -> FloatArray:
-    """Return the textbook's dissipation: each element's new traction times its slip, added up.
+    """Return the dissipation as a sum over elements of their new traction times their slip.
 
-    First order in dx, and low; kept to show what it costs against the work of the rigid slip.
+    The error is of first order in dx and negative; used for comparison with the work of the rigid
+    slip.
 
     Parameters
     ----------
     fields : ndarray, shape (4, points + 1, strips)
-        As `march_fields` returns them.
+        From `march_fields`.
     longitudinal, lateral : float
         Flexibilities L1 and L2 [m/Pa].
     rolling_speed : float
@@ -102,6 +103,6 @@ def element_sum(
     ndarray, shape (strips,)
         P_l [W/m].
     """
-    traction_x, traction_y, cut_x, cut_y = fields
-    work = longitudinal * traction_x * cut_x + lateral * traction_y * cut_y
+    traction_x, traction_y, excess_x, excess_y = fields
+    work = longitudinal * traction_x * excess_x + lateral * traction_y * excess_y
     return np.asarray(rolling_speed * work.sum(axis=0))

@@ -1,4 +1,4 @@
-"""Thousands of contacts with Hertz patches and FASTSIM, one after another in compiled code."""
+"""Batches of contacts with Hertz patches and FASTSIM, solved one after another."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from wearsim.mechanics.tangential.kalker_coefficients import (
 )
 from wearsim.types import FloatArray, IntArray
 
-NEVER, EXACT, ALWAYS = range(3)  # where the closed form takes the march's place
-TABLE, LINE_LIMIT, GIVEN = range(3)  # where Kalker's coefficients come from
-NO_LIMIT, NOT_FINITE = 30, 31  # statuses beside those of `hertz_patches`
-_LANES = 4  # strips that a march takes at a time; each one left over costs as much as they
+NEVER, EXACT, ALWAYS = range(3)  # use of the closed form instead of `march`
+TABLE, LINE_LIMIT, GIVEN = range(3)  # source of Kalker's coefficients
+NO_LIMIT, NOT_FINITE = 30, 31  # statuses in addition to those of `hertz.patches`
+_LANES = 4  # strips per vector operation of `march`; a remaining strip costs as much as four
 
 
 class Theory(NamedTuple):
-    """How tractions are found; `models.fastsim_theory.FastsimTheory` has the words.
+    """Options of the tangential theory; see `models.tangential.fastsim.FastsimTheory`.
 
-    G [Pa], nu, the bound, the closed form, the dissipation, the steps along a strip, whether one
-    flexibility stands for three, where the creepage coefficients come from, (3,) given ones and the
-    tables of C11, C22 and C23.
+    G [Pa], nu, whether the bound is elliptic, use of the closed form, whether the dissipation is
+    the element sum, steps along a strip, whether a single flexibility is used, source of the
+    creepage coefficients, given coefficients (3,) and the tables of C11, C22 and C23.
     """
 
     shear_modulus: float
@@ -47,11 +47,11 @@ class Theory(NamedTuple):
 
 
 class ContactInputs(NamedTuple):
-    """What is asked of every contact.
+    """Operating points of the contacts.
 
     Loads [N], creepages and spins [1/m], all (contacts,); friction (contacts, points, strips), with
-    one point where it is the same along a strip, and one strip where it is the same in all; whether
-    particles carry it; the creepage's variation (contacts, strips), or (0, strips) for none; V.
+    one point if constant along a strip, and one strip if equal for all; whether friction moves with
+    the material; variation of the creepage (contacts, strips), or (0, strips) for none; V [m/s].
     """
 
     normal_force: FloatArray
@@ -65,9 +65,9 @@ class ContactInputs(NamedTuple):
 
 
 class ContactResults(NamedTuple):
-    """What comes out: a(y) [m], q(y) [N/m] and P_l [W/m] (contacts, strips), the rest (contacts,).
+    """Solution: a(y) [m], q(y) [N/m] and P_l [W/m] (contacts, strips), the others (contacts,).
 
-    Forces [N] and spin moment [N m] on body 1, adhering part of the area and power [W].
+    Forces [N] and spin moment [N m] on body 1, adhering fraction of the area and power [W].
     """
 
     half_length: FloatArray
@@ -81,10 +81,10 @@ class ContactResults(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """Room for one contact: coverage and slip of all strips, and what the march takes.
+    """Work space of one contact: coverage and slip of all strips, and the inputs of `march`.
 
-    Half-lengths, gradients and bounds begin at the first strip in contact, and have room for as
-    many strips as make up whole lanes.
+    Half-lengths, gradients and bounds begin at the first strip in contact, and their size is a
+    multiple of `_LANES`.
     """
 
     middle: FloatArray
@@ -107,20 +107,20 @@ def solve_contacts(
     patches: Patches,
     results: ContactResults,
 ) -> int:
-    """Solve every contact; their order and company change nothing.
+    """Solve every contact; the result does not depend on the order or on the batch.
 
     Parameters
     ----------
     bodies, theory : Bodies, Theory
-        What the contacts share.
+        Constants of the contacts, and options.
     gaps : ndarray, shape (rows, strips)
         Gaps [m].
     row : ndarray of int, shape (contacts,)
         The row of each contact's gap.
-    asked : Asked
+    inputs : ContactInputs
         Loads, creepage and friction.
-    patches, found : Patches, Found
-        Overwritten; of a contact that failed only `patches.status` means anything.
+    patches, results : Patches, ContactResults
+        Overwritten; of a contact that failed only `patches.status` is valid.
 
     Returns
     -------
@@ -128,8 +128,8 @@ def solve_contacts(
         The first contact that failed, or their number.
     """
     strips = len(bodies.y)
-    room, lanes = np.empty((5, strips)), np.empty((3, _whole_lanes(strips)))
-    work = Workspace(room[0], room[1], room[2], room[3], room[4], lanes[0], lanes[1], lanes[2])
+    rows, lanes = np.empty((5, strips)), np.empty((3, _whole_lanes(strips)))
+    work = Workspace(rows[0], rows[1], rows[2], rows[3], rows[4], lanes[0], lanes[1], lanes[2])
     total, sums = new_sums(strips), new_sums(_whole_lanes(strips))
     ones = np.ones((theory.points, strips))
     given = theory.given
@@ -175,10 +175,10 @@ def _coefficients(theory: Theory, ratio: float) -> tuple[float, float, float]:
     if theory.kalker == LINE_LIMIT:
         limits = short_limit(ratio, nu)
         return limits[0], limits[1], limits[2]
-    results = (math.nan, math.nan, math.nan)
+    values = (math.nan, math.nan, math.nan)
     for which in range(3):
-        results = results[1], results[2], coefficient(which, ratio, nu, theory.tables[which])
-    return results
+        values = values[1], values[2], coefficient(which, ratio, nu, theory.tables[which])
+    return values
 
 
 @kernel
@@ -194,13 +194,11 @@ def _load_weighted_mean(values: FloatArray, line_load: FloatArray) -> float:
 def _fill_creepage(
     k: int, bodies: Bodies, inputs: ContactInputs, line_load: FloatArray, work: Workspace
 ) -> None:
-    """Spread the mean creepage over the strips, as `Creepage` says."""
+    """Fill the longitudinal creepage of the strips, as defined by `Creepage`."""
     strips, mean = len(bodies.y), inputs.longitudinal[k]
-    varied = len(inputs.variation) > 0
-    for j in range(strips):
-        work.longitudinal[j] = mean
-        work.spin_part[j] = 0.0
-    if varied:
+    work.longitudinal[:] = mean
+    work.spin_part[:] = 0.0
+    if len(inputs.variation) > 0:
         shift = _load_weighted_mean(inputs.variation[k], line_load)
         for j in range(strips):
             work.longitudinal[j] = mean + (inputs.variation[k, j] - shift)
@@ -228,9 +226,13 @@ def _solve_tractions(
     sums: Sums,
     total: Sums,
 ) -> None:
-    """Sum the tractions of contact `k` along its strips into `total`."""
-    a, b = patches.a[k], patches.b[k]
-    longitudinal, lateral, turning = _flexibilities(a, b, coefficients, theory.shear_modulus)
+    """Integrate the tractions of contact `k` along its strips into `total`."""
+    a, b, shear_modulus = patches.a[k], patches.b[k], theory.shear_modulus
+    c11, c22, c23 = coefficients
+    # L1, L2 and L3 [m/Pa], as in `kalker_coefficients.flexibilities`
+    longitudinal = 8.0 * a / (3.0 * c11 * shear_modulus)
+    lateral = 8.0 * a / (3.0 * c22 * shear_modulus)
+    turning = math.pi * a * math.sqrt(a / b) / (4.0 * c23 * shear_modulus)
     if theory.single:
         along = _mean_magnitude(results.line_load[k], work)
         spinning = inputs.spin[k] * math.sqrt(a * b)
@@ -239,7 +241,11 @@ def _solve_tractions(
         )
         lateral, turning = longitudinal, longitudinal
     parabola = 2.0 * inputs.normal_force[k] / (math.pi * a * b)
-    _fill_bounds(b, patches.peak_pressure[k], parabola, theory.elliptic, work)
+    for j in range(len(work.peak)):
+        t = work.middle[j] / b
+        section = max((1.0 - t) * (1.0 + t), 0.0) if work.coverage[j] > 0.0 else 0.0
+        elliptic_peak = patches.peak_pressure[k] * math.sqrt(section)
+        work.peak[j] = elliptic_peak if theory.elliptic else parabola * section
     count, whole = stop - first, _whole_lanes(stop - first)
     for j in range(count):
         here = first + j
@@ -247,7 +253,7 @@ def _solve_tractions(
         work.gradient_x[j] = mean / longitudinal + work.spin_part[here] / turning
         work.half_length[j] = results.half_length[k, here]
         work.bound[j] = work.peak[here]
-    for j in range(count, whole):  # strips of no length and no traction
+    for j in range(count, whole):  # padding by strips of zero length
         work.gradient_x[j] = work.half_length[j] = work.bound[j] = 0.0
     gradient_y, gradient_spin = inputs.lateral[k] / lateral, inputs.spin[k] / turning
     slopes = gradient_y, gradient_spin, longitudinal, lateral
@@ -263,7 +269,7 @@ def _solve_tractions(
         return
     closed = theory.closed_form == ALWAYS
     closed = closed or (theory.closed_form == EXACT and inputs.spin[k] == 0.0)
-    for lane in range(lanes):  # the particles of a pattern that rolls through, or one for all
+    for lane in range(lanes):  # the material points of a friction field that moves, or one for all
         for j in range(count):
             bound[j] = friction[lane, first + j if columns > 1 else 0] * work.peak[first + j]
         if theory.element_sum:
@@ -276,7 +282,7 @@ def _solve_tractions(
             )
             if inputs.spin[k] != 0.0:
                 for j in range(count):
-                    sums.moment[j] = 0.0  # phi x is left out, of the work as of the traction
+                    sums.moment[j] = 0.0  # phi x is neglected in the work and in the traction
         else:
             march_into(
                 whole,
@@ -294,25 +300,13 @@ def _solve_tractions(
 
 @kernel
 def _whole_lanes(strips: int) -> int:
-    """Return as many strips, or a few more, as are marched through without one left over."""
+    """Return the number of strips rounded up to a multiple of `_LANES`."""
     return (strips + _LANES - 1) // _LANES * _LANES
 
 
 @kernel
-def _flexibilities(
-    a: float, b: float, coefficients: tuple[float, float, float], shear_modulus: float
-) -> tuple[float, float, float]:
-    """Return L1, L2 and L3 [m/Pa], as `kalker.flexibilities` does."""
-    c11, c22, c23 = coefficients
-    longitudinal = 8.0 * a / (3.0 * c11 * shear_modulus)
-    lateral = 8.0 * a / (3.0 * c22 * shear_modulus)
-    turning = math.pi * a * math.sqrt(a / b) / (4.0 * c23 * shear_modulus)
-    return longitudinal, lateral, turning
-
-
-@kernel
 def _mean_magnitude(line_load: FloatArray, work: Workspace) -> float:
-    """Return the mean size of the longitudinal creepage without spin, weighted by the load."""
+    """Return the load-weighted mean magnitude of the longitudinal creepage without spin."""
     product, load = 0.0, 0.0
     for j in range(len(line_load)):
         product += abs(work.longitudinal[j] - work.spin_part[j]) * line_load[j]
@@ -321,19 +315,8 @@ def _mean_magnitude(line_load: FloatArray, work: Workspace) -> float:
 
 
 @kernel
-def _fill_bounds(
-    b: float, peak_pressure: float, parabola: float, elliptic: bool, work: Workspace
-) -> None:
-    """Put the traction bound's pressure at x = 0 of every strip, elliptic or parabolic."""
-    for j in range(len(work.peak)):
-        t = work.middle[j] / b
-        section = max((1.0 - t) * (1.0 + t), 0.0) if work.coverage[j] > 0.0 else 0.0
-        work.peak[j] = peak_pressure * math.sqrt(section) if elliptic else parabola * section
-
-
-@kernel
 def _accumulate(count: int, part: Sums, weight: float, first: int, total: Sums) -> None:
-    """Add the weighted sums of the strips from `first` on to those of all."""
+    """Add the weighted sums of the strips from `first` on to the totals."""
     for j in range(count):
         total.force_x[first + j] += weight * part.force_x[j]
         total.force_y[first + j] += weight * part.force_y[j]
@@ -352,17 +335,15 @@ def _fill_results(
     work: Workspace,
     total: Sums,
 ) -> None:
-    """Turn the sums along the strips into the solution of contact `k`."""
+    """Fill the solution of contact `k` from the integrals along its strips."""
     eta, phi, speed = inputs.lateral[k], inputs.spin[k], inputs.rolling_speed
     centre = _load_weighted_mean(bodies.y, results.line_load[k])
     force_x, force_y, moment, power, sticking, length = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(len(bodies.y)):
         part = work.coverage[j]
         tx, ty, turning = total.force_x[j], total.force_y[j], total.moment[j]
-        if theory.element_sum:
-            dissipation = part * (speed * total.work[j])
-        else:
-            dissipation = part * (-speed * (work.longitudinal[j] * tx + eta * ty + phi * turning))
+        rigid_work = work.longitudinal[j] * tx + eta * ty + phi * turning
+        dissipation = part * (speed * total.work[j] if theory.element_sum else -speed * rigid_work)
         results.dissipation[k, j] = dissipation
         power += dissipation
         force_x += part * tx

@@ -1,4 +1,4 @@
-"""Kalker's creepage coefficients of the linear theory, for every ellipse and Poisson's ratio."""
+"""Kalker's creepage coefficients of the linear theory, for any ellipse and Poisson's ratio."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from wearsim.mechanics.numerics.jit import kernel
 from wearsim.types import FloatArray
 
-# The table of Kalker (1990), Three-Dimensional Elastic Bodies in Rolling Contact: a row per ratio,
+# Table of Kalker (1990), Three-Dimensional Elastic Bodies in Rolling Contact: one row per ratio,
 # C11, C22, C23 and C33, each for nu = 0, 1/4 and 1/2.
 _RATIOS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 _SHORT = """
@@ -38,12 +38,12 @@ _LONG = """
 3.65 4.36 5.42  3.65 3.99 4.39  1.58 1.75 1.94  1.10 1.04 .954
 3.51 4.22 5.30  3.51 3.81 4.16  1.44 1.59 1.77  1.16 1.11 1.06
 """
-# C33 at b/a = 1/20, where the limit for a long contact is still 12 % off: from the exact linear
-# theory (CONTACT), good to 4 %.
+# C33 at b/a = 1/20, where the error of the limit for a long contact is 12 %: from the exact linear
+# theory (CONTACT), with an error of 4 %
 _C33_AT_20 = (0.787, 0.491, 0.167)
 
 _NODES = (0.0, 0.25, 0.5)  # Poisson's ratio of the table's columns
-# how fast the table's distance from its limit fades, as a power of a/b below 0.1
+# exponent of a/b with which the deviation of the table from its limit decays below 0.1
 _FADE = (1.5, 1.5, 2.5, 1.5)
 
 
@@ -64,7 +64,7 @@ class CreepageCoefficients:
 
 
 class Spline(NamedTuple):
-    """Cubic splines of ln C over ln(a/b), a column per Poisson's ratio 0, 1/4, 1/2.
+    """Cubic splines of ln C over ln(a/b), one column per Poisson's ratio 0, 1/4, 1/2.
 
     Knots (knots,); values and slopes (knots, 3).
     """
@@ -132,39 +132,9 @@ def long_limit(ratio: float, nu: float) -> tuple[float, float, float, float]:
     )
 
 
-@kernel
-def _approach_short(which: int, ratio: float, edge: float, value: float, nu: float) -> float:
-    """Continue the coefficient from its `value` at a/b = `edge` towards its limit at a/b = 0."""
-    excess = value / short_limit(edge, nu)[which] - 1.0
-    fade = math.pow(ratio / edge, _FADE[which])
-    return short_limit(ratio, nu)[which] * (1.0 + excess * fade)
-
-
-@kernel
-def _approach_long(which: int, ratio: float, edge: float, value: float, nu: float) -> float:
-    """Continue the coefficient from its `value` at b/a = `edge` towards its limit at b/a = 0."""
-    excess = value / long_limit(edge, nu)[which] - 1.0
-    fade = math.log(16.0 / edge**2) / math.log(16.0 / ratio**2)
-    return long_limit(ratio, nu)[which] * (1.0 + excess * fade**2)
-
-
-def _spline_slopes(
-    knots: FloatArray, values: FloatArray, first: FloatArray, last: FloatArray
-) -> FloatArray:
-    """Return the slopes of the cubic splines whose end slopes are `first` and `last`."""
-    step = np.diff(knots)
-    rise = np.diff(values, axis=0) / step[:, None]
-    matrix = np.eye(len(knots))
-    right = np.vstack([first, np.zeros_like(values[1:-1]), last])
-    for i in range(1, len(knots) - 1):
-        matrix[i, i - 1 : i + 2] = step[i], 2.0 * (step[i - 1] + step[i]), step[i - 1]
-        right[i] = 3.0 * (step[i] * rise[i - 1] + step[i - 1] * rise[i])
-    return np.asarray(np.linalg.solve(matrix, right))
-
-
 @lru_cache(maxsize=4)
 def spline(which: int) -> Spline:
-    """Return the spline of a coefficient: the table, meeting its limits with equal slopes.
+    """Return the spline of a coefficient, whose end slopes are those of the limits.
 
     Parameters
     ----------
@@ -179,22 +149,26 @@ def spline(which: int) -> Spline:
         ratios.append(20.0)
         known = np.vstack([known, _C33_AT_20])
     knots, values = np.log(ratios), np.log(known)
-    # just outside the knots no slope counts
+    # outside the knots a coefficient does not depend on the slopes
     table = Spline(knots, values, np.zeros_like(values))
     small = 1e-5
-    first, last = np.empty(3), np.empty(3)
+    matrix, right = np.eye(len(knots)), np.zeros_like(values)
     for k, nu in enumerate(_NODES):
         below = coefficient(which, math.exp(knots[0] - small), nu, table)
         above = coefficient(which, math.exp(knots[-1] + small), nu, table)
-        first[k] = (values[0, k] - math.log(below)) / small
-        last[k] = (math.log(above) - values[-1, k]) / small
-    slopes = _spline_slopes(knots, values, first, last)
-    return Spline(knots, values, slopes)
+        right[0, k] = (values[0, k] - math.log(below)) / small
+        right[-1, k] = (math.log(above) - values[-1, k]) / small
+    step = np.diff(knots)
+    rise = np.diff(values, axis=0) / step[:, None]
+    for i in range(1, len(knots) - 1):
+        matrix[i, i - 1 : i + 2] = step[i], 2.0 * (step[i - 1] + step[i]), step[i - 1]
+        right[i] = 3.0 * (step[i] * rise[i - 1] + step[i - 1] * rise[i])
+    return Spline(knots, values, np.asarray(np.linalg.solve(matrix, right)))
 
 
 @kernel
 def _at(knots: FloatArray, values: FloatArray, slopes: FloatArray, k: int, place: float) -> float:
-    """Return C at ``ln(a/b) = place`` for Poisson's ratio of column k."""
+    """Return C at ``ln(a/b) = place`` for the Poisson's ratio of column k."""
     i = 0
     while i < len(knots) - 2 and place > knots[i + 1]:
         i += 1
@@ -207,15 +181,8 @@ def _at(knots: FloatArray, values: FloatArray, slopes: FloatArray, k: int, place
 
 
 @kernel
-def _weight(k: int, nu: float) -> float:
-    """Return what column k counts for in the parabola through all three."""
-    own, one, other = _NODES[k], _NODES[(k + 1) % 3], _NODES[(k + 2) % 3]
-    return (nu - one) * (nu - other) / ((own - one) * (own - other))
-
-
-@kernel
 def coefficient(which: int, ratio: float, nu: float, table: Spline) -> float:
-    """Return one creepage coefficient, interpolated as `creepage_coefficients` says.
+    """Return one creepage coefficient, interpolated as described in `creepage_coefficients`.
 
     Parameters
     ----------
@@ -224,21 +191,29 @@ def coefficient(which: int, ratio: float, nu: float, table: Spline) -> float:
     ratio, nu : float
         a/b and Poisson's ratio.
     table : Spline
-        Its spline.
+        Spline of the coefficient.
     """
     place = math.log(ratio)
     low, high = table.knots[0], table.knots[-1]
     inside = min(max(place, low), high)
-    # the parabola in nu through the columns, in terms that are nearly linear in nu
+    # parabola in nu through the columns, for quantities that are nearly linear in nu
     total = 0.0
     for k in range(len(_NODES)):
         column = _at(table.knots, table.values, table.slopes, k, inside)
-        total += _weight(k, nu) * (column * (1.0 - _NODES[k]) if which == 3 else 1.0 / column)
+        own, one, other = _NODES[k], _NODES[(k + 1) % 3], _NODES[(k + 2) % 3]
+        weight = (nu - one) * (nu - other) / ((own - one) * (own - other))  # of Lagrange
+        total += weight * (column * (1.0 - own) if which == 3 else 1.0 / column)
     value = total / (1.0 - nu) if which == 3 else 1.0 / total
-    if place < low:
-        return _approach_short(which, ratio, math.exp(low), value, nu)
-    if place > high:
-        return _approach_long(which, 1.0 / ratio, math.exp(-high), value, nu)
+    if place < low:  # continued towards the limit at a/b = 0
+        edge = math.exp(low)
+        excess = value / short_limit(edge, nu)[which] - 1.0
+        decay = math.pow(ratio / edge, _FADE[which])
+        return short_limit(ratio, nu)[which] * (1.0 + excess * decay)
+    if place > high:  # continued towards the limit at b/a = 0
+        slenderness, edge = 1.0 / ratio, math.exp(-high)
+        excess = value / long_limit(edge, nu)[which] - 1.0
+        decay = math.log(16.0 / edge**2) / math.log(16.0 / slenderness**2)
+        return long_limit(slenderness, nu)[which] * (1.0 + excess * decay**2)
     return value
 
 
@@ -251,12 +226,12 @@ def _check(ratio: float, poisson_ratio: float) -> None:
 
 @lru_cache(maxsize=1024)
 def creepage_coefficients(ratio: float, poisson_ratio: float) -> CreepageCoefficients:
-    """Interpolate Kalker's table, joined to its limits at both ends.
+    """Interpolate Kalker's table, continued to its limits at both ends.
 
     Parameters
     ----------
     ratio : float
-        a/b, the patch's half-length along rolling over the one across; any positive value.
+        a/b, half-length of the patch along rolling over that across; any positive value.
     poisson_ratio : float
         Combined Poisson's ratio, 0 to 0.5.
 
@@ -274,7 +249,7 @@ def creepage_coefficients(ratio: float, poisson_ratio: float) -> CreepageCoeffic
     -----
     Kalker (1990), Three-Dimensional Elastic Bodies in Rolling Contact,
     DOI 10.1007/978-94-015-7889-9. Cubic splines of ln C over ln(a/b) for each column of the table;
-    across nu a parabola of 1/C11, 1/C22, 1/C23 and (1 - nu) C33, which are nearly linear.
+    in nu a parabola of 1/C11, 1/C22, 1/C23 and (1 - nu) C33, which are nearly linear.
     """
     _check(ratio, poisson_ratio)
     at = float(ratio), float(poisson_ratio)
@@ -283,12 +258,12 @@ def creepage_coefficients(ratio: float, poisson_ratio: float) -> CreepageCoeffic
 
 
 def line_limit_coefficients(ratio: float, poisson_ratio: float) -> CreepageCoefficients:
-    """Return the limits for a contact that is long across rolling, whatever the ratio.
+    """Return the limits for a contact that is long across rolling, evaluated at any ratio.
 
     Parameters
     ----------
     ratio : float
-        a/b, the patch's half-length along rolling over the one across.
+        a/b, half-length of the patch along rolling over that across.
     poisson_ratio : float
         Combined Poisson's ratio, 0 to 0.5.
 
@@ -299,8 +274,8 @@ def line_limit_coefficients(ratio: float, poisson_ratio: float) -> CreepageCoeff
     Raises
     ------
     ValueError
-        If an argument is out of its range, or the ratio too large for the limit to mean anything
-        (C23 is not positive).
+        If an argument is out of its range, or the ratio is too large for the limit (C23 is not
+        positive).
     """
     _check(ratio, poisson_ratio)
     limits = CreepageCoefficients(*short_limit(float(ratio), float(poisson_ratio)))
@@ -334,11 +309,13 @@ def flexibilities(
     -----
     Kalker (1982), DOI 10.1080/00423118208968684.
     """
-    a = semi_axis_x
     return Flexibilities(
-        longitudinal=8.0 * a / (3.0 * coefficients.c11 * shear_modulus),
-        lateral=8.0 * a / (3.0 * coefficients.c22 * shear_modulus),
-        spin=math.pi * a * math.sqrt(a / semi_axis_y) / (4.0 * coefficients.c23 * shear_modulus),
+        longitudinal=8.0 * semi_axis_x / (3.0 * coefficients.c11 * shear_modulus),
+        lateral=8.0 * semi_axis_x / (3.0 * coefficients.c22 * shear_modulus),
+        spin=math.pi
+        * semi_axis_x
+        * math.sqrt(semi_axis_x / semi_axis_y)
+        / (4.0 * coefficients.c23 * shear_modulus),
     )
 
 
@@ -351,14 +328,14 @@ def one_flexibility(
     creepage_y: float,
     creepage_spin: float,
 ) -> float:
-    """Return the one flexibility that stands for FASTSIM's three: their mean, weighted by creepage.
+    """Return the single flexibility of FASTSIM: the mean of the three, weighted by creepage.
 
     Parameters
     ----------
     longitudinal, lateral, turning : float
         L1, L2 and L3 [m/Pa].
     creepage_x, creepage_y, creepage_spin : float
-        Longitudinal and lateral creepage, and spin times sqrt(ab); L1 where there is none.
+        Longitudinal and lateral creepage, and spin times sqrt(ab); if all are zero, L1 is returned.
 
     Notes
     -----

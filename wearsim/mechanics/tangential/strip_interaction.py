@@ -1,26 +1,26 @@
-"""What strips of a finite contact owe to one another: effective moduli, and slip they induce.
+"""Interaction of the strips of a finite contact: effective moduli and induced slip.
 
-Strip theory treats a strip as one of infinitely many alike. Two things are missing of order
-(a/b)^2 ln(b/a) and (a/b) ln(b/a).
+Strip theory treats a strip as one of infinitely many identical strips. It lacks two effects, of
+order (a/b)^2 ln(b/a) and (a/b) ln(b/a).
 
-**Moduli.** A patch of finite width answers slip a little more stiffly. E* and G are multiplied by
-the ratio of Kalker's C11 and C22 for equivalent ellipses to their limits for a long contact, so
-that small creepage meets the linear theory.
+**Moduli.** A patch of finite width is slightly stiffer. E* and G are multiplied by the ratio of
+Kalker's C11 and C22 for equivalent ellipses to their limits for a long contact, so that the linear
+theory is recovered for small creepage.
 
-**Induced slip.** Traction in y that varies along y strains the surface along x, and the other way
-round: with T the strips' forces and the half-space's displacement nu x y / (pi G R^3),
+**Induced slip.** Traction in y that varies along y strains the surface along x, and vice versa:
+with the forces T of the strips and the displacement nu x y / (pi G R^3) of the half-space,
 
     d u_x / d x = -(nu / (pi G)) d/dy int T_y(y') W(y - y') dy',    W -> 1/|y - y'|,
 
-and likewise d u_y / d x from T_x. Near a strip W is rounded off over a length that follows from
+and likewise d u_y / d x from T_x. Near a strip W is regularised over a length that is obtained by
 averaging ln|x - x'| over the tractions: 0.5 e^(3/4) a where strips slide (elliptic traction), 0.5
-e^(3/2) a where they adhere (the linear theory's traction on the slip's weight in the force).
-With a geometric sum of exponentials in place of W,
+e^(3/2) a where they adhere (traction of the linear theory, and weight of the slip in the force).
+W is approximated by a geometric series of exponentials,
 
     1 / |y| = int e^(-k |y|) dk,  k = k_0, k_0/4, k_0/16, ...,
 
-the sum over all pairs of strips takes a forward and a backward sweep. The operator is
-antisymmetric: it moves power from strip to strip and leaves the total.
+so that the sum over all pairs of strips requires one forward and one backward sweep. The operator
+is antisymmetric: it transfers power between strips and conserves the total.
 """
 
 from __future__ import annotations
@@ -35,19 +35,19 @@ from wearsim.mechanics.numerics.jit import kernel
 from wearsim.mechanics.tangential.kalker_coefficients import creepage_coefficients, short_limit
 from wearsim.types import FloatArray
 
-_STEP = 0.05  # of ln(a/b) in the table; its chords err by less than 1e-4
-_LOWEST = math.log(2e-3)  # ln(a/b) below which a contact is as good as infinitely wide
+_STEP = 0.05  # of ln(a/b) in the table; the error of linear interpolation is below 1e-4
+_LOWEST = math.log(2e-3)  # ln(a/b) below which a contact is treated as infinitely wide
 _HIGHEST = math.log(20.0)
 
-_LADDER = math.log(4.0)  # step of ln k: the sum ripples about its integral by 4 %, far and near
-_GROUPS = 2  # of four exponentials: enough for b/a up to 8000
-_FLAT = 0.1  # k times the contact's width below which exponentials add nothing: (k width)^2/4
-# k_0 = _HEAD / (length that W is rounded off over), as sum and integral hold the same logarithm
+_LADDER = math.log(4.0)  # step of ln k: the sum deviates from its integral by 4 %
+_GROUPS = 2  # of four exponentials: sufficient for b/a up to 8000
+_FLAT = 0.1  # k times the contact's width below which exponentials are negligible: (k width)^2/4
+# k_0 = _HEAD / (regularisation length of W), so that sum and integral have the same logarithm
 _HEAD = 2.0 * math.exp(-float(np.euler_gamma) - 0.5 * _LADDER)
 
 
 class StripElasticity(NamedTuple):
-    """E* and G [Pa]; and the factors of both in a contact of finite width, a row per ln(a/b)."""
+    """E* and G [Pa], and their factors in a contact of finite width, one row per ln(a/b)."""
 
     contact_modulus: float
     shear_modulus: float
@@ -66,8 +66,8 @@ def strip_elasticity(contact_modulus: float, shear_modulus: float) -> StripElast
     nu = min(max(1.0 - shear_modulus / contact_modulus, 0.0), 0.5)
     ratios = np.exp(np.arange(_LOWEST, _HIGHEST + _STEP, _STEP))
     limit_x, limit_y, *_ = short_limit(float(ratios[0]), nu)
-    found = [creepage_coefficients(float(ratio), nu) for ratio in ratios]
-    widening = np.array([(c.c11 / limit_x, c.c22 / limit_y) for c in found])
+    kalker = [creepage_coefficients(float(ratio), nu) for ratio in ratios]
+    widening = np.array([(c.c11 / limit_x, c.c22 / limit_y) for c in kalker])
     return StripElasticity(float(contact_modulus), float(shear_modulus), widening)
 
 
@@ -75,8 +75,9 @@ def strip_elasticity(contact_modulus: float, shear_modulus: float) -> StripElast
 def equivalent_ratio(half_length: FloatArray, line_load: FloatArray, spacing: float) -> float:
     """Return a/b of the ellipses equivalent to a contact.
 
-    They have its greatest half-length and together its area, and are as many as all rises of a(y)
-    make up that half-length: one patch or several, and smoothly in between as patches merge.
+    They have the greatest half-length of the contact and in total its area. Their number is the sum
+    of all increases of a(y) over that half-length: it is the number of separate patches, and varies
+    continuously as patches merge.
 
     Parameters
     ----------
@@ -116,14 +117,14 @@ def effective_moduli(ratio: float, elasticity: StripElasticity) -> tuple[float, 
 
 @kernel
 def coupling_length(half_length: float, adhering: float) -> float:
-    """Return the length [m] over which W is rounded off.
+    """Return the regularisation length of W [m].
 
     Parameters
     ----------
     half_length : float
         Mean half-length of the strips [m].
     adhering : float
-        Part of the contact that adheres, 0 to 1.
+        Adhering fraction of the contact, 0 to 1.
     """
     return 0.5 * half_length * math.exp(0.75 * (1.0 + adhering))
 
@@ -140,7 +141,7 @@ def induced_slip(
     induced_x: FloatArray,
     induced_y: FloatArray,
 ) -> None:
-    """Fill the slip that strips induce in one another, to be added to their own.
+    """Fill the slip that the strips induce in each other, to be added to the rigid slip.
 
     Parameters
     ----------
@@ -180,14 +181,14 @@ def _add_group(
     induced_x: FloatArray,
     induced_y: FloatArray,
 ) -> None:
-    """Add the slip of four exponentials, all in one sweep up and one down.
+    """Add the slip of four exponentials in one forward and one backward sweep.
 
     Parameters
     ----------
     force_x, force_y, first, last, induced_x, induced_y
         As in `induced_slip`.
     decay, weight : float
-        exp(-k spacing) of the greatest k, and what its sums weigh.
+        exp(-k spacing) of the greatest k, and the weight of its sums.
     """
     two = math.sqrt(math.sqrt(decay))
     three = math.sqrt(math.sqrt(two))

@@ -1,18 +1,18 @@
-"""Strip theory: rolling contact in every strip, with the slip that strip sees.
+"""Strip theory: rolling contact of every strip under its effective slip.
 
-Each strip is `carter.strip_force`, with moduli for the finite width of the contact and with the
-slip that its neighbours' tractions induce (`strip_coupling`). That takes two rounds: forces from
-the rigid slip, the slip they induce, forces from both. Where there is longitudinal creepage only,
-the slip induced is lateral, changes the power by less than 0.05 % on a Hertzian patch, and is left
-out.
+The forces of a strip are those of `carter.strip_force`, with moduli for the finite width of the
+contact and with the slip induced by the tractions of the other strips (`strip_interaction`). Two
+sweeps are made: forces from the rigid slip, the slip they induce, and forces from both. With
+longitudinal creepage only, the induced slip is lateral, changes the power by less than 0.05 % on a
+Hertzian patch, and is neglected.
 
-What a strip's traction bound falls by along rolling, 2 p0/a, is taken alike for all strips, as the
-mean over the load: it stands for the curvature along rolling, which is. On profiles whose strips
-bear on one another it differs from strip to strip, but not what tractions make of the slip.
+The steepness of the traction bound along rolling, 2 p0/a, is replaced by its load-weighted mean
+over the strips: it represents the curvature along rolling, which is the same for all strips. On
+profiles whose strips interact, 2 p0/a varies, but the relation between traction and slip does not.
 
-A strip dissipates the work of its traction on the slip it sees, induced slip included; all are then
-scaled alike, by less than half a per cent, so that they add up to the work of the rigid slip,
-P = -V (xi F_x + eta F_y + phi M_z), to round-off.
+The dissipation of a strip is the work of its traction on the effective slip. The dissipation of all
+strips is then scaled by a common factor, less than half a per cent from 1, so that the total is the
+work of the rigid slip, P = -V (xi F_x + eta F_y + phi M_z), to round-off.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ from wearsim.types import FloatArray
 
 SUMS = ("force_x", "force_y", "spin_moment", "power", "peak_pressure", "adhesion_fraction")
 
-_LEAST = 1e-30  # Pa/m, added to the steepness of a bound: less than a rounding, but where it is 0
+_LEAST = 1e-30  # Pa/m, added to the steepness of the bound to avoid a division by zero
 
 
 class StripTractions(NamedTuple):
-    """What the strips of a contact carry, all (strips,): zero where they are not loaded.
+    """Tractions of the strips of a contact, all (strips,), zero in unloaded strips.
 
-    Forces on body 1 [N/m], the moment of the lateral one [N], work per rolled distance [N/m],
-    length that adheres [m], and slip induced by the other strips.
+    Forces on body 1 [N/m], moment of the lateral force [N], work per rolled distance [N/m],
+    adhesion length [m], and slip induced by the other strips.
     """
 
     force_x: FloatArray
@@ -55,14 +55,14 @@ class StripTractions(NamedTuple):
 
 @kernel
 def new_tractions(strips: int) -> StripTractions:
-    """Return tractions to be filled."""
-    room = np.zeros((7, strips))
-    return StripTractions(room[0], room[1], room[2], room[3], room[4], room[5], room[6])
+    """Return `StripTractions` of zeros."""
+    rows = np.zeros((7, strips))
+    return StripTractions(rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6])
 
 
 @kernel
 def bound_steepness(half_length: FloatArray, line_load: FloatArray) -> float:
-    """Return what the pressure bound of all strips falls by along rolling, 2 p0/a [Pa/m].
+    """Return the steepness of the pressure bound along rolling, 2 p0/a [Pa/m].
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def bound_steepness(half_length: FloatArray, line_load: FloatArray) -> float:
     Returns
     -------
     float
-        The mean over the load; zero where there is none.
+        Load-weighted mean over the strips; zero without load.
     """
     load, moment = 0.0, 0.0
     for i in range(line_load.shape[0]):
@@ -95,17 +95,17 @@ def _fill_forces(
     modulus_y: float,
     out: StripTractions,
 ) -> None:
-    """Fill the forces for the slip that strips see; that induced is read from `out`.
+    """Fill the forces for the effective slip; the induced slip is read from `out`.
 
-    All strips are done alike, without branches: those without load or friction get harmless
-    numbers in, and a traction bound of zero. Those that spin asks more of are then done again.
+    All strips are computed without branches: those without load or friction have placeholder inputs
+    and a traction bound of zero. Strips that require the full formula for spin are then repeated.
     """
     turned = 0
     if spin != 0.0:
         for i in range(line_load.shape[0]):
             x, y = slip_x[i] + out.induced_x[i], slip_y + out.induced_y[i]
-            steep = friction[i] * steepness
-            turned += 1 if spin_turns(half_length[i], steep, x, y, spin, modulus_y) else 0
+            if spin_turns(half_length[i], friction[i] * steepness, x, y, spin, modulus_y):
+                turned += 1
     for i in range(line_load.shape[0]):
         loaded = 1.0 if line_load[i] > 0.0 else 0.0
         force_x, force_y, moment, adhering = straight_force(
@@ -124,13 +124,14 @@ def _fill_forces(
         if line_load[i] > 0.0:
             x, y = slip_x[i] + out.induced_x[i], slip_y + out.induced_y[i]
             a, q, mu = half_length[i], line_load[i], friction[i]
-            found = strip_force(a, q, mu, steepness, x, y, spin, modulus_x, modulus_y)
-            out.force_x[i], out.force_y[i], out.moment[i], out.adhesion_length[i] = found
+            out.force_x[i], out.force_y[i], out.moment[i], out.adhesion_length[i] = strip_force(
+                a, q, mu, steepness, x, y, spin, modulus_x, modulus_y
+            )
 
 
 @kernel
 def _fill_work(slip_x: FloatArray, slip_y: float, spin: float, out: StripTractions) -> None:
-    """Fill the work on the slip that strips see, scaled to add up to that on the rigid slip."""
+    """Fill the work on the effective slip, scaled so that the total is that of the rigid slip."""
     seen, rigid = 0.0, 0.0
     for i in range(slip_x.shape[0]):
         force_x, force_y = out.force_x[i], out.force_y[i]
@@ -160,10 +161,10 @@ def solve_strips(
     Parameters
     ----------
     half_length, line_load, friction, slip_x : ndarray, shape (strips,)
-        a [m], q [N/m], mu, and the rigid longitudinal slip per unit of rolling velocity, spin's
-        part included.
+        a [m], q [N/m], mu, and the rigid longitudinal slip per unit of rolling velocity, including
+        the part of spin.
     slip_y, spin : float
-        Lateral creepage, and spin [1/m] whose phi x adds to it.
+        Lateral creepage, and spin phi [1/m]; the local lateral slip is slip_y + phi x.
     spacing : float
         Width of a strip [m].
     elasticity : StripElasticity
@@ -171,7 +172,7 @@ def solve_strips(
         Filled.
     """
     n = line_load.shape[0]
-    first, last = n, -n  # no literal, which induced_slip would be compiled for by itself
+    first, last = n, -n  # a literal would be compiled as another signature of induced_slip
     load, mean = 0.0, 0.0
     for i in range(n):
         out.induced_x[i], out.induced_y[i] = 0.0, 0.0
@@ -230,7 +231,7 @@ def strip_contacts(
     dissipation: FloatArray,
     sums: FloatArray,
 ) -> None:
-    """Complete several contacts of slender strips: tractions and their sums.
+    """Compute the tractions of several contacts of slender strips, and their sums.
 
     Parameters
     ----------
@@ -244,18 +245,18 @@ def strip_contacts(
     rolling_speed : float
         V [m/s].
     longitudinal, lateral, spin : ndarray, shape (contacts,)
-        Mean longitudinal, and lateral creepage, and spin [1/m] for its phi x.
+        Mean longitudinal creepage, lateral creepage, and spin phi [1/m].
     variation, friction : ndarray, shape (contacts, strips)
-        How the longitudinal creepage varies, its mean weighted by the line load being taken off
-        here; friction coefficient.
+        Variation of the longitudinal creepage, whose load-weighted mean is subtracted here;
+        friction coefficient.
     dissipation : ndarray, shape (contacts, strips)
         Filled: P_l [W/m].
     sums : ndarray, shape (6, contacts)
-        Filled, in the order of `SUMS`: forces on body 1 [N], their moment about the load's centre
-        [N m], power [W], greatest pressure [Pa], and part of the area that adheres.
+        Filled, in the order of `SUMS`: forces on body 1 [N], their moment about the centre of the
+        load [N m], power [W], greatest pressure [Pa], and adhering fraction of the area.
     """
     contacts, n = line_load.shape
-    slip_x, found = np.empty(n), new_tractions(n)
+    slip_x, tractions = np.empty(n), new_tractions(n)
     for k in range(contacts):
         total, centre, mean = 0.0, 0.0, 0.0
         for i in range(n):
@@ -276,21 +277,19 @@ def strip_contacts(
             spin[k],
             spacing,
             elasticity,
-            found,
+            tractions,
         )
-        peak, length, adhering = 0.0, 0.0, 0.0
-        sum_x, sum_y, moment, power = 0.0, 0.0, 0.0, 0.0
+        peak = length = adhering = sum_x = sum_y = moment = power = 0.0
         for i in range(n):
-            dissipation[k, i] = rolling_speed * found.work[i]
+            dissipation[k, i] = rolling_speed * tractions.work[i]
             if line_load[k, i] > 0.0:
                 peak = max(peak, 2.0 * line_load[k, i] / (np.pi * half_length[k, i]))
             length += half_length[k, i]
-            adhering += found.adhesion_length[i]
-            sum_x += found.force_x[i]
-            sum_y += found.force_y[i]
-            moment += found.moment[i] - (y[i] - centre) * found.force_x[i]
+            adhering += tractions.adhesion_length[i]
+            sum_x += tractions.force_x[i]
+            sum_y += tractions.force_y[i]
+            moment += tractions.moment[i] - (y[i] - centre) * tractions.force_x[i]
             power += dissipation[k, i]
         sums[0, k], sums[1, k] = sum_x * spacing, sum_y * spacing
         sums[2, k], sums[3, k] = moment * spacing, power * spacing
-        sums[4, k] = peak
-        sums[5, k] = 0.5 * adhering / length
+        sums[4, k], sums[5, k] = peak, 0.5 * adhering / length

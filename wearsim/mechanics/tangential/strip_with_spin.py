@@ -1,21 +1,21 @@
-"""Strip theory with spin: how far a strip slides, and what slips behind the part that adheres.
+"""Strip theory with spin: adhesion zone of a strip, and slip behind it.
 
 Haines and Ollerton, Proc. Inst. Mech. Eng. 177 (1963), and Kalker, Proc. Kon. Ned. Akad. Wet. B 70
-(1967), solve rolling in every strip as in a plane. It is amended here so that its linear limits are
-those of the whole ellipse, as Sichani, Enblom and Berg do (2016),
+(1967), solve rolling in every strip as in a plane. The moduli are amended here so that the linear
+limits are those of the ellipse, following Sichani, Enblom and Berg (2016),
 DOI 10.1080/00423114.2016.1156135. With the traction bound B sqrt(a^2 - x^2) and
 
     X = (xi Gx + s Gk) / 2B,  Y = eta Gy / 2B,  psi = phi Gs / 2B,
 
-s being the part of the longitudinal slip that comes from spin, the strip adheres at x > 2d - a,
-where its traction is
+where s is the longitudinal slip caused by spin, the strip adheres at x > 2d - a, and its traction
+there is
 
     -B [e sqrt(a^2 - x^2) - (e - psi j) sqrt((a - d)^2 - (x - d)^2)],
     e = (X/d, Y/d + psi),  |e| = 1:  d = (X^2 + Y^2) / (sqrt(Y^2 + (1 - psi^2) X^2) - Y psi).
 
-The published amendment scales s and phi x alike, by what C23 has beyond its plane limit. In a plane
-s meets E* and phi x meets G, so that s comes out Gs/G too stiff, half as stiff again on the rig;
-here s has a modulus of its own, by which C33 is met.
+The published amendment scales s and phi x by the same factor, the ratio of C23 to its plane limit.
+In a plane the modulus of s is E* and that of phi x is G, so that s is too stiff by Gs/G, about 1.5
+for the test rig. Here s has a separate modulus, which is determined from C33.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ from wearsim.mechanics.numerics.jit import kernel
 from wearsim.mechanics.tangential.kalker_coefficients import CreepageCoefficients
 from wearsim.types import FloatArray
 
-_LIMIT = 50  # steps of Newton's method, which comes from one side and needs a handful
+_LIMIT = 50  # steps of Newton's method, which converges monotonically in about five
 
 
 class Moduli(NamedTuple):
-    """Moduli with which strips have the linear limit of a whole ellipse [Pa].
+    """Moduli for which strip theory has the linear limit of the ellipse [Pa].
 
-    Gx for longitudinal and Gy for lateral creepage; Gk and Gs for the parts of spin that act along
+    Gx for longitudinal and Gy for lateral creepage; Gk and Gs for the slip caused by spin along
     rolling, -phi y, and across it, phi x.
     """
 
@@ -56,10 +56,10 @@ class Motion(NamedTuple):
 
 
 class Strip(NamedTuple):
-    """One strip: half-length a [m], B [Pa/m] and shift d [m]; d = a where it slides throughout.
+    """One strip: half-length a [m], B [Pa/m] and shift d [m]; d = a in full sliding.
 
-    Direction of the traction where slip begins, psi, the part of the rigid slip without phi x, Gx
-    and Gy [Pa].
+    Direction of the traction at the onset of slip, psi, the rigid slip without phi x, Gx and Gy
+    [Pa].
     """
 
     half_length: float
@@ -80,7 +80,7 @@ def amended_moduli(
     semi_axis_y: float,
     shear_modulus: float,
 ) -> Moduli:
-    """Return the moduli with which strip theory meets Kalker's coefficients in the linear limit.
+    """Return the moduli for which strip theory has Kalker's coefficients in the linear limit.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def amended_moduli(
     Returns
     -------
     Moduli
-        For a contact long across rolling these are E*, G, E* and, to first order, G.
+        For a contact that is long across rolling: E*, G, E* and, to first order, G.
     """
     ratio = semi_axis_x / semi_axis_y
     plane = 4.0 * shear_modulus / math.pi**2
@@ -110,7 +110,7 @@ def amended_moduli(
 def beyond_strip_theory(
     j: int, half_length: FloatArray, bound_peak: FloatArray, motion: Motion, moduli: Moduli
 ) -> bool:
-    """Tell whether spin leaves nothing of strip `j` adhering in strip theory.
+    """Return whether strip `j` has no adhesion zone in strip theory because of spin.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def beyond_strip_theory(
     Returns
     -------
     bool
-        Whether psi is 1 or more, to either side.
+        Whether the magnitude of psi is at least 1.
     """
     return bool(abs(motion.spin) * moduli.spin_across * half_length[j] >= 2.0 * bound_peak[j])
 
@@ -131,7 +131,7 @@ def beyond_strip_theory(
 def strip_of(
     j: int, half_length: FloatArray, bound_peak: FloatArray, motion: Motion, moduli: Moduli
 ) -> Strip:
-    """Return how far strip `j` slides, and the traction's direction where it begins to.
+    """Return the `Strip` with number `j`.
 
     Parameters
     ----------
@@ -153,12 +153,12 @@ def strip_of(
     part = math.sqrt(y * y + (1.0 - twist * twist) * x * x) - y * twist
     shift = square / part if part > 0.0 else 0.0
     if shift < a:
-        along, across = 0.0, 0.0  # nothing slides, or
+        along, across = 0.0, 0.0
         if shift > 0.0:
             along, across = -x / shift, -(y / shift + twist)
     else:
         shift = a
-        # the slip that the shift follows from, with which the strip slides throughout by itself
+        # the longitudinal slip that the shift is computed from
         driven = motion.drive[j] / moduli.longitudinal
         along, across = _direction_at_edge(driven, slip_y, twist, 2.0 * rise * a, moduli)
     return Strip(
@@ -179,10 +179,10 @@ def strip_of(
 def _direction_at_edge(
     slip_x: float, slip_y: float, twist: float, strain: float, moduli: Moduli
 ) -> tuple[float, float]:
-    """Return the traction's direction at the leading edge of a strip that slides throughout.
+    """Return the traction's direction at the leading edge of a strip in full sliding.
 
-    There it turns at once until the slip that strip theory leaves opposes it: slip = -lambda e,
-    where lambda, from 0 up, makes e a unit vector.
+    The traction opposes the slip of strip theory there: slip = -lambda e, where lambda >= 0 is
+    determined by |e| = 1.
     """
     k_x, k_y = strain / moduli.longitudinal, strain / moduli.lateral
     w_x, w_y = slip_x, slip_y + k_y * twist
@@ -190,8 +190,8 @@ def _direction_at_edge(
     for _ in range(_LIMIT):
         e_x, e_y = w_x / (factor + k_x), w_y / (factor + k_y)
         size = math.sqrt(e_x * e_x + e_y * e_y)
-        bend = e_x * e_x / (factor + k_x) + e_y * e_y / (factor + k_y)
-        change = (size - 1.0) * size * size / bend
+        slope = e_x * e_x / (factor + k_x) + e_y * e_y / (factor + k_y)
+        change = (size - 1.0) * size * size / slope
         factor += change
         if not abs(change) > 1e-14 * (factor + k_x):
             break
@@ -200,16 +200,16 @@ def _direction_at_edge(
 
 @kernel
 def slip_at(strip: Strip, x: float, e_x: float, e_y: float) -> tuple[float, float]:
-    """Return strip theory's slip where it slides, over the rolling velocity.
+    """Return the slip of strip theory in the slip zone, over the rolling velocity.
 
     Parameters
     ----------
     strip : Strip
         The strip.
     x : float
-        Where [m].
+        Position [m].
     e_x, e_y : float
-        The traction's direction there, which counts where the strip slides throughout.
+        The traction's direction there, used only in full sliding.
     """
     a, d = strip.half_length, strip.shift
     if d < a:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from pydantic import Field
 
-from wearsim.mechanics.tangential.friction_field import REACH, smooth
+from wearsim.mechanics.numerics.gaussian_processes import REACH, smooth
 from wearsim.plugins import (
     Distribution,
     Frame,

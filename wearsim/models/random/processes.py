@@ -7,7 +7,7 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
-from wearsim.mechanics.numerics.ornstein_uhlenbeck import filter_noise
+from wearsim.mechanics.numerics.gaussian_processes import filter_noise
 from wearsim.plugins import Distribution, Options, Process, RandomInputSpec, Uniforms
 from wearsim.quantities import PositiveDuration
 from wearsim.types import FloatArray

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wearsim.mechanics.tangential.friction_field import CELLS, REACH, smooth
+from wearsim.mechanics.numerics.gaussian_processes import CELLS, REACH, filter_noise, smooth
 
 LENGTH = 50e-6
 SPACING = LENGTH / 2.0
@@ -79,3 +79,23 @@ def test_that_a_point_of_the_field_has_one_value_in_any_grid(lattice):
     # nor does it matter where the rectangle of noise begins
     cut = smooth(x, y, np.ascontiguousarray(noise[2:, 1:]), rows[2], columns[1], SPACING)
     np.testing.assert_array_equal(cut, whole)
+
+
+def test_that_it_answers_a_unit_of_noise_with_a_geometric_fall():
+    memory = 0.8
+    noise = np.eye(6)
+    answers = np.array([filter_noise(row.copy(), memory) for row in noise])
+    steps = np.arange(6)
+    np.testing.assert_allclose(answers[0], memory**steps, rtol=1e-14)
+    for k in range(1, 6):
+        expected = np.where(steps < k, 0.0, 0.6 * memory ** (steps - k))
+        np.testing.assert_allclose(answers[k], expected, rtol=1e-14)
+    # what independent noise of unit variance makes of it
+    np.testing.assert_allclose(np.sum(answers**2, axis=0), 1.0, rtol=1e-14)
+
+
+def test_that_a_longer_path_begins_with_the_shorter_one():
+    noise = np.random.default_rng(1).normal(size=500)
+    np.testing.assert_array_equal(
+        filter_noise(noise[:123].copy(), 0.97), filter_noise(noise, 0.97)[:123]
+    )

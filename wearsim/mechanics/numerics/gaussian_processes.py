@@ -1,4 +1,4 @@
-"""A Gaussian field in the contact: white noise on a lattice of its own, smoothed."""
+"""Correlated Gaussian inputs from white noise: field in the contact, and process in time."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from wearsim.mechanics.numerics.jit import kernel
 from wearsim.types import FloatArray
 
-REACH = 5  # cells to either side that a point takes in: 2.5 correlation lengths
+REACH = 5  # cells on either side within which noise affects a point: 2.5 correlation lengths
 CELLS = 2 * REACH
 
 
@@ -22,10 +22,10 @@ def smooth(
     first_column: int,
     spacing: float,
 ) -> FloatArray:
-    """Smooth lattice noise at given points into a field of unit variance.
+    """Evaluate a field of unit variance at given points by smoothing noise on a lattice.
 
-    Every node weighs exp(-2 r^2/l^2), l being two spacings; noise smoothed by that has the
-    correlation exp(-r^2/l^2). The sum of the squared weights normalises it at each point.
+    Every node has the weight exp(-2 r^2/l^2) with l of two spacings; the correlation of the field
+    is exp(-r^2/l^2). It is normalised by the sum of the squared weights at each point.
 
     Parameters
     ----------
@@ -34,10 +34,10 @@ def smooth(
     y : ndarray, shape (strips,)
         Axial position [m].
     noise : ndarray, shape (rows, columns)
-        Independent normal scores at the nodes: rows across the track, columns along rolling,
-        with `REACH` cells to spare on all sides.
+        Independent standard normal values at the nodes: rows across the track, columns along
+        rolling, with a margin of `REACH` cells on all sides.
     first_row, first_column : int
-        Index of the first row and column on the endless lattice, whose node 0, 0 is the origin.
+        Index of the first row and column on the infinite lattice, whose node 0, 0 is the origin.
     spacing : float
         Distance of neighbouring nodes [m].
 
@@ -56,7 +56,7 @@ def smooth(
     for i in range(strips):
         place = y[i] / spacing
         row = math.floor(place)
-        # exp(-(t - k)^2/2) but for a factor exp(-t^2/2), which the normalisation cancels
+        # exp(-(t - k)^2/2) without the factor exp(-t^2/2), which the normalisation cancels
         growth = math.exp(place - row)
         power, squares = growth ** (1 - REACH), 0.0
         for k in range(CELLS):
@@ -83,3 +83,25 @@ def smooth(
                 power *= growth
             field[p, i] = total / math.sqrt(squares)
     return field
+
+
+@kernel
+def filter_noise(noise: FloatArray, memory: float) -> FloatArray:
+    """Return z_0 = w_0, z_k+1 = r z_k + sqrt(1 - r^2) w_k+1, which has unit variance throughout.
+
+    Parameters
+    ----------
+    noise : ndarray, shape (points,)
+        Independent standard normal values w.
+    memory : float
+        Correlation r of neighbouring values.
+
+    Returns
+    -------
+    ndarray, shape (points,)
+    """
+    path = np.empty(noise.shape[0])
+    fresh = math.sqrt((1.0 - memory) * (1.0 + memory))
+    for k in range(noise.shape[0]):
+        path[k] = noise[k] if k == 0 else memory * path[k - 1] + fresh * noise[k]
+    return path
