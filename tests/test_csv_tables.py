@@ -1,4 +1,4 @@
-"""CSV with units in its headers: SI columns, or every mistake of the file."""
+"""CSV files with units in their headers: columns in SI units, or all mistakes of the file."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ def _read(text: str) -> dict[str, FloatArray]:
 def _mistakes(text: str) -> list[str]:
     with pytest.raises(ScenarioError) as caught:
         _read(text)
-    return [str(problem) for problem in caught.value.mistakes]
+    return [str(mistake) for mistake in caught.value.mistakes]
 
 
 @pytest.mark.parametrize("mark", [",", ";", "\t", " ; "])
-def test_that_columns_come_in_si_whatever_separates_them(mark: str) -> None:
+def test_columns_are_in_si_for_every_separator(mark: str) -> None:
     rows = [["time [min]", "note", '"load [kN]"'], ["0", "a", "0.3"], ["1.5", "", "-1e-1"]]
     text = "\ufeff# a log\n\n" + "\n# more\n".join(mark.join(row) for row in rows) + "\n\n"
     columns = _read(text)
@@ -33,14 +33,14 @@ def test_that_columns_come_in_si_whatever_separates_them(mark: str) -> None:
     assert columns["load"].tolist() == [300.0, -100.0]
 
 
-def test_that_a_column_may_stand_under_an_alias() -> None:
+def test_column_can_have_an_alias() -> None:
     text = "y [mm],z [um]\n0,1\n1,-2\n"
     columns = {"y": "m", "height": "m"}
     found = read_columns(text, "p.csv", columns, aliases={"height": ["z"]})
     np.testing.assert_allclose(found["height"], [1e-6, -2e-6], rtol=1e-15)
 
 
-def test_that_plain_numbers_need_no_unit() -> None:
+def test_plain_numbers_need_no_unit() -> None:
     columns = read_columns("n,mu [-]\n1,0.1\n2,0.2\n", "mu.csv", {"n": "1", "mu": "1"})
     assert columns["mu"].tolist() == [0.1, 0.2]
     with pytest.raises(ScenarioError) as caught:
@@ -90,7 +90,7 @@ def test_that_plain_numbers_need_no_unit() -> None:
         ),
         (
             "time [s],load [N],load [kN]\n0,1,2\n1,2,3\n",
-            ["line 1: column 'load' stands 2 times"],
+            ["line 1: column 'load' appears 2 times"],
         ),
         (
             "time [s];load [N]\n0;1,5\n1;x\n2;\n3\n4;nan\n5;-inf\n6;1_0\n7;1e999\n",
@@ -117,18 +117,18 @@ def test_that_plain_numbers_need_no_unit() -> None:
         (
             "time [s],load [N]\n0,1\n2,1\n2,1\n1,1\n",
             [
-                "line 4: column 'time' must rise, got 2, expected more than 2",
-                "line 5: column 'time' must rise, got 1, expected more than 2",
+                "line 4: column 'time' must increase, got 2, expected more than 2",
+                "line 5: column 'time' must increase, got 1, expected more than 2",
             ],
         ),
         ("time [s],load [N]\n0,1\n", ["too few rows of numbers, got 1, expected at least 2"]),
     ],
 )
-def test_that_every_mistake_is_told_with_its_line(text: str, mistakes: list[str]) -> None:
+def test_every_mistake_is_reported_with_its_line(text: str, mistakes: list[str]) -> None:
     assert _mistakes(text) == mistakes
 
 
-def test_that_the_list_of_mistakes_is_capped() -> None:
+def test_number_of_mistakes_is_limited() -> None:
     mistakes = _mistakes("time [s],load [N]\n" + "".join(f"{k},x\n" for k in range(50)))
     assert len(mistakes) == 21
     assert mistakes[-1] == "and 30 more"
@@ -144,7 +144,7 @@ def test_that_the_list_of_mistakes_is_capped() -> None:
     ),
     st.sampled_from([",", ";", "\t"]),
 )
-def test_that_numbers_come_back_as_they_were_written(
+def test_numbers_are_read_exactly_as_written(
     rows: list[tuple[float, float]], mark: str
 ) -> None:
     text = f"a [m]{mark}b [s]\n" + "".join(f"{a!r}{mark}{b!r}\n" for a, b in rows)
@@ -153,7 +153,7 @@ def test_that_numbers_come_back_as_they_were_written(
 
 
 @given(st.text(alphabet='time load[]sN,;\t\n"#0123456789.e-', max_size=200) | st.text())
-def test_that_any_text_gives_columns_or_a_scenario_error(text: str) -> None:
+def test_any_text_gives_columns_or_a_scenario_error(text: str) -> None:
     try:
         columns = _read(text)
     except ScenarioError as error:

@@ -1,4 +1,4 @@
-"""What is loaded when: slow libraries only where they are needed."""
+"""Lazy imports: slow libraries are loaded only where they are needed."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ SLOW = {"numpy", "numba", "h5py", "pint", "pydantic", "matplotlib", "scipy"}
 HELP = """
 import contextlib, io, sys
 from wearsim.cli.app import app
-with contextlib.redirect_stdout(io.StringIO()) as told, contextlib.suppress(SystemExit):
+with contextlib.redirect_stdout(io.StringIO()) as output, contextlib.suppress(SystemExit):
     app({arguments!r}, prog_name="wearsim")
-assert "wearsim" in told.getvalue(), told.getvalue()
+assert "wearsim" in output.getvalue(), output.getvalue()
 """
 
 
 def modules_after(code: str) -> set[str]:
-    """Return the top-level modules loaded by `code` in a process of its own."""
+    """Return the top-level modules loaded by `code` in a separate process."""
     tail = "\nimport sys\nsys.stderr.write('\\n'.join({n.split('.')[0] for n in sys.modules}))"
     done = subprocess.run(
         [sys.executable, "-c", code + tail], capture_output=True, text=True, check=True
@@ -26,35 +26,35 @@ def modules_after(code: str) -> set[str]:
     return set(done.stderr.split("\n"))
 
 
-def test_that_importing_wearsim_loads_nothing_slow():
+def test_importing_wearsim_loads_nothing_slow():
     assert not modules_after("import wearsim") & (SLOW | {"typer", "rich", "pluggy"})
 
 
-def test_that_its_names_are_known_before_they_are_loaded():
+def test_public_names_are_listed_without_loading_them():
     assert not modules_after("import wearsim\nassert 'run' in dir(wearsim)") & SLOW
 
 
-def test_that_a_name_is_loaded_when_it_is_used():
+def test_public_name_is_loaded_at_its_first_use():
     assert modules_after("import wearsim\nwearsim.load_scenario") >= {"pydantic", "numpy"}
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["--version"]], ids=" ".join)
-def test_that_help_loads_nothing_slow(arguments: list[str]):
+def test_help_loads_nothing_slow(arguments: list[str]):
     assert not modules_after(HELP.format(arguments=arguments)) & SLOW
 
 
 @pytest.mark.parametrize("verb", ["check", "run", "resume", "show", "plot"])
-def test_that_the_help_of_a_verb_loads_nothing_slow(verb: str):
+def test_help_of_a_verb_loads_nothing_slow(verb: str):
     # typer itself loads pydantic to read the type of some parameters
     loaded = modules_after(HELP.format(arguments=[verb, "--help"]))
     assert not loaded & (SLOW - {"pydantic"})
 
 
-def test_that_reading_a_results_file_loads_no_compiler():
+def test_reading_a_results_file_does_not_load_numba():
     assert "numba" not in modules_after("import wearsim\nwearsim.open_results")
 
 
-def test_that_reading_a_scenario_loads_no_plotting():
+def test_reading_a_scenario_does_not_load_matplotlib():
     assert not modules_after("import wearsim\nwearsim.load_scenario\nwearsim.run") & {
         "matplotlib",
         "typer",
@@ -62,13 +62,13 @@ def test_that_reading_a_scenario_loads_no_plotting():
     }
 
 
-def test_that_the_command_and_the_module_are_the_same():
-    told = [
+def test_command_and_module_give_the_same_help():
+    outputs = [
         subprocess.run(command, capture_output=True, text=True, check=True).stdout
         for command in (
             [sys.executable, "-m", "wearsim", "--help"],
             [sys.executable, "-c", "from wearsim.cli.app import main; main()", "--help"],
         )
     ]
-    assert told[0] == told[1]
-    assert "Usage: wearsim" in told[0]
+    assert outputs[0] == outputs[1]
+    assert "Usage: wearsim" in outputs[0]

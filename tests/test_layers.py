@@ -1,46 +1,101 @@
-"""The rooms of the house: who may import whom, and who may speak."""
+"""Structure of the packages: layers, sizes of packages and files, import circles, output."""
 
 from __future__ import annotations
 
 import ast
 import subprocess
 import sys
+from collections.abc import Iterator
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).parents[1]
 MODULES = sorted((ROOT / "wearsim").rglob("*.py"))
+PLUGIN_MODULES = sorted(ROOT.glob("plugins/*/src/**/*.py"))
+MAX_LINES, MAX_FILES = 400, 15
+EXEMPT = ROOT / "wearsim" / "cli" / "commands"  # one file per command
 
 
-def lint_imports() -> subprocess.CompletedProcess[str]:
+def test_layers_are_imported_from_above_only():
     command = "from importlinter.cli import lint_imports; raise SystemExit(lint_imports())"
-    return subprocess.run(
+    done = subprocess.run(
         [sys.executable, "-c", command], cwd=ROOT, capture_output=True, text=True, check=False
     )
-
-
-def test_that_no_room_imports_from_above_and_guests_stay_in_their_rooms():
-    done = lint_imports()
     assert done.returncode == 0, done.stdout + done.stderr
     assert "0 broken" in done.stdout
 
 
-def test_that_every_room_stands_in_the_layers():
+def test_every_package_is_in_the_layers_contract():
     pyproject = (ROOT / "pyproject.toml").read_text()
-    rooms = {path.parent.name for path in (ROOT / "wearsim").glob("*/__init__.py")}
-    assert len(rooms) >= 9
-    missing = [room for room in sorted(rooms) if f'"wearsim.{room}",\n' not in pyproject]
-    assert not missing, f"rooms outside the layers contract: {missing}"
+    packages = {path.parent.name for path in (ROOT / "wearsim").glob("*/__init__.py")}
+    assert len(packages) >= 9
+    missing = [name for name in sorted(packages) if f'"wearsim.{name}",\n' not in pyproject]
+    assert not missing, f"packages outside the layers contract: {missing}"
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))
-def test_that_no_module_prints(path: Path):
+def test_no_module_prints(path: Path):
     calls = [node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Call)]
     names = {call.func.id for call in calls if isinstance(call.func, ast.Name)}
     assert "print" not in names
 
 
-def test_that_every_module_has_a_docstring():
-    silent = [str(path) for path in MODULES if not ast.get_docstring(ast.parse(path.read_text()))]
-    assert not silent
+def test_every_module_has_a_docstring():
+    bare = [str(path) for path in MODULES if not ast.get_docstring(ast.parse(path.read_text()))]
+    assert not bare
+
+
+def test_no_file_is_longer_than_400_lines():
+    lines = {path: len(path.read_text().splitlines()) for path in MODULES + PLUGIN_MODULES}
+    long = {str(path.relative_to(ROOT)): n for path, n in lines.items() if n > MAX_LINES}
+    assert not long
+
+
+def test_no_package_has_more_than_15_files():
+    folders = {path.parent for path in MODULES + PLUGIN_MODULES} - {EXEMPT}
+    files = {str(folder.relative_to(ROOT)): len(list(folder.glob("*.py"))) for folder in folders}
+    assert not {folder: count for folder, count in files.items() if count > MAX_FILES}
+
+
+def module_name(path: Path) -> str:
+    """Return the dotted name of a module of wearsim or of a plugin."""
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    parts = parts[parts.index("src") + 1 :] if "src" in parts else parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def imports_of(node: ast.AST) -> Iterator[ast.Import | ast.ImportFrom]:
+    """Yield the imports below a node, local ones too, without those for type checkers alone."""
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.Import | ast.ImportFrom):
+            yield child
+        elif isinstance(child, ast.If) and ast.unparse(child.test) == "TYPE_CHECKING":
+            yield from (item for branch in child.orelse for item in imports_of(branch))
+        else:
+            yield from imports_of(child)
+
+
+def imported_modules(name: str, tree: ast.Module, known: set[str]) -> set[str]:
+    """Return the modules of `known` that a module imports, or imports names of."""
+    found = set()
+    for item in imports_of(tree):
+        if isinstance(item, ast.Import):
+            found |= {alias.name for alias in item.names}
+        else:
+            assert item.level == 0, f"{name}: relative import"
+            names = {f"{item.module}.{alias.name}" for alias in item.names}
+            found |= {f"{item.module}"} if names - known else set()
+            found |= names
+    return (found & known) - {name}
+
+
+def test_modules_do_not_import_each_other_in_a_circle():
+    trees = {module_name(path): ast.parse(path.read_text()) for path in MODULES + PLUGIN_MODULES}
+    graph = {name: imported_modules(name, tree, set(trees)) for name, tree in trees.items()}
+    assert graph["wearsim.evolution.problem"] >= {"wearsim.types", "wearsim.plugins"}
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        pytest.fail(" -> ".join(error.args[1]))

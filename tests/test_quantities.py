@@ -1,4 +1,4 @@
-"""Quantities: numbers with units in, SI floats out, and a clear word for everything else."""
+"""Quantities with units: conversion to SI floats, and messages for invalid text."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ LENGTH = 'expected a length such as "20 mm"'
         (PerPower, "50 N/W", 50.0),
     ],
 )
-def test_that_a_quantity_becomes_the_nearest_si_float(kind: object, text: str, si: float) -> None:
+def test_quantity_becomes_the_nearest_si_float(kind: object, text: str, si: float) -> None:
     assert TypeAdapter(kind).validate_python(text) == pytest.approx(si, rel=3e-16, abs=0.0)
 
 
@@ -97,13 +97,13 @@ def test_that_a_quantity_becomes_the_nearest_si_float(kind: object, text: str, s
         ("2 (m^9)^9", f"'(m^9)^9' is not a unit, got \"2 (m^9)^9\", {LENGTH}"),
     ],
 )
-def test_that_a_malformed_quantity_is_refused_with_the_right_form(text: str, message: str) -> None:
+def test_malformed_quantity_is_refused_with_the_right_form(text: str, message: str) -> None:
     with pytest.raises(QuantityError) as caught:
         quantity(text, "m")
     assert str(caught.value) == message
 
 
-def test_that_hertz_is_refused_as_ambiguous() -> None:
+def test_hertz_is_refused_as_ambiguous() -> None:
     with pytest.raises(QuantityError) as caught:
         quantity("16 Hz", "rad/s")
     assert str(caught.value) == (
@@ -112,16 +112,16 @@ def test_that_hertz_is_refused_as_ambiguous() -> None:
     )
 
 
-def test_that_one_per_second_is_no_rotation_speed() -> None:
+def test_one_per_second_is_not_a_rotation_speed() -> None:
     with pytest.raises(ValueError, match="wrong dimension"):
         quantity("16 1/s", "rad/s")
 
 
-def test_that_a_quantity_can_be_asked_for_in_any_unit() -> None:
+def test_quantity_can_be_converted_to_any_unit() -> None:
     assert quantity("7.5 h", "min") == 450.0
 
 
-def test_that_conversion_names_both_dimensions() -> None:
+def test_conversion_error_names_both_dimensions() -> None:
     assert conversion("kN", "N") == 1000
     with pytest.raises(QuantityError) as caught:
         conversion("mm", "N")
@@ -142,7 +142,7 @@ def _error(**values: object) -> list[tuple[tuple[int | str, ...], str]]:
     return [(item["loc"], str(item["ctx"]["error"])) for item in caught.value.errors()]
 
 
-def test_that_bounds_are_kept() -> None:
+def test_bounds_are_enforced() -> None:
     assert _error(length="0 mm", torque="-1 Nm") == [
         (
             ("length",),
@@ -159,25 +159,25 @@ def test_that_bounds_are_kept() -> None:
 
 
 @pytest.mark.parametrize("value", [20, 20.0, True, None, {"value": 20}])
-def test_that_anything_but_text_is_refused(value: object) -> None:
+def test_values_other_than_text_are_refused(value: object) -> None:
     [(place, message)] = _error(length=value)
     assert place == ("length",)
     assert message.endswith('expected a length above zero such as "20 mm"')
 
 
-def test_that_a_value_per_roller_is_one_float_or_a_tuple() -> None:
+def test_value_per_roller_is_a_float_or_a_tuple() -> None:
     assert Both.model_validate({"offset": "1 mm"}).offset == 0.001
     assert Both.model_validate({"offset": ["-1 mm", "1 m"]}).offset == (-0.001, 1.0)
 
 
-def test_that_every_bad_value_of_a_list_is_told_with_its_place() -> None:
+def test_every_bad_value_of_a_list_is_reported_with_its_index() -> None:
     assert _error(offset=["1", "2 mm", "3 N"]) == [
         (("offset", 0), f'needs a unit, got "1", {LENGTH}'),
         (("offset", 2), f'wrong dimension, got "3 N" (a force), {LENGTH}'),
     ]
 
 
-def test_that_options_can_be_written_as_json_and_read_again() -> None:
+def test_options_survive_a_json_round_trip() -> None:
     both = Both.model_validate({"length": "3 mm", "offset": ["1 um", "-7 mm"]})
     assert both.model_dump_json() == (
         '{"length":"0.003 m","torque":null,"offset":["1e-06 m","-0.007 m"]}'
@@ -185,7 +185,7 @@ def test_that_options_can_be_written_as_json_and_read_again() -> None:
     assert Both.model_validate_json(both.model_dump_json()) == both
 
 
-def test_that_the_json_schema_asks_for_text_with_a_unit() -> None:
+def test_json_schema_requires_text_with_a_unit() -> None:
     schema = Both.model_json_schema()["properties"]["length"]
     assert schema["type"] == "string"
     assert schema["examples"] == ["20 mm"]
@@ -201,7 +201,7 @@ def test_that_the_json_schema_asks_for_text_with_a_unit() -> None:
     number=st.floats(allow_nan=False, allow_infinity=False, max_value=1e300, min_value=-1e300),
     unit=st.sampled_from([("mm", Fraction(1, 1000)), ("km", Fraction(1000)), ("m", Fraction(1))]),
 )
-def test_that_the_result_is_exact_to_the_last_bit(
+def test_result_is_exact_to_the_last_bit(
     number: float, unit: tuple[str, Fraction]
 ) -> None:
     name, size = unit
@@ -209,7 +209,7 @@ def test_that_the_result_is_exact_to_the_last_bit(
 
 
 @given(st.text(alphabet="0123456789.eE+-^*/() mNPasJ,µ\n", max_size=40) | st.text(max_size=40))
-def test_that_any_text_gives_a_finite_number_or_a_value_error(text: str) -> None:
+def test_any_text_gives_a_finite_number_or_a_value_error(text: str) -> None:
     try:
         assert math.isfinite(quantity(text, "m"))
     except ValueError as error:
@@ -226,13 +226,13 @@ def _named(value: object, context: dict[str, object] | None) -> str:
     return str(caught.value.errors()[0]["ctx"]["error"])
 
 
-def test_that_an_input_file_is_read_through_the_context() -> None:
+def test_input_file_is_read_through_the_context() -> None:
     named = Named.model_validate({"file": "a.csv"}, context={"read": {"a.csv": "text"}.__getitem__})
     assert named.file == InputFile("a.csv", "text")
     assert named.model_dump_json() == '{"file":"a.csv"}'
 
 
-def test_that_a_file_that_cannot_be_read_is_told() -> None:
+def test_unreadable_file_is_reported() -> None:
     def missing(path: str) -> str:
         raise FileNotFoundError(2, "No such file or directory", path)
 
@@ -251,19 +251,19 @@ def test_that_a_file_that_cannot_be_read_is_told() -> None:
     )
 
 
-def test_that_long_values_are_cut_short_in_messages() -> None:
+def test_long_values_are_abbreviated_in_messages() -> None:
     assert shown("x" * 100) == f'"{"x" * 56}...'
     assert shown([True, "a", 1.5]) == '[true, "a", 1.5]'
 
 
-def test_that_importing_costs_no_pint() -> None:
+def test_importing_quantities_does_not_load_pint() -> None:
     code = "import sys, wearsim.quantities, wearsim.csv_tables; print('pint' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
 
 
 @pytest.mark.parametrize(
-    ("value", "unit", "told"),
+    ("value", "unit", "text"),
     [
         (0.0125, "m", "12.5 mm"),
         (6.9e5, "N/m", "690 N/mm"),
@@ -274,7 +274,7 @@ def test_that_importing_costs_no_pint() -> None:
         (math.inf, "N", "inf"),
     ],
 )
-def test_that_an_si_value_is_told_in_the_unit_of_engineers(
-    value: float, unit: str, told: str
+def test_si_value_is_written_in_engineering_units(
+    value: float, unit: str, text: str
 ) -> None:
-    assert in_engineers_unit(value, unit) == told
+    assert in_engineers_unit(value, unit) == text

@@ -1,4 +1,4 @@
-"""Batches of solved contacts as columns, and as the sequence that they are."""
+"""Batches of solved contacts, as columns and as sequences."""
 
 from dataclasses import fields
 
@@ -12,27 +12,27 @@ Y = np.linspace(-1.0, 1.0, 5)
 
 
 def solution(number):
-    """Return a contact that is told apart by its numbers."""
+    """Return a contact solution identified by its number of iterations."""
     strips = np.full(5, float(number))
-    sums = dict.fromkeys((item.name for item in fields(ContactSolution)), number + 0.5)
+    scalars = dict.fromkeys((item.name for item in fields(ContactSolution)), number + 0.5)
     return ContactSolution(
-        **sums
+        **scalars
         | {"y": Y, "half_length": strips, "line_load": 2.0 * strips, "dissipation": strips}
         | {"iterations": number},
     )
 
 
 def numbers(contacts):
-    """Return which contacts they are."""
+    """Return the numbers that identify contacts."""
     return [contact.iterations for contact in contacts]
 
 
 def batch(shape=(1, 2, 3), first=0):
-    """Return a batch of contacts that count from `first`."""
+    """Return a batch of contacts numbered from `first`."""
     return BatchSolution.of(shape, [solution(first + k) for k in range(int(np.prod(shape)))])
 
 
-def test_that_a_batch_is_the_sequence_of_its_contacts():
+def test_batch_is_a_sequence_of_contacts():
     found = batch()
     assert len(found) == 6
     assert numbers(found) == [0, 1, 2, 3, 4, 5]
@@ -42,12 +42,12 @@ def test_that_a_batch_is_the_sequence_of_its_contacts():
 
 
 @pytest.mark.parametrize("name", ["line_load", "power", "y"])
-def test_that_the_rows_of_a_batch_are_those_of_its_contacts(name):
+def test_rows_of_a_batch_equal_those_of_its_contacts(name):
     found = batch()
     assert (rows_of(found, name) == rows_of(list(found), name)).all()
 
 
-def test_that_contacts_are_taken_and_joined_along_the_last_axis():
+def test_selection_and_joining_act_on_the_last_axis():
     found = batch()
     taken = found.at(np.array([2, 0]))
     assert taken.shape == (1, 2, 2)
@@ -60,7 +60,7 @@ def test_that_contacts_are_taken_and_joined_along_the_last_axis():
     assert all(column.flags.c_contiguous for column in replaced.columns.values())
 
 
-def test_that_an_axis_of_contacts_is_moved_and_moved_back():
+def test_moving_an_axis_and_back_keeps_the_order():
     found = batch()
     moved = found.with_axis_moved(2, 0)
     assert moved.shape == (3, 1, 2)
@@ -69,7 +69,7 @@ def test_that_an_axis_of_contacts_is_moved_and_moved_back():
     assert numbers(moved.with_axis_moved(0, 2)) == numbers(found)
 
 
-def test_that_points_are_taken_by_number():
+def test_operating_points_are_selected_by_number():
     column = np.arange(4.0)
     points = OperatingPoints(
         column, column, -column, column, column, 1.0, np.tile(column[:, None], (1, 5))

@@ -1,6 +1,6 @@
-"""wearsim: the wear of rolling contacts, stepped through millions of roller passes.
+"""Wear of rolling contacts over millions of roller passes.
 
-The names below are loaded when they are first used, so that importing wearsim is quick.
+The public names are imported at their first use, so that importing wearsim is quick.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ __all__ = [
     "study_contact",
 ]
 
-_HOMES = {
+_MODULES = {
     "ContactSolution": "wearsim.types",
     "ContactStudy": "wearsim.studies.contact.single",
     "DissipationResult": "wearsim.results",
@@ -75,9 +75,9 @@ def __getattr__(name: str) -> object:
         from importlib.metadata import version  # noqa: PLC0415
 
         return version("wearsim")
-    if name not in _HOMES:
+    if name not in _MODULES:
         raise AttributeError(f"module 'wearsim' has no attribute '{name}'")
-    return getattr(import_module(_HOMES[name]), name)
+    return getattr(import_module(_MODULES[name]), name)
 
 
 def __dir__() -> list[str]:

@@ -1,4 +1,4 @@
-"""`python -m wearsim`, the same as the command `wearsim`."""
+"""Entry point of `python -m wearsim`, equal to the command `wearsim`."""
 
 from wearsim.cli.app import main
 

@@ -1,4 +1,4 @@
-"""Operating points and solutions of many contacts, stored as columns."""
+"""Operating points and solutions of a batch of contacts, stored as columns."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from wearsim.types import ContactSolution, Creepage, FloatArray, IntArray, Opera
 
 @dataclass(frozen=True)
 class OperatingPoints(Sequence[OperatingPoint]):
-    """Many operating points without a bearing torque, as columns; a sequence of `OperatingPoint`.
+    """Operating points without bearing torque, as columns; a sequence of `OperatingPoint`.
 
     Parameters
     ----------
@@ -43,24 +43,26 @@ class OperatingPoints(Sequence[OperatingPoint]):
 
     def __post_init__(self) -> None:
         count = len(self.normal_force)
-        for name in ("longitudinal", "lateral", "spin", "friction", "variation"):
+        for name in _POINT_COLUMNS:
             column = getattr(self, name)
             if column is not None and len(column) != count:
                 raise ValueError(
-                    f"{name} has {len(column)} values for {count} contacts; give every contact one"
+                    f"{name} has {len(column)} values for {count} contacts; expected one each"
                 )
 
     @classmethod
     def of(cls, points: Sequence[OperatingPoint]) -> OperatingPoints | None:
-        """Return `points` as columns, or None where they are not all of one kind."""
+        """Return `points` as columns, or None if they differ in `OperatingPoint.kind`."""
         if isinstance(points, cls):
             return points
-        if not points or points[0].bearing_torque is not None:
-            return None
-        if len(points) > 1 and len({point.kind for point in points}) > 1:
+        if (
+            not points
+            or points[0].bearing_torque is not None
+            or (len(points) > 1 and len({point.kind for point in points}) > 1)
+        ):
             return None
         creepages = [point.creepage for point in points]
-        plain = creepages[0].variation is None
+        varies = creepages[0].variation is not None
         return cls(
             normal_force=np.array([point.normal_force for point in points], dtype=np.float64),
             longitudinal=np.array([creepage.longitudinal for creepage in creepages]),
@@ -68,17 +70,16 @@ class OperatingPoints(Sequence[OperatingPoint]):
             spin=np.array([creepage.spin for creepage in creepages]),
             friction=np.array([point.friction for point in points]),
             rolling_speed=points[0].rolling_speed,
-            variation=None if plain else np.array([item.variation for item in creepages]),
+            variation=np.array([item.variation for item in creepages]) if varies else None,
             friction_carried=points[0].friction_carried,
         )
 
     def __len__(self) -> int:
         return len(self.normal_force)
 
-    def at(self, numbers: IntArray) -> OperatingPoints:
+    def at(self, numbers: IntArray | slice) -> OperatingPoints:
         """Return some of the points, by number and in that order."""
-        names = ("normal_force", "longitudinal", "lateral", "spin", "friction", "variation")
-        columns = {n: getattr(self, n) for n in names}
+        columns = {name: getattr(self, name) for name in _POINT_COLUMNS}
         return replace(self, **{n: c[numbers] for n, c in columns.items() if c is not None})
 
     @overload
@@ -88,11 +89,8 @@ class OperatingPoints(Sequence[OperatingPoint]):
     def __getitem__(self, index: slice) -> OperatingPoints: ...
 
     def __getitem__(self, index: int | slice) -> OperatingPoint | OperatingPoints:
-        variation = None if self.variation is None else self.variation[index]
         if isinstance(index, slice):
-            names = ("normal_force", "longitudinal", "lateral", "spin", "friction")
-            columns = {name: getattr(self, name)[index] for name in names}
-            return replace(self, **columns, variation=variation)
+            return self.at(index)
         friction = self.friction[index]
         return OperatingPoint(
             normal_force=float(self.normal_force[index]),
@@ -101,16 +99,21 @@ class OperatingPoints(Sequence[OperatingPoint]):
                 float(self.longitudinal[index]),
                 float(self.lateral[index]),
                 float(self.spin[index]),
-                variation,
+                None if self.variation is None else self.variation[index],
             ),
             friction=float(friction) if self.friction.ndim == 1 else friction,
             friction_carried=self.friction_carried,
         )
 
 
+_POINT_COLUMNS = ("normal_force", "longitudinal", "lateral", "spin", "friction", "variation")
+
+
 @dataclass(frozen=True, eq=False)
 class BatchSolution(Sequence[ContactSolution]):
-    """Many solved contacts, column by column; a sequence of them one by one, last axis fastest.
+    """Solutions of a batch of contacts, as columns; a sequence of `ContactSolution`.
+
+    The sequence runs through the leading axes with the last axis fastest.
 
     Parameters
     ----------
@@ -119,7 +122,7 @@ class BatchSolution(Sequence[ContactSolution]):
     y : ndarray, shape (strips,)
         Axial position of the strips [m], the same for all contacts.
     columns : mapping of str to ndarray
-        The other fields of `ContactSolution`, each with the leading axes first.
+        The other fields of `ContactSolution`, leading axes first.
     """
 
     shape: tuple[int, ...]
@@ -128,7 +131,7 @@ class BatchSolution(Sequence[ContactSolution]):
 
     @classmethod
     def of(cls, shape: tuple[int, ...], solutions: Sequence[ContactSolution]) -> BatchSolution:
-        """Gather contacts that were solved one after another, last axis fastest."""
+        """Return a sequence of solutions as a batch, last axis fastest."""
         rows = {name: rows_of(solutions, name) for name in _COLUMNS}
         columns = {name: values.reshape(shape + values.shape[1:]) for name, values in rows.items()}
         return cls(shape, solutions[0].y, columns)
@@ -141,14 +144,13 @@ class BatchSolution(Sequence[ContactSolution]):
 
     @cached_property
     def solutions(self) -> tuple[ContactSolution, ...]:
-        """The contacts one by one, last axis fastest."""
-        axes = len(self.shape)
-        # to lists where a contact has one number, so that it is a plain one of Python's
+        """The solutions of the contacts, last axis fastest."""
+        # numbers of contacts as lists, to give plain Python numbers
         flat = [
-            self.columns[name].ravel().tolist()
-            if self.columns[name].ndim == axes
-            else self.columns[name].reshape(-1, len(self.y))
-            for name in _COLUMNS
+            column.ravel().tolist()
+            if column.ndim == len(self.shape)
+            else column.reshape(-1, len(self.y))
+            for column in (self.columns[name] for name in _COLUMNS)
         ]
         return tuple(
             ContactSolution(self.y, **dict(zip(_COLUMNS, values, strict=True)))
@@ -168,13 +170,13 @@ class BatchSolution(Sequence[ContactSolution]):
         return self.solutions[index]
 
     def at(self, numbers: IntArray) -> BatchSolution:
-        """Return the contacts at some places of the last leading axis, in that order."""
+        """Return the contacts at some indices of the last leading axis, in that order."""
         last = len(self.shape) - 1
         columns = {name: c.take(numbers, axis=last) for name, c in self.columns.items()}
         return BatchSolution((*self.shape[:-1], len(numbers)), self.y, columns)
 
     def with_axis_moved(self, source: int, target: int) -> BatchSolution:
-        """Return the contacts in another order, with a leading axis at another place."""
+        """Return the contacts with a leading axis moved to another position."""
         axes = len(self.shape)
         order = list(range(axes))
         order.insert(target, order.pop(source))
@@ -185,7 +187,7 @@ class BatchSolution(Sequence[ContactSolution]):
         return BatchSolution(tuple(self.shape[axis] for axis in order), self.y, columns)
 
     def joined_with(self, *others: BatchSolution) -> BatchSolution:
-        """Return these contacts and others behind them along the last leading axis."""
+        """Return these contacts followed by others along the last leading axis."""
         last, parts = len(self.shape) - 1, (self, *others)
         columns = {
             name: np.concatenate([part.columns[name] for part in parts], axis=last)
@@ -195,7 +197,7 @@ class BatchSolution(Sequence[ContactSolution]):
         return BatchSolution((*self.shape[:-1], count), self.y, columns)
 
     def with_others(self, numbers: IntArray, others: BatchSolution) -> BatchSolution:
-        """Return these contacts with others at some places of the last leading axis."""
+        """Return these contacts with others at some indices of the last leading axis."""
         order = np.arange(self.shape[-1])
         order[numbers] = len(order) + np.arange(len(numbers))
         return self.joined_with(others).at(order)

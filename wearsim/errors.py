@@ -1,4 +1,4 @@
-"""Everything wearsim raises on purpose, and the exit code each means at the shell."""
+"""Errors raised by wearsim, and their exit codes at the shell."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from typing import Any
 
 
 class WearsimError(Exception):
-    """Base of every error wearsim raises on purpose."""
+    """Base class of the errors raised by wearsim."""
 
     exit_code = 1
 
 
 @dataclass(frozen=True)
 class Mistake:
-    """One mistake in an input file: where it stands, what it is, what was got and expected."""
+    """One mistake in an input file: table, key, description, value given and value expected."""
 
     table: str
     key: str
@@ -24,33 +24,27 @@ class Mistake:
     expected: str | None = None
 
     def __str__(self) -> str:
-        where = " ".join(
-            part for part in (f"[{self.table}]" if self.table else "", self.key) if part
-        )
-        text = f"{where}: {self.what}" if where else self.what
-        if self.got is not None:
-            text += f", got {self.got}"
-        if self.expected is not None:
-            text += f", expected {self.expected}"
-        return text
+        where = " ".join(filter(None, (self.table and f"[{self.table}]", self.key)))
+        got = "" if self.got is None else f", got {self.got}"
+        expected = "" if self.expected is None else f", expected {self.expected}"
+        return (f"{where}: {self.what}" if where else self.what) + got + expected
 
 
 class ScenarioError(WearsimError):
-    """A scenario, or a file it names, cannot be used; all its mistakes are held together.
+    """A scenario, or a file named in it, that cannot be used.
 
     Parameters
     ----------
     file : str
-        The file the mistakes are in.
+        File with the mistakes.
     mistakes : list of Mistake
-        Every mistake found.
+        All mistakes of the file.
     """
 
     exit_code = 2
 
     def __init__(self, file: str, mistakes: list[Mistake]) -> None:
-        self.file = file
-        self.mistakes = mistakes
+        self.file, self.mistakes = file, mistakes
         super().__init__("\n".join(f"{file}: {mistake}" for mistake in mistakes))
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -58,32 +52,32 @@ class ScenarioError(WearsimError):
 
 
 class PluginError(WearsimError):
-    """A plugin is missing, broken, or shares its name with another."""
+    """A plugin that is missing or broken, or has the name of another."""
 
     exit_code = 2
 
 
 class CapabilityError(WearsimError):
-    """A contact model was asked for something it says it cannot do."""
+    """A contact model without a required capability."""
 
     exit_code = 2
 
 
 class ResultsFileError(WearsimError):
-    """A results file cannot be read, or would be overwritten unasked."""
+    """A results file that cannot be read, or exists and must not be overwritten."""
 
     exit_code = 2
 
 
 class SolverError(WearsimError):
-    """The physics went wrong: lost contact, no convergence, a value that is not finite.
+    """A failed computation: lost contact, no convergence, a value that is not finite.
 
     Parameters
     ----------
     message : str
-        What happened, where, and what to try.
+        Failure, where it happened, and possible remedies.
     state : dict
-        The state that led there: numbers and arrays by name.
+        State before the failure: numbers and arrays by name.
     """
 
     def __init__(self, message: str, state: dict[str, Any] | None = None) -> None:
@@ -92,22 +86,22 @@ class SolverError(WearsimError):
 
 
 class ContactError(SolverError):
-    """A contact mistake has no solution, or its solver did not find it."""
+    """A contact problem without solution, or whose solver did not converge."""
 
 
 class StepError(SolverError):
-    """A step of the evolution did not converge, or would be unstable."""
+    """A step of the evolution that did not converge or would be unstable."""
 
 
 class WorkerError(WearsimError):
-    """Work cannot be spread over workers: they die of it, are not there, or are not alike.
+    """Failed distribution of work: workers that crash, are missing or have another version.
 
     Parameters
     ----------
     message : str
-        What happened, and what to try.
+        Failure and possible remedies.
     realisations : sequence of int
-        Those that the workers died of.
+        Realisations at which workers crashed.
     """
 
     def __init__(self, message: str, realisations: Sequence[int] = ()) -> None:
@@ -115,7 +109,7 @@ class WorkerError(WearsimError):
         super().__init__(message)
 
 
-class Interrupted(WearsimError):  # noqa: N818  (it is how a run ends, not what went wrong)
-    """A run was stopped by the user; what was done is in the checkpoint."""
+class Interrupted(WearsimError):  # noqa: N818  (the end of a run, not an error)
+    """A run stopped by the user; its checkpoint holds the state."""
 
     exit_code = 130

@@ -1,4 +1,4 @@
-"""Quantities written with their units, "20 mm", and read as SI floats: types for options models."""
+"""Quantities with units, such as "20 mm", read as SI floats: types for options models."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, TypeVar, get_args
 from pydantic_core import CoreSchema, SchemaValidator, core_schema
 
 from wearsim.units import (
-    _LONGEST,
     ANGLE,
     DENSITY,
     DURATION,
     FORCE,
     LENGTH,
     MASS_PER_ENERGY,
+    MAX_CHARACTERS,
     PER_POWER,
     PRESSURE,
     ROTATION_SPEED,
@@ -27,8 +27,8 @@ from wearsim.units import (
     Bound,
     Kind,
     QuantityError,
-    _kind_of,
-    _measure,
+    kind_of,
+    measure,
     shown,
 )
 
@@ -49,28 +49,25 @@ _PATTERN = r"^\s*[+-]?[0-9.]+([eE][+-]?[0-9]+)?\s*(?![eE][+-]?[0-9])([A-Za-zµμ
 
 def _split(value: object, expected: str) -> tuple[str, str]:
     """Split a quantity into its number and its unit."""
-    if isinstance(value, int | float) and not isinstance(value, bool):
-        raise QuantityError("needs a unit", shown(value), expected)
-    if not isinstance(value, str) or len(value) > _LONGEST:
-        raise QuantityError("is not a quantity", shown(value), expected)
-    text = value.strip()
-    if NOT_FINITE.match(text):
-        raise QuantityError("must be finite", shown(value), expected)
-    if DECIMAL_COMMA.match(text):
-        raise QuantityError("needs a decimal point", shown(value), expected)
+    text = value.strip() if isinstance(value, str) and len(value) <= MAX_CHARACTERS else ""
     number = NUMBER.match(text)
-    if number is None:
-        raise QuantityError("is not a quantity", shown(value), expected)
-    unit = text[number.end() :].strip()
-    if not unit:
-        raise QuantityError("needs a unit", shown(value), expected)
-    return number[0], unit
+    unit = text[number.end() :].strip() if number else ""
+    what = "is not a quantity"
+    if NOT_FINITE.match(text):
+        what = "must be finite"
+    elif DECIMAL_COMMA.match(text):
+        what = "needs a decimal point"
+    elif number and unit:
+        return number[0], unit
+    elif number or (isinstance(value, int | float) and not isinstance(value, bool)):
+        what = "needs a unit"
+    raise QuantityError(what, shown(value), expected)
 
 
 def _si(number: str, factor: Fraction) -> float:
-    """Return the float nearest to `number` times `factor`; infinity where there is none."""
+    """Return the float nearest to `number` times `factor`; infinity if it is too large."""
     rough = float(number)
-    if rough in {0.0, float("inf"), -float("inf")}:  # an exact 1e999999999 would never end
+    if rough in {0.0, float("inf"), -float("inf")}:  # 1e999999999 takes too long as a fraction
         return rough
     try:
         return float(Fraction(number) * factor)
@@ -80,14 +77,14 @@ def _si(number: str, factor: Fraction) -> float:
 
 @dataclass(frozen=True)
 class Quantity:
-    """Marks a float field as a quantity of `kind`: ``Annotated[float, Quantity(LENGTH)]``.
+    """Marker of a float field as a quantity of `kind`: ``Annotated[float, Quantity(LENGTH)]``.
 
     Parameters
     ----------
     kind : Kind
-        What is measured.
+        Kind of quantity.
     bound : {"any", "positive", "not negative"}
-        Which values are allowed.
+        Allowed values.
     """
 
     kind: Kind
@@ -95,34 +92,36 @@ class Quantity:
 
     @property
     def expected(self) -> str:
-        """The form that is expected, for messages."""
+        """Description of the expected form, for messages."""
         return self.kind.expected(self.bound)
 
     def parse(self, value: object) -> float:
-        """Return `value` in SI; raises QuantityError."""
+        """Return `value` in SI.
+
+        Raises
+        ------
+        QuantityError
+            If it is not a quantity of this kind within the bound.
+        """
         number, unit = _split(value, self.expected)
         try:
-            size, dimensions = _measure(unit)
+            size, dimensions = measure(unit)
         except ValueError as error:
             raise QuantityError(str(error), shown(value), self.expected) from error
-        wanted, target = _measure(self.kind.unit)
-        if dimensions != target:
-            got = f"{shown(value)} ({_kind_of(unit).name})"
+        si_size, si_dimensions = measure(self.kind.unit)
+        if dimensions != si_dimensions:
+            got = f"{shown(value)} ({kind_of(unit).name})"
             raise QuantityError("wrong dimension", got, self.expected)
-        result = _si(number, size / wanted)
+        result = _si(number, size / si_size)
         if result in {float("inf"), -float("inf")}:
             raise QuantityError("must be finite", shown(value), self.expected)
-        return self._within(result, value)
-
-    def _within(self, result: float, value: object) -> float:
-        if self.bound == "positive" and result <= 0.0:
-            raise QuantityError("must be above zero", shown(value), self.expected)
-        if self.bound == "not negative" and result < 0.0:
-            raise QuantityError("must not be negative", shown(value), self.expected)
+        if _is_below(self.bound, result):
+            what = "must be above zero" if self.bound == "positive" else "must not be negative"
+            raise QuantityError(what, shown(value), self.expected)
         return result
 
     def write(self, value: float | None) -> str | None:
-        """Return an SI value with its unit, as a scenario would hold it."""
+        """Return an SI value with its unit, as written in a scenario."""
         return None if value is None else f"{str(value).removesuffix('.0')} {self.kind.unit}"
 
     def __get_pydantic_core_schema__(
@@ -134,22 +133,22 @@ class Quantity:
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        return {
-            "type": "string",
-            "pattern": _PATTERN,
-            "examples": [self.kind.example],
-        }
+        return {"type": "string", "pattern": _PATTERN, "examples": [self.kind.example]}
+
+
+def _is_below(bound: Bound, value: float) -> bool:
+    return bound != "any" and (value < 0.0 or (bound == "positive" and value == 0.0))
 
 
 def quantity(text: str, unit: str) -> float:
-    """Return a quantity written with its unit as a number of `unit`.
+    """Return a quantity with a unit as a number of `unit`.
 
     Parameters
     ----------
     text : str
-        The quantity, "600 min".
+        Quantity, "600 min".
     unit : str
-        The unit wanted, "s".
+        Unit to convert to, "s".
 
     Returns
     -------
@@ -158,9 +157,9 @@ def quantity(text: str, unit: str) -> float:
     Raises
     ------
     QuantityError
-        A ValueError, if `text` is not a finite quantity of the same kind as `unit`.
+        If `text` is not a finite quantity of the same kind as `unit`; it is a ValueError.
     """
-    kind = _kind_of(unit)
+    kind = kind_of(unit)
     return Quantity(Kind(kind.name, unit, kind.example)).parse(text)
 
 
@@ -219,42 +218,41 @@ NonNegativeMassPerEnergy: TypeAlias = Annotated[float, Quantity(MASS_PER_ENERGY,
 
 @dataclass(frozen=True)
 class HostQuantity:
-    """Marks an option that is measured like the value which its random input stands for.
+    """Marker of an option of a random input with the unit of the scenario value it replaces.
 
-    The validation context says what that is: ``{"quantity": Quantity(FORCE)}``, or nothing for a
-    plain number.
+    The validation context holds the kind of that value, ``{"quantity": Quantity(FORCE)}``, or
+    nothing for a plain number.
 
     Parameters
     ----------
     bound : {"any", "positive", "not negative"}
-        Which values are allowed.
+        Allowed values.
     infinite : bool
-        Whether "inf" and "-inf" are values too.
+        Whether "inf" and "-inf" are allowed.
     """
 
     bound: Bound = "any"
     infinite: bool = False
 
     def parse(self, value: object, info: ValidationInfo) -> float:
-        """Return `value` in SI; raises QuantityError."""
-        host: Quantity | None = (info.context or {}).get("quantity")
-        endless = {"inf": float("inf"), "+inf": float("inf"), "-inf": -float("inf")}
-        if self.infinite and isinstance(value, str) and value.strip().lower() in endless:
-            return endless[value.strip().lower()]
-        if host is not None:
-            return Quantity(host.kind, self.bound).parse(value)
-        expected = {"any": "a plain number", "positive": "a number above zero"}.get(
-            self.bound, "a number of zero or more"
-        )
-        expected += ' or "inf"' if self.infinite else ""
+        """Return `value` in SI; raise QuantityError if it cannot be used."""
+        replaced: Quantity | None = (info.context or {}).get("quantity")
+        text = value.strip().lower() if isinstance(value, str) else ""
+        if self.infinite and text in {"inf", "+inf", "-inf"}:
+            return float(text)
+        if replaced is not None:
+            return Quantity(replaced.kind, self.bound).parse(value)
+        expected = {
+            "any": "a plain number",
+            "positive": "a number above zero",
+            "not negative": "a number of zero or more",
+        }[self.bound] + (' or "inf"' if self.infinite else "")
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise QuantityError("is not a number", shown(value), expected)
         result = float(value)
         if result - result != 0.0:  # infinite or not a number
             raise QuantityError("must be finite", shown(value), expected)
-        if (self.bound == "positive" and result <= 0.0) or (
-            self.bound == "not negative" and result < 0.0
-        ):
+        if _is_below(self.bound, result):
             raise QuantityError("is out of range", shown(value), expected)
         return result
 
@@ -276,57 +274,51 @@ PositiveValue: TypeAlias = Annotated[float, HostQuantity("positive")]
 Limit: TypeAlias = Annotated[float, HostQuantity(infinite=True)]
 
 
-class _OneOrMany:
-    """Lets a field hold one value or a list of values; see `PerRoller`."""
+class _OneOrList:
+    """Marker of a field that holds one value or a list of values, see `PerRoller`."""
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
         one = handler.generate_schema(get_args(source)[0])
-        many = core_schema.tuple_variable_schema(one)
-        read_one, read_many = SchemaValidator(one), SchemaValidator(many)
-        write_one: Callable[[Any], Any] = one.get("serialization", {}).get("function", _as_it_is)
+        several = core_schema.tuple_variable_schema(one)
+        read_one, read_list = SchemaValidator(one), SchemaValidator(several)
+        write_one: Callable[[Any], Any] = one.get("serialization", {}).get("function", lambda v: v)
 
         def read(value: object) -> Any:
             if isinstance(value, list | tuple):
-                return read_many.validate_python(tuple(value))
+                return read_list.validate_python(tuple(value))
             return read_one.validate_python(value)
 
         def write(value: Any) -> Any:
-            if isinstance(value, tuple):
-                return [write_one(item) for item in value]
-            return write_one(value)
+            return [*map(write_one, value)] if isinstance(value, tuple) else write_one(value)
 
         return core_schema.no_info_plain_validator_function(
             read,
-            json_schema_input_schema=core_schema.union_schema([one, many]),
+            json_schema_input_schema=core_schema.union_schema([one, several]),
             serialization=core_schema.plain_serializer_function_ser_schema(write, when_used="json"),
         )
 
 
-def _as_it_is(value: Any) -> Any:
-    return value
-
-
 V = TypeVar("V")
 
-PerRoller: TypeAlias = Annotated[V | tuple[V, ...], _OneOrMany()]
+PerRoller: TypeAlias = Annotated[V | tuple[V, ...], _OneOrList()]
 """A value for all rollers, or a list with one value per roller: ``PerRoller[Length]``."""
 
 
 @dataclass(frozen=True)
 class InputFile:
-    """A file that a scenario names, with its content; a field's type in an options model.
+    """A file named in a scenario, with its content; type of a field in an options model.
 
-    The content is read through the validation context, ``{"read": function}``, so that a scenario
-    that is stored with the content of its files needs none of them.
+    The content is read by a function in the validation context, ``{"read": function}``, so that a
+    scenario stored with the content of its files does not need the files.
 
     Parameters
     ----------
     path : str
-        The path as the scenario writes it.
+        Path as written in the scenario.
     text : str
-        The file's content.
+        Content of the file.
     """
 
     path: str

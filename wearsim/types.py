@@ -1,4 +1,4 @@
-"""The words every room shares: materials, grids, operating points and contact solutions, in SI."""
+"""Shared types: materials, grids, operating points and contact solutions, in SI units."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ IntArray: TypeAlias = npt.NDArray[np.int64]
 BoolArray: TypeAlias = npt.NDArray[np.bool_]
 
 Number: TypeAlias = float | FloatArray
-"""One number for all realisations, or one for each, shape (realisations,)."""
+"""A number for all realisations, or one per realisation, shape (realisations,)."""
 
 
 @dataclass(frozen=True)
@@ -39,12 +39,12 @@ class Material:
 
 @dataclass(frozen=True)
 class Grid:
-    """Strips of equal width across the track; `y` holds their centres.
+    """Strips of equal width across the track.
 
     Parameters
     ----------
     y : ndarray, shape (strips,)
-        Axial position of each strip's centre [m], rising, equally spaced.
+        Axial position of each strip's centre [m], increasing, equally spaced.
     spacing : float
         Width of a strip [m].
     """
@@ -54,10 +54,10 @@ class Grid:
 
     @classmethod
     def spanning(cls, start: float, stop: float, strips: int) -> Grid:
-        """Cut the interval from `start` to `stop` [m] into `strips` equal strips."""
+        """Return the interval from `start` to `stop` [m] divided into `strips` equal strips."""
         spacing = (stop - start) / strips
         centre = 0.5 * (start + stop)
-        # counted from the middle, so that a symmetric interval gives a grid symmetric to the bit
+        # offsets from the middle: a symmetric interval gives a grid symmetric to the bit
         offsets = np.arange(strips, dtype=np.float64) - 0.5 * (strips - 1)
         return cls(y=centre + offsets * spacing, spacing=spacing)
 
@@ -74,7 +74,7 @@ class Profile:
     Parameters
     ----------
     y : ndarray, shape (points,)
-        Axial position [m], rising.
+        Axial position [m], increasing.
     height : ndarray, shape (points,)
         Height of the surface above its nominal shape [m]; worn material is negative.
     """
@@ -89,8 +89,8 @@ class Creepage:
 
     The local longitudinal creepage of a strip is ``longitudinal + g(y) - <g>``, where ``<g>`` is
     the mean of g weighted by the line load, so that `longitudinal` is always the mean creepage of
-    the contact. g is `variation` where it is given and ``-spin * y`` otherwise; either way `spin`
-    times x is the lateral part that varies along rolling.
+    the contact. g is `variation` if given and ``-spin * y`` otherwise. In both cases the lateral
+    creepage varies by ``spin * x`` along rolling.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ class Creepage:
     spin : float
         Spin phi [1/m].
     variation : ndarray, shape (strips,), optional
-        Variation g of the longitudinal creepage across the strips, spin's part included.
+        Variation g of the longitudinal creepage across the strips, including that due to spin.
     """
 
     longitudinal: float
@@ -112,7 +112,7 @@ class Creepage:
 
 @dataclass(frozen=True)
 class OperatingPoint:
-    """What is asked of one contact.
+    """Load, speed, creepage and friction of one contact.
 
     Parameters
     ----------
@@ -121,19 +121,19 @@ class OperatingPoint:
     rolling_speed : float
         Rolling velocity V [m/s].
     creepage : Creepage
-        Prescribed creepage; under a bearing torque its longitudinal value is only a first guess.
+        Prescribed creepage; with a bearing torque its longitudinal value is an initial guess.
     friction : float or ndarray, shape (strips,) or (points, strips)
-        Friction coefficient mu: one value, one per strip, or one for each of a strip's points,
-        from the leading edge on, which the model names (`ContactModel.friction_points`).
+        Friction coefficient mu: one value, one per strip, or one per point of each strip from the
+        leading edge on, at the points of `ContactModel.friction_points`.
     bearing_torque : float, optional
-        Torque [N m] that the contact must carry to the roller's bearing. When given, the mean
-        longitudinal creepage follows from the balance of torque.
+        Torque [N m] of the roller's bearing. If given, the mean longitudinal creepage follows from
+        the torque balance of the roller.
     rolling_radius : ndarray, shape (strips,), optional
-        Arm of each strip's longitudinal traction about the roller's axis [m]; needed with a
-        bearing torque.
+        Lever arm of each strip's longitudinal traction about the roller's axis [m]; required with
+        a bearing torque.
     friction_carried : bool
-        Each of a strip's points is a particle that keeps its friction while it crosses the contact,
-        as where the pattern is fixed to a body; what is solved is the mean over the particles.
+        Each point of a strip is a particle that keeps its friction while it crosses the contact,
+        as for a friction pattern fixed to a body; the solution is the mean over the particles.
     """
 
     normal_force: float
@@ -146,7 +146,7 @@ class OperatingPoint:
 
     @property
     def kind(self) -> tuple[object, ...]:
-        """What points must have in common to be columns of `OperatingPoints`."""
+        """Values that operating points must share to be columns of one `OperatingPoints`."""
         return (
             self.rolling_speed,
             self.bearing_torque,
@@ -158,14 +158,14 @@ class OperatingPoint:
 
 @dataclass(frozen=True)
 class ContactSolution:
-    """One solved contact, strip by strip; tractions act on body 1 and oppose positive creepage.
+    """Solution of one contact; tractions act on body 1 and oppose positive creepage.
 
     Parameters
     ----------
     y : ndarray, shape (strips,)
         Axial position of the strips [m].
     half_length : ndarray, shape (strips,)
-        Half-length a(y) of the contact along rolling [m]; 0 outside it.
+        Half-length a(y) of the contact along rolling [m]; 0 outside the contact.
     line_load : ndarray, shape (strips,)
         Normal force per unit of axial length q(y) [N/m].
     dissipation : ndarray, shape (strips,)
@@ -175,17 +175,17 @@ class ContactSolution:
     spin_moment : float
         Moment of the tractions on body 1 about the contact normal through the load's centre [N m].
     approach : float
-        Approach of the bodies delta, measured from gap zero [m].
+        Approach delta of the bodies, measured from gap zero [m].
     peak_pressure : float
         Greatest normal pressure [Pa].
     adhesion_fraction : float
-        Part of the contact's area that adheres, 0 to 1.
+        Adhesion area over contact area, 0 to 1.
     power : float
         Dissipated power P_d, the sum of `dissipation` over the strips [W].
     longitudinal_creepage : float
-        Mean longitudinal creepage, found by torque balance where a bearing torque is given.
+        Mean longitudinal creepage; result of the torque balance if a bearing torque is given.
     iterations : int
-        Iterations the normal problem took.
+        Iterations of the normal problem.
     """
 
     y: FloatArray
@@ -205,7 +205,7 @@ class ContactSolution:
 
 @dataclass(frozen=True)
 class ContactFields:
-    """The inside of one contact, on points that follow each strip from trailing to leading edge.
+    """Fields within one contact, at points along each strip from trailing to leading edge.
 
     Parameters
     ----------
@@ -218,7 +218,7 @@ class ContactFields:
     slip_x, slip_y : ndarray, shape (points, strips)
         Slip of body 1 on body 2 per unit of rolling velocity.
     adhesion : ndarray of bool, shape (points, strips)
-        Where the surfaces adhere.
+        Whether the surfaces adhere.
     power_density : ndarray, shape (points, strips)
         Dissipated power per unit of area [W/m^2].
     """

@@ -1,4 +1,4 @@
-"""Units: their sizes, dimensions and kinds, and values written in engineering units."""
+"""Units of measurement: sizes, dimensions, kinds of quantity and engineering units."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     import pint
 
 
-# Exact values, so that a quantity becomes the float nearest to what was written. The radian is a
-# dimension of its own: 1/s is neither rad/s nor turn/s.
+# Exact fractions, so that a quantity becomes the float nearest to its text. Angle is a separate
+# dimension: 1/s is neither rad/s nor turn/s.
 _DEFINITIONS = """
 m = [length]; km = 1000 * m; cm = 1/100 * m; mm = 1/1000 * m; um = 1/1000 * mm; nm = 1/1000 * um
 micrometer = um; micrometre = um
@@ -40,20 +40,20 @@ _SPELLINGS = str.maketrans(
 
 _UNIT_TEXT = re.compile(r"(?:[A-Za-z]+(?:\^[+-]?[0-9])?|1|[*/() ])+")
 
-_LONGEST = 100  # characters of a quantity that are looked at
+MAX_CHARACTERS = 100  # of a quantity or unit
 
 
 class QuantityError(ValueError):
-    """A value that cannot be used, told as what is wrong, what was got and what was expected.
+    """A value that cannot be used.
 
     Parameters
     ----------
     what : str
-        What is wrong.
+        Description of the mistake.
     got : str, optional
-        The value as it was written.
+        Value given.
     expected : str, optional
-        The right form.
+        Expected form.
     """
 
     def __init__(self, what: str, got: str | None = None, expected: str | None = None) -> None:
@@ -63,7 +63,7 @@ class QuantityError(ValueError):
 
 
 def shown(value: object) -> str:
-    """Return `value` as it would stand in a TOML file, cut short where it is long."""
+    """Return `value` as written in a TOML file, abbreviated if long."""
     if isinstance(value, dict):
         return "a table"
     if isinstance(value, bool):
@@ -79,14 +79,14 @@ def shown(value: object) -> str:
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of quantity: its name with an article, its SI unit and how one is written."""
+    """A kind of quantity: name with an article, SI unit and an example."""
 
     name: str
     unit: str
     example: str
 
     def expected(self, bound: Bound = "any") -> str:
-        """Return the form that is expected, for messages."""
+        """Return a description of the expected form, for messages."""
         limit = {"any": "", "positive": " above zero", "not negative": " of zero or more"}[bound]
         return f'{self.name}{limit} such as "{self.example}"'
 
@@ -141,9 +141,8 @@ def _registry() -> pint.UnitRegistry[Fraction]:
     return units
 
 
-def _spelt(unit: str) -> str:
-    unit = unit.replace("**", "^").translate(_SPELLINGS)
-    unit = " ".join(unit.split())
+def _normalised(unit: str) -> str:
+    unit = " ".join(unit.replace("**", "^").translate(_SPELLINGS).split())
     return f"1{unit}" if unit.startswith("/") else unit
 
 
@@ -160,10 +159,10 @@ Dimensions: TypeAlias = frozenset[tuple[str, str]]
 
 
 @lru_cache(maxsize=1024)
-def _measure(unit: str) -> tuple[Fraction, Dimensions]:
-    """Return the size of `unit` in SI and its dimensions; ValueError says what is wrong."""
-    text = _spelt(unit)
-    if not text or len(text) > _LONGEST or not _UNIT_TEXT.fullmatch(text) or ")^" in text:
+def measure(unit: str) -> tuple[Fraction, Dimensions]:
+    """Return the size of `unit` in SI and its dimensions; raise ValueError if it is unknown."""
+    text = _normalised(unit)
+    if not text or len(text) > MAX_CHARACTERS or not _UNIT_TEXT.fullmatch(text) or ")^" in text:
         raise ValueError(f"'{unit}' is not a unit")
     for name in re.findall(r"[A-Za-z]+", text):
         if name not in _UNITS:
@@ -172,30 +171,30 @@ def _measure(unit: str) -> tuple[Fraction, Dimensions]:
     try:
         one = units.Quantity(Fraction(1), units.parse_units(text)).to_root_units()
         dimensions = frozenset((name, str(power)) for name, power in one.dimensionality.items())
-    except Exception as error:  # the parser fails in many ways on unbalanced text
+    except Exception as error:  # the parser raises various exceptions for unbalanced text
         raise ValueError(f"'{unit}' is not a unit") from error
     return Fraction(one.magnitude), dimensions
 
 
-def _kind_of(unit: str) -> Kind:
-    """Return the kind of quantity that `unit` measures; a nameless one is named by its unit."""
-    dimensions = _measure(unit)[1]
+def kind_of(unit: str) -> Kind:
+    """Return the kind of quantity of `unit`; one without a name is named by its unit."""
+    dimensions = measure(unit)[1]
     for kind in _KINDS:
-        if _measure(kind.unit)[1] == dimensions:
+        if measure(kind.unit)[1] == dimensions:
             return kind
-    name = f"a quantity in {_spelt(unit)}" if dimensions else "a plain number"
-    return Kind(name, unit, f"1 {_spelt(unit)}")
+    name = f"a quantity in {_normalised(unit)}" if dimensions else "a plain number"
+    return Kind(name, unit, f"1 {_normalised(unit)}")
 
 
 def conversion(unit: str, target: str) -> Fraction:
-    """Return how many `target` one `unit` is, exactly.
+    """Return the exact factor from `unit` to `target`.
 
     Parameters
     ----------
     unit : str
-        A unit as a user writes it, "mm".
+        Unit in the spelling of a user, "mm".
     target : str
-        The unit wanted, "m".
+        Unit to convert to, "m".
 
     Returns
     -------
@@ -204,26 +203,26 @@ def conversion(unit: str, target: str) -> Fraction:
     Raises
     ------
     QuantityError
-        If `unit` is unknown or measures something else than `target`.
+        If `unit` is unknown or has another dimension than `target`.
     """
-    wanted = _kind_of(target)
+    wanted = kind_of(target)
     expected = f"a unit of {wanted.name.split(maxsplit=1)[1]} such as {target}"
     try:
-        size, dimensions = _measure(unit)
+        size, dimensions = measure(unit)
     except ValueError as error:
         raise QuantityError(str(error), None, expected) from error
-    if dimensions != _measure(target)[1]:
-        raise QuantityError("wrong dimension", f"{unit} ({_kind_of(unit).name})", expected)
-    return size / _measure(target)[0]
+    if dimensions != measure(target)[1]:
+        raise QuantityError("wrong dimension", f"{unit} ({kind_of(unit).name})", expected)
+    return size / measure(target)[0]
 
 
 def engineers_unit(unit: str) -> tuple[str, float]:
-    """Return the unit that engineers use for what an SI unit measures, and its size in SI.
+    """Return the engineering unit for the quantity of an SI unit, and its size in SI.
 
     Parameters
     ----------
     unit : str
-        In SI; "1" for a plain number.
+        SI unit; "1" for a plain number.
 
     Returns
     -------
@@ -232,26 +231,26 @@ def engineers_unit(unit: str) -> tuple[str, float]:
     """
     if unit == "1":
         return unit, 1.0
-    engineers = _kind_of(unit).example.split(maxsplit=1)[1]
+    engineers = kind_of(unit).example.split(maxsplit=1)[1]
     return engineers, float(conversion(engineers, unit))
 
 
 def in_engineers_unit(value: float, unit: str, digits: int = 6) -> str:
-    """Return an SI value in the unit that engineers use, with that unit.
+    """Return an SI value with its engineering unit, as text.
 
     Parameters
     ----------
     value : float
-        In SI.
+        Value in SI.
     unit : str
-        Its SI unit; "1" for a plain number.
+        SI unit; "1" for a plain number.
     digits : int
         Significant digits.
 
     Returns
     -------
     str
-        "12.5 mm" for 0.0125 and "m"; zero and infinity stand without a unit.
+        "12.5 mm" for 0.0125 and "m"; zero and infinity have no unit.
     """
     if unit == "1" or value in {0.0, float("inf"), -float("inf")}:
         return f"{value:.{digits}g}"

@@ -167,7 +167,7 @@ def test_that_a_table_of_quantiles_is_linear_between_them() -> None:
     [
         ("probability, value\n0.1, 1\n1, 2\n", "must go from 0 to 1, got 0.1 to 1"),
         ("probability, value\n0, 3\n1, 2\n", "column 'value' must not fall, got 2 after 3"),
-        ("probability, value\n0, 3\n0, 4\n1, 5\n", "column 'probability' must rise"),
+        ("probability, value\n0, 3\n0, 4\n1, 5\n", "column 'probability' must increase"),
         ("value [N]\n1\n2\n", "a plain number has no unit"),
         ("number\n1\n2\n", "column 'value' is missing"),
     ],
