@@ -1,4 +1,4 @@
-"""Small random inputs, so that the tests of reading them stand on the scenario room alone."""
+"""Small random inputs, so that the parsing tests depend only on the scenario package."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class FlatOptions(Options):
 
 
 class Flat(Distribution):
-    """Even between two values."""
+    """Uniform between two values."""
 
     def __init__(self, options: FlatOptions) -> None:
         self.low, self.high = options.low, options.high
@@ -46,7 +46,7 @@ class Flat(Distribution):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        return ("is rather flat",) if self.low == self.high else ()
+        return ("has a constant value",) if self.low == self.high else ()
 
 
 class BellOptions(Options):
@@ -57,12 +57,12 @@ class BellOptions(Options):
     @model_validator(mode="after")
     def _feasible(self) -> Self:
         if not self.support[0] <= self.mean <= self.support[1]:
-            raise QuantityError("the mean lies outside the support", f"{self.mean:g}", "one inside")
+            raise QuantityError("the mean is outside the support", f"{self.mean:g}", "one inside")
         return self
 
 
 class Bell(Distribution):
-    """Normal, cut off at the ends of its support (far enough out to leave its moments)."""
+    """Normal, clipped at the ends of a wide support, which leaves its moments unchanged."""
 
     def __init__(self, options: BellOptions) -> None:
         self.options = options
@@ -98,7 +98,7 @@ class SquareOptions(Options):
 
 
 class Square(JointDistribution):
-    """Both angles even and independent."""
+    """Two independent uniform angles."""
 
     components = ("yaw", "tilt")
     dimension = 2
@@ -122,7 +122,7 @@ class PatchesOptions(Options):
 
 
 class Patches(FrictionField):
-    """The same friction everywhere, which is all that reading it needs."""
+    """The same friction at all points."""
 
     def __init__(self, options: PatchesOptions, marginal: Distribution) -> None:
         self.marginal = marginal
@@ -136,7 +136,7 @@ class WanderOptions(Options):
 
 
 class Wander(Process):
-    """Another value at every step."""
+    """Independent values at each step."""
 
     def __init__(self, options: WanderOptions, marginal: Distribution) -> None:
         self.marginal, self.spacing = marginal, options.time

@@ -1,4 +1,4 @@
-"""A good scenario, and small plugins, so that these tests stand on the scenario room alone."""
+"""A valid scenario and small plugins, so that these tests depend only on the scenario package."""
 
 from __future__ import annotations
 

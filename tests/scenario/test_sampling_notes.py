@@ -1,4 +1,4 @@
-"""A plan of draws where nothing is drawn is told, once."""
+"""Note on sampling keys without random inputs."""
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ RANDOM = {"friction.coefficient": {"distribution": "uniform", "low": 0.08, "high
 
 
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("changes", "message"),
     [
         ({"sampling.plan": "sobol"}, "sampling.plan has no effect: no input is random"),
         (
@@ -20,10 +20,10 @@ RANDOM = {"friction.coefficient": {"distribution": "uniform", "low": 0.08, "high
         ),
     ],
 )
-def test_that_a_plan_without_draws_is_told(changes, told):
-    assert load_scenario(RIG, changes).notes == (told,)
+def test_sampling_keys_without_random_inputs_give_a_note(changes, message):
+    assert load_scenario(RIG, changes).notes == (message,)
 
 
 @pytest.mark.parametrize("changes", [{}, {"sampling.plan": "sobol", **RANDOM}])
-def test_that_nothing_is_told_where_a_plan_is_used_or_none_is_given(changes):
+def test_used_or_absent_sampling_keys_give_no_note(changes):
     assert not load_scenario(RIG, changes).notes

@@ -1,4 +1,4 @@
-"""The scenarios that ship: they load with the installed plugins, and say what they are for."""
+"""Shipped scenarios: they load with the installed plugins and have the documented values."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def _load(name: str) -> Scenario:
 
 
 @pytest.mark.parametrize("path", sorted(FOLDER.glob("*.toml")), ids=lambda path: path.stem)
-def test_that_it_loads_and_builds_its_plugins(path: Path) -> None:
+def test_shipped_scenario_loads_and_builds_its_plugins(path: Path) -> None:
     scenario = load_scenario(path)
     assert tomllib.loads(scenario.text)["title"] == scenario.title
     scenario.contact.build()
@@ -31,7 +31,7 @@ def test_that_it_loads_and_builds_its_plugins(path: Path) -> None:
         scenario.wear.build()
 
 
-def test_that_the_rig_is_the_corrected_one() -> None:
+def test_rig_has_the_corrected_radii() -> None:
     rig = _load("rig-450min")
     assert (rig.roller.radius, rig.roller.crown_radius, rig.cylinder.radius) == (0.02, 0.5, 0.025)
     assert rig.total_passes == 1_350_000
@@ -43,7 +43,7 @@ def test_that_the_rig_is_the_corrected_one() -> None:
     }
 
 
-def test_that_the_printed_rig_is_twice_as_large() -> None:
+def test_printed_rig_is_twice_as_large() -> None:
     rig, printed = _load("rig-450min"), _load("rig-as-printed")
     assert printed.roller.radius == 2 * rig.roller.radius
     assert printed.roller.crown_radius == 2 * rig.roller.crown_radius
@@ -51,12 +51,12 @@ def test_that_the_printed_rig_is_twice_as_large() -> None:
     assert "are diameters" in printed.text
 
 
-def test_that_the_three_rollers_stand_apart() -> None:
+def test_three_rollers_have_different_offsets() -> None:
     scenario = _load("rig-three-rollers")
     assert scenario.per_roller(scenario.roller.offset) == (-1e-3, 3e-4, 1e-3)
 
 
-def test_that_the_log_is_labelled_synthetic_and_covers_the_test() -> None:
+def test_log_is_labelled_synthetic_and_covers_the_test() -> None:
     scenario = _load("rig-logged-load")
     [(path, text)] = scenario.files.items()
     assert "synthetic" in scenario.title

@@ -1,6 +1,6 @@
-"""Bad scenarios: every mistake at once, each as `file: [table] key: what, got, expected`."""
+"""Invalid scenarios: all mistakes together, as `file: [table] key: what, got, expected`."""
 
-# ruff: noqa: E501  (messages are shown as they are told)
+# ruff: noqa: E501  (long messages)
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ LOAD = '[load]\nnormal_force = "300 N"\n'
 SLIP = "longitudinal = 1e-3"
 
 MISTAKES = {
-    "a bare number, a wrong dimension and stray keys": (
+    "a number without unit, a wrong dimension and unknown keys": (
         '[roller]\nradius = "20 mm"',
         '[roller]\nradius = 20\ndiameter = "20 MPa"\nradus = "2 mm"\nspeed = "3 rpm"\nfoo = 1',
         """\
@@ -27,7 +27,7 @@ rig.toml: [roller] radus: unknown key (did you mean 'radius'?)
 rig.toml: [roller] speed: unknown key (it belongs in [operation])
 rig.toml: [roller] foo: unknown key (known here: crown_diameter, crown_radius, diameter, material, offset, radius)""",
     ),
-    "no radius at all": (
+    "no radius": (
         'radius = "20 mm"\ncrown_radius = "500 mm"\n',
         "",
         """\
@@ -104,7 +104,7 @@ rig.toml: [operation] passes: is not a whole number, got "many", expected a whol
 rig.toml: [fricton]: unknown table (did you mean 'friction'?)
 rig.toml: [friction]: the table is missing""",
     ),
-    "a value where a table belongs, and the other way round": (
+    "a value instead of a table and a table instead of a value": (
         'title = "a rig"\nseed = 3\n\n[roller]',
         'seed = -1\nspeed = "3 rpm"\nevolution = "implicit"\n[title]\n[roller]',
         """\
@@ -113,7 +113,7 @@ rig.toml: title: is not text, got a table, expected text
 rig.toml: seed: is out of range, got -1, expected a whole number of at least 0 and at most 9223372036854775807
 rig.toml: evolution: is not a table, got "implicit", expected a line [evolution] and its keys below""",
     ),
-    "an unknown load, and what its term lacks": (
+    "an unknown load and an incomplete term": (
         LOAD,
         '[load]\nkind = "sprin"\n[load.thermal]\ngain = "3 N"\n',
         """\
@@ -141,7 +141,7 @@ rig.toml: [load] stiffness: wrong dimension, got "3 N" (a force), expected a sti
         LOAD + 'stiffness = "3 N/m"\n',
         'rig.toml: [load] stiffness: unknown key (it belongs in [load] with kind = "spring")',
     ),
-    "a load's file that is not there": (
+    "a missing file of a load": (
         LOAD,
         '[load]\nkind = "recorded"\nfile = "gone.csv"\n',
         'rig.toml: [load] file: the file cannot be read, got "gone.csv"',
@@ -266,7 +266,7 @@ rig.toml: [outputs] spacing: unknown choice, got "lin", expected one of "even", 
 
 
 @pytest.mark.parametrize("case", MISTAKES)
-def test_that_every_mistake_is_told_in_full(parse: Parse, case: str) -> None:
+def test_mistake_is_reported_in_full(parse: Parse, case: str) -> None:
     good, bad, message = MISTAKES[case]
     files = {"log.csv": "time [min];load [m]\n0;1\n1;x\n"}
     with pytest.raises(ScenarioError) as caught:
@@ -274,7 +274,7 @@ def test_that_every_mistake_is_told_in_full(parse: Parse, case: str) -> None:
     assert str(caught.value) == message
 
 
-def test_that_the_mistakes_of_all_tables_come_together(parse: Parse) -> None:
+def test_mistakes_of_all_tables_are_reported_together(parse: Parse) -> None:
     with pytest.raises(ScenarioError) as caught:
         parse(
             ('radius = "20 mm"', "radius = 20"),
@@ -282,7 +282,7 @@ def test_that_the_mistakes_of_all_tables_come_together(parse: Parse) -> None:
             ('"1000 rpm"', '"1000 mm"'),
             ('"1.1e-11 1/Pa"', '"-1 1/Pa"'),
         )
-    places = [(problem.table, problem.key) for problem in caught.value.mistakes]
+    places = [(mistake.table, mistake.key) for mistake in caught.value.mistakes]
     assert places == [
         ("roller", "radius"),
         ("operation", "speed"),
@@ -291,7 +291,7 @@ def test_that_the_mistakes_of_all_tables_come_together(parse: Parse) -> None:
     ]
 
 
-def test_that_an_empty_scenario_lacks_its_tables(parse: Parse) -> None:
+def test_empty_scenario_lacks_the_required_tables(parse: Parse) -> None:
     with pytest.raises(ScenarioError) as caught:
         parse(text="")
     assert str(caught.value).splitlines() == [
@@ -300,12 +300,12 @@ def test_that_an_empty_scenario_lacks_its_tables(parse: Parse) -> None:
     ]
 
 
-def test_that_an_endless_integer_is_told(parse: Parse) -> None:
+def test_too_long_integer_is_a_mistake(parse: Parse) -> None:
     with pytest.raises(ScenarioError, match="is not valid TOML"):
         parse(("seed = 3", f"seed = {'9' * 5000}"))
 
 
-def test_that_a_file_that_cannot_be_read_is_told(tmp_path: Path) -> None:
+def test_unreadable_scenario_file_is_a_mistake(tmp_path: Path) -> None:
     missing, binary = tmp_path / "gone.toml", tmp_path / "binary.toml"
     with pytest.raises(ScenarioError) as caught:
         load_scenario(missing)
@@ -316,7 +316,9 @@ def test_that_a_file_that_cannot_be_read_is_told(tmp_path: Path) -> None:
     assert str(caught.value) == f"{binary}: is not text in UTF-8"
 
 
-def test_that_files_are_sought_beside_the_scenario(small_registry: object, tmp_path: Path) -> None:
+def test_files_are_read_from_the_folder_of_the_scenario(
+    small_registry: object, tmp_path: Path
+) -> None:
     named = '[load]\nkind = "recorded"\nfile = "log.csv"\n'
     (tmp_path / "rig.toml").write_text(GOOD.replace(LOAD, named), encoding="utf-8")
     (tmp_path / "log.csv").write_text("time [s],load [N]\n0,1\n1,2\n", encoding="utf-8")

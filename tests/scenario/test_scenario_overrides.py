@@ -14,13 +14,13 @@ from wearsim.scenario import parse_override
 from wearsim.scenario.parse.overrides import apply_overrides
 
 
-def test_that_an_override_changes_one_value_and_keeps_the_comments(parse: Parse) -> None:
+def test_override_changes_one_value_and_keeps_comments(parse: Parse) -> None:
     scenario = parse(overrides={"load.normal_force": "350 N"})
     assert scenario.load.options.normal_force == 350.0
     assert scenario.text == GOOD.replace("300 N", "350 N")
 
 
-def test_that_overrides_reach_the_top_inline_tables_lists_and_new_tables(parse: Parse) -> None:
+def test_overrides_reach_all_kinds_of_keys(parse: Parse) -> None:
     scenario = parse(
         overrides={
             "seed": 7,
@@ -39,13 +39,13 @@ def test_that_overrides_reach_the_top_inline_tables_lists_and_new_tables(parse: 
     assert "# not the diameter" in scenario.text
 
 
-def test_that_an_override_takes_the_place_of_what_it_excludes(parse: Parse) -> None:
+def test_override_replaces_a_key_that_it_excludes(parse: Parse) -> None:
     scenario = parse(overrides={"operation.passes": 100, "roller.diameter": "30 mm"})
     assert (scenario.total_passes, scenario.operation.duration) == (100, None)
     assert scenario.roller.radius == 0.015
 
 
-def test_that_two_overrides_that_exclude_each_other_are_refused(parse: Parse) -> None:
+def test_two_exclusive_overrides_are_refused(parse: Parse) -> None:
     with pytest.raises(ScenarioError, match="exactly one is needed, got duration and passes"):
         parse(overrides={"operation.passes": 100, "operation.duration": "3 min"})
 
@@ -77,7 +77,7 @@ def test_that_two_overrides_that_exclude_each_other_are_refused(parse: Parse) ->
         ),
     ],
 )
-def test_that_a_bad_override_is_told(
+def test_invalid_override_is_a_mistake(
     parse: Parse, overrides: dict[str, object], message: str
 ) -> None:
     with pytest.raises(ScenarioError) as caught:
@@ -98,14 +98,12 @@ def test_that_a_bad_override_is_told(
         ("title=a = b", "title", "a = b"),
     ],
 )
-def test_that_an_override_from_the_shell_is_toml_or_text(
-    text: str, key: str, value: object
-) -> None:
+def test_override_text_is_toml_or_plain_text(text: str, key: str, value: object) -> None:
     assert parse_override(text) == (key, value)
 
 
 @pytest.mark.parametrize("text", ["seed", "=3", " = 3"])
-def test_that_an_override_without_key_or_value_is_refused(text: str) -> None:
+def test_override_without_key_or_value_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match="is not an override, expected key=value"):
         parse_override(text)
 
@@ -122,7 +120,7 @@ keys = st.sampled_from(["seed", "load.normal_force", "wear.cylinder.k_over_h", "
 
 @settings(suppress_health_check=[HealthCheck.too_slow], deadline=None)
 @given(st.dictionaries(keys, values, max_size=4))
-def test_that_the_changed_text_holds_what_was_asked(overrides: dict[str, object]) -> None:
+def test_changed_text_holds_the_overrides(overrides: dict[str, object]) -> None:
     data = tomllib.loads(apply_overrides(GOOD, "rig.toml", overrides))
     for dotted, value in overrides.items():
         found = data

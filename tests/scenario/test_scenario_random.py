@@ -1,6 +1,6 @@
-"""Random inputs in a scenario: what is read, what is refused, and values in their place."""
+"""Random inputs in a scenario: parsing, mistakes, and substitution of values."""
 
-# ruff: noqa: E501  (messages are shown as they are told)
+# ruff: noqa: E501  (long messages)
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def rig(parse: Parse) -> Scenario:
     return parse(LOAD, FRICTION, SLACK, WEAR)
 
 
-def test_that_the_tables_hold_the_means(rig: Scenario) -> None:
+def test_tables_hold_the_means(rig: Scenario) -> None:
     assert rig.load.options.normal_force == pytest.approx(300.0, rel=1e-12)
     assert rig.friction.coefficient == 0.1
     assert (rig.creepage.yaw, rig.creepage.tilt) == (0.0, 0.0)
@@ -52,7 +52,7 @@ def test_that_the_tables_hold_the_means(rig: Scenario) -> None:
     assert rig.wear.options.roller.k_over_h == 0.0
 
 
-def test_that_the_random_inputs_stand_in_the_order_of_their_names(rig: Scenario) -> None:
+def test_random_inputs_are_in_the_order_of_their_names(rig: Scenario) -> None:
     assert [(item.name, item.kind, item.role, item.persistence) for item in rig.random] == [
         ("creepage.misalignment", "square", "joint", "per-roller"),
         ("friction.coefficient", "patches", "field", "per-pass"),
@@ -65,7 +65,7 @@ def test_that_the_random_inputs_stand_in_the_order_of_their_names(rig: Scenario)
     assert (slack.quantity.kind, load.quantity.kind, friction.quantity) == (ANGLE, FORCE, None)
 
 
-def test_that_a_draw_is_in_si(rig: Scenario) -> None:
+def test_draws_are_in_si(rig: Scenario) -> None:
     slack, friction, load, _ = rig.random
     np.testing.assert_allclose(load.values(np.array([[0.0], [0.75]])), [[200.0], [350.0]])
     np.testing.assert_allclose(slack.values(np.array([[0.0, 1.0]])), [[-2e-3, 2e-3]])
@@ -73,7 +73,7 @@ def test_that_a_draw_is_in_si(rig: Scenario) -> None:
         friction.values(np.zeros((1, 0)))
 
 
-def test_that_random_inputs_are_told_in_engineers_units(rig: Scenario) -> None:
+def test_random_inputs_are_described_in_engineering_units(rig: Scenario) -> None:
     assert [item.describe() for item in rig.random] == [
         "square, yaw up to 2 mrad, tilt up to 2 mrad, per-roller",
         "patches, length 50 um, frame contact, of bell, mean 0.1, std 0.02, on [0.01, inf), per-pass",
@@ -82,19 +82,19 @@ def test_that_random_inputs_are_told_in_engineers_units(rig: Scenario) -> None:
     ]
 
 
-def test_that_sub_tables_and_inline_tables_are_the_same(parse: Parse, rig: Scenario) -> None:
+def test_sub_tables_and_inline_tables_are_equivalent(parse: Parse, rig: Scenario) -> None:
     table = '[load.normal_force]\ndistribution = "flat"\nlow = "200 N"\nhigh = "0.4 kN"\n'
     other = parse((FORCE_LINE, table), FRICTION, SLACK, WEAR)
     assert [item.describe() for item in other.random] == [item.describe() for item in rig.random]
 
 
-def test_that_a_scenario_without_random_inputs_has_none(parse: Parse) -> None:
+def test_scenario_without_random_inputs_has_none(parse: Parse) -> None:
     scenario = parse()
     assert (scenario.random, dict(scenario.drawn)) == ((), {})
     assert (scenario.sampling.plan, scenario.sampling.realisation) == ("monte-carlo", 0)
 
 
-def test_that_terms_offsets_and_creepages_can_be_random(parse: Parse) -> None:
+def test_terms_offsets_and_creepages_can_be_random(parse: Parse) -> None:
     flat = '{{distribution = "flat", low = "{}", high = "{}"}}'
     term = f'\n[load.thermal]\ntime_constant = "3 min"\ngain = {flat.format("0 N/W", "8 N/W")}'
     offset = f"offset = {flat.format('-1 mm', '3 mm')}\n"
@@ -112,14 +112,14 @@ def test_that_terms_offsets_and_creepages_can_be_random(parse: Parse) -> None:
     assert scenario.creepage.bearing_torque == pytest.approx(5e-4)
 
 
-def test_that_a_process_takes_the_mean_of_its_marginal(parse: Parse) -> None:
+def test_process_is_represented_by_its_marginal_mean(parse: Parse) -> None:
     wander = '{distribution = "wander", time = "3 min", marginal = {distribution = "flat", low = "1 N", high = "3 N"}}'
     scenario = parse((FORCE_LINE, f"normal_force = {wander}"))
     assert scenario.random[0].role == "process"
     assert scenario.load.options.normal_force == pytest.approx(2.0)
 
 
-def test_that_a_distribution_may_read_a_file(parse: Parse) -> None:
+def test_distribution_can_read_a_file(parse: Parse) -> None:
     logged = 'normal_force = {distribution = "logged", file = "log.csv"}'
     files = {"log.csv": "value [kN]\n0.1\n0.4\n"}
     scenario = parse((FORCE_LINE, logged), files=files)
@@ -127,22 +127,22 @@ def test_that_a_distribution_may_read_a_file(parse: Parse) -> None:
     assert scenario.load.options.normal_force == 250.0
 
 
-def test_that_the_warnings_of_a_distribution_are_noted(parse: Parse) -> None:
+def test_distribution_warnings_become_notes(parse: Parse) -> None:
     scenario = parse(
         (FORCE_LINE, 'normal_force = {distribution = "flat", low = "3 N", high = "3 N"}')
     )
-    assert scenario.notes == ("load.normal_force: is rather flat",)
+    assert scenario.notes == ("load.normal_force: has a constant value",)
 
 
-def test_that_a_support_may_end_at_the_bound_of_a_continuous_law(parse: Parse) -> None:
+def test_continuous_support_may_end_at_an_excluded_bound(parse: Parse) -> None:
     scenario = parse((MU, 'coefficient = {distribution = "flat", low = 0, high = 1}'))
     assert scenario.friction.coefficient == pytest.approx(0.5)
 
 
-# --- values in their place
+# --- substituted values
 
 
-def test_that_a_realisation_has_the_values_to_the_bit(rig: Scenario) -> None:
+def test_realisation_has_the_values_bit_for_bit(rig: Scenario) -> None:
     values = {
         "load.normal_force": 1000.0 / 3.0,
         "creepage.yaw": 1e-3 / 3.0,
@@ -161,13 +161,13 @@ def test_that_a_realisation_has_the_values_to_the_bit(rig: Scenario) -> None:
 
 
 @pytest.mark.parametrize("force", [5e-324, 0.1 + 0.2, math.nextafter(300.0, 301.0), 1e22, 1.7e308])
-def test_that_any_float_goes_through_its_text_and_back(rig: Scenario, force: float) -> None:
+def test_any_float_survives_conversion_to_text(rig: Scenario, force: float) -> None:
     drawn = realise(rig, {"load.normal_force": np.float64(force), "friction.coefficient": force})
     assert drawn.load.options.normal_force == force
     assert drawn.friction.coefficient == force
 
 
-def test_that_a_realisation_in_parts_is_the_same_as_in_one(rig: Scenario) -> None:
+def test_stepwise_realisation_equals_a_single_one(rig: Scenario) -> None:
     first = realise(realise(rig, {"load.normal_force": 250.0}), {"friction.coefficient": 0.07})
     both = realise(rig, {"friction.coefficient": 0.07, "load.normal_force": 250.0})
     assert dict(first.drawn) == dict(both.drawn)
@@ -175,7 +175,7 @@ def test_that_a_realisation_in_parts_is_the_same_as_in_one(rig: Scenario) -> Non
     assert [item.name for item in first.random] == [item.name for item in both.random]
 
 
-def test_that_a_value_per_roller_is_a_list(rig: Scenario) -> None:
+def test_value_per_roller_is_a_tuple(rig: Scenario) -> None:
     angles = (1e-3, -1e-3 / 3.0, 2e-3)
     drawn = realise(rig, {"creepage.yaw": angles, "creepage.tilt": angles[::-1]})
     assert (drawn.creepage.yaw, drawn.creepage.tilt) == (angles, angles[::-1])
@@ -183,7 +183,7 @@ def test_that_a_value_per_roller_is_a_list(rig: Scenario) -> None:
         realise(rig, {"creepage.yaw": angles[:2], "creepage.tilt": angles})
 
 
-def test_that_a_realisation_reads_the_files_it_has(parse: Parse) -> None:
+def test_realisation_uses_the_stored_files(parse: Parse) -> None:
     recorded = '[load]\nkind = "recorded"\nfile = "log.csv"\n'
     term = '[load.thermal]\ntime_constant = "3 min"\ngain = {distribution = "flat", low = "0 N/W", high = "8 N/W"}\n'
     files = {"log.csv": "time [s],load [N]\n0,1\n1,2\n"}
@@ -191,7 +191,7 @@ def test_that_a_realisation_reads_the_files_it_has(parse: Parse) -> None:
     assert realise(scenario, {"load.thermal.gain": 3.0}).load.terms[0].options.gain == 3.0
 
 
-def test_that_a_realisation_is_checked(rig: Scenario) -> None:
+def test_realisation_values_are_checked(rig: Scenario) -> None:
     with pytest.raises(ScenarioError, match=r"\[load\] normal_force: must be above zero"):
         realise(rig, {"load.normal_force": -1.0})
     with pytest.raises(ScenarioError, match=r"\[friction\] coefficient: must be finite"):
@@ -202,7 +202,7 @@ def test_that_a_realisation_is_checked(rig: Scenario) -> None:
         realise(rig, {"creepage.yaw": 1e-3})
 
 
-def test_that_a_stored_scenario_has_the_same_random_inputs(rig: Scenario) -> None:
+def test_stored_scenario_has_the_same_random_inputs(rig: Scenario) -> None:
     again = parse_scenario(rig.text, rig.file, rig.files.__getitem__)
     assert [item.describe() for item in again.random] == [item.describe() for item in rig.random]
 
@@ -210,12 +210,12 @@ def test_that_a_stored_scenario_has_the_same_random_inputs(rig: Scenario) -> Non
 # --- overrides
 
 
-def test_that_overrides_reach_into_a_random_input(parse: Parse) -> None:
+def test_overrides_reach_options_of_a_random_input(parse: Parse) -> None:
     key, value = parse_override("load.normal_force.high=500 N")
     assert parse(LOAD, overrides={key: value}).load.options.normal_force == pytest.approx(350.0)
 
 
-def test_that_an_override_makes_a_value_random_and_back(parse: Parse) -> None:
+def test_override_makes_a_value_random_or_fixed(parse: Parse) -> None:
     key, value = parse_override('load.normal_force={distribution="flat", low="1 N", high="3 N"}')
     scenario = parse(overrides={key: value})
     assert [item.name for item in scenario.random] == ["load.normal_force"]
@@ -227,7 +227,7 @@ def test_that_an_override_makes_a_value_random_and_back(parse: Parse) -> None:
         assert (plain.random, plain.load.options.normal_force) == ((), 350.0)
 
 
-def test_that_angles_and_misalignment_take_each_others_place(parse: Parse) -> None:
+def test_angles_and_misalignment_replace_each_other(parse: Parse) -> None:
     fixed = parse(SLACK, overrides={"creepage.yaw": "1 mrad", "creepage.tilt": "2 mrad"})
     assert (fixed.random, fixed.creepage.yaw, fixed.creepage.tilt) == ((), 1e-3, 2e-3)
     slack = {"distribution": "square", "side": "1 mrad"}
@@ -238,7 +238,7 @@ def test_that_angles_and_misalignment_take_each_others_place(parse: Parse) -> No
 # --- sampling
 
 
-def test_that_sampling_holds_the_plan_and_the_correlations(parse: Parse) -> None:
+def test_sampling_holds_plan_and_correlations(parse: Parse) -> None:
     text = 'plan = "sobol"\nrealisation = 7\ncorrelation = [["load.normal_force", "wear.cylinder.k_over_h", -0.5]]'
     table = parse(LOAD, WEAR, _sampling(text)).sampling
     assert (table.plan, table.realisation) == ("sobol", 7)
@@ -247,7 +247,7 @@ def test_that_sampling_holds_the_plan_and_the_correlations(parse: Parse) -> None
 
 PROCESS = (MU, 'coefficient = {distribution = "flat", low = 0, high = 1, persistence = "per-pass"}')
 SAMPLING_MISTAKES = {
-    "a plan that is none": (
+    "an unknown plan": (
         (),
         'plan = "sobl"\nrealisation = -1',
         """\
@@ -261,7 +261,7 @@ rig.toml: [sampling] realisation: is out of range, got -1, expected a whole numb
 rig.toml: [sampling] correlation (entry 1): 'load.normal_forc' is not a random input (did you mean 'load.normal_force'?)
 rig.toml: [sampling] correlation (entry 1): 'friction.coefficient' is not a random input (known: load.normal_force)""",
     ),
-    "other persistences, and inputs of several numbers": (
+    "different persistences, and inputs of several numbers": (
         (LOAD, PROCESS, SLACK),
         'correlation = [["load.normal_force", "friction.coefficient", 0.5], ["load.normal_force", "creepage.misalignment", 0.1]]',
         """\
@@ -269,7 +269,7 @@ rig.toml: [sampling] correlation (entry 1): needs two random inputs of the same 
 rig.toml: [sampling] correlation (entry 2): 'creepage.misalignment' is a joint, and only single numbers can be correlated, got "square"
 rig.toml: [sampling] correlation (entry 2): needs two random inputs of the same persistence, got per-test and per-roller""",
     ),
-    "a correlation beyond one, and one that is short of a number": (
+    "a correlation above one, and one without a number": (
         (LOAD, WEAR),
         'correlation = [["load.normal_force", "wear.cylinder.k_over_h", 1.5], ["load.normal_force", "x"]]',
         """\
@@ -280,14 +280,14 @@ rig.toml: [sampling] correlation (entry 2) (entry 3): is missing""",
 
 
 @pytest.mark.parametrize("case", SAMPLING_MISTAKES)
-def test_that_a_mistake_in_sampling_is_told(parse: Parse, case: str) -> None:
+def test_sampling_mistakes_are_reported(parse: Parse, case: str) -> None:
     changes, text, message = SAMPLING_MISTAKES[case]
     with pytest.raises(ScenarioError) as caught:
         parse(*changes, _sampling(text))
     assert str(caught.value) == message
 
 
-def test_that_correlations_must_go_together(parse: Parse) -> None:
+def test_inconsistent_correlations_are_mistakes(parse: Parse) -> None:
     flat = (MU, 'coefficient = {distribution = "flat", low = 0, high = 1}')
     a, b, c = "friction.coefficient", "load.normal_force", "wear.cylinder.k_over_h"
     triangle = f"correlation = {[[a, b, 0.9], [b, c, 0.9], [a, c, -0.9]]}"
@@ -298,7 +298,7 @@ def test_that_correlations_must_go_together(parse: Parse) -> None:
         parse(LOAD, WEAR, flat, _sampling(twice))
 
 
-def test_that_an_input_with_mistakes_is_told_once(parse: Parse) -> None:
+def test_invalid_input_is_reported_once(parse: Parse) -> None:
     text = 'correlation = [["load.normal_force", "wear.cylinder.k_over_h", 0.5]]'
     with pytest.raises(ScenarioError) as caught:
         parse((FORCE_LINE, 'normal_force = {distribution = "flt"}'), WEAR, _sampling(text))
@@ -320,7 +320,7 @@ MISTAKES = {
         "normal_force = {distribution = 3}",
         "rig.toml: [load.normal_force] distribution: is not text, got 3, expected text",
     ),
-    "options that are wrong, missing, another's and misspelt": (
+    "options that are wrong, missing, misplaced and misspelt": (
         FORCE_LINE,
         'normal_force = {distribution = "bell", men = "3 N", std = "3 m", low = "3 N", persistance = "per-pass", persistence = "per-pas"}',
         """\
@@ -331,17 +331,17 @@ rig.toml: [load.normal_force] men: unknown key (did you mean 'mean'?)
 rig.toml: [load.normal_force] low: unknown key (it belongs in a random input with distribution = "flat")
 rig.toml: [load.normal_force] persistance: unknown key (did you mean 'persistence'?)""",
     ),
-    "knowledge that no law fits": (
+    "infeasible moments": (
         MU,
         'coefficient = {distribution = "bell", mean = 2, std = 0.2, support = [0, 1]}',
-        "rig.toml: [friction.coefficient]: the mean lies outside the support, got 2, expected one inside",
+        "rig.toml: [friction.coefficient]: the mean is outside the support, got 2, expected one inside",
     ),
-    "an unbounded law for a force": (
+    "an unbounded distribution of a force": (
         FORCE_LINE,
         'normal_force = {distribution = "bell", mean = "307 N", std = "32 N"}',
         'rig.toml: [load] normal_force: takes values down to -inf, and must be above 0, got bell, mean 307 N, std 32 N, on (-inf, inf), per-test, expected maxent with support ["0 N", "inf"] or truncated-normal',
     ),
-    "a law that takes the bound itself": (
+    "a distribution that includes an excluded bound": (
         MU,
         'coefficient = {distribution = "bell", mean = 0.01, std = 0.2, support = [0, 1]}',
         'rig.toml: [friction] coefficient: takes values down to 0, and must be above 0, got bell, mean 0.01, std 0.2, on [0, 1], per-test, expected maxent with support [0, "inf"] or truncated-normal',
@@ -446,7 +446,7 @@ rig.toml: [friction.coefficient.marginal] men: unknown key (did you mean 'mean'?
         '[roller]\noffset = {distribution = "flat", low = "0 m", high = "1 mm", persistence = "per-pass"}\n',
         f'rig.toml: [roller.offset] persistence: is only for {CONTACT}, got "per-pass", expected "per-test" or "per-roller"',
     ),
-    "a misalignment of one value": (
+    "a scalar misalignment": (
         XI,
         f'{XI}\nmisalignment = {{distribution = "flat", low = "0 rad", high = "1 mrad"}}',
         'rig.toml: [creepage.misalignment] distribution: sets one value, but creepage.misalignment sets yaw and tilt, got "flat", expected one of "pair", "square"',
@@ -456,7 +456,7 @@ rig.toml: [friction.coefficient.marginal] men: unknown key (did you mean 'mean'?
         f'{XI}\nmisalignment = "2 mrad"',
         'rig.toml: [creepage] misalignment: is not a random input, got "2 mrad", expected a table such as {distribution = "disc", radius = "2 mrad"}',
     ),
-    "a misalignment of other values": (
+    "a misalignment with other components": (
         XI,
         f'{XI}\nmisalignment = {{distribution = "pair", side = "2 mrad"}}',
         'rig.toml: [creepage.misalignment] distribution: sets left and right, got "pair", expected a distribution of yaw and tilt',
@@ -468,17 +468,17 @@ rig.toml: [friction.coefficient.marginal] men: unknown key (did you mean 'mean'?
 rig.toml: [creepage] yaw: is set by misalignment already, got "1 mrad", expected one of the two
 rig.toml: [creepage] tilt: is set by misalignment already, got a table, expected one of the two""",
     ),
-    "two angles of one": (
+    "a joint input for one angle": (
         XI,
         f'{XI}\nyaw = {{distribution = "square", side = "2 mrad"}}',
         'rig.toml: [creepage.yaw] distribution: sets several values together, which only creepage.misalignment can, got "square", expected one of "bell", "flat", "logged", "wander"',
     ),
-    "a file that is not there": (
+    "a missing file": (
         FORCE_LINE,
         'normal_force = {distribution = "logged", file = "gone.csv"}',
         'rig.toml: [load.normal_force] file: the file cannot be read, got "gone.csv"',
     ),
-    "a file with mistakes, found when it is built": (
+    "a file with mistakes": (
         FORCE_LINE,
         'normal_force = {distribution = "logged", file = "log.csv"}',
         "rig.toml: [load.normal_force] file: log.csv line 1: column 'value': wrong dimension, got m (a length), expected a unit of force such as N",
@@ -487,14 +487,14 @@ rig.toml: [creepage] tilt: is set by misalignment already, got a table, expected
 
 
 @pytest.mark.parametrize("case", MISTAKES)
-def test_that_every_mistake_is_told_in_full(parse: Parse, case: str) -> None:
+def test_random_input_mistake_is_reported_in_full(parse: Parse, case: str) -> None:
     good, bad, message = MISTAKES[case]
     with pytest.raises(ScenarioError) as caught:
         parse((good, bad), files={"log.csv": "value [m]\n1\n2\n"})
     assert str(caught.value) == message
 
 
-def test_that_the_mistakes_of_all_random_inputs_come_together(parse: Parse) -> None:
+def test_mistakes_of_all_random_inputs_are_reported_together(parse: Parse) -> None:
     with pytest.raises(ScenarioError) as caught:
         parse(
             (FORCE_LINE, 'normal_force = {distribution = "flt"}'),
@@ -502,7 +502,7 @@ def test_that_the_mistakes_of_all_random_inputs_come_together(parse: Parse) -> N
             (K, 'k_over_h = {distribution = "flat", low = 3, high = "1 1/Pa"}'),
             ('"1000 rpm"', '"1000 mm"'),
         )
-    assert [(problem.table, problem.key) for problem in caught.value.mistakes] == [
+    assert [(mistake.table, mistake.key) for mistake in caught.value.mistakes] == [
         ("operation", "speed"),
         ("load.normal_force", "distribution"),
         ("friction", "coefficient"),
@@ -511,7 +511,7 @@ def test_that_the_mistakes_of_all_random_inputs_come_together(parse: Parse) -> N
 
 
 @pytest.mark.parametrize(
-    ("key", "value", "told"),
+    ("key", "value", "message"),
     [
         ("creepage.tilt", "90 deg", "1.571 rad"),
         ("creepage.yaw", ["0 rad", "-0.2 rad", "0 rad"], "0.2 rad"),
@@ -523,19 +523,19 @@ def test_that_the_mistakes_of_all_random_inputs_come_together(parse: Parse) -> N
         ),
     ],
 )
-def test_that_an_angle_that_is_not_small_is_refused(key, value, told):
+def test_angle_that_is_not_small_is_a_mistake(key, value, message):
     with pytest.raises(ScenarioError, match="too large an angle") as caught:
         load_scenario(RIG, {"operation.rollers": 3, key: value})
-    assert told in str(caught.value)
+    assert message in str(caught.value)
 
 
-def test_that_an_angle_with_a_normal_law_is_taken():
-    law = {"distribution": "normal", "mean": "0 rad", "std": "1 mrad"}
-    assert load_scenario(RIG, {"creepage.tilt": law}).random
+def test_normally_distributed_angle_is_accepted():
+    angle = {"distribution": "normal", "mean": "0 rad", "std": "1 mrad"}
+    assert load_scenario(RIG, {"creepage.tilt": angle}).random
 
 
 @pytest.mark.parametrize("key", ["wear.cylinder.k_over_h", "roller.offset"])
-def test_that_what_no_contact_sees_cannot_change_in_time(key):
+def test_only_contact_values_can_vary_in_time(key):
     unit = "1/Pa" if "wear" in key else "m"
     marginal = {"distribution": "uniform", "low": f"1e-11 {unit}", "high": f"2e-11 {unit}"}
     process = {"distribution": "ornstein-uhlenbeck", "correlation_time": "1 min"}
@@ -543,20 +543,20 @@ def test_that_what_no_contact_sees_cannot_change_in_time(key):
         load_scenario(RIG, {key: {**process, "marginal": marginal}})
 
 
-def test_that_a_field_selects_a_contact_model_that_can_take_it():
-    law = {"distribution": "uniform", "low": 0.09, "high": 0.11}
-    field = {"friction.coefficient": {"distribution": "white", "marginal": law}}
+def test_friction_field_selects_a_capable_contact_model():
+    marginal = {"distribution": "uniform", "low": 0.09, "high": 0.11}
+    field = {"friction.coefficient": {"distribution": "white", "marginal": marginal}}
     rig = RIG.parent / "mean-contact.toml"
     text = rig.read_text().split("[contact]")[0]
     chosen = parse_scenario(text, "bare.toml", {}.__getitem__, field)
     assert chosen.contact.model == "hertz-fastsim"
     assert any("is a field, white" in note for note in chosen.notes)
-    asked = parse_scenario(text, "bare.toml", {}.__getitem__, {**field, "contact.model": "slender"})
-    assert asked.contact.model == "slender"
+    given = parse_scenario(text, "bare.toml", {}.__getitem__, {**field, "contact.model": "slender"})
+    assert given.contact.model == "slender"
 
 
 @pytest.mark.parametrize(
-    ("key", "value", "told"),
+    ("key", "value", "message"),
     [
         (
             "load.normal_force",
@@ -575,17 +575,17 @@ def test_that_a_field_selects_a_contact_model_that_can_take_it():
         ),
     ],
 )
-def test_that_a_table_in_the_place_of_a_value_is_told_what_it_lacks(key, value, told):
+def test_table_without_distribution_is_a_mistake(key, value, message):
     with pytest.raises(ScenarioError) as caught:
         load_scenario(RIG, {key: value})
-    assert str(caught.value).endswith(told)
+    assert str(caught.value).endswith(message)
 
 
-def test_that_a_number_in_steps_is_told_as_a_multiple():
+def test_expected_multiple_is_reported():
     with pytest.raises(ScenarioError, match="expected a multiple of 4 of at least 4"):
         load_scenario(RIG, {"evolution.nodes": 6})
 
 
-def test_that_a_field_on_friction_is_among_what_is_expected():
+def test_fields_are_among_the_expected_friction_inputs():
     with pytest.raises(ScenarioError, match=r'"gaussian-field".*"ornstein-uhlenbeck".*"white"'):
         load_scenario(RIG, {"friction.coefficient": {"distribution": "disc", "radius": "1 mrad"}})

@@ -1,4 +1,4 @@
-"""A good scenario: what it holds, and what follows from it."""
+"""Valid scenarios: their values and derived quantities."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from wearsim.scenario import Scenario, parse_scenario, require_run
 from wearsim.types import Material
 
 
-def test_that_a_scenario_holds_si(parse: Parse) -> None:
+def test_scenario_values_are_in_si(parse: Parse) -> None:
     scenario = parse()
     assert (scenario.title, scenario.seed, scenario.name) == ("a rig", 3, "rig")
     assert (scenario.roller.radius, scenario.roller.crown_radius) == (0.02, 0.5)
@@ -27,7 +27,7 @@ def test_that_a_scenario_holds_si(parse: Parse) -> None:
     assert scenario.notes == ()
 
 
-def test_that_the_rolling_speed_and_the_passes_follow(parse: Parse) -> None:
+def test_rolling_speed_and_passes_are_derived(parse: Parse) -> None:
     scenario = parse()
     assert scenario.rolling_speed == pytest.approx(2.6179938779914944)
     assert scenario.pass_rate == pytest.approx(50.0)
@@ -35,14 +35,14 @@ def test_that_the_rolling_speed_and_the_passes_follow(parse: Parse) -> None:
     assert scenario.total_time == pytest.approx(27000.0)
 
 
-def test_that_passes_are_whole_and_at_least_one(parse: Parse) -> None:
+def test_number_of_passes_is_an_integer_above_zero(parse: Parse) -> None:
     assert parse(('"450 min"', '"1 us"')).total_passes == 1
     counted = parse(('duration = "450 min"', "passes = 7"))
     assert counted.total_passes == 7
     assert counted.total_time == pytest.approx(0.14)
 
 
-def test_that_a_diameter_is_twice_a_radius(parse: Parse) -> None:
+def test_diameter_is_twice_the_radius(parse: Parse) -> None:
     scenario = parse(
         ('radius = "20 mm"', 'diameter = "40 mm"'),
         ('crown_radius = "500 mm"', 'crown_diameter = "1 m"'),
@@ -52,7 +52,7 @@ def test_that_a_diameter_is_twice_a_radius(parse: Parse) -> None:
     assert scenario.cylinder.radius == 0.025
 
 
-def test_that_a_material_can_be_given_by_its_constants(parse: Parse) -> None:
+def test_material_can_be_given_by_its_constants(parse: Parse) -> None:
     steel = 'radius = "20 mm"'
     table = (
         '\n[roller.material]\nyoungs_modulus = "70 GPa"\npoisson_ratio = 0.5\nhardness = "1 GPa"\n'
@@ -65,7 +65,7 @@ def test_that_a_material_can_be_given_by_its_constants(parse: Parse) -> None:
     assert scenario.roller.material == Material(70e9, 0.5, 1e9)
 
 
-def test_that_neglected_coupling_is_noted(parse: Parse) -> None:
+def test_neglected_coupling_gives_a_note(parse: Parse) -> None:
     soft = '{ youngs_modulus = "3 GPa", poisson_ratio = 0.3 }'
     scenario = parse(
         (
@@ -77,14 +77,14 @@ def test_that_neglected_coupling_is_noted(parse: Parse) -> None:
     assert note.startswith("the materials' Dundurs constant is -0.27")
 
 
-def test_that_a_value_per_roller_can_be_asked_for(parse: Parse) -> None:
+def test_per_roller_returns_one_value_per_roller(parse: Parse) -> None:
     offsets = 'offset = ["-1 mm", "0.3 mm", "1 mm"]\n'
     scenario = parse(("[roller]\n", f"[roller]\n{offsets}"))
     assert scenario.per_roller(scenario.roller.offset) == (-1e-3, 3e-4, 1e-3)
     assert scenario.per_roller(scenario.creepage.tilt) == (0.0, 0.0, 0.0)
 
 
-def test_that_a_cylinder_may_start_from_a_measured_profile(parse: Parse) -> None:
+def test_cylinder_can_start_from_a_measured_profile(parse: Parse) -> None:
     named = ('radius = "25 mm"', 'radius = "25 mm"\nprofile = "worn.csv"')
     files = {"worn.csv": "y [mm];height [um]\n-1;0\n0;-3\n1;0\n"}
     scenario = parse(named, files=files)
@@ -93,7 +93,7 @@ def test_that_a_cylinder_may_start_from_a_measured_profile(parse: Parse) -> None
     np.testing.assert_allclose(scenario.cylinder.profile.height, [0.0, -3e-6, 0.0])
 
 
-def test_that_terms_are_added_to_a_load(parse: Parse) -> None:
+def test_terms_are_added_to_a_load(parse: Parse) -> None:
     term = '\n[load.thermal]\ngain = "50 N/W"\ntime_constant = "20 min"\n'
     load = parse(('normal_force = "300 N"\n', f'normal_force = "300 N"\n{term}')).load
     assert [(item.name, item.options.gain) for item in load.terms] == [("thermal", 50.0)]
@@ -101,14 +101,14 @@ def test_that_terms_are_added_to_a_load(parse: Parse) -> None:
     assert load.terms[0].build() == ("built", load.terms[0].options)
 
 
-def test_that_plugins_are_built_with_their_options(parse: Parse) -> None:
+def test_plugins_are_built_with_their_options(parse: Parse) -> None:
     scenario = parse(('model = "slender"', 'model = "hertz-fastsim"\nmx = 7\nstrips = 41'))
     assert scenario.contact.build() == ("built", scenario.contact.options)
     assert scenario.wear.build() == ("built", scenario.wear.options)
     assert (scenario.contact.options.mx, scenario.contact.strips) == (7, 41)
 
 
-def test_that_defaults_stand_for_what_is_left_out(parse: Parse) -> None:
+def test_missing_keys_have_default_values(parse: Parse) -> None:
     scenario = parse(('[contact]\nmodel = "slender"\n', ""))
     assert scenario.contact.model == "slender"
     assert (scenario.evolution.stepper, scenario.evolution.tolerance) == ("auto", 1e-3)
@@ -116,7 +116,7 @@ def test_that_defaults_stand_for_what_is_left_out(parse: Parse) -> None:
     assert parse(('title = "a rig"\nseed = 3\n', "")).title == "rig"
 
 
-def test_that_a_cadence_replaces_the_default_one(parse: Parse) -> None:
+def test_record_schedule_replaces_the_default(parse: Parse) -> None:
     outputs = parse(("[wear]", '[outputs]\nevery = "10 min"\n[wear]')).outputs
     assert (outputs.records, outputs.every_passes, outputs.every) == (None, None, 600.0)
 
@@ -126,11 +126,11 @@ def _single_contact(parse: Parse) -> Scenario:
     return parse(('duration = "450 min"\n', ""), text=text)
 
 
-def test_that_a_single_contact_needs_no_duration_and_no_wear(parse: Parse) -> None:
+def test_single_contact_needs_no_duration_and_no_wear_law(parse: Parse) -> None:
     assert _single_contact(parse).wear is None
 
 
-def test_that_a_run_needs_them_and_says_both(parse: Parse) -> None:
+def test_run_without_duration_and_wear_law_reports_both(parse: Parse) -> None:
     require_run(parse())
     with pytest.raises(ScenarioError) as caught:
         require_run(_single_contact(parse))
@@ -142,7 +142,7 @@ def test_that_a_run_needs_them_and_says_both(parse: Parse) -> None:
     )
 
 
-def test_that_a_stored_scenario_is_the_same_again(parse: Parse) -> None:
+def test_stored_scenario_is_read_back_unchanged(parse: Parse) -> None:
     named = ('radius = "25 mm"', 'radius = "25 mm"\nprofile = "worn.csv"')
     files = {"worn.csv": "y [mm];height [um]\n-1;0\n0;-3\n1;0\n"}
     first = parse(named, files=files, overrides={"seed": 5})
@@ -151,7 +151,7 @@ def test_that_a_stored_scenario_is_the_same_again(parse: Parse) -> None:
     assert again.seed == 5
 
 
-def test_that_the_digest_covers_the_text_and_the_files(parse: Parse) -> None:
+def test_digest_depends_on_text_and_files(parse: Parse) -> None:
     named = ('radius = "25 mm"', 'radius = "25 mm"\nprofile = "worn.csv"')
     files = {"worn.csv": "y [mm];height [um]\n-1;0\n0;-3\n1;0\n"}
     changed = {"worn.csv": files["worn.csv"] + "# seen\n"}
@@ -164,7 +164,7 @@ def test_that_the_digest_covers_the_text_and_the_files(parse: Parse) -> None:
     assert len(digests) == 4
 
 
-def test_that_importing_the_room_is_cheap() -> None:
+def test_importing_the_package_loads_no_heavy_library() -> None:
     code = (
         "import sys, wearsim.scenario;"
         "heavy = {'pint', 'tomlkit', 'scipy', 'matplotlib', 'numba', 'h5py'};"

@@ -18,7 +18,7 @@ Schema = dict[str, Any]
 
 
 def _fits(value: object, schema: Schema, defs: Schema) -> bool:
-    """A small validator of the words that the schema uses."""
+    """Validate a value by the JSON Schema keywords that the schema uses."""
     if "$ref" in schema:
         return _fits(value, defs[schema["$ref"].rsplit("/", 1)[-1]], defs)
     if "anyOf" in schema:
@@ -39,8 +39,8 @@ def _fits(value: object, schema: Schema, defs: Schema) -> bool:
         )
     if kind == "array" and "prefixItems" in schema:
         items = schema["prefixItems"]
-        alike = isinstance(value, list) and len(value) == len(items)
-        return alike and all(map(_fits, value, items, [defs] * len(items)))
+        same = isinstance(value, list) and len(value) == len(items)
+        return same and all(map(_fits, value, items, [defs] * len(items)))
     if kind == "array":
         return isinstance(value, list) and all(_fits(i, schema["items"], defs) for i in value)
     if kind == "string":
@@ -88,7 +88,7 @@ def schema(small_registry: object) -> Schema:
 
 
 @pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: path.stem)
-def test_that_the_schema_takes_every_shipped_scenario(path: Path) -> None:
+def test_schema_accepts_every_shipped_scenario(path: Path) -> None:
     schema = scenario_schema()  # with the installed plugins
     data = tomllib.loads(path.read_text(encoding="utf-8"))
     assert _fits(data, schema, schema["$defs"])
@@ -104,21 +104,19 @@ def test_that_the_schema_takes_every_shipped_scenario(path: Path) -> None:
         ("[friction]", "[fricton]"),
     ],
 )
-def test_that_the_schema_refuses_what_the_parser_refuses(
-    schema: Schema, good: str, bad: str
-) -> None:
+def test_schema_rejects_what_the_parser_rejects(schema: Schema, good: str, bad: str) -> None:
     assert _fits(tomllib.loads(GOOD), schema, schema["$defs"])
     assert not _fits(tomllib.loads(GOOD.replace(good, bad)), schema, schema["$defs"])
 
 
 def _random() -> str:
-    """A scenario with the installed random inputs in every table that takes them."""
+    """Return a scenario with installed random inputs in every table that takes them."""
     bodies = GOOD[: GOOD.index("[load]")]
     offset = 'offset = {distribution = "normal", mean = "0 mm", std = "1 mm"}'
     return bodies.replace("[roller]", f"[roller]\n{offset}") + RANDOM
 
 
-def test_that_the_schema_takes_random_inputs_as_the_parser_does() -> None:
+def test_schema_accepts_random_inputs_like_the_parser() -> None:
     schema = scenario_schema()  # with the installed plugins
     assert _fits(tomllib.loads(_random()), schema, schema["$defs"])
     scenario = parse_scenario(_random(), "rig.toml", {}.__getitem__)
@@ -142,7 +140,7 @@ def test_that_the_schema_takes_random_inputs_as_the_parser_does() -> None:
         ),
     ],
 )
-def test_that_the_schema_refuses_random_inputs_that_the_parser_refuses(good: str, bad: str) -> None:
+def test_schema_rejects_random_inputs_like_the_parser(good: str, bad: str) -> None:
     text = _random()
     assert good in text
     text = text.replace(good, bad, 1)
@@ -152,7 +150,7 @@ def test_that_the_schema_refuses_random_inputs_that_the_parser_refuses(good: str
         parse_scenario(text, "rig.toml", {}.__getitem__)
 
 
-def test_that_every_key_is_described() -> None:
+def test_every_key_has_a_description() -> None:
     schema = scenario_schema()  # with the installed plugins
     for node in _nodes(schema):
         if node.get("type") == "object":
@@ -160,12 +158,12 @@ def test_that_every_key_is_described() -> None:
                 assert field.get("description"), key
 
 
-def test_that_every_reference_leads_somewhere_and_nothing_is_left_over(schema: Schema) -> None:
+def test_all_definitions_are_referenced_and_defined(schema: Schema) -> None:
     used = {node["$ref"].rsplit("/", 1)[-1] for node in _nodes(schema) if "$ref" in node}
     assert used == set(schema["$defs"])
 
 
-def test_that_defaults_are_written_as_a_user_would(schema: Schema) -> None:
+def test_defaults_are_written_as_in_a_scenario(schema: Schema) -> None:
     tables = schema["properties"]
     assert tables["roller"]["properties"]["offset"]["default"] == "0 m"
     assert tables["outputs"]["properties"]["checkpoint_every"]["default"] == "30 s"
@@ -173,7 +171,7 @@ def test_that_defaults_are_written_as_a_user_would(schema: Schema) -> None:
     assert not any(node.get("type") == "null" for node in _nodes(schema))
 
 
-def test_that_plugins_are_alternatives_by_name(schema: Schema) -> None:
+def test_plugins_are_alternatives_by_name(schema: Schema) -> None:
     contact = schema["properties"]["contact"]["anyOf"]
     assert [item["properties"]["model"]["const"] for item in contact] == [
         "hertz-fastsim",

@@ -1,4 +1,4 @@
-"""How often 95 % intervals hold the truth: the wear depth k (x1 x2 x3)^(2/3) of log-normal x.
+"""Coverage of 95 % intervals for the wear depth k (x1 x2 x3)^(2/3) of log-normal x.
 
 Its logarithm is normal, so that its mean, standard deviation and quantiles are known.
 """
@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.special import ndtri
 
-from wearsim.uq.estimation.standard_errors import Control
 from wearsim.uq.estimation.estimates import estimate
+from wearsim.uq.estimation.standard_errors import Control
 from wearsim.uq.sampling.plans import REPLICATES, drawing
 
 REPEATS = 500
@@ -18,20 +18,20 @@ SPREADS = np.array([0.2, 0.12, 0.08])  # of ln x
 SIGMA = float(np.sqrt((SPREADS**2).sum())) * 2.0 / 3.0
 MEAN = math.exp(SIGMA**2 / 2.0)
 STD = MEAN * math.sqrt(math.expm1(SIGMA**2))
-TRUTH = (MEAN, STD, 1.0, math.exp(SIGMA * ndtri(0.95)))
+EXACT = (MEAN, STD, 1.0, math.exp(SIGMA * ndtri(0.95)))
 
 
 def depth(scores):
-    """Return the depth by normal scores, (realisations, 3)."""
+    """Return the depth from normal scores, (realisations, 3)."""
     return np.exp(2.0 / 3.0 * scores @ SPREADS)
 
 
 def coverage(estimates):
-    """Return how often mean, standard deviation, median and 95 % quantile are held."""
+    """Return the coverage of mean, standard deviation, median and 95 % quantile."""
     held = np.zeros(4)
     for found in estimates:
         parts = (found.mean, found.std, found.quantile(0.5), found.quantile(0.95))
-        held += [part.low <= true <= part.high for part, true in zip(parts, TRUTH, strict=True)]
+        held += [part.low <= exact <= part.high for part, exact in zip(parts, EXACT, strict=True)]
     return held / REPEATS
 
 
@@ -41,14 +41,14 @@ def draws(count, seed):
 
 
 @pytest.mark.parametrize("count", [200, 1000])
-def test_that_intervals_of_independent_realisations_hold_the_truth(count):
+def test_independent_intervals_cover_the_exact_values(count):
     found = coverage(estimate(depth(scores), (0.5, 0.95)) for scores in draws(count, 1))
     assert (found >= 0.93).all(), found
     assert (found <= 0.97).all(), found
 
 
 @pytest.mark.parametrize("count", [256])
-def test_that_intervals_of_sobol_replicates_hold_the_truth(count):
+def test_sobol_replicate_intervals_cover_the_exact_values(count):
     def estimates():
         for seed in range(REPEATS):
             draw = drawing("sobol", seed, None, REPLICATES)
@@ -59,12 +59,12 @@ def test_that_intervals_of_sobol_replicates_hold_the_truth(count):
     found = coverage(estimates())
     assert (found[:3] >= 0.93).all(), found
     assert (found[:3] <= 0.97).all(), found
-    # few realisations of a replicate are that far out: the interval errs on the wide side
+    # few realisations of a replicate are in the tail: the interval is too wide
     assert found[3] >= 0.93
 
 
-def test_that_intervals_by_a_control_variate_hold_the_truth():
-    # the control knows nothing of the third input
+def test_control_variate_intervals_cover_the_exact_values():
+    # the control variate does not depend on the third input
     rest = math.exp((2.0 / 3.0) ** 2 * (SPREADS[:2] ** 2).sum() / 2.0)
 
     def estimates():
@@ -78,13 +78,13 @@ def test_that_intervals_by_a_control_variate_hold_the_truth():
     assert (found <= 0.97).all(), found
 
 
-def test_that_sobol_replicates_and_a_control_variate_know_the_mean_better():
+def test_sobol_and_control_variate_intervals_are_narrower():
     count = 1024
     scores = next(draws(count, 3))
     plain = estimate(depth(scores)).mean.half_width
     control = Control(np.exp(2.0 / 3.0 * scores[:, :2] @ SPREADS[:2]), 1.0)
     controlled = estimate(depth(scores), plan="control-variate", control=control)
-    # the third input's part of the variance is left
+    # remaining variance: that of the third input
     left = SPREADS[2] ** 2 / (SPREADS**2).sum()
     assert controlled.mean.half_width / plain == pytest.approx(math.sqrt(left), rel=0.15)
     assert controlled.variance_saved == pytest.approx(1.0 - left, abs=0.03)

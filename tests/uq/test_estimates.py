@@ -1,4 +1,4 @@
-"""Estimates by plan: identities, closed forms and what too few values leave unknown."""
+"""Estimates by sampling design: identities, closed forms and insufficient samples."""
 
 import math
 
@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from wearsim.uq.estimation.standard_errors import Control, Controlled
 from wearsim.uq.estimation.estimates import DESIGNS, estimate
 from wearsim.uq.estimation.intervals import Interval
 from wearsim.uq.estimation.moments import summarise
-from wearsim.uq.estimation.standard_errors import Independent, Replicated
+from wearsim.uq.estimation.standard_errors import Control, Controlled, Independent, Replicated
 
 PROBABILITIES = (0.025, 0.5, 0.95)
 
@@ -20,13 +19,13 @@ def values_of(count, seed=1):
 
 
 def given(values, plan):
-    """Return what a plan needs besides the values."""
+    """Return the arguments that a design needs in addition to the values."""
     if plan == "sobol":
         return {"plan": plan, "replicate": np.arange(len(values)) % 8}
     if plan == "control-variate":
-        # goes with the values, though not in step
-        values_there = np.arange(len(values)) % 7 + 3.0 * values
-        return {"plan": plan, "control": Control(values_there, 3.0)}
+        # correlated with the values, but not fully
+        control_values = np.arange(len(values)) % 7 + 3.0 * values
+        return {"plan": plan, "control": Control(control_values, 3.0)}
     return {"plan": plan}
 
 
@@ -35,7 +34,7 @@ def ends(found):
 
 
 @pytest.mark.parametrize("plan", ["monte-carlo", "latin-hypercube", "saltelli"])
-def test_that_independent_realisations_give_the_textbooks_estimates(plan):
+def test_independent_realisations_give_textbook_estimates(plan):
     values = values_of(300)
     found, known = estimate(values, PROBABILITIES, plan), summarise(values)
     low, high = stats.t.interval(0.95, 299, values.mean(), stats.sem(values))
@@ -49,7 +48,7 @@ def test_that_independent_realisations_give_the_textbooks_estimates(plan):
     assert found.variance_saved is None
 
 
-def test_that_the_interval_of_the_std_nears_that_of_the_fourth_moment():
+def test_std_interval_converges_to_that_of_the_fourth_moment():
     values = values_of(100_000)
     found, known = estimate(values), summarise(values)
     assert found.std.half_width == pytest.approx(1.96 * known.std_error, rel=0.01)
@@ -57,7 +56,7 @@ def test_that_the_interval_of_the_std_nears_that_of_the_fourth_moment():
 
 @pytest.mark.parametrize("plan", DESIGNS)
 @pytest.mark.parametrize("same", [0.1, 0.0, -3e-7])
-def test_that_values_that_are_all_the_same_have_intervals_of_no_width(plan, same):
+def test_constant_values_have_intervals_of_zero_width(plan, same):
     values = np.full(30, same)
     found = estimate(values, PROBABILITIES, **given(values, plan))
     assert ends(found) == [Interval(same, same, same), Interval(0.0, 0.0, 0.0)] + 3 * [
@@ -67,7 +66,7 @@ def test_that_values_that_are_all_the_same_have_intervals_of_no_width(plan, same
 
 
 @pytest.mark.parametrize("plan", DESIGNS)
-def test_that_one_value_has_no_spread_and_no_end(plan):
+def test_one_value_has_no_std_and_infinite_intervals(plan):
     values = np.array([0.07])
     found = estimate(values, PROBABILITIES, **given(values, plan))
     assert found.mean == Interval(0.07, -math.inf, math.inf)
@@ -77,7 +76,7 @@ def test_that_one_value_has_no_spread_and_no_end(plan):
 
 
 @pytest.mark.parametrize("plan", DESIGNS)
-def test_that_no_values_are_no_error(plan):
+def test_no_values_give_unknown_estimates(plan):
     found = estimate(np.array([]), PROBABILITIES, **given(np.array([]), plan))
     assert found.count == 0
     assert np.isnan([interval.value for interval in ends(found)]).all()
@@ -86,7 +85,7 @@ def test_that_no_values_are_no_error(plan):
 
 @pytest.mark.parametrize("plan", DESIGNS)
 @pytest.mark.parametrize("count", [2, 3, 4, 5, 9, 10, 33, 400])
-def test_that_an_interval_is_about_its_estimate(plan, count):
+def test_interval_contains_its_estimate(plan, count):
     values = values_of(count)
     found = estimate(values, PROBABILITIES, **given(values, plan))
     for interval in ends(found):
@@ -95,19 +94,19 @@ def test_that_an_interval_is_about_its_estimate(plan, count):
     assert math.isinf(found.std.high) == (count < 5)
 
 
-def test_that_a_value_that_has_all_of_the_variance_leaves_the_std_unknown():
+def test_single_deviating_value_leaves_the_std_interval_unknown():
     found = estimate(np.array([0.0] * 6 + [1.0]))
     assert found.std == Interval(pytest.approx(math.sqrt(1 / 7)), 0.0, math.inf)
 
 
-def test_that_replicates_of_one_size_differ_as_their_own_means():
+def test_equal_replicates_have_the_error_of_their_means():
     values = np.random.default_rng(2).random((8, 20))
     errors = Replicated(np.repeat(np.arange(8), 20))
     assert errors.error(values.ravel()) == pytest.approx(stats.sem(values.mean(axis=1)))
     assert (errors.draws, errors.degrees) == (8, 7)
 
 
-def test_that_replicates_of_one_each_are_independent_realisations():
+def test_replicates_of_size_one_equal_independent_realisations():
     values = values_of(8)
     errors = Replicated(np.arange(8)[::-1] * 10)
     assert errors.error(values) == pytest.approx(Independent(8, "").error(values))
@@ -118,14 +117,14 @@ def test_that_replicates_of_one_each_are_independent_realisations():
         )
 
 
-def test_that_one_replicate_alone_tells_no_error():
+def test_single_replicate_gives_no_error():
     values = values_of(64)
     found = estimate(values, PROBABILITIES, "sobol", np.full(64, 3))
     assert found.mean.value == pytest.approx(values.mean())
     assert np.isinf([interval.half_width for interval in ends(found)]).all()
 
 
-def test_that_a_control_has_its_known_mean_and_the_mean_is_the_regressions():
+def test_weights_reproduce_the_control_mean_and_the_regression():
     rng = np.random.default_rng(3)
     control = rng.gamma(3.0, size=50)
     values = 2.0 * control + rng.standard_normal(50)
@@ -137,7 +136,7 @@ def test_that_a_control_has_its_known_mean_and_the_mean_is_the_regressions():
     assert found.variance_saved == pytest.approx(np.corrcoef(control, values)[0, 1] ** 2)
 
 
-def test_that_a_control_in_step_leaves_only_the_error_of_its_own_mean():
+def test_fully_correlated_control_leaves_only_its_mean_error():
     control = np.random.default_rng(4).random(40)
     exact = estimate(5.0 + 2.0 * control, plan="control-variate", control=Control(control, 0.5))
     assert [exact.mean.low, exact.mean.high] == pytest.approx([6.0, 6.0])
@@ -150,7 +149,7 @@ def test_that_a_control_in_step_leaves_only_the_error_of_its_own_mean():
 @pytest.mark.parametrize(
     ("count", "control"), [(9, np.arange(9.0)), (30, np.full(30, 0.1))], ids=["few", "constant"]
 )
-def test_that_a_control_of_no_use_is_left_out_and_said(count, control):
+def test_unusable_control_is_ignored_and_reported(count, control):
     values = values_of(count)
     found = estimate(values, PROBABILITIES, "control-variate", control=Control(control, 2.0))
     assert ends(found) == ends(estimate(values, PROBABILITIES))
@@ -158,7 +157,7 @@ def test_that_a_control_of_no_use_is_left_out_and_said(count, control):
 
 
 @pytest.mark.parametrize(
-    ("needs", "told"),
+    ("needs", "message"),
     [
         ({"plan": "sobol"}, "needs the replicate"),
         ({"plan": "sobol", "replicate": np.arange(3)}, "needs the replicate"),
@@ -166,11 +165,11 @@ def test_that_a_control_of_no_use_is_left_out_and_said(count, control):
         ({"plan": "halton"}, 'unknown plan "halton", expected one of monte-carlo'),
     ],
 )
-def test_that_what_a_plan_needs_is_asked_for(needs, told):
-    with pytest.raises(ValueError, match=told):
+def test_missing_data_of_a_design_are_refused(needs, message):
+    with pytest.raises(ValueError, match=message):
         estimate(values_of(5), **needs)
 
 
-def test_that_failed_values_are_refused():
+def test_non_finite_values_are_refused():
     with pytest.raises(ValueError, match="2 of 3 values are not finite"):
         estimate(np.array([1.0, np.nan, np.inf]))

@@ -26,7 +26,7 @@ def sampled(correlations, names=NAMES, plan="monte-carlo"):
         {("a", "c"): 0.7, ("d", "b"): -0.2},
     ],
 )
-def test_that_ranks_are_correlated_as_asked_and_laws_kept(wanted):
+def test_rank_correlations_are_met_and_marginals_kept(wanted):
     drawn = sampled([(*pair, rank) for pair, rank in wanted.items()])
     for i, first in enumerate(NAMES):
         assert stats.kstest(drawn[first], "uniform").pvalue > 1e-4
@@ -37,29 +37,29 @@ def test_that_ranks_are_correlated_as_asked_and_laws_kept(wanted):
 
 
 @pytest.mark.parametrize("plan", ["monte-carlo", "latin-hypercube", "sobol"])
-def test_that_only_what_takes_part_changes(plan):
-    free, tied = sampled([], plan=plan), sampled([("d", "b", 0.4)], plan=plan)
-    for name in ("a", "b", "c"):  # b comes before d by name, and so keeps its numbers
-        np.testing.assert_array_equal(free[name], tied[name])
-    assert (free["d"] != tied["d"]).all()
+def test_uncorrelated_inputs_are_unchanged(plan):
+    free, correlated = sampled([], plan=plan), sampled([("d", "b", 0.4)], plan=plan)
+    for name in ("a", "b", "c"):  # b precedes d by name and keeps its numbers
+        np.testing.assert_array_equal(free[name], correlated[name])
+    assert (free["d"] != correlated["d"]).all()
 
 
-def test_that_groups_do_not_touch_each_other():
+def test_correlated_groups_are_independent_of_each_other():
     alone = sampled([("a", "b", 0.4)])
-    beside = sampled([("c", "d", 0.7), ("a", "b", 0.4)])
+    both = sampled([("c", "d", 0.7), ("a", "b", 0.4)])
     for name in ("a", "b"):
-        np.testing.assert_array_equal(alone[name], beside[name])
+        np.testing.assert_array_equal(alone[name], both[name])
 
 
-def test_that_tied_numbers_stay_strictly_between_0_and_1():
+def test_correlated_numbers_stay_strictly_between_0_and_1():
     copula = GaussianCopula([("a", "b", 0.7)], {"a": 1, "b": 1})
     ends = np.array([[2.0**-53], [1.0 - 2.0**-53]])
-    tied = copula.correlate({"a": ends, "b": ends})["b"]
-    assert ((tied > 0.0) & (tied < 1.0)).all()
+    correlated = copula.correlate({"a": ends, "b": ends})["b"]
+    assert ((correlated > 0.0) & (correlated < 1.0)).all()
 
 
 @pytest.mark.parametrize(
-    ("correlations", "told"),
+    ("correlations", "message"),
     [
         ([("a", "z", 0.1)], 'cannot correlate "z": no such input, the inputs are a, b, c, two'),
         ([("a", "two", 0.1)], "cannot correlate two: one draw takes 2 numbers"),
@@ -74,6 +74,6 @@ def test_that_tied_numbers_stay_strictly_between_0_and_1():
         ),
     ],
 )
-def test_that_correlations_that_cannot_be_are_refused(correlations, told):
-    with pytest.raises(ValueError, match=told):
+def test_invalid_correlations_are_refused(correlations, message):
+    with pytest.raises(ValueError, match=message):
         GaussianCopula(correlations, {"a": 1, "b": 1, "c": 1, "two": 2})

@@ -1,4 +1,4 @@
-"""Estimates and their errors, against closed forms, scipy and repeated sampling."""
+"""Moments and their standard errors, against closed forms, scipy and repeated sampling."""
 
 from __future__ import annotations
 
@@ -14,20 +14,18 @@ from wearsim.uq.estimation.moments import RowMoments, converge, is_constant, ord
 
 
 def _coverage(count: int, probability: float, low: int, high: int) -> float:
-    """Return the chance that the quantile lies between two order statistics."""
+    """Return the probability that the quantile is between two order statistics."""
     below = stats.binom(count, probability)
     return float(below.cdf(high - 1) - below.cdf(low - 1))
 
 
-def test_that_the_median_of_ten_lies_between_the_second_and_the_ninth():
-    assert order_ranks(10, 0.5) == (2, 9)  # 97.85 %: the textbook's table
+def test_median_of_ten_is_between_second_and_ninth():
+    assert order_ranks(10, 0.5) == (2, 9)  # 97.85 %: textbook table
     assert _coverage(10, 0.5, 2, 9) == pytest.approx(1 - 22 / 1024)
 
 
 @given(st.integers(1, 100_000), st.floats(0.001, 0.999), st.sampled_from([0.8, 0.95, 0.99]))
-def test_that_an_interval_of_ranks_keeps_its_confidence_and_no_narrower_end_does(
-    count, probability, confidence
-):
+def test_order_ranks_are_the_narrowest_with_the_confidence(count, probability, confidence):
     low, high = order_ranks(count, probability, confidence)
     assert 0 <= low < high <= count + 1
     below, miss = stats.binom(count, probability), 0.5 * (1 - confidence)
@@ -38,27 +36,27 @@ def test_that_an_interval_of_ranks_keeps_its_confidence_and_no_narrower_end_does
         assert below.sf(high - 2) > miss * (1 - 1e-9)
 
 
-def test_that_intervals_hold_the_quantile_as_often_as_they_promise():
-    rng, law, held = np.random.default_rng(4), stats.expon(), 0
+def test_quantile_intervals_have_the_exact_coverage():
+    rng, distribution, held = np.random.default_rng(4), stats.expon(), 0
     for _ in range(1000):
         found = summarise(rng.exponential(size=150), (0.9,)).quantile(0.9)
-        held += found.low <= law.ppf(0.9) <= found.high
+        held += found.low <= distribution.ppf(0.9) <= found.high
     low, high = order_ranks(150, 0.9)
-    promised = _coverage(150, 0.9, low, high)
-    assert 0.95 <= promised < 0.98
+    expected = _coverage(150, 0.9, low, high)
+    assert 0.95 <= expected < 0.98
     assert held / 1000 == pytest.approx(
-        promised, abs=4 * math.sqrt(promised * (1 - promised) / 1000)
+        expected, abs=4 * math.sqrt(expected * (1 - expected) / 1000)
     )
 
 
-def test_that_an_end_with_too_few_realisations_is_infinite():
+def test_interval_end_is_infinite_for_too_few_realisations():
     found = summarise(np.arange(20.0), (0.025, 0.5, 0.975))
     assert found.quantile(0.025).low == -math.inf
     assert found.quantile(0.975).high == math.inf
     assert 0.0 <= found.quantile(0.5).low < found.quantile(0.5).high <= 19.0
 
 
-def test_that_a_summary_agrees_with_the_textbook():
+def test_summary_agrees_with_numpy_and_scipy():
     values = np.random.default_rng(1).gamma(3.0, 0.03, size=777)
     found = summarise(values, (0.25,))
     assert found.count == 777
@@ -73,32 +71,32 @@ def test_that_a_summary_agrees_with_the_textbook():
 @pytest.mark.parametrize(
     ("draw", "kurtosis"), [("standard_normal", 3.0), ("standard_exponential", 9.0)]
 )
-def test_that_the_error_of_the_std_follows_the_fourth_moment(draw, kurtosis):
+def test_std_error_follows_the_fourth_moment(draw, kurtosis):
     n = 400_000
     found = summarise(getattr(np.random.default_rng(2), draw)(n))
     assert found.std_error == pytest.approx(math.sqrt((kurtosis - 1) / (4 * n)), rel=0.02)
 
 
-def test_that_the_error_of_the_std_is_what_repetition_shows():
+def test_std_error_agrees_with_repeated_sampling():
     rows = np.random.default_rng(3).gamma(4.0, size=(2000, 200))
     spread = rows.std(axis=1, ddof=1).std()
     typical = np.mean([summarise(row).std_error for row in rows])
     assert typical == pytest.approx(spread, rel=0.06)
 
 
-def test_that_one_realisation_has_a_mean_and_no_spread():
+def test_one_realisation_has_a_mean_and_no_std():
     found = summarise(np.array([0.07]), (0.5,))
     assert (found.count, found.mean) == (1, 0.07)
     assert np.isnan([found.std, found.mean_error, found.std_error, found.skewness]).all()
 
 
-def test_that_equal_realisations_have_no_spread():
+def test_equal_realisations_have_zero_std():
     found = summarise(np.full(9, 0.07))
     assert (found.std, found.mean_error, found.std_error) == (0.0, 0.0, 0.0)
     assert math.isnan(found.skewness)
 
 
-def test_that_estimates_settle_as_if_each_number_were_the_last():
+def test_convergence_equals_summaries_of_partial_samples():
     values = 300.0 + np.random.default_rng(5).standard_normal(60)
     found = converge(values, np.arange(1, 61))
     assert math.isnan(found.std[0])
@@ -109,7 +107,7 @@ def test_that_estimates_settle_as_if_each_number_were_the_last():
 
 
 @pytest.mark.parametrize("batch", [1, 7, 256, 300, 1000])
-def test_that_batches_change_no_bit_of_the_moments_of_rows(batch):
+def test_row_moments_are_independent_of_the_batch_size(batch):
     rows = 1e3 + np.random.default_rng(6).standard_normal((1000, 5))
     found, whole = RowMoments(5), RowMoments(5)
     for first in range(0, 1000, batch):
@@ -122,7 +120,7 @@ def test_that_batches_change_no_bit_of_the_moments_of_rows(batch):
     np.testing.assert_allclose(std, rows.std(axis=0, ddof=1), rtol=1e-12)
 
 
-def test_that_looking_at_the_moments_of_rows_changes_nothing():
+def test_reading_row_moments_does_not_change_them():
     rows = np.random.default_rng(7).standard_normal((300, 2))
     found = RowMoments(2)
     found.add(rows[:100])
@@ -134,7 +132,7 @@ def test_that_looking_at_the_moments_of_rows_changes_nothing():
     assert np.isnan(one.mean_and_std()[1]).all()
 
 
-def test_that_values_that_differ_by_rounding_alone_are_constant() -> None:
+def test_values_that_differ_by_rounding_are_constant() -> None:
     rounded = summarise(np.array([0.1, 0.1, np.nextafter(0.1, 1.0)]))
     assert rounded.is_constant
     assert math.isnan(rounded.skewness)

@@ -1,4 +1,4 @@
-"""Random numbers by address."""
+"""Addressed random numbers."""
 
 import itertools
 
@@ -10,7 +10,7 @@ from wearsim.uq.sampling.philox import Stream
 
 
 @pytest.mark.parametrize("cuts", [[1, 2, 3, 5, 8, 13, 21, 40], [4, 8, 40], [39]])
-def test_that_a_number_is_the_same_in_whatever_batch_it_is_drawn(cuts):
+def test_words_are_independent_of_the_batch_size(cuts):
     stream = Stream(7, "load.normal_force")
     whole = stream.words(3, 40, realisation=2, block=1)
     edges = [0, *(cut for cut in cuts if cut < 40), 40]
@@ -21,7 +21,7 @@ def test_that_a_number_is_the_same_in_whatever_batch_it_is_drawn(cuts):
     np.testing.assert_array_equal(np.concatenate(parts), whole)
 
 
-def test_that_every_part_of_the_address_counts():
+def test_every_part_of_the_address_changes_the_words():
     at = {"first": 0, "count": 8, "realisation": 0, "block": 0}
     draws = [
         Stream(1, "a").words(**at),
@@ -37,14 +37,14 @@ def test_that_every_part_of_the_address_counts():
 
 
 @pytest.mark.parametrize("word", [0, 2**64 - 1])
-def test_that_even_the_ends_lie_strictly_between_0_and_1(monkeypatch, word):
+def test_extreme_words_give_numbers_strictly_between_0_and_1(monkeypatch, word):
     monkeypatch.setattr(Stream, "words", lambda *_: np.array([word], dtype=np.uint64))
     uniform = Stream(1, "a").uniforms(0, 1)[0]
     assert 0.0 < uniform < 1.0
     assert min(uniform, 1.0 - uniform) == 2.0**-53
 
 
-def test_that_the_numbers_are_uniform_and_unlike_their_neighbours():
+def test_numbers_are_uniform_and_uncorrelated():
     stream = Stream(3, "friction.coefficient")
     grid = np.array([stream.uniforms(0, 100, realisation=k) for k in range(100)])
     assert stats.kstest(grid.ravel(), "uniform").pvalue > 1e-4

@@ -1,4 +1,4 @@
-"""Sampling plans: strata, nets and scrambles."""
+"""Sampling designs: strata, nets and scrambles."""
 
 import itertools
 
@@ -15,11 +15,11 @@ UNKNOWN = ("bearing.preload", "shaft.runout", "creepage.wobble@2")
 
 
 def strata(uniform, count):
-    """Return how many numbers lie in each of `count` equal intervals."""
+    """Return the number of points in each of `count` equal intervals."""
     return np.bincount((uniform * count).astype(int), minlength=count)
 
 
-def test_that_monte_carlo_takes_the_streams_blocks_as_components():
+def test_monte_carlo_components_are_stream_blocks():
     drawn = monte_carlo(5, "creepage.misalignment", 2, first=3, count=6)
     stream = Stream(5, "creepage.misalignment", "test")
     np.testing.assert_array_equal(drawn[:, 0], stream.uniforms(3, 6))
@@ -27,14 +27,14 @@ def test_that_monte_carlo_takes_the_streams_blocks_as_components():
 
 
 @pytest.mark.parametrize("total", [1, 2, 7, 100, 1000])
-def test_that_a_latin_hypercube_has_one_realisation_in_every_stratum(total):
+def test_latin_hypercube_has_one_realisation_per_stratum(total):
     drawn = latin_hypercube(1, total, "creepage.misalignment", 2, 0, total)
     for component in drawn.T:
         np.testing.assert_array_equal(strata(component, total), 1)
     assert ((drawn > 0.0) & (drawn < 1.0)).all()
 
 
-def test_that_latin_hypercube_components_and_inputs_are_in_orders_of_their_own():
+def test_latin_hypercube_components_are_uncorrelated():
     total = 2000
     both = latin_hypercube(1, total, "creepage.misalignment", 2, 0, total)
     other = latin_hypercube(1, total, "load.normal_force", 1, 0, total)
@@ -43,7 +43,7 @@ def test_that_latin_hypercube_components_and_inputs_are_in_orders_of_their_own()
 
 
 @pytest.mark.parametrize("word", [0, 2**64 - 1])
-def test_that_the_ends_of_a_stratum_stay_in_it(monkeypatch, word):
+def test_stratum_ends_are_not_rounded_out_of_the_stratum(monkeypatch, word):
     def words(self, first, count, realisation=0, block=0):
         return np.full(count, word, dtype=np.uint64)
 
@@ -53,28 +53,28 @@ def test_that_the_ends_of_a_stratum_stay_in_it(monkeypatch, word):
     assert (drawn < np.array([1.0, 2.0, 3.0]) / 3.0).all()
 
 
-def test_that_realisations_beyond_a_latin_hypercube_are_refused():
+def test_realisations_beyond_a_latin_hypercube_are_refused():
     with pytest.raises(ValueError, match=r"realisation 10 .* is beyond .* total is 10; .*greater"):
         latin_hypercube(1, 10, "a", 1, 8, 3)
 
 
 @pytest.mark.parametrize(
-    ("plan", "total", "told"),
+    ("plan", "total", "message"),
     [
         ("latin-hypercube", None, "needs total"),
         ("latin-hypercube", 0, "total must be 1 or more realisations, got 0"),
         ("halton", None, 'unknown sampling plan "halton", expected one of monte-carlo'),
     ],
 )
-def test_that_a_plan_that_cannot_be_is_refused(plan, total, told):
-    with pytest.raises(ValueError, match=told):
+def test_invalid_designs_are_refused(plan, total, message):
+    with pytest.raises(ValueError, match=message):
         drawing(plan, 1, total)
 
 
 @pytest.mark.parametrize("name", [*KNOWN, *UNKNOWN, "creepage.yaw@0", "creepage.tilt@3"])
 @pytest.mark.parametrize("power", [0, 3, 10])
-def test_that_scrambled_points_have_one_in_every_interval(name, power):
-    # also from a later multiple of 2^m on
+def test_scrambled_points_have_one_point_per_interval(name, power):
+    # also from a later multiple of 2^m
     for start in (0, 3 * 2**power):
         drawn = sobol.scrambled(11, name, 1, start, 2**power)[:, 0]
         np.testing.assert_array_equal(strata(drawn, 2**power), 1)
@@ -88,7 +88,7 @@ def pairs(power):
 
 
 @pytest.mark.parametrize("power", [4, 8])
-def test_that_pairs_have_one_point_in_every_elementary_box(power):
+def test_pairs_have_one_point_per_elementary_box(power):
     for drawn in pairs(power):
         for wide in range(power + 1):
             rows = (drawn[:, 0] * 2**wide).astype(int)
@@ -97,19 +97,19 @@ def test_that_pairs_have_one_point_in_every_elementary_box(power):
             np.testing.assert_array_equal(boxes, 1)
 
 
-def test_that_a_scramble_keeps_intervals_nested_and_no_more():
+def test_nested_scramble_keeps_only_the_nesting():
     words = Stream(1, "words").words(0, 64).astype(np.uint32)
     near = words[:, None] ^ (np.uint32(1) << np.arange(32, dtype=np.uint32))
     key = sobol._key(1, "a", 0, 0)
     changed = sobol.nested_scramble(words, key)[:, None] ^ sobol.nested_scramble(near, key)
-    # words that first differ in a bit do so afterwards: the bits above it are the same
+    # the highest different bit of two words is unchanged, and the bits above it are equal
     np.testing.assert_array_equal(
         np.frexp(changed.astype(float))[1], np.broadcast_to(np.arange(1, 33), changed.shape)
     )
 
 
 @pytest.mark.parametrize("name", [KNOWN[0], UNKNOWN[0]])
-def test_that_scrambled_points_spread_within_their_intervals_as_independent_numbers(name):
+def test_scrambled_points_are_uniform_within_their_intervals(name):
     # the mean of n numbers, one in each interval of 1/n, has the variance 1/(12 n^3)
     count, seeds = 64, 1000
     drawn = np.array([sobol.scrambled(seed, name, 1, 0, count)[:, 0] for seed in range(seeds)])
@@ -120,7 +120,7 @@ def test_that_scrambled_points_spread_within_their_intervals_as_independent_numb
     assert means.std() == pytest.approx(expected, rel=4.0 / np.sqrt(2.0 * seeds))
 
 
-def test_that_sobol_integrates_a_smooth_product_far_better_than_chance():
+def test_sobol_error_is_far_below_monte_carlo_error():
     count, seeds = 1024, 60
     errors = []
     for seed in range(seeds):
@@ -131,7 +131,7 @@ def test_that_sobol_integrates_a_smooth_product_far_better_than_chance():
     assert abs(np.mean(errors)) < 4.0 * np.std(errors) / np.sqrt(seeds)
 
 
-def test_that_names_without_a_dimension_are_independent_and_help_where_effects_add():
+def test_padded_inputs_are_independent_and_stratified():
     count, seeds = 256, 200
     sums, correlations = [], []
     for seed in range(seeds):
@@ -145,7 +145,7 @@ def test_that_names_without_a_dimension_are_independent_and_help_where_effects_a
     assert np.std(correlations) < 2.0 / np.sqrt(count)
 
 
-def test_that_known_inputs_of_all_rollers_have_dimensions_of_their_own():
+def test_common_inputs_of_all_rollers_have_separate_dimensions():
     names = [name for name in sobol.SLOT_OF if name not in {"creepage.yaw", "creepage.tilt"}]
     taken = [
         slot
@@ -168,20 +168,20 @@ def test_that_known_inputs_of_all_rollers_have_dimensions_of_their_own():
         ("creepage.yaw@123456", 1),
     ],
 )
-def test_that_other_names_have_no_fixed_dimension(name, dimension):
+def test_other_names_have_no_fixed_dimension(name, dimension):
     assert sobol.slots(name, dimension) is None
     drawn = sobol.scrambled(1, name, dimension, 0, 32)
     assert drawn.shape == (32, dimension)
     np.testing.assert_array_equal(strata(drawn[:, -1], 32), 1)
 
 
-def test_that_a_sobol_plan_says_where_it_ends():
+def test_sobol_realisations_beyond_the_last_are_refused():
     with pytest.raises(ValueError, match="has 4294967296 realisations"):
         sobol.scrambled(1, "a", 1, 2**32 - 1, 2)
 
 
 @pytest.mark.parametrize("name", [KNOWN[0], UNKNOWN[0]])
-def test_that_the_first_replicate_is_the_plain_scramble_and_others_are_nets_of_their_own(name):
+def test_replicates_are_different_nets(name):
     plain = sobol.scrambled(11, name, 1, 0, 256)
     np.testing.assert_array_equal(sobol.scrambled(11, name, 1, 0, 256, 0), plain)
     drawn = [sobol.scrambled(11, name, 1, 0, 256, replicate)[:, 0] for replicate in range(4)]
@@ -192,7 +192,7 @@ def test_that_the_first_replicate_is_the_plain_scramble_and_others_are_nets_of_t
 
 
 @pytest.mark.parametrize("name", [KNOWN[0], UNKNOWN[0]])
-def test_that_realisations_take_the_replicates_in_turn(name):
+def test_realisations_alternate_between_replicates(name):
     drawn = drawing("sobol", 11, None, 8)(name, 1, 0, 100)
     for replicate in range(8):
         own = drawn[replicate::8]
@@ -200,7 +200,7 @@ def test_that_realisations_take_the_replicates_in_turn(name):
         np.testing.assert_array_equal(own, known)
 
 
-def test_that_one_replicate_is_the_plan_as_it_was():
+def test_one_replicate_equals_the_plain_sequence():
     drawn = drawing("sobol", 11, None)("creepage.misalignment", 2, 5, 40)
     known = sobol.scrambled(11, "creepage.misalignment", 2, 5, 40)
     np.testing.assert_array_equal(drawn, known)
@@ -209,7 +209,7 @@ def test_that_one_replicate_is_the_plan_as_it_was():
     )
 
 
-def test_that_replicates_are_independent_of_each_other():
+def test_replicates_are_independent_of_each_other():
     # means of replicates, over many seeds
     count, seeds = 16, 400
     means = np.array(
@@ -222,6 +222,6 @@ def test_that_replicates_are_independent_of_each_other():
     assert np.abs(correlation).max() < 4.0 / np.sqrt(seeds)
 
 
-def test_that_no_replicates_are_refused():
+def test_zero_replicates_are_refused():
     with pytest.raises(ValueError, match="replicates must be 1 or more sequences, got 0"):
         drawing("sobol", 1, None, 0)

@@ -12,7 +12,7 @@ NONE = Interval(0.0, 0.0, 0.0)
 
 
 def ishigami(x):
-    """Return values by uniform numbers between -pi and pi; a = 7, b = 0.1."""
+    """Return values from uniform numbers between -pi and pi; a = 7, b = 0.1."""
     one, two, three = x.T
     return np.sin(one) + 7.0 * np.sin(two) ** 2 + 0.1 * three**4 * np.sin(one)
 
@@ -31,7 +31,7 @@ GAINS = np.array([0.0, 1.0, 4.5, 9.0])
 
 
 def sobol_g(x):
-    """Return values by uniform numbers between 0 and 1."""
+    """Return values from uniform numbers between 0 and 1."""
     return np.prod((np.abs(4.0 * x - 2.0) + GAINS) / (1.0 + GAINS), axis=1)
 
 
@@ -78,7 +78,7 @@ def by_column(x):
 
 
 @pytest.mark.parametrize("case", ["ishigami", "g", "line"])
-def test_that_first_order_indices_from_any_sample_are_the_closed_forms(case):
+def test_first_order_indices_agree_with_closed_forms(case):
     function, indices = CASES[case]
     known = indices()[0]
     x = np.random.default_rng(1).random((4000, len(known)))
@@ -89,7 +89,7 @@ def test_that_first_order_indices_from_any_sample_are_the_closed_forms(case):
 
 
 def intervals_hold(draw, repeats, seed):
-    """Return how often the interval of the one index that `draw` yields holds it."""
+    """Return the coverage of the interval of the index that `draw` returns."""
     rng, held = np.random.default_rng(seed), 0
     for _ in range(repeats):
         values, numbers, known = draw(rng)
@@ -109,45 +109,45 @@ def second_of_ishigami(rng):
 
 
 def misalignment(rng):
-    """Return a depth that a skew roller lessens, whichever way it points, by its two angles."""
+    """Return a depth that decreases with the misalignment of a roller, and the two angles."""
     angles, other = rng.standard_normal((400, 2)), rng.standard_normal(400)
     share = 4 * 0.1**2 / (4 * 0.1**2 + 0.2**2)
     return 1.0 - 0.1 * (angles**2).sum(axis=1) + 0.2 * other, angles, share
 
 
-def nothing(rng):
+def without_influence(rng):
     return rng.standard_normal(400), rng.standard_normal((400, 3)), 0.0
 
 
 @pytest.mark.parametrize("draw", [second_of_line, second_of_ishigami, misalignment])
-def test_that_intervals_hold_the_first_order_index(draw):
+def test_first_order_intervals_have_their_coverage(draw):
     assert 0.90 <= intervals_hold(draw, 200, 2) <= 0.99
 
 
-def test_that_no_effect_is_seldom_taken_for_one():
-    assert intervals_hold(nothing, 200, 3) >= 0.95
+def test_missing_effect_is_rarely_significant():
+    assert intervals_hold(without_influence, 200, 3) >= 0.95
     rng = np.random.default_rng(4)
     x = rng.standard_normal((2000, 3))
     found = first_order(np.exp(0.3 * x[:, 0]), by_column(x))
     assert [without_effect(found[name]) for name in "012"] == [False, True, True]
 
 
-def test_that_an_even_effect_is_found_though_no_line_sees_it():
+def test_symmetric_effect_without_correlation_is_detected():
     angles = np.random.default_rng(5).standard_normal((500, 1))
     values = 1.0 - 0.05 * angles[:, 0] ** 2
     assert abs(np.corrcoef(angles[:, 0], values)[0, 1]) < 0.1
     assert first_order(values, {"yaw": angles})["yaw"].value > 0.98
 
 
-def test_that_numbers_of_a_group_act_together():
+def test_interaction_within_a_group_is_detected():
     x = np.random.default_rng(6).standard_normal((1000, 2))
     found = first_order(x[:, 0] * x[:, 1], {"one": x[:, :1], "both": x})
     assert found["both"].value > 0.97
-    # a product says nothing by one of its factors; the values' spread goes with it all the same
+    # the mean of a product does not depend on one factor, only its variance does
     assert found["one"].low == 0.0
 
 
-def test_that_a_group_per_roller_is_found_by_few_realisations():
+def test_group_of_six_numbers_needs_few_realisations():
     x = np.random.default_rng(7).standard_normal((600, 6))
     other = np.random.default_rng(8).standard_normal(600)
     values = (x**2).sum(axis=1) + math.sqrt(12.0) * other
@@ -156,17 +156,20 @@ def test_that_a_group_per_roller_is_found_by_few_realisations():
     assert found.half_width < 0.1
 
 
-def test_that_what_does_not_vary_has_no_effect():
+def test_constant_numbers_have_no_effect():
     x = np.random.default_rng(9).random((100, 1))
-    still = np.full((100, 2), 0.3)
-    assert first_order(x[:, 0], {"still": still})["still"] == NONE
-    assert first_order(np.full(100, 0.1), {"x": x, "still": still}) == {"x": NONE, "still": NONE}
-    # a column that does not vary adds nothing to one that does, and nor does one twice
+    constant = np.full((100, 2), 0.3)
+    assert first_order(x[:, 0], {"constant": constant})["constant"] == NONE
+    assert first_order(np.full(100, 0.1), {"x": x, "constant": constant}) == {
+        "x": NONE,
+        "constant": NONE,
+    }
+    # a constant or repeated column does not change the index
     alone = first_order(x[:, 0], {"x": x})["x"]
-    assert first_order(x[:, 0], {"x": np.hstack([still, x, x])})["x"] == alone
+    assert first_order(x[:, 0], {"x": np.hstack([constant, x, x])})["x"] == alone
 
 
-def test_that_numbers_of_few_values_are_no_trouble():
+def test_discrete_numbers_have_the_correct_index():
     rng = np.random.default_rng(10)
     kind = rng.integers(0, 2, (2000, 1)).astype(float)
     values = kind[:, 0] + 0.5 * rng.standard_normal(2000)
@@ -175,12 +178,12 @@ def test_that_numbers_of_few_values_are_no_trouble():
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 23])
-def test_that_too_few_realisations_are_unknown(count):
+def test_too_few_realisations_are_unknown(count):
     x = np.random.default_rng(11).random((count, 1))
     assert first_order(x[:, 0], {"x": x})["x"] == UNKNOWN
 
 
-def test_that_failed_realisations_are_refused():
+def test_non_finite_realisations_are_refused():
     x = np.random.default_rng(12).random((50, 1))
     wrong = np.where(x > 0.5, np.nan, x)
     with pytest.raises(ValueError, match="leave out failed realisations"):
@@ -200,7 +203,7 @@ def saltelli_blocks(function, groups, bases, rng):
 
 
 @pytest.mark.parametrize("case", list(CASES))
-def test_that_a_saltelli_design_gives_the_closed_forms_within_its_intervals(case):
+def test_saltelli_indices_agree_with_closed_forms(case):
     function, indices = CASES[case]
     known = np.stack(indices(), axis=1)
     names = [str(k) for k in range(len(known))]
@@ -210,26 +213,26 @@ def test_that_a_saltelli_design_gives_the_closed_forms_within_its_intervals(case
         found = saltelli_indices(blocks, names)
         for k, name in enumerate(names):
             held[k] += [
-                part.low - 1e-12 <= true <= part.high + 1e-12
-                for part, true in zip(found[name], known[k], strict=True)
+                part.low - 1e-12 <= exact <= part.high + 1e-12
+                for part, exact in zip(found[name], known[k], strict=True)
             ]
     assert (held >= 0.89 * 200).all(), held
-    many = saltelli_blocks(function, len(known), 20_000, rng)
+    large = saltelli_blocks(function, len(known), 20_000, rng)
     for name, (first, total) in zip(names, known, strict=True):
-        found = saltelli_indices(many, names)[name]
+        found = saltelli_indices(large, names)[name]
         assert [part.value for part in found] == pytest.approx([first, total], abs=0.03)
 
 
-def test_that_a_group_that_changes_no_value_has_indices_of_zero():
+def test_group_without_effect_has_zero_indices():
     blocks = saltelli_blocks(line, 4, 50, np.random.default_rng(14))
     assert saltelli_indices(blocks, "abcd")["d"] == (NONE, NONE)
     assert saltelli_indices(np.full((50, 3), 0.1), ["a"]) == {"a": (NONE, NONE)}
 
 
-def test_that_rows_with_a_failed_value_are_left_out_whole():
+def test_rows_with_a_failed_value_are_left_out():
     blocks = saltelli_blocks(line, 4, 50, np.random.default_rng(15))
-    torn = blocks.copy()
-    torn[7, 3] = torn[20, 0] = np.nan
+    failed = blocks.copy()
+    failed[7, 3] = failed[20, 0] = np.nan
     whole = np.delete(blocks, [7, 20], axis=0)
-    assert saltelli_indices(torn, "abcd") == saltelli_indices(whole, "abcd")
+    assert saltelli_indices(failed, "abcd") == saltelli_indices(whole, "abcd")
     assert saltelli_indices(blocks[:9], "abcd") == dict.fromkeys("abcd", (UNKNOWN, UNKNOWN))

@@ -1,4 +1,4 @@
-"""Targets: how they are read and when they are reached."""
+"""Targets of the stopping rule: parsing, and when they are reached."""
 
 import math
 
@@ -18,13 +18,13 @@ from wearsim.uq.estimation.stopping_rule import Target
         ("width.q97.5 .5%", Target("width", 0.975, 0.005)),
     ],
 )
-def test_that_a_target_is_read_and_told(text, target):
+def test_target_is_parsed_and_written(text, target):
     assert Target.parse(text) == target
     assert Target.parse(str(target)) == target
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "message"),
     [
         ("", "cannot read the target"),
         ("depth 1%", "expected observable.statistic and a half-width"),
@@ -36,12 +36,12 @@ def test_that_a_target_is_read_and_told(text, target):
         ("depth.q100 1%", "above q0 and below q100"),
     ],
 )
-def test_that_what_is_no_target_is_refused(text, told):
-    with pytest.raises(ValueError, match=told):
+def test_invalid_targets_are_refused(text, message):
+    with pytest.raises(ValueError, match=message):
         Target.parse(text)
 
 
-def test_that_a_target_is_reached_where_its_half_width_is_small_enough():
+def test_target_is_reached_at_its_half_width():
     values = 1.0 + 0.1 * np.random.default_rng(1).standard_normal(400)
     found = estimate(values, (0.9,))
     for statistic, interval in (
@@ -56,17 +56,17 @@ def test_that_a_target_is_reached_where_its_half_width_is_small_enough():
         assert not Target("depth", statistic, achieved * 0.999).reached(found)
 
 
-def test_that_the_quantile_of_a_target_is_the_one_its_estimate_needs():
+def test_target_lists_the_quantiles_it_needs():
     assert Target("depth", 0.9, 0.1).probabilities == (0.9,)
     assert Target("depth", "std", 0.1).probabilities == ()
 
 
 @pytest.mark.parametrize("values", [np.array([]), np.array([1.0]), np.array([-1.0, 1.0])])
-def test_that_what_is_unknown_or_about_zero_is_far_off(values):
+def test_unknown_or_zero_estimate_is_infinitely_far(values):
     assert Target("depth", "mean", 0.5).achieved(estimate(values)) == math.inf
 
 
-def test_that_values_all_the_same_reach_any_target_though_not_a_few_of_them():
+def test_constant_values_reach_any_target_from_32_on():
     target = Target("depth", "mean", 1e-9)
     assert target.reached(estimate(np.zeros(32)))
     assert not target.reached(estimate(np.zeros(31)))
