@@ -1,4 +1,4 @@
-"""The cache of compiled kernels: shared by processes, and wherever it can be kept."""
+"""Disk cache of compiled kernels: shared by processes, at a writable location."""
 
 from __future__ import annotations
 
@@ -69,11 +69,11 @@ wearsim.study_contact(
     with_fields=True,
 )
 run(creepage={{"drive": "free", "bearing_torque": "10 N mm"}})
-law = {{"distribution": "uniform", "low": 0.09, "high": 0.11}}
-wander = {{"distribution": "ornstein-uhlenbeck", "correlation_time": "10 s", "marginal": law}}
-run(friction__coefficient=wander, creepage__misalignment={{
+marginal = {{"distribution": "uniform", "low": 0.09, "high": 0.11}}
+process = {{"distribution": "ornstein-uhlenbeck", "correlation_time": "10 s", "marginal": marginal}}
+run(friction__coefficient=process, creepage__misalignment={{
     "distribution": "disc", "radius": "1 mrad", "persistence": "per-pass"}})
-field = {{"distribution": "gaussian-field", "correlation_length": "300 um", "marginal": law}}
+field = {{"distribution": "gaussian-field", "correlation_length": "300 um", "marginal": marginal}}
 wearsim.dissipation(scenario("mean-contact.toml", friction__coefficient=field), 2)
 march = spin | {{"contact__closed_form": "never"}}
 for more in ({{}}, march, march | {{"contact__dissipation": "element-sum"}}):
@@ -87,7 +87,7 @@ for module in pkgutil.walk_packages(wearsim.mechanics.__path__, prefix):
     held = importlib.import_module(module.name)
     for name, value in vars(held).items():
         if isinstance(value, Whole) and value.__module__ == held.__name__:
-            # as Python calls it and as other kernels do
+            # for calls from Python and from other kernels
             called = {{str(types) for form in (value, value.part) for types in form.signatures}}
             counts[f"{{module.name.removeprefix(prefix)}}.{{name}}"] = sorted(called)
 print(json.dumps(counts))
@@ -106,9 +106,9 @@ def start(code: str, environment: dict[str, str]) -> subprocess.Popen[str]:
 
 
 def finish(process: subprocess.Popen[str]) -> Any:
-    told, complaints = process.communicate()
-    assert process.returncode == 0, complaints
-    return json.loads(told)
+    output, errors = process.communicate()
+    assert process.returncode == 0, errors
+    return json.loads(output)
 
 
 def run(code: str, **environment: object) -> Any:
@@ -116,33 +116,33 @@ def run(code: str, **environment: object) -> Any:
 
 
 @pytest.fixture
-def copied(tmp_path: Path) -> Path:
-    """The package by itself, without anything compiled, as another install would have it."""
+def site(tmp_path: Path) -> Path:
+    """Return the folder of a copy of the package without compiled kernels."""
     ignore = shutil.ignore_patterns("__pycache__")
     shutil.copytree(ROOT / "wearsim", tmp_path / "site" / "wearsim", ignore=ignore)
     return tmp_path / "site"
 
 
 def make_read_only(site: Path) -> None:
-    """Deny numba its folder beside the kernels, to root as well: a file stands in its place."""
+    """Replace numba's cache folders next to the kernels by files, which also blocks root."""
     for package in (site / "wearsim" / "mechanics").rglob("__init__.py"):
         (package.parent / "__pycache__").write_text("not a folder")
 
 
 @pytest.mark.slow
-def test_that_processes_starting_together_share_an_empty_cache(copied: Path, tmp_path: Path):
-    environment = {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(copied)}
-    together = [start(CONTACT, environment) for _ in range(4)]
-    solved = [finish(process) for process in together]
+def test_concurrent_processes_share_an_empty_cache(site: Path, tmp_path: Path):
+    environment = {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(site)}
+    processes = [start(CONTACT, environment) for _ in range(4)]
+    results = [finish(process) for process in processes]
     later = run(CONTACT, **environment)
-    assert {item["bits"] for item in solved} == {later["bits"]}
+    assert {item["bits"] for item in results} == {later["bits"]}
     assert later["hits"] == 1
     assert later["misses"] == 0
     assert Path(later["path"]).is_relative_to(tmp_path / "cache")
 
 
 @pytest.mark.slow
-def test_that_every_kernel_is_compiled_for_one_signature_only(tmp_path: Path):
+def test_every_kernel_has_one_signature(tmp_path: Path):
     counts = run(EVERYTHING, NUMBA_CACHE_DIR=tmp_path)
     assert "slender.newton.solve_slender" in counts
     unused = [name for name, signatures in counts.items() if not signatures]
@@ -151,36 +151,36 @@ def test_that_every_kernel_is_compiled_for_one_signature_only(tmp_path: Path):
     assert not several, json.dumps(several, indent=1)
 
 
-def test_that_a_writable_install_keeps_its_cache_beside_the_kernels(copied: Path):
-    first, second = (run(STRIP, PYTHONPATH=copied) for _ in range(2))
-    assert Path(first["file"]).is_relative_to(copied)
-    assert Path(first["path"]) == copied / "wearsim" / "mechanics" / "tangential" / "__pycache__"
+def test_writable_install_has_its_cache_next_to_the_kernels(site: Path):
+    first, second = (run(STRIP, PYTHONPATH=site) for _ in range(2))
+    assert Path(first["file"]).is_relative_to(site)
+    assert Path(first["path"]) == site / "wearsim" / "mechanics" / "tangential" / "__pycache__"
     assert (first["hits"], second["hits"]) == (0, 1)
 
 
-def test_that_a_read_only_install_caches_in_the_users_folder(copied: Path, tmp_path: Path):
-    make_read_only(copied)
-    environment = {"PYTHONPATH": copied, "XDG_CACHE_HOME": tmp_path / "cache"}
+def test_read_only_install_has_its_cache_in_the_user_folder(site: Path, tmp_path: Path):
+    make_read_only(site)
+    environment = {"PYTHONPATH": site, "XDG_CACHE_HOME": tmp_path / "cache"}
     first, second = (run(STRIP, **environment) for _ in range(2))
-    assert Path(first["file"]).is_relative_to(copied)
+    assert Path(first["file"]).is_relative_to(site)
     assert Path(first["path"]).is_relative_to(tmp_path / "cache")
     assert (first["hits"], second["hits"]) == (0, 1)
 
 
 @pytest.mark.slow
-def test_that_a_read_only_install_runs_where_nothing_can_be_cached(copied: Path, tmp_path: Path):
-    make_read_only(copied)
+def test_read_only_install_runs_without_any_cache(site: Path, tmp_path: Path):
+    make_read_only(site)
     (tmp_path / "nowhere").write_text("not a folder")
     nowhere = tmp_path / "nowhere" / "home"
-    environment = {"PYTHONPATH": copied, "XDG_CACHE_HOME": nowhere, "HOME": nowhere}
-    solved = run(CONTACT, **environment)
-    assert Path(solved["file"]).is_relative_to(copied)
-    assert solved["path"] is None
-    assert solved["bits"] == run(CONTACT)["bits"]
+    environment = {"PYTHONPATH": site, "XDG_CACHE_HOME": nowhere, "HOME": nowhere}
+    results = run(CONTACT, **environment)
+    assert Path(results["file"]).is_relative_to(site)
+    assert results["path"] is None
+    assert results["bits"] == run(CONTACT)["bits"]
 
 
-def test_cache_is_renewed_when_a_callee_elsewhere_changes(copied: Path, tmp_path: Path):
-    mechanics = copied / "wearsim" / "mechanics"
+def test_cache_is_renewed_when_a_callee_elsewhere_changes(site: Path, tmp_path: Path):
+    mechanics = site / "wearsim" / "mechanics"
     callers, callees = mechanics / "slender", mechanics / "hertz"
     head = "from wearsim.mechanics.numerics.jit import kernel\n"
     body = "\n\n@kernel\ndef {name}(x: float) -> float:\n    return {value}\n"
@@ -192,5 +192,5 @@ def test_cache_is_renewed_when_a_callee_elsewhere_changes(copied: Path, tmp_path
     for value in ("x + 1.0", "x + 3.0"):
         (callees / "inner.py").write_text(head + body.format(name="inner", value=value))
         code = "from wearsim.mechanics.slender.outer import outer; print(outer(1.0))"
-        found.append(run(code, PYTHONPATH=copied, NUMBA_CACHE_DIR=tmp_path / "cache"))
+        found.append(run(code, PYTHONPATH=site, NUMBA_CACHE_DIR=tmp_path / "cache"))
     assert found == [4.0, 8.0]

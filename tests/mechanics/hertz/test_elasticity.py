@@ -12,7 +12,7 @@ materials = st.builds(
 )
 
 
-def test_that_two_steels_have_the_constants_of_steel():
+def test_two_steels_have_the_constants_of_steel():
     pair = combine(Material(200e9, 0.3), Material(200e9, 0.3))
     assert pair.shear_modulus == pytest.approx(200e9 / 2.6, rel=1e-14)
     assert pair.poisson_ratio == pytest.approx(0.3, rel=1e-14)
@@ -22,7 +22,7 @@ def test_that_two_steels_have_the_constants_of_steel():
 
 @settings(deadline=None)
 @given(materials, materials)
-def test_that_the_contact_modulus_is_that_of_both_bodies_in_series(first, second):
+def test_contact_modulus_is_that_of_both_bodies_in_series(first, second):
     series = sum((1.0 - m.poisson_ratio**2) / m.youngs_modulus for m in (first, second))
     pair = combine(first, second)
     assert pair.contact_modulus == pytest.approx(1.0 / series, rel=1e-12)
@@ -31,14 +31,14 @@ def test_that_the_contact_modulus_is_that_of_both_bodies_in_series(first, second
 
 @settings(deadline=None)
 @given(materials, materials)
-def test_that_swapping_the_bodies_only_turns_the_sign_of_the_coupling(first, second):
+def test_swapped_bodies_change_only_the_sign_of_the_coupling(first, second):
     one, other = combine(first, second), combine(second, first)
     assert one.shear_modulus == pytest.approx(other.shear_modulus, rel=1e-14)
     assert one.dundurs == pytest.approx(-other.dundurs, rel=1e-9, abs=1e-15)
     assert abs(one.dundurs) <= 0.5
 
 
-def test_that_a_soft_body_on_a_rigid_one_couples_by_dundurs_constant():
+def test_soft_body_on_a_rigid_one_has_dundurs_constant():
     # beta = (1 - 2 nu)/(2 (1 - nu)) against a rigid body, in size
     pair = combine(Material(1e6, 0.3), Material(1e15, 0.3))
     assert abs(pair.dundurs) == pytest.approx(0.4 / 1.4, rel=1e-6)

@@ -29,7 +29,7 @@ MODULUS = 200e9 / (2.0 * (1.0 - 0.3**2))
         ((40e-3, 1000e-3, 50e-3), 0.3435e-3, 3.8929e-3, 428.51e6, None),
     ],
 )
-def test_that_the_rig_has_the_patch_that_was_checked_by_hand(radii, two_a, two_b, peak, approach):
+def test_patch_of_the_rig_meets_the_hand_calculation(radii, two_a, two_b, peak, approach):
     roller, crown, cylinder = radii
     patch = hertz(0.5 / roller + 0.5 / cylinder, 0.5 / crown, 300.0, MODULUS)
     assert 2.0 * patch.a == pytest.approx(two_a, rel=2e-4)
@@ -41,7 +41,7 @@ def test_that_the_rig_has_the_patch_that_was_checked_by_hand(radii, two_a, two_b
 
 @pytest.mark.bench
 @pytest.mark.parametrize("case", rows("hertz"))
-def test_that_every_reference_case_is_met(case):
+def test_reference_cases_are_met(case):
     patch = hertz(case["A_per_m"], case["B_per_m"], case["N_N"], MODULUS)
     assert patch.a == pytest.approx(case["a_m"], rel=1e-12)
     assert patch.b == pytest.approx(case["b_m"], rel=1e-12)
@@ -52,7 +52,7 @@ def test_that_every_reference_case_is_met(case):
 
 @settings(deadline=None)  # the first call compiles
 @given(st.floats(-9.0, 0.0))
-def test_that_the_elliptic_integrals_are_those_of_scipy(exponent):
+def test_elliptic_integrals_equal_those_of_scipy(exponent):
     complement = 10.0**exponent
     first, d_integral = elliptic_integrals(complement)
     assert first == pytest.approx(float(ellipkm1(complement**2)), rel=4e-15)
@@ -62,14 +62,14 @@ def test_that_the_elliptic_integrals_are_those_of_scipy(exponent):
         assert d_integral == pytest.approx(expected, rel=1e-12)
 
 
-def test_that_the_elliptic_integrals_reach_the_circle():
+def test_elliptic_integrals_of_the_circle():
     first, d_integral = elliptic_integrals(1.0)
     assert first == pytest.approx(0.5 * math.pi, rel=1e-15)
     assert d_integral == pytest.approx(0.25 * math.pi, rel=1e-14)
 
 
 @pytest.mark.parametrize("exponent", range(-16, -2))
-def test_that_the_elliptic_integrals_are_smooth_beside_the_circle(exponent):
+def test_elliptic_integrals_are_smooth_near_the_circle(exponent):
     complement = 1.0 - 10.0**exponent
     square = (1.0 - complement) * (1.0 + complement)
     first, d_integral = elliptic_integrals(complement)
@@ -82,7 +82,7 @@ def test_that_the_elliptic_integrals_are_smooth_beside_the_circle(exponent):
 
 @settings(deadline=None)  # the first call compiles
 @given(st.floats(-4.0, 4.0))
-def test_that_the_aspect_ratio_solves_its_equation_over_eight_decades(exponent):
+def test_axis_ratio_solves_its_equation_over_eight_decades(exponent):
     # from a chosen b/a to A/B by scipy's integrals, and back
     aspect = 10.0 ** (-abs(exponent))
     first = float(ellipkm1(aspect**2))
@@ -97,7 +97,7 @@ def test_that_the_aspect_ratio_solves_its_equation_over_eight_decades(exponent):
 
 @settings(deadline=None)  # the first call compiles
 @given(st.floats(-4.0, 4.0), st.floats(1.0, 1e4))
-def test_that_swapping_the_curvatures_swaps_the_axes(exponent, load):
+def test_swapped_curvatures_swap_the_axes(exponent, load):
     ratio = 10.0**exponent
     one = hertz(20.0, 20.0 * ratio, load, MODULUS)
     other = hertz(20.0 * ratio, 20.0, load, MODULUS)
@@ -106,7 +106,7 @@ def test_that_swapping_the_curvatures_swaps_the_axes(exponent, load):
     assert one.approach == other.approach
 
 
-def test_that_equal_curvatures_make_a_circle():
+def test_equal_curvatures_have_a_circular_patch():
     patch = hertz(5.0, 5.0, 300.0, MODULUS)
     radius = (0.75 * 300.0 * 0.1 / MODULUS) ** (1.0 / 3.0)  # R = 1/(2 A)
     assert patch.a == pytest.approx(radius, rel=1e-13)
@@ -118,7 +118,7 @@ def test_that_equal_curvatures_make_a_circle():
 
 @settings(deadline=None)  # the first call compiles
 @given(st.floats(-4.0, 4.0), st.floats(1.0, 1e4))
-def test_that_the_pressure_adds_up_to_the_load(exponent, load):
+def test_pressure_integrates_to_the_load(exponent, load):
     patch = hertz(20.0, 20.0 * 10.0**exponent, load, MODULUS)
     volume = 2.0 / 3.0 * math.pi * patch.a * patch.b * patch.peak_pressure
     assert volume == pytest.approx(load, rel=1e-13)
@@ -129,7 +129,7 @@ def test_that_the_pressure_adds_up_to_the_load(exponent, load):
     assert patch.line_load(y) == pytest.approx(section, rel=1e-12)
 
 
-def test_that_the_load_below_a_line_is_the_line_load_integrated():
+def test_load_below_is_the_integral_of_the_line_load():
     patch = hertz(45.0, 1.0, 300.0, MODULUS)
     edges = np.linspace(-1.2 * patch.b, 1.2 * patch.b, 4001)
     middle = 0.5 * (edges[1:] + edges[:-1])
@@ -139,7 +139,7 @@ def test_that_the_load_below_a_line_is_the_line_load_integrated():
     assert patch.load_below(np.zeros(1))[0] == pytest.approx(150.0, rel=1e-14)
 
 
-def test_that_a_given_ellipse_of_hertz_has_the_approach_of_hertz():
+def test_given_hertz_ellipse_has_the_approach_of_hertz():
     patch = hertz(45.0, 1.0, 300.0, MODULUS)
     assert given_ellipse(patch.a, patch.b, 300.0, MODULUS).approach == pytest.approx(
         patch.approach, rel=1e-13
@@ -149,7 +149,7 @@ def test_that_a_given_ellipse_of_hertz_has_the_approach_of_hertz():
 @pytest.mark.parametrize(
     "bad", [(0.0, 1.0, 1.0, 1.0), (1.0, -1.0, 1.0, 1.0), (1.0, 1.0, math.nan, 1.0)]
 )
-def test_that_impossible_input_is_refused(bad):
+def test_invalid_input_is_refused(bad):
     with pytest.raises(ValueError, match="must be positive and finite"):
         hertz(*bad)
 
@@ -161,7 +161,7 @@ def fit(gap, strips=161, half=8e-3):
 
 @settings(deadline=None)  # the first call compiles
 @given(st.floats(-2e-3, 2e-3), st.floats(0.5, 5.0), st.floats(-1e-3, 1e-3))
-def test_that_a_parabola_is_fitted_exactly_wherever_it_lies(centre, curvature, height):
+def test_parabola_is_fitted_exactly_at_any_position(centre, curvature, height):
     found = fit(lambda y: height + curvature * (y - centre) ** 2)
     assert found[-1] == CONVERGED
     expected = hertz(45.0, curvature, 300.0, MODULUS)
@@ -172,7 +172,7 @@ def test_that_a_parabola_is_fitted_exactly_wherever_it_lies(centre, curvature, h
 
 @pytest.mark.parametrize("depth", [1e-6, 5e-6, 17e-6, 48e-6])
 @pytest.mark.parametrize("offset", [0.0, 0.4e-3])
-def test_that_a_worn_profile_gets_the_patch_that_its_own_fit_makes(depth, offset):
+def test_patch_of_worn_profile_is_consistent_with_its_fit(depth, offset):
     def gap(y):
         return y**2 + 0.95 * np.maximum(depth - (y - offset) ** 2, 0.0)
 
@@ -187,7 +187,7 @@ def test_that_a_worn_profile_gets_the_patch_that_its_own_fit_makes(depth, offset
     assert abs(expected[1] / (2.0 * expected[0])) < 1e-8 * b
 
 
-def test_that_a_profile_without_curvature_is_told_apart():
+def test_unsuitable_profiles_have_a_status():
     assert fit(lambda y: -(y**2))[-1] == NO_CURVATURE
     assert fit(lambda y: 1e-3 * y**2)[-1] == LEAVES_STRIPS
     assert fit(lambda y: 1e6 * y**2, strips=9)[-1] == TOO_FEW_STRIPS

@@ -1,4 +1,4 @@
-"""The smoothing of lattice noise: against the plain sum, and its variance and correlation."""
+"""Smoothing of lattice noise against the plain sum, its correlation, and the recursion in time."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ SPACING = LENGTH / 2.0
 
 
 def weights(x, y, rows, columns):
-    """Return what every node weighs at one point, normalised: the plain formula."""
+    """Return the normalised weights of all nodes at one point by the plain formula."""
     node_y, node_x = SPACING * rows[:, None], SPACING * columns
     weight = np.exp(-2.0 * ((x - node_x) ** 2 + (y - node_y) ** 2) / LENGTH**2)
     for nodes, place, axis in ((rows, y, 0), (columns, x, 1)):
@@ -26,7 +26,7 @@ def lattice():
     return np.arange(-12, 16), np.arange(-14, 13)
 
 
-def test_that_it_is_the_normalised_sum_over_the_cells_in_reach(lattice):
+def test_field_is_the_normalised_sum_over_cells_in_reach(lattice):
     rows, columns = lattice
     random = np.random.default_rng(1)
     noise = random.normal(size=(len(rows), len(columns)))
@@ -41,7 +41,7 @@ def test_that_it_is_the_normalised_sum_over_the_cells_in_reach(lattice):
 
 
 def responses(x, y, lattice):
-    """Return what a unit of noise in each cell makes of the field, shape (points, cells)."""
+    """Return the field for a unit of noise in each cell, shape (points, cells)."""
     rows, columns = lattice
     made = []
     for cell in range(len(rows) * len(columns)):
@@ -53,7 +53,7 @@ def responses(x, y, lattice):
 
 
 @pytest.mark.parametrize("direction", [(1.0, 0.0), (0.0, 1.0), (0.6, 0.8)])
-def test_that_variance_is_one_and_correlation_falls_as_the_bell_curve(lattice, direction):
+def test_field_has_unit_variance_and_gaussian_correlation(lattice, direction):
     distance = LENGTH * np.array([0.0, 0.25, 0.5, 1.0, 1.5, 2.0])
     for start in (0.0, 0.17, 0.5):
         # strip i holds point i, so that the diagonal walks along the direction
@@ -66,7 +66,7 @@ def test_that_variance_is_one_and_correlation_falls_as_the_bell_curve(lattice, d
         )
 
 
-def test_that_a_point_of_the_field_has_one_value_in_any_grid(lattice):
+def test_field_value_does_not_depend_on_the_grid(lattice):
     rows, columns = lattice
     noise = np.random.default_rng(2).normal(size=(len(rows), len(columns)))
     y = SPACING * np.linspace(-5.0, 5.0, 7)
@@ -76,12 +76,12 @@ def test_that_a_point_of_the_field_has_one_value_in_any_grid(lattice):
         np.ascontiguousarray(x[::3, 2:5]), y[2:5].copy(), noise, rows[0], columns[0], SPACING
     )
     np.testing.assert_array_equal(fewer, whole[::3, 2:5])
-    # nor does it matter where the rectangle of noise begins
+    # the position of the rectangle of noise does not matter either
     cut = smooth(x, y, np.ascontiguousarray(noise[2:, 1:]), rows[2], columns[1], SPACING)
     np.testing.assert_array_equal(cut, whole)
 
 
-def test_that_it_answers_a_unit_of_noise_with_a_geometric_fall():
+def test_impulse_response_of_the_process_is_geometric():
     memory = 0.8
     noise = np.eye(6)
     answers = np.array([filter_noise(row.copy(), memory) for row in noise])
@@ -90,11 +90,11 @@ def test_that_it_answers_a_unit_of_noise_with_a_geometric_fall():
     for k in range(1, 6):
         expected = np.where(steps < k, 0.0, 0.6 * memory ** (steps - k))
         np.testing.assert_allclose(answers[k], expected, rtol=1e-14)
-    # what independent noise of unit variance makes of it
+    # variance for independent noise of unit variance
     np.testing.assert_allclose(np.sum(answers**2, axis=0), 1.0, rtol=1e-14)
 
 
-def test_that_a_longer_path_begins_with_the_shorter_one():
+def test_longer_path_begins_with_the_shorter_one():
     noise = np.random.default_rng(1).normal(size=500)
     np.testing.assert_array_equal(
         filter_noise(noise[:123].copy(), 0.97), filter_noise(noise, 0.97)[:123]

@@ -1,4 +1,4 @@
-"""How kernels are compiled: once, within what Python calls."""
+"""Compilation of kernels: optimised once, within the kernel that Python calls."""
 
 from __future__ import annotations
 
@@ -36,23 +36,23 @@ def _misnamed(x: float) -> float:
     return x.no_such_attribute
 
 
-def test_that_kernels_that_kernels_call_get_no_machine_code():
+def test_called_kernels_have_no_machine_code():
     _sum(2.0, 5)
-    _sum.recompile()  # whatever the cache knew
+    _sum.recompile()  # ignores the cache
     assert len(_sum.signatures) == 1
     for called in (_shifted, _root):
         assert not called.signatures
         assert len(called.part.signatures) == 1
 
 
-def test_that_a_kernel_gives_the_same_bits_to_python_and_to_kernels():
-    apart = 0.0
+def test_kernel_is_bitwise_equal_from_python_and_from_kernels():
+    separate = 0.0
     for i in range(100):
-        apart += kernel(_root.py_func)(0.7 + i) + 0.1
-    assert _sum(0.7, 100) == apart
+        separate += kernel(_root.py_func)(0.7 + i) + 0.1
+    assert _sum(0.7, 100) == separate
 
 
-def test_that_other_compiled_functions_call_kernels():
+def test_other_compiled_functions_call_kernels():
     @numba.njit
     def twice(x: float) -> float:
         return 2.0 * _shifted(x)
@@ -60,14 +60,14 @@ def test_that_other_compiled_functions_call_kernels():
     assert twice(9.0) == 2.0 * (1.0 + 0.1)
 
 
-def test_that_a_numba_that_is_built_otherwise_compiles_kernels_all_the_same(monkeypatch):
+def test_kernels_compile_without_the_dispatcher_module(monkeypatch):
     monkeypatch.setitem(sys.modules, "wearsim.mechanics.numerics.kernel_dispatcher", None)
     plain = kernel(_root.py_func)
     assert not hasattr(plain, "part")
     assert plain(9.0) == _root(9.0)
 
 
-def test_that_a_numba_whose_compiler_has_changed_compiles_kernels_in_its_own_way(monkeypatch):
+def test_kernels_compile_with_a_changed_numba_compiler(monkeypatch):
     def changed(self):
         raise AttributeError("no such pass")
 
@@ -87,7 +87,7 @@ def test_that_a_numba_whose_compiler_has_changed_compiles_kernels_in_its_own_way
 
 
 @pytest.mark.parametrize("collecting", [True, False])
-def test_that_garbage_is_collected_after_compiling_as_before(collecting: bool):
+def test_garbage_collector_is_restored_after_compilation(collecting: bool):
     before = gc.isenabled()
     (gc.enable if collecting else gc.disable)()
     try:

@@ -16,7 +16,7 @@ def solved(system, size, right):
 
 
 @pytest.mark.parametrize("size", [1, 2, 3, 4, 5, 7, 8, 16, 61])
-def test_that_systems_of_every_size_are_solved_like_lapack_does(size):
+def test_systems_of_any_size_are_solved_as_by_lapack(size):
     random = np.random.default_rng(size)
     matrix, right = random.normal(size=(size, size)), random.normal(size=size)
     solution = solved(matrix.T.copy(), size, right)
@@ -24,7 +24,7 @@ def test_that_systems_of_every_size_are_solved_like_lapack_does(size):
 
 
 @pytest.mark.parametrize("size", [1, 4, 5, 18])
-def test_that_systems_are_inverted_like_lapack_does(size):
+def test_systems_are_inverted_as_by_lapack(size):
     matrix = np.random.default_rng(size).normal(size=(size, size))
     system, order = matrix.T.copy(), np.zeros(size, dtype=np.int64)
     inverse = np.empty((size, size))
@@ -33,17 +33,17 @@ def test_that_systems_are_inverted_like_lapack_does(size):
     np.testing.assert_allclose(inverse.T @ matrix, np.eye(size), atol=1e-12)
 
 
-def test_that_a_zero_on_the_diagonal_is_pivoted_away():
+def test_zero_diagonal_is_pivoted():
     system = np.array([[0.0, 1.0], [1.0, 0.0]])
     np.testing.assert_array_equal(solved(system, 2, [2.0, 3.0]), [3.0, 2.0])
 
 
 @pytest.mark.parametrize("bad", [0.0, np.nan])
-def test_that_a_singular_or_undefined_system_is_told(bad):
+def test_singular_or_undefined_system_is_detected(bad):
     assert solved(np.full((5, 5), bad), 5, np.ones(5)) is None
 
 
-def test_that_only_the_leading_block_is_touched():
+def test_only_the_leading_block_is_changed():
     system = np.arange(25.0).reshape(5, 5) + np.diag(np.full(5, 50.0))
     before = system.copy()
     solution = solved(system, 3, np.ones(5))

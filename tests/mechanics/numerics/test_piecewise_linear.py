@@ -10,12 +10,12 @@ from wearsim.mechanics.numerics.piecewise_linear import PiecewiseLinear
 
 @settings(max_examples=50, deadline=None)
 @given(st.integers(0, 10**6), st.floats(0.0, 5.0), st.floats(0.0, 5.0))
-def test_that_mean_and_deviation_are_the_integrals(seed, one, other):
+def test_mean_and_deviation_are_exact_integrals(seed, one, other):
     random = np.random.default_rng(seed)
     path = PiecewiseLinear(np.arange(6.0), random.uniform(-2.0, 3.0, 6))
     start, stop = min(one, other), max(one, other) + 1e-3
     stop = min(stop, 5.0)
-    # corners as nodes, so that the trapezoidal rule and Simpson's are exact in every piece
+    # the samples are nodes, so that the trapezoidal rule and Simpson's rule are exact
     inner = np.arange(6.0)
     nodes = np.unique([start, stop, *inner[(inner > start) & (inner < stop)]])
     if len(nodes) < 2 or stop - start < 1e-6:
@@ -29,7 +29,7 @@ def test_that_mean_and_deviation_are_the_integrals(seed, one, other):
     assert path.deviation(start, stop) == pytest.approx(np.sqrt(spread), abs=1e-5)
 
 
-def test_that_a_moment_has_its_value_and_no_deviation():
+def test_empty_interval_has_its_value_and_no_deviation():
     path = PiecewiseLinear(np.array([0.0, 2.0]), np.array([1.0, 5.0]))
     assert path.mean(0.5, 0.5) == 2.0
     assert path.deviation(0.5, 0.5) == 0.0

@@ -1,4 +1,4 @@
-"""Semi-Hertzian contact: Hertz recovered, the printed conditions, and hard profiles."""
+"""Semi-Hertzian contact: limit of Hertz, published conditions, and difficult profiles."""
 
 import numpy as np
 import pytest
@@ -88,7 +88,7 @@ def patch_of_shape(ratio):
 
 @pytest.mark.parametrize("ratio", [0.3, 0.9, 1.0, 1.1, 3.0, 11.3, 30.0])
 @pytest.mark.parametrize("variant", LOCAL)
-def test_that_the_local_methods_are_hertz_on_every_ellipse(variant, ratio):
+def test_local_methods_are_hertz_on_every_ellipse(variant, ratio):
     curvature, patch = patch_of_shape(ratio)
     grid = Grid.spanning(-1.3 * patch.b, 1.3 * patch.b, 80)
     approach, q, a = solved(variant, grid, curvature * grid.y**2)
@@ -99,7 +99,7 @@ def test_that_the_local_methods_are_hertz_on_every_ellipse(variant, ratio):
 
 
 @pytest.mark.parametrize("variant", LOCAL)
-def test_that_what_is_missing_to_hertz_falls_with_the_width_of_the_strips(variant):
+def test_error_relative_to_hertz_decreases_with_strip_width(variant):
     curvature, patch = patch_of_shape(11.3)
     errors = []
     for strips in (20, 80, 320):
@@ -113,7 +113,7 @@ def test_that_what_is_missing_to_hertz_falls_with_the_width_of_the_strips(varian
 @settings(max_examples=50, deadline=None)
 # next to the circle `hertz` itself has an error of up to 1e-6
 @given(st.floats(-19.0, 9.0).filter(lambda value: abs(value) > 1e-9))
-def test_that_hertz_is_read_off_the_table(logarithm):
+def test_table_interpolates_hertz(logarithm):
     ratio = np.exp(logarithm)
     patch = hertz(1.0, ratio, 1.0, 1.0)
     stiffness, length, part = read_local_hertz(local_hertz_table(), ratio)
@@ -124,7 +124,7 @@ def test_that_hertz_is_read_off_the_table(logarithm):
 
 
 @pytest.mark.parametrize("name", ["fresh", "skew"])
-def test_that_virtual_penetration_meets_its_printed_conditions(name):
+def test_virtual_penetration_meets_its_published_conditions(name):
     grid = Grid.spanning(-3e-3, 3e-3, 121)
     gap = shape_of(name, grid.y)
     first = int(np.argmin(gap))
@@ -137,14 +137,14 @@ def test_that_virtual_penetration_meets_its_printed_conditions(name):
         q[j] / (np.pi * MODULUS) * direct(np.log(a[j] / grid.spacing), 121)[abs(first - j)]
         for j in np.flatnonzero(q)
     )
-    # on a skew profile the mean place about the point lies a little beside it
+    # on a skew profile the mean position around the lowest point is slightly different from it
     assert displacement == pytest.approx(delta, rel=1e-6 if name == "fresh" else 2e-3)
 
 
 @pytest.mark.parametrize(
     ("ratio", "error"), [(0.3, 0.25), (1.0, 0.04), (3.0, 0.1), (11.3, 0.18), (30.0, 0.21)]
 )
-def test_that_virtual_penetration_is_no_farther_from_hertz_than_is_known(ratio, error):
+def test_error_of_virtual_penetration_is_the_published_one(ratio, error):
     curvature, patch = patch_of_shape(ratio)
     grid = Grid.spanning(-1.3 * patch.b, 1.3 * patch.b, 80)
     approach, q, _ = solved(KIK_PIOTROWSKI, grid, curvature * grid.y**2)
@@ -156,7 +156,7 @@ def test_that_virtual_penetration_is_no_farther_from_hertz_than_is_known(ratio, 
 @pytest.mark.parametrize("variant", VARIANTS)
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("strips", [41, 120, 301])
-def test_that_every_profile_carries_its_load_under_the_strips_in_contact(variant, name, strips):
+def test_profiles_carry_their_load_on_the_strips_in_contact(variant, name, strips):
     grid = Grid.spanning(-3e-3, 3e-3, strips)
     gap = shape_of(name, grid.y)
     approach, q, a = solved(variant, grid, gap)
@@ -164,7 +164,7 @@ def test_that_every_profile_carries_its_load_under_the_strips_in_contact(variant
     assert (q >= 0.0).all()
     np.testing.assert_array_equal(a > 0.0, q > 0.0)
     assert (gap[q > 0.0] < approach).all()
-    # the gap's zero means nothing
+    # the result does not depend on the zero of the gap
     moved, same, _ = solved(variant, grid, gap + 5e-6)
     assert moved - approach == pytest.approx(5e-6, rel=1e-6)
     np.testing.assert_allclose(same, q, atol=1e-7 * q.max())
@@ -188,7 +188,7 @@ def random_profile(strips, roughness, curvature, seed):
 @pytest.mark.parametrize("variant", VARIANTS)
 @settings(max_examples=40, deadline=None)
 @given(random_profiles)
-def test_that_a_mirrored_profile_gives_the_mirrored_contact(variant, drawn):
+def test_mirrored_profile_has_the_mirrored_contact(variant, drawn):
     strips, roughness, curvature, load, seed = drawn
     grid, gap = random_profile(strips, roughness, curvature, seed)
     status, approach, q, a = solve(variant, grid, gap, load)
@@ -204,7 +204,7 @@ def test_that_a_mirrored_profile_gives_the_mirrored_contact(variant, drawn):
 @pytest.mark.parametrize("variant", VARIANTS)
 @pytest.mark.parametrize("name", ["fresh", "flat", "concave", "two patches"])
 @pytest.mark.parametrize("compliance", [1e-12, 1e-11, 1e-10])
-def test_that_wear_compliance_is_the_contact_in_the_gap_it_opens(variant, name, compliance):
+def test_wear_compliance_is_the_contact_in_the_worn_gap(variant, name, compliance):
     grid = Grid.spanning(-4e-3, 4e-3, 80)
     gap = shape_of(name, grid.y)
     softening = compliance * (1.0 + 0.3 * grid.y / grid.y[-1])
@@ -219,7 +219,7 @@ def test_that_wear_compliance_is_the_contact_in_the_gap_it_opens(variant, name, 
 
 
 @pytest.mark.parametrize("variant", LOCAL)
-def test_that_patches_far_apart_share_the_load_by_their_common_approach(variant):
+def test_distant_patches_share_the_load_at_a_common_approach(variant):
     sharp, blunt, behind = 4.0, 2.0, 1.5e-6
     grid = Grid.spanning(-8e-3, 8e-3, 800)
     gap = np.minimum(sharp * (grid.y + 4e-3) ** 2, behind + blunt * (grid.y - 4e-3) ** 2)
@@ -233,7 +233,7 @@ def test_that_patches_far_apart_share_the_load_by_their_common_approach(variant)
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
-def test_that_patches_grow_together_without_a_jump(variant):
+def test_patches_merge_continuously(variant):
     grid = Grid.spanning(-3e-3, 3e-3, 240)
     ridges = np.linspace(12e-6, 0.0, 601)
     lean = np.where(grid.y > 0.0, 0.3e-6, 0.0) * np.minimum(np.abs(grid.y) / 0.5e-3, 1.0)
@@ -242,7 +242,7 @@ def test_that_patches_grow_together_without_a_jump(variant):
         for h in ridges
     ]
     moved = np.abs(np.diff(loads, axis=0)).sum(axis=1) / np.sum(loads[0])
-    # from two patches to one, each step of the ridge by 20 nm moves some thousandths of the load
+    # from two patches to one, a change of the ridge by 20 nm moves a few thousandths of the load
     assert (loads[0][118:122] == 0.0).all()
     assert (loads[-1][118:122] > 0.0).all()
     assert moved.max() < 0.02
@@ -250,7 +250,7 @@ def test_that_patches_grow_together_without_a_jump(variant):
 
 @pytest.mark.parametrize("variant", VARIANTS)
 @pytest.mark.parametrize("name", ["flat", "concave", "two patches"])
-def test_that_the_load_converges_with_the_grid(variant, name):
+def test_load_converges_with_the_grid(variant, name):
     exact, errors = None, []
     for strips in (1215, 405, 135, 45):
         grid = Grid.spanning(-3e-3, 3e-3, strips)
@@ -264,7 +264,7 @@ def test_that_the_load_converges_with_the_grid(variant, name):
     assert errors[0] < errors[1] < errors[2]
 
 
-def test_that_the_smoothed_curvature_of_a_parabola_is_its_own():
+def test_smoothed_curvature_of_a_parabola_is_exact():
     grid = Grid.spanning(-3e-3, 3e-3, 101)
     gap = 1.3 * (grid.y - 0.2e-3) ** 2 + 1e-6
     depth = np.maximum(2e-6 - (gap - gap.min()), 0.0)
@@ -274,7 +274,7 @@ def test_that_the_smoothed_curvature_of_a_parabola_is_its_own():
 
 
 @pytest.mark.parametrize("name", ["plane", "concave", "rough", "step"])
-def test_that_the_smoothed_curvature_stays_within_its_bounds(name):
+def test_smoothed_curvature_is_within_its_bounds(name):
     grid = Grid.spanning(-3e-3, 3e-3, 241)
     gap = shape_of(name, grid.y)
     depth = np.maximum(2e-6 - (gap - gap.min()), 0.0)
@@ -288,7 +288,7 @@ def test_that_the_smoothed_curvature_stays_within_its_bounds(name):
         assert found[120] == 0.125 * typical
 
 
-def test_that_the_smoothed_curvature_does_not_depend_on_the_number_of_strips():
+def test_smoothed_curvature_is_independent_of_the_strip_count():
     found = []
     for strips in (101, 303, 909):
         grid = Grid.spanning(-3e-3, 3e-3, strips)
@@ -302,14 +302,14 @@ def test_that_the_smoothed_curvature_does_not_depend_on_the_number_of_strips():
     assert fine < coarse < 0.1
 
 
-def test_that_minima_are_found_with_their_middles():
+def test_minima_are_found_at_their_middles():
     gap = np.array([0.0, 1.0, 1.0, 0.5, 0.5, 0.5, 0.5, 2.0, 3.0, 3.0, 2.0, 2.5, 1.0])
     places = np.empty((13, 2), dtype=np.int64)
     count = first_contacts(gap, places)
     assert places[:count].tolist() == [[0, 0], [4, 5], [10, 10], [12, 12]]
 
 
-def test_that_a_ridge_holds_up_the_level_of_a_lower_patch():
+def test_ridge_limits_the_level_from_a_lower_patch():
     gap = np.array([3.0, 1.0, 0.0, 1.0, 2.0, 1.0, 0.8, 1.0, 3.0])
     places = np.empty((9, 2), dtype=np.int64)
     level, slope = np.empty(9), np.empty(9)
@@ -320,7 +320,7 @@ def test_that_a_ridge_holds_up_the_level_of_a_lower_patch():
         contact_levels(gap, places, count, reach, True, rigid, level, slope)
         return level[2], level[6]
 
-    # apart, each has half of its own overlap; the second then waits at the ridge for the first
+    # separate patches have half of their overlap; the second level is then limited by the ridge
     assert levels(1.8) == pytest.approx((0.9, 1.3))
     assert levels(3.0) == pytest.approx((1.5, 1.9))
     assert levels(3.6) == pytest.approx((1.8, 2.0))
@@ -328,7 +328,7 @@ def test_that_a_ridge_holds_up_the_level_of_a_lower_patch():
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
-def test_that_what_cannot_be_solved_is_told(variant):
+def test_unsolvable_contacts_have_a_status(variant):
     grid = Grid.spanning(-3e-3, 3e-3, 41)
     broken = grid.y**2
     broken[7] = np.nan
@@ -338,7 +338,7 @@ def test_that_what_cannot_be_solved_is_told(variant):
     assert solve(variant, narrow, np.zeros(201))[0] == TOO_FINE
 
 
-def test_that_wear_without_any_order_may_not_settle_but_never_passes_for_settled():
+def test_irregular_wear_compliance_never_converges_wrongly():
     random = np.random.default_rng(5)
     outcomes = set()
     for _ in range(20):

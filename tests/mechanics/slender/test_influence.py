@@ -30,7 +30,7 @@ def by_quadrature(t):
 
 
 @pytest.mark.parametrize("t", [0.005, 0.02, 0.3, 1.0, 2.9999, 3.0, 7.0, 300.0])
-def test_that_f_and_its_slope_are_those_of_quadrature(t):
+def test_f_and_its_slope_meet_adaptive_quadrature(t):
     value, slope = (float(x[0]) for x in mean_asinh(np.array([t])))
     assert value == pytest.approx(by_quadrature(t), abs=1e-11)
     step = 1e-4
@@ -38,14 +38,14 @@ def test_that_f_and_its_slope_are_those_of_quadrature(t):
     assert slope == pytest.approx(difference, abs=1e-7)
 
 
-def test_that_f_tends_to_its_logarithm():
+def test_f_tends_to_its_logarithm():
     value, slope = mean_asinh(np.array([1e6]))
     assert value[0] == pytest.approx(np.log(2e6) + np.log(2.0) + 0.5, abs=1e-11)
     assert slope[0] == pytest.approx(1.0, abs=1e-11)
 
 
 @pytest.mark.parametrize("t", [0.005, 0.3, 1.0, 7.0, 300.0])
-def test_that_h_and_its_slope_are_those_of_quadrature(t):
+def test_h_and_its_slope_meet_adaptive_quadrature(t):
     def by_integral(t):
         # the mean over s of the second derivative of asinh(t/|s - x|) at x = 0, by parts
         return quad(
@@ -64,7 +64,7 @@ def test_that_h_and_its_slope_are_those_of_quadrature(t):
     assert slope == pytest.approx(difference, abs=1e-7)
 
 
-def test_that_a_strip_without_end_bends_the_surface_by_four():
+def test_infinite_strip_has_curvature_coefficient_four():
     assert 2.0 * middle_curvature(np.array([1e8]))[0][0] == pytest.approx(4.0, rel=1e-14)
 
 
@@ -80,12 +80,12 @@ def direct(tau, count, function=mean_asinh):
     ids=["displacement", "curvature"],
 )
 @pytest.mark.parametrize("tau", [LOWEST, -3.21, -0.7, 0.0, 0.333, 2.5, HIGHEST])
-def test_that_the_table_reads_as_the_function(tau, tabulated, function):
+def test_table_interpolates_the_function(tau, tabulated, function):
     table, expected = tabulated(40), direct(tau, 40, function)
-    value, tangent, alone = np.empty(40), np.empty(40), np.empty(40)
+    value, tangent, values_only = np.empty(40), np.empty(40), np.empty(40)
     read_influence(table, tau, 40, value, tangent)
-    read_values(table, tau, 40, alone)
-    np.testing.assert_array_equal(alone, value)
+    read_values(table, tau, 40, values_only)
+    np.testing.assert_array_equal(values_only, value)
     assert [read_value(table, tau, k) for k in range(40)] == pytest.approx(value, rel=1e-14)
     np.testing.assert_allclose(value, expected, atol=2e-9)
     step = 1e-4
@@ -94,7 +94,7 @@ def test_that_the_table_reads_as_the_function(tau, tabulated, function):
         np.testing.assert_allclose(tangent, expected + 0.25 * slope / step, atol=2e-7)
 
 
-def test_that_a_vanishing_half_length_leaves_a_line():
+def test_vanishing_half_length_is_a_line_load():
     value, tangent = np.empty(40), np.empty(40)
     read_influence(influence_table(40), -50.0, 40, value, tangent)
     k = np.arange(1, 40)

@@ -1,4 +1,4 @@
-"""Slender contact: its equations, its limits and its hard cases."""
+"""Slender contact: equations, limits and difficult cases."""
 
 import numpy as np
 import pytest
@@ -24,9 +24,9 @@ MODULUS = 200e9 / (2.0 * (1.0 - 0.3**2))
 CURVATURE = 90.0
 PATCH = hertz(45.0, 1.0, 300.0, MODULUS)
 BY_LOAD = 4.0 / (np.pi * MODULUS * CURVATURE)  # a^2/q of a strip by itself
-# what is left of a solution once its steps are below 1e-7: next to nothing where Newton squares
-# them, a small part where s follows; in parts of the greatest line load
-LEFT = {"local": 2e-8, "coupled": 2e-8}
+# difference of two converged solutions over the greatest line load: convergence is quadratic
+# for local half-lengths, and linear with a small factor for coupled ones
+RESIDUAL_LOAD = {"local": 2e-8, "coupled": 2e-8}
 
 
 def solve(grid, gaps, loads, wear=None, start=None, lengths="coupled", found=None):
@@ -57,7 +57,7 @@ def solve(grid, gaps, loads, wear=None, start=None, lengths="coupled", found=Non
 
 
 def no_wear(count, n):
-    """Return the wear of contacts that wear nothing."""
+    """Return zero wear."""
     return SharedWear(np.zeros((count, 2), dtype=np.int64), np.zeros((count, 2, n)))
 
 
@@ -68,24 +68,24 @@ def wear_of_one(compliance):
 
 
 def factors(line_load, spacing):
-    """Return s of one contact's loaded strips: two sweeps over its curvature, without any table."""
+    """Return s of the loaded strips of one contact by two sweeps without a table."""
     place = np.flatnonzero(line_load)
-    apart = place[:, None] - place
+    distance = place[:, None] - place
 
-    def bend(t):
+    def edge_curvature(t):
         short = 1.0 / (1.0 + t * t)  # the parameter m = k^2, whose complement is k'^2
         return 4.0 / np.pi * t * np.sqrt(short) * ellipk(short)
 
     s = np.ones(len(place))
     for _ in range(SWEEPS):
         a = np.sqrt(s * BY_LOAD * line_load[place]) / spacing
-        curvature = bend((apart + 0.5) / a) - bend((apart - 0.5) / a)
+        curvature = edge_curvature((distance + 0.5) / a) - edge_curvature((distance - 0.5) / a)
         s = np.clip(s * (0.25 * curvature / s).sum(axis=1), LOWEST_FACTOR, HIGHEST_FACTOR)
     return s
 
 
 def surface(grid, gaps, line_load, wear, lengths):
-    """Return gap, wear and displacement together, written out without any table."""
+    """Return the sum of gap, wear and displacement, computed without a table."""
     count, n = gaps.shape
     total = gaps + wear.opening(line_load)
     for k in range(count):
@@ -98,7 +98,7 @@ def surface(grid, gaps, line_load, wear, lengths):
 
 
 def assert_solved(grid, gaps, loads, wear, line_load, approach, lengths="coupled"):
-    """Hold a solution against the equations of contact themselves."""
+    """Check that a solution satisfies the equations of contact."""
     total = surface(grid, gaps, line_load, wear, lengths)
     scale = np.ptp(approach[:, None] - gaps) + np.abs(approach).max()
     assert (line_load >= 0.0).all()
@@ -121,16 +121,16 @@ def shape_of(name, y):
     }[name]
 
 
-# of p0, of the approach and of the line load (L1) of the fresh rig
-MISSED = {"local": (7e-3, 2e-3, 2.5e-3), "coupled": (2e-4, 1e-4, 6e-4)}
+# relative errors of p0, approach and line load (L1) of the unworn rig
+ERRORS = {"local": (7e-3, 2e-3, 2.5e-3), "coupled": (2e-4, 1e-4, 6e-4)}
 
 
-@pytest.mark.parametrize("lengths", MISSED)
-def test_that_the_fresh_rig_is_hertz(lengths):
+@pytest.mark.parametrize("lengths", ERRORS)
+def test_unworn_rig_is_hertz(lengths):
     grid = Grid.spanning(-1.85e-3, 1.85e-3, 121)
     half_length = np.empty((1, 121))
     status, (q,), (approach,), _ = solve(grid, grid.y**2, 300.0, lengths=lengths, found=half_length)
-    pressure, by_approach, by_load = MISSED[lengths]
+    pressure, by_approach, by_load = ERRORS[lengths]
     assert status == CONVERGED
     (a,), inside = half_length, q > 0.0
     assert a.max() == pytest.approx(PATCH.a, rel=pressure)
@@ -142,7 +142,7 @@ def test_that_the_fresh_rig_is_hertz(lengths):
     assert q.sum() * grid.spacing == pytest.approx(300.0, rel=1e-12)
 
 
-def test_that_half_lengths_are_those_of_their_definition():
+def test_half_lengths_satisfy_their_definition():
     grid = Grid.spanning(-3e-3, 3e-3, 120)
     for name in ("fresh", "two patches", "edge"):
         half_length = np.empty((1, 120))
@@ -158,7 +158,7 @@ def test_that_half_lengths_are_those_of_their_definition():
     ("strips", "lengths"),
     [(41, "coupled"), (120, "coupled"), (120, "local"), (401, "coupled")],
 )
-def test_that_every_profile_is_solved_to_the_equations(name, strips, lengths):
+def test_profiles_satisfy_the_equations(name, strips, lengths):
     grid = Grid.spanning(-3e-3, 3e-3, strips)
     gap = shape_of(name, grid.y)[None, :]
     status, q, approach, _ = solve(grid, gap, 300.0, lengths=lengths)
@@ -166,7 +166,7 @@ def test_that_every_profile_is_solved_to_the_equations(name, strips, lengths):
     assert_solved(grid, gap, [300.0], no_wear(1, strips), q, approach, lengths)
 
 
-def test_that_the_ten_micrometre_bump_makes_two_patches():
+def test_ten_micrometre_bump_has_two_patches():
     grid = Grid.spanning(-3e-3, 3e-3, 120)
     _, (q,), _, _ = solve(grid, shape_of("two patches", grid.y), 300.0)
     assert (q[:60] > 0.0).any()
@@ -183,7 +183,7 @@ def test_that_the_ten_micrometre_bump_makes_two_patches():
     st.floats(0.0, 1e-10),
     st.integers(0, 10**6),
 )
-def test_that_random_rough_profiles_are_solved_to_the_equations(
+def test_random_rough_profiles_satisfy_the_equations(
     strips, roughness, curvature, load, compliance, seed
 ):
     grid = Grid.spanning(-3e-3, 3e-3, strips)
@@ -205,7 +205,7 @@ GROUPS = {
 
 
 @pytest.mark.parametrize("bodies", GROUPS.values(), ids=GROUPS)
-def test_that_coupled_contacts_are_solved_to_the_equations(bodies):
+def test_coupled_contacts_satisfy_the_equations(bodies):
     grid = Grid.spanning(-4e-3, 4e-3, 81)
     gaps = np.array([(grid.y - offset) ** 2 for offset in (-1e-3, 0.3e-3, 1e-3)])
     random = np.random.default_rng(3)
@@ -216,7 +216,7 @@ def test_that_coupled_contacts_are_solved_to_the_equations(bodies):
     assert_solved(grid, gaps, [300.0, 250.0, 400.0], wear, q, approach)
 
 
-def test_that_fifty_contacts_on_one_body_are_solved_to_the_equations():
+def test_fifty_contacts_on_one_body_satisfy_the_equations():
     grid = Grid.spanning(-4e-3, 4e-3, 81)
     random = np.random.default_rng(4)
     gaps = (grid.y - random.uniform(-1e-3, 1e-3, (50, 1))) ** 2
@@ -228,36 +228,38 @@ def test_that_fifty_contacts_on_one_body_are_solved_to_the_equations():
     assert_solved(grid, gaps, loads, wear, q, approach)
 
 
-def test_that_uncoupled_contacts_are_solved_as_if_alone():
+def test_uncoupled_contacts_equal_separate_solutions():
     grid = Grid.spanning(-4e-3, 4e-3, 81)
     gaps = np.array([(grid.y - 1e-3) ** 2, 0.5 * grid.y**2])
     _, both, _, _ = solve(grid, gaps, [300.0, 200.0])
     for k, load in enumerate((300.0, 200.0)):
-        _, alone, _, _ = solve(grid, gaps[k], load)
-        np.testing.assert_allclose(both[k], alone[0], atol=LEFT["coupled"] * alone.max())
+        _, separate, _, _ = solve(grid, gaps[k], load)
+        np.testing.assert_allclose(
+            both[k], separate[0], atol=RESIDUAL_LOAD["coupled"] * separate.max()
+        )
 
 
-@pytest.mark.parametrize("lengths", LEFT)
-def test_that_a_start_nearby_ends_where_a_start_from_nothing_does(lengths):
+@pytest.mark.parametrize("lengths", RESIDUAL_LOAD)
+def test_warm_start_converges_to_the_cold_solution(lengths):
     grid = Grid.spanning(-3e-3, 3e-3, 101)
     flat, two = shape_of("flat", grid.y), shape_of("two patches", grid.y)
     _, cold, _, _ = solve(grid, flat, 300.0, lengths=lengths)
     _, start, _, _ = solve(grid, two, 100.0, lengths=lengths)
     status, warm, _, _ = solve(grid, flat, 300.0, start=start, lengths=lengths)
     assert status == CONVERGED
-    np.testing.assert_allclose(warm, cold, rtol=1e-9, atol=LEFT[lengths] * cold.max())
+    np.testing.assert_allclose(warm, cold, rtol=1e-9, atol=RESIDUAL_LOAD[lengths] * cold.max())
 
 
 RIDGES = {
     "smooth": lambda y: np.exp(-((y / 0.4e-3) ** 2)),
-    "beside": lambda y: np.exp(-(((y - 0.3e-3) / 0.2e-3) ** 2)),
+    "off-centre": lambda y: np.exp(-(((y - 0.3e-3) / 0.2e-3) ** 2)),
     "plateau": lambda y: (np.abs(y - 0.1e-3) < 0.35e-3) * 1.0,
 }
 
 
 @pytest.mark.parametrize("compliance", [0.0, 1e-11, 1e-10])
 @pytest.mark.parametrize("ridge", RIDGES)
-def test_that_a_patch_splits_and_merges_from_warm_starts_as_from_cold_ones(ridge, compliance):
+def test_splitting_patch_is_equal_from_warm_and_cold_starts(ridge, compliance):
     grid = Grid.spanning(-3e-3, 3e-3, 81)
     wear = wear_of_one(np.full(81, compliance))
     start, patches = None, []
@@ -268,15 +270,15 @@ def test_that_a_patch_splits_and_merges_from_warm_starts_as_from_cold_ones(ridge
         assert iterations <= 12
         assert_solved(grid, gap, [300.0], wear, q, approach)
         _, cold, _, _ = solve(grid, gap, 300.0, wear)
-        np.testing.assert_allclose(q, cold, atol=LEFT["coupled"] * cold.max())
+        np.testing.assert_allclose(q, cold, atol=RESIDUAL_LOAD["coupled"] * cold.max())
         start = q
         patches.append(int((np.diff((q[0] > 0.0) * 1, prepend=0) == 1).sum()))
     assert patches[0] == patches[-1] == 1
-    # fast wear takes a ridge off within the step, and the contact stays whole
+    # fast wear removes a ridge within the step, and the contact remains one patch
     assert max(patches) > 1 or compliance == 1e-10
 
 
-def test_that_a_mirrored_profile_gives_the_mirrored_load():
+def test_mirrored_profile_has_the_mirrored_load():
     grid = Grid.spanning(-3e-3, 3e-3, 100)
     gap = shape_of("step", grid.y)
     _, (q,), _, _ = solve(grid, gap, 300.0)
@@ -285,19 +287,21 @@ def test_that_a_mirrored_profile_gives_the_mirrored_load():
 
 
 @pytest.mark.parametrize("ratio", [0.2, 1.0, 8.0])
-def test_that_the_strips_of_an_ellipse_curve_its_surface_as_its_bodies_are(ratio):
+def test_strips_of_an_ellipse_have_the_curvature_of_the_bodies(ratio):
     patch = hertz(45.0, 45.0 * ratio, 300.0, MODULUS)
     edges = np.linspace(-patch.b, patch.b, 402)
     spacing, middles = edges[1] - edges[0], 0.5 * (edges[1:] + edges[:-1])
     q, a = patch.line_load(middles), patch.half_length(middles)
     t = (middles[:, None, None] - middles[:, None] + np.array([0.5, -0.5]) * spacing) / a[:, None]
-    bend = np.sign(t) * middle_curvature(np.abs(t).ravel())[0].reshape(t.shape)
-    curvature = ((bend[..., 0] - bend[..., 1]) * q / a**2).sum(axis=1) / (np.pi * MODULUS)
+    edge_curvature = np.sign(t) * middle_curvature(np.abs(t).ravel())[0].reshape(t.shape)
+    curvature = ((edge_curvature[..., 0] - edge_curvature[..., 1]) * q / a**2).sum(axis=1) / (
+        np.pi * MODULUS
+    )
     inner = np.abs(middles) < 0.9 * patch.b
     np.testing.assert_allclose(curvature[inner], CURVATURE, rtol=2e-3)
 
 
-def test_that_the_load_converges_with_the_grid():
+def test_load_converges_with_the_grid():
     exact, errors = None, []
     for strips in (1215, 405, 135, 45):
         grid = Grid.spanning(-2e-3, 2e-3, strips)
@@ -310,6 +314,6 @@ def test_that_the_load_converges_with_the_grid():
     assert errors[0] < 0.6 * errors[1] < 0.36 * errors[2]
 
 
-def test_that_strips_far_narrower_than_the_contact_are_refused():
+def test_too_narrow_strips_are_refused():
     grid = Grid.spanning(-1e-5, 1e-5, 201)
     assert solve(grid, np.zeros(201), 300.0)[0] == TOO_FINE

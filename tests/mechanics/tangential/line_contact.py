@@ -1,4 +1,4 @@
-"""Steady rolling of one strip solved numerically, to hold the closed form against.
+"""Numerical solution of steady rolling of one strip, the reference of the closed form.
 
 Lengths are in half-lengths, tractions in mu p0 and slip in 2 mu p0 / E_x. Tractions are constant
 over n elements; stick and slip are found by Newton's method on the projection onto Coulomb's disc.
@@ -8,7 +8,7 @@ import numpy as np
 
 
 def _differences(n):
-    """Return what unit tractions add to the strain between an element and the next one ahead."""
+    """Return the strain by unit tractions between an element and the next one ahead."""
     width = 2.0 / n
     place = np.arange(-n - 1, n + 2) * width
 
@@ -16,8 +16,8 @@ def _differences(n):
         return z * np.log(np.abs(z)) - z
 
     moved = -(integral(place + 0.5 * width) - integral(place - 0.5 * width)) / np.pi
-    apart = np.arange(n)[:, None] - np.arange(n)[None, :] + n + 1
-    return (moved[apart + 1] - moved[apart]) / width
+    offset = np.arange(n)[:, None] - np.arange(n)[None, :] + n + 1
+    return (moved[offset + 1] - moved[offset]) / width
 
 
 def _bound(n):
@@ -49,13 +49,13 @@ def _solve(d_x, d_y, psi, stiffness, n):
                 back = np.eye(n) + reach * scale[j] * strain
                 blocks[i][j] = (i == j) * np.eye(n) - turned[:, None] * back
         step = np.linalg.solve(np.block(blocks), residual.ravel()).reshape(2, n)
-        # elements that change between stick and slip can make whole steps go round in circles
+        # undamped steps may cycle because of elements that alternate between stick and slip
         traction = traction - (step if iteration < 12 else 0.5 * step)
-    raise AssertionError("Newton's method did not settle")
+    raise AssertionError("Newton's method did not converge")
 
 
 def rolling_strip(d_x, d_y, psi, stiffness, n=64):
-    """Return both forces over mu q and their moment over mu q a, extrapolated to no width.
+    """Return both forces over mu q and their moment over mu q a, extrapolated to zero width.
 
     Parameters
     ----------
@@ -64,6 +64,6 @@ def rolling_strip(d_x, d_y, psi, stiffness, n=64):
     stiffness : float
         E_x / G_y.
     n : int
-        Elements; half as many give the other point of the extrapolation.
+        Number of elements; the extrapolation also uses half as many.
     """
     return 2.0 * _solve(d_x, d_y, psi, stiffness, n) - _solve(d_x, d_y, psi, stiffness, n // 2)

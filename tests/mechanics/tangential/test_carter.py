@@ -33,7 +33,7 @@ def work(slip_x, slip_y, spin, found):
 
 
 @pytest.mark.bench
-def test_that_carters_law_is_met():
+def test_strip_force_meets_carters_law():
     for part in (0.1, 0.4, 0.9, 1.0, 1.5):
         expected = 1.0 - (1.0 - min(part, 1.0)) ** 2
         for d_x, d_y in ((part, 0.0), (0.0, part)):
@@ -45,8 +45,8 @@ def test_that_carters_law_is_met():
 
 @pytest.mark.bench
 @pytest.mark.parametrize("psi", [-0.3, 0.1, 0.3])
-def test_that_lateral_creepage_with_spin_is_carters_law_about_another_stiffness(psi):
-    # where all traction is lateral, taking back (1 - psi) of it where the strip adheres is exact
+def test_lateral_creepage_with_spin_is_carter_of_other_stiffness(psi):
+    # for lateral traction only, its reduction by 1 - psi in the adhesion zone is exact
     for d_y in (0.1, 0.5):
         t = d_y / (1.0 - psi)
         found = force(*scaled(0.0, d_y, psi))
@@ -55,7 +55,7 @@ def test_that_lateral_creepage_with_spin_is_carters_law_about_another_stiffness(
 
 
 @pytest.mark.bench
-def test_that_small_creepage_meets_the_linear_theory():
+def test_small_creepage_meets_the_linear_theory():
     slip_x, slip_y, spin = 1e-9, -2e-9, 3e-5
     force_x, force_y, moment, adhering = strip_force(
         A, Q, MU, STEEPNESS, slip_x, slip_y, spin, *MODULI
@@ -76,7 +76,7 @@ CASES = [
 
 
 @pytest.mark.bench
-def test_that_a_numerical_solution_of_the_strip_is_met():
+def test_strip_force_meets_numerical_solution():
     errors = {0.0: [], 0.08: [], 0.2: []}
     for d, angle, psi in CASES:
         d_x, d_y = d * np.cos(np.radians(angle)), d * np.sin(np.radians(angle))
@@ -92,7 +92,7 @@ def test_that_a_numerical_solution_of_the_strip_is_met():
 
 @pytest.mark.bench
 @pytest.mark.parametrize("turn", [0.0, 0.3, 1.0, 3.0])
-def test_that_full_sliding_with_spin_follows_the_slip_along_the_strip(turn):
+def test_full_sliding_traction_follows_the_local_slip(turn):
     slip_x, slip_y = 0.5, 0.3
     place = np.cos((np.arange(400) + 0.5) * np.pi / 400)
     weight = (1.0 - place**2) / (1.0 - place**2).sum()
@@ -102,17 +102,17 @@ def test_that_full_sliding_with_spin_follows_the_slip_along_the_strip(turn):
         (weight * (slip_y + turn * place) / local).sum(),
         (weight * place * (slip_y + turn * place) / local).sum(),
     )
-    # elasticity counts for nothing at a hundred times the creepage of saturation
+    # elasticity is negligible at a hundred times the creepage of saturation
     size = 100.0 * RATE / MODULI[1]
     found = force(size * slip_x, size * slip_y, size * turn / A)
-    # below TURNED the turning is left out to its second order
+    # below TURNED the rotation of the slip is neglected, an error of second order
     tolerance = 0.01 + 0.5 * TURNED**2
     np.testing.assert_allclose(found, np.negative(exact), atol=tolerance)
     own = work(size * slip_x, size * slip_y, size * turn / A, found)
     assert own == pytest.approx(size * (weight * local).sum(), rel=2e-3)
 
 
-def test_that_a_direction_that_turns_little_is_its_series():
+def test_mean_direction_for_small_rotation_is_its_series():
     assert mean_direction(3.0, 4.0, 0.0) == pytest.approx((0.6, 0.8, 0.0))
     # the mean of s^2 and of s^4 are 1/4 and 1/8
     turn = 0.2
@@ -127,7 +127,7 @@ sizes = st.floats(-6.0, 6.0).map(lambda x: np.sign(x) * 10.0 ** (abs(x) - 4.0) i
 
 @pytest.mark.bench
 @given(sizes, sizes, sizes, st.floats(0.01, 0.8))
-def test_that_traction_opposes_slip_within_the_traction_bound(d_x, d_y, psi, friction):
+def test_traction_opposes_slip_within_the_bound(d_x, d_y, psi, friction):
     slip = scaled(d_x, d_y, psi)
     found = force(*slip, friction=friction)
     scale = np.hypot(slip[0], slip[1]) + abs(slip[2]) * A
@@ -138,7 +138,7 @@ def test_that_traction_opposes_slip_within_the_traction_bound(d_x, d_y, psi, fri
 
 @pytest.mark.bench
 @given(sizes, sizes, sizes)
-def test_that_a_mirrored_strip_has_mirrored_forces(d_x, d_y, psi):
+def test_mirrored_strip_has_mirrored_forces(d_x, d_y, psi):
     slip_x, slip_y, spin = scaled(d_x, d_y, psi)
     force_x, force_y, moment, adhering = strip_force(
         A, Q, MU, STEEPNESS, slip_x, slip_y, spin, *MODULI
@@ -151,7 +151,7 @@ def test_that_a_mirrored_strip_has_mirrored_forces(d_x, d_y, psi):
 
 @pytest.mark.bench
 @given(sizes, sizes, sizes)
-def test_that_forces_change_no_faster_than_creepage(d_x, d_y, psi):
+def test_force_is_lipschitz_in_creepage(d_x, d_y, psi):
     here = force(*scaled(d_x, d_y, psi))
     near = force(*scaled(d_x * (1.0 + 1e-9), d_y * (1.0 - 1e-9), psi * (1.0 + 1e-9)))
     assert np.abs(near - here).max() < 1e-6
@@ -160,7 +160,7 @@ def test_that_forces_change_no_faster_than_creepage(d_x, d_y, psi):
 @pytest.mark.bench
 @pytest.mark.parametrize("psi", [0.0, 0.3, SPIN_LIMIT, 2.0])
 @pytest.mark.parametrize("angle", [0.0, 0.3, 0.8, 1.5])
-def test_that_the_force_is_continuous_where_the_strip_begins_to_slide_fully(angle, psi):
+def test_force_is_continuous_at_the_onset_of_full_sliding(angle, psi):
     def at(d):
         return force(*scaled(d * np.cos(angle), d * np.sin(angle), psi))
 
@@ -176,7 +176,7 @@ def test_that_the_force_is_continuous_where_the_strip_begins_to_slide_fully(angl
 
 
 @pytest.mark.bench
-def test_that_no_creepage_adheres_and_no_friction_slides():
+def test_strip_without_creepage_adheres_and_without_friction_slides():
     assert strip_force(A, Q, MU, STEEPNESS, 0.0, 0.0, 0.0, *MODULI) == (0.0, 0.0, 0.0, 2.0 * A)
     assert strip_force(A, Q, 0.0, STEEPNESS, 1e-3, 1e-3, 1.0, *MODULI) == (0.0, 0.0, 0.0, 0.0)
     slight = strip_force(A, Q, 1e-9, STEEPNESS, 1e-3, 0.0, 0.0, *MODULI)

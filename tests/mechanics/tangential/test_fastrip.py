@@ -1,4 +1,4 @@
-"""FaStrip: its linear and sliding limits, Carter's closed form, CONTACT's own, and its inside."""
+"""FaStrip: linear and sliding limits, Carter's closed form, FaStrip of CONTACT, and fields."""
 
 import math
 
@@ -63,7 +63,7 @@ class Ellipse:
 
 @pytest.mark.bench
 @pytest.mark.parametrize(("a", "b"), [(A, B), (3e-4, 3e-4), (1e-3, 2e-4)])
-def test_that_small_creepage_meets_kalkers_coefficients(a, b):
+def test_small_creepage_meets_kalkers_coefficients(a, b):
     small = 1e-9
     kalker = creepage_coefficients(a / b, NU)
     shape = {"a": a, "b": b, "mu": 10.0, "strips": 2000}
@@ -75,7 +75,7 @@ def test_that_small_creepage_meets_kalkers_coefficients(a, b):
     assert turning[2] == pytest.approx(-kalker.c33 * unit * a * b, rel=1e-3)
 
 
-def test_that_a_long_contact_has_the_moduli_of_a_plane():
+def test_long_contact_has_the_moduli_of_a_plane():
     ratio = 1e-7
     found = amended_moduli(creepage_coefficients(ratio, 0.3), ratio, 1.0, 1.0)
     assert found[:3] == pytest.approx((1.0 / 0.7, 1.0, 1.0 / 0.7), rel=1e-5)
@@ -85,7 +85,7 @@ def test_that_a_long_contact_has_the_moduli_of_a_plane():
 
 @pytest.mark.bench
 @pytest.mark.parametrize("axis", ["longitudinal", "lateral"])
-def test_that_one_creepage_is_carters_closed_form_with_any_number_of_steps(axis):
+def test_single_creepage_is_carters_closed_form_for_any_steps(axis):
     ellipse = Ellipse(5e-4) if axis == "longitudinal" else Ellipse(0.0, 5e-4)
     a, rise = ellipse.half_length, ellipse.bound_peak[0] / ellipse.half_length[0]
     d = np.minimum(0.5 * 5e-4 * getattr(ellipse.moduli, axis) / rise, a)
@@ -99,7 +99,7 @@ def test_that_one_creepage_is_carters_closed_form_with_any_number_of_steps(axis)
 
 
 def about_sliding_throughout(ellipse, number):
-    """Return a strip that just slides throughout, and as it just does not; None where none can."""
+    """Return a strip just above and just below full sliding; None if it always slides."""
 
     def strip(factor):
         bound_peak = ellipse.bound_peak * factor
@@ -117,7 +117,7 @@ def about_sliding_throughout(ellipse, number):
 
 
 @pytest.mark.bench
-def test_that_a_strip_goes_over_to_sliding_throughout_without_a_turn():
+def test_direction_is_continuous_at_the_onset_of_full_sliding():
     rng, found = np.random.default_rng(2), []
     for xi, eta, phi in rng.normal(size=(30, 3)) * (5e-4, 5e-4, 1.0):
         ellipse = Ellipse(xi, eta, phi, a=1e-3, b=2e-4, strips=11)
@@ -131,7 +131,7 @@ def test_that_a_strip_goes_over_to_sliding_throughout_without_a_turn():
 
 
 @pytest.mark.bench
-def test_that_a_contact_that_slides_throughout_carries_all_that_friction_can():
+def test_full_sliding_force_is_friction_times_load():
     ellipse = Ellipse(0.03, -0.04)
     *force, _, power = ellipse.totals(1)
     assert np.hypot(*force) == pytest.approx(30.0, rel=1e-3)
@@ -143,9 +143,9 @@ SHAPE = {"a": "a_m", "b": "b_m", "load": "N_N", "mu": "mu"}
 
 
 def from_contact(cases, *, published):
-    """Return the error of the power against CONTACT's own FaStrip.
+    """Return the relative error of the power against FaStrip of CONTACT.
 
-    As published, C23 amends both parts of spin in what a plane would have, 1/(1 - nu) and 1.
+    In the published version, C23 amends the plane moduli 1/(1 - nu) and 1 of both parts of spin.
     """
     powers = []
     for case in cases:
@@ -161,20 +161,22 @@ def from_contact(cases, *, published):
 
 
 @pytest.mark.bench
-def test_that_contacts_own_fastrip_agrees_where_spin_is_weak():
+def test_fastrip_of_contact_agrees_for_weak_spin():
     errors = from_contact(rows("rig_random", kind="paper"), published=False)
     assert np.sqrt(np.mean(errors**2)) < 0.003
     whole = table("mean_problem")
     mean = [{**whole, **case} for case in whole["rows"]]
     assert from_contact(mean, published=False) == pytest.approx(0.0, abs=5e-3)
-    # without spin; its coefficients at a/b = 10 are others
-    alone = [c for c in rows("hard_cases") if c["phi_per_m"] == 0.0 and c["b_m"] > 0.2 * c["a_m"]]
-    assert len(alone) == 6
-    assert from_contact(alone, published=False) == pytest.approx(0.0, abs=1e-3)
+    # without spin; the coefficients of CONTACT at a/b = 10 are different
+    without_spin = [
+        c for c in rows("hard_cases") if c["phi_per_m"] == 0.0 and c["b_m"] > 0.2 * c["a_m"]
+    ]
+    assert len(without_spin) == 6
+    assert from_contact(without_spin, published=False) == pytest.approx(0.0, abs=1e-3)
 
 
 @pytest.mark.bench
-def test_that_strong_spin_differs_from_contacts_own_by_its_amendment_alone():
+def test_strong_spin_differs_from_contact_by_the_amendment_only():
     partial = rows("rig_random", kind="partial")
     errors = from_contact(partial, published=True)
     assert np.sqrt(np.mean(errors**2)) < 0.009
@@ -183,7 +185,7 @@ def test_that_strong_spin_differs_from_contacts_own_by_its_amendment_alone():
 
 
 @pytest.mark.bench
-def test_that_few_steps_are_enough():
+def test_few_steps_are_sufficient():
     ellipses = [
         Ellipse(*case) for case in ((6e-4, 5e-4, 0.05), (3e-4, -2e-4, 0.6), (0.0, 0.0, 0.8))
     ]
@@ -199,7 +201,7 @@ CREEPAGES = st.tuples(st.floats(-2e-3, 2e-3), st.floats(-2e-3, 2e-3), st.floats(
 @pytest.mark.bench
 @settings(deadline=None, max_examples=60)
 @given(CREEPAGES)
-def test_that_traction_keeps_to_the_bound_and_slip_opposes_it(creepage):
+def test_traction_is_within_the_bound_and_slip_opposes_it(creepage):
     ellipse = Ellipse(*creepage, strips=11)
     t_x, t_y, s_x, s_y = ellipse.fields(201)
     place = np.linspace(1.0, -1.0, 201)[:, None]
@@ -213,7 +215,7 @@ def test_that_traction_keeps_to_the_bound_and_slip_opposes_it(creepage):
 @pytest.mark.bench
 @settings(deadline=None, max_examples=60)
 @given(CREEPAGES)
-def test_that_mirroring_the_contact_mirrors_it_and_power_is_positive(creepage):
+def test_mirrored_contact_is_mirrored_and_power_is_positive(creepage):
     xi, eta, phi = creepage
     here, there = Ellipse(xi, eta, phi), Ellipse(xi, -eta, -phi)
     one, other = here.rows(), there.rows()[:, ::-1]
@@ -225,7 +227,7 @@ def test_that_mirroring_the_contact_mirrors_it_and_power_is_positive(creepage):
 
 @pytest.mark.bench
 @pytest.mark.parametrize("creepage", [(4e-4, 5e-4, 0.05), (2e-4, 0.0, 0.6), (5e-3, 5e-3, 0.1)])
-def test_that_the_fields_add_up_to_the_sums(creepage):
+def test_fields_integrate_to_the_sums(creepage):
     ellipse = Ellipse(*creepage)
     along, across, moment, _ = ellipse.rows(2000)
     t_x, t_y, *_ = ellipse.fields(4001)
@@ -238,7 +240,7 @@ def test_that_the_fields_add_up_to_the_sums(creepage):
 
 
 @pytest.mark.bench
-def test_that_spin_too_strong_for_strip_theory_is_left_to_fastsim():
+def test_strips_without_adhesion_by_spin_are_solved_by_fastsim():
     ellipse = Ellipse(1e-3, 5e-4, 20.0)
     share = 1.0 / ellipse.flexibility
     expected = march(
@@ -255,7 +257,7 @@ def test_that_spin_too_strong_for_strip_theory_is_left_to_fastsim():
 
 
 @pytest.mark.bench
-def test_that_strips_without_contact_friction_or_creepage_carry_nothing():
+def test_strips_without_contact_friction_or_creepage_have_no_force():
     still = Ellipse()
     assert not still.rows()[:3].any()
     assert still.rows()[3] == pytest.approx(2.0 * still.half_length)

@@ -1,4 +1,4 @@
-"""FASTSIM's kernels against a readable twin, closed forms, the energy balance and their orders."""
+"""FASTSIM against a plain implementation, closed forms, energy balance, order of convergence."""
 
 import math
 from typing import NamedTuple
@@ -86,7 +86,7 @@ def rig(strips=50, xi=1e-3, eta=0.0, phi=0.0, elliptic=False, curvatures=(45.0, 
 
 
 def edge(points, elliptic):
-    """Return what the last inner point weighs: by this a parabola is integrated exactly."""
+    """Return the weight of the last inner point, which integrates a parabola exactly."""
     place = 1.0 - 2.0 * np.arange(1, points) / points
     if elliptic:
         return 1.0 - scipy.special.zeta(-0.5) * math.sqrt(points / (points - 1.0))
@@ -95,15 +95,17 @@ def edge(points, elliptic):
 
 
 def weights(sticks, elliptic):
-    """Return the weights of a march's points, (points, strips), for where it sticks."""
+    """Return the weights of the points of a march, (points, strips); `sticks` marks adhesion."""
     points = len(sticks)
     found = [end_weights(k, points, elliptic) for k in range(1, points + 1)]
     sticking, sliding = np.array(found).T[:, :, None]
     return np.where(sticks, sticking, sliding)
 
 
-def twin(half_length, bound_peak, elliptic, gradient_x, gradient_y, gradient_spin, points):
-    """March one strip after another, as a textbook would write it."""
+def reference_march(
+    half_length, bound_peak, elliptic, gradient_x, gradient_y, gradient_spin, points
+):
+    """Integrate one strip after another without vectorisation."""
     sums = np.zeros((4, len(half_length)))
     for j, a in enumerate(half_length):
         traction = np.zeros(2)
@@ -130,7 +132,7 @@ def twin(half_length, bound_peak, elliptic, gradient_x, gradient_y, gradient_spi
 
 
 def local(case, friction, first=0):
-    """March under a field of friction; `case` was cut with a coefficient of 0.1."""
+    """Integrate under a friction field; the bounds of `case` include a coefficient of 0.1."""
     sums = new_sums(len(case.half_length))
     half_length, bound_peak, elliptic, *gradients = case.arguments
     flexible = case.flex.longitudinal, case.flex.lateral
@@ -148,7 +150,7 @@ def local(case, friction, first=0):
     return sums
 
 
-SCENES = [
+CREEPAGES = [
     {"xi": 1e-3},
     {"xi": -4e-4, "eta": 5e-4, "phi": 0.5},
     {"xi": 0.0, "eta": 0.0, "phi": 2.0},
@@ -157,17 +159,17 @@ SCENES = [
 
 
 @pytest.mark.parametrize("elliptic", [False, True])
-@pytest.mark.parametrize("problem", SCENES)
-def test_that_the_march_equals_its_readable_twin(problem, elliptic):
+@pytest.mark.parametrize("problem", CREEPAGES)
+def test_march_equals_its_reference_implementation(problem, elliptic):
     case = rig(strips=11, elliptic=elliptic, **problem)
-    found, expected = march(*case.arguments, 24), twin(*case.arguments, 24)
+    found, expected = march(*case.arguments, 24), reference_march(*case.arguments, 24)
     scale = np.abs(expected).max(axis=1, keepdims=True) + 1e-300
     assert found / scale == pytest.approx(expected / scale, abs=1e-10)
 
 
 @pytest.mark.parametrize("elliptic", [False, True])
-@pytest.mark.parametrize("problem", SCENES)
-def test_that_the_fields_add_up_to_the_sums_of_the_march(problem, elliptic):
+@pytest.mark.parametrize("problem", CREEPAGES)
+def test_fields_integrate_to_the_sums_of_the_march(problem, elliptic):
     case = rig(strips=11, elliptic=elliptic, **problem)
     sums = march(*case.arguments, 40)
     traction_x, traction_y, cut_x, cut_y = march_fields(*case.arguments, 40)
@@ -175,19 +177,21 @@ def test_that_the_fields_add_up_to_the_sums_of_the_march(problem, elliptic):
     dx = case.half_length / 20.0
     sticks = (cut_x == 0.0) & (cut_y == 0.0)
     counted = weights(sticks[1:], elliptic)
-    for found, whole in (
+    for found, integrand in (
         (sums[0], traction_x),
         (sums[1], traction_y),
         (sums[2], place * traction_y),
     ):
-        expected = (counted * whole[1:]).sum(axis=0) * dx
-        assert found == pytest.approx(expected, rel=1e-9, abs=1e-10 * np.abs(whole).max() * dx[5])
+        expected = (counted * integrand[1:]).sum(axis=0) * dx
+        assert found == pytest.approx(
+            expected, rel=1e-9, abs=1e-10 * np.abs(integrand).max() * dx[5]
+        )
     assert sums[3] == pytest.approx(sticks[1:].sum(axis=0) * dx, rel=1e-12)
 
 
 @pytest.mark.parametrize("elliptic", [False, True])
-@pytest.mark.parametrize("problem", SCENES)
-def test_that_a_uniform_field_of_friction_is_a_coefficient(problem, elliptic):
+@pytest.mark.parametrize("problem", CREEPAGES)
+def test_uniform_friction_field_equals_a_coefficient(problem, elliptic):
     case = rig(strips=11, elliptic=elliptic, **problem)
     found, expected = local(case, np.full((24, 11), 0.1)), march(*case.arguments, 24)
     scale = np.abs(expected).max(axis=1)
@@ -195,8 +199,8 @@ def test_that_a_uniform_field_of_friction_is_a_coefficient(problem, elliptic):
         assert getattr(found, name) == pytest.approx(expected[row], abs=1e-14 * scale[row])
 
 
-@pytest.mark.parametrize("problem", SCENES)
-def test_that_a_field_of_friction_adds_up_as_its_inside_does(problem):
+@pytest.mark.parametrize("problem", CREEPAGES)
+def test_sums_under_local_friction_integrate_its_fields(problem):
     case = rig(strips=11, **problem)
     friction = np.random.default_rng(0).uniform(0.02, 0.2, (30, 14))
     half_length, bound_peak, elliptic, *gradients = case.arguments
@@ -217,16 +221,16 @@ def test_that_a_field_of_friction_adds_up_as_its_inside_does(problem):
 
 @pytest.mark.parametrize("elliptic", [False, True])
 @pytest.mark.parametrize("points", [2, 3, 8, 13, 50])
-def test_that_the_weights_at_the_edges_integrate_the_bound(points, elliptic):
+def test_end_weights_integrate_the_bound(points, elliptic):
     counted = [end_weights(k, points, elliptic)[1] for k in range(1, points + 1)]
     shapes = [bound_shape(place_of(k, points), elliptic) for k in range(1, points + 1)]
-    whole = math.pi / 2.0 if elliptic else 4.0 / 3.0
-    # the root's next correction is left out
+    integrand = math.pi / 2.0 if elliptic else 4.0 / 3.0
+    # the next correction for the square root is neglected
     missing = 0.07 * points**-2.5 if elliptic else 1e-14
-    assert 2.0 / points * np.dot(counted, shapes) == pytest.approx(whole, rel=missing)
+    assert 2.0 / points * np.dot(counted, shapes) == pytest.approx(integrand, rel=missing)
 
 
-def test_that_full_sliding_integrates_friction_times_pressure():
+def test_full_sliding_integrates_friction_times_pressure():
     # mu = 0.1 (1 + s^2) with s = x/a: the integral of (1 - s^2)(1 + s^2) is 8/5
     case = rig(strips=11, xi=0.5)
     place = np.linspace(1.0, -1.0, 401)[1:, None]
@@ -234,7 +238,7 @@ def test_that_full_sliding_integrates_friction_times_pressure():
     assert sums.force_x == pytest.approx(-1.6 * case.bound_peak * case.half_length, rel=1e-4)
 
 
-def test_that_no_traction_exceeds_the_bound_and_all_vanish_at_both_edges():
+def test_traction_is_within_the_bound_and_zero_at_both_edges():
     case = rig(strips=11, eta=5e-4, phi=3.0)
     traction_x, traction_y, _, _ = march_fields(*case.arguments, 40)
     shape = 1.0 - np.linspace(1.0, -1.0, 41)[:, None] ** 2
@@ -245,7 +249,7 @@ def test_that_no_traction_exceeds_the_bound_and_all_vanish_at_both_edges():
 
 @pytest.mark.parametrize("elliptic", [False, True])
 @pytest.mark.parametrize("creepage", [(1e-5, 0.0), (3e-4, 2e-4), (1e-3, 0.0), (0.0, 5e-3)])
-def test_that_the_march_tends_to_the_closed_form_without_spin(creepage, elliptic):
+def test_march_converges_to_the_closed_form_without_spin(creepage, elliptic):
     case = rig(strips=7, xi=creepage[0], eta=creepage[1], elliptic=elliptic)
     found, expected = march(*case.arguments, 20000), closed_form(*case.arguments[:5])
     force = np.hypot(expected[0], expected[1]).max()
@@ -255,7 +259,7 @@ def test_that_the_march_tends_to_the_closed_form_without_spin(creepage, elliptic
         assert np.max(np.abs(one - other) / scale) < 2e-4
 
 
-def test_that_strips_outside_and_strips_without_creepage_carry_nothing():
+def test_strips_without_contact_or_creepage_have_no_force():
     half_length, peak = np.array([0.0, 1e-4]), np.array([0.0, 1e8])
     none = np.zeros(2)
     for found in (
@@ -267,7 +271,7 @@ def test_that_strips_outside_and_strips_without_creepage_carry_nothing():
 
 
 @pytest.mark.parametrize("strip", [0.1, 0.5, 0.9])
-def test_that_the_closed_form_is_kalkers(strip):
+def test_closed_form_equals_kalkers_formula(strip):
     patch = hertz(45.0, 1.0, 300.0, SHEAR / 0.7)
     flex = 8.0 * patch.a / (3.0 * math.pi**2 / 2.8 * SHEAR)
     half = patch.a * math.sqrt(1.0 - strip**2)
@@ -281,14 +285,14 @@ def test_that_the_closed_form_is_kalkers(strip):
     assert found[0] == pytest.approx(expected, rel=1e-12)
 
 
-def test_that_the_mean_problem_dissipates_what_its_closed_form_says():
+def test_closed_form_power_of_the_mean_problem():
     case = rig(strips=2000)
     sums = closed_form(*case.arguments[:5])
     assert case.power(sums) == pytest.approx(0.073873, rel=1e-5)
     assert -sums[0].sum() * case.spacing / 30.0 == pytest.approx(0.94057, rel=1e-5)
 
 
-def test_that_50_by_50_points_meet_the_closed_form_within_a_thousandth():
+def test_50_by_50_points_meet_the_closed_form_within_1e_3():
     case = rig(strips=50)
     assert case.power(march(*case.arguments, 50)) == pytest.approx(0.073873, rel=1e-3)
 
@@ -296,7 +300,7 @@ def test_that_50_by_50_points_meet_the_closed_form_within_a_thousandth():
 @pytest.mark.bench
 @pytest.mark.parametrize("bound", ["par", "ell"])
 @pytest.mark.parametrize("case", rows("mean_problem")[:2], ids=lambda case: case["case"])
-def test_that_contacts_quadrature_of_fastsim_is_met(case, bound):
+def test_closed_form_meets_the_fastsim_quadrature_of_contact(case, bound):
     mean = table("mean_problem")
     here = rig(
         strips=4000,
@@ -330,22 +334,22 @@ def order(points, values):
 @pytest.mark.parametrize(
     "problem", [{}, {"eta": 5e-4}, {"eta": 5e-4, "phi": 0.05}], ids=["one-way", "lateral", "spin"]
 )
-def test_that_the_rigid_slips_work_is_second_order_and_the_element_sum_first(problem):
+def test_rigid_slip_work_is_second_order_and_element_sum_first(problem):
     points = np.array([10, 20, 50, 100, 200])
     work, textbook = errors(points, **problem)
-    # where a strip begins to slide a corner is cut, of either sign: together they do better
+    # the error at the onset of slip has either sign, so that it partly cancels over the strips
     assert np.all(np.abs(work) * points**2 < 0.25)
     assert order(points, textbook) == pytest.approx(1.0, abs=0.1)
     assert np.all(textbook < 0.0)
 
 
-def test_that_few_steps_do_where_spin_turns_the_slip():
+def test_few_steps_are_sufficient_where_spin_turns_the_slip():
     for count, worst in ((6, 1e-2), (10, 3.5e-3), (16, 1.2e-3), (40, 3e-4)):
         work, _ = errors(np.array([count]), xi=-4e-4, eta=5e-4, phi=0.5)
         assert abs(work[0]) < worst
 
 
-def test_that_the_errors_of_the_grids_are_those_measured_before():
+def test_grid_errors_are_the_recorded_ones():
     work, textbook = errors(np.array([10, 20, 50, 200]))
     assert textbook == pytest.approx([-0.165, -0.082, -0.032, -0.008], abs=5e-4)
     assert np.all(np.abs(work) < [2e-3, 3e-4, 5e-5, 2e-6])
@@ -353,7 +357,7 @@ def test_that_the_errors_of_the_grids_are_those_measured_before():
 
 @settings(deadline=None, max_examples=30)
 @given(st.floats(-2e-3, 2e-3), st.floats(-2e-3, 2e-3), st.floats(-5.0, 5.0), st.booleans())
-def test_that_mirroring_the_contact_mirrors_its_tractions(xi, eta, phi, elliptic):
+def test_mirrored_contact_has_mirrored_tractions(xi, eta, phi, elliptic):
     # y to -y: lateral creepage, spin, lateral force and moment change sign
     one, other = (
         rig(strips=9, xi=xi, eta=sign * eta, phi=sign * phi, elliptic=elliptic) for sign in (1, -1)
@@ -366,10 +370,10 @@ def test_that_mirroring_the_contact_mirrors_its_tractions(xi, eta, phi, elliptic
 
 @settings(deadline=None, max_examples=30)
 @given(st.floats(-2e-3, 2e-3), st.floats(-2e-3, 2e-3), st.floats(-5.0, 5.0), st.booleans())
-def test_that_power_stays_between_nothing_and_full_sliding(xi, eta, phi, elliptic):
+def test_power_is_between_zero_and_full_sliding(xi, eta, phi, elliptic):
     case = rig(strips=9, xi=xi, eta=eta, phi=phi, elliptic=elliptic)
     power = case.power(march(*case.arguments, 60))
-    # every point of the bound sliding at the rigid slip there
+    # traction bound at every point times the rigid slip there
     place = np.linspace(-1.0, 1.0, 601)[:, None]
     shape = 1.0 - place**2
     slip = np.hypot(case.slip_x, eta + phi * place * case.half_length)

@@ -1,4 +1,4 @@
-"""Contacts solved together are those solved alone: their order, company and gaps change nothing."""
+"""Batched Hertz-FASTSIM contacts equal single ones, for any order and batch."""
 
 import math
 
@@ -63,7 +63,7 @@ def find(gaps=GAPS, row=ROW, loads=LOADS, **given):
     return patches
 
 
-def test_that_every_patch_is_the_one_hertz_finds_for_its_gap():
+def test_every_patch_equals_the_single_hertz_solution():
     patches = find()
     assert np.all(patches.status == CONVERGED)
     for k, load in enumerate(LOADS):
@@ -81,7 +81,7 @@ def test_that_every_patch_is_the_one_hertz_finds_for_its_gap():
 
 
 @pytest.mark.parametrize("curvatures", [(45.0, 1.0), (1.0, 1.0), (1.0, 8.0)])
-def test_that_a_parabola_gives_the_patch_of_its_own_curvature(curvatures):
+def test_parabola_has_the_patch_of_its_curvature(curvatures):
     gap = (3e-6 + curvatures[1] * (Y - 1e-4) ** 2)[None, :]
     load = np.array([300.0])
     patches = find(gap, np.zeros(1, dtype=np.int64), load, curvature_x=curvatures[0])
@@ -93,7 +93,7 @@ def test_that_a_parabola_gives_the_patch_of_its_own_curvature(curvatures):
     assert patches.centre[0] == pytest.approx(1e-4, rel=1e-11)
 
 
-def test_that_a_prescribed_patch_keeps_its_axes_under_any_load():
+def test_prescribed_patch_keeps_its_axes_under_any_load():
     patches = find(a=2e-4, b=2e-3)
     assert np.all(patches.a == 2e-4)
     assert np.all(patches.b == 2e-3)
@@ -114,7 +114,7 @@ def test_that_a_prescribed_patch_keeps_its_axes_under_any_load():
         (Y**2, math.nan, NO_LOAD),
     ],
 )
-def test_that_a_contact_that_fails_says_why_and_harms_no_other(gap, load, status):
+def test_failed_contact_has_a_status_and_does_not_affect_others(gap, load, status):
     gaps, row = np.array([Y**2, gap]), np.array([0, 1, 0])
     patches = find(gaps, row, np.array([300.0, load, 300.0]))
     assert patches.status.tolist() == [CONVERGED, status, CONVERGED]
@@ -131,7 +131,7 @@ def theory(closed_form=NEVER, kalker=TABLE, element_sum=False, points=24, single
     )  # fmt: skip
 
 
-def asked(chosen=slice(None)):
+def operating_points(chosen=slice(None)):
     random = np.random.default_rng(5)
     numbers = random.normal(size=(3, CONTACTS)) * [[4e-4], [5e-4], [0.1]]
     friction = random.uniform(0.05, 0.15, (CONTACTS, 1, 1))
@@ -139,14 +139,14 @@ def asked(chosen=slice(None)):
     return ContactInputs(*(column[chosen] for column in columns), False, np.zeros((0, len(Y))), 2.6)
 
 
-def solve(rules, wanted, row=ROW, gaps=GAPS, **given):
+def solve(options, inputs, row=ROW, gaps=GAPS, **given):
     found = ContactResults(*np.zeros((3, len(row), len(Y))), *np.zeros((5, len(row))))
     patches = patches_of(len(row))
-    failed = solve_contacts(bodies(**given), rules, gaps, row, wanted, patches, found)
+    failed = solve_contacts(bodies(**given), options, gaps, row, inputs, patches, found)
     return failed, found, patches
 
 
-RULES = [
+OPTIONS = [
     {},
     {"closed_form": EXACT},
     {"closed_form": ALWAYS},
@@ -155,38 +155,42 @@ RULES = [
 ]
 
 
-@pytest.mark.parametrize("rules", RULES)
-def test_that_order_and_company_change_no_bit(rules):
-    rules = theory(**rules)
-    failed, found, _ = solve(rules, asked())
+@pytest.mark.parametrize("options", OPTIONS)
+def test_result_is_bitwise_independent_of_order_and_batch(options):
+    options = theory(**options)
+    failed, found, _ = solve(options, operating_points())
     assert failed == CONTACTS
     order = np.random.default_rng(1).permutation(CONTACTS)[:25]
-    _, other, _ = solve(rules, asked(order), ROW[order])
+    _, other, _ = solve(options, operating_points(order), ROW[order])
     copied = GAPS[ROW]
-    _, apart, _ = solve(rules, asked(), np.arange(CONTACTS), copied)
+    _, separate, _ = solve(options, operating_points(), np.arange(CONTACTS), copied)
     for name in ContactResults._fields:
         assert np.array_equal(getattr(found, name)[order], getattr(other, name)), name
-        assert np.array_equal(getattr(found, name), getattr(apart, name)), name
+        assert np.array_equal(getattr(found, name), getattr(separate, name)), name
 
 
 @pytest.mark.parametrize("closed_form", [NEVER, EXACT])
-def test_that_power_is_the_work_of_forces_and_moment(closed_form):
-    wanted = asked()
-    _, found, _ = solve(theory(closed_form), wanted)
-    work = wanted.longitudinal * found.force_x + wanted.lateral * found.force_y
-    expected = -2.6 * (work + wanted.spin * found.spin_moment)
+def test_power_is_the_work_of_forces_and_moment(closed_form):
+    inputs = operating_points()
+    _, found, _ = solve(theory(closed_form), inputs)
+    work = inputs.longitudinal * found.force_x + inputs.lateral * found.force_y
+    expected = -2.6 * (work + inputs.spin * found.spin_moment)
     assert found.power == pytest.approx(expected, rel=1e-12)
     assert found.dissipation.sum(axis=1) * GRID.spacing == pytest.approx(found.power, rel=1e-12)
     assert found.line_load.sum(axis=1) * GRID.spacing == pytest.approx(LOADS, rel=1e-12)
 
 
-def test_that_the_first_contact_that_fails_is_named():
-    wanted = asked()
-    wanted.lateral[[7, 9]] = math.nan
-    failed, _, patches = solve(theory(), wanted)
+def test_first_failed_contact_is_returned():
+    inputs = operating_points()
+    inputs.lateral[[7, 9]] = math.nan
+    failed, _, patches = solve(theory(), inputs)
     assert (failed, patches.status[7]) == (7, NOT_FINITE)
     gap = 8.0 * Y[None, :] ** 2
     failed, _, patches = solve(
-        theory(kalker=LINE_LIMIT), asked(), np.zeros(CONTACTS, np.int64), gap, curvature_x=1.0
+        theory(kalker=LINE_LIMIT),
+        operating_points(),
+        np.zeros(CONTACTS, np.int64),
+        gap,
+        curvature_x=1.0,
     )
     assert (failed, patches.status[0]) == (0, NO_LIMIT)

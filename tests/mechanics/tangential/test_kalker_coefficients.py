@@ -28,17 +28,17 @@ def values(ratio, nu):
 
 @pytest.mark.bench
 @pytest.mark.parametrize("case", rows("kalker_coefficients"))
-def test_that_the_exact_linear_theory_is_met_within_1_5_percent(case):
+def test_coefficients_meet_the_exact_theory_within_1_5_percent(case):
     found = values(case["a_over_b"], case["nu"])
     for name, value in zip(NAMES, found, strict=True):
         bound = 0.015
-        if name == "c33":  # the reference's own error; README of the data for a/b >= 5
+        if name == "c33":  # error of the reference; README of the data for a/b >= 5
             bound = max(bound, case["rel_err"]["C33"])
         assert value == pytest.approx(case[name.upper()], rel=bound), name
 
 
 @pytest.mark.bench
-def test_that_the_interpolation_is_good_on_the_whole():
+def test_interpolation_error_is_small_on_average():
     errors = np.array(
         [
             [value / case[name.upper()] - 1.0 for name, value in zip(NAMES, found, strict=True)]
@@ -58,19 +58,19 @@ def test_that_the_interpolation_is_good_on_the_whole():
         (10.0, 0.25, (11.7, 12.8, 14.6, 0.526)),
     ],
 )
-def test_that_the_printed_table_is_met_at_its_knots(ratio, nu, expected):
+def test_interpolation_reproduces_the_printed_table(ratio, nu, expected):
     assert values(ratio, nu) == pytest.approx(expected, rel=1e-12)
 
 
 @settings(deadline=None)
 @given(st.floats(-6.0, 6.0), st.floats(0.0, 0.5))
-def test_that_coefficients_are_positive_everywhere(exponent, nu):
+def test_coefficients_are_positive(exponent, nu):
     assert np.all(values(10.0**exponent, nu) > 0.0)
 
 
 @settings(deadline=None)
 @given(st.floats(-3.0, 3.0), st.floats(0.0, 0.499))
-def test_that_coefficients_are_continuous_in_both_arguments(exponent, nu):
+def test_coefficients_are_continuous_in_both_arguments(exponent, nu):
     ratio = 10.0**exponent
     here = values(ratio, nu)
     assert values(ratio * (1.0 + 1e-7), nu) == pytest.approx(here, rel=1e-6)
@@ -81,7 +81,7 @@ KNOTS = sorted({round(math.exp(place), 12) for which in range(4) for place in sp
 
 
 @pytest.mark.parametrize("nu", [0.0, 0.1, 0.25, 0.3, 0.42, 0.5])
-def test_that_no_knot_and_neither_end_of_the_table_makes_a_jump_or_a_kink(nu):
+def test_coefficients_are_smooth_at_knots_and_table_ends(nu):
     assert len(KNOTS) == 20
     assert (KNOTS[0], KNOTS[-1]) == (0.1, 20.0)
     step = 1e-4
@@ -89,12 +89,12 @@ def test_that_no_knot_and_neither_end_of_the_table_makes_a_jump_or_a_kink(nu):
         below, here, above = (np.log(values(knot * math.exp(k * step), nu)) for k in (-1, 0, 1))
         near = np.log(values(knot * (1.0 + 1e-12), nu)), np.log(values(knot * (1.0 - 1e-12), nu))
         assert near[0] == pytest.approx(near[1], abs=1e-10)
-        # twice the curvature's share: a kink would add its change of slope times the step
+        # a kink would add its change of slope times the step
         assert above - here == pytest.approx(here - below, abs=5e-7)
 
 
 @pytest.mark.parametrize("ratio", [0.05, 0.3, 1.0, 4.0, 15.0])
-def test_that_the_tables_columns_of_poissons_ratio_make_no_jump_or_kink(ratio):
+def test_coefficients_are_smooth_at_tabulated_poisson_ratios(ratio):
     step = 1e-4
     below, here, above = (values(ratio, 0.25 + k * step) for k in (-1, 0, 1))
     assert above - here == pytest.approx(here - below, rel=5e-3, abs=1e-6)
@@ -102,27 +102,27 @@ def test_that_the_tables_columns_of_poissons_ratio_make_no_jump_or_kink(ratio):
 
 
 @pytest.mark.parametrize(("edge", "limit"), [(0.1, short_limit), (10.0, long_limit)])
-def test_that_between_its_columns_it_follows_poissons_ratio_as_the_limits_do(edge, limit):
-    # what the table has beyond its limit varies slowly, and lies between that of its columns
-    def beyond(nu):
+def test_dependence_on_poissons_ratio_is_that_of_the_limits(edge, limit):
+    # the ratio of table and limit varies slowly, and lies between those of the columns
+    def excess(nu):
         return values(edge, nu) / np.array(limit(min(edge, 1.0 / edge), nu))
 
-    columns = np.array([beyond(nu) for nu in (0.0, 0.25, 0.5)])
+    columns = np.array([excess(nu) for nu in (0.0, 0.25, 0.5)])
     allowed = np.array([1e-3, 1e-3, 4e-3, 1.5e-2])
     for nu in np.linspace(0.0, 0.5, 21):
-        found = beyond(nu)
+        found = excess(nu)
         assert np.all(found <= columns.max(axis=0) * (1.0 + allowed))
         assert np.all(found >= columns.min(axis=0) * (1.0 - allowed))
 
 
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.5])
-def test_that_the_limits_are_reached(nu):
+def test_limits_are_reached(nu):
     assert values(1e-7, nu) == pytest.approx(short_limit(1e-7, nu), rel=1e-6)
     assert values(1e9, nu)[2] == pytest.approx(long_limit(1e-9, nu)[2], rel=3e-3)
     assert values(1e9, nu)[0] == pytest.approx(long_limit(1e-9, nu)[0], rel=3e-3)
 
 
-def test_that_a_long_contact_has_the_line_limit():
+def test_long_contact_has_the_line_limit():
     found = line_limit_coefficients(0.088, 0.3)
     assert found.c11 == pytest.approx(3.5249, rel=2e-5)
     assert found.c22 == pytest.approx(math.pi**2 / 4.0, rel=1e-14)
@@ -131,12 +131,12 @@ def test_that_a_long_contact_has_the_line_limit():
 
 
 @pytest.mark.parametrize(("ratio", "nu"), [(0.0, 0.3), (math.nan, 0.3), (1.0, -0.1), (1.0, 0.6)])
-def test_that_arguments_out_of_range_are_refused(ratio, nu):
+def test_arguments_out_of_range_are_refused(ratio, nu):
     with pytest.raises(ValueError, match=r"must"):
         creepage_coefficients(ratio, nu)
 
 
-def test_that_flexibilities_follow_from_coefficients():
+def test_flexibilities_are_computed_from_coefficients():
     # L1 and L2 of the reference run of the mean problem
     found = flexibilities(
         line_limit_coefficients(0.17173473898160382 / 1.9464336537534505, 0.3),
@@ -149,12 +149,12 @@ def test_that_flexibilities_follow_from_coefficients():
     assert found.spin == pytest.approx(1.1056223217325914e-15, rel=2e-4)
 
 
-def test_that_one_flexibility_stands_for_three():
+def test_single_flexibility_is_the_weighted_mean():
     three = (2.0, 3.0, 5.0)
     for k in range(3):
-        alone = [0.0, 0.0, 0.0]
-        alone[k] = -7e-4
-        assert one_flexibility(*three, *alone) == pytest.approx(three[k], rel=1e-15)
+        creepages = [0.0, 0.0, 0.0]
+        creepages[k] = -7e-4
+        assert one_flexibility(*three, *creepages) == pytest.approx(three[k], rel=1e-15)
     assert one_flexibility(*three, 0.0, 0.0, 0.0) == three[0]
     found = one_flexibility(*three, 3e-300, -4e-300, 12e-300)
     assert found == pytest.approx((3.0 * 2.0 + 4.0 * 3.0 + 12.0 * 5.0) / 13.0, rel=1e-14)

@@ -1,4 +1,4 @@
-"""What strips owe to one another, against the half-space and the exact linear theory."""
+"""Interaction of strips, against the half-space and the exact linear theory."""
 
 import numpy as np
 import pytest
@@ -25,12 +25,12 @@ def induced(force_x, force_y, spacing, length):
     return out
 
 
-def test_that_an_infinitely_wide_contact_has_the_materials_moduli():
+def test_infinitely_wide_contact_has_the_moduli_of_the_material():
     assert effective_moduli(1e-6, STEEL) == pytest.approx((110e9, 77e9), rel=1e-4)
     assert effective_moduli(1e3, STEEL) == effective_moduli(50.0, STEEL)
 
 
-def test_that_an_ellipse_of_strips_is_its_own_equivalent():
+def test_ellipse_is_its_own_equivalent_ellipse():
     n, a, b = 400, 1e-4, 1.3e-3
     y = (np.arange(n) - 0.5 * (n - 1)) * 2.0 * b / n
     half_length = a * np.sqrt(1.0 - (y / b) ** 2)
@@ -43,7 +43,7 @@ def test_that_an_ellipse_of_strips_is_its_own_equivalent():
 @pytest.mark.bench
 @pytest.mark.parametrize("ratio", [0.05, 0.1, 0.2])
 @pytest.mark.parametrize("nu", [0.0, 0.25, 0.5])
-def test_that_small_creepage_meets_kalkers_coefficients(nu, ratio):
+def test_small_creepage_meets_kalkers_coefficients(nu, ratio):
     exact = rows("kalker_coefficients", nu=nu, a_over_b=ratio)[0]
     n, a, shear = 256, 1e-4, 80e9
     b = a / ratio
@@ -63,7 +63,7 @@ def test_that_small_creepage_meets_kalkers_coefficients(nu, ratio):
         return -np.array([out.force_x.sum(), out.force_y.sum(), moment]) * spacing / shear
 
     size, spin = 1e-3, 1.0
-    # moving along and across at once, so that strips couple
+    # longitudinal and lateral creepage together, so that the strips interact
     both = found(size, size, 0.0) / (a * b * size)
     assert both[0] == pytest.approx(exact["C11"], rel=0.02)
     assert both[1] == pytest.approx(exact["C22"], rel=0.02)
@@ -74,7 +74,7 @@ def test_that_small_creepage_meets_kalkers_coefficients(nu, ratio):
 
 
 @pytest.mark.parametrize(("adhering", "source", "target"), [(0.0, 0, 0), (1.0, -1, 1)])
-def test_that_induced_slip_is_that_of_the_half_space(adhering, source, target):
+def test_induced_slip_is_that_of_the_half_space(adhering, source, target):
     # forces 1 - (y/b)^2, spread along x elliptically, or as in adhesion: sqrt((1 - s)/(1 + s)),
     # and (1 + s) for the weight of slip in the force of a strip that adheres
     a, b, n = 1.0, 12.0, 480
@@ -104,7 +104,7 @@ arrays = st.lists(st.floats(-1e5, 1e5), min_size=60, max_size=60).map(np.array)
 
 
 @given(arrays, st.floats(0.05, 5.0))
-def test_that_induced_slip_moves_power_and_adds_none(forces, length):
+def test_induced_slip_conserves_the_total_power(forces, length):
     force_x, force_y = np.ascontiguousarray(forces[::2]), np.ascontiguousarray(forces[1::2])
     found = induced(force_x, force_y, 1.0, length)
     passed = force_x * found[0] + force_y * found[1]

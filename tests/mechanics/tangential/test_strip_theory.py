@@ -55,7 +55,7 @@ def errors(found):
     ("kind", "rms", "worst", "row_error"),
     [("paper", 5e-4, 1.2e-3, 3e-3), ("partial", 2.2e-3, 6.5e-3, 5e-3)],
 )
-def test_that_random_inputs_dissipate_like_the_exact_theory(kind, rms, worst, row_error):
+def test_power_for_random_inputs_meets_the_exact_theory(kind, rms, worst, row_error):
     powers, distances = [], []
     y_over_b, dissipation = strips_of(kind)
     for row, exact in zip(rows("rig_random", kind=kind), dissipation, strict=True):
@@ -71,7 +71,7 @@ def test_that_random_inputs_dissipate_like_the_exact_theory(kind, rms, worst, ro
     assert np.max(distances) < 0.03
 
 
-def test_that_hard_cases_on_wide_patches_dissipate_like_the_exact_theory():
+def test_power_of_hard_cases_on_wide_patches_meets_exact_theory():
     powers = []
     for row in rows("hard_cases"):
         if row["b_m"] >= 2.99 * row["a_m"]:
@@ -84,7 +84,7 @@ def test_that_hard_cases_on_wide_patches_dissipate_like_the_exact_theory():
 
 
 @pytest.mark.parametrize("row", rows("mean_problem"), ids=lambda row: row["case"])
-def test_that_forces_and_power_of_the_rig_are_those_of_the_exact_theory(row):
+def test_forces_and_power_of_the_rig_meet_the_exact_theory(row):
     patch = [MEAN[key] for key in ("a_m", "b_m", "N_N", "mu")]
     y, found = solve_row(*patch, row)
     spacing = y[1] - y[0]
@@ -98,12 +98,12 @@ noise = st.lists(st.floats(-1.0, 1.0), min_size=40, max_size=40).map(np.array)
 
 
 @given(creepages, creepages, creepages, noise, st.floats(1.0, 50.0), st.booleans())
-def test_that_work_is_that_of_the_rigid_slip_and_never_negative(
-    longitudinal, lateral, spin, uneven, width, apart
+def test_work_is_that_of_the_rigid_slip_and_not_negative(
+    longitudinal, lateral, spin, uneven, width, two_patches
 ):
     a, friction = 1.4e-4, 0.2 + 0.15 * uneven[::-1].copy()
     y, half_length, line_load = ellipse(a, a * width, 300.0, strips=40)
-    if apart:
+    if two_patches:
         line_load[17:22] = 0.0
     spin /= a * width
     slip_x = longitudinal * (1.0 + 0.5 * uneven) - spin * y
@@ -116,7 +116,7 @@ def test_that_work_is_that_of_the_rigid_slip_and_never_negative(
 
 
 @given(creepages, creepages, creepages)
-def test_that_a_mirrored_contact_has_mirrored_strips(longitudinal, lateral, spin):
+def test_mirrored_contact_has_mirrored_strips(longitudinal, lateral, spin):
     y, half_length, line_load = ellipse(1.4e-4, 1.5e-3, 300.0, strips=40)
     line_load, spin = line_load * (1.0 + 300.0 * y), spin / 1.5e-3
     first = solve(half_length, line_load, 0.2, longitudinal - spin * y, lateral, spin, y[1] - y[0])
@@ -138,29 +138,29 @@ def test_that_a_mirrored_contact_has_mirrored_strips(longitudinal, lateral, spin
 
 
 @pytest.mark.parametrize("longitudinal", [1e-4, 4e-4, 8e-4, 2e-3])
-def test_that_leaving_out_what_longitudinal_creepage_alone_induces_changes_little(longitudinal):
+def test_neglected_induced_slip_of_longitudinal_creepage_is_small(longitudinal):
     y, half_length, line_load = ellipse(1.4e-4, 1.5e-3, 300.0)
     slip_x = np.full(len(y), longitudinal)
-    alone, slight = (
+    single, slight = (
         solve(half_length, line_load, 0.1, slip_x, lateral, 0.0, y[1] - y[0])
         for lateral in (0.0, 1e-12)
     )
-    assert not alone.force_y.any()
-    assert slight.work.sum() == pytest.approx(alone.work.sum(), rel=6e-4)
-    assert np.linalg.norm(slight.work - alone.work) < 2e-3 * np.linalg.norm(alone.work)
+    assert not single.force_y.any()
+    assert slight.work.sum() == pytest.approx(single.work.sum(), rel=6e-4)
+    assert np.linalg.norm(slight.work - single.work) < 2e-3 * np.linalg.norm(single.work)
 
 
-def test_that_patches_far_apart_know_nothing_of_one_another():
+def test_distant_patches_are_independent():
     y, half_length, line_load = ellipse(1e-4, 1e-3, 200.0, strips=50)
     gap = np.zeros(600)
     both = [np.concatenate([values, gap, values]) for values in (half_length, line_load)]
     slip_x = np.full(700, 5e-4)
     found = solve(*both, 0.2, slip_x, 4e-4, 0.0, y[1] - y[0])
-    alone = solve(half_length, line_load, 0.2, slip_x[:50].copy(), 4e-4, 0.0, y[1] - y[0])
-    np.testing.assert_allclose(found.work[:50], alone.work, rtol=2e-3)
+    single = solve(half_length, line_load, 0.2, slip_x[:50].copy(), 4e-4, 0.0, y[1] - y[0])
+    np.testing.assert_allclose(found.work[:50], single.work, rtol=2e-3)
 
 
-def test_that_no_friction_and_no_creepage_dissipate_nothing():
+def test_no_dissipation_without_friction_or_creepage():
     y, half_length, line_load = ellipse(1e-4, 1e-3, 200.0, strips=50)
     slip_x = np.full(50, 5e-4)
     slippery = solve(half_length, line_load, 0.0, slip_x, 1e-4, 0.3, y[1] - y[0])
@@ -173,20 +173,20 @@ def test_that_no_friction_and_no_creepage_dissipate_nothing():
 
 
 @pytest.mark.parametrize(("lateral", "spin"), [(0.0, 0.0), (3e-4, 0.5), (1e-4, 20.0)])
-def test_that_strips_without_friction_or_load_carry_nothing_and_harm_no_other(lateral, spin):
+def test_strips_without_friction_or_load_do_not_affect_others(lateral, spin):
     y, half_length, line_load = ellipse(1e-4, 1e-3, 200.0, strips=50)
     slip_x, friction = 3e-4 - spin * y, np.full(50, 0.1)
     friction[20:30] = 0.0
     found = solve(half_length, line_load, friction, slip_x, lateral, spin, y[1] - y[0])
     assert not np.array(found)[:5, 20:30].any()
     assert np.all(found.work[:20] > 0.0)
-    # what strips beside the contact hold of an earlier one counts for nothing
-    room, rest = np.zeros(3), np.full(3, 7e-5)
+    # values of an earlier contact in strips outside the contact are ignored
+    zeros, leftover = np.zeros(3), np.full(3, 7e-5)
     wider = solve(
-        np.concatenate([rest, half_length, rest]),
-        np.concatenate([room, line_load, room]),
-        np.concatenate([room, friction, room]),
-        np.concatenate([rest, slip_x, rest]),
+        np.concatenate([leftover, half_length, leftover]),
+        np.concatenate([zeros, line_load, zeros]),
+        np.concatenate([zeros, friction, zeros]),
+        np.concatenate([leftover, slip_x, leftover]),
         lateral,
         spin,
         y[1] - y[0],
@@ -195,7 +195,7 @@ def test_that_strips_without_friction_or_load_carry_nothing_and_harm_no_other(la
     assert not np.array(wider)[:5, [0, 1, 2, -3, -2, -1]].any()
 
 
-def test_that_contacts_are_the_sums_of_their_strips():
+def test_contact_totals_are_the_sums_over_strips():
     y, half_length, line_load = ellipse(1.4e-4, 1.5e-3, 300.0, strips=60)
     spacing, speed, friction = y[1] - y[0], 2.6, np.full(60, 0.2)
     longitudinal, lateral, spin = 3e-4, 4e-4, 0.6
