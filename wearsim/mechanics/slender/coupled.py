@@ -3,7 +3,7 @@
 The gap of contact k opens by the wear that all contacts cause on its bodies,
 
     sum_j W_ij(a_j) q_j + c_i q_i + D_i + z_i = delta_k,   D_i = sum over its bodies and all l of
-    their contacts c_l,i q_l,i,
+    their contacts c_l,i q_l,i.
 
 Each step of Newton's method consists of the steps of the separate contacts (`newton`), which
 `body_elimination` turns into the coupled step.

@@ -29,7 +29,7 @@ from wearsim.mechanics.tangential.strip_with_spin import (
 )
 from wearsim.types import FloatArray
 
-_STEP_RATIO = 5  # steps of FASTSIM per step here: the direction alone is a smooth function
+_STEP_RATIO = 5  # steps of FASTSIM per step here, as the direction is a smoother function
 
 
 @kernel

@@ -131,7 +131,7 @@ def beyond_strip_theory(
 def strip_of(
     j: int, half_length: FloatArray, bound_peak: FloatArray, motion: Motion, moduli: Moduli
 ) -> Strip:
-    """Return the `Strip` with number `j`.
+    """Return strip `j` with its shift and the traction's direction at the onset of slip.
 
     Parameters
     ----------
