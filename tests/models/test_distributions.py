@@ -166,7 +166,7 @@ def test_that_a_table_of_quantiles_is_linear_between_them() -> None:
     ("text", "told"),
     [
         ("probability, value\n0.1, 1\n1, 2\n", "must go from 0 to 1, got 0.1 to 1"),
-        ("probability, value\n0, 3\n1, 2\n", "column 'value' must not fall, got 2 after 3"),
+        ("probability, value\n0, 3\n1, 2\n", "column 'value' must not decrease, got 2 after 3"),
         ("probability, value\n0, 3\n0, 4\n1, 5\n", "column 'probability' must increase"),
         ("value [N]\n1\n2\n", "a plain number has no unit"),
         ("number\n1\n2\n", "column 'value' is missing"),
@@ -198,12 +198,12 @@ def test_that_a_bad_table_is_told(text: str, told: str) -> None:
         ("lognormal", None, {"mean": 1.0, "factor": 2.0}, "got mean and factor"),
         ("lognormal", None, {}, "expected either mean and std, or median and factor"),
         ("lognormal", None, {"median": 1.0, "factor": 1.0}, "greater than 1"),
-        ("uniform", None, {"low": 2.0, "high": 2.0}, "must lie above the lower one, got 2 to 2"),
+        ("uniform", None, {"low": 2.0, "high": 2.0}, "must be above the lower one, got 2 to 2"),
         (
             "truncated-normal",
             None,
             {"parent_mean": 0.0, "parent_std": 1.0, "support": ["inf", 0.0]},
-            "must lie above",
+            "must be above",
         ),
     ],
 )

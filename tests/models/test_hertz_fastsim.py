@@ -645,7 +645,7 @@ def test_that_the_fields_know_friction_that_differs_from_point_to_point():
     assert force == pytest.approx(solution.force_x, rel=1e-4)
     bound = friction[::-1] * 4.0 / 3.0 * fields.pressure[:-1]
     assert np.all(np.hypot(fields.traction_x, fields.traction_y)[:-1] <= bound + 1e-3)
-    with pytest.raises(CapabilityError, match="no one field inside"):
+    with pytest.raises(CapabilityError, match="no stationary field inside"):
         model.fields(solution, gap, RIG[0], replace(local, friction_carried=True))
     with pytest.raises(CapabilityError, match="without a bearing torque"):
         model.solve(gap, RIG[0], replace(local, bearing_torque=0.1, rolling_radius=np.ones(50)))

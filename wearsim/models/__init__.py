@@ -1,4 +1,4 @@
-"""The built-in models, laws, loads and random inputs, registered through everyone's hooks."""
+"""Built-in contact models, wear laws, loads and random inputs, registered by the plugin hooks."""
 
 from __future__ import annotations
 

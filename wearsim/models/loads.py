@@ -30,7 +30,7 @@ class SpringOptions(ConstantOptions):
     """Options of the load `spring`."""
 
     stiffness: NonNegativeStiffness = Field(
-        description="load lost per depth the roller sinks into worn material, e.g. '690 N/mm'"
+        description="decrease of the load per worn depth, e.g. '690 N/mm'"
     )
 
 
@@ -39,19 +39,21 @@ class RecordedOptions(Options):
 
     file: InputFile = Field(description="CSV with columns such as 'time [min]', 'load [N]'")
     stiffness: NonNegativeStiffness = Field(
-        0.0, description="load lost per depth besides, where the log does not show it already"
+        0.0, description="decrease of the load per worn depth, if the log does not include it"
     )
 
 
 class ThermalOptions(Options):
     """Options of the load term `thermal`."""
 
-    gain: PerPower = Field(description="load gained per dissipated power at rest, e.g. '50 N/W'")
-    time_constant: PositiveDuration = Field(description="time to 63 % of it, e.g. '20 min'")
+    gain: PerPower = Field(description="steady-state load per dissipated power, e.g. '50 N/W'")
+    time_constant: PositiveDuration = Field(
+        description="time to 63 % of the steady state, e.g. '20 min'"
+    )
 
 
 class ConstantLoad(Load):
-    """The same load at all times, less what a mounting spring loses as its roller sinks."""
+    """Constant load, with the stiffness of the mounting spring if there is one."""
 
     def __init__(self, options: ConstantOptions) -> None:
         self._force = options.normal_force
@@ -67,7 +69,7 @@ class ConstantLoad(Load):
 
 
 class RecordedLoad(Load):
-    """A logged load, linear between its samples and integrated exactly."""
+    """Logged load, linear between its samples and integrated exactly."""
 
     def __init__(self, options: RecordedOptions) -> None:
         columns = read_columns(
@@ -90,7 +92,7 @@ class RecordedLoad(Load):
         return self._log.mean(start, stop)
 
     def extremes(self, start: float, stop: float) -> tuple[float, float]:
-        """Return the exact least and greatest load between two times [s] [N]."""
+        """Return the exact minimum and maximum load between two times [s] [N]."""
         return self._log.extremes(start, stop)
 
     def deviation(self, start: float, stop: float) -> float:
@@ -99,9 +101,9 @@ class RecordedLoad(Load):
 
 
 class ThermalTerm(LoadTerm):
-    """Load from thermal expansion: it follows gain x power with a first-order lag.
+    """Load from thermal expansion, a first-order lag of gain x power.
 
-    The parts between mount and contact grow with temperature, which follows the dissipated power
+    The parts between mount and contact expand with temperature, which follows the dissipated power
     (section 2.2 of the paper, DOI 10.1016/j.wear.2004.11.012).
     """
 
@@ -115,9 +117,8 @@ class ThermalTerm(LoadTerm):
         return target + (state - target) * math.exp(-duration / self.time_constant)
 
     def mean_force(self, state: FloatArray, power: FloatArray, duration: float) -> FloatArray:
-        """Return the term's exact mean over that time, shape (rollers,) [N]."""
-        target = self.gain * power
-        ratio = duration / self.time_constant
+        """Return the exact mean of the term over `duration` [s], shape (rollers,) [N]."""
+        target, ratio = self.gain * power, duration / self.time_constant
         part = -math.expm1(-ratio) / ratio if ratio > 0.0 else 1.0
         return target + (state - target) * part
 
@@ -133,13 +134,13 @@ SPECS = (
         name="constant",
         factory=ConstantLoad,
         options=ConstantOptions,
-        summary="the same load at all times",
+        summary="a constant load",
     ),
     LoadSpec(
         name="spring",
         factory=ConstantLoad,
         options=SpringOptions,
-        summary="a preload that a mounting spring loses as the roller sinks in",
+        summary="a preload that decreases with worn depth by the stiffness of the mounting spring",
         references=_PAPER,
     ),
     LoadSpec(
@@ -153,7 +154,7 @@ SPECS = (
         factory=ThermalTerm,
         options=ThermalOptions,
         role="term",
-        summary="load that follows the dissipated power with a first-order lag",
+        summary="a first-order lag of the dissipated power",
         references=_PAPER,
     ),
 )

@@ -1,4 +1,4 @@
-"""The ellipse in strips of any shape, for theories that take flexibility from Kalker's ellipse."""
+"""Equivalent ellipse of strips, for theories whose flexibilities are those of an ellipse."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from wearsim.mechanics.tangential.kalker_coefficients import Flexibilities, one_
 from wearsim.models.tangential.base import LocalSlip, Strips, load_weighted_mean
 from wearsim.types import FloatArray
 
-# covered less than this, a strip's load is all round-off and the square of its half-length zero
+# below this coverage the load of a strip is round-off and the square of its half-length zero
 _SLIVER = 1e-12
 
 
@@ -28,9 +28,9 @@ class EllipseStrips(Strips):
     ellipse : HertzContact
         The patch.
     from_centre : ndarray, shape (strips,)
-        Distance of the middle of each strip's covered part from the patch's centre [m].
+        Distance of the middle of the covered part from the centre of the patch [m].
     coverage : ndarray, shape (strips,)
-        Part of each strip that the patch covers, 0 to 1; sums over a strip are weighted with it.
+        Fraction of each strip covered by the patch, the weight of integrals over a strip.
     """
 
     ellipse: HertzContact
@@ -40,8 +40,8 @@ class EllipseStrips(Strips):
     def whole(self) -> Strips:
         """Return strips that carry their loads over their whole width.
 
-        Where the patch covers a part of a strip the half-length falls as its root, which is what
-        the strip's load presses together. A strip that the patch hardly reaches carries nothing.
+        The half-length of a partly covered strip is reduced by the square root of its coverage,
+        which is the half-length that its load produces. A coverage of round-off counts as zero.
         """
         reached = (self.coverage > _SLIVER) & (self.half_length > 0.0) & (self.line_load > 0.0)
         return Strips(
@@ -57,16 +57,16 @@ class EllipseStrips(Strips):
 
 
 def covered_share(strips: Strips) -> FloatArray | float:
-    """Return the part of each strip that is in contact, which weights sums over a strip."""
+    """Return the fraction of each strip in contact, the weight of integrals over a strip."""
     return strips.coverage if isinstance(strips, EllipseStrips) else 1.0
 
 
 def equivalent_ellipse(strips: Strips) -> tuple[float, float]:
-    """Return the semi-axes a and b [m] of the ellipse whose flexibilities the strips get.
+    """Return the semi-axes a and b [m] of the ellipse whose flexibilities the strips have.
 
-    Its half-length a is the greatest of the strips', and its area is theirs: b = area/(pi a). So
-    b changes smoothly as strips come into contact, and a gap between two patches counts for
-    nothing. An ellipse gives itself.
+    a is the largest half-length of the strips, and the area is theirs: b = area/(pi a). Hence b
+    changes smoothly as strips come into contact, and a gap between two patches has no effect. The
+    equivalent ellipse of an ellipse is the ellipse itself.
     """
     if isinstance(strips, EllipseStrips):
         return strips.ellipse.a, strips.ellipse.b
@@ -78,8 +78,8 @@ def equivalent_ellipse(strips: Strips) -> tuple[float, float]:
 def peak_pressure(strips: Strips, *, elliptic: bool) -> FloatArray:
     """Return the elliptic or parabolic pressure at x = 0, shape (strips,) [Pa].
 
-    On an ellipse the parabolic one is Kalker's paraboloid; on other strips both carry the strip's
-    own line load.
+    On an ellipse the parabolic pressure is Kalker's paraboloid; otherwise both pressures have the
+    line load of each strip.
     """
     if isinstance(strips, EllipseStrips):
         patch = strips.ellipse
@@ -94,10 +94,10 @@ def peak_pressure(strips: Strips, *, elliptic: bool) -> FloatArray:
 
 
 def single_flexibility(strips: Strips, flexibility: Flexibilities, slip: LocalSlip) -> float:
-    """Return the one flexibility [m/Pa] that stands for three under the strips' creepage.
+    """Return the single flexibility [m/Pa] that replaces Kalker's three at this creepage.
 
-    Longitudinal creepage counts with its mean magnitude, spin with sqrt(ab) of the equivalent
-    ellipse.
+    The weights are the mean magnitude of the longitudinal creepage, the lateral creepage and the
+    spin times sqrt(ab) of the equivalent ellipse.
     """
     a, b = equivalent_ellipse(strips)
     return one_flexibility(
@@ -111,6 +111,6 @@ def single_flexibility(strips: Strips, flexibility: Flexibilities, slip: LocalSl
 
 
 def touching(strips: Strips) -> slice:
-    """Return the strips from the first to the last in contact."""
+    """Return the slice from the first to the last strip in contact."""
     inside = np.flatnonzero(strips.half_length > 0.0)
     return slice(int(inside[0]), int(inside[-1]) + 1)

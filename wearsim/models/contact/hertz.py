@@ -1,4 +1,4 @@
-"""The contact model `hertz`, and the normal contact that it shares with `hertz-fastsim`."""
+"""The contact model `hertz`, and the normal contact of `hertz-fastsim`."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from wearsim.models.tangential.base import (
     Strips,
     TangentialTheory,
     complete,
+    fields_inside,
     friction_per_strip,
-    inside,
     power_not_finite,
 )
 from wearsim.models.tangential.options import TangentialOptions, tangential_theory
@@ -40,7 +40,7 @@ LIMIT = 200
 
 
 class Patch(Options):
-    """A prescribed contact ellipse."""
+    """Prescribed contact ellipse."""
 
     a: PositiveLength = Field(description="half-length along rolling")
     b: PositiveLength = Field(description="half-length across rolling")
@@ -53,21 +53,21 @@ class HertzOptions(TangentialOptions):
 
 
 class HertzModel(ContactModel):
-    """Exact Hertz on the grid's strips, with any theory for the tractions.
+    """Exact Hertzian contact on the strips of a grid, with any tangential theory.
 
-    On a worn profile the lateral curvature and the centre are those of the parabola fitted to the
-    gap over the patch by least squares, weighted with ``1 - ((y - yc)/b)^2``; patch and fit are
-    repeated until they agree to 1e-10. A prescribed patch is centred on the vertex of the parabola
-    fitted in the same way to as much of the gap as lies evenly about that vertex.
+    On a worn profile the lateral curvature and the centre are those of a parabola fitted to the
+    gap over the patch by least squares with the weights ``1 - ((y - yc)/b)^2``; patch and fit are
+    iterated to a relative change of 1e-10. A prescribed patch is centred on the vertex of the
+    parabola fitted with these weights to the largest interval symmetric about the vertex.
 
     Parameters
     ----------
     theory : TangentialTheory
-        Finds the tractions.
+        Theory of the tangential contact.
     my : int
         Strips across the patch of a single contact.
     patch : Patch, optional
-        Contact ellipse to use instead of Hertz's.
+        Contact ellipse that replaces the Hertzian one.
     """
 
     name: ClassVar[str] = "hertz"
@@ -81,7 +81,7 @@ class HertzModel(ContactModel):
         self.patch = patch
 
     def prepare(self, grid: Grid, materials: tuple[Material, Material]) -> None:
-        """Take the strips and the two bodies' materials."""
+        """Set the strips and the materials of both bodies."""
         self._grid = grid
         self._pair: ElasticPair = combine(*materials)
 
@@ -92,7 +92,7 @@ class HertzModel(ContactModel):
         normal_force: float,
         materials: tuple[Material, Material],
     ) -> Grid | None:
-        """Return `my` strips that span the patch exactly."""
+        """Return `my` strips over the width of the patch."""
         if self.patch is not None:
             b = self.patch.b
         else:
@@ -108,18 +108,19 @@ class HertzModel(ContactModel):
         wear_compliance: FloatArray | None = None,
         warm: ContactSolution | None = None,
     ) -> ContactSolution:
-        """Solve one contact; `warm` is of no use to it, so that a solution has one value only.
+        """Solve one contact; `warm` is not used.
 
         Raises
         ------
         ContactError
-            If the gap's curvature over the patch is not positive, the patch leaves the strips or
-            holds too few of them, the fit does not settle, or a value is not finite.
+            If the curvature of the gap over the patch is not positive, the patch extends beyond
+            the strips or covers too few of them, the fit does not converge, or a value is not
+            finite.
         CapabilityError
-            If a wear compliance is given, or friction that the model does not take.
+            If a wear compliance is given, or friction that the model does not support.
         """
         self._refuse(wear_compliance)
-        if not np.isfinite(point.friction).all():  # a closed form would take it for none
+        if not np.isfinite(point.friction).all():  # a closed form would return zero traction
             raise power_not_finite(point, gap=gap)
         strips = self._theory_strips(gap, longitudinal_curvature, point)
         return complete(self.theory, strips, self._pair, point)
@@ -132,14 +133,20 @@ class HertzModel(ContactModel):
         point: OperatingPoint,
         points_along: int = 101,
     ) -> ContactFields:
-        """Return tractions and slip inside a solved contact."""
+        """Return pressure, traction and slip in a solved contact."""
         strips = self._theory_strips(gap, longitudinal_curvature, point)
-        friction = self._friction(strips, point)
-        creepage = solution.longitudinal_creepage
-        return inside(self.theory, strips, self._pair, point, creepage, points_along, friction)
+        return fields_inside(
+            self.theory,
+            strips,
+            self._pair,
+            point,
+            solution.longitudinal_creepage,
+            points_along,
+            self._friction(strips, point),
+        )
 
     def _friction(self, strips: Strips, point: OperatingPoint) -> FloatArray:
-        """Return friction as the fields of the theory take it."""
+        """Return the friction coefficients of the fields."""
         return friction_per_strip(strips, point)
 
     def _refuse(self, wear_compliance: FloatArray | None) -> None:
@@ -152,14 +159,14 @@ class HertzModel(ContactModel):
     def _theory_strips(
         self, gap: FloatArray, longitudinal_curvature: float, point: OperatingPoint
     ) -> Strips:
-        """Return the strips of the patch as the tangential theory takes them."""
+        """Return the strips of the patch in the form that the tangential theory supports."""
         strips = self._strips(gap, longitudinal_curvature, point)
         return strips if self.theory.knows_ellipses else strips.whole()
 
     def _strips(
         self, gap: FloatArray, longitudinal_curvature: float, point: OperatingPoint
     ) -> EllipseStrips:
-        """Solve the normal problem and cut its patch into the grid's strips."""
+        """Solve the normal problem and divide its patch into the strips of the grid."""
         gap = np.require(gap, np.float64, ["C", "W"])
         _check(gap, longitudinal_curvature, point.normal_force)
         if self.patch is None:
@@ -170,10 +177,10 @@ class HertzModel(ContactModel):
             patch, centre, height = self._prescribed(self.patch, gap, point.normal_force)
             iterations = 0
         y, spacing = self._grid.y, self._grid.spacing
-        reach = (1.0 - 1e-9) * patch.b  # a grid cut to the patch holds it
+        reach = (1.0 - 1e-9) * patch.b  # a grid of the width of the patch contains it
         first, last = float(y[0]) - 0.5 * spacing, float(y[-1]) + 0.5 * spacing
         if centre - reach < first or centre + reach > last:
-            raise self._leaves(centre, patch.b, {"gap": gap, "normal_force": point.normal_force})
+            raise self._too_wide(centre, patch.b, {"gap": gap, "normal_force": point.normal_force})
         edges = np.append(y - 0.5 * spacing, last) - centre
         inner = np.clip(edges, -patch.b, patch.b)
         middle = 0.5 * (inner[1:] + inner[:-1])
@@ -195,7 +202,7 @@ class HertzModel(ContactModel):
     def _fitted(
         self, gap: FloatArray, longitudinal_curvature: float, normal_force: float
     ) -> tuple[HertzContact, float, float, int]:
-        """Return the patch that its own fit makes, its centre, the gap there and the iterations."""
+        """Return the converged patch, its centre, the fitted gap there and the iterations."""
         y = self._grid.y
         curvature, b, centre, height, iterations, status = parabola_fit.hertz_on_profile(
             y,
@@ -215,11 +222,12 @@ class HertzModel(ContactModel):
             "iterations": iterations,
         }
         if status == parabola_fit.LEAVES_STRIPS:
-            raise self._leaves(centre, b, state)
+            raise self._too_wide(centre, b, state)
         if status != parabola_fit.CONVERGED:
             raise _failure(status, state, self._grid.spacing)
-        modulus = self._pair.contact_modulus
-        patch = hertz(0.5 * longitudinal_curvature, curvature, normal_force, modulus)
+        patch = hertz(
+            0.5 * longitudinal_curvature, curvature, normal_force, self._pair.contact_modulus
+        )
         return patch, centre, height, iterations
 
     def _prescribed(
@@ -235,12 +243,12 @@ class HertzModel(ContactModel):
         ellipse = given_ellipse(patch.a, patch.b, normal_force, self._pair.contact_modulus)
         return ellipse, centre, height
 
-    def _leaves(self, centre: float, b: float, state: Mapping[str, Any]) -> ContactError:
+    def _too_wide(self, centre: float, b: float, state: Mapping[str, Any]) -> ContactError:
         y, half = self._grid.y, 0.5 * self._grid.spacing
         return ContactError(
-            f"the Hertz patch, {(centre - b) * 1e3:.4g} to {(centre + b) * 1e3:.4g} mm, leaves its"
-            f" strips, which span {(y[0] - half) * 1e3:.4g} to {(y[-1] + half) * 1e3:.4g} mm;"
-            " raise contact.width or move contact.centre",
+            f"the Hertz patch, {(centre - b) * 1e3:.4g} to {(centre + b) * 1e3:.4g} mm, extends"
+            f" beyond its strips, which span {(y[0] - half) * 1e3:.4g} to"
+            f" {(y[-1] + half) * 1e3:.4g} mm; raise contact.width or move contact.centre",
             dict(state),
         )
 
@@ -248,15 +256,15 @@ class HertzModel(ContactModel):
 def _check(gap: FloatArray, longitudinal_curvature: float, normal_force: float) -> None:
     state = {"gap": gap, "normal_force": normal_force}
     if not np.isfinite(gap).all():
-        raise ContactError("the gap holds a value that is not finite", state)
+        raise ContactError("the gap has a value that is not finite", state)
     if not (normal_force > 0.0 and math.isfinite(normal_force)):
         raise ContactError(
             f"the contact is lost: its load is {normal_force:.4g} N; raise the load", state
         )
     if not (longitudinal_curvature > 0.0 and math.isfinite(longitudinal_curvature)):
         raise ContactError(
-            f"the relative curvature along rolling is {longitudinal_curvature:.4g} 1/m and must be"
-            " positive; check the radii",
+            f"the relative curvature along rolling is {longitudinal_curvature:.4g} 1/m, expected a"
+            " positive value; check the radii",
             state,
         )
 
@@ -266,31 +274,27 @@ def _failure(status: int, state: Mapping[str, Any], spacing: float) -> ContactEr
     if status == parabola_fit.NO_CURVATURE:
         text = (
             f"the gap's fitted curvature over {width:.4g} mm is {state['curvature']:.4g} 1/m, and"
-            " Hertz needs it positive: the profile is worn past what one parabola can stand for;"
+            " Hertz needs it positive: no parabola approximates the worn profile;"
             " use contact.model = 'slender'"
         )
     elif status == parabola_fit.TOO_FEW_STRIPS:
         text = (
-            f"the patch, {width:.4g} mm wide, holds fewer than three strips of"
-            f" {spacing * 1e3:.4g} mm, and no parabola can be fitted; raise contact.strips"
+            f"the patch, {width:.4g} mm wide, covers fewer than three strips of"
+            f" {spacing * 1e3:.4g} mm, too few to fit a parabola; raise contact.strips"
         )
     else:
         text = (
-            f"the patch and the parabola fitted over it did not agree after {LIMIT} tries;"
+            f"the patch and the parabola fitted over it did not converge in {LIMIT} iterations;"
             " use contact.model = 'slender'"
         )
     return ContactError(text, dict(state))
 
 
-def _build(options: HertzOptions) -> HertzModel:
-    return HertzModel(tangential_theory(options), options.my)
-
-
 SPEC = ContactModelSpec(
     name="hertz",
-    factory=_build,
+    factory=lambda options: HertzModel(tangential_theory(options), options.my),
     options=HertzOptions,
     capabilities=HertzModel.capabilities,
-    summary="exact Hertz, refitted as the profile wears, with any tangential theory",
+    summary="exact Hertz, fitted to the worn profile, with any tangential theory",
     references=("Johnson (1985), Contact Mechanics, DOI 10.1017/CBO9781139171731",),
 )

@@ -1,4 +1,4 @@
-"""The contact model `hertz-fastsim`: exact Hertz and Kalker's FASTSIM, as the paper has it."""
+"""The contact model `hertz-fastsim`: exact Hertz and Kalker's FASTSIM, the model of the paper."""
 
 from __future__ import annotations
 
@@ -11,9 +11,15 @@ from pydantic import Field
 
 from wearsim.contact_batch import BatchSolution, OperatingPoints
 from wearsim.errors import CapabilityError, ContactError
+from wearsim.mechanics.hertz.parabola_fit import CONVERGED
+from wearsim.mechanics.hertz.patches import Bodies, Patches, find_patches, half_lengths
+from wearsim.mechanics.tangential.hertz_fastsim_batch import (
+    ContactInputs,
+    ContactResults,
+    solve_contacts,
+)
 from wearsim.mechanics.tangential.kalker_coefficients import CreepageCoefficients
 from wearsim.models.contact.hertz import LIMIT, TOLERANCE, HertzModel, Patch
-from wearsim.models.contact.hertz_fastsim_batch import HertzFastsimBatch
 from wearsim.models.tangential.base import Strips, power_not_finite
 from wearsim.models.tangential.fastsim import (
     Bound,
@@ -25,7 +31,7 @@ from wearsim.models.tangential.fastsim import (
 )
 from wearsim.plugins import Capabilities, ContactModelSpec, Options
 from wearsim.plugins.contact_model import naming_contact
-from wearsim.types import ContactSolution, FloatArray, Grid, Material, OperatingPoint
+from wearsim.types import ContactSolution, FloatArray, Grid, IntArray, Material, OperatingPoint
 
 
 class KalkerCoefficients(Options):
@@ -50,8 +56,8 @@ class HertzFastsimOptions(Options):
     )
     closed_form: ClosedForm = Field(
         "exact",
-        description="integrate instead of marching: exact (where there is no spin), always (with"
-        " spin, its part along rolling left out: fast, 0.2 % rms in power) or never",
+        description="integrate in closed form instead of marching: exact (without spin), always"
+        " (neglects the lateral slip of spin along rolling: fast, 0.2 % rms in power) or never",
     )
     flexibility: Flexibility = Field(
         "three", description="flexibilities: Kalker's three, or one weighted by the creepages"
@@ -61,20 +67,20 @@ class HertzFastsimOptions(Options):
         description="creepage coefficients: Kalker's table, or line-limit (long contacts)",
     )
     kalker_coefficients: KalkerCoefficients | None = Field(
-        None, description="creepage coefficients to use instead: c11, c22, c23"
+        None, description="prescribed creepage coefficients instead: c11, c22, c23"
     )
     patch: Patch | None = Field(
-        None, description="contact ellipse to use instead of Hertz's: a, b; the load sets p0"
+        None, description="prescribed contact ellipse instead of Hertz's: a, b; p0 from the load"
     )
 
 
 class HertzFastsim(HertzModel):
-    """Exact Hertz on the grid's strips, with FASTSIM for the tractions.
+    """Exact Hertzian contact on the strips of a grid, with FASTSIM for the tractions.
 
     Parameters
     ----------
     options : HertzFastsimOptions, optional
-        The options; their defaults where left out.
+        The options; by default their defaults.
     """
 
     name: ClassVar[str] = "hertz-fastsim"
@@ -104,10 +110,9 @@ class HertzFastsim(HertzModel):
         super().__init__(theory, self.options.my, self.options.patch)
 
     def prepare(self, grid: Grid, materials: tuple[Material, Material]) -> None:
-        """Take the strips and the two bodies' materials."""
+        """Set the strips and the materials of both bodies."""
         super().prepare(grid, materials)
-        given = (0.0, 0.0) if self.patch is None else (self.patch.a, self.patch.b)
-        self._batch = HertzFastsimBatch(grid, self._pair, self.theory, given, TOLERANCE, LIMIT)
+        self._compiled = self.theory.compiled(self._pair)
 
     def solve(
         self,
@@ -117,15 +122,15 @@ class HertzFastsim(HertzModel):
         wear_compliance: FloatArray | None = None,
         warm: ContactSolution | None = None,
     ) -> ContactSolution:
-        """Solve one contact as `HertzModel` does, or under friction that differs within it.
+        """Solve one contact; friction may vary from point to point.
 
         Raises
         ------
         ContactError
             As `HertzModel.solve`.
         CapabilityError
-            If a wear compliance is given, or a bearing torque where friction differs from point to
-            point.
+            If a wear compliance is given, or a bearing torque with friction that varies from point
+            to point.
         """
         if np.ndim(point.friction) > 1 and point.bearing_torque is None:
             self._refuse(wear_compliance)
@@ -142,46 +147,75 @@ class HertzFastsim(HertzModel):
         wear_compliance: FloatArray | None = None,
         warm: Sequence[ContactSolution] | None = None,
     ) -> BatchSolution:
-        """Solve many contacts in one call of compiled code, as `solve` does to round-off.
+        """Solve many contacts in one call of compiled code; equal to `solve` up to round-off.
 
-        Points under a bearing torque, or of several kinds, are solved one after another.
+        Points with a bearing torque, or of different kinds, are solved one after another.
 
         Raises
         ------
         ContactError, CapabilityError
-            As `solve`, naming the first contact that fails.
+            As `solve`, with the position of the first contact that fails.
         """
         self._refuse(wear_compliance)
         columns = OperatingPoints.of(points)
         if columns is None:
             return super().solve_batch(gap, longitudinal_curvature, points)
-        batch, failed = self._batch.solve(gap, longitudinal_curvature, columns)
-        if failed is not None:
-            raise self._failure_of(failed, gap, longitudinal_curvature, points)
-        return batch
+        shape, strips = gap.shape[:-1], self._grid.strips
+        gaps, row = _distinct_gaps(gap)
+        forces = _usable_loads(columns.normal_force, longitudinal_curvature)
+        self._check_shapes(len(row), columns)
+        patches = _new_patches(len(row))
+        results = ContactResults(*np.zeros((3, len(row), strips)), *np.zeros((5, len(row))))
+        inputs = ContactInputs(
+            forces,
+            _column(columns.longitudinal),
+            _column(columns.lateral),
+            _column(columns.spin),
+            self._friction_array(columns.friction),
+            columns.friction_carried,
+            np.zeros((0, strips)) if columns.variation is None else _column(columns.variation),
+            float(columns.rolling_speed),
+        )
+        bodies = self._bodies(longitudinal_curvature)
+        first_failed = solve_contacts(bodies, self._compiled, gaps, row, inputs, patches, results)
+        if first_failed < len(row):
+            raise self._error_of(first_failed, gap, longitudinal_curvature, points)
+        fields = results._asdict() | {
+            "approach": patches.approach,
+            "peak_pressure": patches.peak_pressure,
+            "longitudinal_creepage": np.array(columns.longitudinal, dtype=np.float64),
+            "iterations": patches.iterations,
+        }
+        shaped = {name: value.reshape(shape + value.shape[1:]) for name, value in fields.items()}
+        return BatchSolution(shape, bodies.y, shaped)
 
     def friction_points(
         self, gap: FloatArray, longitudinal_curvature: float, point: OperatingPoint
     ) -> tuple[FloatArray, FloatArray]:
-        """Return where friction is asked for: where each of the `mx` steps of the march ends."""
+        """Return the points of the friction coefficients: the ends of the `mx` steps."""
         x, y = self.friction_points_batch(gap[None, :], longitudinal_curvature, [point])
         return x[0], y
 
     def friction_points_batch(
         self, gap: FloatArray, longitudinal_curvature: float, points: Sequence[OperatingPoint]
     ) -> tuple[FloatArray, FloatArray]:
-        """Return `friction_points` of every contact, x of shape (contacts, mx, strips)."""
-        if isinstance(points, OperatingPoints):
-            forces = points.normal_force
-        else:
-            forces = np.array([point.normal_force for point in points])
-        half_length, failed = self._batch.half_lengths(gap, longitudinal_curvature, forces)
-        if failed is not None:
-            raise self._failure_of(failed, gap, longitudinal_curvature, points)
+        """Return `friction_points` of all contacts, x of shape (contacts, mx, strips)."""
+        forces = (
+            points.normal_force
+            if isinstance(points, OperatingPoints)
+            else np.array([point.normal_force for point in points])
+        )
+        gaps, row = _distinct_gaps(gap)
+        bodies, patches = self._bodies(longitudinal_curvature), _new_patches(len(row))
+        loads = _usable_loads(forces, longitudinal_curvature)
+        find_patches(bodies, gaps, row, loads, patches)
+        if (patches.status != CONVERGED).any():
+            failed = int(np.argmax(patches.status != CONVERGED))
+            raise self._error_of(failed, gap, longitudinal_curvature, points)
         places = np.linspace(1.0, -1.0, self.options.mx + 1)[1:, None]
-        return places * half_length[:, None, :], self._grid.y
+        return places * half_lengths(bodies, patches, loads)[:, None, :], self._grid.y
 
-    def _failure_of(
+    def _error_of(
         self,
         number: int,
         gap: FloatArray,
@@ -200,15 +234,73 @@ class HertzFastsim(HertzModel):
         return naming_contact(error, number, shape)
 
     def _friction(self, strips: Strips, point: OperatingPoint) -> FloatArray:
-        """Return friction as the fields take it, per strip or per point of the march."""
+        """Return the friction coefficients of the fields, per strip or per point."""
         if np.ndim(point.friction) <= 1:
             return super()._friction(strips, point)
         if point.friction_carried:
             raise CapabilityError(
-                "friction that particles carry through the contact has no one field inside it;"
-                " give friction that stays in the contact (frame = 'contact')"
+                "friction that is carried through the contact has no stationary field inside it;"
+                " give friction that is fixed to the contact (frame = 'contact')"
             )
         return np.asarray(point.friction)
+
+    def _bodies(self, longitudinal_curvature: float) -> Bodies:
+        return Bodies(
+            _column(self._grid.y),
+            float(self._grid.spacing),
+            0.5 * float(longitudinal_curvature),
+            self._pair.contact_modulus,
+            *((0.0, 0.0) if self.patch is None else (self.patch.a, self.patch.b)),
+            TOLERANCE,
+            LIMIT,
+        )
+
+    def _friction_array(self, friction: FloatArray) -> FloatArray:
+        """Return friction as (contacts, points, strips), axes without variation of length 1."""
+        contacts = len(friction)
+        shape = {1: (contacts, 1, 1), 2: (contacts, 1, self._grid.strips)}
+        return _column(friction).reshape(shape.get(friction.ndim, friction.shape))
+
+    def _check_shapes(self, contacts: int, points: OperatingPoints) -> None:
+        if len(points) != contacts:
+            raise ValueError(f"{len(points)} operating points for a batch of {contacts} contacts")
+        strips, given = self._grid.strips, points.friction.shape[1:]
+        if given not in {(), (strips,), (self.theory.mx, strips)}:
+            raise ValueError(
+                f"friction has the shape {given} per contact, expected (), (strips,) = "
+                f"({strips},) or (mx, strips) = ({self.theory.mx}, {strips}); take it at"
+                " `friction_points`"
+            )
+        if points.variation is not None and points.variation.shape[1:] != (strips,):
+            raise ValueError(
+                f"the creepage varies over {points.variation.shape[1:]} strips, expected {strips}"
+            )
+
+
+def _usable_loads(forces: FloatArray, curvature: float) -> FloatArray:
+    """Return the loads, or NaN if the curvature along rolling is not positive and finite."""
+    usable = curvature > 0.0 and math.isfinite(curvature)
+    return _column(forces if usable else np.full(len(forces), math.nan))
+
+
+def _column(values: FloatArray) -> FloatArray:
+    """Return the values contiguous and writeable, so that kernels are compiled only once."""
+    return np.require(values, np.float64, ["C", "W"])
+
+
+def _new_patches(contacts: int) -> Patches:
+    return Patches(*np.zeros((6, contacts)), *np.zeros((2, contacts), dtype=np.int64))
+
+
+def _distinct_gaps(gap: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Return the distinct gaps, (rows, strips), and the row of each contact.
+
+    An axis of stride 0 repeats one gap, which is not copied.
+    """
+    shape = gap.shape[:-1]
+    own = gap[tuple(slice(0, 1) if step == 0 else slice(None) for step in gap.strides[:-1])]
+    rows = np.arange(math.prod(own.shape[:-1])).reshape(own.shape[:-1])
+    return _column(own).reshape(-1, gap.shape[-1]), np.broadcast_to(rows, shape).flatten()
 
 
 SPEC = ContactModelSpec(
@@ -216,7 +308,7 @@ SPEC = ContactModelSpec(
     factory=HertzFastsim,
     options=HertzFastsimOptions,
     capabilities=HertzFastsim.capabilities,
-    summary="exact Hertz and Kalker's FASTSIM, refitted as the profile wears: the paper's model",
+    summary="exact Hertz and Kalker's FASTSIM, fitted to the worn profile: the paper's model",
     references=(
         "Kalker (1982), FASTSIM, Vehicle System Dynamics 11, DOI 10.1080/00423118208968684",
         "Kalker (1990), Three-Dimensional Elastic Bodies, DOI 10.1007/978-94-015-7889-9",

@@ -8,7 +8,6 @@ import numpy as np
 from pydantic import Field
 
 from wearsim.errors import ContactError
-from wearsim.mechanics.hertz.elasticity import ElasticPair, combine
 from wearsim.mechanics.numerics.jit import own_array
 from wearsim.mechanics.semi_hertzian import solver as kernels
 from wearsim.mechanics.semi_hertzian.penetration import (
@@ -17,19 +16,12 @@ from wearsim.mechanics.semi_hertzian.penetration import (
     NOT_FINITE,
     TOO_FINE,
 )
-from wearsim.mechanics.slender.influence import HIGHEST, influence_table
-from wearsim.models.contact.default_grid import check_edges, grid_about_hertz
-from wearsim.models.tangential.base import TangentialTheory, complete, inside, semi_elliptic_strips
+from wearsim.mechanics.slender.influence import HIGHEST
+from wearsim.models.contact.strip_model import StripModel, check_edges
+from wearsim.models.tangential.base import TangentialTheory
 from wearsim.models.tangential.options import TangentialOptions, tangential_theory
-from wearsim.plugins import Capabilities, ContactModel, ContactModelSpec
-from wearsim.types import (
-    ContactFields,
-    ContactSolution,
-    FloatArray,
-    Grid,
-    Material,
-    OperatingPoint,
-)
+from wearsim.plugins import Capabilities, ContactModelSpec
+from wearsim.types import ContactSolution, FloatArray, Grid, Material, OperatingPoint
 
 Variant = Literal["kik-piotrowski", "ayasse-chollet", "analyn"]
 
@@ -41,7 +33,7 @@ _VARIANTS: dict[Variant, int] = {
 
 _REMEDY = {
     TOO_FINE: f"a half-length exceeds {np.exp(HIGHEST):.0f} strip widths: lower contact.strips",
-    NO_CONVERGENCE: "contact and the gap that its wear opens did not agree",
+    NO_CONVERGENCE: "the contact and the gap that its wear opens did not converge",
     NOT_FINITE: "a value is not finite, or the load is not positive",
 }
 
@@ -56,22 +48,21 @@ class SemiHertzianOptions(TangentialOptions):
     )
 
 
-class SemiHertzian(ContactModel):
-    """Strips as springs whose stiffness is Hertz's, or that of a virtual penetration.
+class SemiHertzian(StripModel):
+    """Strips as springs with Hertzian stiffness, or that of a virtual penetration.
 
-    What the variants need of the profile's shape, its lateral curvature, is smoothed by one rule:
-    a least-squares parabola over the half-width of the contact to either side
-    (`mechanics.semi_hertzian.solver`). Several patches are solved together for one approach;
-    each penetrates from its own first contact point, until they grow together
-    (`mechanics.semi_hertzian.penetration`). With a wear compliance all this is taken from the gap that
-    wear leaves, not from the one before.
+    The variants depend on the lateral curvature of the profile, which is that of a least-squares
+    parabola over the half-width of the contact to either side (`mechanics.semi_hertzian.solver`).
+    Several patches are solved for one approach; the penetration of each is measured from its
+    point of first contact, until the patches merge (`mechanics.semi_hertzian.penetration`). With a
+    wear compliance, the gap after wear is used throughout.
 
     Parameters
     ----------
     variant : {"kik-piotrowski", "ayasse-chollet", "analyn"}
-        Which of the methods.
+        Variant of the method.
     theory : TangentialTheory
-        How tractions are found.
+        Theory of the tangential contact.
     """
 
     capabilities = Capabilities(
@@ -83,25 +74,13 @@ class SemiHertzian(ContactModel):
     )
 
     def __init__(self, variant: Variant, theory: TangentialTheory) -> None:
-        self.theory = theory
+        super().__init__(theory)
         self._variant = _VARIANTS[variant]
 
     def prepare(self, grid: Grid, materials: tuple[Material, Material]) -> None:
-        """Tabulate the influence of one strip on another, and Hertz's ellipses."""
-        self._grid = grid
-        self._pair: ElasticPair = combine(*materials)
-        self._influence = influence_table(grid.strips)
+        """Set strips and materials; tabulate the influence of the strips and Hertzian ellipses."""
+        super().prepare(grid, materials)
         self._local_hertz = kernels.local_hertz_table()
-
-    def suggest_grid(
-        self,
-        gap_curvature: float,
-        longitudinal_curvature: float,
-        normal_force: float,
-        materials: tuple[Material, Material],
-    ) -> Grid | None:
-        """Return 121 strips over 1.2 times the width of the Hertzian patch."""
-        return grid_about_hertz(gap_curvature, longitudinal_curvature, normal_force, materials)
 
     def solve(
         self,
@@ -122,7 +101,7 @@ class SemiHertzian(ContactModel):
             self._grid.spacing,
             self._pair.contact_modulus,
             float(longitudinal_curvature),
-            self._influence,
+            self._table,
             self._local_hertz,
             line_load,
             half_length,
@@ -136,39 +115,14 @@ class SemiHertzian(ContactModel):
         if status != CONVERGED:
             raise ContactError(f"the semi-Hertzian contact failed: {_REMEDY[status]}", state)
         check_edges(self._grid, line_load, state)
-        strips = semi_elliptic_strips(
-            self._grid, line_load, half_length, longitudinal_curvature, approach, iterations
+        return self._complete(
+            line_load, half_length, longitudinal_curvature, approach, iterations, point
         )
-        return complete(self.theory, strips, self._pair, point)
-
-    def fields(
-        self,
-        solution: ContactSolution,
-        gap: FloatArray,
-        longitudinal_curvature: float,
-        point: OperatingPoint,
-        points_along: int = 101,
-    ) -> ContactFields:
-        """Return tractions and slip inside a solved contact."""
-        strips = semi_elliptic_strips(
-            self._grid,
-            solution.line_load,
-            solution.half_length,
-            longitudinal_curvature,
-            solution.approach,
-            solution.iterations,
-        )
-        creepage = solution.longitudinal_creepage
-        return inside(self.theory, strips, self._pair, point, creepage, points_along)
-
-
-def _build(options: SemiHertzianOptions) -> SemiHertzian:
-    return SemiHertzian(options.variant, tangential_theory(options))
 
 
 SPEC = ContactModelSpec(
     name="semi-hertzian",
-    factory=_build,
+    factory=lambda options: SemiHertzian(options.variant, tangential_theory(options)),
     options=SemiHertzianOptions,
     capabilities=SemiHertzian.capabilities,
     summary="strips as springs: Kik-Piotrowski, STRIPES or ANALYN, chosen by the option variant",

@@ -11,51 +11,34 @@ from pydantic import Field
 
 from wearsim.contact_batch import BatchSolution, OperatingPoints
 from wearsim.errors import ContactError
-from wearsim.mechanics.hertz.elasticity import ElasticPair, combine
 from wearsim.mechanics.slender import newton as kernels
-from wearsim.mechanics.slender.influence import HIGHEST, curvature_table, influence_table, no_table
+from wearsim.mechanics.slender.influence import HIGHEST, curvature_table, no_table
 from wearsim.mechanics.tangential.strip_theory import SUMS
-from wearsim.models.contact.default_grid import check_edges, grid_about_hertz
-from wearsim.models.contact.slender_normal import Medium, NormalContacts, start_of
-from wearsim.models.contact.slender_tangential import Asked, first_not_finite, strip_tractions
-from wearsim.models.tangential.base import (
-    TangentialTheory,
-    complete,
-    inside,
-    power_not_finite,
-    semi_elliptic_strips,
+from wearsim.models.contact.slender_problems import (
+    Constants,
+    NormalContacts,
+    TangentialInputs,
+    first_not_finite,
+    start_of,
+    strip_tractions,
 )
+from wearsim.models.contact.strip_model import StripModel, check_edges
+from wearsim.models.tangential.base import TangentialTheory, power_not_finite
 from wearsim.models.tangential.options import TangentialOptions, tangential_theory
 from wearsim.models.tangential.strip_theory import StripTheory
-from wearsim.plugins import (
-    Capabilities,
-    ContactModel,
-    ContactModelSpec,
-    PassLoop,
-    SharedWear,
-)
+from wearsim.plugins import Capabilities, ContactModelSpec, PassLoop, SharedWear
 from wearsim.plugins.contact_model import naming_contact
-from wearsim.types import (
-    ContactFields,
-    ContactSolution,
-    FloatArray,
-    Grid,
-    Material,
-    Number,
-    OperatingPoint,
-)
+from wearsim.types import ContactSolution, FloatArray, Grid, Material, Number, OperatingPoint
 
 _REMEDY = {
-    kernels.SINGULAR: "its equations are singular: are the gap, the load and the materials sound?",
+    kernels.SINGULAR: "its equations are singular: check the gap, the load and the materials",
     kernels.TOO_FINE: (
         f"a half-length exceeds {np.exp(HIGHEST):.0f} strip widths: lower contact.strips"
     ),
-    kernels.NO_CONVERGENCE: "Newton's method did not settle on the strips in contact",
+    kernels.NO_CONVERGENCE: "Newton's method did not converge on the strips in contact",
     kernels.NOT_FINITE: "a value is not finite",
 }
-
-
-_ALONE = (1, 1, 1)  # leading axes of a contact by itself
+_SINGLE = (1, 1, 1)  # leading axes of a single contact
 
 
 class SlenderOptions(TangentialOptions):
@@ -63,14 +46,22 @@ class SlenderOptions(TangentialOptions):
 
     half_length: Literal["coupled", "local"] = Field(
         "coupled",
-        description="half-lengths that follow all line loads, or each its own: a quarter cheaper,"
-        " with an error in p0 of 0.5 % where the patch is ten times as wide as long and 3 % where"
-        " it is three times",
+        description="half-length from the line loads of all strips, or local from that of the same"
+        " strip: a quarter cheaper, with an error in p0 of 0.5 % where the patch is ten times as"
+        " wide as long and 3 % where it is three times",
     )
 
 
-class Slender(ContactModel):
-    """Strips pressed together as lines (Kalker 1972), on any profile, with any wear compliance."""
+class Slender(StripModel):
+    """Line-contact strips (Kalker 1972) on any profile, with wear compliance.
+
+    Parameters
+    ----------
+    theory : TangentialTheory
+        Theory of the tangential contact.
+    coupled_lengths : bool
+        Whether half-lengths depend on the line loads of all strips.
+    """
 
     capabilities = Capabilities(
         wear_compliance=True,
@@ -83,27 +74,15 @@ class Slender(ContactModel):
     )
 
     def __init__(self, theory: TangentialTheory, coupled_lengths: bool = True) -> None:
-        self.theory = theory
+        super().__init__(theory)
         self._coupled_lengths = coupled_lengths
         if not isinstance(theory, StripTheory):
             self.capabilities = replace(self.capabilities, pass_loop=False)
 
     def prepare(self, grid: Grid, materials: tuple[Material, Material]) -> None:
-        """Tabulate the influence of one strip on another."""
-        self._grid = grid
+        """Set strips and materials, and tabulate the influence of one strip on another."""
+        super().prepare(grid, materials)
         self._bend = (curvature_table if self._coupled_lengths else no_table)(grid.strips)
-        self._pair: ElasticPair = combine(*materials)
-        self._table = influence_table(grid.strips)
-
-    def suggest_grid(
-        self,
-        gap_curvature: float,
-        longitudinal_curvature: float,
-        normal_force: float,
-        materials: tuple[Material, Material],
-    ) -> Grid | None:
-        """Return 121 strips over 1.2 times the width of the Hertzian patch."""
-        return grid_about_hertz(gap_curvature, longitudinal_curvature, normal_force, materials)
 
     def solve(
         self,
@@ -118,12 +97,12 @@ class Slender(ContactModel):
         own = np.zeros(shape) if wear_compliance is None else wear_compliance.reshape(shape)
         start = None if warm is None else (warm.line_load, warm.approach)
         normal = self._solve_normal(
-            gap.reshape(shape), longitudinal_curvature, point.normal_force, own, start, _ALONE
+            gap.reshape(shape), longitudinal_curvature, point.normal_force, own, start, _SINGLE
         )
-        if not self._plain(point):
-            return self._complete(normal, (0, 0), longitudinal_curvature, point)
-        asked = Asked.of_one(point, self._grid)
-        dissipation, sums = strip_tractions(*normal.strips, asked, self._grid, self._pair)
+        if not self._has_closed_form(point):
+            return self._completed(normal, (0, 0), longitudinal_curvature, point)
+        inputs = TangentialInputs.of_one(point, self._grid)
+        dissipation, sums = strip_tractions(normal, inputs, self._grid, self._pair)
         if first_not_finite(sums) is not None:
             raise power_not_finite(point, line_load=normal.line_load[0, 0])
         return ContactSolution(
@@ -145,9 +124,14 @@ class Slender(ContactModel):
         wear: SharedWear,
         warm: Sequence[ContactSolution] | None = None,
     ) -> Sequence[ContactSolution]:
-        """Solve several contacts that wear a profile they share, all at once."""
-        one = SharedWear(wear.bodies, wear.compliance[None])
-        return self.solve_coupled_batch(gap[None], longitudinal_curvature, points, one, warm)
+        """Solve several contacts that wear common bodies, in one system of equations."""
+        return self.solve_coupled_batch(
+            gap[None],
+            longitudinal_curvature,
+            points,
+            SharedWear(wear.bodies, wear.compliance[None]),
+            warm,
+        )
 
     def solve_coupled_batch(
         self,
@@ -157,35 +141,34 @@ class Slender(ContactModel):
         wear: SharedWear,
         warm: Sequence[ContactSolution] | None = None,
     ) -> Sequence[ContactSolution]:
-        """Solve many sets of contacts that wear profiles they share, in one call."""
+        """Solve many sets of contacts that wear common bodies, in one call."""
         leading, columns = (*gap.shape[:2], 1), self._columns(points)
         if columns is not None:
-            return self._solve(gap, longitudinal_curvature, columns, wear, warm, leading)
+            return self._solve_columns(gap, longitudinal_curvature, columns, wear, warm, leading)
         loads = np.array([point.normal_force for point in points])
         start = start_of(warm)
         normal = self._solve_normal(gap, longitudinal_curvature, loads, wear, start, leading)
         return [
-            self._complete(normal, (k, contact), longitudinal_curvature, point)
-            for (k, contact), point in zip(np.ndindex(gap.shape[:2]), points, strict=True)
+            self._completed(normal, place, longitudinal_curvature, point)
+            for place, point in zip(np.ndindex(gap.shape[:2]), points, strict=True)
         ]
 
-    def _complete(
+    def _completed(
         self,
         normal: NormalContacts,
-        place: tuple[int, int],
+        place: tuple[int, ...],
         longitudinal_curvature: float,
         point: OperatingPoint,
     ) -> ContactSolution:
-        """Return the solution of the normal contact at `place`, set and contact, by any theory."""
-        strips = semi_elliptic_strips(
-            self._grid,
+        """Return the solution at `place`, set and contact, by any tangential theory."""
+        return self._complete(
             normal.line_load[place],
             normal.half_length[place],
             longitudinal_curvature,
             float(normal.approach[place]),
             int(normal.iterations[place[0]]),
+            point,
         )
-        return complete(self.theory, strips, self._pair, point)
 
     def solve_batch(
         self,
@@ -195,17 +178,17 @@ class Slender(ContactModel):
         wear_compliance: FloatArray | None = None,
         warm: Sequence[ContactSolution] | None = None,
     ) -> BatchSolution:
-        """Solve many independent contacts, in one call where strip theory takes them."""
+        """Solve many independent contacts, in one call if strip theory supports the points."""
         columns = self._columns(points)
         if columns is None:
             return super().solve_batch(gap, longitudinal_curvature, points, wear_compliance, warm)
-        alone = gap.reshape(-1, 1, gap.shape[-1])
-        own = np.zeros(alone.shape)
-        if wear_compliance is not None:
-            own = wear_compliance.reshape(alone.shape)
-        return self._solve(alone, longitudinal_curvature, columns, own, warm, gap.shape[:-1])
+        single = gap.reshape(-1, 1, gap.shape[-1])
+        shape = single.shape
+        own = np.zeros(shape) if wear_compliance is None else wear_compliance.reshape(shape)
+        leading = gap.shape[:-1]
+        return self._solve_columns(single, longitudinal_curvature, columns, own, warm, leading)
 
-    def _solve(
+    def _solve_columns(
         self,
         gap: FloatArray,
         longitudinal_curvature: float,
@@ -216,11 +199,29 @@ class Slender(ContactModel):
     ) -> BatchSolution:
         """Solve sets of contacts, (sets, contacts, strips), by strip theory.
 
-        What they wear is shared, or each contact's own compliance.
+        `wear` is shared, or the wear compliance of each contact. `leading` is the shape of the
+        result.
         """
         loads, start = points.normal_force, start_of(warm)
         normal = self._solve_normal(gap, longitudinal_curvature, loads, wear, start, leading)
-        return self._completed(normal, points, leading)
+        inputs = TangentialInputs.of(points, self._grid)
+        dissipation, sums = strip_tractions(normal, inputs, self._grid, self._pair)
+        number = first_not_finite(sums)
+        if number is not None:
+            line_load = normal.line_load.reshape(dissipation.shape)
+            error = power_not_finite(points[number], line_load=line_load[number])
+            raise naming_contact(error, number, leading)
+        strips = (*leading, self._grid.strips)
+        columns = {
+            "half_length": normal.half_length.reshape(strips),
+            "line_load": normal.line_load.reshape(strips),
+            "dissipation": dissipation.reshape(strips),
+            "approach": normal.approach.reshape(leading),
+            "longitudinal_creepage": points.longitudinal.reshape(leading),
+            "iterations": normal.iterations.repeat(normal.gap.shape[1]).reshape(leading),
+            **dict(zip(SUMS, sums.reshape(-1, *leading), strict=True)),
+        }
+        return BatchSolution(leading, self._grid.y, columns)
 
     def _solve_normal(
         self,
@@ -233,9 +234,9 @@ class Slender(ContactModel):
     ) -> NormalContacts:
         """Solve the normal problem of sets of contacts.
 
-        `start` has line loads and approaches nearby; `leading` is for naming one that fails.
+        `start` is the initial guess of line loads and approaches.
         """
-        medium = Medium(
+        constants = Constants(
             self._grid.spacing,
             self._pair.contact_modulus,
             longitudinal_curvature,
@@ -244,9 +245,9 @@ class Slender(ContactModel):
         )
         normal = NormalContacts.starting(gap, loads, start)
         if isinstance(wear, SharedWear):
-            normal.solve(wear, medium)
+            normal.solve(wear, constants)
         else:
-            normal.solve_apart(wear, medium)
+            normal.solve_independent(wear, constants)
         for number in normal.failed.tolist():
             try:
                 self._check(
@@ -262,47 +263,23 @@ class Slender(ContactModel):
                 raise naming_contact(error, number, leading) from error
         return normal
 
-    def _plain(self, point: OperatingPoint) -> bool:
-        """Tell whether strip theory can take a point by its closed form."""
-        rank = 0 if isinstance(point.friction, float) else np.ndim(point.friction)
-        free = point.bearing_torque is not None
+    def _has_closed_form(self, point: OperatingPoint) -> bool:
+        """Return whether strip theory solves an operating point in closed form."""
         return (
             isinstance(self.theory, StripTheory)
-            and rank < 2
-            and not free
+            and (isinstance(point.friction, float) or np.ndim(point.friction) < 2)
+            and point.bearing_torque is None
             and not point.friction_carried
         )
 
     def _columns(self, points: Sequence[OperatingPoint]) -> OperatingPoints | None:
-        """Return the points as columns where strip theory can take them all at once, or None."""
+        """Return the points as columns if strip theory solves them in closed form, or None."""
         if not isinstance(self.theory, StripTheory):
             return None
         columns = OperatingPoints.of(points)
-        plain = columns is not None and columns.friction.ndim < 3 and not columns.friction_carried
-        return columns if plain else None
-
-    def _completed(
-        self, normal: NormalContacts, points: OperatingPoints, leading: tuple[int, ...]
-    ) -> BatchSolution:
-        """Return the solutions of normal contacts by strip theory, all in one call."""
-        asked = Asked.of(points, self._grid)
-        dissipation, sums = strip_tractions(*normal.strips, asked, self._grid, self._pair)
-        number = first_not_finite(sums)
-        if number is not None:
-            line_load = normal.strips[0].reshape(dissipation.shape)
-            error = power_not_finite(points[number], line_load=line_load[number])
-            raise naming_contact(error, number, leading)
-        strips = (*leading, self._grid.strips)
-        columns = {
-            "half_length": normal.half_length.reshape(strips),
-            "line_load": normal.line_load.reshape(strips),
-            "dissipation": dissipation.reshape(strips),
-            "approach": normal.approach.reshape(leading),
-            "longitudinal_creepage": points.longitudinal.reshape(leading),
-            "iterations": normal.iterations.repeat(normal.gap.shape[1]).reshape(leading),
-            **dict(zip(SUMS, sums.reshape(-1, *leading), strict=True)),
-        }
-        return BatchSolution(leading, self._grid.y, columns)
+        if columns is None or columns.friction.ndim > 2 or columns.friction_carried:
+            return None
+        return columns
 
     def _check(
         self,
@@ -323,7 +300,7 @@ class Slender(ContactModel):
             return super().pass_loop(loop)
         from wearsim.mechanics.slender import chord_method, pass_loop  # noqa: PLC0415  (slow to load, rarely needed)
 
-        medium = chord_method.contact_constants(
+        constants = chord_method.contact_constants(
             self._grid.spacing,
             self._pair.contact_modulus,
             self._pair.shear_modulus,
@@ -342,7 +319,7 @@ class Slender(ContactModel):
             loop.from_apex,
             loop.rolling_speed,
             loop.similar,
-            medium,
+            constants,
             pass_loop.Wear(
                 loop.slip_base,
                 loop.spin_arm,
@@ -354,7 +331,7 @@ class Slender(ContactModel):
             chord_method.Loads(
                 loop.line_load, loop.anchor, loop.anchor_gap, loop.approach, loop.anchor_approach
             ),
-            chord_method.new_chord_state(medium, *loop.nominal_gap.shape),
+            chord_method.new_chord_state(constants, *loop.nominal_gap.shape),
             loop.energy,
         )
         gap = loop.nominal_gap + loop.cylinder_depth + loop.roller_depth
@@ -367,34 +344,10 @@ class Slender(ContactModel):
         self._check(status, gap, loads, loop.line_load, loop.approach)
         return int(full_solves)
 
-    def fields(
-        self,
-        solution: ContactSolution,
-        gap: FloatArray,
-        longitudinal_curvature: float,
-        point: OperatingPoint,
-        points_along: int = 101,
-    ) -> ContactFields:
-        """Return tractions and slip inside a solved contact."""
-        strips = semi_elliptic_strips(
-            self._grid,
-            solution.line_load,
-            solution.half_length,
-            longitudinal_curvature,
-            solution.approach,
-            solution.iterations,
-        )
-        creepage = solution.longitudinal_creepage
-        return inside(self.theory, strips, self._pair, point, creepage, points_along)
-
-
-def _build(options: SlenderOptions) -> Slender:
-    return Slender(tangential_theory(options), options.half_length == "coupled")
-
 
 SPEC = ContactModelSpec(
     name="slender",
-    factory=_build,
+    factory=lambda options: Slender(tangential_theory(options), options.half_length == "coupled"),
     options=SlenderOptions,
     capabilities=Slender.capabilities,
     summary="line-contact strips on any profile; the default",

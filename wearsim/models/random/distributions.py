@@ -1,4 +1,4 @@
-"""The joint random input `disc`: a roller's yaw and tilt, uniform within the slack of its mount."""
+"""Built-in distributions: `maxent`, `normal`, `lognormal`, `uniform`, `disc` and others."""
 
 from __future__ import annotations
 
@@ -7,32 +7,32 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
-from pydantic import Field, ValidationInfo, model_validator
+from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
 
-from wearsim.models.random.maxent import LawDistribution, MaxentOptions, in_unit, maxent
 from wearsim.models.random.table import TableDistribution, TableOptions
 from wearsim.plugins import Distribution, JointDistribution, Options, RandomInputSpec
-from wearsim.quantities import Limit, PositiveValue, Value
+from wearsim.quantities import Limit, PositiveValue, Quantity, Value
 from wearsim.types import FloatArray
 from wearsim.units import QuantityError
-from wearsim.uq.distributions.base import Uniform
+from wearsim.uq.distributions.base import MaxentDistribution, Uniform
+from wearsim.uq.distributions.maxent import Infeasible, maximum_entropy
 from wearsim.uq.distributions.truncated_normal import TruncatedNormal, cut_normal
 
-_FARTHEST = 40.0  # no uniform number has a normal score beyond it
+_LARGEST_SCORE = 40.0  # above the normal score of any floating-point number below 1
 
 
 class DiscOptions(Options):
     """Options of the joint distribution `disc`."""
 
-    radius: PositiveValue = Field(description="greatest size of both together, e.g. '2 mrad'")
+    radius: PositiveValue = Field(description="maximum magnitude of (yaw, tilt), e.g. '2 mrad'")
 
 
 class Disc(JointDistribution):
-    """Yaw and tilt, uniform on a disc about zero.
+    """Joint distribution of yaw and tilt, uniform on a disc about zero.
 
-    Two normal scores have a direction that is uniform, and a length r that falls below R with
-    probability 1 - exp(-R^2/2), which is the part of the disc's area that it is sent to. Turned
-    uniforms 1 - u give the negative of both.
+    Two normal scores have a uniform direction, and a length r that is below R with probability
+    1 - exp(-R^2/2). This is the fraction of the area of the disc inside the image of R. Reflected
+    uniform numbers 1 - u give the negative of both angles.
     """
 
     components = ("yaw", "tilt")
@@ -42,23 +42,22 @@ class Disc(JointDistribution):
         self._radius = options.radius
 
     def values(self, uniform: FloatArray) -> FloatArray:
-        """Return yaw and tilt, shape (draws, 2), from uniforms (draws, 2)."""
+        """Return yaw and tilt, shape (draws, 2), from uniform numbers (draws, 2)."""
         from scipy.special import ndtri  # noqa: PLC0415  (slow to import, and rarely needed)
 
-        scores = np.clip(ndtri(uniform), -_FARTHEST, _FARTHEST)
-        # the least number above zero stands for the centre, where the ratio's limit is right
+        scores = np.clip(ndtri(uniform), -_LARGEST_SCORE, _LARGEST_SCORE)
+        # a tiny positive number replaces zero at the centre, where the limit of the ratio is used
         square = np.maximum((scores**2).sum(axis=-1, keepdims=True), 1e-300)
-        values: FloatArray = self._radius * np.sqrt(-np.expm1(-0.5 * square) / square) * scores
-        return values
+        return np.asarray(self._radius * np.sqrt(-np.expm1(-0.5 * square) / square) * scores)
 
     @property
     def mean(self) -> tuple[float, float]:
-        """Mean of both."""
+        """Mean of both angles."""
         return 0.0, 0.0
 
     @property
     def reach(self) -> tuple[float, float]:
-        """Greatest size of each."""
+        """Maximum magnitude of each angle."""
         return self._radius, self._radius
 
 
@@ -91,8 +90,8 @@ class LognormalOptions(Options):
 class UniformOptions(Options):
     """Options of the distribution `uniform`."""
 
-    low: Value = Field(description="least value, e.g. '250 N'")
-    high: Value = Field(description="greatest value, e.g. '350 N'")
+    low: Value = Field(description="minimum, e.g. '250 N'")
+    high: Value = Field(description="maximum, e.g. '350 N'")
 
     @model_validator(mode="after")
     def _rising(self, info: ValidationInfo) -> Self:
@@ -103,13 +102,11 @@ class UniformOptions(Options):
 class TruncatedNormalOptions(Options):
     """Options of the distribution `truncated-normal`."""
 
-    parent_mean: Value = Field(description="mean before truncation; for the mean after it: maxent")
+    parent_mean: Value = Field(description="mean before truncation; maxent takes the mean after it")
     parent_std: PositiveValue = Field(
-        description="standard deviation before truncation; for that after it: maxent"
+        description="standard deviation before truncation; maxent takes that after it"
     )
-    support: tuple[Limit, Limit] = Field(
-        description="least and greatest value, e.g. ['0 N', 'inf']"
-    )
+    support: tuple[Limit, Limit] = Field(description="minimum and maximum, e.g. ['0 N', 'inf']")
 
     @model_validator(mode="after")
     def _rising(self, info: ValidationInfo) -> Self:
@@ -120,33 +117,83 @@ class TruncatedNormalOptions(Options):
 class ConstantOptions(Options):
     """Options of the distribution `constant`."""
 
-    value: Value = Field(description="the value of every draw, e.g. '300 N'")
+    value: Value = Field(description="the value, e.g. '300 N'")
+
+
+class MaxentOptions(Options):
+    """Options of the distribution `maxent`."""
+
+    support: tuple[Limit, Limit] = Field(
+        description="minimum and maximum possible value, e.g. ['0 N', 'inf']"
+    )
+    mean: Value | None = Field(None, description="mean, e.g. '307 N'")
+    std: PositiveValue | None = Field(None, description="standard deviation, e.g. '32 N'")
+    mean_log: float | None = Field(
+        None,
+        description="mean of the logarithm of the SI value, instead of std: a gamma distribution",
+    )
+    _distribution: MaxentDistribution = PrivateAttr()
+
+    @model_validator(mode="after")
+    def _solve(self, info: ValidationInfo) -> Self:
+        try:
+            self._distribution = maximum_entropy(self.support, self.mean, self.std, self.mean_log)
+        except Infeasible as error:
+            raise QuantityError(f"{error}{_in_unit(info)}") from error
+        return self
+
+    @property
+    def distribution(self) -> MaxentDistribution:
+        """Distribution of maximum entropy."""
+        return self._distribution
 
 
 def check_rising(low: float, high: float, info: ValidationInfo) -> None:
-    """Raise a QuantityError unless a support goes from a lower to a higher value."""
+    """Raise a QuantityError unless the limits of a support are in ascending order."""
     if not low < high:
-        what = f"the upper limit must lie above the lower one{in_unit(info)}"
+        what = f"the upper limit must be above the lower one{_in_unit(info)}"
         raise QuantityError(what, f"{low:g} to {high:g}")
 
 
-def normal(options: NormalOptions) -> LawDistribution:
-    """Build the distribution `normal`."""
-    return LawDistribution(TruncatedNormal(-math.inf, math.inf, options.mean, options.std))
+def _in_unit(info: ValidationInfo) -> str:
+    """Return a remark on the unit of the numbers in a message, if they have one."""
+    replaced: Quantity | None = (info.context or {}).get("quantity")
+    return "" if replaced is None else f" (numbers in {replaced.kind.unit})"
 
 
-def uniform(options: UniformOptions) -> LawDistribution:
-    """Build the distribution `uniform`."""
-    return LawDistribution(Uniform(options.low, options.high))
+class AnalyticDistribution(Distribution):
+    """Random input whose quantiles and moments are those of an analytic distribution."""
 
+    def __init__(self, analytic: MaxentDistribution) -> None:
+        self.analytic = analytic
 
-def truncated_normal(options: TruncatedNormalOptions) -> LawDistribution:
-    """Build the distribution `truncated-normal`."""
-    return LawDistribution(cut_normal(*options.support, options.parent_mean, options.parent_std))
+    def quantile(self, probability: FloatArray) -> FloatArray:
+        """Return the quantiles, shape as `probability`."""
+        return self.analytic.quantile(probability)
+
+    @cached_property
+    def support(self) -> tuple[float, float]:
+        """Minimum and maximum."""
+        return self.analytic.support
+
+    @cached_property
+    def mean(self) -> float:
+        """Exact mean."""
+        return self.analytic.mean
+
+    @cached_property
+    def std(self) -> float:
+        """Exact standard deviation."""
+        return self.analytic.std
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Warnings about the validity, for the user."""
+        return self.analytic.warnings
 
 
 class Lognormal(Distribution):
-    """A value whose logarithm is normal."""
+    """Distribution of a value whose logarithm is normal."""
 
     def __init__(self, options: LognormalOptions) -> None:
         if options.median is not None and options.factor is not None:
@@ -154,19 +201,19 @@ class Lognormal(Distribution):
         else:
             assert options.mean is not None
             assert options.std is not None
-            square = math.log1p((options.std / options.mean) ** 2)
-            self._centre = math.log(options.mean) - 0.5 * square
-            self._spread = math.sqrt(square)
+            variance = math.log1p((options.std / options.mean) ** 2)
+            self._centre = math.log(options.mean) - 0.5 * variance
+            self._spread = math.sqrt(variance)
 
     def quantile(self, probability: FloatArray) -> FloatArray:
-        """Return the values below which a draw falls with these probabilities, same shape."""
+        """Return the quantiles, shape as `probability`."""
         from scipy.special import ndtri  # noqa: PLC0415  (slow to import, and rarely needed)
 
         return np.exp(self._centre + self._spread * ndtri(probability))
 
     @cached_property
     def support(self) -> tuple[float, float]:
-        """Least and greatest value."""
+        """Minimum and maximum."""
         return 0.0, math.inf
 
     @cached_property
@@ -181,7 +228,7 @@ class Lognormal(Distribution):
 
 
 class Constant(Distribution):
-    """The same value at every draw."""
+    """Distribution of a constant."""
 
     def __init__(self, options: ConstantOptions) -> None:
         self._value = options.value
@@ -192,7 +239,7 @@ class Constant(Distribution):
 
     @cached_property
     def support(self) -> tuple[float, float]:
-        """The value, twice."""
+        """The value as minimum and maximum."""
         return self._value, self._value
 
     @cached_property
@@ -214,16 +261,18 @@ _ENTROPY = (
 SPECS = (
     RandomInputSpec(
         name="maxent",
-        factory=maxent,
+        factory=lambda options: AnalyticDistribution(options.distribution),
         options=MaxentOptions,
-        summary="the least certain law that has this support, mean and standard deviation",
+        summary="maximum entropy for given support, mean and standard deviation",
         references=_ENTROPY,
     ),
     RandomInputSpec(
         name="normal",
-        factory=normal,
+        factory=lambda options: AnalyticDistribution(
+            TruncatedNormal(-math.inf, math.inf, options.mean, options.std)
+        ),
         options=NormalOptions,
-        summary="normal law of given mean and standard deviation",
+        summary="normal with given mean and standard deviation",
     ),
     RandomInputSpec(
         name="lognormal",
@@ -233,21 +282,23 @@ SPECS = (
     ),
     RandomInputSpec(
         name="uniform",
-        factory=uniform,
+        factory=lambda options: AnalyticDistribution(Uniform(options.low, options.high)),
         options=UniformOptions,
         summary="uniform between two limits",
     ),
     RandomInputSpec(
         name="truncated-normal",
-        factory=truncated_normal,
+        factory=lambda options: AnalyticDistribution(
+            cut_normal(*(*options.support, options.parent_mean, options.parent_std))
+        ),
         options=TruncatedNormalOptions,
-        summary="normal law cut off at limits; its mean and std are the parent's (else maxent)",
+        summary="normal truncated at limits; mean and std are those before (else maxent)",
     ),
     RandomInputSpec(
         name="constant",
         factory=Constant,
         options=ConstantOptions,
-        summary="one value, certain",
+        summary="a constant value",
     ),
     RandomInputSpec(
         name="table",
@@ -260,7 +311,7 @@ SPECS = (
         factory=Disc,
         options=DiscOptions,
         role="joint",
-        summary="yaw and tilt together, uniform on a disc",
+        summary="yaw and tilt, uniform on a disc",
         references=_ENTROPY[1:],
     ),
 )

@@ -20,33 +20,31 @@ from wearsim.quantities import PositiveLength
 from wearsim.types import FloatArray
 
 _CELLS = 2  # lattice spacings per correlation length
-# Cells are drawn in tiles, long across the track as a contact is, so that few draws cover it.
+# cells are drawn in tiles that are long across the track, as contacts are, for fewer draws
 _TILE_ROWS, _TILE_COLUMNS = 64, 16
-_TILES = 2**26  # to either side of the origin; two such numbers and a tile's cells make 64 bits
+_TILES = 2**26  # to either side of the origin; two tile numbers and a cell number make 64 bits
 
 
 class WhiteOptions(Options):
     """Options of the friction field `white`."""
 
-    frame: Frame = Field(
-        "contact", description="what the pattern is fixed to: contact, cylinder or roller"
-    )
+    frame: Frame = Field("contact", description="frame of the field: contact, cylinder or roller")
 
 
 class GaussianFieldOptions(WhiteOptions):
     """Options of the friction field `gaussian-field`."""
 
     correlation_length: PositiveLength = Field(
-        description="distance at which the correlation has fallen to 1/e, e.g. '50 um'"
+        description="distance at which the correlation is 1/e, e.g. '50 um'"
     )
 
 
 class White(FrictionField):
-    """Every point of the grid draws by itself, as in the paper.
+    """Independent friction at each point of the grid, as in the paper.
 
-    Point p of strip s takes the number at position p x strips + s, so that another grid is
-    another realisation. Traction rides the lower envelope of the noise: the finer the grid, the
-    less of it there is.
+    Point p of strip s has the uniform number of index p x strips + s, so that another grid is
+    another realisation. The traction follows the lower envelope of the noise: it decreases as the
+    grid is refined.
     """
 
     def __init__(self, options: WhiteOptions, marginal: Distribution) -> None:
@@ -59,20 +57,20 @@ class White(FrictionField):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What a user should know before trusting it."""
+        """Warnings about the validity, for the user."""
         grid = (
-            "white friction has no continuum limit: the dissipation depends on the grid, and falls"
-            " as it is refined; use gaussian-field"
+            "white friction has no continuum limit: the dissipation depends on the grid, and"
+            " decreases as it is refined; use gaussian-field"
         )
         return (*self.marginal.warnings, grid)
 
 
 class GaussianField(FrictionField):
-    """A field with the correlation exp(-r^2/l^2) in normal scores and any marginal distribution.
+    """Field with the correlation exp(-r^2/l^2) in normal scores and any marginal distribution.
 
-    White noise on an endless square lattice of spacing l/2, smoothed (process convolution: Higdon
-    2002, DOI 10.1007/978-1-4471-0657-9_2). A cell has its number for ever, so that neither the
-    solver's grid nor the extent of the contact changes the field.
+    Smoothed white noise on an infinite square lattice of spacing l/2 (process convolution: Higdon
+    2002, DOI 10.1007/978-1-4471-0657-9_2). The uniform number of a cell depends on its indices
+    only, so that the field depends neither on the grid nor on the extent of the contact.
     """
 
     def __init__(self, options: GaussianFieldOptions, marginal: Distribution) -> None:
@@ -97,34 +95,33 @@ class GaussianField(FrictionField):
         return self.marginal.quantile(ndtr(scores))
 
     def unresolved(self, along: float, across: float) -> str | None:
-        """Return what is wrong with a grid of these spacings [m], or None where it resolves it."""
+        """Return why a grid of these spacings [m] does not resolve the field, or None."""
         greatest = self.correlation_length / 2.0
-        allowed = greatest * (1.0 + 1e-9)  # a spacing meant to be just that is not refused
-        told = [
+        too_large = [
             f"{spacing * 1e6:.3g} um {direction} (take at least {spacing / greatest:.3g} times as"
-            f" many {what})"
-            for spacing, direction, what in (
+            f" many {divisions})"
+            for spacing, direction, divisions in (
                 (along, "along rolling", "points"),
                 (across, "across the track", "strips"),
             )
-            if spacing > allowed
+            if spacing > greatest * (1.0 + 1e-9)  # round-off of just that spacing is accepted
         ]
-        if not told:
+        if not too_large:
             return None
         return (
             f"the grid does not resolve a correlation length of {self.correlation_length * 1e6:.3g}"
-            f" um, which needs spacings of half of it: they are {' and '.join(told)}"
+            f" um, which needs spacings of half of it: they are {' and '.join(too_large)}"
         )
 
 
 def _cells(position: FloatArray, spacing: float) -> range:
-    """Return the lattice's indices that points at these positions take in."""
+    """Return the indices of the lattice that contribute to points at these positions."""
     low, high = float(position.min()), float(position.max())
     return range(math.floor(low / spacing) - REACH + 1, math.floor(high / spacing) + REACH + 1)
 
 
 def _noise(rows: range, columns: range, uniforms: Uniforms) -> FloatArray:
-    """Return the lattice's normal scores in a rectangle of cells."""
+    """Return the normal scores of the lattice in a rectangle of cells."""
     from scipy.special import ndtri  # noqa: PLC0415  (slow to import)
 
     across = range(rows.start // _TILE_ROWS, (rows.stop - 1) // _TILE_ROWS + 1)
@@ -151,7 +148,7 @@ SPECS = (
         factory=White,
         options=WhiteOptions,
         role="field",
-        summary="friction that every point of the grid draws by itself: depends on the grid",
+        summary="independent friction at each point of the grid: depends on the grid",
         references=("Chevalier, Cloupet, Soize, Wear 258 (2005), DOI 10.1016/j.wear.2004.11.012",),
     ),
     RandomInputSpec(
@@ -159,7 +156,7 @@ SPECS = (
         factory=GaussianField,
         options=GaussianFieldOptions,
         role="field",
-        summary="friction with a correlation length, the same whatever the grid",
+        summary="friction with a correlation length, independent of the grid",
         references=("Higdon, process convolutions (2002), DOI 10.1007/978-1-4471-0657-9_2",),
     ),
 )

@@ -1,4 +1,4 @@
-"""What every tangential theory shares: local creepage, balance of torque, sums over strips."""
+"""Base class of tangential theories: local creepage, torque balance and sums over strips."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ import numpy as np
 
 from wearsim.errors import CapabilityError, ContactError
 from wearsim.mechanics.hertz.elasticity import ElasticPair
-from wearsim.types import ContactFields, ContactSolution, FloatArray, Grid, OperatingPoint
+from wearsim.types import ContactFields, ContactSolution, FloatArray, OperatingPoint
 
 
 @dataclass(frozen=True)
 class Strips:
-    """A solved normal contact.
+    """Solved normal contact.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ class Strips:
     longitudinal_curvature : float
         Relative curvature along rolling [1/m].
     approach, peak_pressure : float
-        Approach [m] and greatest pressure [Pa].
+        Approach [m] and maximum pressure [Pa].
     iterations : int
         Iterations of the normal problem.
     """
@@ -42,53 +42,18 @@ class Strips:
     iterations: int
 
 
-def semi_elliptic_strips(
-    grid: Grid,
-    line_load: FloatArray,
-    half_length: FloatArray,
-    longitudinal_curvature: float,
-    approach: float,
-    iterations: int,
-) -> Strips:
-    """Return a solved contact whose pressure is semi-elliptic along rolling in every strip.
-
-    Parameters
-    ----------
-    grid : Grid
-        The strips.
-    line_load, half_length : ndarray, shape (strips,)
-        q [N/m] and a [m], of which some are loaded.
-    longitudinal_curvature, approach : float
-        Relative curvature along rolling [1/m], approach [m].
-    iterations : int
-        Iterations of the normal problem.
-    """
-    loaded = line_load > 0.0
-    peak = 2.0 * (line_load[loaded] / (np.pi * half_length[loaded])).max()
-    return Strips(
-        y=grid.y,
-        half_length=half_length,
-        line_load=line_load,
-        spacing=grid.spacing,
-        longitudinal_curvature=longitudinal_curvature,
-        approach=float(approach),
-        peak_pressure=float(peak),
-        iterations=iterations,
-    )
-
-
 @dataclass(frozen=True)
 class LocalSlip:
-    """The rigid slip each strip sees, per unit of rolling velocity.
+    """Rigid slip of each strip per unit of rolling velocity.
 
     Parameters
     ----------
     longitudinal : ndarray, shape (strips,)
-        The whole local longitudinal creepage xi(y), spin's part included.
+        Local longitudinal creepage xi(y), including the contribution of spin.
     spin_part : ndarray, shape (strips,)
-        The part of it that comes from spin, for theories whose flexibility differs for spin.
+        Contribution of spin, for theories with a separate flexibility for spin.
     lateral, spin : float
-        Lateral creepage eta, and spin phi [1/m] whose phi x adds to it.
+        Lateral creepage eta, and spin phi [1/m], which adds phi x to it.
     """
 
     longitudinal: FloatArray
@@ -99,7 +64,7 @@ class LocalSlip:
 
 @dataclass(frozen=True)
 class Tractions:
-    """What the tangential problem yields, per strip; forces act on body 1.
+    """Solution of the tangential problem per strip; forces act on body 1.
 
     Parameters
     ----------
@@ -110,7 +75,7 @@ class Tractions:
     dissipation : ndarray, shape (strips,)
         Dissipated power per unit of axial length P_l [W/m].
     adhesion_length : ndarray, shape (strips,)
-        Length of the strip that adheres [m].
+        Length of the adhesion zone along rolling [m].
     """
 
     force_x: FloatArray
@@ -121,12 +86,12 @@ class Tractions:
 
 
 class TangentialTheory(ABC):
-    """Solves the tangential problem on given strips.
+    """Solver of the tangential problem on given strips.
 
     Attributes
     ----------
     knows_ellipses : bool
-        Whether it takes strips that an ellipse covers in part as what they are.
+        Whether `EllipseStrips` with partly covered strips are supported.
     """
 
     knows_ellipses: ClassVar[bool] = False
@@ -140,7 +105,7 @@ class TangentialTheory(ABC):
         friction: FloatArray,
         rolling_speed: float,
     ) -> Tractions:
-        """Return the tractions for a local slip; `friction` has shape (strips,)."""
+        """Return the tractions for a local slip and `friction`, shape (strips,)."""
 
     @abstractmethod
     def fields(
@@ -152,39 +117,36 @@ class TangentialTheory(ABC):
         rolling_speed: float,
         points_along: int,
     ) -> ContactFields:
-        """Return pressure, traction and slip inside the contact, (points_along, strips)."""
+        """Return pressure, traction and slip in the contact, (points_along, strips)."""
 
 
 def load_weighted_mean(strips: Strips, values: FloatArray) -> float:
-    """Return the mean of `values`, shape (strips,), weighted by the line load."""
+    """Return the mean of `values`, shape (strips,), weighted with the line load."""
     return float(np.dot(values, strips.line_load) / strips.line_load.sum())
 
 
 def local_slip(strips: Strips, point: OperatingPoint, longitudinal: float) -> LocalSlip:
-    """Spread the mean creepage `longitudinal` over the strips, as `Creepage` says."""
-    creepage = point.creepage
+    """Return the local creepage for the mean creepage `longitudinal`; see `Creepage`."""
+    creepage, zero = point.creepage, np.zeros_like(strips.y)
     if creepage.variation is None and creepage.spin == 0.0:
-        zero = np.zeros_like(strips.y)
         return LocalSlip(zero + longitudinal, zero, creepage.lateral, 0.0)
-    if creepage.variation is None:
-        variation = -creepage.spin * strips.y
-        spin_part = variation - load_weighted_mean(strips, variation)
-        return LocalSlip(longitudinal + spin_part, spin_part, creepage.lateral, creepage.spin)
-    variation = creepage.variation - load_weighted_mean(strips, creepage.variation)
-    zero = np.zeros_like(variation)
-    return LocalSlip(longitudinal + variation, zero, creepage.lateral, creepage.spin)
+    by_spin = creepage.variation is None
+    variation = -creepage.spin * strips.y if creepage.variation is None else creepage.variation
+    variation = variation - load_weighted_mean(strips, variation)
+    spin_part = variation if by_spin else zero
+    return LocalSlip(longitudinal + variation, spin_part, creepage.lateral, creepage.spin)
 
 
 def friction_per_strip(strips: Strips, point: OperatingPoint) -> FloatArray:
-    """Return the friction coefficient of every strip, shape (strips,)."""
+    """Return the friction coefficient of each strip, shape (strips,)."""
     if np.ndim(point.friction) > 1:
         raise CapabilityError(
-            "this contact model takes one friction coefficient per strip, and not one per point;"
+            "this contact model takes one friction coefficient per strip, not one per point;"
             " use contact.model = 'hertz-fastsim', without a bearing torque"
         )
     friction = np.empty_like(strips.y)
     friction[:] = point.friction
-    if not np.isfinite(friction).all():  # a closed form would take it for none
+    if not np.isfinite(friction).all():  # a closed form would return zero traction
         raise power_not_finite(point, line_load=strips.line_load)
     return friction
 
@@ -192,20 +154,20 @@ def friction_per_strip(strips: Strips, point: OperatingPoint) -> FloatArray:
 def _balanced_creepage(
     theory: TangentialTheory, strips: Strips, pair: ElasticPair, point: OperatingPoint
 ) -> float:
-    """Find the mean creepage whose tractions carry the bearing torque."""
+    """Return the mean creepage at which the tractions balance the bearing torque."""
     from scipy.optimize import brentq  # noqa: PLC0415  (slow to import, and rarely needed)
 
     radius, torque = point.rolling_radius, point.bearing_torque
     if radius is None or torque is None:
-        raise ValueError("a bearing torque needs the rolling radius of every strip")
+        raise ValueError("a bearing torque needs the rolling radius of each strip")
     friction = friction_per_strip(strips, point)
 
     def excess(longitudinal: float) -> float:
         slip = local_slip(strips, point, longitudinal)
-        found = theory.tractions(strips, pair, slip, friction, point.rolling_speed)
-        return -float(np.dot(found.force_x, radius)) * strips.spacing - torque
+        tractions = theory.tractions(strips, pair, slip, friction, point.rolling_speed)
+        return -float(np.dot(tractions.force_x, radius)) * strips.spacing - torque
 
-    # creepage that surely slides everywhere: beyond the variation, several times saturation
+    # a creepage of gross sliding: above the variation and many times that of saturation
     variation = local_slip(strips, point, 0.0).longitudinal
     saturation = float(friction.max() * strips.half_length.max()) * strips.longitudinal_curvature
     reach = float(np.abs(variation).max()) + 100.0 * (saturation + abs(point.creepage.lateral))
@@ -213,15 +175,15 @@ def _balanced_creepage(
     if low >= 0.0 or high <= 0.0:
         carried = torque + (high if torque > 0.0 else low)
         raise ContactError(
-            f"the roller skids: its bearing torque of {torque:.4g} N m is more than the"
-            f" {abs(carried):.4g} N m that friction can carry at a load of"
+            f"the roller skids: its bearing torque of {torque:.4g} N m exceeds the"
+            f" {abs(carried):.4g} N m that friction can transmit at a load of"
             f" {point.normal_force:.4g} N; lower creepage.bearing_torque or raise the friction",
             {"line_load": strips.line_load, "half_length": strips.half_length},
         )
     return float(brentq(excess, -reach, reach, xtol=1e-16, rtol=1e-14))
 
 
-def inside(
+def fields_inside(
     theory: TangentialTheory,
     strips: Strips,
     pair: ElasticPair,
@@ -230,9 +192,9 @@ def inside(
     points_along: int,
     friction: FloatArray | None = None,
 ) -> ContactFields:
-    """Return pressure, traction and slip inside a contact whose mean creepage is `longitudinal`.
+    """Return pressure, traction and slip in a contact with the mean creepage `longitudinal`.
 
-    `friction` is in the theory's own form; without it that of every strip is taken.
+    `friction` has a shape that the theory supports; by default it is that of each strip.
     """
     return theory.fields(
         strips,
@@ -245,30 +207,29 @@ def inside(
 
 
 def spread_work(work: FloatArray) -> FloatArray:
-    """Return the dissipation of strips that do some work, negative nowhere and the same in all.
+    """Return a dissipation without negative values that has the sum of the work.
 
     Parameters
     ----------
     work : ndarray, shape (strips,)
-        Work of every strip's traction on the rigid slip. Where a theory's flexibilities are not
-        those of one surface, what elasticity stores need not come back to the same strip, and the
-        work of one that hardly slips may be negative.
+        Work of the traction of each strip on the rigid slip. If a theory's flexibilities are not
+        those of one surface, the stored elastic energy is not recovered strip by strip, and the
+        work of a strip with little slip may be negative.
 
     Returns
     -------
     ndarray, shape (strips,)
-        The work, where it is negative nowhere. Else such strips get nothing, and the others give
-        alike what makes the sum that of the work; nothing if that is negative.
+        The work if it is negative nowhere. Otherwise negative values are set to zero and the others
+        scaled by a common factor that preserves the sum; all zero if the sum is negative.
     """
     if not (work < 0.0).any():
         return work
-    positive = np.maximum(work, 0.0)
-    total = max(float(work.sum()), 0.0)
+    positive, total = np.maximum(work, 0.0), max(float(work.sum()), 0.0)
     return positive * (total / positive.sum()) if total > 0.0 else 0.0 * positive
 
 
 def power_not_finite(point: OperatingPoint, **state: FloatArray) -> ContactError:
-    """Return the error of a contact whose tractions make no sense, with the state it was in."""
+    """Return the error of a contact whose dissipated power is not finite, with its state."""
     return ContactError(
         "the dissipated power is not finite; check creepage, friction and rolling speed",
         {"point": point, **state},
@@ -278,14 +239,14 @@ def power_not_finite(point: OperatingPoint, **state: FloatArray) -> ContactError
 def complete(
     theory: TangentialTheory, strips: Strips, pair: ElasticPair, point: OperatingPoint
 ) -> ContactSolution:
-    """Solve the tangential problem of `strips` and sum it up as a `ContactSolution`."""
+    """Solve the tangential problem of `strips` and return the complete contact solution."""
     longitudinal = point.creepage.longitudinal
     if point.bearing_torque is not None:
         longitudinal = _balanced_creepage(theory, strips, pair, point)
     slip = local_slip(strips, point, longitudinal)
     friction = friction_per_strip(strips, point)
-    found = theory.tractions(strips, pair, slip, friction, point.rolling_speed)
-    power = float(found.dissipation.sum()) * strips.spacing
+    tractions = theory.tractions(strips, pair, slip, friction, point.rolling_speed)
+    power = float(tractions.dissipation.sum()) * strips.spacing
     if not math.isfinite(power):
         raise power_not_finite(point, line_load=strips.line_load)
     arm = strips.y - load_weighted_mean(strips, strips.y)
@@ -294,13 +255,13 @@ def complete(
         y=strips.y,
         half_length=strips.half_length,
         line_load=strips.line_load,
-        dissipation=found.dissipation,
-        force_x=float(found.force_x.sum()) * strips.spacing,
-        force_y=float(found.force_y.sum()) * strips.spacing,
-        spin_moment=float((found.moment - arm * found.force_x).sum()) * strips.spacing,
+        dissipation=tractions.dissipation,
+        force_x=float(tractions.force_x.sum()) * strips.spacing,
+        force_y=float(tractions.force_y.sum()) * strips.spacing,
+        spin_moment=float((tractions.moment - arm * tractions.force_x).sum()) * strips.spacing,
         approach=strips.approach,
         peak_pressure=strips.peak_pressure,
-        adhesion_fraction=float(found.adhesion_length.sum() / length),
+        adhesion_fraction=float(tractions.adhesion_length.sum() / length),
         power=power,
         longitudinal_creepage=longitudinal,
         iterations=strips.iterations,

@@ -1,4 +1,4 @@
-"""FaStrip as a tangential theory, on the strips of any normal contact."""
+"""FaStrip as a tangential theory on the strips of any normal contact."""
 
 from __future__ import annotations
 
@@ -34,26 +34,26 @@ from wearsim.types import ContactFields, FloatArray
 
 
 class FastripTheory(TangentialTheory):
-    """Strip theory with spin where a strip adheres, and a march where it slides.
+    """Strip theory with spin in the adhesion zone, and a march along the slip zone.
 
-    Kalker's coefficients are those of the strips' equivalent ellipse, and the traction bound is
-    elliptic along rolling. A strip whose spin is too strong for strip theory is left to FASTSIM
+    Kalker's coefficients are those of the equivalent ellipse of the strips, and the traction bound
+    is elliptic along rolling. Strips with too much spin for strip theory are solved by FASTSIM
     with one flexibility.
 
     Parameters
     ----------
     mx : int
-        Steps of the march along the part of a strip that slides.
+        Steps of the march along the slip zone of a strip.
 
     Notes
     -----
-    Sichani, Enblom and Berg (2016), DOI 10.1080/00423114.2016.1156135; `mechanics.fastrip` says in
-    what this differs.
+    Sichani, Enblom and Berg (2016), DOI 10.1080/00423114.2016.1156135; the differences are listed
+    in `mechanics.tangential.fastrip`.
 
     The moduli of spin and of creepage are not those of one surface, so that the work of a strip
-    that hardly slips may come out negative, down to -5 % of the greatest where spin outweighs
-    creepage. Such strips dissipate nothing, and the others give it alike (`spread_work`): power
-    stays the work of the rigid slip.
+    with little slip may be negative, down to -5 % of the maximum where spin dominates creepage.
+    The dissipation of such strips is set to zero, and that of the others scaled (`spread_work`):
+    the power remains the work of the rigid slip.
     """
 
     knows_ellipses: ClassVar[bool] = True
@@ -69,7 +69,7 @@ class FastripTheory(TangentialTheory):
         friction: FloatArray,
         rolling_speed: float,
     ) -> Tractions:
-        """Return the tractions for a local slip; strips outside the contact cost nothing."""
+        """Return the tractions for a local slip; strips outside the contact are skipped."""
         part = touching(strips)
         problem = self._problem(strips, pair, slip, friction, part)
         out = np.zeros((4, len(strips.y)))
@@ -90,37 +90,36 @@ class FastripTheory(TangentialTheory):
     ) -> ContactFields:
         """Return pressure, traction and slip inside the contact.
 
-        Slip is strip theory's, along the direction that opposes the traction. Strips that strip
-        theory does not hold for have the fields of FASTSIM.
+        The slip is that of strip theory, opposite to the traction. Strips for which strip theory is
+        not valid have the fields of FASTSIM.
         """
         march = FastsimTheory("elliptic", self.mx, flexibility="one")
-        other = march.fields(strips, pair, slip, friction, rolling_speed, points_along)
-        everywhere = slice(0, len(strips.y))
-        problem = self._problem(strips, pair, slip, friction, everywhere)
-        found = fastrip_fields(*problem, points_along)[:, ::-1]
-        own = [not beyond_strip_theory(j, *problem) for j in range(len(strips.y))]
+        marched = march.fields(strips, pair, slip, friction, rolling_speed, points_along)
+        problem = self._problem(strips, pair, slip, friction, slice(0, len(strips.y)))
+        valid = [not beyond_strip_theory(j, *problem) for j in range(len(strips.y))]
         traction_x, traction_y, slip_x, slip_y = (
-            np.where(own, mine, theirs)
-            for mine, theirs in zip(
-                found, (other.traction_x, other.traction_y, other.slip_x, other.slip_y), strict=True
+            np.where(valid, by_strips, by_march)
+            for by_strips, by_march in zip(
+                fastrip_fields(*problem, points_along)[:, ::-1],
+                (marched.traction_x, marched.traction_y, marched.slip_x, marched.slip_y),
+                strict=True,
             )
         )
-        resting = (slip_x == 0.0) & (slip_y == 0.0) & (strips.half_length > 0.0)
         return ContactFields(
-            x=other.x,
+            x=marched.x,
             y=strips.y,
-            pressure=other.pressure,
+            pressure=marched.pressure,
             traction_x=traction_x,
             traction_y=traction_y,
             slip_x=slip_x,
             slip_y=slip_y,
-            adhesion=resting,
+            adhesion=(slip_x == 0.0) & (slip_y == 0.0) & (strips.half_length > 0.0),
             power_density=-rolling_speed * (traction_x * slip_x + traction_y * slip_y),
         )
 
     @staticmethod
     def _beyond(strips: Strips, pair: ElasticPair, slip: LocalSlip) -> float:
-        """Return the flexibility of strips that are left to FASTSIM."""
+        """Return the flexibility of the strips that are solved by FASTSIM."""
         a, b = equivalent_ellipse(strips)
         coefficients = creepage_coefficients(a / b, pair.poisson_ratio)
         three = flexibilities(coefficients, a, b, pair.shear_modulus)
@@ -130,7 +129,7 @@ class FastripTheory(TangentialTheory):
     def _problem(
         strips: Strips, pair: ElasticPair, slip: LocalSlip, friction: FloatArray, part: slice
     ) -> tuple[FloatArray, FloatArray, Motion, Moduli]:
-        """Return what the kernels take, for the strips of `part`."""
+        """Return the arguments of the kernels for the strips of `part`."""
         a, b = equivalent_ellipse(strips)
         coefficients = creepage_coefficients(a / b, pair.poisson_ratio)
         moduli = amended_moduli(coefficients, a, b, pair.shear_modulus)

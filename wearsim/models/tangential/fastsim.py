@@ -1,4 +1,4 @@
-"""FASTSIM as a tangential theory, on the strips of any normal contact."""
+"""FASTSIM as a tangential theory on the strips of any normal contact."""
 
 from __future__ import annotations
 
@@ -44,45 +44,45 @@ _CLOSED_FORM = {"never": batches.NEVER, "exact": batches.EXACT, "always": batche
 
 
 class FastsimTheory(TangentialTheory):
-    """Kalker's simplified theory with its three flexibilities, or with one.
+    """Kalker's simplified theory with three flexibilities, or with one.
 
     Parameters
     ----------
     bound : {"parabolic", "elliptic"}
-        Traction bound along rolling. On an ellipse the parabolic one is Kalker's
-        ``2N/(pi a b) (1 - x^2/a^2 - y^2/b^2)`` and the elliptic one Hertz's; on other strips each
-        carries the strip's own line load.
+        Traction bound along rolling. On an ellipse the parabolic bound is Kalker's
+        ``2N/(pi a b) (1 - x^2/a^2 - y^2/b^2)`` and the elliptic bound Hertz's; on other strips the
+        integral of either is the line load of the strip.
     mx : int
         Points along each strip.
     dissipation : {"rigid-slip", "element-sum"}
         Work of the rigid slip, second order in 1/mx, or the textbook's sum over elements, first
-        order and low.
+        order and too low.
     kalker : {"table", "line-limit"}
         Kalker's table, or its limits for a contact that is long across rolling.
     coefficients : CreepageCoefficients, optional
-        Coefficients to use in place of either.
+        Coefficients that replace either.
     closed_form : {"exact", "always", "never"}
-        Where the integral of the march replaces it, if the dissipation is the work of the rigid
-        slip: where there is no spin and it is exact; with spin too, whose phi x along the strip is
-        then left out of the slip; or nowhere. Over the paper's inputs leaving it out moves the mean
-        and the standard deviation of the power by less than 1e-4 of them, and one power by 0.2 %
-        rms, 2.5 % at most.
+        Use of the closed-form integral instead of the march, if the dissipation is the work of the
+        rigid slip: without spin, where it is exact; also with spin, whose lateral slip phi x is
+        then neglected; or never. Over the inputs of the paper the neglect changes the mean and the
+        standard deviation of the power by less than 1e-4 of them, and a single power by 0.2 % rms,
+        at most 2.5 %.
     flexibility : {"three", "one"}
         Kalker's three flexibilities, or their mean weighted with the magnitudes of the creepages,
-        ``L = (|xi| L1 + |eta| L2 + |phi| c L3)/sqrt(xi^2 + eta^2 + phi^2 c^2)``, c = sqrt(ab). One
-        leaves the direction of slip to the creepage where a contact slides throughout.
+        ``L = (|xi| L1 + |eta| L2 + |phi| c L3)/sqrt(xi^2 + eta^2 + phi^2 c^2)``, c = sqrt(ab). With
+        one, the direction of slip in gross sliding is that of the creepage.
 
     Notes
     -----
     Kalker (1982), DOI 10.1080/00423118208968684.
 
-    Three flexibilities are not those of one surface: where spin acts against the longitudinal
-    creepage, the work of a strip that hardly slips may be negative. With creepages of 1e-3 and spin
-    of 0.8/m (standard deviations of 4000 draws) some strip's is in one contact of ten on the rig's
-    ellipse, a/b = 0.09, down to -8 % of the greatest P_l, and on a circle in one of 200, to -1 %.
-    Drawn evenly in their logarithms, creepages to 3e-3 and spin to 10/m, it is in up to one contact
-    of six, to -20 % where a/b = 5; with one flexibility in up to one of 50, to -0.7 %. That of a
-    whole contact never was.
+    Three flexibilities are not those of one surface: where spin is opposed to the longitudinal
+    creepage, the work of a strip with little slip may be negative. For creepages of 1e-3 and a spin
+    of 0.8/m (standard deviations, 4000 samples) one contact in ten has such a strip on the ellipse
+    of the rig, a/b = 0.09, with down to -8 % of the maximum P_l; one in 200 on a circle, to -1 %.
+    For log-uniform creepages up to 3e-3 and a spin up to 10/m it is up to one contact in six, with
+    down to -20 % for a/b = 5; with one flexibility up to one in 50, to -0.7 %. The power of a whole
+    contact was never negative.
     """
 
     knows_ellipses: ClassVar[bool] = True
@@ -106,35 +106,34 @@ class FastsimTheory(TangentialTheory):
         self.single = flexibility == "one"
 
     def flexibilities(self, strips: Strips, pair: ElasticPair) -> Flexibilities:
-        """Return L1, L2 and L3 of the strips' equivalent ellipse.
+        """Return L1, L2 and L3 of the equivalent ellipse of the strips.
 
         Raises
         ------
         ContactError
-            If the limit of a long contact is asked for where it means nothing.
+            If the limit of a long contact is not valid for the ellipse.
         """
         a, b = equivalent_ellipse(strips)
-        found = self.coefficients
-        if found is None and self.kalker == "table":
-            found = creepage_coefficients(a / b, pair.poisson_ratio)
-        elif found is None:
+        coefficients = self.coefficients
+        if coefficients is None and self.kalker == "table":
+            coefficients = creepage_coefficients(a / b, pair.poisson_ratio)
+        elif coefficients is None:
             try:
-                found = line_limit_coefficients(a / b, pair.poisson_ratio)
+                coefficients = line_limit_coefficients(a / b, pair.poisson_ratio)
             except ValueError as error:
                 raise ContactError(
                     f"{error}; use kalker = 'table'", {"half_length": strips.half_length}
                 ) from error
-        return flexibilities(found, a, b, pair.shear_modulus)
+        return flexibilities(coefficients, a, b, pair.shear_modulus)
 
     def _flexibilities_under(
         self, strips: Strips, pair: ElasticPair, slip: LocalSlip
     ) -> Flexibilities:
-        """Return the flexibilities that the march takes under a creepage."""
+        """Return the flexibilities of the march for a creepage."""
         three = self.flexibilities(strips, pair)
-        if not self.single:
-            return three
-        one = single_flexibility(strips, three, slip)
-        return Flexibilities(one, one, one)
+        return (
+            Flexibilities(*[single_flexibility(strips, three, slip)] * 3) if self.single else three
+        )
 
     def tractions(
         self,
@@ -144,17 +143,16 @@ class FastsimTheory(TangentialTheory):
         friction: FloatArray,
         rolling_speed: float,
     ) -> Tractions:
-        """Return the tractions for a local slip; strips outside the contact cost nothing."""
+        """Return the tractions for a local slip; strips outside the contact are skipped."""
         part = touching(strips)
         flexibility = self._flexibilities_under(strips, pair, slip)
         problem = self._problem(strips, flexibility, slip, friction, part)
         out = np.zeros((5, len(strips.y)))
-        always = self.closed_form == "always"
-        exact = self.closed_form == "exact" and slip.spin == 0.0
-        if (always or exact) and not self.element_sum:
+        allowed = self.closed_form == "always" or (self.closed_form == "exact" and slip.spin == 0.0)
+        if allowed and not self.element_sum:
             out[:4, part] = closed_form(*problem[:5])
             if slip.spin != 0.0:
-                out[2] = 0.0  # phi x is left out, of the work as of the traction
+                out[2] = 0.0  # phi x is neglected, in the work as in the traction
         else:
             out[:4, part] = march(*problem, self.mx)
         force_x, force_y, moment, adhesion, dissipation = out
@@ -180,33 +178,30 @@ class FastsimTheory(TangentialTheory):
     ) -> ContactFields:
         """Return pressure, traction and slip inside the contact.
 
-        The pressure is elliptic along rolling whatever the bound, which may exceed it. Slip at a
-        point is that of the step which ends there, and its elastic part takes L1 along rolling and
-        L2 across it, so that it is zero where the surfaces adhere. Where `friction` has the shape
-        (points, strips) its points are those of the march, and `points_along` counts for nothing.
+        The pressure is elliptic along rolling for both bounds, and may be less than a parabolic
+        bound. The slip at a point is that of the step that ends there, and its elastic part has the
+        flexibilities L1 along rolling and L2 across it, so that it is zero in the adhesion zone. If
+        `friction` has the shape (points, strips), its points are those of the march, and
+        `points_along` is not used.
         """
         flexibility = self._flexibilities_under(strips, pair, slip)
-        everywhere = slice(0, len(strips.y))
-        problem = self._problem(strips, flexibility, slip, friction, everywhere)
+        problem = self._problem(strips, flexibility, slip, friction, slice(0, len(strips.y)))
         half_length, _, elliptic, gradient_x, gradient_y, gradient_spin = problem
         steps = len(friction) if friction.ndim == 2 else points_along - 1
         local = np.require(
             np.broadcast_to(friction, (steps, len(strips.y))), np.float64, ["C", "W"]
         )
         peak = peak_pressure(strips, elliptic=self.elliptic)
-        marched = march_local_fields(
+        traction_x, traction_y, cut_x, cut_y = march_local_fields(
             half_length, peak, local, elliptic, gradient_x, gradient_y, gradient_spin
         )[:, ::-1]
-        traction_x, traction_y, cut_x, cut_y = marched
-        a = strips.half_length
-        inside = a > 0.0
+        a, inside = strips.half_length, strips.half_length > 0.0
         place = np.linspace(-1.0, 1.0, steps + 1)[:, None]
         shape = np.maximum((1.0 - place) * (1.0 + place), 0.0)
         step = np.where(inside, 2.0 * a / steps, 1.0)
         slip_x = -cut_x * flexibility.longitudinal / step
         slip_y = -cut_y * flexibility.lateral / step
-        # the march starts at the leading edge with nothing cut off: what the first step finds
-        # holds there too
+        # at the leading edge, where the march starts, the slip is that of the first step
         slip_x[-1], slip_y[-1] = slip_x[-2], slip_y[-2]
         return ContactFields(
             x=place * a,
@@ -221,7 +216,7 @@ class FastsimTheory(TangentialTheory):
         )
 
     def compiled(self, pair: ElasticPair) -> batches.Theory:
-        """Return the theory as the kernels for many contacts take it."""
+        """Return the theory as an argument of the kernels for many contacts."""
         given = self.coefficients
         chosen = batches.TABLE if self.kalker == "table" else batches.LINE_LIMIT
         return batches.Theory(
@@ -245,7 +240,7 @@ class FastsimTheory(TangentialTheory):
         friction: FloatArray,
         part: slice,
     ) -> tuple[FloatArray, FloatArray, bool, FloatArray, float, float]:
-        """Return what the kernels take, for the strips of `part`."""
+        """Return the arguments of the kernels for the strips of `part`."""
         mean = slip.longitudinal - slip.spin_part
         gradient_x = mean / flexibility.longitudinal + slip.spin_part / flexibility.spin
         bound = friction * peak_pressure(strips, elliptic=self.elliptic)

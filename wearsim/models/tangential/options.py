@@ -1,4 +1,4 @@
-"""The tangential theories that a contact model offers, and the options that choose among them."""
+"""Options that select the tangential theory of a contact model."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from wearsim.models.tangential.strip_theory import StripTheory
 from wearsim.plugins import Options
 from wearsim.units import QuantityError, shown
 
-# the theories that each of the other options means something to
-_TAKEN_BY = {"mx": ("fastrip", "fastsim"), "bound": ("fastsim",), "flexibility": ("fastsim",)}
+# the theories that use each of the other options
+_USED_BY = {"mx": ("fastrip", "fastsim"), "bound": ("fastsim",), "flexibility": ("fastsim",)}
 
 
 class TangentialOptions(Options):
-    """Options with which every contact model of strips chooses its tangential theory."""
+    """Options of contact models of strips that select the tangential theory."""
 
     tangential: Literal["strip", "fastrip", "fastsim"] = Field(
         "strip",
@@ -31,26 +31,25 @@ class TangentialOptions(Options):
         description="flexibilities of a FASTSIM march: Kalker's three, or one weighted by creepage",
     )
 
-    @field_validator(*_TAKEN_BY)
+    @field_validator(*_USED_BY)
     @classmethod
-    def _means_something(cls, value: object, info: ValidationInfo) -> object:
-        """Refuse an option that the theory chosen has no use for; defaults do not come here."""
-        chosen, takers = info.data.get("tangential"), _TAKEN_BY[str(info.field_name)]
-        if chosen is not None and chosen not in takers:
-            remedy = " or ".join(f'tangential = "{taker}"' for taker in takers)
+    def _is_used(cls, value: object, info: ValidationInfo) -> object:
+        """Refuse an option that the theory does not use; defaults are not validated."""
+        theory, users = info.data.get("tangential"), _USED_BY[str(info.field_name)]
+        if theory is not None and theory not in users:
             raise QuantityError(
-                f'means nothing with tangential = "{chosen}"',
+                f'is not used with tangential = "{theory}"',
                 shown(value),
-                f"none of it, or {remedy}",
+                "none of it, or " + " or ".join(f'tangential = "{user}"' for user in users),
             )
         return value
 
 
 def tangential_theory(options: TangentialOptions) -> TangentialTheory:
-    """Return the tangential theory that `options` choose."""
+    """Return the tangential theory that the options select."""
     if options.tangential == "strip":
         return StripTheory()
-    # kernels of marches take a while to load, and strips alone have no use for them
+    # the kernels of marches are slow to load
     if options.tangential == "fastrip":
         from wearsim.models.tangential.fastrip import FastripTheory  # noqa: PLC0415
 

@@ -1,4 +1,4 @@
-"""Traction and slip along the strips of strip theory, point by point."""
+"""Strip theory as a tangential theory, with the fields along its strips."""
 
 from __future__ import annotations
 
@@ -21,66 +21,6 @@ from wearsim.models.tangential.base import LocalSlip, Strips, TangentialTheory, 
 from wearsim.types import BoolArray, ContactFields, FloatArray
 
 
-def strip_fields(
-    strips: Strips,
-    pair: ElasticPair,
-    slip: LocalSlip,
-    friction: FloatArray,
-    rolling_speed: float,
-    points_along: int,
-    found: StripTractions,
-) -> ContactFields:
-    """Return the fields inside the strips, (points_along, strips).
-
-    Parameters
-    ----------
-    strips, pair, slip, friction, rolling_speed
-        What `StripTheory.tractions` was given.
-    points_along : int
-        Points along each strip.
-    found : StripTractions
-        What it found.
-
-    Returns
-    -------
-    ContactFields
-        The traction's integrals are `found`'s, but where first-order terms exceed the traction
-        bound, to which they are cut: less than 1 % of the forces.
-    """
-    s = np.linspace(-1.0, 1.0, points_along)
-    x = s[:, None] * strips.half_length
-    shape = (points_along, len(strips.y))
-    traction_x, traction_y, slip_x, slip_y = (np.zeros(shape) for _ in range(4))
-    adhesion = np.zeros(shape, dtype=bool)
-    pressure = np.zeros(shape)
-    elasticity = strip_elasticity(pair.contact_modulus, pair.shear_modulus)
-    ratio = equivalent_ratio(strips.half_length, strips.line_load, strips.spacing)
-    moduli = effective_moduli(ratio, elasticity)
-    loaded = np.flatnonzero(strips.line_load > 0.0)
-    steepness = bound_steepness(strips.half_length, strips.line_load)
-    for i in loaded:
-        a, q = float(strips.half_length[i]), float(strips.line_load[i])
-        peak = 2.0 * q / (np.pi * a)
-        pressure[:, i] = peak * np.sqrt(np.maximum(0.0, (1.0 - s) * (1.0 + s)))
-        rigid_x = float(slip.longitudinal[i] + found.induced_x[i])
-        rigid_y = float(slip.lateral + found.induced_y[i])
-        mu = float(friction[i])
-        (traction_x[:, i], traction_y[:, i], slip_x[:, i], slip_y[:, i], adhesion[:, i]) = _along(
-            s, a, mu * peak, mu * steepness, rigid_x, rigid_y, float(slip.spin), moduli
-        )
-    return ContactFields(
-        x=x,
-        y=strips.y,
-        pressure=pressure,
-        traction_x=traction_x,
-        traction_y=traction_y,
-        slip_x=slip_x,
-        slip_y=slip_y,
-        adhesion=adhesion,
-        power_density=-rolling_speed * (traction_x * slip_x + traction_y * slip_y),
-    )
-
-
 def _along(
     s: FloatArray,
     a: float,
@@ -91,26 +31,25 @@ def _along(
     spin: float,
     moduli: tuple[float, float],
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, BoolArray]:
-    """Return tractions, slip and adhesion at x = s a in a strip whose traction bound is `bound`.
+    """Return tractions, slip and adhesion at x = s a in a strip with the traction bound `bound`.
 
     `steepness` includes the friction coefficient.
     """
-    nothing = np.zeros_like(s)
+    zero = np.zeros_like(s)
     local_y = rigid_y + spin * a * s
-    still = (nothing + rigid_x == 0.0) & (local_y == 0.0)
+    still = (zero + rigid_x == 0.0) & (local_y == 0.0)
     if bound <= 0.0 or still.all():
-        return nothing, nothing, nothing + rigid_x, local_y, still
+        return zero, zero, zero + rigid_x, local_y, still
     state = strip_state(a, steepness, rigid_x, rigid_y, spin, *moduli)
     mean_x, mean_y, _ = mean_direction(rigid_x, rigid_y, spin * a)
     local = np.where(still, 1.0, np.hypot(rigid_x, local_y))
     shape = np.sqrt(np.maximum(0.0, (1.0 - s) * (1.0 + s)))
     tractions, slips = [], []
     for e, u, psi, mean, rigid, modulus in (
-        (state.e_x, state.u_x, 0.0, mean_x, nothing + rigid_x, moduli[0]),
+        (state.e_x, state.u_x, 0.0, mean_x, zero + rigid_x, moduli[0]),
         (state.e_y, state.u_y, state.psi, mean_y, local_y, moduli[1]),
     ):
-        rate = steepness * a / modulus
-        turning = rigid / local
+        rate, turning = steepness * a / modulus, rigid / local
         if state.t < 1.0:
             traction, moving = _partly_adhering(s, shape, state.t, e, u, psi)
         else:
@@ -132,7 +71,7 @@ def _partly_adhering(
 ) -> tuple[FloatArray, FloatArray]:
     """Return traction over -mu p0, and slip over its scale, along one axis.
 
-    The strip adheres from s = 1 back to 2 t - 1.
+    The adhesion zone of the strip extends from s = 2 t - 1 to 1.
     """
     beyond = (s - t) ** 2 - (1.0 - t) ** 2
     taken_back = np.sqrt(np.maximum(0.0, -beyond))
@@ -146,7 +85,7 @@ def _partly_adhering(
 
 
 class StripTheory(TangentialTheory):
-    """Carter's closed form in every strip, with its local slip."""
+    """Carter's closed form in each strip with its local slip."""
 
     def tractions(
         self,
@@ -156,14 +95,14 @@ class StripTheory(TangentialTheory):
         friction: FloatArray,
         rolling_speed: float,
     ) -> Tractions:
-        """Return the tractions for a local slip; `friction` has shape (strips,)."""
-        found = self._solve(strips, pair, slip, friction)
+        """Return the tractions for a local slip and `friction`, shape (strips,)."""
+        solved = self._solve(strips, pair, slip, friction)
         return Tractions(
-            found.force_x,
-            found.force_y,
-            found.moment,
-            rolling_speed * found.work,
-            found.adhesion_length,
+            solved.force_x,
+            solved.force_y,
+            solved.moment,
+            rolling_speed * solved.work,
+            solved.adhesion_length,
         )
 
     def fields(
@@ -175,15 +114,46 @@ class StripTheory(TangentialTheory):
         rolling_speed: float,
         points_along: int,
     ) -> ContactFields:
-        """Return the tractions whose integrals are the forces, and the slip that goes with them."""
-        found = self._solve(strips, pair, slip, friction)
-        return strip_fields(strips, pair, slip, friction, rolling_speed, points_along, found)
+        """Return pressure, traction and slip in the contact, (points_along, strips).
+
+        The integrals of the traction are the forces of `tractions`, except where first-order terms
+        exceed the traction bound, at which they are cut off: less than 1 % of the forces.
+        """
+        solved = self._solve(strips, pair, slip, friction)
+        s = np.linspace(-1.0, 1.0, points_along)
+        shape = (points_along, len(strips.y))
+        pressure, traction_x, traction_y, slip_x, slip_y = np.zeros((5, *shape))
+        adhesion = np.zeros(shape, dtype=bool)
+        elasticity = strip_elasticity(pair.contact_modulus, pair.shear_modulus)
+        ratio = equivalent_ratio(strips.half_length, strips.line_load, strips.spacing)
+        moduli = effective_moduli(ratio, elasticity)
+        steepness = bound_steepness(strips.half_length, strips.line_load)
+        for i in np.flatnonzero(strips.line_load > 0.0):
+            a, mu = float(strips.half_length[i]), float(friction[i])
+            peak = 2.0 * float(strips.line_load[i]) / (np.pi * a)
+            pressure[:, i] = peak * np.sqrt(np.maximum(0.0, (1.0 - s) * (1.0 + s)))
+            rigid_x = float(slip.longitudinal[i] + solved.induced_x[i])
+            rigid_y = float(slip.lateral + solved.induced_y[i])
+            traction_x[:, i], traction_y[:, i], slip_x[:, i], slip_y[:, i], adhesion[:, i] = _along(
+                s, a, mu * peak, mu * steepness, rigid_x, rigid_y, float(slip.spin), moduli
+            )
+        return ContactFields(
+            x=s[:, None] * strips.half_length,
+            y=strips.y,
+            pressure=pressure,
+            traction_x=traction_x,
+            traction_y=traction_y,
+            slip_x=slip_x,
+            slip_y=slip_y,
+            adhesion=adhesion,
+            power_density=-rolling_speed * (traction_x * slip_x + traction_y * slip_y),
+        )
 
     @staticmethod
     def _solve(
         strips: Strips, pair: ElasticPair, slip: LocalSlip, friction: FloatArray
     ) -> StripTractions:
-        found = new_tractions(len(strips.y))
+        solved = new_tractions(len(strips.y))
         solve_strips(
             np.ascontiguousarray(strips.half_length),
             np.ascontiguousarray(strips.line_load),
@@ -193,6 +163,6 @@ class StripTheory(TangentialTheory):
             float(slip.spin),
             float(strips.spacing),
             strip_elasticity(pair.contact_modulus, pair.shear_modulus),
-            found,
+            solved,
         )
-        return found
+        return solved

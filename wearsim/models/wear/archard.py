@@ -10,7 +10,7 @@ from wearsim.types import ContactSolution, FloatArray
 
 
 class BodyWear(Options):
-    """The wear factor of one body."""
+    """Wear factor of one body."""
 
     k_over_h: NonNegativeWearFactor = Field(
         description="wear factor K/H, volume per dissipated energy, e.g. '1.1e-11 1/Pa'"
@@ -20,8 +20,8 @@ class BodyWear(Options):
 class ArchardOptions(Options):
     """Options of the wear law `archard-dissipation`."""
 
-    cylinder: BodyWear = Field(description="the cylinder's wear factor")
-    roller: BodyWear = Field(description="every roller's wear factor; '0 1/Pa' for no wear")
+    cylinder: BodyWear = Field(description="wear factor of the cylinder")
+    roller: BodyWear = Field(description="wear factor of each roller; '0 1/Pa' for no wear")
 
 
 class ArchardDissipation(WearLaw):
@@ -36,7 +36,7 @@ class ArchardDissipation(WearLaw):
     def depth_per_pass(
         self, body: Body, solution: ContactSolution, rolling_speed: float
     ) -> FloatArray:
-        """Return the depth that one pass wears off `body`, shape (strips,) [m]."""
+        """Return the depth worn off `body` in one pass, shape (strips,) [m]."""
         return self.depth_per_dissipation(body, rolling_speed) * solution.dissipation
 
     def depth_per_dissipation(self, body: Body, rolling_speed: float) -> float:
@@ -48,7 +48,7 @@ SPEC = WearLawSpec(
     name="archard-dissipation",
     factory=ArchardDissipation,
     options=ArchardOptions,
-    summary="worn volume in proportion to dissipated energy, strip by strip",
+    summary="wear proportional to the dissipated energy, strip by strip",
     references=(
         "Archard, J. Appl. Phys. 24 (1953), DOI 10.1063/1.1721448",
         "Chevalier, Cloupet, Soize, Wear 258 (2005), DOI 10.1016/j.wear.2004.11.012",

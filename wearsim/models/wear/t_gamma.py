@@ -1,4 +1,4 @@
-"""The wear law `t-gamma`: three regimes of wear, by the energy dissipated per contact area."""
+"""The wear law `t-gamma`: three wear regimes by dissipated energy per contact area."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ INDEX = Quantity(
 
 
 class Regimes(Options):
-    """How one body wears: the rates of the three regimes, and where the last begins.
+    """Wear rates of one body in three regimes, and the threshold of the third.
 
-    Without other values they are those of the twin-disc tests of R8T wheel steel on 900A rail
-    steel. Severe wear begins where mild wear reaches its rate: at 10.4 N/mm^2 with these.
+    The defaults are those of twin-disc tests of R8T wheel steel on 900A rail steel. Severe wear
+    begins where the rate of mild wear reaches that of severe wear: at 10.4 N/mm^2 by default.
     """
 
     mild: PositiveMassPerEnergy = Field(
@@ -37,8 +37,8 @@ class Regimes(Options):
     )
     severe: Annotated[float, RATE] = Field(
         55.0e-3,
-        description="mass worn per rolled distance and contact area in severe wear, which does not"
-        " depend on the energy, '55 ug/(m mm^2)'",
+        description="mass worn per rolled distance and contact area in severe wear, independent of"
+        " the energy, '55 ug/(m mm^2)'",
     )
     catastrophic: NonNegativeMassPerEnergy = Field(
         61.9e-9, description="mass worn per energy beyond the last threshold, '61.9 ug/J'"
@@ -47,7 +47,7 @@ class Regimes(Options):
         77.2e6, description="T gamma over A where catastrophic wear begins, '77.2 N/mm^2'"
     )
     density: PositiveDensity = Field(7850.0, description="density of the body, '7850 kg/m^3'")
-    factor: float = Field(1.0, ge=0.0, description="multiplies all rates; 0 for no wear")
+    factor: float = Field(1.0, ge=0.0, description="factor of all rates; 0 for no wear")
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
@@ -77,18 +77,18 @@ class Regimes(Options):
 class TGammaOptions(Options):
     """Options of the wear law `t-gamma`."""
 
-    cylinder: Regimes = Field(default_factory=Regimes, description="how the cylinder wears")
+    cylinder: Regimes = Field(default_factory=Regimes, description="wear of the cylinder")
     roller: Regimes = Field(
-        default_factory=Regimes, description="how every roller wears; factor = 0 for no wear"
+        default_factory=Regimes, description="wear of each roller; factor = 0 for no wear"
     )
 
 
 class TGamma(WearLaw):
     """Depth per pass by the local T gamma over A of each strip.
 
-    A strip of half-length a that dissipates P_l has T gamma / A = P_l/(2 a V). Over a rolled
-    distance it loses rate times its area, so that a pass wears 2 a rate/density. While every strip
-    wears mildly this is Archard's law with K/H = mild/density.
+    A strip of half-length a with the dissipation P_l has T gamma / A = P_l/(2 a V). Its mass loss
+    per rolled distance is the rate times its area, so that a pass wears the depth 2 a rate/density.
+    If all strips are in mild wear this is Archard's law with K/H = mild/density.
     """
 
     def __init__(self, options: TGammaOptions) -> None:
@@ -100,7 +100,7 @@ class TGamma(WearLaw):
     def depth_per_pass(
         self, body: Body, solution: ContactSolution, rolling_speed: float
     ) -> FloatArray:
-        """Return the depth that one pass wears off `body`, shape (strips,) [m]."""
+        """Return the depth worn off `body` in one pass, shape (strips,) [m]."""
         regimes, length = self._regimes[body], 2.0 * solution.half_length
         touching = length > 0.0
         index = solution.dissipation / (np.where(touching, length, 1.0) * rolling_speed)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from wearsim.models.random.maxent import LawDistribution
+from wearsim.models.random.distributions import AnalyticDistribution
 from wearsim.scenario import Scenario
 from wearsim.studies.contact.draws import LOAD, LONGITUDINAL, TILT, YAW
 from wearsim.studies.run.grid import fresh_patch
@@ -61,9 +61,9 @@ def _radii(scenario: Scenario) -> str:
 def law_of(scenario: Scenario, key: str) -> MaxentDistribution:
     """Return the law of maximum entropy that a scenario's random input draws from."""
     (item,) = (item for item in scenario.random if item.name == key)
-    if not isinstance(item.distribution, LawDistribution):
+    if not isinstance(item.distribution, AnalyticDistribution):
         raise TypeError(f"{key} has no law: its distribution is {item.kind}")
-    return item.distribution.law
+    return item.distribution.analytic
 
 
 def printed_area(printed: paper.PrintedMultipliers, law: MaxentDistribution) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.mechanics.hertz.ellipse import HertzContact, hertz
-from wearsim.models.contact.default_grid import grid_about_hertz
+from wearsim.models.contact.strip_model import grid_about_hertz
 from wearsim.plugins import ContactModel
 from wearsim.studies.run.grid import profile_grid
 from wearsim.types import Creepage, FloatArray, Grid, OperatingPoint, Profile

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from wearsim.contact_batch import OperatingPoints, rows_of
-from wearsim.models.contact.default_grid import grid_about_hertz
+from wearsim.models.contact.strip_model import grid_about_hertz
 from wearsim.plugins import ContactModelSpec, registry
 from wearsim.scenario.examples import shipped_scenario
 from wearsim.studies.contact.single import study_contact
