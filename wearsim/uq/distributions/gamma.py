@@ -53,8 +53,8 @@ class Gamma(MaxentDistribution):
                 widest=lambda y: 0.5 + 0.1 * y,
             )
 
-        both = np.concatenate([edges(-1.0)[:0:-1], edges(1.0)])
-        return InverseTable([Piece(0.0, 1.0, both, lambda y: k * (y - np.expm1(y)))])
+        offsets = np.concatenate([edges(-1.0)[:0:-1], edges(1.0)])
+        return InverseTable([Piece(0.0, 1.0, offsets, lambda y: k * (y - np.expm1(y)))])
 
     def inverse(self, below: FloatArray, above: FloatArray) -> FloatArray:
         """Return quantiles, shape (draws,), from the probabilities below and above them."""

@@ -22,7 +22,7 @@ from wearsim.uq.distributions.truncated_normal import QuadraticExponent, Truncat
 _ROUNDING = 1e-12
 _RAREST = 1e-12  # least probability of a peak at the far end of the support
 _SMALLEST, _LARGEST = 1e-150, 1e150  # range in which squares and their inverses are finite
-_OTHER_UNIT = "choose a unit in which it lies between 1e-150 and 1e150"
+_OTHER_UNIT = "choose a unit in which it is between 1e-150 and 1e150"
 
 
 class Infeasible(WearsimError, ValueError):  # noqa: N818  (established term)
@@ -76,37 +76,43 @@ def _check(
     low: float, high: float, mean: float | None, std: float | None, mean_log: float | None
 ) -> None:
     """Raise unless the maximum-entropy distribution exists."""
-    if not low < high:
-        raise Infeasible(f"the support must increase, got {low:g} to {high:g}")
-    if math.isfinite(low) and math.isfinite(high) and math.isinf(high - low):
-        raise Infeasible(f"the support {_interval(low, high)} is too wide: its width overflows")
+    _require(low < high, f"the support must increase, got {low:g} to {high:g}")
+    support = _interval(low, high)
+    finite = math.isfinite(low) and math.isfinite(high)
+    _require(
+        not finite or math.isfinite(high - low),
+        f"the support {support} is too wide: its width overflows",
+    )
     for name, value in (("mean", mean), ("std", std), ("mean_log", mean_log)):
         if value is not None and not math.isfinite(value):
             raise Infeasible(f"{name} must be finite, got {value:g}")
     _check_sizes(low, high, mean, std)
     if mean_log is not None:
         _check_logarithm(low, high, mean, std, mean_log)
-        return
-    if mean is None:
+    elif mean is None:
         if std is not None:
             raise Infeasible(
                 f"a std alone determines no distribution, got std {std:g}; give the mean too"
             )
-        if math.isinf(high - low):
-            raise Infeasible(
-                f"the support {_interval(low, high)} alone determines no distribution, since it is"
-                " unbounded; give a mean, or finite limits"
-            )
-        return
-    if not low < mean < high:
-        raise Infeasible(f"mean {mean:g} is not inside the support {_interval(low, high)}")
-    if std is not None:
-        _check_spread(low, high, mean, std)
-    elif math.isinf(low) and math.isinf(high):
-        raise Infeasible(
-            f"mean {mean:g} alone determines no distribution on (-inf, inf); give the std too,"
-            " or a limit"
+        _require(
+            finite,
+            f"the support {support} alone determines no distribution, since it is unbounded; give a"
+            " mean, or finite limits",
         )
+    else:
+        _require(low < mean < high, f"mean {mean:g} is not inside the support {support}")
+        _require(
+            std is not None or math.isfinite(low) or math.isfinite(high),
+            f"mean {mean:g} alone determines no distribution on (-inf, inf); give the std too, or a"
+            " limit",
+        )
+        if std is not None:
+            _check_spread(low, high, mean, std)
+
+
+def _require(condition: bool, text: str) -> None:
+    if not condition:
+        raise Infeasible(text)
 
 
 def _check_sizes(low: float, high: float, mean: float | None, std: float | None) -> None:
@@ -117,54 +123,56 @@ def _check_sizes(low: float, high: float, mean: float | None, std: float | None)
     for name, size in sizes.items():
         if size is not None and 0.0 < size < _SMALLEST:
             raise Infeasible(f"{name} {size:g} is too small to be squared; {_OTHER_UNIT}")
-    places = {"low": low, "high": high, "mean": mean, "std": std}
-    for name, place in places.items():
+    for name, place in {"low": low, "high": high, "mean": mean, "std": std}.items():
         if place is not None and _LARGEST < abs(place) < math.inf:
             raise Infeasible(f"{name} {place:g} is too large to be squared; {_OTHER_UNIT}")
 
 
 def _check_spread(low: float, high: float, mean: float, std: float) -> None:
     """Raise unless a distribution on the support can have this mean and standard deviation."""
-    if std <= 0.0:
-        raise Infeasible(f"std {std:g} is not above zero")
+    _require(std > 0.0, f"std {std:g} is not above zero")
     below, above = mean - low, high - mean
     least = min(below, above)
     if math.isinf(least):
         return
-    name = "mean - low" if below < above else "high - mean"
-    more = f"std {std:g} is more than {name} = {least:g}"
+    more = (
+        f"std {std:g} is more than {'mean - low' if below < above else 'high - mean'} = {least:g}"
+    )
+    support = _interval(low, high)
     if math.isinf(max(below, above)):
-        if std > least * (1.0 + _ROUNDING):
-            support = _interval(low, high)
-            raise Infeasible(f"{more}, the limit of a maximum-entropy distribution on {support}")
+        _require(
+            std <= least * (1.0 + _ROUNDING),
+            f"{more}, the limit of a maximum-entropy distribution on {support}",
+        )
         return
     limit = math.sqrt(below) * math.sqrt(above)
-    if std >= limit * (1.0 - _ROUNDING):
-        raise Infeasible(
-            f"std {std:g} is not less than sqrt((mean - low) (high - mean)) = {limit:g}, the"
-            f" limit of any distribution on {_interval(low, high)} with mean {mean:g}"
-        )
+    _require(
+        std < limit * (1.0 - _ROUNDING),
+        f"std {std:g} is not less than sqrt((mean - low) (high - mean)) = {limit:g}, the limit of"
+        f" any distribution on {support} with mean {mean:g}",
+    )
     weight = _far_peak(least / (high - low), std / (high - low))[1]
-    if std > least * (1.0 + _ROUNDING) and least < 0.02 * (high - low) and weight < _RAREST:
-        raise Infeasible(
-            f"{more}, which requires a probability of {weight:.0e} at the far end of"
-            f" {_interval(low, high)}, too small to occur in any sample; lower the std"
-        )
+    _require(
+        std <= least * (1.0 + _ROUNDING) or least >= 0.02 * (high - low) or weight >= _RAREST,
+        f"{more}, which requires a probability of {weight:.0e} at the far end of {support}, too"
+        " small to occur in any sample; lower the std",
+    )
 
 
 def _check_logarithm(
     low: float, high: float, mean: float | None, std: float | None, mean_log: float
 ) -> None:
+    name = f"mean_log {mean_log:g}"
     if mean is None:
-        raise Infeasible(f"mean_log {mean_log:g} needs the mean too")
+        raise Infeasible(f"{name} needs the mean too")
     if std is not None:
-        raise Infeasible(f"mean_log {mean_log:g} replaces the std, got std {std:g}; leave one out")
-    if (low, high) != (0.0, math.inf):
-        raise Infeasible(f"mean_log needs the support [0, inf), got {_interval(low, high)}")
-    if not mean > 0.0:
-        raise Infeasible(f"mean {mean:g} is not inside the support [0, inf)")
-    if not mean_log < math.log(mean):
-        raise Infeasible(f"mean_log {mean_log:g} is not less than log(mean) = {math.log(mean):g}")
+        raise Infeasible(f"{name} replaces the std, got std {std:g}; leave one out")
+    _require(
+        (low, high) == (0.0, math.inf),
+        f"mean_log needs the support [0, inf), got {_interval(low, high)}",
+    )
+    _require(mean > 0.0, f"mean {mean:g} is not inside the support [0, inf)")
+    _require(mean_log < math.log(mean), f"{name} is not less than log(mean) = {math.log(mean):g}")
 
 
 def _interval(low: float, high: float) -> str:
@@ -182,12 +190,9 @@ def _towards_lower(low: float, high: float, mean: float, std: float | None) -> M
     reach = mean - low if part < 0.02 else (high - low) / (fall or 1.0)
     widest = reach * exponential_std(fall) if fall > 0.0 else (high - low) / math.sqrt(12.0)
     if std is None or abs(std - widest) <= _ROUNDING * widest:
-        if fall == 0.0:
-            return Uniform(low, high)
-        return Exponential(low, high, 1.0 / reach, mean)
-    if std < widest:
-        return _one_peak(low, high, mean, std)
-    return _two_ends(low, high, mean, std, fall)
+        return Uniform(low, high) if fall == 0.0 else Exponential(low, high, 1.0 / reach, mean)
+    one_peak = std < widest
+    return _one_peak(low, high, mean, std) if one_peak else _two_ends(low, high, mean, std, fall)
 
 
 def _one_peak(low: float, high: float, mean: float, std: float) -> MaxentDistribution:

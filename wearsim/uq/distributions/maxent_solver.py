@@ -66,8 +66,9 @@ def multipliers(
     finest = min(bases, key=lambda basis: float(basis.means[0]))
     value, density = _objective(result, weights, bases[0])
     residual, last = np.inf, np.inf
+    size = np.where(finest.means == 0.0, 1.0, np.abs(finest.means))
     for _ in range(200):
-        residual = _residual(density, finest)
+        residual = float(np.max(np.abs(finest.features @ density - finest.means) / size))
         if residual < 1e-15 or (residual < 1e-11 and residual >= last):
             break
         last = residual
@@ -98,12 +99,6 @@ def _objective(tried: FloatArray, weights: FloatArray, basis: Basis) -> tuple[fl
     mass = weights * np.exp(exponent - top)
     total = float(mass.sum())
     return top + float(np.log(total)) + float(tried @ basis.means), mass / total
-
-
-def _residual(density: FloatArray, basis: Basis) -> float:
-    """Return the greatest relative error of the means (absolute for a mean of 0)."""
-    size = np.where(basis.means == 0.0, 1.0, np.abs(basis.means))
-    return float(np.max(np.abs(basis.features @ density - basis.means) / size))
 
 
 def _newton_step(density: FloatArray, basis: Basis) -> tuple[FloatArray, float]:

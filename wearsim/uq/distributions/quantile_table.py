@@ -14,6 +14,7 @@ _MAX_PANEL_DROP = 2.0  # change of the log density over a panel
 _MAX_PANEL_BEND = 0.2  # panel width times the square root of the log density's curvature
 _NODES = 0.5 - 0.5 * np.cos(np.pi * np.arange(9) / 8)  # nodes of a panel, from 0 to 1
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(8)
+_POINTS = _NODES[:-1, None] + np.diff(_NODES)[:, None] * 0.5 * (1.0 + _GAUSS)
 _CHUNK = 1 << 15  # draws per block; the panel data of a block fit into the processor's cache
 
 
@@ -89,22 +90,21 @@ class InverseTable:
         Logarithm of the integral of the density over all pieces, in units of offset.
     mean, std : float
         Mean and standard deviation.
+    above_pieces : ndarray, shape (pieces,)
+        Probability above the upper end of each piece.
     """
 
     def __init__(self, pieces: list[Piece]) -> None:
         counts = [len(piece.edges) - 1 for piece in pieces]
-        self._ends = np.cumsum(counts)
         self._origin = np.repeat([piece.origin for piece in pieces], counts)
         self._scale = np.repeat([piece.scale for piece in pieces], counts)
         self._start = np.concatenate([piece.edges[:-1] for piece in pieces])
         self._width = np.concatenate([np.diff(piece.edges) for piece in pieces])
-        logs = [_node_logs(piece) for piece in pieces]
-        top = max(float(log[1].max()) for log in logs)
-        at_nodes = np.concatenate([log[0] for log in logs])
-        within = np.concatenate([log[1] for log in logs])
+        logs = zip(*(_node_logs(piece) for piece in pieces), strict=True)
+        at_nodes, within = (np.concatenate(parts) for parts in logs)
+        top = float(within.max())
         peak = within.max(axis=(1, 2))
-        steps = np.diff(_NODES)
-        local = np.exp(within - peak[:, None, None]) * (0.5 * _WEIGHTS) * steps[:, None]
+        local = np.exp(within - peak[:, None, None]) * (0.5 * _WEIGHTS) * np.diff(_NODES)[:, None]
         parts = local.sum(axis=2)
         masses = np.exp(peak - top) * parts.sum(axis=1) * self._width
         total = masses.sum()
@@ -112,6 +112,7 @@ class InverseTable:
         self._mass = masses / total
         self._below = np.concatenate([[0.0], np.cumsum(self._mass)])
         self._above = np.concatenate([np.cumsum(self._mass[::-1])[::-1], [0.0]])
+        self.above_pieces = self._above[np.cumsum(counts)]
         self._rise = at_nodes[:, -1] - at_nodes[:, 0]
         self._rise[np.abs(self._rise) < 1e-8] = 1e-8  # a panel with constant density
         self._growth, self._decay = np.expm1(self._rise), np.expm1(-self._rise)
@@ -131,17 +132,12 @@ class InverseTable:
         return np.ascontiguousarray(solved.T, dtype=np.float64)
 
     def _moments(self, local: FloatArray, mass_per_part: FloatArray) -> tuple[float, float]:
-        places = _NODES[:-1, None] + np.diff(_NODES)[:, None] * 0.5 * (1.0 + _GAUSS)
-        offsets = self._start[:, None, None] + self._width[:, None, None] * places
+        offsets = self._start[:, None, None] + self._width[:, None, None] * _POINTS
         weights = local * mass_per_part[:, None, None]
         first = self._origin[0]
         values = (self._origin - first)[:, None, None] + self._scale[:, None, None] * offsets
         mean = float((weights * values).sum())
         return first + mean, float(np.sqrt((weights * (values - mean) ** 2).sum()))
-
-    def above_piece(self, piece: int) -> float:
-        """Return the probability above the upper end of a piece."""
-        return float(self._above[self._ends[piece]])
 
     def values(self, below: FloatArray, above: FloatArray) -> FloatArray:
         """Return quantiles, shape (draws,), from the probabilities below and above them."""
@@ -157,11 +153,10 @@ class InverseTable:
         upper = below > 0.5
         # near the upper end, only the probability above has sufficient relative precision
         panel[upper] = last - np.searchsorted(self._above[-2:0:-1], above[upper], side="right")
-        from_below = ~upper
         mass = np.maximum(self._mass[panel], 1e-300)
-        part = np.where(from_below, below - self._below[panel], above - self._above[panel + 1])
+        part = np.where(upper, above - self._above[panel + 1], below - self._below[panel])
         part = np.clip(part / mass, 0.0, 1.0)
-        share, rest = np.where(from_below, part, 1.0 - part), np.where(from_below, 1.0 - part, part)
+        share, rest = np.where(upper, 1.0 - part, part), np.where(upper, part, 1.0 - part)
         place = _exponential_place(
             share, rest, self._rise[panel], self._growth[panel], self._decay[panel]
         )
@@ -190,7 +185,5 @@ def _exponential_place(
 def _node_logs(piece: Piece) -> tuple[FloatArray, FloatArray]:
     """Return the log density at the panel nodes, and at Gauss points between adjacent nodes."""
     start, width = piece.edges[:-1, None], np.diff(piece.edges)[:, None]
-    between = _NODES[:-1, None] + np.diff(_NODES)[:, None] * 0.5 * (1.0 + _GAUSS)
-    points = start + width * between.ravel()
-    shape = (len(start), *between.shape)
-    return piece.log_density(start + width * _NODES), piece.log_density(points).reshape(shape)
+    between = piece.log_density(start + width * _POINTS.ravel())
+    return piece.log_density(start + width * _NODES), between.reshape(-1, *_POINTS.shape)

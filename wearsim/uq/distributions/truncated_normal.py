@@ -37,24 +37,21 @@ class TruncatedNormal(MaxentDistribution):
         # in the tail that holds both ends, if there is one, to avoid cancellation
         upper = float(ndtr(-start)) - float(ndtr(-stop))
         self._mass = upper if start > 0.0 else float(ndtr(stop)) - float(ndtr(start))
-        self.mean, self.std = self._moments(start, stop)
-        log_mass = math.log(self._mass * std * math.sqrt(2.0 * math.pi))
-        l2 = 0.5 / (std * std)
-        self._log_top = -log_mass
-        self.multipliers = (l2 * mean * mean + log_mass, -2.0 * l2 * mean, l2)
-
-    def _moments(self, start: float, stop: float) -> tuple[float, float]:
-        """Return mean and standard deviation from the parent's density at both ends."""
-        at = [
+        density = [
             math.exp(-0.5 * end * end) / math.sqrt(2.0 * math.pi) / self._mass
             for end in (start, stop)
         ]
         arms = [
-            end * part if part > 0.0 else 0.0 for end, part in zip((start, stop), at, strict=True)
+            end * part if part > 0.0 else 0.0
+            for end, part in zip((start, stop), density, strict=True)
         ]
-        shift = at[0] - at[1]
-        mean, std = self._parent
-        return mean + std * shift, std * math.sqrt(1.0 + arms[0] - arms[1] - shift * shift)
+        shift = density[0] - density[1]
+        self.mean = mean + std * shift
+        self.std = std * math.sqrt(1.0 + arms[0] - arms[1] - shift * shift)
+        log_mass = math.log(self._mass * std * math.sqrt(2.0 * math.pi))
+        l2 = 0.5 / (std * std)
+        self._log_top = -log_mass
+        self.multipliers = (l2 * mean * mean + log_mass, -2.0 * l2 * mean, l2)
 
     @property
     def parent(self) -> tuple[float, float]:
@@ -133,7 +130,7 @@ class QuadraticExponent(MaxentDistribution):
         if not self._has_two_peaks:
             return None
         least = self.support[0] - 0.5 * self._scale * self._fall / self._bend
-        return least, self._table.above_piece(0)
+        return least, float(self._table.above_pieces[0])
 
     @property
     def _has_two_peaks(self) -> bool:
@@ -205,5 +202,5 @@ def cut_normal(
 
 def has_parent(low: float, high: float, parent_mean: float, parent_std: float) -> bool:
     """Return whether closed forms are accurate on a support nearer above the parent's mean."""
-    deep = low - parent_mean > _DEEPEST * parent_std
-    return not deep and high - low > _NARROWEST * parent_std
+    near = low - parent_mean <= _DEEPEST * parent_std
+    return near and high - low > _NARROWEST * parent_std

@@ -117,8 +117,8 @@ def summarise(values: FloatArray, probabilities: tuple[float, ...] = ()) -> Summ
     last = converge(values, np.array([count]))
     deviation = values - float(values.mean())
     second, third = float((deviation**2).mean()), float((deviation**3).mean())
-    skewness = math.nan
     mean, std = float(last.mean[0]), float(last.std[0])
+    skewness = math.nan
     if count > 2 and second > 0.0 and not is_constant(mean, std):
         skewness = third / second**1.5 * math.sqrt(count * (count - 1.0)) / (count - 2.0)
     ordered = np.sort(values)
@@ -255,12 +255,10 @@ class RowMoments:
 
     def add(self, rows: FloatArray) -> None:
         """Add rows, shape (rows, columns)."""
-        taken = 0
-        while taken < len(rows):
-            part = rows[taken : taken + _BLOCK - self._held]
+        while len(rows):
+            part, rows = np.split(rows, [_BLOCK - self._held])
             self._waiting[self._held : self._held + len(part)] = part
             self._held += len(part)
-            taken += len(part)
             if self._held == _BLOCK:
                 self._merged = _merge(self._merged, self._waiting)
                 self._held = 0

@@ -108,8 +108,9 @@ class Control(NamedTuple):
     @property
     def is_usable(self) -> bool:
         """Whether the realisations are sufficient for a regression and the values vary."""
-        sufficient = len(self.values) >= _MIN_REGRESSION
-        return sufficient and not is_constant(float(self.values.mean()), float(self.values.std()))
+        return len(self.values) >= _MIN_REGRESSION and not is_constant(
+            float(self.values.mean()), float(self.values.std())
+        )
 
 
 class Controlled(PlanErrors):

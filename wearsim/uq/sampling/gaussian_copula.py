@@ -80,12 +80,14 @@ def _check(first: str, second: str, rank: float, dimensions: Mapping[str, int]) 
     """Raise a ValueError for an invalid correlation."""
     for name in (first, second):
         if name not in dimensions:
-            known = ", ".join(dimensions) or "none"
-            raise ValueError(f'cannot correlate "{name}": no such input, the inputs are {known}')
+            raise ValueError(
+                f'cannot correlate "{name}": no such input, the inputs are'
+                f" {', '.join(dimensions) or 'none'}"
+            )
         if dimensions[name] != 1:
             raise ValueError(
-                f"cannot correlate {name}: one draw takes {dimensions[name]} numbers, and only inputs"
-                " of one number have ranks"
+                f"cannot correlate {name}: one draw takes {dimensions[name]} numbers, and only"
+                " inputs of one number have ranks"
             )
     if first == second:
         raise ValueError(f"cannot correlate {first} with itself; name two inputs")
@@ -106,7 +108,7 @@ def _groups(pairs: Mapping[tuple[str, str], float]) -> list[list[str]]:
 
 
 def _factor(names: list[str], pairs: Mapping[tuple[str, str], float]) -> list[list[float]]:
-    """Return the rows of the Cholesky factor of the normal scores' correlation matrix."""
+    """Return the rows of the Cholesky factor for the normal scores."""
     factor: list[list[float]] = []
     for i, name in enumerate(names):
         row: list[float] = []

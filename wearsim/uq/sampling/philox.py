@@ -72,5 +72,6 @@ class Stream:
 
         Component k of each draw is taken from block k; other parameters as for `words`.
         """
-        columns = [self.uniforms(first, count, realisation, k) for k in range(dimension)]
-        return np.stack(columns, axis=1)
+        return np.stack(
+            [self.uniforms(first, count, realisation, k) for k in range(dimension)], axis=1
+        )

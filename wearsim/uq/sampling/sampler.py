@@ -48,11 +48,24 @@ class Sampler:
         correlations: Sequence[Correlation] = (),
         replicates: int = 1,
     ) -> None:
-        self._dimensions = _dimensions(inputs)
+        self._dimensions: dict[str, int] = {}
+        for name, dimension in inputs:
+            if name in self._dimensions:
+                raise ValueError(f"the input {name} is given twice; use different names")
+            if dimension < 1:
+                raise ValueError(f"the input {name} must take 1 or more numbers, got {dimension}")
+            self._dimensions[name] = dimension
         self._draw = drawing(plan, seed, total, replicates)
         self._copula = GaussianCopula(correlations, self._dimensions)
-        if plan == "sobol":
-            _refuse_shared_slots(self._dimensions)
+        owner: dict[int, str] = {}
+        for name, dimension in self._dimensions.items() if plan == "sobol" else ():
+            for slot in slots(name, dimension) or ():
+                if slot in owner:
+                    raise ValueError(
+                        f"{owner[slot]} and {name} are one quantity and share a dimension of the"
+                        " Sobol sequence; draw only one of them"
+                    )
+                owner[slot] = name
 
     def uniforms(self, first: int, count: int) -> dict[str, FloatArray]:
         """Return the uniform numbers of `count` consecutive realisations.
@@ -82,28 +95,3 @@ class Sampler:
                 for name, dimension in self._dimensions.items()
             }
         )
-
-
-def _dimensions(inputs: Sequence[tuple[str, int]]) -> dict[str, int]:
-    """Return the dimension of each input; raises a ValueError for an invalid input."""
-    dimensions: dict[str, int] = {}
-    for name, dimension in inputs:
-        if name in dimensions:
-            raise ValueError(f"the input {name} is given twice; use different names")
-        if dimension < 1:
-            raise ValueError(f"the input {name} must take 1 or more numbers, got {dimension}")
-        dimensions[name] = dimension
-    return dimensions
-
-
-def _refuse_shared_slots(dimensions: dict[str, int]) -> None:
-    """Raise a ValueError for inputs that share a dimension of the Sobol sequence."""
-    owner: dict[int, str] = {}
-    for name, dimension in dimensions.items():
-        for slot in slots(name, dimension) or ():
-            if slot in owner:
-                raise ValueError(
-                    f"{owner[slot]} and {name} are one quantity and share a dimension of the Sobol"
-                    " sequence; draw only one of them"
-                )
-            owner[slot] = name

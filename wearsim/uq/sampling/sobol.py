@@ -9,6 +9,7 @@ resolving such a conflict would depend on the other inputs.
 
 from __future__ import annotations
 
+import re
 from functools import lru_cache
 from typing import TypeAlias
 
@@ -38,7 +39,7 @@ SLOT_OF = {
 }
 """First slot of each common input, and its number of slots."""
 
-_ROLLERS = 1000  # scipy has 21201 dimensions
+_ROLLER = re.compile("0|[1-9][0-9]{0,2}")  # fewer than scipy's 21201 dimensions
 _BITS = 32
 _ROUNDS = 4
 _VALUES, _ORDER = 0, 1  # uses of a key
@@ -54,16 +55,12 @@ def slots(name: str, dimension: int) -> range | None:
     dimension : int
         Number of uniform numbers per realisation.
     """
-    base, _, roller = name.partition("@")
+    base, at, roller = name.partition("@")
     slot, width = SLOT_OF.get(base, (0, 0))
-    if dimension > width:
+    if dimension > width or (at and not _ROLLER.fullmatch(roller)):
         return None
-    if not roller:
-        return None if "@" in name else range(slot, slot + dimension)
-    if not (roller.isascii() and roller.isdecimal() and str(int(roller)) == roller):
-        return None
-    shift = SLOTS * (1 + int(roller))
-    return range(shift + slot, shift + slot + dimension) if int(roller) < _ROLLERS else None
+    start = slot + (SLOTS * (1 + int(roller)) if at else 0)
+    return range(start, start + dimension)
 
 
 def scrambled(
@@ -112,10 +109,8 @@ def _sequence(dimensions: int, first: int, count: int) -> Words:
     engine = Sobol(dimensions, scramble=False, bits=_BITS)
     if first > 0:
         engine.fast_forward(first)
-        points = engine.random(count)
-    else:
-        # the first point separately: scipy warns if the first batch is not a power of two
-        points = np.concatenate([engine.random(1), engine.random(max(count - 1, 0))])[:count]
+    # the first point separately: scipy warns if the first batch is not a power of two
+    points = np.concatenate([engine.random(1), engine.random(max(count - 1, 0))])[:count]
     return np.asarray(points * 2.0**_BITS).astype(np.uint32)
 
 
@@ -126,22 +121,15 @@ def _padded(seed: int, name: str, dimension: int, first: int, count: int, replic
     are 2^m consecutive points of the sequence, and thus a net (Burley 2020, JCGT 9(4)).
     """
     index = np.arange(first, first + count, dtype=np.uint64).astype(np.uint32)
-    words = np.empty((count, dimension), dtype=np.uint32)
+    words = np.zeros((count, dimension), dtype=np.uint32)
     for k in range(0, dimension, 2):
         order = nested_scramble(index, _key(seed, name, _ORDER, k, replicate))
         words[:, k] = reverse_bits(order)
-        if k + 1 < dimension:
-            words[:, k + 1] = _second_dimension(order)
-    return words
-
-
-def _second_dimension(index: Words) -> Words:
-    """Return the words of Sobol's second dimension: Pascal's triangle modulo 2 times the index."""
-    words = np.zeros_like(index)
-    direction = 2 ** (_BITS - 1)
-    for bit in range(_BITS):
-        words ^= (index >> np.uint32(bit) & np.uint32(1)) * np.uint32(direction)
-        direction ^= direction >> 1
+        if k + 1 < dimension:  # Pascal's triangle modulo 2 times the index
+            direction = 2 ** (_BITS - 1)
+            for bit in range(_BITS):
+                words[:, k + 1] ^= (order >> np.uint32(bit) & np.uint32(1)) * np.uint32(direction)
+                direction ^= direction >> 1
     return words
 
 

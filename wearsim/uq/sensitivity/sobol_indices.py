@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
-from wearsim.types import FloatArray
+from wearsim.types import FloatArray, IntArray
 from wearsim.uq.estimation.intervals import UNKNOWN, Interval, t_interval
 from wearsim.uq.estimation.moments import is_constant
-from wearsim.uq.sensitivity.polynomial_chaos import best_fit, fewest_realisations
 
 SMALL = 0.01
 """Index below which an effect whose interval includes 0 counts as none."""
@@ -18,6 +19,11 @@ SMALL = 0.01
 _NONE = Interval(0.0, 0.0, 0.0)
 _MOST = 65536  # realisations used by a fit, sufficient for errors of 0.5 %
 FEWEST_BASES = 10
+_DEGREE = 10  # greatest degree of a polynomial
+_TERMS = 120  # greatest number of terms, with the constant
+_PER_TERM = 8  # least number of realisations per term
+_BLOCK = 8192  # rows per block
+_RIDGE = 1e-9  # relative regularisation, for terms that are equal in all realisations
 
 
 def without_effect(index: Interval) -> bool:
@@ -87,11 +93,11 @@ def _share(values: FloatArray, numbers: FloatArray, name: str) -> Interval:
         return UNKNOWN
     ranks = np.stack([_ranks(column) for column in varying.T], axis=1)
     deviation = values - values.mean()
-    fits = (
+    fit = min(
         best_fit(ndtri(ranks), deviation, "hermite"),
         best_fit(2.0 * ranks - 1.0, deviation, "legendre"),
+        key=lambda one: one.error,
     )
-    fit = min(fits, key=lambda one: one.error)
     left_out = fit.residual / (1.0 - fit.leverage)
     variance = float((deviation**2).sum()) / (count - 1)
     left = float((deviation * left_out).sum()) / (count - 1) / variance
@@ -171,3 +177,125 @@ def _ratio(part: FloatArray, square: FloatArray) -> Interval:
     influence = (part - share * square) / float(square.mean())
     error = float(influence.std(ddof=1)) / math.sqrt(len(part))
     return t_interval(share, error, len(part) - 1).within(0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted polynomial and its leave-one-out errors.
+
+    Parameters
+    ----------
+    terms : int
+        Number of terms, with the constant.
+    error : float
+        Mean square of the leave-one-out prediction errors.
+    residual, leverage : ndarray, shape (n,)
+        Residual and leverage of each realisation.
+    """
+
+    terms: int
+    error: float
+    residual: FloatArray
+    leverage: FloatArray
+
+
+def fewest_realisations(numbers: int) -> int:
+    """Return the number of realisations that a fit of so many numbers and their squares needs."""
+    return _PER_TERM * (1 + 2 * numbers)
+
+
+def best_fit(scores: FloatArray, values: FloatArray, family: str) -> Fit:
+    """Return the polynomial with the least leave-one-out error.
+
+    Parameters
+    ----------
+    scores : ndarray, shape (n, m)
+        Normal scores ("hermite") or ranks from -1 to 1 ("legendre").
+    values : ndarray, shape (n,)
+        Values with the mean 0; at least `fewest_realisations` of them.
+    family : {"hermite", "legendre"}
+        The polynomials whose products the terms are.
+
+    Returns
+    -------
+    Fit
+    """
+    count = len(values)
+    distinct = [len(np.unique(column)) for column in scores.T]
+    powers, ends = _terms(distinct, min(count // _PER_TERM, _TERMS))
+    gram, moment = np.zeros((len(powers),) * 2), np.zeros(len(powers))
+    for rows, design in _designs(scores, powers, family):
+        gram += design.T @ design
+        moment += design.T @ values[rows]
+    lower = np.linalg.cholesky(gram + _RIDGE * count * np.eye(len(powers)))
+    # columns orthonormalised successively: the first k of them span the first k terms
+    transform = np.linalg.inv(lower).T
+    slopes = transform.T @ moment
+    residual, leverage = np.empty((count, len(ends))), np.empty((count, len(ends)))
+    for rows, design in _designs(scores, powers, family):
+        columns = design @ transform
+        for k, end in enumerate(ends):
+            residual[rows, k] = values[rows] - columns[:, :end] @ slopes[:end]
+            leverage[rows, k] = (columns[:, :end] ** 2).sum(axis=1)
+    errors = ((residual / (1.0 - leverage)) ** 2).mean(axis=0)
+    best = int(np.argmin(errors))
+    return Fit(ends[best], float(errors[best]), residual[:, best], leverage[:, best])
+
+
+def _terms(distinct: list[int], most: int) -> tuple[IntArray, list[int]]:
+    """Return the powers of each term, (terms, m), and the possible numbers of terms.
+
+    Terms are ordered by total degree, then by the number of factors.
+    """
+    width = len(distinct)
+    powers, ends = [(0,) * width], list[int]()
+    for degree in range(1, _DEGREE + 1):
+        for factors in range(1, min(degree, width) + 1):
+            if len(powers) + math.comb(width, factors) * math.comb(degree - 1, factors - 1) > most:
+                continue
+            powers += [
+                term
+                for term in _of_degree(degree, factors, width)
+                if all(power < known for power, known in zip(term, distinct, strict=True))
+            ]
+            if degree > 1:
+                ends.append(len(powers))
+    return np.array(powers, dtype=np.int64), sorted(set(ends))
+
+
+def _of_degree(degree: int, factors: int, width: int) -> Iterator[tuple[int, ...]]:
+    """Yield the powers of all terms of this degree with so many factors."""
+    for chosen in combinations(range(width), factors):
+        # compositions of the degree into parts of 1 or more
+        for cuts in combinations(range(1, degree), factors - 1):
+            powers = [0] * width
+            for number, start, stop in zip(chosen, (0, *cuts), (*cuts, degree), strict=True):
+                powers[number] = stop - start
+            yield tuple(powers)
+
+
+def _designs(
+    scores: FloatArray, powers: IntArray, family: str
+) -> Iterator[tuple[slice, FloatArray]]:
+    """Yield the terms of successive blocks of rows, (rows, terms)."""
+    for first in range(0, len(scores), _BLOCK):
+        rows = slice(first, first + _BLOCK)
+        degrees = _orthonormal(scores[rows], int(powers.max()), family)
+        design = np.ones((degrees.shape[1], len(powers)))
+        for number in range(scores.shape[1]):
+            design *= degrees[powers[:, number], :, number].T
+        yield rows, design
+
+
+def _orthonormal(x: FloatArray, highest: int, family: str) -> FloatArray:
+    """Return orthonormal polynomials of all degrees, (degrees, rows, m), by recurrence."""
+    values = np.ones((highest + 1, *x.shape))
+    for degree in range(highest):
+        before = values[degree - 1] if degree else 0.0
+        if family == "hermite":
+            upper, lower = (degree + 1.0) ** 0.5, degree**0.5
+        else:
+            upper = (degree + 1.0) / ((2.0 * degree + 1.0) * (2.0 * degree + 3.0)) ** 0.5
+            lower = degree / ((2.0 * degree + 1.0) * abs(2.0 * degree - 1.0)) ** 0.5
+        values[degree + 1] = (x * values[degree] - lower * before) / upper
+    return values

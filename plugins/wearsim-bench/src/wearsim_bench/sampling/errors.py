@@ -1,4 +1,4 @@
-"""Errors of sampling plans: many studies of one size beside what all tests together tell."""
+"""Errors of sampling plans: studies of one size compared with the estimate from all tests."""
 
 from __future__ import annotations
 
@@ -9,9 +9,8 @@ import numpy as np
 
 from wearsim.studies.ensemble.designs import EnsemblePlan
 from wearsim.types import FloatArray
-from wearsim.uq.estimation.estimates import Estimate, estimate
+from wearsim.uq.estimation.estimates import Estimate, WeightedDistribution, estimate
 from wearsim.uq.estimation.intervals import Interval
-from wearsim.uq.estimation.quantiles import WeightedDistribution
 from wearsim.uq.estimation.standard_errors import Control, Controlled
 from wearsim.uq.sampling.plans import REPLICATES
 
@@ -21,16 +20,16 @@ MEAN, QUANTILE = "mean of depth", "95 % quantile of depth"
 
 @dataclass(frozen=True)
 class Study:
-    """The tests of one study.
+    """Results of the tests of one study.
 
     Parameters
     ----------
     replicate : int
-        Studies of the same replicate may share draws; those of others are independent.
+        Number of the replicate; studies of different replicates are independent.
     depths, controls : ndarray, shape (tests,)
-        At the end of each, and in closed form [m].
+        Final depths, and their closed-form approximations [m].
     known : tuple of float
-        Mean of the control and that mean's standard error [m].
+        Mean of the control variate and its standard error [m].
     """
 
     replicate: int
@@ -39,12 +38,12 @@ class Study:
     known: tuple[float, float]
 
     def blocks(self, size: int) -> list[Study]:
-        """Return the studies of `size` tests that stand in it one after another.
+        """Return the consecutive blocks of `size` tests as studies.
 
-        Each has the law of a study that was asked for so many: independent draws have it
-        wherever they stand; and `size` points of a Sobol sequence on end, from a multiple of `size`
-        on and a power of two, are the first ones with digits exchanged, which Owen's scrambling
-        cannot tell apart from those.
+        A block has the distribution of a study of this size. This holds for independent draws, and
+        for a Sobol sequence if `size` is a power of two: a block that starts at a multiple of
+        `size` is the first block with permuted digits, which has the same distribution under
+        Owen scrambling.
         """
         return [
             Study(
@@ -57,25 +56,25 @@ class Study:
         ]
 
     def estimate(self, plan: EnsemblePlan) -> Estimate:
-        """Return what an ensemble of this plan says of these tests."""
+        """Return the estimate of an ensemble with this plan from these tests."""
         control = Control(self.controls, *self.known) if plan == "control-variate" else None
         replicate = np.arange(len(self.depths)) % REPLICATES
         return estimate(self.depths, (PROBABILITY,), plan, replicate, control)
 
 
-def interval_of(found: Estimate, group: str) -> Interval:
+def interval_of(result: Estimate, group: str) -> Interval:
     """Return the mean or the quantile of an estimate, by its group."""
-    return found.mean if group == MEAN else found.quantile(PROBABILITY)
+    return result.mean if group == MEAN else result.quantile(PROBABILITY)
 
 
 @dataclass(frozen=True)
 class Reference:
-    """What all tests together tell [m].
+    """Reference value from all tests.
 
     Parameters
     ----------
     value, error : float
-        And its standard error.
+        Value and standard error [m].
     """
 
     value: float
@@ -83,29 +82,29 @@ class Reference:
 
 
 def references(studies: Sequence[Study]) -> dict[str, Reference]:
-    """Return what all studies together on_progress, by group.
+    """Return the reference values from all studies, by group.
 
-    All tests, however drawn, are weighted so that the closed form has its known mean, which is what
-    all cheap draws tell. The standard errors are the jackknife's, one replicate left out each time.
+    The tests are weighted so that the control variate has its known mean. The standard errors are
+    those of the jackknife over replicates.
 
     Parameters
     ----------
     studies : sequence of Study
-        Of two replicates or more.
+        Studies of at least two replicates.
     """
     numbers = sorted({study.replicate for study in studies})
-    whole = _together(studies)
-    left = [_together([s for s in studies if s.replicate != number]) for number in numbers]
+    pooled = _pooled(studies)
+    reduced = [_pooled([s for s in studies if s.replicate != number]) for number in numbers]
     share = (len(numbers) - 1) / len(numbers)
-    found = {}
-    for group, value in whole.items():
-        others = np.array([other[group] for other in left])
+    references = {}
+    for group, value in pooled.items():
+        others = np.array([other[group] for other in reduced])
         error = float(np.sqrt(share * ((others - others.mean()) ** 2).sum()))
-        found[group] = Reference(value, error)
-    return found
+        references[group] = Reference(value, error)
+    return references
 
 
-def _together(studies: Sequence[Study]) -> dict[str, float]:
+def _pooled(studies: Sequence[Study]) -> dict[str, float]:
     depths = np.concatenate([study.depths for study in studies])
     controls = np.concatenate([study.controls for study in studies])
     means = sorted({study.known for study in studies})
@@ -117,20 +116,21 @@ def _together(studies: Sequence[Study]) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class PlanError:
-    """How far the studies of a plan and a size are from the truth.
+    """Errors of the studies of one plan and size.
 
     Parameters
     ----------
     rms : float
-        Relative error.
+        Root mean square of the relative errors.
     claimed : float
-        Half-width of the interval, median, relative; infinite where half of them have no end.
+        Median relative half-width of the confidence interval; infinite if half are unbounded.
     held : float
-        Part of the studies whose interval holds the truth.
+        Fraction of the studies whose interval contains the reference.
     studies : int
+        Number of studies.
     known : float
-        Standard error of `rms`, relative to it: that of the mean of the replicates' squares, since
-        studies of one replicate may share draws.
+        Relative standard error of `rms`, from the means over replicates, since studies of one
+        replicate may share draws.
     """
 
     rms: float
@@ -141,34 +141,36 @@ class PlanError:
 
 
 def plan_error(
-    studies: Sequence[Study], plan: EnsemblePlan, group: str, truth: Reference
+    studies: Sequence[Study], plan: EnsemblePlan, group: str, reference: Reference
 ) -> PlanError:
-    """Return how far studies of one size are from the truth.
+    """Return the errors of studies of one size.
 
     Parameters
     ----------
     studies : sequence of Study
-        Of two replicates or more.
+        Studies of at least two replicates.
     plan : str
+        The sampling plan.
     group : str
         `MEAN` or `QUANTILE`.
-    truth : Reference
+    reference : Reference
+        Reference value of the group.
     """
-    found = [interval_of(study.estimate(plan), group) for study in studies]
-    apart = np.array([interval.value / truth.value - 1.0 for interval in found])
-    widths = [interval.half_width / truth.value for interval in found]
-    held = [interval.low <= truth.value <= interval.high for interval in found]
+    intervals = [interval_of(study.estimate(plan), group) for study in studies]
+    errors = np.array([interval.value / reference.value - 1.0 for interval in intervals])
+    widths = [interval.half_width / reference.value for interval in intervals]
+    held = [interval.low <= reference.value <= interval.high for interval in intervals]
     return PlanError(
-        rms=float(np.sqrt(np.mean(apart**2))),
+        rms=float(np.sqrt(np.mean(errors**2))),
         claimed=float(np.median(widths)),
         held=float(np.mean(held)),
-        studies=len(found),
-        known=_known(studies, apart**2),
+        studies=len(intervals),
+        known=_relative_standard_error(studies, errors**2),
     )
 
 
-def _known(studies: Sequence[Study], squares: FloatArray) -> float:
-    """Return the standard error of the root of the mean of squares, relative to it."""
+def _relative_standard_error(studies: Sequence[Study], squares: FloatArray) -> float:
+    """Return the relative standard error of the root of the mean of squares."""
     replicates = np.array([study.replicate for study in studies])
     numbers = np.unique(replicates)
     means = np.array([squares[replicates == number].mean() for number in numbers])
