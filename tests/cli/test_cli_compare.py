@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from cli_examples import SCENARIOS, Command
 
-from tests.studies.ensemble_cases import frail, small
+from tests.studies.ensemble_cases import partly_failing, small
 from wearsim.errors import Interrupted
 from wearsim.results import open_ensemble, open_results
 from wearsim.scenario import load_scenario
@@ -28,7 +28,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     ensemble(heavy, 30, path / "b.h5", scheduler="serial")
     run(small(), path / "r.h5")
     run(small(passes=2000), path / "short.h5")
-    ensemble(frail(), 12, path / "f.h5", scheduler="serial")
+    ensemble(partly_failing(), 12, path / "f.h5", scheduler="serial")
     with pytest.raises(Interrupted):
         ensemble(small(), 12, path / "u.h5", scheduler="serial", stop_requested=lambda: True)
     ensemble(small(), 1, path / "one.h5", scheduler="serial")

@@ -17,7 +17,7 @@ from rich.console import Console
 import wearsim
 from tests.interruptible import interruptible
 from tests.report.made_up_ensembles import made_up
-from tests.studies.ensemble_cases import frail, small
+from tests.studies.ensemble_cases import partly_failing, small
 from wearsim.cli.progress import realisations as progress
 from wearsim.cli.progress.realisations import (
     EnsembleLines,
@@ -64,7 +64,7 @@ def tests(tmp_path: Path) -> Path:
 def failing(tmp_path: Path) -> Path:
     """A scenario of a short run in which some realisations fail."""
     path = tmp_path / "failing.toml"
-    path.write_text(frail().text)
+    path.write_text(partly_failing().text)
     return path
 
 
@@ -420,7 +420,7 @@ def test_terminal_shows_a_live_line(monkeypatch: pytest.MonkeyPatch) -> None:
         assert isinstance(watch, LiveEnsemble)
         watch(PROGRESS)
     assert "24 %" in screen.getvalue()
-    assert progress_text(PROGRESS, what="") in screen.getvalue()
+    assert progress_text(PROGRESS, items="") in screen.getvalue()
 
 
 def test_quiet_shows_nothing(capsys: pytest.CaptureFixture[str]) -> None:
@@ -547,7 +547,7 @@ def test_export_refuses_a_file_as_its_folder(command: Command, done: Path) -> No
     Path("a.png").write_text("mine")
     result = command("export", done, "-o", "a.png")
     assert result.exit_code == 2
-    assert "a.png: is a file; tables go into a folder" in result.stderr
+    assert "a.png: is a file; tables are written to a folder" in result.stderr
 
 
 def test_ensemble_opened_as_a_run_names_open_ensemble(done: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 from matplotlib.colors import to_hex
 
 from tests.report.made_up_ensembles import INPUTS, made_up
-from wearsim.report.figures.ensemble import FEW, convergence_of, ensemble_figure
+from wearsim.report.figures.ensemble import LINES, convergence_of, ensemble_figure
 from wearsim.report.parts.saving import save_figure
 from wearsim.report.parts.style import GREY
 from wearsim.results import EnsembleResult
@@ -44,7 +44,7 @@ def test_course_has_median_mean_band_and_realisations(figure, result):
         np.testing.assert_allclose(labelled(axes, label).get_xdata(), course.passes / 1e6)
     assert axes.get_xlabel() == "million roller passes"
     thin = [line for line in axes.get_lines() if line.get_linewidth() < 1.0]
-    assert len(thin) == FEW
+    assert len(thin) == LINES
     np.testing.assert_allclose(thin[3].get_ydata(), result.values("depth")[3] * 1e6)
     heights = axes.collections[0].get_paths()[0].vertices[:, 1]
     assert heights.max() == pytest.approx(course.quantiles[0.95].max() * 1e6)

@@ -54,20 +54,22 @@ def maxent(
     from wearsim.uq.distributions.maxent import Infeasible, maximum_entropy
 
     try:
-        law = maximum_entropy((_limit(support[0]), _limit(support[1])), mean, std, mean_log)
+        distribution = maximum_entropy(
+            (_limit(support[0]), _limit(support[1])), mean, std, mean_log
+        )
     except Infeasible as error:
         raise Infeasible(re.sub(r"\bmean_log\b", "--mean-log", str(error))) from error
     if figure is not None:
         from wearsim.report.figures.maxent import maxent_figure
         from wearsim.report.parts.saving import save_figure
 
-        save_figure(maxent_figure(law), figure)
+        save_figure(maxent_figure(distribution), figure)
     if json:
-        write_json(_data(law, figure))
+        write_json(_data(distribution, figure))
         return
-    write_table("maximum-entropy distribution", _rows(law))
-    typer.echo("\n".join(_plot(law)))
-    write_notes((), law.warnings)
+    write_table("maximum-entropy distribution", _rows(distribution))
+    typer.echo("\n".join(_plot(distribution)))
+    write_notes((), distribution.warnings)
     if figure is not None:
         note(f"figure: {figure}")
 
@@ -82,44 +84,44 @@ def _limit(text: str) -> float:
         ) from error
 
 
-def _rows(law: MaxentDistribution) -> list[tuple[str, str]]:
+def _rows(distribution: MaxentDistribution) -> list[tuple[str, str]]:
     from wearsim.report.text.maxent_numbers import multipliers, parent, value
 
-    found = parent(law)
+    found = parent(distribution)
     return [
-        ("family", law.family),
-        ("support", " to ".join(f"{end:g}" for end in law.support)),
-        ("density", f"exp(-l0 - l1 x - l2 {law.third})"),
-        *((f"l{number}", f"{item:.7g}") for number, item in enumerate(multipliers(law))),
+        ("family", distribution.family),
+        ("support", " to ".join(f"{end:g}" for end in distribution.support)),
+        ("density", f"exp(-l0 - l1 x - l2 {distribution.third})"),
+        *((f"l{number}", f"{item:.7g}") for number, item in enumerate(multipliers(distribution))),
         (
             "parent normal distribution",
             f"mean {found[0]:.7g}, standard deviation {found[1]:.7g}" if found else "none",
         ),
-        ("mean", f"{value(law, law.mean):.7g}"),
-        ("standard deviation", f"{law.std:.7g}"),
+        ("mean", f"{value(distribution, distribution.mean):.7g}"),
+        ("standard deviation", f"{distribution.std:.7g}"),
         *(
             (f"{100.0 * probability:g} % quantile", f"{item:.7g}")
-            for probability, item in _quantiles(law).items()
+            for probability, item in _quantiles(distribution).items()
         ),
     ]
 
 
-def _quantiles(law: MaxentDistribution) -> dict[float, float]:
+def _quantiles(distribution: MaxentDistribution) -> dict[float, float]:
     import numpy as np
 
     from wearsim.report.text.maxent_numbers import value
 
-    values = law.quantile(np.array(PROBABILITIES)).tolist()
-    return {p: value(law, item) for p, item in zip(PROBABILITIES, values, strict=True)}
+    values = distribution.quantile(np.array(PROBABILITIES)).tolist()
+    return {p: value(distribution, item) for p, item in zip(PROBABILITIES, values, strict=True)}
 
 
-def _plot(law: MaxentDistribution) -> list[str]:
+def _plot(distribution: MaxentDistribution) -> list[str]:
     """Return the density as a plot of block characters, line by line, with its range below."""
     import numpy as np
 
-    low, high = law.bulk
+    low, high = distribution.bulk
     edges = np.linspace(low, high, _COLUMNS + 1)
-    density = law.density(0.5 * (edges[1:] + edges[:-1]))
+    density = distribution.density(0.5 * (edges[1:] + edges[:-1]))
     eighths = np.rint(density / density.max() * 8 * _ROWS).astype(int)
     lines = [
         "  " + "".join(_BLOCKS[min(max(height - 8 * row, 0), 8)] for height in eighths).rstrip()
@@ -129,20 +131,20 @@ def _plot(law: MaxentDistribution) -> list[str]:
     return [*lines, f"  {'▔' * _COLUMNS}", f"  {left}{right:>{_COLUMNS - len(left)}}"]
 
 
-def _data(law: MaxentDistribution, figure: Path | None) -> dict[str, Any]:
+def _data(distribution: MaxentDistribution, figure: Path | None) -> dict[str, Any]:
     """Return the distribution in the units of the given moments."""
     from wearsim.report.text.maxent_numbers import multipliers, parent, value
 
-    found = parent(law)
+    found = parent(distribution)
     return {
-        "family": law.family,
-        "support": law.support,
-        "multipliers": dict(zip(("l0", "l1", "l2"), multipliers(law), strict=True)),
-        "l2_multiplies": law.third,
+        "family": distribution.family,
+        "support": distribution.support,
+        "multipliers": dict(zip(("l0", "l1", "l2"), multipliers(distribution), strict=True)),
+        "l2_multiplies": distribution.third,
         "parent": found and {"mean": found[0], "std": found[1]},
-        "mean": value(law, law.mean),
-        "std": law.std,
-        "quantiles": _quantiles(law),
-        "warnings": list(law.warnings),
+        "mean": value(distribution, distribution.mean),
+        "std": distribution.std,
+        "quantiles": _quantiles(distribution),
+        "warnings": list(distribution.warnings),
         "figure": figure,
     }

@@ -24,28 +24,28 @@ _BAR, _COLUMNS_FOR_BAR = 16, 115
 
 
 @contextmanager
-def counting(quiet: bool, what: str) -> Iterator[Counter]:
+def counting(quiet: bool, items: str) -> Iterator[Counter]:
     """Open a display of a number of realisations on stderr; it takes done and total.
 
     Parameters
     ----------
     quiet : bool
         Whether to show nothing.
-    what : str
+    items : str
         Name of the counted items, "realisations".
     """
     screen = console(err=True)
     if quiet:
         yield lambda done, total: None
     elif not screen.is_terminal:
-        yield CountedLines(note, what)
+        yield CountedLines(note, items)
     else:
         text = "{task.percentage:3.0f} %  {task.fields[done]}"
         with live_line(screen, text, bar_width=24, columns=0) as progress:
             task = progress.add_task("", total=1.0, done="")
 
             def show(done: int, total: int) -> None:
-                words = f"{count(done)} of {count(total)} {what}"
+                words = f"{count(done)} of {count(total)} {items}"
                 progress.update(task, total=total, completed=done, done=words)
 
             yield show
@@ -58,16 +58,16 @@ class CountedLines:
     ----------
     write : callable
         Writes a line.
-    what : str
+    items : str
         Name of the counted items.
     now : callable
         Returns a monotonic time [s].
     """
 
     def __init__(
-        self, write: Callable[[str], None], what: str, now: Callable[[], float] = time.monotonic
+        self, write: Callable[[str], None], items: str, now: Callable[[], float] = time.monotonic
     ) -> None:
-        self._write, self._what, self._now = write, what, now
+        self._write, self._items, self._now = write, items, now
         self._begun = self._written = now()
 
     def __call__(self, done: int, total: int) -> None:
@@ -77,7 +77,7 @@ class CountedLines:
             return
         self._written = now
         left = lapse((now - self._begun) * (total - done) / done)
-        self._write(f"{count(done)} of {count(total)} {self._what}, {left} left")
+        self._write(f"{count(done)} of {count(total)} {self._items}, {left} left")
 
 
 @contextmanager
@@ -102,14 +102,14 @@ def watching_ensemble(quiet: bool) -> Iterator[EnsembleWatcher]:
 
 
 def progress_text(
-    progress: EnsembleProgress, what: str = " realisations", columns: float = math.inf
+    progress: EnsembleProgress, items: str = " realisations", columns: float = math.inf
 ) -> str:
     """Return the progress of an ensemble on one line.
 
     Parameters
     ----------
     progress : EnsembleProgress
-    what : str
+    items : str
         Name of the counted items, with a leading space.
     columns : float
         Greatest length; parts of low priority are left out to meet it.
@@ -117,7 +117,7 @@ def progress_text(
     left = progress.done + progress.failed < progress.asked
     rate = f"{progress.rate:.3g}" if progress.rate < 1000.0 else count(progress.rate)
     parts = [
-        f"{count(progress.done)} of {count(progress.asked)}{what}",
+        f"{count(progress.done)} of {count(progress.asked)}{items}",
         f"{count(progress.failed)} failed" if progress.failed else "",
         f"{rate}/s",
         f"{lapse(progress.left)} left" if left else "",

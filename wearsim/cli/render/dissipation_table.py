@@ -68,12 +68,12 @@ def _power_ranges(power: Summary) -> Rows:
         values = " to ".join(_watts(end.value) for end in ends)
         # as many digits as the quantile, which would else seem to be outside its interval
         pairs = [(_watts(end.low), _watts(end.high)) for end in ends]
-        intervals = [_TOO_FEW if NOTHING in pair else " to ".join(pair) for pair in pairs]
+        intervals = [_TOO_FEW if NOTHING in pair else "..".join(pair) for pair in pairs]
         confidence = " and ".join(dict.fromkeys(intervals))
-        name = f"dissipated power, {100 * low:g} to {100 * high:g} %"
+        name = f"dissipated power, {100.0 * (high - low):g} %"
         rows.append((name, f"{values} W (95 % confidence: {confidence})"))
     extremes = f"{_watts(power.least)} to {shown(power.greatest, 'W')}"
-    return [*rows, ("dissipated power, least to greatest", extremes)]
+    return [*rows, ("dissipated power, all", extremes)]
 
 
 def _watts(value: float) -> str:

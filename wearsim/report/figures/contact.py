@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,10 +12,8 @@ from matplotlib.patches import Patch
 from wearsim.report.parts.patch_size import patch_edges, patches
 from wearsim.report.parts.style import BLUE, ORANGE, PRESSURE, figure_style, name_axes
 from wearsim.report.text.units import PER_SI, shown
+from wearsim.studies.contact.single import ContactStudy
 from wearsim.types import ContactFields, ContactSolution, FloatArray, IntArray
-
-if TYPE_CHECKING:
-    from wearsim.studies.contact.single import ContactStudy
 
 MM, MPA, W_MM2 = PER_SI["mm"], PER_SI["MPa"], PER_SI["W/mm^2"]
 N_MM, W_MM = PER_SI["N/mm"], PER_SI["W/mm"]
@@ -51,7 +49,7 @@ def contact_figure(study: ContactStudy, title: str) -> Figure:
             _draw_fields(panels, study.fields, study.solution)
         _draw_strips(panels, study.solution)
         caption = (
-            f"{study.described_model}: normal force {shown(study.point.normal_force, 'N')},"
+            f"{study.described_model}\nnormal force {shown(study.point.normal_force, 'N')},"
             f" peak pressure {shown(study.solution.peak_pressure, 'MPa')},"
             f" dissipated power {shown(study.solution.power, 'W')}"
         )
@@ -65,16 +63,21 @@ def _draw_fields(panels: dict[str, Axes], fields: ContactFields, solution: Conta
     y = np.broadcast_to(fields.y[inside], fields.x[:, inside].shape) * MM
     x = fields.x[:, inside] * MM
     traction = np.hypot(fields.traction_x, fields.traction_y)
-    pressure = _pressure(fields, solution)[:, inside] * MPA
-    _draw_map(panels["pressure"], y, x, pressure, "Pressure [MPa]")
-    title = "Traction on the cylinder [MPa]"
-    _draw_map(panels["traction"], y, x, traction[:, inside] * MPA, title)
+    for name, value, title in (
+        ("pressure", _pressure(fields, solution) * MPA, "Pressure [MPa]"),
+        ("traction", traction * MPA, "Traction on the cylinder [MPa]"),
+        ("power", fields.power_density * W_MM2, r"Dissipated power density [W/mm$^2$]"),
+    ):
+        axes = panels[name]
+        mesh = axes.pcolormesh(
+            y, x, value[:, inside], shading="gouraud", cmap=PRESSURE, vmin=0.0, rasterized=True
+        )
+        axes.figure.colorbar(mesh, ax=axes, pad=0.02, aspect=16)
+        name_axes(axes, title, "", X_LABEL)
     _draw_arrows(
         panels["traction"], y, x, fields.traction_y[:, inside], fields.traction_x[:, inside]
     )
     _draw_areas(panels["areas"], y, x, fields.adhesion[:, inside].astype(float), solution)
-    power = fields.power_density[:, inside] * W_MM2
-    _draw_map(panels["power"], y, x, power, r"Dissipated power density [W/mm$^2$]")
     for name in [name for row in MAPS for name in row]:
         _draw_outlines(panels[name], solution, SLIDE if name == "areas" else "black")
 
@@ -90,12 +93,6 @@ def _pressure(fields: ContactFields, solution: ContactSolution) -> FloatArray:
     peak = 2.0 * solution.line_load / (np.pi * a)
     elliptic: FloatArray = peak * np.sqrt(np.maximum(0.0, 1.0 - (fields.x / a) ** 2))
     return elliptic
-
-
-def _draw_map(axes: Axes, y: FloatArray, x: FloatArray, value: FloatArray, title: str) -> None:
-    mesh = axes.pcolormesh(y, x, value, shading="gouraud", cmap=PRESSURE, vmin=0.0, rasterized=True)
-    axes.figure.colorbar(mesh, ax=axes, pad=0.02, aspect=16)
-    name_axes(axes, title, "", X_LABEL)
 
 
 def _draw_arrows(

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from wearsim.report.parts.convergence import draw_convergence
-from wearsim.report.parts.style import BLUE, GREEN, GREY, ORANGE, figure_style, name_axes, say
-from wearsim.report.text.units import PER_SI, count, shown
-
-if TYPE_CHECKING:
-    from wearsim.results import DissipationResult
+from wearsim.report.parts.style import (
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    figure_style,
+    name_axes,
+    write_message,
+)
+from wearsim.report.text.units import PER_SI, number_of_realisations, shown
+from wearsim.results import DissipationResult
 
 MM, W_MM = PER_SI["mm"], PER_SI["W/mm"]
 MOST_LINES = 200
@@ -59,9 +65,9 @@ def dissipation_figure(result: DissipationResult) -> Figure:
 
 def _caption(result: DissipationResult) -> str:
     power, raw = result.summaries["power"], result.raw
-    text = f"{_number_of(result.count)} ({raw.plan}, {result.described_model}"
-    text += f"{'' if result.finished else ', unfinished'}): mean dissipated power"
-    text += f" {shown(power.mean, 'W')}"
+    text = f"{number_of_realisations(result.count)} ({raw.plan}, {result.described_model}"
+    text += f"{'' if result.finished else ', unfinished'})\n"
+    text += f"mean dissipated power {shown(power.mean, 'W')}"
     if result.count == 1:
         return text
     if power.is_constant:
@@ -71,16 +77,12 @@ def _caption(result: DissipationResult) -> str:
     return f"{text}, std {shown(power.std, 'W')}, 95 % range {band} W"
 
 
-def _number_of(realisations: int) -> str:
-    return f"{count(realisations)} realisation{'s' if realisations > 1 else ''}"
-
-
 def _draw_density(axes: Axes, result: DissipationResult) -> None:
     power, summary, title = result.power, result.summaries["power"], "Density of dissipated power"
     at_means = f"inputs at their means: {shown(result.mean_problem_power, 'W')}"
     if result.count == 1 or summary.is_constant:
-        same = f"{shown(summary.mean, 'W')} in {_number_of(result.count)}: no density to draw"
-        say(axes, title, [same, at_means])
+        value, number = shown(summary.mean, "W"), number_of_realisations(result.count)
+        write_message(axes, title, [f"{value} in {number}: no density to draw", at_means])
         return
     axes.hist(power, CLASSES, density=True, color=BLUE, alpha=0.45, label="realisations")
     low, high = axes.get_xlim()
@@ -105,7 +107,7 @@ def _draw_density(axes: Axes, result: DissipationResult) -> None:
 def _draw_realisations(axes: Axes, result: DissipationResult) -> None:
     kept, y = result.dissipation, result.y * MM
     rows = kept[:MOST_LINES]
-    title = _number_of(len(rows))
+    title = number_of_realisations(len(rows))
     if len(kept) > 1 and float(np.ptp(kept, axis=0).max()) <= _EQUAL * float(kept.max()):
         rows, title = rows[:1], "equal in all"
     opacity = float(np.clip(15.0 / len(rows), 0.12, 1.0))
@@ -119,11 +121,11 @@ def _draw_band(axes: Axes, result: DissipationResult) -> None:
     y = result.y * MM
     names = ("dissipation_low", "dissipation_high", "dissipation_mean")
     low, high, mean = (result.values(name) * W_MM for name in names)
-    axes.fill_between(y, low, high, color=BLUE, alpha=0.25, lw=0, label="2.5 % to 97.5 %")
+    axes.fill_between(y, low, high, color=BLUE, alpha=0.25, lw=0, label="2.5 to 97.5 %")
     axes.plot(y, mean, color="black", label="mean")
     at_means = result.values("mean_problem_dissipation") * W_MM
     axes.plot(y, at_means, color=GREEN, ls="--", label="inputs at their means")
     name_axes(axes, "Mean and 95 % range", "y [mm]", r"$P_l$ [W/mm]")
     axes.set_ylim(0.0, 1.3 * axes.get_ylim()[1])
     axes.margins(x=0.0)
-    axes.legend(loc="upper center", ncols=3)
+    axes.legend(loc="upper center", ncols=3, columnspacing=1.0)

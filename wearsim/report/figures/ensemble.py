@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -17,29 +16,26 @@ from wearsim.report.parts.style import (
     ORANGE,
     figure_style,
     name_axes,
-    say,
     set_depth_axes,
+    write_message,
 )
 from wearsim.report.text.estimates import (
     NINETY_PERCENT,
     TOO_FEW_REALISATIONS,
-    ninety_percent_range,
     sufficient_for,
     too_few,
 )
 from wearsim.report.text.labels import OBSERVABLES, statistic_in_words
-from wearsim.report.text.units import PER_SI, count, shown
+from wearsim.report.text.units import PER_SI, count, number_of_realisations, shown
+from wearsim.results import EnsembleResult
+from wearsim.results.ensemble.result import Effect
 from wearsim.results.ensemble.schema import PENDING
 from wearsim.types import IntArray
+from wearsim.uq.estimation.intervals import Interval
 from wearsim.uq.estimation.stopping_rule import Target
 
-if TYPE_CHECKING:
-    from wearsim.results import EnsembleResult
-    from wearsim.results.ensemble.result import Effect
-    from wearsim.uq.estimation.intervals import Interval
-
 UM, MM = PER_SI["um"], PER_SI["mm"]
-FEW = 12  # realisations drawn as lines
+LINES = 12  # realisations drawn as lines
 _MOST_CLASSES = 60
 _MOST_EFFECTS = 14
 _WORN = 1e-3  # part of the greatest depth beyond which the profile is drawn,
@@ -67,7 +63,7 @@ def ensemble_figure(result: EnsembleResult) -> Figure:
         figure = Figure(figsize=(13.0, 7.5), layout="constrained")
         figure.suptitle(f"{result.title}\n{_caption(result)}", fontsize=10.5)
         if result.count == 0:
-            say(figure.subplots(), "", ["no realisation is completed: nothing to draw"])
+            write_message(figure.subplots(), "", ["no realisation is completed: nothing to draw"])
             return figure
         # subfigures, since the rows have different columns
         upper, lower = np.ravel(np.array(figure.subfigures(2, 1)))
@@ -83,30 +79,26 @@ def ensemble_figure(result: EnsembleResult) -> Figure:
 
 def _caption(result: EnsembleResult) -> str:
     raw = result.raw
-    text = _number_of(result.count)
+    text = number_of_realisations(result.count)
     text += "" if result.finished else f" of {count(result.asked)}"
     text += f" ({count(result.failed)} failed)" if result.failed else ""
     text += f", {raw.plan}, of {count(raw.total_passes)} roller passes"
     text += f" ({result.described_model}, {raw.stepper}{'' if result.finished else ', unfinished'})"
     if result.count == 0:
         return text
-    depth = result.estimate("depth", -1, ())
+    depth = result.estimate("depth", -1, NINETY_PERCENT)
     name = "depth" if result.count == 1 else "mean depth"
-    text += f": {name} {shown(depth.mean.value, 'um')}"
+    text += f"\n{name} {shown(depth.mean.value, 'um')}"
     if result.count == 1:
         return text
     if result.is_constant("depth"):
         return f"{text}, equal in all realisations"
     text += f", std {shown(depth.std.value, 'um', 3)}"
-    known = ninety_percent_range(result, "depth")
-    if known is None:
+    ends = [depth.quantile(p) for p in NINETY_PERCENT]
+    if not all(np.isfinite(end.half_width) for end in ends):
         return text
-    ends = [shown(end, "um", 3).removesuffix(" um") for end in known]
-    return f"{text}, 90 % range {' to '.join(ends)} um"
-
-
-def _number_of(realisations: int) -> str:
-    return f"{count(realisations)} realisation{'' if realisations == 1 else 's'}"
+    low, high = (shown(end.value, "um", 3) for end in ends)
+    return f"{text}, 90 % range {low.removesuffix(' um')} to {high}"
 
 
 def _draw_course(axes: Axes, result: EnsembleResult) -> None:
@@ -114,11 +106,13 @@ def _draw_course(axes: Axes, result: EnsembleResult) -> None:
     course = result.course("depth")
     drawn, unit, name = set_depth_axes(axes, course.passes, course.quantiles[0.5])
     passes = course.passes[drawn] / unit
-    numbers = result.numbers[:FEW]
+    numbers = result.numbers[:LINES]
     first = int(numbers[0])
     rows = np.asarray(result.raw.rows("depth", first, int(numbers[-1]) + 1)[numbers - first])
     rows = rows[:, drawn] * UM
-    axes.plot(passes, rows[0], color=GREY, lw=0.6, alpha=0.6, label=_number_of(len(rows)))
+    axes.plot(
+        passes, rows[0], color=GREY, lw=0.6, alpha=0.6, label=number_of_realisations(len(rows))
+    )
     axes.plot(passes, rows[1:].T, color=GREY, lw=0.6, alpha=0.6)
     if result.count > 1:
         low, median, high = (course.quantiles[p][drawn] * UM for p in (0.05, 0.5, 0.95))
@@ -135,7 +129,7 @@ def _draw_density(axes: Axes, result: EnsembleResult) -> None:
     if result.count == 1 or result.is_constant("depth"):
         where = "the only realisation" if result.count == 1 else f"all {count(result.count)}"
         value = shown(float(depth.mean()), "um")
-        say(axes, title, [f"{value} in {where}: no density to draw"])
+        write_message(axes, title, [f"{value} in {where}: no density to draw"])
         return
     # Rice's rule
     classes = int(np.clip(np.ceil(2.0 * len(depth) ** (1.0 / 3.0)), 5, _MOST_CLASSES))
@@ -234,10 +228,10 @@ def _draw_effects(axes: Axes, result: EnsembleResult) -> None:
     """Draw first-order Sobol indices with intervals, and total indices if available."""
     effects, title = result.sensitivity("depth"), "Sobol indices of the depth at the end"
     if result.count == 1 or not any(np.isfinite(item.first.value) for item in effects):
-        say(axes, title, [too_few(result)])
+        write_message(axes, title, [too_few(result)])
         return
     if result.is_constant("depth"):
-        say(axes, title, ["none, the depth is equal in all realisations"])
+        write_message(axes, title, ["none, the depth is equal in all realisations"])
         return
     effects = effects[:_MOST_EFFECTS]
     places = np.arange(len(effects))

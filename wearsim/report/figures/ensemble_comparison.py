@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from textwrap import fill
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib import colormaps
@@ -15,9 +14,7 @@ from wearsim.report.parts.style import BLUE, GREEN, ORANGE, RECORDS, RED, figure
 from wearsim.report.text.comparison_words import against, realisations
 from wearsim.report.text.estimates import sufficient_for
 from wearsim.report.text.labels import OBSERVABLES, Named
-
-if TYPE_CHECKING:
-    from wearsim.studies.ensemble.compare import Compared, Comparison
+from wearsim.studies.ensemble.compare import Compared, Comparison
 
 COLOURS = (BLUE, ORANGE, GREEN, RED)
 MOST_POINTS = 2000  # of a distribution function

@@ -12,12 +12,12 @@ from wearsim.uq.distributions.base import MaxentDistribution
 _POINTS = 1001
 
 
-def maxent_figure(law: MaxentDistribution) -> Figure:
+def maxent_figure(distribution: MaxentDistribution) -> Figure:
     """Return the figure of a maximum-entropy distribution.
 
     Parameters
     ----------
-    law : MaxentDistribution
+    distribution : MaxentDistribution
 
     Returns
     -------
@@ -27,27 +27,34 @@ def maxent_figure(law: MaxentDistribution) -> Figure:
     with figure_style():
         figure = Figure(figsize=(6.4, 3.6), layout="constrained")
         axes = figure.subplots()
-        low, high = law.bulk
+        low, high = distribution.bulk
         # the ends are left out, where a density may be infinite
         x = low + (high - low) * (np.arange(_POINTS) + 0.5) / _POINTS
-        density = law.density(x)
-        first, last = law.quantile(np.array([0.025, 0.975]))
+        density = distribution.density(x)
+        first, last = distribution.quantile(np.array([0.025, 0.975]))
         inside = ((x >= first) & (x <= last)).tolist()
         label = f"95 %: {first:.4g} to {last:.4g}"
         axes.fill_between(x, density, where=inside, color=BLUE, alpha=0.15, lw=0, label=label)
-        axes.plot(x, density, color=BLUE, label=law.family)
-        found = parent(law)
+        axes.plot(x, density, color=BLUE, label=distribution.family)
+        found = parent(distribution)
         if found is not None:
             mean, std = found
             normal = np.exp(-0.5 * ((x - mean) / std) ** 2) / (std * np.sqrt(2.0 * np.pi))
             if np.abs(normal - density).max() > 1e-3 * density.max():
                 label = f"parent: mean {mean:.4g}, std {std:.4g}"
                 axes.plot(x, normal, "--", color=GREY, lw=1.0, label=label)
-        axes.axvline(law.mean, color=ORANGE, lw=1.0, label=f"mean {value(law, law.mean):.4g}")
+        axes.axvline(
+            distribution.mean,
+            color=ORANGE,
+            lw=1.0,
+            label=f"mean {value(distribution, distribution.mean):.4g}",
+        )
         axes.set_xlim(low, high)
         axes.set_ylim(0.0, 1.08 * float(density.max()))
         axes.legend(loc="best")
-        numbers = enumerate(multipliers(law))
+        numbers = enumerate(multipliers(distribution))
         terms = ", ".join(f"$\\lambda_{number}$ = {item:.5g}" for number, item in numbers)
-        name_axes(axes, f"Maximum entropy: {law.family}\n{terms}", "value", "probability density")
+        name_axes(
+            axes, f"Maximum entropy: {distribution.family}\n{terms}", "value", "probability density"
+        )
     return figure

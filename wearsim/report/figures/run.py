@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib import colormaps
@@ -26,10 +25,8 @@ from wearsim.report.parts.style import (
     set_depth_axes,
 )
 from wearsim.report.text.units import PER_SI, count, pass_unit, shown
+from wearsim.results import Result
 from wearsim.types import FloatArray, IntArray
-
-if TYPE_CHECKING:
-    from wearsim.results import Result
 
 UM, MM, MIN, W_MM = PER_SI["um"], PER_SI["mm"], PER_SI["min"], PER_SI["W/mm"]
 MOST_RECORDS = 24
@@ -76,11 +73,12 @@ def _caption(result: Result) -> str:
     if result.start_height.any():
         below = shown(float(np.max(result.depth_below_nominal[-1])), "um")
         depth = f"{depth} worn since the start, depth below nominal {below}"
+    unfinished = "" if result.finished else ", unfinished"
     return (
         f"{count(float(result.passes[-1]))} roller passes in"
-        f" {shown(float(result.time[-1]), 'min')}: {depth},"
-        f" width {shown(float(np.max(result.width[-1])), 'mm')}"
-        f" ({result.described_model}, {result.stepper}{'' if result.finished else ', unfinished'})"
+        f" {shown(float(result.time[-1]), 'min')}"
+        f" ({result.described_model}, {result.stepper}{unfinished})\n"
+        f"{depth}, width {shown(float(np.max(result.width[-1])), 'mm')}"
     )
 
 

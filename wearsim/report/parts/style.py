@@ -54,7 +54,7 @@ def name_axes(axes: Axes, title: str, x: str, y: str) -> None:
     axes.set_ylabel(y)
 
 
-def say(axes: Axes, title: str, lines: Sequence[str]) -> None:
+def write_message(axes: Axes, title: str, lines: Sequence[str]) -> None:
     """Write lines of text into a panel that has nothing to draw."""
     axes.text(0.5, 0.5, "\n".join(lines), ha="center", va="center", transform=axes.transAxes)
     axes.set_title(title)

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from wearsim.report.text.estimates import part_with_interval, with_interval
 from wearsim.report.text.labels import OBSERVABLES
 from wearsim.report.text.units import count, shown
-from wearsim.uq.estimation.mann_whitney import FEWEST
-
-if TYPE_CHECKING:
-    from wearsim.studies.ensemble.compare import Compared, Comparison
-    from wearsim.uq.estimation.mann_whitney import Paired
+from wearsim.studies.ensemble.compare import Compared, Comparison
+from wearsim.uq.estimation.intervals import Interval
+from wearsim.uq.estimation.mann_whitney import FEWEST, Paired
 
 EQUAL = "equal in all tests"
 
@@ -54,50 +51,49 @@ def against(found: Comparison, row: Compared) -> list[tuple[str, str]]:
     unit = OBSERVABLES[found.observable].unit
     more, less = ("deeper", "shallower") if found.observable == "depth" else ("more", "less")
     if row.difference is not None:
-        return [(f"{row.label} against {first.label}", _of_runs(first, row, unit, more, less))]
+        errors = (first.value.half_width, row.value.half_width)
+        text = _of_runs(row.difference, errors, unit, more, less)
+        return [(f"{row.label} against {first.label}", text)]
     rows = []
     if row.deeper is not None:
-        rows.append((f"{row.label} {more} than {first.label}", _of_tests(first, row)))
+        rows.append((f"{row.label} {more} than {first.label}", _of_tests(first, row, row.deeper)))
     if row.paired is not None:
         rows.append(("  with the same draws", _of_pairs(row.paired, unit, more, less)))
     return rows
 
 
-def _of_runs(first: Compared, row: Compared, unit: str, more: str, less: str) -> str:
+def _of_runs(
+    difference: Interval, errors: tuple[float, float], unit: str, more: str, less: str
+) -> str:
     """Return the difference of two runs, with their estimated errors."""
-    assert row.difference is not None
-    errors = [item.value.half_width for item in (first, row)]
     texts = " and ".join(shown(error, unit, 2) for error in errors)
     stated = f"estimated errors {texts}" if any(errors) else "no error estimate"
-    by = row.difference.value
+    by = difference.value
     if by == 0.0:
         return f"equal ({stated})"
-    if row.difference.low <= 0.0 <= row.difference.high:
+    if difference.low <= 0.0 <= difference.high:
         return f"not significant: difference {shown(abs(by), unit, 3)}, within the {stated}"
     return f"{more if by > 0.0 else less} by {shown(abs(by), unit)} ({stated})"
 
 
-def _of_tests(first: Compared, row: Compared) -> str:
+def _of_tests(first: Compared, row: Compared, deeper: Interval) -> str:
     """Return the probability that a test of one ensemble exceeds a test of the other."""
-    assert row.deeper is not None
     low = min(first.values[0], row.values[0])
     high = max(first.values[-1], row.values[-1])
     if low == high and row.count + first.count > 2:
         return EQUAL
-    if not math.isfinite(row.deeper.value):
+    if not math.isfinite(deeper.value):
         return f"too few realisations, {FEWEST} of each are sufficient"
     pairs = "pairs of tests" if row.kind == first.kind else "the tests of the ensemble"
-    return f"in {part_with_interval(row.deeper)} of {pairs}"
+    return f"in {part_with_interval(deeper)} of {pairs}"
 
 
 def _of_pairs(found: Paired, unit: str, more: str, less: str) -> str:
     """Return the difference between tests with the same draws."""
     by = found.difference
     if found.count == 1:
-        if by.value == 0.0:
-            return "equal in the only pair of tests"
-        word = more if by.value > 0.0 else less
-        return f"{word} by {shown(abs(by.value), unit)} in the only pair of tests"
+        amount = f"{more if by.value > 0.0 else less} by {shown(abs(by.value), unit)}"
+        return f"{amount if by.value else 'equal'} in the only pair of tests"
     if by.low == by.value == by.high == 0.0:
         return EQUAL
     return f"in {part_with_interval(found.share)}, by {with_interval(by, unit)} on average"

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from wearsim.report.text.units import NOTHING, PER_SI, count, shown
+from wearsim.results import EnsembleResult
 from wearsim.uq.estimation.intervals import Interval
-from wearsim.uq.sensitivity.polynomial_chaos import fewest_realisations
-from wearsim.uq.sensitivity.sobol_indices import FEWEST_BASES
-
-if TYPE_CHECKING:
-    from wearsim.results import EnsembleResult
+from wearsim.uq.sensitivity.sobol_indices import FEWEST_BASES, fewest_realisations
 
 TOO_FEW = "too few"
 TOO_FEW_REALISATIONS = "too few realisations"
@@ -94,22 +90,6 @@ def sufficient_for(realisations: int, probability: float) -> bool:
         Of the quantile.
     """
     return realisations * min(probability, 1.0 - probability) >= _ONE
-
-
-def ninety_percent_range(result: EnsembleResult, name: str) -> tuple[float, float] | None:
-    """Return the 5 % and 95 % quantiles at the end, or None if their intervals are infinite.
-
-    Parameters
-    ----------
-    result : EnsembleResult
-    name : str
-        Name of the observable.
-    """
-    found = result.estimate(name, -1, NINETY_PERCENT)
-    low, high = (found.quantile(p) for p in NINETY_PERCENT)
-    if not (math.isfinite(low.half_width) and math.isfinite(high.half_width)):
-        return None
-    return low.value, high.value
 
 
 def too_few(result: EnsembleResult, names: list[str] | None = None) -> str:

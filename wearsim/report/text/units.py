@@ -63,6 +63,11 @@ def count(value: float) -> str:
     return f"{value:,.0f}"
 
 
+def number_of_realisations(number: int) -> str:
+    """Return "1 realisation" or "1,000 realisations"."""
+    return f"{count(number)} realisation{'' if number == 1 else 's'}"
+
+
 def pass_unit(greatest: float) -> tuple[float, str]:
     """Return the unit of an axis of roller passes, and its label.
 
