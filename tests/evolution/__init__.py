@@ -1,4 +1,4 @@
-"""Tests of the evolution, and the problems they run on."""
+"""Tests of the evolution, and helpers that build and step wear problems."""
 
 from pathlib import Path
 
@@ -11,12 +11,12 @@ SCENARIOS = Path(__file__).parents[2] / "scenarios"
 
 
 def never(passes):
-    """Record nothing."""
+    """Return infinity: no record is due."""
     return float("inf")
 
 
 def built(name="rig-450min", **changes):
-    """Return problem, stepper and passes of a scenario; a key's dots are written as `__`."""
+    """Return problem, stepper and passes of a scenario; `__` in a key replaces a dot."""
     overrides = {key.replace("__", "."): value for key, value in changes.items()}
     scenario = load_scenario(SCENARIOS / f"{name}.toml", overrides=overrides)
     problem, stepper, _ = assemble_problem(scenario)
@@ -24,7 +24,7 @@ def built(name="rig-450min", **changes):
 
 
 def stepped(problem, stepper, stop, state=None):
-    """Return the state at `stop` passes, and the advances that led there."""
+    """Return the state at `stop` passes and all steps."""
     state = state if state is not None else fresh_state(problem)
     advances = []
     for advance in evolve(problem, state, stepper, stop, never, 10**6):

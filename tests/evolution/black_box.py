@@ -1,4 +1,4 @@
-"""Contact models that claim nothing beyond `solve`, for the steppers that ask for nothing more."""
+"""Contact models without capabilities, for steppers that require `solve` only."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ TINY = Path(__file__).parents[1] / "plugins" / "data" / "tiny" / "wearsim_tiny.p
 
 
 class BlackBox(ContactModel):
-    """Another model that hides what it can do, and counts what it solves."""
+    """Contact model that hides the capabilities of another and counts its solves."""
 
     def __init__(self, inner):
         self.inner, self.solved = inner, 0
@@ -29,7 +29,7 @@ class BlackBox(ContactModel):
 
 
 def foundation_model(grid):
-    """Return the third party's elastic foundation, prepared for a grid."""
+    """Return the elastic foundation of the example plugin, prepared for a grid."""
     spec = importlib.util.spec_from_file_location("wearsim_tiny", TINY)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
@@ -39,9 +39,9 @@ def foundation_model(grid):
 
 
 def boxed(foundation=False, box=BlackBox, **changes):
-    """Return problem, stepper and passes of the rig with a model that claims nothing.
+    """Return problem, stepper and passes of the rig with a model without capabilities.
 
-    It is the built-in one of slender contacts, or an elastic foundation.
+    The model is the built-in one of slender contacts or an elastic foundation.
     """
     problem, stepper, stop = built(evolution__stepper="stabilised", **changes)
     model = foundation_model(problem.grid) if foundation else problem.model

@@ -1,4 +1,4 @@
-"""Replays against the closed forms of full slip, and the balances that hold to round-off."""
+"""Runs against closed forms for full slip, and balances that hold to round-off."""
 
 import numpy as np
 import pytest
@@ -36,26 +36,26 @@ def rig():
     return worn()
 
 
-def test_that_the_depth_is_that_of_the_closed_form(rig):
+def test_depth_equals_closed_form(rig):
     depth = cylinder_depth_of(rig[1])[0]
     assert depth == pytest.approx(closed_depth(PASSES), rel=5e-3)
 
 
-def test_that_the_width_is_that_of_the_closed_form(rig):
+def test_width_equals_closed_form(rig):
     problem, state = rig
     found = width(problem.grid.y, state.cylinder_depth[0, 0, 0], 1e-6)
     depth = closed_depth(PASSES)
     assert found == pytest.approx(2.0 * np.sqrt(2.0 * CROWN * (depth - 1e-6)), rel=1e-2)
 
 
-def test_that_the_profile_is_a_parabola(rig):
+def test_profile_is_a_parabola(rig):
     problem, state = rig
     depth = cylinder_depth_of(state)[0]
     parabola = np.maximum(0.0, depth - problem.grid.y**2 / (2.0 * CROWN))
     assert np.abs(state.cylinder_depth[0, 0, 0] - parabola).max() < 0.5e-6
 
 
-def test_that_the_depth_with_a_spring_is_that_of_its_closed_form():
+def test_depth_with_a_spring_equals_closed_form():
     _, state = worn(load__kind="spring", load__stiffness="690 N/mm")
     depth = cylinder_depth_of(state)[0]
     assert depth == pytest.approx(closed_depth_with_spring(PASSES, 690e3), rel=5e-3)
@@ -75,7 +75,7 @@ def test_that_the_depth_with_a_spring_is_that_of_its_closed_form():
         {"evolution__stepper": "per-pass"},
     ],
 )
-def test_that_worn_volume_is_wear_factor_times_dissipated_energy(changes):
+def test_worn_volume_is_wear_factor_times_energy(changes):
     problem, state = worn(**{"operation__passes": 20_000, **changes})
     volume = cylinder_volume_of(problem, state)[0]
     assert volume == pytest.approx(K_OVER_H * state.energy[0], rel=1e-10)
@@ -85,18 +85,18 @@ def test_that_worn_volume_is_wear_factor_times_dissipated_energy(changes):
     assert total == pytest.approx(factor * state.energy[0], rel=1e-10)
 
 
-def test_that_equal_materials_wear_in_the_ratio_of_their_rolled_lengths():
+def test_equal_materials_wear_in_the_ratio_of_rolled_lengths():
     _, state = worn(wear__roller__k_over_h="1.1e-11 1/Pa", operation__passes=30_000)
     ratio = state.roller_depth.max() / state.cylinder_depth.max()
     assert ratio == pytest.approx(0.025 / (0.020 * 3), rel=1e-9)
 
 
-def test_that_a_groove_of_alike_rollers_is_symmetric_to_round_off(rig):
+def test_groove_of_identical_rollers_is_symmetric(rig):
     profile = rig[1].cylinder_depth[0, 0, 0]
     assert np.abs(profile - profile[::-1]).max() < 1e-9 * profile.max()
 
 
-def test_that_nothing_wears_where_both_wear_factors_are_zero():
+def test_zero_wear_factors_give_no_wear():
     problem, stepper, stop = built(wear__cylinder__k_over_h="0 1/Pa")
     state, advances = stepped(problem, stepper, stop)
     assert state.cylinder_depth.max() == 0.0
@@ -104,10 +104,10 @@ def test_that_nothing_wears_where_both_wear_factors_are_zero():
     assert len(advances) <= 2
 
 
-def test_that_merged_rollers_wear_like_separate_ones():
+def test_merged_rollers_wear_like_separate_ones():
     merged = worn(operation__passes=30_000)[1]
-    # an offset of a nanometre keeps them apart without moving them
-    apart = worn(operation__passes=30_000, roller__offset=["0 mm", "1 nm", "2 nm"])[1]
-    assert apart.roller_depth.shape[1] == 3
-    np.testing.assert_allclose(cylinder_depth_of(apart), cylinder_depth_of(merged), rtol=1e-3)
-    np.testing.assert_allclose(apart.energy, merged.energy, rtol=1e-4)
+    # an offset of a nanometre prevents merging without an effect on the wear
+    separate = worn(operation__passes=30_000, roller__offset=["0 mm", "1 nm", "2 nm"])[1]
+    assert separate.roller_depth.shape[1] == 3
+    np.testing.assert_allclose(cylinder_depth_of(separate), cylinder_depth_of(merged), rtol=1e-3)
+    np.testing.assert_allclose(separate.energy, merged.energy, rtol=1e-4)

@@ -1,4 +1,4 @@
-"""Tests stepped together: each is what it is alone, whatever goes beside it."""
+"""Tests stepped together: results independent of the batch, failures, compatibility."""
 
 from dataclasses import replace
 
@@ -36,8 +36,8 @@ CASES = {
 }
 
 
-def scenes_of(changes, each=EACH):
-    """Return the problems of tests that share strips and model, their stepper and their length."""
+def problems_of(changes, each=EACH):
+    """Return problems that share strips and model, their stepper and their passes."""
     common = {"operation__passes": PASSES, "contact__strips": 61}
     common |= {"contact__width": "22 mm", "evolution__tolerance": 1e-2}
     problems, grid, model = [], None, None
@@ -53,7 +53,7 @@ def scenes_of(changes, each=EACH):
 
 
 def ends_of(problems, stepper, stop, max_steps=10**6):
-    """Step tests together; return the end of each and the steps it took, or its error."""
+    """Step tests together; return the end state and the step counts of each, or its error."""
     tests = Lockstep(problems, stepper, stop, max_steps)
     ends = {}
     while tests.stack is not None:
@@ -66,7 +66,7 @@ def ends_of(problems, stepper, stop, max_steps=10**6):
 
 
 def bits(found):
-    """Return everything about the end of a test, to the last bit."""
+    """Return all arrays of the end of a test as bytes, or its error."""
     if isinstance(found, Exception):
         return type(found), str(found)
     end, *counts = found
@@ -75,17 +75,17 @@ def bits(found):
 
 
 @pytest.mark.parametrize("case", list(CASES))
-def test_that_a_test_is_the_same_to_the_bit_in_any_company(case):
-    problems, stepper, stop = scenes_of(CASES[case])
+def test_results_are_equal_to_the_bit_in_any_batch(case):
+    problems, stepper, stop = problems_of(CASES[case])
     alone = [bits(ends_of([problem], stepper, stop)[0]) for problem in problems]
-    for company in ([0, 1, 2, 3, 4], [4, 2], [3, 1, 0], [1, 1, 1, 4, 0, 2, 3, 3]):
-        found = ends_of([problems[k] for k in company], stepper, stop)
-        assert [bits(one) for one in found] == [alone[k] for k in company]
+    for batch in ([0, 1, 2, 3, 4], [4, 2], [3, 1, 0], [1, 1, 1, 4, 0, 2, 3, 3]):
+        found = ends_of([problems[k] for k in batch], stepper, stop)
+        assert [bits(one) for one in found] == [alone[k] for k in batch]
 
 
 @pytest.mark.parametrize("case", list(CASES))
-def test_that_a_test_in_company_is_the_run_of_itself(case):
-    problems, stepper, stop = scenes_of(CASES[case])
+def test_batched_test_equals_single_run(case):
+    problems, stepper, stop = problems_of(CASES[case])
     for problem, (end, steps, rejected) in zip(
         problems, ends_of(problems, stepper, stop), strict=True
     ):
@@ -99,15 +99,15 @@ def test_that_a_test_in_company_is_the_run_of_itself(case):
             assert getattr(end, name) == pytest.approx(getattr(run, name), rel=1e-12, abs=1e-300)
 
 
-def test_that_tests_take_steps_of_their_own():
-    problems, stepper, stop = scenes_of({})
+def test_tests_have_individual_step_counts():
+    problems, stepper, stop = problems_of({})
     assert len({steps for _, steps, _ in ends_of(problems, stepper, stop)}) > 1
 
 
-def test_that_a_log_is_followed_at_the_times_of_each_test(tmp_path):
+def test_recorded_load_follows_the_time_of_each_test(tmp_path):
     path = tmp_path / "log.csv"
     path.write_text(LOG)
-    problems, stepper, stop = scenes_of({"load": {"kind": "recorded", "file": str(path)}})
+    problems, stepper, stop = problems_of({"load": {"kind": "recorded", "file": str(path)}})
     together = ends_of(problems, stepper, stop)
     for problem, found in zip(problems, together, strict=True):
         assert bits(found) == bits(ends_of([problem], stepper, stop)[0])
@@ -115,10 +115,10 @@ def test_that_a_log_is_followed_at_the_times_of_each_test(tmp_path):
         assert found[0].cylinder_depth == pytest.approx(run.cylinder_depth, rel=1e-12)
 
 
-def test_that_what_fails_fails_alone_with_its_own_words():
+def test_failures_are_isolated_with_their_own_message():
     fails = [{"wear__cylinder__k_over_h": "4e-9 1/Pa"}, {"load__normal_force": "90 kN"}]
     each = [EACH[0], fails[0], EACH[3], fails[1], EACH[1]]
-    problems, stepper, stop = scenes_of({}, each)
+    problems, stepper, stop = problems_of({}, each)
     found = ends_of(problems, stepper, stop)
     assert [isinstance(one, Exception) for one in found] == [False, True, False, True, False]
     for problem, one in zip(problems, found, strict=True):
@@ -129,8 +129,8 @@ def test_that_what_fails_fails_alone_with_its_own_words():
             assert str(failure.value) == str(one)
 
 
-def test_that_a_test_is_given_up_after_its_own_steps():
-    problems, stepper, stop = scenes_of({})
+def test_max_steps_applies_to_each_test():
+    problems, stepper, stop = problems_of({})
     most = sorted(steps for _, steps, _ in ends_of(problems, stepper, stop))[2]
     found = ends_of(problems, stepper, stop, most)
     failed = [one for one in found if isinstance(one, Exception)]
@@ -139,7 +139,7 @@ def test_that_a_test_is_given_up_after_its_own_steps():
 
 
 class Recording(Slender):
-    """A prepared model that keeps the sizes of the batches that it is handed."""
+    """Prepared model that records the sizes of its batches."""
 
     def __init__(self, model):
         vars(self).update(vars(model))
@@ -152,22 +152,22 @@ class Recording(Slender):
 
 @pytest.fixture
 def recorded():
-    """Scenes of a recording model, their stepper and length, and the sizes of its batches."""
-    problems, stepper, stop = scenes_of({})
+    """Problems of a recording model, their stepper and passes, and the sizes of its batches."""
+    problems, stepper, stop = problems_of({})
     model = Recording(problems[0].model)
     return [replace(problem, model=model) for problem in problems], stepper, stop, model.sizes
 
 
-def test_tests_that_do_not_fail_are_solved_in_one_batch(recorded):
+def test_tests_without_failures_are_solved_in_one_batch(recorded):
     problems, stepper, stop, sizes = recorded
     ends = ends_of(problems, stepper, stop)
     assert max(sizes) == len(problems)
-    # a step, its halves and the whole, each begins with all that are under way
+    # the two halves of a step and the whole step begin with all tests in progress
     assert sizes.count(len(problems)) >= 3 * min(steps for _, steps, _ in ends)
     assert len(sizes) < sum(steps for _, steps, _ in ends) * 3
 
 
-def test_settled_realisations_are_not_solved_again(recorded):
+def test_converged_realisations_are_not_solved_again(recorded):
     problems, stepper, stop, sizes = recorded
     ends_of(problems, stepper, stop)
     together = sum(sizes)
@@ -177,7 +177,7 @@ def test_settled_realisations_are_not_solved_again(recorded):
     assert together == sum(sizes)
 
 
-def test_that_a_plain_test_can_go_together():
+def test_plain_test_can_be_stacked():
     problem, stepper, _ = built()
     assert can_step_together(problem, stepper)
 
@@ -191,13 +191,13 @@ def test_that_a_plain_test_can_go_together():
     ],
     ids=["stabilised", "per-pass", "load term"],
 )
-def test_that_what_is_not_vectorised_goes_alone(changes):
+def test_unsupported_tests_are_not_stacked(changes):
     problem, stepper, _ = built(**changes)
     assert not can_step_together(problem, stepper)
 
 
-def test_that_only_alike_tests_go_with_each_other():
-    (one, other), _, _ = scenes_of({}, EACH[:2])
+def test_only_compatible_tests_share_a_stack():
+    (one, other), _, _ = problems_of({}, EACH[:2])
     assert compatible(one, other)
     assert not compatible(one, replace(other, iteration_tolerance=2.0 * other.iteration_tolerance))
     faster = replace(other.kinematics, rolling_speed=2.0 * other.kinematics.rolling_speed)
@@ -205,7 +205,7 @@ def test_that_only_alike_tests_go_with_each_other():
     assert not compatible(one, built()[0])
 
 
-def test_that_work_is_divided_until_what_fails_stands_alone():
+def test_bisection_isolates_failures():
     done = []
 
     def work(places):
@@ -224,8 +224,8 @@ def test_that_work_is_divided_until_what_fails_stands_alone():
     assert len(done) == 4
 
 
-def test_that_a_joined_scene_can_be_taken_apart():
-    problems, stepper, stop = scenes_of(CASES["three rollers"])
+def test_stacked_problem_can_be_split():
+    problems, stepper, stop = problems_of(CASES["three rollers"])
     tests = Lockstep(problems, stepper, stop, 10**6)
     for k, problem in enumerate(problems):
         one = problem_of(tests.stack.problem, np.array([k]))

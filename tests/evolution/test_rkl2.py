@@ -1,4 +1,4 @@
-"""Stabilised steps of models that claim nothing: order, stability, balance, errors, failures."""
+"""Stabilised steps of models without capabilities: order, stability, balance, errors, failures."""
 
 from dataclasses import replace
 
@@ -28,10 +28,10 @@ SPRING = {"load__kind": "spring", "load__stiffness": "20 kN/mm"}
 THERMAL = {"load.thermal": {"gain": "300 N/W", "time_constant": "3 min"}}
 
 
-def assert_covered(problem, truth, found):
-    """Hold the stated errors of depth and volume against the actual ones."""
-    assert abs(greatest_depth(found) - greatest_depth(truth))[0] <= found.depth_error[0]
-    volumes = total_worn_volume(problem, found)[0], total_worn_volume(problem, truth)[0]
+def assert_covered(problem, reference, found):
+    """Check that the error estimates of depth and volume cover the errors."""
+    assert abs(greatest_depth(found) - greatest_depth(reference))[0] <= found.depth_error[0]
+    volumes = total_worn_volume(problem, found)[0], total_worn_volume(problem, reference)[0]
     assert abs(volumes[0] - volumes[1]) <= found.volume_error[0] + 1e-7 * volumes[1]
 
 
@@ -41,24 +41,24 @@ def foundation():
     return problem, *stepped(problem, stepper, stop)
 
 
-def test_that_the_rig_on_a_foundation_takes_fewer_than_300_contacts(foundation):
+def test_rig_on_a_foundation_needs_fewer_than_300_solves(foundation):
     problem, state, advances = foundation
     assert problem.model.solved < 300
     assert state.depth_error[0] < 1e-3 * greatest_depth(state)[0]
     assert max(oscillation(a.end.contacts[0].line_load) for a in advances) < 0.01
 
 
-def test_that_the_depth_on_a_foundation_is_that_of_the_closed_form(foundation):
+def test_depth_on_a_foundation_equals_closed_form(foundation):
     assert cylinder_depth_of(foundation[1])[0] == pytest.approx(closed_depth(PASSES), rel=5e-3)
 
 
-def test_that_the_depth_with_a_spring_is_that_of_its_closed_form():
+def test_depth_with_a_spring_equals_closed_form():
     problem, stepper, stop = boxed(foundation=True, load__kind="spring", load__stiffness="690 N/mm")
     depth = cylinder_depth_of(stepped(problem, stepper, stop)[0])[0]
     assert depth == pytest.approx(closed_depth_with_spring(PASSES, 690e3), rel=5e-3)
 
 
-def test_that_a_tighter_tolerance_gives_a_smaller_error(foundation):
+def test_tighter_tolerance_gives_a_smaller_error(foundation):
     problem, _, stop = boxed(foundation=True)
     exact = stepped(problem, StabilisedStepper(StepControl(3e-5)), stop)[0]
     loose = stepped(problem, StabilisedStepper(StepControl(1e-2)), stop)[0]
@@ -71,7 +71,7 @@ def test_that_a_tighter_tolerance_gives_a_smaller_error(foundation):
 @pytest.mark.parametrize(
     "changes", [{}, SPRING, THREE, THERMAL], ids=["constant", "spring", "three", "thermal"]
 )
-def test_that_steps_are_of_second_order(changes):
+def test_steps_are_of_second_order(changes):
     passes = 30_000
     problem, _, _ = boxed(foundation=True, contact__strips=41, **changes)
     profiles = []
@@ -88,18 +88,18 @@ def test_that_steps_are_of_second_order(changes):
 
 @pytest.mark.parametrize("case", list(CASES))
 @pytest.mark.parametrize("tolerance", [1e-2, 3e-4])
-def test_that_slender_contacts_meet_per_pass_truth_and_their_own_estimate(case, tolerance):
+def test_slender_contacts_match_per_pass_within_estimate(case, tolerance):
     common = {"operation__passes": 30_000, "contact__strips": 71, **CASES[case]}
     problem, stepper, stop = built(evolution__stepper="per-pass", **common)
-    truth, _ = stepped(problem, stepper, stop)
+    reference, _ = stepped(problem, stepper, stop)
     problem, stepper, stop = boxed(evolution__tolerance=tolerance, **common)
     found, _ = stepped(problem, stepper, stop)
-    assert_covered(problem, truth, found)
+    assert_covered(problem, reference, found)
     assert found.depth_error[0] < tolerance * greatest_depth(found)[0]
     assert found.volume_error[0] < tolerance * total_worn_volume(problem, found)[0]
 
 
-def test_that_no_step_skips_over_a_log(tmp_path):
+def test_no_step_skips_a_peak_of_the_load(tmp_path):
     path = tmp_path / "log.csv"
     path.write_text(SPIKE)
     common = {
@@ -108,10 +108,10 @@ def test_that_no_step_skips_over_a_log(tmp_path):
         "contact__strips": 71,
     }
     problem, stepper, stop = built(evolution__stepper="per-pass", **common)
-    truth, _ = stepped(problem, stepper, stop)
+    reference, _ = stepped(problem, stepper, stop)
     problem, stepper, stop = boxed(evolution__tolerance=3e-3, **common)
     found, _ = stepped(problem, stepper, stop)
-    assert_covered(problem, truth, found)
+    assert_covered(problem, reference, found)
     assert found.depth_error[0] < 5e-3 * greatest_depth(found)[0]
 
 
@@ -126,7 +126,7 @@ def test_that_no_step_skips_over_a_log(tmp_path):
     ],
     ids=["constant", "tilted", "spring", "thermal", "hertz-fastsim"],
 )
-def test_that_worn_volume_is_wear_factor_times_dissipated_energy(changes):
+def test_worn_volume_is_wear_factor_times_energy(changes):
     problem, stepper, stop = boxed(operation__passes=20_000, **changes)
     state, _ = stepped(problem, stepper, stop)
     volume = worn_volume(state.cylinder_depth, problem.grid.spacing, 0.025)
@@ -141,7 +141,7 @@ def half_worn():
 
 
 @pytest.mark.parametrize("factor", [3.0, 10.0, 30.0])
-def test_that_steps_far_beyond_the_explicit_limit_smooth_a_scratch(half_worn, factor):
+def test_steps_beyond_explicit_limit_smooth_a_scratch(half_worn, factor):
     problem, state = half_worn
     state = roughened(state)
     step = factor * stability_limit(problem, state)
@@ -154,7 +154,7 @@ def test_that_steps_far_beyond_the_explicit_limit_smooth_a_scratch(half_worn, fa
     assert oscillation(state.contacts[0].line_load) < 0.05 * worst
 
 
-def test_that_the_rate_of_decay_on_a_foundation_is_that_of_its_stiffest_strip():
+def test_decay_rate_on_a_foundation_is_that_of_stiffest_strip():
     problem, _, _ = boxed(foundation=True)
     state = fresh_state(problem)
     contact = state.contacts[0]
@@ -166,27 +166,27 @@ def test_that_the_rate_of_decay_on_a_foundation_is_that_of_its_stiffest_strip():
     before = problem.model.solved
     assert decay_rates(problem, state)[0] == pytest.approx(slowest, rel=0.01)
     assert problem.model.solved - before <= 2
-    # one look is enough where the rate is known
+    # one iteration is sufficient if the rate is known
     known = replace(state, decay=decay_rates(problem, state))
     before = problem.model.solved
     assert decay_rates(problem, known)[0] == pytest.approx(slowest, rel=0.01)
     assert problem.model.solved - before == 1
 
 
-def test_that_an_expectation_over_passes_agrees_with_drawing_every_pass():
+def test_expectation_over_passes_matches_drawn_passes():
     drawn = {"creepage__misalignment": {**SLACK, "persistence": "per-pass"}, "passes": 3000}
-    _, truth = end_of(scenario_of(evolution__stepper="per-pass", contact__strips=61, **drawn))
+    _, reference = end_of(scenario_of(evolution__stepper="per-pass", contact__strips=61, **drawn))
     problem, state = end_of(
         scenario_of(evolution__stepper="stabilised", contact__strips=61, **drawn)
     )
     assert problem.has_nodes
     assert state.quadrature[0, 0] > 0.0
-    assert_covered(problem, truth, state)
+    assert_covered(problem, reference, state)
     assert state.depth_error[0] < 0.02 * greatest_depth(state)[0]
 
 
-class Startled(BlackBox):
-    """Fails where the contact has moved too far since the one to start from."""
+class FailingFarAway(BlackBox):
+    """Model that fails if the contact differs too much from the initial guess."""
 
     def solve(self, gap, longitudinal_curvature, point, wear_compliance=None, warm=None):
         found = super().solve(gap, longitudinal_curvature, point, wear_compliance, warm)
@@ -195,17 +195,17 @@ class Startled(BlackBox):
         return found
 
 
-def test_that_a_step_is_shortened_until_every_stage_is_solved():
+def test_step_is_shortened_until_every_stage_is_solved():
     common = {"foundation": True, "operation__passes": 30_000, "contact__strips": 61}
-    problem, stepper, stop = boxed(box=Startled, **common)
+    problem, stepper, stop = boxed(box=FailingFarAway, **common)
     found, advances = stepped(problem, stepper, stop)
-    truth, plain = stepped(*boxed(**common))
+    reference, plain = stepped(*boxed(**common))
     assert found.rejected > 0
     assert len(advances) > len(plain)
-    assert greatest_depth(found) == pytest.approx(greatest_depth(truth), rel=2e-3)
+    assert greatest_depth(found) == pytest.approx(greatest_depth(reference), rel=2e-3)
 
 
-def test_that_a_model_that_fails_however_short_the_step_is_quoted():
+def test_error_of_a_model_that_always_fails_is_raised():
     class Failing(BlackBox):
         def solve(self, gap, *others):
             if gap.min() > 1e-6:

@@ -1,4 +1,4 @@
-"""The weights of the Runge-Kutta-Legendre scheme, by its stability polynomial."""
+"""Weights of the Runge-Kutta-Legendre scheme, checked by its stability polynomial."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ COUNTS = (2, 3, 4, 5, 8, 17, 60)
 
 
 def stability(z, count):
-    """Return what a step of u' = z u makes of u = 1."""
+    """Return the result of a step of u' = z u from u = 1."""
     stages = legendre_stages(count)
     before, last = np.ones_like(z), 1.0 + stages[0].start_rate * z
     for stage in stages[1:]:
@@ -20,14 +20,14 @@ def stability(z, count):
 
 
 @pytest.mark.parametrize("count", COUNTS)
-def test_that_a_step_is_of_second_order(count):
+def test_step_is_of_second_order(count):
     z = np.array([-1e-2, -5e-3])
     errors = np.abs(stability(z, count) - np.exp(z))
     assert np.log2(errors[0] / errors[1]) == pytest.approx(3.0, abs=0.02)
 
 
 @pytest.mark.parametrize("count", COUNTS)
-def test_that_it_is_the_shifted_legendre_polynomial(count):
+def test_stability_polynomial_is_shifted_legendre(count):
     z = np.linspace(-reach(count), 0.0, 101)
     b = (count * count + count - 2) / (2.0 * count * (count + 1))
     polynomial = np.polynomial.legendre.Legendre.basis(count)(1.0 + 2.0 * z / reach(count))
@@ -35,7 +35,7 @@ def test_that_it_is_the_shifted_legendre_polynomial(count):
 
 
 @pytest.mark.parametrize("count", COUNTS)
-def test_that_all_that_decays_within_reach_falls_without_a_change_of_sign(count):
+def test_decay_within_reach_has_no_change_of_sign(count):
     z = -np.linspace(0.01, 1.0 / 1.2, 2001) * reach(count)
     found = stability(z, count)
     assert found.min() > 0.0
@@ -43,7 +43,7 @@ def test_that_all_that_decays_within_reach_falls_without_a_change_of_sign(count)
 
 
 @pytest.mark.parametrize("count", COUNTS)
-def test_that_no_stage_is_wasted(count):
+def test_number_of_stages_is_least_possible(count):
     assert stages_for(0.999 * reach(count)) == max(count, MIN_STAGES)
     assert stages_for(1.001 * reach(count)) == count + 1
     assert stages_for(0.0) == MIN_STAGES

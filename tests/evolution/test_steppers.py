@@ -1,4 +1,4 @@
-"""Steppers against each other: order, error estimates, stability."""
+"""Steppers compared with each other: order, error estimates, stability."""
 
 from dataclasses import replace
 
@@ -32,37 +32,39 @@ CASES = {
 }
 
 
-def compared(truth_name="per-pass", passes=45_000, **changes):
-    """Return problem, truth and implicit replay of the same test."""
+def compared(reference_name="per-pass", passes=45_000, **changes):
+    """Return problem, reference state and implicit state of the same test."""
     common = {"operation__passes": passes, "contact__strips": 91, **changes}
-    problem, truth_stepper, stop = built(evolution__stepper=truth_name, **common)
-    truth, _ = stepped(problem, truth_stepper, stop)
+    problem, reference_stepper, stop = built(evolution__stepper=reference_name, **common)
+    reference, _ = stepped(problem, reference_stepper, stop)
     problem, stepper, _ = built(**common)
-    return problem, truth, stepped(problem, stepper, stop)[0]
+    return problem, reference, stepped(problem, stepper, stop)[0]
 
 
 @pytest.mark.parametrize("case", list(CASES))
-def test_that_the_implicit_replay_meets_per_pass_truth_and_its_own_estimate(case):
-    problem, truth, found = compared(**CASES[case])
-    depth, exact = cylinder_depth_of(found)[0], cylinder_depth_of(truth)[0]
+def test_implicit_run_matches_per_pass_within_estimate(case):
+    problem, reference, found = compared(**CASES[case])
+    depth, exact = cylinder_depth_of(found)[0], cylinder_depth_of(reference)[0]
     assert depth == pytest.approx(exact, rel=5e-3)
     assert abs(depth - exact) <= found.depth_error[0]
     assert found.depth_error[0] < 1e-2 * exact
-    volume, whole = cylinder_volume_of(problem, found)[0], cylinder_volume_of(problem, truth)[0]
+    volume, whole = cylinder_volume_of(problem, found)[0], cylinder_volume_of(problem, reference)[0]
     assert volume == pytest.approx(whole, rel=5e-3)
     assert abs(volume - whole) <= found.volume_error[0] + 1e-7 * whole
 
 
-SHAKEN = "time [s], load [N]\n" + "\n".join(
+ALTERNATING = "time [s], load [N]\n" + "\n".join(
     f"{t}, {150 if t // 5 % 2 else 450}" for t in range(1200)
 )
 
 
 @pytest.mark.parametrize("name", ["implicit", "explicit"])
 @pytest.mark.parametrize(
-    ("log", "creepage"), [(SPIKE, 1e-3), (SHAKEN, 1e-3), (SHAKEN, 2e-4)], ids=["spike", "a", "b"]
+    ("log", "creepage"),
+    [(SPIKE, 1e-3), (ALTERNATING, 1e-3), (ALTERNATING, 2e-4)],
+    ids=["spike", "a", "b"],
 )
-def test_that_no_step_skips_over_a_log(tmp_path, name, log, creepage):
+def test_no_step_skips_a_peak_of_the_load(tmp_path, name, log, creepage):
     path = tmp_path / "log.csv"
     path.write_text(log)
     common = {
@@ -73,70 +75,70 @@ def test_that_no_step_skips_over_a_log(tmp_path, name, log, creepage):
         "evolution__tolerance": 3e-3,
     }
     problem, stepper, stop = built(evolution__stepper="per-pass", **common)
-    truth, _ = stepped(problem, stepper, stop)
+    reference, _ = stepped(problem, stepper, stop)
     problem, stepper, stop = built(evolution__stepper=name, **common)
     found, _ = stepped(problem, stepper, stop)
-    depth, exact = cylinder_depth_of(found)[0], cylinder_depth_of(truth)[0]
+    depth, exact = cylinder_depth_of(found)[0], cylinder_depth_of(reference)[0]
     assert depth == pytest.approx(exact, rel=5e-3)
     assert abs(depth - exact) <= found.depth_error[0] + 2e-4 * exact
-    volume, whole = cylinder_volume_of(problem, found)[0], cylinder_volume_of(problem, truth)[0]
+    volume, whole = cylinder_volume_of(problem, found)[0], cylinder_volume_of(problem, reference)[0]
     assert volume == pytest.approx(whole, rel=5e-3)
     assert abs(volume - whole) <= found.volume_error[0] + 2e-4 * whole
 
 
-def test_that_the_error_is_held_where_only_the_rollers_wear():
+def test_error_is_controlled_where_only_rollers_wear():
     changes = {"wear__cylinder__k_over_h": "0 1/Pa", "wear__roller__k_over_h": "3e-11 1/Pa"}
-    _, truth, found = compared(passes=100_000, **changes)
-    depth, exact = found.roller_depth.max(), truth.roller_depth.max()
+    _, reference, found = compared(passes=100_000, **changes)
+    depth, exact = found.roller_depth.max(), reference.roller_depth.max()
     assert depth == pytest.approx(exact, rel=2e-3)
     assert abs(depth - exact) <= found.depth_error[0] < 2e-3 * exact
 
 
-def test_that_tracks_beside_each_other_have_their_own_limit_of_stability():
-    apart = {"roller__offset": ["-10 mm", "0 mm", "10 mm"], "contact__strips": 241}
-    problem, _, _ = built(operation__passes=30_000, **apart)
-    alone, _, _ = built(operation__passes=30_000, contact__strips=81, contact__width="10.9 mm")
+def test_separate_tracks_have_separate_stability_limits():
+    offsets = {"roller__offset": ["-10 mm", "0 mm", "10 mm"], "contact__strips": 241}
+    problem, _, _ = built(operation__passes=30_000, **offsets)
+    single, _, _ = built(operation__passes=30_000, contact__strips=81, contact__width="10.9 mm")
     ratio = stability_limit(problem, fresh_state(problem)) / stability_limit(
-        alone, fresh_state(alone)
+        single, fresh_state(single)
     )
-    strips = alone.grid.spacing / problem.grid.spacing  # the limit grows with the strips' width
+    strips = single.grid.spacing / problem.grid.spacing  # the limit grows with the strips' width
     assert ratio * strips == pytest.approx(3.0, rel=0.15)
 
 
-def test_that_a_tighter_tolerance_gives_a_smaller_error():
+def test_tighter_tolerance_gives_a_smaller_error():
     errors = []
     for tolerance in (1e-2, 1e-3, 1e-4):
-        _, truth, found = compared(passes=30_000, evolution__tolerance=tolerance)
-        errors.append(abs(cylinder_depth_of(found)[0] / cylinder_depth_of(truth)[0] - 1.0))
+        _, reference, found = compared(passes=30_000, evolution__tolerance=tolerance)
+        errors.append(abs(cylinder_depth_of(found)[0] / cylinder_depth_of(reference)[0] - 1.0))
     assert errors[2] < errors[1] < errors[0]
     assert errors[2] < 0.2 * errors[0]
 
 
-def test_that_three_offset_rollers_converge_as_the_step_shrinks():
+def test_offset_rollers_converge_with_the_step_length():
     passes = 60_000
     problem, _, _ = built(operation__passes=passes, **THREE)
-    truth, _ = stepped(problem, PerPassStepper(), passes)
+    reference, _ = stepped(problem, PerPassStepper(), passes)
     y = problem.grid.y
     depth_errors, centre_errors = [], []
     for steps in (10, 20, 40):
         stepper = ImplicitStepper(StepControl(1.0), forced_step=passes / steps)
         found, _ = stepped(problem, stepper, passes)
-        depth_errors.append(abs(cylinder_depth_of(found)[0] - cylinder_depth_of(truth)[0]))
-        ours, exact = (centroid(y, s.cylinder_depth[0, 0, 0]) for s in (found, truth))
+        depth_errors.append(abs(cylinder_depth_of(found)[0] - cylinder_depth_of(reference)[0]))
+        ours, exact = (centroid(y, s.cylinder_depth[0, 0, 0]) for s in (found, reference))
         centre_errors.append(abs(ours - exact))
     for errors in (depth_errors, centre_errors):
         orders = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
         assert (orders > 0.7).all()
         assert (orders < 1.6).all()
-    assert depth_errors[-1] < 5e-3 * cylinder_depth_of(truth)[0]
+    assert depth_errors[-1] < 5e-3 * cylinder_depth_of(reference)[0]
 
 
-# half-lengths that follow from each other are those of the anchor while a contact is followed
-FOLLOWED = [("local", 2e-8), ("coupled", 2e-5)]
+# coupled half-lengths are kept from the last factorisation by the chord method
+HALF_LENGTHS = [("local", 2e-8), ("coupled", 2e-5)]
 
 
-@pytest.mark.parametrize(("half_length", "tolerance"), FOLLOWED)
-def test_that_the_compiled_loop_is_the_python_loop(half_length, tolerance):
+@pytest.mark.parametrize(("half_length", "tolerance"), HALF_LENGTHS)
+def test_compiled_loop_equals_python_loop(half_length, tolerance):
     problem, _, _ = built(
         contact__half_length=half_length,
         roller__offset=["0 mm", "0 mm", "1 mm"],
@@ -158,8 +160,8 @@ def test_that_the_compiled_loop_is_the_python_loop(half_length, tolerance):
     assert fast.full_solves < 30
 
 
-@pytest.mark.parametrize(("half_length", "tolerance"), FOLLOWED)
-def test_that_a_pass_followed_by_the_chord_method_leaves_next_to_nothing(half_length, tolerance):
+@pytest.mark.parametrize(("half_length", "tolerance"), HALF_LENGTHS)
+def test_chord_method_leaves_a_small_residual(half_length, tolerance):
     problem, _, _ = built(
         contact__half_length=half_length, operation__passes=200_000, contact__strips=91
     )
@@ -191,9 +193,7 @@ def roughened(state):
 
 
 @pytest.mark.parametrize(("factor", "unstable"), [(0.9, False), (1.4, True)])
-def test_that_the_limit_of_stability_is_where_explicit_steps_begin_to_oscillate(
-    half_worn, factor, unstable
-):
+def test_explicit_steps_oscillate_beyond_the_limit(half_worn, factor, unstable):
     problem, state = half_worn
     limit = stability_limit(problem, state)
     stepper = ExplicitStepper(StepControl(1.0), factor * limit, allow_unstable=True)
@@ -213,7 +213,7 @@ def test_that_the_limit_of_stability_is_where_explicit_steps_begin_to_oscillate(
         assert not any(warnings)
 
 
-def test_that_implicit_steps_of_ten_times_the_limit_do_not_oscillate(half_worn):
+def test_implicit_steps_beyond_the_limit_do_not_oscillate(half_worn):
     problem, state = half_worn
     step = 10.0 * stability_limit(problem, state)
     state, stepper = roughened(state), ImplicitStepper(StepControl(1.0), forced_step=step)
@@ -222,7 +222,7 @@ def test_that_implicit_steps_of_ten_times_the_limit_do_not_oscillate(half_worn):
         assert oscillation(state.contacts[0].line_load) < 1e-3
 
 
-def test_that_the_limit_is_the_interpenetration_of_the_strips(half_worn):
+def test_limit_is_the_interpenetration_of_the_strips(half_worn):
     problem, state = half_worn
     cylinder, _ = problem.shared_wear(*problem.wear_per_pass(list(state.contacts)))
     wear = stability_limit(problem, state) * cylinder.max()
@@ -230,26 +230,26 @@ def test_that_the_limit_is_the_interpenetration_of_the_strips(half_worn):
     assert 0.1e-6 < wear < 0.4e-6
 
 
-def test_that_a_forced_step_past_the_limit_is_refused(half_worn):
+def test_forced_step_beyond_the_limit_is_refused(half_worn):
     problem, state = half_worn
     step = 2.0 * stability_limit(problem, state)
     with pytest.raises(StepError, match=r"exceeds the stability limit.*allow_unstable = true"):
         ExplicitStepper(StepControl(1.0), step).advance(problem, state, 1e12)
 
 
-def test_that_the_explicit_replay_stays_under_the_limit_and_meets_the_truth():
-    _, truth, _ = compared(passes=45_000)
+def test_explicit_run_is_stable_and_matches_per_pass():
+    _, reference, _ = compared(passes=45_000)
     problem, stepper, stop = built(
         operation__passes=45_000, contact__strips=91, evolution__stepper="explicit"
     )
     state, advances = stepped(problem, stepper, stop)
     assert not any(advance.warning for advance in advances)
-    depth, exact = cylinder_depth_of(state)[0], cylinder_depth_of(truth)[0]
+    depth, exact = cylinder_depth_of(state)[0], cylinder_depth_of(reference)[0]
     assert depth == pytest.approx(exact, rel=5e-3)
     assert abs(depth - exact) <= state.depth_error[0]
 
 
-def test_that_a_free_roller_finds_its_creepage_at_every_step():
+def test_free_roller_creepage_balances_the_torque():
     problem, stepper, stop = built(
         creepage={"drive": "free", "bearing_torque": "100 N mm", "differential_slip": True},
         operation__passes=300_000,
@@ -257,18 +257,18 @@ def test_that_a_free_roller_finds_its_creepage_at_every_step():
     state, _ = stepped(problem, stepper, stop)
     contact = state.contacts[0]
     assert problem.inputs.bearing_torque == 0.1
-    # the arm is the roller's own radius, which its crown makes smaller to the sides
+    # the lever arm is the local radius of the roller, which the crown reduces to the sides
     assert 1.0 < contact.force_x * -0.02 / 0.1 < 1.003
     # the groove shortens the cylinder's radius by d, and the roller's slip follows it
     assert contact.longitudinal_creepage > 0.0
 
 
-def test_that_a_load_that_falls_to_nothing_is_an_error_that_names_the_cause(tmp_path):
+def test_vanishing_load_raises_an_error_with_its_cause(tmp_path):
     log = tmp_path / "log.csv"
     log.write_text("time [min], load [N]\n0, 300\n2, 300\n2.1, -10\n450, -10\n")
     for name in ("implicit", "stabilised", "explicit", "per-pass"):
         problem, stepper, stop = built(
-            # a term might still hold it up, so that this log is not refused beforehand
+            # with a load term the scenario is not refused before the run
             load={"kind": "recorded", "file": str(log), "thermal": THERMAL},
             evolution__stepper=name,
             operation__passes=30_000,
@@ -279,7 +279,7 @@ def test_that_a_load_that_falls_to_nothing_is_an_error_that_names_the_cause(tmp_
         assert caught.value.state
 
 
-def test_that_a_stiff_spring_brings_wear_to_rest():
+def test_stiff_spring_limits_the_worn_depth():
     problem, stepper, stop = built(load__kind="spring", load__stiffness="40 kN/mm")
     state, _ = stepped(problem, stepper, stop)
     depth = cylinder_depth_of(state)[0]

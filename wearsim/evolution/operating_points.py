@@ -46,8 +46,8 @@ def operating_points(
         problem.at_contacts(roller_depth),
     )
     if variation is not None:
-        strips = problem.grid.strips
-        variation = np.broadcast_to(variation, (*problem.shape, strips)).reshape(-1, strips)
+        shape = (*problem.shape, problem.grid.strips)
+        variation = np.broadcast_to(variation, shape).reshape(-1, shape[-1])
     return OperatingPoints(
         normal_force=loads.ravel(),
         **problem.input_columns,
@@ -79,8 +79,7 @@ def operating_point(
     spin, radius = float(problem.spin[place]), None
     if problem.free:
         s = problem.from_apex[roller]
-        radius = kinematics.roller_radius - s * s / (2.0 * kinematics.crown_radius)
-        radius = radius - roller_depth
+        radius = kinematics.roller_radius - s * s / (2.0 * kinematics.crown_radius) - roller_depth
     return OperatingPoint(
         normal_force=load,
         rolling_speed=kinematics.rolling_speed,

@@ -168,21 +168,19 @@ class WearProblem:
     @cached_property
     def input_columns(self) -> dict[str, Any]:
         """Creepages, spin and friction by their name in `OperatingPoints`, shape (contacts,)."""
-        inputs = self.inputs
         columns = {
-            "longitudinal": inputs.longitudinal,
-            "lateral": inputs.yaw,
+            "longitudinal": self.inputs.longitudinal,
+            "lateral": self.inputs.yaw,
             "spin": self.spin,
-            "friction": inputs.friction,
+            "friction": self.inputs.friction,
         }
         return {n: np.broadcast_to(column, self.shape).ravel() for n, column in columns.items()}
 
     @cached_property
     def cylinder_share(self) -> FloatArray:
         """Fraction of all passes made by each contact, shape (contacts,)."""
-        kinematics = self.kinematics
-        share = kinematics.multiplicity[self.roller] * self.weight
-        return np.asarray(share / kinematics.physical_rollers)
+        passes = self.kinematics.multiplicity[self.roller] * self.weight
+        return np.asarray(passes / self.kinematics.physical_rollers)
 
     @cached_property
     def stiffness(self) -> Number:
@@ -203,8 +201,7 @@ class WearProblem:
 
     def mean_load(self, start: Number, stop: Number) -> FloatArray:
         """Return the exact mean of the load between two times [s], as `force` [N]."""
-        problems = self.stacked or (self,)
-        return values_between([problem.load.mean for problem in problems], start, stop)
+        return values_between([p.load.mean for p in self.stacked or (self,)], start, stop)
 
     def deviations(self, start: Number, stop: Number) -> list[tuple[str, tuple[int, ...], Number]]:
         """Return field, rollers and standard deviation of all that varies between two times [s]."""
@@ -300,8 +297,8 @@ class WearProblem:
         -------
         cylinder, roller : ndarray, shape (stations, contacts, realisations, strips)
         """
-        shares, length = self.wear_shares, per_strip(passes)
-        return self._depths(contacts, {body: shares[body] * length for body in BODIES})
+        shares = self.wear_shares.items()
+        return self._depths(contacts, {body: share * per_strip(passes) for body, share in shares})
 
     def _depths(
         self, contacts: Sequence[ContactSolution], passes: Mapping[Body, Number]
@@ -323,14 +320,12 @@ class WearProblem:
     @cached_property
     def wear_factors(self) -> dict[Body, Number | None]:
         """Depth per pass and dissipation of either body [m/(W/m)]; None if wear is not linear."""
-        problems, speed = self.stacked or (self,), self.kinematics.rolling_speed
-        factors: dict[Body, Number | None] = {}
-        for body in BODIES:
-            all_factors = [problem.law.depth_per_dissipation(body, speed) for problem in problems]
-            known = [factor for factor in all_factors if factor is not None]
-            linear = len(known) == len(all_factors)
-            factors[body] = (np.array(known) if self.stacked else known[0]) if linear else None
-        return factors
+        laws, speed = [p.law for p in self.stacked or (self,)], self.kinematics.rolling_speed
+        factors = {body: [w.depth_per_dissipation(body, speed) for w in laws] for body in BODIES}
+        return {
+            body: None if None in each else np.array(each) if self.stacked else each[0]
+            for body, each in factors.items()
+        }
 
     def shared_wear(
         self, cylinder: FloatArray, roller: FloatArray

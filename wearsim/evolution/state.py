@@ -206,15 +206,9 @@ class WearState:
             if part:
                 values[name] = cls.from_arrays(part)
         columns = _with_prefix(arrays, _CONTACT)
-        values["contacts"] = tuple(
-            ContactSolution(**{name: _unpacked(column[k]) for name, column in columns.items()})
-            for k in range(len(columns["power"]))
-        )
+        y = columns.pop("y")
+        values["contacts"] = BatchSolution((len(y),), y[0], columns).solutions
         return cls(**values)
-
-
-def _unpacked(value: npt.NDArray[Any]) -> Any:
-    return value.item() if value.ndim == 0 else np.array(value)
 
 
 def _with_prefix(arrays: Mapping[str, npt.NDArray[Any]], prefix: str) -> dict[str, Any]:
@@ -228,9 +222,8 @@ def as_batch(contacts: Contacts, shape: tuple[int, ...]) -> BatchSolution:
         return BatchSolution.of(shape, contacts)
     if contacts.shape == shape:
         return contacts
-    axes = len(contacts.shape)
     columns = {
-        name: column.reshape(shape + column.shape[axes:])
+        name: column.reshape(shape + column.shape[len(contacts.shape) :])
         for name, column in contacts.columns.items()
     }
     return BatchSolution(shape, contacts.y, columns)
@@ -238,8 +231,7 @@ def as_batch(contacts: Contacts, shape: tuple[int, ...]) -> BatchSolution:
 
 def widened(array: FloatArray, strips: int) -> FloatArray:
     """Return `array` with `strips` zeros added at both ends of its last axis."""
-    margins = [(0, 0)] * (array.ndim - 1) + [(strips, strips)]
-    return np.pad(array, margins)
+    return np.pad(array, [(0, 0)] * (array.ndim - 1) + [(strips, strips)])
 
 
 def widened_state(state: WearState, y: FloatArray, strips: int) -> WearState:
@@ -303,8 +295,7 @@ def fresh_state(problem: WearProblem) -> WearState:
 
 def fresh_stacked_state(problem: WearProblem) -> WearState:
     """Return the fresh state of stacked tests with individual steps."""
-    state = fresh_state(problem)
-    count = problem.shape[2]
+    state, count = fresh_state(problem), problem.shape[2]
     individual = IndividualCounts(np.zeros(count), np.full(count, state.solves // count))
     state = replace(state, solves=0, individual=individual)
     return replace(state, coarse_step_solution=state)

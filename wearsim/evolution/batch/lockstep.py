@@ -15,7 +15,6 @@ from wearsim.errors import ContactError, StepError
 from wearsim.evolution.batch.bisect_failures import bisect_failures
 from wearsim.evolution.batch.stack import (
     Stack,
-    can_be_stacked,
     problem_of,
     stacked_problem,
     stacked_states,
@@ -28,15 +27,21 @@ from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, fresh_stacked_state
 from wearsim.evolution.steppers.backward_euler import ImplicitStepper
 from wearsim.evolution.steppers.base import Stepper
+from wearsim.plugins import BODIES
 from wearsim.types import FloatArray, IntArray
 
 
 def can_step_together(problem: WearProblem, stepper: Stepper) -> bool:
     """Return whether a test can be stepped together with `compatible` ones.
 
-    Only implicit steps can: those of other steppers differ between tests in more than length.
+    Tests with load terms, a bearing torque, inputs drawn at every pass, several stations or a wear
+    law that is not linear in the dissipation are stepped one at a time, as are those of other
+    steppers, whose steps differ between tests in more than length.
     """
-    return isinstance(stepper, ImplicitStepper) and can_be_stacked(problem)
+    linear = all(problem.wear_factors[body] is not None for body in BODIES)
+    plain = not (problem.free or problem.terms or problem.has_nodes or problem.redraw)
+    single = problem.shape[0] == problem.shape[2] == 1
+    return isinstance(stepper, ImplicitStepper) and linear and plain and single
 
 
 Path: TypeAlias = tuple[Stack, Stack, Stack]
@@ -85,12 +90,8 @@ class Lockstep:
             steps = np.full(len(numbers), stepper.forced_step or 0.0)
             if not stepper.forced_step:
                 steps = first_steps(self.stack.problem, state)
-            each = zip(numbers.tolist(), steps.tolist(), strict=True)
-            self._trials = {number: self._trial(step) for number, step in each}
-
-    def _trial(self, proposed: float) -> Trial:
-        forced = bool(self.stepper.forced_step)
-        return Trial(proposed, self.stepper.control, self.stepper.order, forced, dict)
+            for number, step in zip(numbers.tolist(), steps.tolist(), strict=True):
+                self._trials[number] = stepper.trial(step, dict)
 
     def fail(self, failures: dict[int, Exception]) -> None:
         """End tests, by number, with the errors given."""
@@ -162,14 +163,15 @@ class Lockstep:
     def _continue(self, path: Path) -> Path | None:
         """Continue from accepted steps; return those that led to finite values."""
         end = path[-1]
-        depth, energy = end.state.cylinder_depth, end.state.energy
-        finite = np.isfinite(depth).all(axis=(0, 1, 3)) & np.isfinite(energy)
+        finite = np.isfinite(end.state.cylinder_depth).all(axis=(0, 1, 3)) & np.isfinite(
+            end.state.energy
+        )
         failures: dict[int, Exception] = {}
         for (number, passes), ok in zip(end.progress, finite, strict=True):
             trial = self._trials[number]
             self.steps[number] += 1
             self.rejected[number] += trial.rejected
-            self._trials[number] = self._trial(trial.proposed)
+            self._trials[number] = self.stepper.trial(trial.proposed, dict)
             if not ok:
                 failures[number] = not_finite(passes, {})
         if self.stack is not None:

@@ -11,7 +11,6 @@ import numpy as np
 from wearsim.evolution.contact_inputs import ContactInputs
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import IndividualCounts, WearState
-from wearsim.plugins import BODIES
 from wearsim.types import IntArray
 
 #: axis of the realisations in the arrays of a `WearState`
@@ -29,32 +28,21 @@ _RADII = ("cylinder_radius", "roller_radius", "crown_radius", "rolling_speed")
 _ARRAYS = ("from_apex", "roller", "weight", "half", "slip_profile")
 
 
-def can_be_stacked(problem: WearProblem) -> bool:
-    """Return whether a test can be stepped together with compatible ones.
-
-    Tests with load terms, a bearing torque, inputs drawn at every pass, several stations or a wear
-    law that is not linear in the dissipation are stepped one at a time.
-    """
-    linear = all(problem.wear_factors[body] is not None for body in BODIES)
-    plain = not (problem.free or problem.terms or problem.has_nodes or problem.redraw)
-    return linear and plain and problem.shape[0] == problem.shape[2] == 1
-
-
 def compatible(one: WearProblem, other: WearProblem) -> bool:
     """Return whether two tests that can be stacked can share a stack.
 
     They share grid, model, kinematics and the arrays that do not depend on the realisation.
     """
     first, second = one.kinematics, other.kinematics
-    pairs = [(getattr(one, name), getattr(other, name)) for name in _ARRAYS]
-    pairs.append((first.multiplicity, second.multiplicity))
+    arrays = [(getattr(one, name), getattr(other, name)) for name in _ARRAYS]
     varying = [[(item.name, item.rollers) for item in problem.varying] for problem in (one, other)]
     return (
         one.grid is other.grid
         and one.model is other.model
         and one.tilt_shifts == other.tilt_shifts
         and one.iteration_tolerance == other.iteration_tolerance
-        and all(a is b if a is None or b is None else np.array_equal(a, b) for a, b in pairs)
+        and np.array_equal(first.multiplicity, second.multiplicity)
+        and all(a is b if a is None or b is None else np.array_equal(a, b) for a, b in arrays)
         and all(getattr(first, name) == getattr(second, name) for name in _RADII)
         and varying[0] == varying[1]
     )
@@ -66,9 +54,12 @@ def stacked_problem(problems: Sequence[WearProblem]) -> WearProblem:
         np.concatenate([getattr(problem.inputs, item.name) for problem in problems], axis=1)
         for item in fields(ContactInputs)
     )
-    gaps = np.concatenate([problem.flat_gap for problem in problems], axis=2)
-    inputs = ContactInputs(*columns)
-    return replace(problems[0], flat_gap=gaps, inputs=inputs, stacked=tuple(problems))
+    return replace(
+        problems[0],
+        flat_gap=np.concatenate([problem.flat_gap for problem in problems], axis=2),
+        inputs=ContactInputs(*columns),
+        stacked=tuple(problems),
+    )
 
 
 def problem_of(problem: WearProblem, numbers: IntArray) -> WearProblem:

@@ -13,7 +13,7 @@ from wearsim.evolution.error_control.step_size import StepControl
 from wearsim.evolution.observables import worn_volume
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import Depths, WearState
-from wearsim.evolution.steppers.single_step import solve_present
+from wearsim.evolution.steppers.single_step import carried_loads, solve_present
 from wearsim.evolution.steppers.wear_increment import WearIncrement
 from wearsim.types import FloatArray, Number
 
@@ -64,9 +64,9 @@ def state_difference(problem: WearProblem, one: WearState, other: WearState) -> 
 
     The difference in depth is the greatest where the first state is worn deep.
     """
+    volumes = total_worn_volume(problem, one), total_worn_volume(problem, other)
     depth = greatest_where_deep(one, depth_difference(one, other))
-    volume = np.abs(total_worn_volume(problem, one) - total_worn_volume(problem, other))
-    return np.array([depth, volume])
+    return np.array([depth, np.abs(volumes[0] - volumes[1])])
 
 
 def variation_bias(
@@ -96,7 +96,7 @@ def variation_bias(
     if not deviations:
         return None
     here = problem.at_time(start, stop)
-    loads = problem.values_of(end.contacts, "line_load").sum(axis=-1) * problem.grid.spacing
+    loads = carried_loads(problem, end.contacts)
     mean: WearIncrement | None = None
     bias: Depths | None = None
     for name, rollers, deviation in deviations:
@@ -122,22 +122,6 @@ def variation_bias(
     return bias
 
 
-def variation_error(
-    problem: WearProblem, end: WearState, first: Number, passes: Number
-) -> FloatArray:
-    """Return the size of `variation_bias`, whose parameters these are, with a safety factor.
-
-    Returns
-    -------
-    ndarray, shape (2, realisations)
-        In depth [m], and in the volume worn off both bodies [m^3].
-    """
-    bias = variation_bias(problem, end, first, passes)
-    if bias is None:
-        return np.zeros((2, problem.shape[2]))
-    return COVER * state_difference(problem, end, _with_added_depths(end, bias))
-
-
 def biased_coarse_solution(end: WearState, coarse: WearState, bias: Depths | None) -> WearState:
     """Return the coarse-step solution with the bias of the variation within a step.
 
@@ -159,10 +143,11 @@ def biased_coarse_solution(end: WearState, coarse: WearState, bias: Depths | Non
         for axis, a, b in zip((0, 1), depth_difference(coarse, end), bias, strict=True)
     )
     sign = np.where(along < 0.0, -1.0, 1.0)[:, None]
-    return _with_added_depths(coarse, (sign * bias[0], sign * bias[1]))
+    return with_added_depths(coarse, (sign * bias[0], sign * bias[1]))
 
 
-def _with_added_depths(state: WearState, depths: Depths) -> WearState:
+def with_added_depths(state: WearState, depths: Depths) -> WearState:
+    """Return a state with depths of cylinder and rollers added, shapes as in `WearState` [m]."""
     return state.replaced(
         cylinder_depth=state.cylinder_depth + depths[0],
         roller_depth=state.roller_depth + depths[1],
@@ -190,10 +175,13 @@ def _shifted_wear(
 def half_quadrature_start(problem: WearProblem, state: WearState) -> WearState:
     """Return the initial half-quadrature solution: `state` with half the nodes per roller."""
     chosen = set(np.flatnonzero(problem.half == 0))
-    contacts = zip(problem.contacts, state.contacts, strict=True)
     return replace(
         state,
-        contacts=tuple(contact for (_, c, _), contact in contacts if c in chosen),
+        contacts=tuple(
+            contact
+            for (_, c, _), contact in zip(problem.contacts, state.contacts, strict=True)
+            if c in chosen
+        ),
         coarse_step_solution=None,
         half_quadrature_solution=None,
     )
@@ -227,8 +215,8 @@ def with_pass_errors(
     """
     if not problem.has_nodes:
         return end
-    half = start.half_quadrature_solution or half_quadrature_start(problem, start)
-    half = step(problem.halved, half, passes)
+    half_start = start.half_quadrature_solution or half_quadrature_start(problem, start)
+    half = step(problem.halved, half_start, passes)
     volume = total_worn_volume(problem, end)
     variance = start.scatter[1] + _volume_variance(problem, end, passes)
     depth = np.square(greatest_depth(end) / np.where(volume > 0.0, volume, 1.0)) * variance
@@ -249,8 +237,8 @@ def _volume_variance(problem: WearProblem, end: WearState, passes: Number) -> Fl
     volume = volume + worn_volume(roller * ratio, spacing, kinematics.roller_radius)
     # differences between the means of the rollers are not random
     deviation = volume - problem.per_roller(volume)[:, problem.roller]
-    share = problem.cylinder_share[None, :, None]
-    return np.asarray(passes * (share * deviation**2).sum(axis=1).max(axis=0))
+    variance = (problem.cylinder_share[None, :, None] * deviation**2).sum(axis=1).max(axis=0)
+    return np.asarray(passes * variance)
 
 
 def excess(

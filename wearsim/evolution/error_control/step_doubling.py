@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -77,9 +79,9 @@ class StepDoublingStepper(Stepper):
 
     def advance(self, problem: WearProblem, state: WearState, stop: float) -> Advance:
         """Take one step, shortened until the error that it adds is allowed."""
-        scheme, forced = self.scheme(problem, state), bool(self.forced_step)
+        scheme = self.scheme(problem, state)
         proposed = self.forced_step or state.step or float(first_steps(problem, state).min())
-        trial = Trial(proposed, self.control, self.order, forced, state.to_arrays)
+        trial = self.trial(proposed, state.to_arrays)
         while True:
             step = trial.step(state.passes, stop)
             try:
@@ -94,6 +96,10 @@ class StepDoublingStepper(Stepper):
                     rejected=state.rejected + trial.rejected,
                 )
                 return Advance(path=(state, tried.half, end))
+
+    def trial(self, proposed: float, state: Callable[[], dict[str, Any]]) -> Trial:
+        """Return the search for the length of a step, with the parameters of `Trial`."""
+        return Trial(proposed, self.control, self.order, bool(self.forced_step), state)
 
     def attempt(
         self, problem: WearProblem, state: WearState, step: Number, stop: float, scheme: Step
@@ -128,8 +134,9 @@ class StepDoublingStepper(Stepper):
         before, after = depth_difference(state, coarse_start), depth_difference(end, coarse)
         change = after[0] - before[0], after[1] - before[1]
         cover = FIRST_ORDER_COVER if self.order == 1 else COVER
-        volume = np.abs(volume_of(problem, change))
-        added = cover * np.array([greatest_where_deep(end, change), volume])
+        added = cover * np.array(
+            [greatest_where_deep(end, change), np.abs(volume_of(problem, change))]
+        )
         auxiliary = {
             name: solution.advanced_to(
                 end.passes_done, coarse_step_solution=None, half_quadrature_solution=None
@@ -143,15 +150,14 @@ class StepDoublingStepper(Stepper):
             **auxiliary,
         )
         reached = np.array([end.depth_error, end.volume_error]) - fixed
-        over = excess(self.control, problem, state, end, added, stop, reached)
-        return Attempt(half, end, over)
+        return Attempt(half, end, excess(self.control, problem, state, end, added, stop, reached))
 
 
 def first_steps(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the passes that wear off a tenth of the elastic approach, shape (realisations,)."""
     cylinder, roller = problem.shared_wear(*problem.wear_per_pass(state.contacts))
     rate = (cylinder + roller).max(axis=(0, 1, 3))
-    gap = problem.gap(*state.depths)
-    approach = problem.values_of(state.contacts, "approach") - gap.min(axis=-1)
+    least_gap = problem.gap(*state.depths).min(axis=-1)
+    approach = problem.values_of(state.contacts, "approach") - least_gap
     worn = np.where(rate > 0.0, rate, 1.0)
     return np.asarray(np.where(rate > 0.0, 0.1 * approach.min(axis=(0, 1)) / worn, np.inf))

@@ -61,10 +61,8 @@ class StepControl:
 
         The error that a step adds grows as the step to the power order + 1.
         """
-        factor = self.grow
-        if excess > 0.0:
-            factor = self.safety / math.pow(excess, 1.0 / (order + 1))
-        return step * min(self.grow, max(self.shrink, factor))
+        aim = self.safety / math.pow(excess, 1.0 / (order + 1)) if excess > 0.0 else self.grow
+        return step * min(self.grow, max(self.shrink, aim))
 
 
 SMALLEST_STEP = 1e-6  # passes; some wear factors wear a whole groove in ten passes
@@ -103,8 +101,7 @@ class Trial:
         state: Callable[[], dict[str, Any]],
     ) -> None:
         self.proposed, self.rejected = proposed, 0
-        self._control, self._order, self._forced = control, order, forced
-        self._state = state
+        self._control, self._order, self._forced, self._state = control, order, forced, state
         self._cause: StepError | ContactError | None = None
 
     def step(self, passes: float, stop: float) -> float:

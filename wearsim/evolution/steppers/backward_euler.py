@@ -69,8 +69,9 @@ def implicit_step(problem: WearProblem, state: WearState, passes: Number) -> Wea
     iterations = np.zeros(len(active), dtype=np.int64)
     for iteration in range(1, MAX_FIXED_POINT + 1):
         points = operating_points(problem, loads, *ends)
-        gap_with_offset, compliance = gap + wear.offset, wear.compliance
-        solved = solve_compliant(problem, gap_with_offset, points, compliance, contacts, active)
+        solved = solve_compliant(
+            problem, gap + wear.offset, points, wear.compliance, contacts, active
+        )
         iterations += active
         new = WearIncrement(problem, solved, passes)
         ends = end_depths(state, new)
@@ -85,10 +86,9 @@ def implicit_step(problem: WearProblem, state: WearState, passes: Number) -> Wea
         relaxation = 10.0 ** ((iteration - 1) // RELAXATION_INTERVAL)
         active &= ~(change < problem.iteration_tolerance * relaxation)
         if not np.count_nonzero(active):
-            power = problem.values_of(solved, "power")
             solves = iterations * (len(solved) // len(active))
             begun = state.advanced_to(begin, solves, contacts=solved)
-            return worn_state(problem, begun, passes, ends, power)
+            return worn_state(problem, begun, passes, ends, problem.values_of(solved, "power"))
         new.estimate_exponents(wear)
         contacts, wear, loads = solved, new, new_loads
     raise StepError(

@@ -11,7 +11,8 @@ from wearsim.evolution.error_control.error_estimates import (
     COVER,
     excess,
     state_difference,
-    variation_error,
+    variation_bias,
+    with_added_depths,
     with_pass_errors,
 )
 from wearsim.evolution.error_control.step_size import StepControl
@@ -65,7 +66,14 @@ class ExplicitStepper(Stepper):
     def advance(self, problem: WearProblem, state: WearState, stop: float) -> Advance:
         """Take one step, below the stability limit and within the tolerance."""
         limit = stability_limit(problem, state)
-        proposed = self._proposal(state, limit)
+        proposed = self.forced_step or min(state.step or np.inf, SAFETY * limit)
+        if self.forced_step and self.forced_step > limit and not self.allow_unstable:
+            raise StepError(
+                f"a step of {self.forced_step:g} passes exceeds the stability limit of"
+                f" {limit:.4g} passes at pass {state.passes:.0f}; lower evolution.step, set"
+                " evolution.stepper = 'stabilised', or set evolution.allow_unstable = true",
+                state.to_arrays(),
+            )
         left, rejected = stop - state.passes, state.rejected
         while True:
             step = min(proposed, left) if self.forced_step else fitted(proposed, left)
@@ -90,31 +98,13 @@ class ExplicitStepper(Stepper):
             steps=state.steps + 1,
             rejected=rejected,
         )
-        return Advance(path=(state, end), warning=_warning(end, step, limit))
-
-    def _proposal(self, state: WearState, limit: float) -> float:
-        if self.forced_step is None:
-            return min(state.step or np.inf, SAFETY * limit)
-        if self.forced_step > limit and not self.allow_unstable:
-            raise StepError(
-                f"a step of {self.forced_step:g} passes exceeds the stability limit of"
-                f" {limit:.4g} passes at pass {state.passes:.0f}; lower evolution.step, set"
-                " evolution.stepper = 'stabilised', or set evolution.allow_unstable = true",
-                state.to_arrays(),
-            )
-        return self.forced_step
-
-
-def _warning(end: WearState, step: float, limit: float) -> str | None:
-    """Return a warning if the line load of a contact oscillates between strips."""
-    worst = max(oscillation(contact.line_load) for contact in end.contacts)
-    if worst < OSCILLATING:
-        return None
-    return (
-        f"unstable: at pass {end.passes:.0f} the line load alternates from strip to strip by"
-        f" {worst:.0%} of its peak; the step of {step:.4g} passes is"
-        f" {step / limit:.2g} times the stability limit"
-    )
+        worst = max(oscillation(contact.line_load) for contact in end.contacts)
+        warning = (
+            f"unstable: at pass {passes:.0f} the line load alternates from strip to strip by"
+            f" {worst:.0%} of its peak; the step of {step:.4g} passes is"
+            f" {step / limit:.2g} times the stability limit"
+        )
+        return Advance(path=(state, end), warning=None if worst < OSCILLATING else warning)
 
 
 def _errors(problem: WearProblem, start: WearState, end: WearState, step: float) -> FloatArray:
@@ -134,5 +124,8 @@ def _errors(problem: WearProblem, start: WearState, end: WearState, step: float)
         cylinder_depth=start.cylinder_depth + wear.cylinder,
         roller_depth=start.roller_depth + wear.roller,
     )
-    difference = state_difference(problem, end, other)
-    return COVER * 0.5 * difference + variation_error(problem, end, start.passes, step)
+    errors = COVER * 0.5 * state_difference(problem, end, other)
+    bias = variation_bias(problem, end, start.passes, step)
+    if bias is None:
+        return errors
+    return errors + COVER * state_difference(problem, end, with_added_depths(end, bias))

@@ -69,10 +69,9 @@ def _passes(
 
     The load and the processes of a pass are those at its middle.
     """
-    first, order = int(state.passes), turn_order(problem)
+    first, order, kinematics = int(state.passes), turn_order(problem), problem.kinematics
     rollers = order[(first + np.arange(count)) % len(order)]
-    passes_done = state.passes + np.arange(count, dtype=np.float64)
-    times = (passes_done + 0.5) / problem.kinematics.pass_rate
+    times = (state.passes + np.arange(count, dtype=np.float64) + 0.5) / kinematics.pass_rate
     passes = problem.single_passes(rollers, first, times)
     force = problem.load.force(times)[:, None] + passes.inputs.normal_force_offset
     return rollers, force, passes
@@ -85,11 +84,9 @@ def _term_rates(problem: WearProblem) -> FloatArray:
     """
     kinematics = problem.kinematics
     own_pass = kinematics.physical_rollers / kinematics.multiplicity / kinematics.pass_rate
-    rates = np.zeros((len(problem.terms), 1 + len(own_pass)))
-    for number, term in enumerate(problem.terms.values()):
-        gain, time_constant = term.lag() or (0.0, np.inf)
-        rates[number] = [gain, *-np.expm1(-own_pass / time_constant)]
-    return rates
+    lags = [term.lag() or (0.0, np.inf) for term in problem.terms.values()]
+    rates = [[gain, *-np.expm1(-own_pass / time_constant)] for gain, time_constant in lags]
+    return np.array(rates).reshape(len(lags), 1 + len(own_pass))
 
 
 def _slip_base(problem: WearProblem) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -102,27 +99,22 @@ def _slip_base(problem: WearProblem) -> tuple[FloatArray, FloatArray, FloatArray
     return np.ascontiguousarray(problem.slip_profile), arm, rates
 
 
-def _wear_rates(problem: WearProblem) -> FloatArray:
-    """Return depth per pass and dissipation over V: the cylinder's, then each roller's."""
-    kinematics, speed = problem.kinematics, problem.kinematics.rolling_speed
-    cylinder, roller = (problem.law.depth_per_dissipation(body, speed) or 0.0 for body in BODIES)
-    ratio = kinematics.cylinder_radius / kinematics.roller_radius
-    return speed * np.array([cylinder, *(roller * ratio / kinematics.multiplicity)])
-
-
 def _run_compiled(problem: WearProblem, state: WearState, count: int) -> WearState:
     """Run `count` passes of every realisation in the model's compiled loop."""
     strips, carried = state.loop_strips, state.loop_contacts
     strips = np.zeros((3, *problem.shape, problem.grid.strips)) if strips is None else strips.copy()
     carried = np.zeros((3, *problem.shape)) if carried is None else carried.copy()
     cylinder, roller = state.cylinder_depth.copy(), state.roller_depth.copy()
-    terms, energy = state.terms.copy(), state.energy.copy()
-    full_solves = state.full_solves
+    terms, energy, full_solves = state.terms.copy(), state.energy.copy(), state.full_solves
     slip_base, spin_arm, slip_rates = _slip_base(problem)
+    kinematics, speed = problem.kinematics, problem.kinematics.rolling_speed
+    per_power = [problem.law.depth_per_dissipation(body, speed) or 0.0 for body in BODIES]
+    ratio = kinematics.cylinder_radius / kinematics.roller_radius
+    wear = speed * np.array([per_power[0], *(per_power[1] * ratio / kinematics.multiplicity)])
     _, force, passes = _passes(problem, state, count)
     inputs, lever = passes.inputs, 1.0 if problem.tilt_shifts else 0.0
     # every physical roller dissipates all the time, one pass per turn of the cylinder
-    turn = problem.kinematics.physical_rollers / problem.kinematics.pass_rate
+    turn = kinematics.physical_rollers / kinematics.pass_rate
     for v in range(problem.shape[2]):
         loop = PassLoop(
             order=turn_order(problem),
@@ -135,12 +127,12 @@ def _run_compiled(problem: WearProblem, state: WearState, count: int) -> WearSta
             stiffness=problem.load.stiffness,
             nominal_gap=np.ascontiguousarray(problem.flat_gap[0, :, v]),
             from_apex=np.ascontiguousarray(problem.from_apex),
-            longitudinal_curvature=problem.kinematics.longitudinal_curvature,
-            rolling_speed=problem.kinematics.rolling_speed,
+            longitudinal_curvature=kinematics.longitudinal_curvature,
+            rolling_speed=speed,
             slip_base=slip_base,
             spin_arm=spin_arm,
             slip_rates=slip_rates,
-            wear=_wear_rates(problem),
+            wear=wear,
             term_rates=_term_rates(problem),
             similar=problem.redraw is None,
             terms=np.ascontiguousarray(terms[:, :, v]),

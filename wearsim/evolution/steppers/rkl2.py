@@ -132,8 +132,7 @@ def stabilised_step(
     )
     solve = solve_present if problem.varying else contacts_at
     contacts, first = _rate(here, state, passes, before, solve)
-    solves = len(stages) * len(contacts)
-    solves += 0 if contacts is state.contacts else len(contacts)
+    solves = (len(stages) + (contacts is not state.contacts)) * len(contacts)
     change = _sum((stages[0].start_rate, first))
     for stage in stages[1:]:
         contacts, rate = _rate(here, replace(state, contacts=contacts), passes, change)

@@ -42,8 +42,8 @@ def mean_loads(
         loads -= problem.stiffness * np.mean(descents, axis=0)
     for number, term in enumerate(problem.terms.values()):
         mean_power = problem.per_roller(power).mean(axis=0)
-        mean = term.mean_force(state.terms[number], mean_power, first_of(stop - start))
-        loads += mean[problem.roller]
+        duration = first_of(stop - start)
+        loads += term.mean_force(state.terms[number], mean_power, duration)[problem.roller]
     return checked_loads(loads, state.passes_done)
 
 
@@ -87,9 +87,9 @@ def explicit_step(problem: WearProblem, state: WearState, passes: Number) -> Wea
     solve = solve_present if problem.varying else contacts_at
     contacts = solve(here, state, mean)
     solves = len(contacts) if contacts is state.contacts else 2 * len(contacts)
-    wear, power = WearIncrement(here, contacts, passes), here.values_of(contacts, "power")
+    ends = end_depths(state, WearIncrement(here, contacts, passes))
     begun = replace(state, contacts=contacts, solves=state.solves + solves)
-    worn = worn_state(here, begun, passes, end_depths(state, wear), power)
+    worn = worn_state(here, begun, passes, ends, here.values_of(contacts, "power"))
     return replace(worn, contacts=solve_present(problem, worn, present_loads(problem, worn)))
 
 
@@ -118,8 +118,7 @@ def contacts_at(problem: WearProblem, state: WearState, loads: FloatArray) -> Co
     """
     if problem.varying:
         return solve_present(problem, state, loads)
-    line_load = problem.values_of(state.contacts, "line_load")
-    carried = line_load.sum(axis=-1) * problem.grid.spacing
+    carried = carried_loads(problem, state.contacts)
     difference = np.abs(carried - loads).max(axis=(0, 1))
     others = np.flatnonzero(difference > SAME_LOAD * loads.max(axis=(0, 1)))
     if not others.size:
@@ -129,6 +128,11 @@ def contacts_at(problem: WearProblem, state: WearState, loads: FloatArray) -> Co
     chosen, part = problem_of(problem, others), state_of(state, others)
     solved = solve_present(chosen, part, np.take(loads, others, axis=REALISATION))
     return state.batch.with_others(others, as_batch(solved, chosen.shape))
+
+
+def carried_loads(problem: WearProblem, contacts: Contacts) -> FloatArray:
+    """Return the integral of the line load of each contact, shape (S, C, N) [N]."""
+    return np.asarray(problem.values_of(contacts, "line_load").sum(axis=-1) * problem.grid.spacing)
 
 
 def solve_present(problem: WearProblem, state: WearState, loads: FloatArray) -> Contacts:
@@ -186,6 +190,6 @@ def cylinder_depth_of(state: WearState) -> FloatArray:
 
 def cylinder_volume_of(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the cylinder's worn volume, shape (realisations,) [m^3]: the mean over stations."""
-    radius = problem.kinematics.cylinder_radius
-    volume = worn_volume(state.cylinder_depth, problem.grid.spacing, radius)
+    kinematics, spacing = problem.kinematics, problem.grid.spacing
+    volume = worn_volume(state.cylinder_depth, spacing, kinematics.cylinder_radius)
     return np.asarray(volume.mean(axis=(0, 1)))

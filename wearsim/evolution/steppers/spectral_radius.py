@@ -9,7 +9,7 @@ import numpy as np
 from wearsim.errors import ContactError
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import Depths, WearState
-from wearsim.evolution.steppers.single_step import present_problem, solve_present
+from wearsim.evolution.steppers.single_step import carried_loads, present_problem, solve_present
 from wearsim.evolution.steppers.wear_increment import WearIncrement
 from wearsim.types import FloatArray
 
@@ -83,9 +83,8 @@ def _decrease(
     profile : tuple of ndarray
         Change of cylinder and rollers, of any size.
     """
-    line_load = problem.values_of(state.contacts, "line_load")
-    gap = problem.gap(*state.depths)
-    approach = problem.values_of(state.contacts, "approach") - gap.min(axis=-1)
+    least_gap = problem.gap(*state.depths).min(axis=-1)
+    approach = problem.values_of(state.contacts, "approach") - least_gap
     step = PERTURBATION * np.maximum(approach.min(axis=(0, 1)), 1e-12)
     size = _maximum_norm(profile)
     factor = (step / np.where(size > 0.0, size, 1.0))[:, None]
@@ -95,7 +94,7 @@ def _decrease(
         roller_depth=state.roller_depth + factor * profile[1],
     )
     # constant loads: the feedback of a spring on the total descent is weaker than that of strips
-    contacts = solve_present(problem, changed, line_load.sum(axis=-1) * problem.grid.spacing)
+    contacts = solve_present(problem, changed, carried_loads(problem, state.contacts))
     new = WearIncrement(present_problem(problem, state), contacts, 1.0)
     cylinder, roller = (
         (old - now) / step[:, None] for old, now in zip(wear.depths, new.depths, strict=True)

@@ -72,23 +72,20 @@ class WearIncrement:
         if self.exponents is None:
             return 0.0
         constant = 1.0 - self.exponents
-        return self._opening(*self.problem.sum_of_parts(*(constant * p for p in self._parts)))
+        cylinder, roller = self.problem.sum_of_parts(*(constant * part for part in self._parts))
+        return cylinder + self.problem.at_contacts(roller)
 
     @property
     def opening(self) -> FloatArray:
         """Gap that the step opens, shape (stations, contacts, realisations, strips) [m]."""
-        return self._opening(*self.depths)
-
-    def _opening(self, cylinder: FloatArray, roller: FloatArray) -> FloatArray:
-        return cylinder + self.problem.at_contacts(roller)
+        return self.cylinder + self.problem.at_contacts(self.roller)
 
     def predicted_opening(self, line_load: FloatArray) -> FloatArray:
         """Return the opening of the linearised wear at a line load, shape as `opening` [m]."""
         stations, contacts, realisations, strips = line_load.shape
         flat = line_load.transpose(2, 0, 1, 3).reshape(realisations, -1, strips)
-        by_realisation = self.compliance.opening(flat)
-        shaped = by_realisation.reshape(realisations, stations, contacts, strips)
-        opening = shaped.transpose(1, 2, 0, 3)
+        opening = self.compliance.opening(flat)
+        opening = opening.reshape(realisations, stations, contacts, strips).transpose(1, 2, 0, 3)
         return opening if self.exponents is None else opening + self.offset
 
     def estimate_exponents(self, old: WearIncrement) -> None:
