@@ -36,7 +36,7 @@ def compare(
     json: Json = False,
     force: Force = False,
 ) -> None:
-    """Compare runs and ensembles: differences and their confidence intervals."""
+    """Compare runs and ensembles, with confidence intervals."""
     if len(files) < 2:
         raise typer.BadParameter(
             f"there is one file, {files[0]}; give another one to compare", param_hint="FILE.h5"

@@ -49,7 +49,7 @@ def maxent(
     json: Json = False,
     force: Force = False,
 ) -> None:
-    """Compute the maximum-entropy distribution for a support and moments."""
+    """Compute a maximum-entropy distribution from moments."""
     check_figure(figure, force)
     from wearsim.uq.distributions.maxent import Infeasible, maximum_entropy
 
