@@ -1,4 +1,4 @@
-"""Works that tests hand to executors; the processes that do them import this module."""
+"""Work functions for tests of executors, in a module that worker processes can import."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class Squares:
-    """Tells the squares, and by whom; may take its time, over the numbers below one above all."""
+    """Squares and process ids, after a delay of `seconds`, or `first` for numbers below 1."""
 
     seconds: float = 0.0
     first: float = 0.0
@@ -25,9 +25,9 @@ class Squares:
 
 @dataclass(frozen=True)
 class Held:
-    """Holds the batch of number 0 back until a file `go` is there; then writes a file `done`.
+    """Squares; the batch of number 0 waits for a file `go` and then writes a file `done`.
 
-    It gives up after two minutes, which only a test that fails sees.
+    The time limit of two minutes is reached in failing tests only.
     """
 
     folder: Path
@@ -44,7 +44,7 @@ class Held:
 
 @dataclass(frozen=True)
 class Deadly:
-    """Kills its process as it comes to one number, so many times."""
+    """Squares; kills its process at the number `at`, `times` times."""
 
     folder: Path
     at: int
@@ -52,13 +52,13 @@ class Deadly:
 
     def __call__(self, numbers: Sequence[int]) -> list[int]:
         time.sleep(0.02)
-        if self.at in numbers and not self._all_killed():
+        if self.at in numbers and not self._kills_done():
             os.kill(os.getpid(), signal.SIGKILL)
         with (self.folder / f"done {min(numbers)}").open("a") as file:
             file.write(".")
         return [number * number for number in numbers]
 
-    def _all_killed(self) -> bool:
+    def _kills_done(self) -> bool:
         for turn in range(self.times):
             try:
                 (self.folder / f"killed {turn}").touch(exist_ok=False)
@@ -70,7 +70,7 @@ class Deadly:
 
 @dataclass(frozen=True)
 class KilledAsItSends:
-    """Has its process killed, once, when a part of its results is on its way."""
+    """Zero bytes; kills its process once while the results are being sent."""
 
     folder: Path
     length: int
@@ -89,7 +89,7 @@ def _write_and_die(handle: int, content: bytes) -> int:
 
 
 class Raising:
-    """Raises an error of a kind."""
+    """Work that raises an error of a given type."""
 
     def __init__(self, kind: type[Exception], *arguments: object) -> None:
         self.kind, self.arguments = kind, arguments
@@ -99,7 +99,7 @@ class Raising:
 
 
 class UnsendableError(Exception):
-    """An error that can be pickled, but not unpickled."""
+    """Error that can be pickled but not unpickled."""
 
     def __init__(self, one: str, other: str) -> None:
         super().__init__(f"{one} and {other}")
@@ -107,7 +107,7 @@ class UnsendableError(Exception):
 
 @dataclass(frozen=True)
 class Unreadable:
-    """A work that no other process can unpickle."""
+    """Work that cannot be unpickled."""
 
     def __setstate__(self, state: object) -> None:
         raise LookupError("cannot be read here")
@@ -120,6 +120,6 @@ class Unreadable:
 
 
 def surroundings(numbers: Sequence[int]) -> list[tuple[str, bool]]:
-    """Return how many threads BLAS may use here, and whether a Ctrl-C is ignored."""
+    """Return the number of BLAS threads of this process, and whether it ignores SIGINT."""
     ignored = signal.getsignal(signal.SIGINT) == signal.SIG_IGN
     return [(os.environ["OPENBLAS_NUM_THREADS"], ignored) for _ in numbers]

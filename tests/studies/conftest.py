@@ -1,4 +1,4 @@
-"""Fixtures of the studies: passes in small helpings, checkpoints as often as they are asked for."""
+"""Fixtures of studies: small chunks of passes, and checkpoints without a limit by the disk."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from wearsim.studies.run.run import _RunInProgress
 
 @pytest.fixture
 def small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let the per-pass stepper look up often, so that short tests can be stopped."""
+    """Reduce the chunks of the per-pass stepper, so that short tests can be stopped."""
     monkeypatch.setattr(per_pass, "CHUNK", 700)
     monkeypatch.setattr(per_pass, "SLOW_CHUNK", 20)
 
 
 @pytest.fixture
 def quick_disk(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let a run believe that writing takes no time, so that nothing limits its checkpoints."""
+    """Set the measured duration of writing to zero, so that it does not limit the checkpoints."""
     monkeypatch.setattr(
         _RunInProgress, "_last_write", property(lambda _: 0.0, lambda _, seconds: None)
     )
@@ -27,5 +27,5 @@ def quick_disk(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
-    """Where a run writes."""
+    """Results file of a run."""
     return tmp_path / "run.h5"

@@ -1,4 +1,4 @@
-"""A Dask cluster of processes of its own, as on machines elsewhere: a scheduler and workers."""
+"""Dask cluster of separate processes: a scheduler and workers."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ NO_DASHBOARD = ("--no-dashboard", "--dashboard-address", "127.0.0.1:0")
 
 @contextmanager
 def started(module: str, *arguments: str, path: str = "") -> Iterator[subprocess.Popen[bytes]]:
-    """Provide a process of Dask, which is killed in the end."""
+    """Provide a Dask process, which is killed at the end."""
     paths = os.pathsep.join(filter(None, [path, str(ROOT), str(HERE)]))
     with subprocess.Popen(
         [sys.executable, "-m", f"distributed.cli.{module}", *NO_DASHBOARD, *arguments],
@@ -46,15 +46,15 @@ def scheduler(folder: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
 
 @contextmanager
 def worker(address: str, folder: Path, path: str = "") -> Iterator[subprocess.Popen[bytes]]:
-    """Provide a worker that is not started again when it dies.
+    """Provide a worker that is not restarted after it ends.
 
     Parameters
     ----------
     address : str
-        Of the scheduler.
+        Address of the scheduler.
     folder : Path
     path : str
-        Where it finds modules first.
+        Folder prepended to the module search path.
     """
     arguments = (address, "--nthreads", "1", "--no-nanny", "--local-directory", str(folder))
     with started("dask_worker", *arguments, path=path) as process:

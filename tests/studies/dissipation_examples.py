@@ -1,4 +1,4 @@
-"""One contact with random inputs of every sort."""
+"""Scenarios of one contact with random inputs of all kinds."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from wearsim.scenario import Scenario, load_scenario, parse_scenario
 
 PAPER = Path(__file__).parents[2] / "scenarios" / "paper-monte-carlo.toml"
 COARSE: dict[str, object] = {"contact__mx": 16, "contact__my": 24}
-NO_ANGLES: dict[str, object] = {"creepage__yaw": "0 rad"}  # takes the misalignment's place
+NO_ANGLES: dict[str, object] = {"creepage__yaw": "0 rad"}  # replaces the misalignment
 
 CONTACT = (
     'title = "a contact"\n\n'
@@ -33,7 +33,7 @@ my = 24
 
 
 def paper(**overrides: object) -> Scenario:
-    """Return the paper's Monte Carlo; two underscores stand for the dot of a key."""
+    """Return the paper's Monte Carlo scenario; `__` in a name is the dot of a key."""
     return load_scenario(PAPER, _dotted(overrides))
 
 

@@ -1,4 +1,4 @@
-"""Small ensembles of short, fast-wearing tests, and how two files of them are compared."""
+"""Small ensembles of short, fast-wearing tests, and their bitwise comparison."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ LOGNORMAL = {"distribution": "lognormal", "median": "2e-9 1/Pa", "factor": 1.5}
 
 
 def small(**changes: object) -> Scenario:
-    """Return the rig with load, creepage, slack and K/H drawn once per test, quick to run."""
+    """Return the rig with random load, creepage, misalignment and K/H per test, quick to run."""
     inputs: dict[str, object] = {
         "passes": 3000,
         "contact__strips": 41,
@@ -24,12 +24,12 @@ def small(**changes: object) -> Scenario:
         "wear__cylinder__k_over_h": LOGNORMAL,
     }
     given = {**inputs, **changes}
-    passes, law = given.pop("passes"), given.pop("wear__cylinder__k_over_h")
-    return scenario_of(passes, law, **given)
+    passes, factor = given.pop("passes"), given.pop("wear__cylinder__k_over_h")
+    return scenario_of(passes, factor, **given)
 
 
-def frail(**changes: object) -> Scenario:
-    """Return tests of which a part fails: they may take no more steps than most of them need."""
+def partly_failing(**changes: object) -> Scenario:
+    """Return tests of which some fail, by a limit on the number of steps."""
     return small(evolution__max_steps=14, **changes)
 
 
@@ -40,7 +40,7 @@ def contents(path: Path | EnsembleResult) -> dict[str, bytes]:
     return {**found, "status": data.status.tobytes(), "errors": repr(data.errors).encode()}
 
 
-def unlike(one: Path | EnsembleResult, other: Path | EnsembleResult) -> list[str]:
-    """Return the names of what two ensembles differ in, to the bit."""
-    mine, theirs = contents(one), contents(other)
-    return [name for name in mine.keys() | theirs.keys() if mine.get(name) != theirs.get(name)]
+def differences(one: Path | EnsembleResult, other: Path | EnsembleResult) -> list[str]:
+    """Return the names of the arrays that differ between two ensembles."""
+    first, second = contents(one), contents(other)
+    return [name for name in first.keys() | second.keys() if first.get(name) != second.get(name)]

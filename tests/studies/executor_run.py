@@ -1,4 +1,4 @@
-"""Run as a process: names the processes that work for it, and then has them work for minutes."""
+"""Script that prints the ids of its worker processes, which then work for minutes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from wearsim.studies.execution.factory import executor
 
 
 def main(scheduler: str) -> None:
-    """Have quick batches done, and slow ones, of which there are as many as workers."""
+    """Run quick batches, and then slow ones for all workers."""
     batches = [*([number] for number in range(1, 9)), *([-number] for number in range(4))]
     with executor(scheduler, 2) as workers:
         for _, results in workers.results(Squares(0.05, 600.0), iter(batches)):

@@ -1,6 +1,6 @@
-"""Run as a process: has ensembles killed, finishes what they left, and tells what came of it.
+"""Script that kills ensembles, resumes them and prints the results as JSON lines.
 
-One process does all: it compiles and runs once, and forks for every ensemble that is to be killed.
+A single process compiles and forks for every ensemble that is killed.
 """
 
 from __future__ import annotations
@@ -10,9 +10,18 @@ import random
 import sys
 from pathlib import Path
 
-from killed_run import chosen_of, ended, ended_after, forked, killing, seconds_of, stages_of, tell
+from killed_run import (
+    chosen_of,
+    ended,
+    ended_after,
+    forked,
+    killing,
+    seconds_of,
+    stages_of,
+    write_line,
+)
 
-from tests.studies.ensemble_cases import small, unlike
+from tests.studies.ensemble_cases import differences, small
 from wearsim.results import open_ensemble
 from wearsim.results.io import atomic_write
 from wearsim.scenario import Scenario
@@ -22,7 +31,7 @@ from wearsim.studies.ensemble.driver import EnsembleWork
 
 
 def go(scenario: Scenario, count: int, path: Path, scheduler: str = "serial") -> int:
-    """Run an ensemble, or go on with what there is; return how many were done, -1 for no file."""
+    """Run or resume an ensemble; return the number of completed realisations, -1 for no file."""
     if not path.exists():
         ensemble(scenario, count, path, scheduler=scheduler)
         return -1
@@ -32,21 +41,21 @@ def go(scenario: Scenario, count: int, path: Path, scheduler: str = "serial") ->
 
 
 def kill_at_stages(scenario: Scenario, count: int, folder: Path, extent: str) -> None:
-    """Kill an ensemble at calls of the seam, all or a few per stage of each of its two writers.
+    """Kill an ensemble at all write stages, or at some of each kind and of each of its writers.
 
-    Tells the names of all calls first. Every fifth is killed once more as it goes on.
+    The names of all stages are printed first. Every fifth is killed again when it is resumed.
     """
     whole = ensemble(scenario, count, folder / "one.h5", scheduler="serial")
     stages = stages_of(lambda: go(scenario, count, folder / "whole.h5"))
-    tell(stages=stages)
-    created = stages.index("after fsync folder") + 1  # the rest is written in place
+    write_line(stages=stages)
+    created = stages.index("after fsync folder") + 1  # later writes are in place
     third = (len(stages) - created) // 3
     bounds = [0, created, created + third, created + 2 * third, len(stages)]
     numbers = []
     for start, stop in itertools.pairwise(bounds):
         numbers += [start + number for number in chosen_of(stages[start:stop], extent)]
     for turn, number in enumerate(numbers):
-        if stages[number] == "after write":  # what comes next is killed before its own write
+        if stages[number] == "after write":  # the next stage is killed before its write
             continue
         path = folder / f"{number}.h5"
         again = [7 * number % 30] if turn % 5 == 0 else []
@@ -59,13 +68,13 @@ def kill_at_stages(scenario: Scenario, count: int, folder: Path, extent: str) ->
 
             killed.append(ended(forked(work)))
         done = go(scenario, count, path)
-        tell(number=number, killed=killed, done=done, unlike=unlike(path, whole))
+        write_line(number=number, killed=killed, done=done, differences=differences(path, whole))
 
 
 def kill_at_moments(scenario: Scenario, count: int, folder: Path, times: int) -> None:
-    """Kill ensembles at random moments, half of them once more as they go on."""
+    """Kill ensembles at random moments, half of them again when they are resumed."""
     whole = ensemble(scenario, count, folder / "one.h5", scheduler="serial")
-    go(scenario, count, folder / "first.h5")  # imports what children find in memory
+    go(scenario, count, folder / "first.h5")  # imports modules for the children
     took = seconds_of(lambda: go(scenario, count, folder / "whole.h5"))
     moments = random.Random(11)
     for number in range(times):
@@ -74,12 +83,12 @@ def kill_at_moments(scenario: Scenario, count: int, folder: Path, times: int) ->
             seconds = moments.uniform(0.0, 1.0) * took
             killed.append(ended_after(seconds, lambda path=path: go(scenario, count, path)))
         done = go(scenario, count, path)
-        tell(killed=killed, done=done, unlike=unlike(path, whole))
+        write_line(killed=killed, done=done, differences=differences(path, whole))
 
 
 if __name__ == "__main__":
     EnsembleWork._batch_size = lambda self: 1
-    realisation.GRID_REALISATIONS = 3  # each kill starts anew
+    realisation.GRID_REALISATIONS = 3  # computed again after every kill
     mode, where = sys.argv[1], Path(sys.argv[2])
     tests = small(passes=400, contact__strips=31)
     if mode == "stages":

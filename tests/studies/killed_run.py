@@ -1,6 +1,6 @@
-"""Run as a process: has runs killed, finishes what they left, and tells what came of it.
+"""Script that kills runs, resumes them and prints the results as JSON lines.
 
-One process does all: it compiles and runs once, and forks for every run that is to be killed.
+A single process compiles and forks for every run that is killed.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from study_examples import LOADS, ROLLERS, short, unlike
+from study_examples import LOADS, ROLLERS, run_differences, short
 
 from wearsim.results import Result, open_results
 from wearsim.results.io import atomic_write
 from wearsim.scenario import Scenario
-from wearsim.studies.run import run as replay
+from wearsim.studies.run import run as studies
 from wearsim.studies.run.events import Event, Started
 
 OFTEN = {"outputs.checkpoint_every": "1e-9 s"}
@@ -26,22 +26,22 @@ SMALL_CHUNK = 1 << 15  # several writes to a file
 
 
 def go(scenario: Scenario, path: Path) -> float:
-    """Run a test, or go on with what there is of it; return where it stood, -1 for nowhere."""
+    """Run or resume a test; return the passes from which it was resumed, -1 for none."""
     if not path.exists():
-        replay.run(scenario, path)
+        studies.run(scenario, path)
         return -1.0
-    stood = [float(scenario.total_passes)]  # nothing is told of a finished run
+    starts = [float(scenario.total_passes)]  # there are no events of a finished run
 
     def watch(event: Event) -> None:
         if isinstance(event, Started):
-            stood.append(event.from_passes)
+            starts.append(event.from_passes)
 
-    replay.resume(path, on_event=watch)
-    return stood[-1]
+    studies.resume(path, on_event=watch)
+    return starts[-1]
 
 
 def forked(work: Callable[[], object]) -> int:
-    """Do `work` in a child, and return its process id."""
+    """Run `work` in a child process, and return the process id."""
     child = os.fork()
     if child:
         return child
@@ -59,25 +59,25 @@ def ended(child: int) -> int:
 
 
 def seconds_of(work: Callable[[], object]) -> float:
-    """Return the processor time that `work` takes in a child, by the timer of `ended_after` [s]."""
-    plenty = 1000.0
+    """Return the processor time of `work` in a child, by the timer of `ended_after` [s]."""
+    limit = 1000.0
     reading, writing = os.pipe()
 
     def timed() -> None:
-        signal.setitimer(signal.ITIMER_PROF, plenty)
+        signal.setitimer(signal.ITIMER_PROF, limit)
         work()
-        os.write(writing, f"{plenty - signal.getitimer(signal.ITIMER_PROF)[0]}".encode())
+        os.write(writing, f"{limit - signal.getitimer(signal.ITIMER_PROF)[0]}".encode())
 
     assert ended(forked(timed)) == 0
     os.close(writing)
-    with os.fdopen(reading) as told:
-        return float(told.read())
+    with os.fdopen(reading) as output:
+        return float(output.read())
 
 
 def ended_after(seconds: float, work: Callable[[], object]) -> int:
-    """Do `work` in a child that SIGPROF ends when it has had so much processor time [s].
+    """Run `work` in a child that SIGPROF ends after a processor time [s].
 
-    No wall clock: a busy machine moves no kill to before the work begins.
+    Unlike a wall clock, processor time does not depend on the load of the machine.
     """
 
     def limited() -> None:
@@ -88,7 +88,7 @@ def ended_after(seconds: float, work: Callable[[], object]) -> int:
 
 
 def stages_of(work: Callable[[], object]) -> list[str]:
-    """Return every call of the seam while `work` is done."""
+    """Return the write stages of `work`."""
     seen: list[str] = []
     atomic_write.on_write_stage = seen.append
     work()
@@ -97,12 +97,12 @@ def stages_of(work: Callable[[], object]) -> list[str]:
 
 
 def chosen_of(stages: list[str], extent: str) -> list[int]:
-    """Return the numbers of the calls of the seam at which to kill."""
+    """Return the numbers of the write stages at which to kill."""
     return {"all": list(range(len(stages))), "each stage": one_of_each(stages)}[extent]
 
 
 def killing(at: int) -> Callable[[str], None]:
-    """Return a seam that kills the process at one of its calls."""
+    """Return a hook for fault injection that kills the process at one of its calls."""
     calls = iter(range(10**6))
 
     def kill(_: str) -> None:
@@ -113,7 +113,7 @@ def killing(at: int) -> Callable[[str], None]:
 
 
 def one_of_each(stages: list[str]) -> list[int]:
-    """Return the numbers of one call per stage: of the first, of the last, or of one between."""
+    """Return the number of one call per stage, in turn the first, the middle and the last."""
     chosen = []
     for turn, name in enumerate(dict.fromkeys(stages)):
         calls = [number for number, stage in enumerate(stages) if stage == name]
@@ -122,14 +122,14 @@ def one_of_each(stages: list[str]) -> list[int]:
 
 
 def kill_at_stages(scenario: Scenario, folder: Path, extent: str) -> None:
-    """Kill a run at calls of the seam, all or one per stage; every fifth once more as it goes on.
+    """Kill a run at all write stages or one of each kind; every fifth again when it is resumed.
 
-    Tells the names of all calls first.
+    The names of all stages are printed first.
     """
-    whole = replay.run(scenario)
+    whole = studies.run(scenario)
     atomic_write._CHUNK = SMALL_CHUNK
     stages = stages_of(lambda: go(scenario, folder / "whole.h5"))
-    tell(stages=stages)
+    write_line(stages=stages)
     for turn, number in enumerate(chosen_of(stages, extent)):
         path = folder / f"{number}.h5"
         again = [7 * number % 50] if turn % 5 == 0 else []
@@ -141,14 +141,14 @@ def kill_at_stages(scenario: Scenario, folder: Path, extent: str) -> None:
                 go(scenario, path)  # noqa: B023  (done before the next turn)
 
             killed.append(ended(forked(work)))
-        tell(number=number, killed=killed, **finished(scenario, path, whole))
+        write_line(number=number, killed=killed, **finished(scenario, path, whole))
         assert not path.with_name(f"{path.name}.part").exists()
 
 
 def kill_at_moments(scenario: Scenario, folder: Path, count: int) -> None:
-    """Kill runs at random moments, half of them once more as they go on."""
-    whole = replay.run(scenario)
-    go(scenario, folder / "first.h5")  # imports what children find in memory
+    """Kill runs at random moments, half of them again when they are resumed."""
+    whole = studies.run(scenario)
+    go(scenario, folder / "first.h5")  # imports modules for the children
     took = min(seconds_of(lambda at=folder / n: go(scenario, at)) for n in ("one.h5", "two.h5"))
     moments = random.Random(7)
     for number in range(count):
@@ -156,22 +156,22 @@ def kill_at_moments(scenario: Scenario, folder: Path, count: int) -> None:
         for _ in range(1 + number % 2):
             seconds = moments.uniform(0.0, 1.0) * took
             killed.append(ended_after(seconds, lambda path=path: go(scenario, path)))
-        tell(killed=killed, **finished(scenario, path, whole))
+        write_line(killed=killed, **finished(scenario, path, whole))
 
 
 def finished(scenario: Scenario, path: Path, whole: Result) -> dict[str, object]:
-    """Finish a run; return where it stood and what sets its file apart from the unbroken one."""
-    stood = go(scenario, path)
-    return {"stood": stood, "unlike": unlike(open_results(path), whole)}
+    """Resume a run; return the passes it was resumed from, and differences to the unbroken run."""
+    passes = go(scenario, path)
+    return {"resumed_from": passes, "differences": run_differences(open_results(path), whole)}
 
 
-def tell(**row: object) -> None:
-    """Write a line for the test."""
+def write_line(**row: object) -> None:
+    """Print a line of JSON for the test."""
     sys.stdout.write(json.dumps(row) + "\n")
 
 
 if __name__ == "__main__":
-    replay._RunInProgress._last_write = property(lambda _: 0.0, lambda _, seconds: None)
+    studies._RunInProgress._last_write = property(lambda _: 0.0, lambda _, seconds: None)
     mode, where = sys.argv[1], Path(sys.argv[2])
     if mode == "stages":
         kill_at_stages(short(**OFTEN, evolution__step=3000), where, sys.argv[3])

@@ -1,4 +1,4 @@
-"""Runs a script that has studies killed, and reads what came of each."""
+"""Execution of scripts that kill studies, and their results."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
-# one thread, since the process forks; and the same wearsim as here
+# a single thread, since the process forks; wearsim of this checkout
 ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)}
 
 

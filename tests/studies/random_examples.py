@@ -17,7 +17,7 @@ FAST = "2e-9 1/Pa"  # two hundred times the rig's
 
 
 def scenario_of(passes=6000, k_over_h=FAST, **changes):
-    """Return the rig with a fast-wearing cylinder; a key's dots are written as `__`."""
+    """Return the rig with a fast-wearing cylinder; `__` in a name is the dot of a key."""
     overrides = {"operation.passes": passes, "wear.cylinder.k_over_h": k_over_h}
     overrides |= {key.replace("__", "."): value for key, value in changes.items()}
     return load_scenario(RIG, overrides)

@@ -1,4 +1,4 @@
-"""Short wear tests of every sort, and how to stop, finish and compare them."""
+"""Short wear tests of all kinds, and functions to stop, finish and compare them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from wearsim.errors import Interrupted
 from wearsim.results import Result, RunData
 from wearsim.results.run.data import differences
 from wearsim.scenario import Scenario, parse_scenario
-from wearsim.studies.run import run as replay
+from wearsim.studies.run import run as studies
 
 RIG = (
     'title = "a rig"\n\n'
@@ -68,7 +68,7 @@ LOADS: dict[str, dict[str, object]] = {
     },
 }
 ROLLERS: dict[str, dict[str, object]] = {
-    "alike": {},
+    "identical": {},
     "offset": {"roller.offset": ["-1 mm", "0.3 mm", "1 mm"], "contact.width": "7 mm"},
     "wearing": {"wear.roller.k_over_h": "1e-11 1/Pa"},
 }
@@ -93,19 +93,19 @@ OTHERS: dict[str, dict[str, object]] = {
 
 
 def short(**overrides: object) -> Scenario:
-    """Return the rig's scenario with overrides; two underscores stand for the dot of a key."""
+    """Return the rig's scenario with overrides; `__` in a name is the dot of a key."""
     dotted = {key.replace("__", "."): value for key, value in overrides.items()}
     return parse_scenario(RIG, "rig.toml", {"load.csv": LOG}.__getitem__, dotted)
 
 
-def unlike(one: Result | RunData, other: Result | RunData) -> list[str]:
-    """Return what differs between two runs by a bit, apart from the wall clock."""
+def run_differences(one: Result | RunData, other: Result | RunData) -> list[str]:
+    """Return the names of values that differ between two runs, except times of day."""
     first, second = (item.raw if isinstance(item, Result) else item for item in (one, other))
     return [name for name in differences(first, second) if name not in {"wall_seconds", "created"}]
 
 
 def after(steps: int) -> Callable[[], bool]:
-    """Return something that asks a run to stop after so many steps."""
+    """Return a function that requests a stop after a number of steps."""
     left = steps
 
     def requested() -> bool:
@@ -117,9 +117,9 @@ def after(steps: int) -> Callable[[], bool]:
 
 
 def run_in_parts(scenario: Scenario, path: Path, *steps: int) -> tuple[Result, int]:
-    """Run a test that is stopped after so many steps again and again; return the parts too.
+    """Run a test in parts of the given numbers of steps; return the number of parts too.
 
-    The last number counts for all parts that follow.
+    The last number of steps applies to all further parts.
     """
     counts = list(steps)
     parts = 0
@@ -128,7 +128,7 @@ def run_in_parts(scenario: Scenario, path: Path, *steps: int) -> tuple[Result, i
         parts += 1
         try:
             if parts == 1:
-                return replay.run(scenario, path, stop_requested=stop), parts
-            return replay.resume(path, stop_requested=stop), parts
+                return studies.run(scenario, path, stop_requested=stop), parts
+            return studies.resume(path, stop_requested=stop), parts
         except Interrupted:
             continue

@@ -1,4 +1,4 @@
-"""The dissipation of one contact under random inputs: its numbers, its draws and its bounds."""
+"""Dissipation of one contact with random inputs: values, draws, strips and failures."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from dissipation_examples import COARSE, NO_ANGLES, contact, field, normal, paper, positive
 
-from wearsim.errors import CapabilityError, ContactError, Interrupted, ScenarioError
+from wearsim.errors import ContactError, Interrupted, ScenarioError
 from wearsim.results import DissipationResult, open_dissipation
 from wearsim.scenario import realise
 from wearsim.studies.contact import monte_carlo as study
 from wearsim.studies.contact.batch import Realisations
 from wearsim.studies.contact.draws import draw_contacts
 from wearsim.studies.contact.monte_carlo import dissipation
-from wearsim.studies.contact.single import solve_contact, study_contact
+from wearsim.studies.contact.single import study_contact
 from wearsim.studies.limits import bytes_per_realisation
 
 # mean and std [W]: converged, from another program
@@ -31,30 +31,30 @@ def all_random() -> DissipationResult:
 
 
 @pytest.mark.parametrize("case", PAPERS)
-def test_that_the_papers_monte_carlo_has_the_power_it_must(case):
+def test_paper_scenario_has_expected_power(case):
     changes, mean, std = PAPERS[case]
     scenario = paper(**COARSE, **changes)
     power = dissipation(scenario, 20_000).summaries["power"]
-    assert power.mean_error < 0.004 * mean  # so that four of them are a test
+    assert power.mean_error < 0.004 * mean  # four standard errors are then a useful tolerance
     assert power.mean == pytest.approx(mean, abs=4 * power.mean_error)
     assert power.std == pytest.approx(std, abs=4 * power.std_error + 0.0005)  # as printed
 
 
 @pytest.mark.parametrize(
-    ("probability", "wanted"), [(0.05, 0.035), (0.95, 0.188), (0.025, 0.025), (0.975, 0.207)]
+    ("probability", "expected"), [(0.05, 0.035), (0.95, 0.188), (0.025, 0.025), (0.975, 0.207)]
 )
-def test_that_the_papers_power_lies_where_it_must(all_random, probability, wanted):
+def test_paper_scenario_has_expected_quantiles(all_random, probability, expected):
     found = all_random.summaries["power"].quantile(probability)
     assert found.high - found.low < 0.03 * 0.207
-    assert found.low - 0.0005 <= wanted <= found.high + 0.0005  # as printed
+    assert found.low - 0.0005 <= expected <= found.high + 0.0005  # as printed
 
 
-def test_that_the_papers_scenario_runs_as_it_stands():
+def test_paper_scenario_runs_unchanged():
     scenario = paper()
     result = dissipation(scenario, 200)
     assert result.finished
     assert result.raw.strip_width == pytest.approx(2 * 1.5565e-3 / 50, rel=1e-3)  # of 307 N
-    # mu N V |creepage| bounds each of them; the spin adds to the creepage off the centre
+    # the power is bounded by mu N V |creepage|, where spin adds to the creepage off the centre
     drawn = result.inputs
     creepage = np.hypot(drawn["creepage.longitudinal"], drawn["creepage.yaw"])
     bound = drawn["friction.coefficient"] * drawn["load.normal_force"] * scenario.rolling_speed
@@ -62,7 +62,7 @@ def test_that_the_papers_scenario_runs_as_it_stands():
     assert (result.power <= bound * (creepage + spin * 1.8e-3)).all()
 
 
-def test_that_forces_are_those_of_the_power():
+def test_power_is_work_of_the_forces():
     result = dissipation(paper(**COARSE), 300)
     drawn = result.inputs
     work = drawn["creepage.longitudinal"] * result.values("force_x")
@@ -73,7 +73,7 @@ def test_that_forces_are_those_of_the_power():
     np.testing.assert_allclose(result.power, strips, rtol=1e-10)
 
 
-def test_that_neither_batches_nor_their_order_change_a_bit():
+def test_solutions_are_bitwise_independent_of_batches():
     scenario = contact(
         roller__offset=normal("0 mm", "0.2 mm"),
         creepage__misalignment={"distribution": "disc", "radius": "1 mrad"},
@@ -85,25 +85,11 @@ def test_that_neither_batches_nor_their_order_change_a_bit():
         count = min(20, 60 - first)
         part = parts.solve(first, count)
         for name, column in part.columns.items():
-            wanted = whole.columns[name][:, :, first : first + count]
-            assert column.tobytes() == wanted.tobytes(), name
+            expected = whole.columns[name][:, :, first : first + count]
+            assert column.tobytes() == expected.tobytes(), name
 
 
-@pytest.mark.parametrize("frame", ["contact", "cylinder"])
-@pytest.mark.parametrize("kind", ["white", "gaussian-field"])
-def test_that_a_field_is_that_of_its_realisation_in_any_batch(frame, kind):
-    options = {} if kind == "white" else {"correlation_length": "200 um"}
-    scenario = contact(
-        friction__coefficient=field(kind, frame=frame, **options), contact__my=50, contact__mx=20
-    )
-    contacts = Realisations(scenario, 6)
-    whole = contacts.solve(0, 6).columns["power"].ravel()
-    single = [contacts.solve(k, 1).columns["power"].item() for k in (5, 2, 0)]
-    assert single == [whole[5], whole[2], whole[0]]
-    assert len(set(whole.tolist())) == 6
-
-
-def test_that_a_study_in_small_batches_is_the_same(monkeypatch):
+def test_study_is_independent_of_batch_size(monkeypatch):
     whole = dissipation(contact(), 50)
     monkeypatch.setattr(study, "BATCH", 7)
     parts = dissipation(contact(), 50)
@@ -113,14 +99,14 @@ def test_that_a_study_in_small_batches_is_the_same(monkeypatch):
 
 
 @pytest.mark.parametrize("plan", ["monte-carlo", "latin-hypercube", "sobol"])
-def test_that_one_more_input_changes_no_others_draws(plan):
+def test_added_input_does_not_change_other_draws(plan):
     one = dissipation(contact(sampling__plan=plan), 20).inputs
     two = dissipation(contact(sampling__plan=plan, creepage__longitudinal=normal(1e-3, 1e-4)), 20)
     key = "load.normal_force"
     assert one[key].tobytes() == two.inputs[key].tobytes()
     assert two.inputs["creepage.longitudinal"].std() > 0.0
-    said = any("not exact for" in text for text in two.warnings)
-    assert said == (plan != "monte-carlo")
+    warned = any("not exact for" in text for text in two.warnings)
+    assert warned == (plan != "monte-carlo")
 
 
 CASES: dict[str, dict[str, object]] = {
@@ -158,7 +144,7 @@ WORN = "y [mm],height [um]\n" + "".join(
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_that_a_realisation_is_the_contact_with_its_values(case):
+def test_realisation_is_the_contact_with_its_values(case):
     settings = {"contact__strips": 81, "contact__width": "6 mm", "contact__centre": "0 mm"}
     changes = {**settings, **CASES[case]}
     if case in {"a worn cylinder", "free rollers"}:
@@ -171,27 +157,27 @@ def test_that_a_realisation_is_the_contact_with_its_values(case):
     found = batch.solve(0, 3)
     for k in range(3):
         values = {key: float(drawn[k]) for key, drawn in batch.draws.values.items()}
-        alone = study_contact(realise(scenario, values)).solution
-        np.testing.assert_allclose(found.y, alone.y, atol=1e-18)
+        single = study_contact(realise(scenario, values)).solution
+        np.testing.assert_allclose(found.y, single.y, atol=1e-18)
         for name in ("power", "force_x", "force_y", "spin_moment", "longitudinal_creepage"):
             assert found.columns[name][0, 0, k] == pytest.approx(
-                getattr(alone, name), rel=1e-9, abs=1e-12
+                getattr(single, name), rel=1e-9, abs=1e-12
             ), name
         np.testing.assert_allclose(
-            found.columns["dissipation"][0, 0, k], alone.dissipation, rtol=1e-7, atol=1e-9
+            found.columns["dissipation"][0, 0, k], single.dissipation, rtol=1e-7, atol=1e-9
         )
 
 
-def test_that_the_mean_problem_is_the_contact_with_all_inputs_at_their_mean():
+def test_mean_problem_has_all_inputs_at_their_mean():
     scenario = paper(**NO_ANGLES, **COARSE)
     result = dissipation(scenario, 5)
-    alone = study_contact(scenario).solution.power
-    assert result.mean_problem_power == pytest.approx(alone, rel=1e-4)  # on wider strips
+    single = study_contact(scenario).solution.power
+    assert result.mean_problem_power == pytest.approx(single, rel=1e-4)  # on wider strips
     over = result.values("mean_problem_dissipation").sum() * result.raw.strip_width
     assert over == pytest.approx(result.mean_problem_power, rel=1e-12)
 
 
-def test_that_the_load_is_drawn_about_that_of_the_scenario_at_the_start():
+def test_loads_are_distributed_about_the_initial_load():
     scenario = contact(load__kind="spring", load__stiffness="690 N/mm")
     result = dissipation(scenario, 400)
     loads = result.values("normal_force")
@@ -199,7 +185,7 @@ def test_that_the_load_is_drawn_about_that_of_the_scenario_at_the_start():
     assert loads.mean() == pytest.approx(300.0, abs=4 * 30 / 20)
 
 
-def test_that_a_process_is_drawn_from_its_marginal():
+def test_process_is_drawn_from_its_marginal():
     process = {
         "distribution": "ornstein-uhlenbeck",
         "correlation_time": "5 min",
@@ -210,7 +196,7 @@ def test_that_a_process_is_drawn_from_its_marginal():
     assert loads.std() == pytest.approx(10.0, abs=4 * 10 / 8000**0.5)
 
 
-def test_that_inputs_of_no_effect_are_named_once_and_not_drawn():
+def test_inputs_without_effect_are_noted_and_not_drawn():
     factor = positive("1.1e-11 1/Pa", "1e-12 1/Pa")
     scenario = contact(
         wear={"cylinder": {"k_over_h": factor}, "roller": {"k_over_h": "0 1/Pa"}},
@@ -224,17 +210,17 @@ def test_that_inputs_of_no_effect_are_named_once_and_not_drawn():
     assert result.power.tobytes() == plain.power.tobytes()
 
 
-def test_that_a_study_without_random_inputs_is_refused():
+def test_study_without_random_inputs_is_refused():
     with pytest.raises(ScenarioError, match="no random input acts on the contact"):
         dissipation(contact(load__normal_force="300 N"), 10)
 
 
-def test_that_one_set_of_strips_holds_every_patch():
+def test_strips_cover_the_contacts_of_all_realisations():
     scenario = contact(creepage__tilt=normal("0 mrad", "1 mrad"), contact__my=50)
     contacts = Realisations(scenario, 500)
     grid, mean = contacts.grid, study_contact(scenario)
     assert grid.spacing == pytest.approx(mean.grid.spacing, rel=1e-12)
-    # the mean contact is cut at its very edges: 50 strips, none in part
+    # the strips of the mean contact end at its edges: 50 strips, none partly in contact
     load = contacts.solve_mean_problem().columns["line_load"].ravel()
     assert (load > 1e-9 * load.max()).sum() == 50
     solved = contacts.solve(0, 500).columns
@@ -244,20 +230,20 @@ def test_that_one_set_of_strips_holds_every_patch():
     np.testing.assert_allclose(loads, contacts.draws.values["load.normal_force"], rtol=1e-12)
 
 
-def test_that_the_strips_of_the_scenario_are_taken():
-    asked = {"contact__strips": 61, "contact__width": "5 mm", "contact__centre": "0.2 mm"}
-    grid = Realisations(contact(**asked), 20).grid
+def test_strips_of_the_scenario_are_used():
+    choice = {"contact__strips": 61, "contact__width": "5 mm", "contact__centre": "0.2 mm"}
+    grid = Realisations(contact(**choice), 20).grid
     assert (grid.strips, grid.spacing) == (61, pytest.approx(5e-3 / 61))
     assert grid.y.mean() == pytest.approx(0.2e-3)
     assert Realisations(contact(contact__strips=61), 20).grid.strips == 61
 
 
-def test_that_a_width_that_holds_not_all_is_refused():
+def test_insufficient_width_is_refused():
     with pytest.raises(ScenarioError, match=r"\[contact\] width: the contacts of all realisations"):
         dissipation(contact(contact__width="3.1 mm"), 200)
 
 
-def test_that_inputs_that_range_too_far_are_refused():
+def test_inputs_needing_too_many_strips_are_refused():
     with pytest.raises(ScenarioError, match=r"a number of strips, such as contact\.strips = 801"):
         dissipation(contact(roller__offset=normal("0 mm", "100 mm")), 20)
 
@@ -270,16 +256,14 @@ def _is_solved(contacts: Realisations, number: int) -> bool:
     return True
 
 
-def test_that_a_realisation_without_a_solution_is_named_and_those_before_are_kept(
-    tmp_path, monkeypatch
-):
+def test_realisation_without_solution_is_reported(tmp_path, monkeypatch):
     monkeypatch.setattr(study, "BATCH", 8)
-    # light loads make patches of less than three strips
+    # patches of light loads are narrower than three strips
     scenario = contact(load__normal_force=positive("300 N", "280 N"), seed=3)
     contacts = Realisations(scenario, 4000)
     loads = contacts.draws.values["load.normal_force"]
     first = min(int(k) for k in np.argsort(loads)[:8] if not _is_solved(contacts, int(k)))
-    assert first >= 8  # or nothing is done before it
+    assert first >= 8  # so that a batch is completed before it
     with pytest.raises(ContactError) as caught:
         dissipation(scenario, 4000, tmp_path / "a.h5")
     message = str(caught.value)
@@ -289,7 +273,7 @@ def test_that_a_realisation_without_a_solution_is_named_and_those_before_are_kep
     assert (kept.count, kept.finished, kept.raw.asked) == (first // 8 * 8, False, 4000)
 
 
-def test_that_a_study_that_is_stopped_keeps_what_is_done(tmp_path, monkeypatch):
+def test_stopped_study_keeps_completed_realisations(tmp_path, monkeypatch):
     monkeypatch.setattr(study, "BATCH", 16)
     seen: list[int] = []
     path = tmp_path / "a.h5"
@@ -307,7 +291,7 @@ def test_that_a_study_that_is_stopped_keeps_what_is_done(tmp_path, monkeypatch):
     assert kept.summaries["power"].count == 32
 
 
-def test_that_one_realisation_is_enough(tmp_path):
+def test_study_of_one_realisation(tmp_path):
     result = dissipation(contact(), 1, tmp_path / "a.h5")
     power = open_dissipation(tmp_path / "a.h5").summaries["power"]
     assert (power.count, power.mean) == (1, result.power[0])
@@ -316,7 +300,7 @@ def test_that_one_realisation_is_enough(tmp_path):
         dissipation(contact(), 0)
 
 
-def test_that_what_is_not_kept_still_counts(monkeypatch):
+def test_statistics_include_profiles_that_are_not_stored(monkeypatch):
     whole = dissipation(contact(), 300)
     monkeypatch.setattr(study, "MOST_KEPT", 100 * len(whole.y) + 5)
     part = dissipation(contact(), 300)
@@ -329,7 +313,7 @@ def test_that_what_is_not_kept_still_counts(monkeypatch):
     assert "P_l(y) of the first 100 of 300 realisations is stored" in part.warnings[0]
 
 
-def test_that_statistics_of_the_strips_are_those_of_the_realisations():
+def test_strip_statistics_are_those_of_the_realisations():
     result = dissipation(contact(), 400)
     rows = result.dissipation
     np.testing.assert_allclose(result.values("dissipation_mean"), rows.mean(axis=0), rtol=1e-13)
@@ -337,96 +321,16 @@ def test_that_statistics_of_the_strips_are_those_of_the_realisations():
     np.testing.assert_allclose(result.values("dissipation_std"), std, rtol=1e-10, atol=1e-12)
 
 
-# ---- friction that differs within the contact
-
-
-def test_that_a_field_needs_a_model_that_takes_it():
-    scenario = contact(friction__coefficient=field("white"), contact={"model": "slender"})
-    with pytest.raises(CapabilityError, match=r"contact\.model = 'hertz-fastsim'"):
-        dissipation(scenario, 2)
-
-
-def test_that_a_field_needs_prescribed_creepage():
-    creepage = {"drive": "free", "bearing_torque": "0.3 N*m"}
-    scenario = contact(friction__coefficient=field("white"), creepage=creepage)
-    with pytest.raises(CapabilityError, match=r"creepage\.drive = 'creepage'"):
-        dissipation(scenario, 2)
-
-
-def test_that_a_field_that_the_grid_does_not_resolve_is_refused_before_the_study():
-    fine = field("gaussian-field", correlation_length="20 um")
-    with pytest.raises(ScenarioError) as caught:
-        dissipation(contact(friction__coefficient=fine), 2)
-    message = str(caught.value)
-    assert (
-        "[friction] coefficient: the grid does not resolve a correlation length of 20 um" in message
-    )
-    assert re.search(r"expected contact\.mx = \d+ and contact\.my = \d+", message)
-
-
-@pytest.mark.parametrize("points", [5, 10])
-def test_that_a_field_is_refused_from_two_points_per_correlation_length_on(points):
-    coarse = {"load__normal_force": "300 N", "contact__mx": points, "contact__my": 201}
-    longest = solve_contact(contact(**coarse)).half_length.max()
-    limit = 2.0 * (2.0 * longest / points)
-
-    def start(length):
-        fine = field("gaussian-field", correlation_length=f"{length * 1e6} um")
-        return Realisations(contact(friction__coefficient=fine, **coarse), 1)
-
-    assert start(1.0001 * limit).friction_points == points
-    with pytest.raises(ScenarioError, match="um along rolling"):
-        start(0.9999 * limit)
-
-
-def test_that_white_friction_names_its_grid_and_warns(tmp_path):
-    scenario = contact(friction__coefficient=field("white"))
-    dissipation(scenario, 3, tmp_path / "a.h5")
-    result = open_dissipation(tmp_path / "a.h5")
-    strips = len(result.y)
-    width = result.raw.strip_width * 1e6
-    assert result.raw.friction_grid == f"16 points along each of {strips} strips of {width:.4g} um"
-    assert any("white friction has no continuum limit" in text for text in result.notes)
-
-
-def test_that_a_field_of_hardly_any_spread_is_uniform_friction():
-    changes = {"contact__my": 50, "contact__mx": 50}
-    wide = field("gaussian-field", 1e-9, correlation_length="150 um")
-    near = dissipation(contact(friction__coefficient=wide, **changes), 20).power
-    marched = dissipation(contact(contact__closed_form="never", **changes), 20).power
-    np.testing.assert_allclose(near, marched, rtol=1e-6)
-
-
-def test_that_white_friction_lowers_the_power_the_more_the_finer_the_grid():
-    # 300 N, uniform in the strip: 0.0739 W; the paper's noise on 25 and 50 cells: 0.0689, 0.0653 W
-    base = {"load__normal_force": positive("300 N", "1e-6 N"), "contact__kalker": "line-limit"}
-    white = field("white", 0.02)
-    for cells, wanted in ((25, 0.0689), (50, 0.0653)):
-        scenario = contact(friction__coefficient=white, contact__my=50, contact__mx=cells, **base)
-        assert dissipation(scenario, 12).power.mean() == pytest.approx(wanted, rel=0.02)
-
-
-def test_that_a_carried_field_has_the_mean_of_its_marginal():
-    # each particle keeps its friction: in full slip the power is linear in it
-    base = {"creepage__longitudinal": 2e-2, "load__normal_force": positive("300 N", "1e-6 N")}
-    carried = field("gaussian-field", 0.01, frame="cylinder", correlation_length="150 um")
-    scenario = contact(friction__coefficient=carried, contact__my=50, **base)
-    power = dissipation(scenario, 60).summaries["power"]
-    uniform = dissipation(contact(contact__my=50, **base), 1).power[0]
-    assert 0.0 < power.std < 0.1 * uniform
-    assert power.mean == pytest.approx(uniform, abs=4 * power.mean_error)
-
-
-def test_that_an_existing_file_stands_before_the_study_begins(tmp_path: Path):
+def test_existing_file_is_refused_before_the_study(tmp_path: Path):
     path = tmp_path / "a.h5"
-    path.write_text("precious")
+    path.write_text("content")
     with pytest.raises(Exception, match="--force replaces it"):
         dissipation(contact(), 2, path)
     assert dissipation(contact(), 2, path, force=True).path == path
 
 
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("changes", "text"),
     [
         (
             {"creepage__misalignment": {"distribution": "disc", "radius": "5 deg"}},
@@ -438,12 +342,12 @@ def test_that_an_existing_file_stands_before_the_study_begins(tmp_path: Path):
         ),
     ],
 )
-def test_that_a_tilt_that_shifts_contacts_too_far_is_named_with_its_shift(changes, told):
+def test_excessive_shift_by_tilt_is_reported(changes, text):
     scenario = contact(contact__my=50, **changes)
     with pytest.raises(ScenarioError) as caught:
         dissipation(scenario, 50)
     message = str(caught.value)
-    assert told in message
+    assert text in message
     tilt = np.abs(draw_contacts(scenario, 50).values["creepage.tilt"]).max()
     assert f"{0.5 * tilt * 1e3:.4g} mm, crown radius x tilt = 500 mm x {tilt * 1e3:.4g}" in message
     assert "creepage.tilt_shifts_contact = false" in message
@@ -452,12 +356,12 @@ def test_that_a_tilt_that_shifts_contacts_too_far_is_named_with_its_shift(change
 
 
 @pytest.mark.parametrize(("scenario", "count"), [("u.toml", 3), (contact(), 2.5), (contact(), "3")])
-def test_that_what_is_no_study_is_told_in_python_too(scenario, count):
+def test_invalid_arguments_raise_type_error(scenario, count):
     with pytest.raises(TypeError, match=r"^(scenario|realisations) must be a .*, got "):
         dissipation(scenario, count)
 
 
-def test_that_the_memory_of_a_realisation_is_not_underrated(monkeypatch):
+def test_memory_per_realisation_is_estimated(monkeypatch):
     monkeypatch.setattr(study, "MOST_KEPT", 1000)
     scenario = paper(contact__mx=4, contact__my=6)
 
@@ -468,13 +372,13 @@ def test_that_the_memory_of_a_realisation_is_not_underrated(monkeypatch):
         tracemalloc.stop()
         return found
 
-    peak(100)  # compiled, and every module imported
+    peak(100)  # compiles kernels and imports modules
     each = (peak(90_000) - peak(30_000)) / 60_000
     assert 0.5 * bytes_per_realisation(scenario) < each < 1.25 * bytes_per_realisation(scenario)
 
 
 @pytest.mark.parametrize(("mx", "my"), [(16, 24), (16, 400), (400, 24)])
-def test_that_a_grid_too_coarse_for_a_field_is_told_the_least_that_is_not(mx, my):
+def test_coarse_grid_error_states_least_sufficient_grid(mx, my):
     def scenario(along: int, across: int):
         fine = field("gaussian-field", correlation_length="20 um")
         grid = {"contact__mx": along, "contact__my": across}
@@ -482,11 +386,11 @@ def test_that_a_grid_too_coarse_for_a_field_is_told_the_least_that_is_not(mx, my
 
     with pytest.raises(ScenarioError) as caught:
         Realisations(scenario(mx, my), 3)
-    told = dict(re.findall(r"contact\.(mx|my) = (\d+)", str(caught.value)))
-    assert ("mx" in told, "my" in told) == (mx == 16, my == 24)
-    needed = {"mx": mx, "my": my} | {key: int(number) for key, number in told.items()}
+    counts = dict(re.findall(r"contact\.(mx|my) = (\d+)", str(caught.value)))
+    assert ("mx" in counts, "my" in counts) == (mx == 16, my == 24)
+    needed = {"mx": mx, "my": my} | {key: int(number) for key, number in counts.items()}
     assert Realisations(scenario(needed["mx"], needed["my"]), 3).friction_points == needed["mx"]
-    for key in told:
+    for key in counts:
         less = {**needed, key: needed[key] - 1}
         with pytest.raises(ScenarioError, match="does not resolve"):
             Realisations(scenario(less["mx"], less["my"]), 3)

@@ -1,4 +1,4 @@
-"""The control variate of ensembles: the depth of full slip of rigid bodies, in closed form."""
+"""Control variate of ensembles: the depth for full slip of rigid bodies in closed form."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def rate(scenario, factor=2e-9):
     return factor * scenario.friction.coefficient * scenario.creepage.longitudinal
 
 
-def test_that_it_is_the_closed_form_of_full_slip():
+def test_depth_is_closed_form_of_full_slip():
     scenario = scenario_of(6000)
     found = closed_form_depths(scenario, NOTHING, 3)
     expected = (0.75 * rate(scenario) * 300.0 * 6000 / np.sqrt(CROWN)) ** (2.0 / 3.0)
@@ -27,10 +27,10 @@ def test_that_it_is_the_closed_form_of_full_slip():
 
 
 @pytest.mark.parametrize("stiffness", [1.0, 690e3, 5e6, 40e6])
-def test_that_a_spring_lets_go_as_the_closed_form_says(stiffness):
+def test_spring_unloads_as_in_closed_form(stiffness):
     scenario = scenario_of(6000, load__kind="spring", load__stiffness=f"{stiffness!r} N/m")
     depth = float(closed_form_depths(scenario, NOTHING, 1)[0])
-    # passes for that depth: section by section of a groove that takes the load off its spring
+    # the number of passes for that depth, integrated over a groove that unloads the spring
     reached = np.sqrt(stiffness * depth / 300.0)
     passes = (
         4.0
@@ -45,7 +45,7 @@ def test_that_a_spring_lets_go_as_the_closed_form_says(stiffness):
         assert depth == pytest.approx(free, rel=1e-6)
 
 
-def test_that_both_bodies_share_what_they_wear():
+def test_depth_is_divided_between_both_bodies():
     alone = float(closed_form_depths(scenario_of(6000), NOTHING, 1)[0])
     both = scenario_of(6000, wear__roller__k_over_h="2e-9 1/Pa")
     ratio = 25.0 / (20.0 * 3.0)  # of the depths of roller and cylinder
@@ -55,7 +55,7 @@ def test_that_both_bodies_share_what_they_wear():
     assert closed_form_depths(nothing, NOTHING, 1)[0] == 0.0
 
 
-def test_that_drawn_values_count_roller_by_roller():
+def test_drawn_values_enter_per_roller():
     scenario = scenario_of(6000)
     columns = {
         "load.normal_force": np.array([300.0, 150.0]),
@@ -67,13 +67,13 @@ def test_that_drawn_values_count_roller_by_roller():
     np.testing.assert_allclose(found / found[0], (sliding / sliding[0]) ** (2.0 / 3.0), rtol=1e-12)
 
 
-def test_that_a_law_that_is_not_linear_has_none():
+def test_nonlinear_wear_law_has_no_control_variate():
     scenario = scenario_of(6000, wear={"law": "t-gamma", "cylinder": {}, "roller": {}})
     assert np.isnan(closed_form_depths(scenario, NOTHING, 1)).all()
     assert control_of(Drawer(scenario, "monte-carlo"), 100) is None
 
 
-def test_that_its_mean_comes_from_cheap_draws_of_their_own():
+def test_mean_is_computed_from_separate_draws():
     scenario = scenario_of(
         6000,
         load__normal_force=LOAD,
@@ -82,10 +82,9 @@ def test_that_its_mean_comes_from_cheap_draws_of_their_own():
         creepage__misalignment={**SLACK, "persistence": "per-roller"},
     )
     drawer = Drawer(scenario, "monte-carlo")
-    known = control_of(drawer, 200_000)
+    control = control_of(drawer, 200_000)
     own = closed_form_depths(scenario, drawer.columns(0, 20_000), 20_000)
-    error = known.std / np.sqrt(20_000)
-    assert abs(own.mean() - known.mean) < 4.0 * error
-    assert own.std() == pytest.approx(known.std, rel=0.05)
-    again = control_of(drawer, 200_000)
-    assert again == known
+    error = control.std / np.sqrt(20_000)
+    assert abs(own.mean() - control.mean) < 4.0 * error
+    assert own.std() == pytest.approx(control.std, rel=0.05)
+    assert control_of(drawer, 200_000) == control

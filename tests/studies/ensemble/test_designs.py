@@ -1,4 +1,4 @@
-"""Which draws a realisation takes, where an ensemble looks at itself, and what it compares."""
+"""Sampling plans, interim analyses, sweeps and comparisons of ensembles."""
 
 from __future__ import annotations
 
@@ -10,15 +10,14 @@ from tests.studies.ensemble_cases import small
 from wearsim.errors import Interrupted
 from wearsim.studies.ensemble.api import ensemble
 from wearsim.studies.ensemble.compare import compare, have_same_draws
-from wearsim.studies.ensemble.designs import parse_plan, sources, whole_count
-from wearsim.studies.ensemble.designs import interim_sizes
+from wearsim.studies.ensemble.designs import interim_sizes, parse_plan, sources, whole_count
 from wearsim.studies.ensemble.sweep import path_of, sweep
 from wearsim.studies.run.draws import Drawer
 
 SERIAL = {"scheduler": "serial"}
 
 
-def test_that_saltellis_rows_take_one_input_after_the_other_from_the_second_draw():
+def test_saltelli_row_replaces_one_input_at_a_time():
     groups = ["a", "b", "c"]
     rows = [sources("saltelli", groups, number) for number in range(10)]
     assert rows[0] == {"a": 0, "b": 0, "c": 0}
@@ -31,24 +30,24 @@ def test_that_saltellis_rows_take_one_input_after_the_other_from_the_second_draw
     assert whole_count("monte-carlo", groups, 6) == 6
 
 
-def test_that_an_unknown_plan_is_told_with_those_there_are():
+def test_unknown_plan_error_lists_the_plans():
     with pytest.raises(ValueError, match="unknown plan 'halton', expected one of monte-carlo"):
         parse_plan("halton")
 
 
-def test_that_looks_rise_to_the_last_realisation():
+def test_interim_sizes_increase_to_the_maximum():
     assert interim_sizes("sobol", 1000) == [64, 128, 256, 512, 1000]
-    looks = interim_sizes("monte-carlo", 1000)
-    assert looks[0] == 64
-    assert looks[-1] == 1000
-    assert (np.diff(looks) > 0).all()
+    sizes = interim_sizes("monte-carlo", 1000)
+    assert sizes[0] == 64
+    assert sizes[-1] == 1000
+    assert (np.diff(sizes) > 0).all()
     assert interim_sizes("monte-carlo", 10) == [10]
-    # a greater limit changes none of them
-    assert interim_sizes("monte-carlo", 5000)[: len(looks) - 1] == looks[:-1]
+    # they do not depend on the maximum
+    assert interim_sizes("monte-carlo", 5000)[: len(sizes) - 1] == sizes[:-1]
 
 
 @pytest.mark.parametrize("plan", ["monte-carlo", "sobol"])
-def test_that_one_realisation_draws_what_it_does_among_many(plan):
+def test_single_realisation_draws_as_in_a_batch(plan):
     drawer = Drawer(small(), plan)
     columns = drawer.columns(0, 9)
     for number in (0, 5, 8):
@@ -58,7 +57,7 @@ def test_that_one_realisation_draws_what_it_does_among_many(plan):
     assert drawn.values["load.normal_force"] == columns["load.normal_force"][5]
 
 
-def test_that_sobol_sequences_spread_evenly_each_by_itself():
+def test_each_sobol_replicate_is_stratified():
     uniform = Drawer(small(), "sobol")._sampler.uniforms(0, 8 * 16)["load.normal_force"][:, 0]
     for replicate in range(8):
         cells = np.sort(np.floor(16 * uniform[replicate::8]))
@@ -74,7 +73,7 @@ def swept(tmp_path_factory):
     return sweep(scenario_of_value, ["8e-4", "1.2e-3"], 8, path, **SERIAL)
 
 
-def test_that_a_sweep_has_common_random_numbers(swept):
+def test_sweep_has_common_random_numbers(swept):
     low, high = swept
     assert low.path.name == "creep-8e-4.h5"
     np.testing.assert_array_equal(low.values("load.normal_force"), high.values("load.normal_force"))
@@ -82,14 +81,14 @@ def test_that_a_sweep_has_common_random_numbers(swept):
     assert have_same_draws(low, high)
 
 
-def test_that_a_sweep_refuses_an_existing_file_before_it_runs(swept, tmp_path):
+def test_sweep_refuses_existing_file_before_it_runs(swept, tmp_path):
     (tmp_path / "creep-2.h5").write_text("mine")
     with pytest.raises(wearsim.errors.ResultsFileError, match="already exists"):
         sweep(lambda text: small(), ["1", "2"], 3, tmp_path / "creep.h5", **SERIAL)
     assert not (tmp_path / "creep-1.h5").exists()
 
 
-def test_that_a_sweep_goes_on_where_it_was_stopped(tmp_path):
+def test_sweep_continues_where_it_was_stopped(tmp_path):
     def scenario_of_value(text):
         return small(creepage__longitudinal=float(text))
 
@@ -100,35 +99,35 @@ def test_that_a_sweep_goes_on_where_it_was_stopped(tmp_path):
             scenario_of_value, values, 3, path, stop_requested=lambda: next(answers, True), **SERIAL
         )
     kept = (tmp_path / "creep-8e-4.h5").read_bytes()
-    found = sweep(scenario_of_value, values, 3, path, **SERIAL)
-    assert [result.count for result in found] == [3, 3, 3]
+    results = sweep(scenario_of_value, values, 3, path, **SERIAL)
+    assert [result.count for result in results] == [3, 3, 3]
     assert (tmp_path / "creep-8e-4.h5").read_bytes() == kept
     with pytest.raises(wearsim.errors.ResultsFileError, match="already exists"):
-        sweep(scenario_of_value, values, 4, path, **SERIAL)  # another ensemble
+        sweep(scenario_of_value, values, 4, path, **SERIAL)  # a different ensemble
 
 
-def test_that_values_make_names_of_files():
+def test_sweep_file_names_contain_the_values():
     assert path_of("out/a.h5", "250 N").name == "a-250N.h5"
     assert path_of("a.h5", "1e-11 1/Pa").name == "a-1e-11_1_per_Pa.h5"
 
 
-def test_that_a_comparison_tells_which_wears_deeper(swept):
+def test_comparison_estimates_which_wears_deeper(swept):
     low, high = swept
     found = compare([low, high], ["low", "high"])
     first, second = found.rows
     assert first.deeper is None
     assert second.deeper.value > 0.5
     assert second.deeper.low <= second.deeper.value <= second.deeper.high
-    # with the same random numbers every pair decides the same way
+    # with the same random numbers every pair has the same sign
     assert second.paired.share.value == 1.0
-    apart = high.at_end("depth") - low.at_end("depth")
-    assert second.paired.difference.value == pytest.approx(apart.mean())
+    difference = high.at_end("depth") - low.at_end("depth")
+    assert second.paired.difference.value == pytest.approx(difference.mean())
     backwards = compare([high, low], ["high", "low"]).rows[1]
     assert backwards.deeper.value == pytest.approx(1.0 - second.deeper.value)
     assert backwards.paired.share.value == 0.0
 
 
-def test_that_runs_and_ensembles_are_compared(swept):
+def test_run_is_compared_with_an_ensemble(swept):
     run = wearsim.run(small(sampling__realisation=3))
     found = compare([swept[0], run], ["ensemble", "run"], "depth")
     row = found.rows[1]
@@ -138,7 +137,7 @@ def test_that_runs_and_ensembles_are_compared(swept):
     assert row.deeper.value == pytest.approx(below)
 
 
-def test_that_of_two_runs_one_is_deeper_or_it_is_open():
+def test_two_runs_compare_by_their_error_estimates():
     runs = [wearsim.run(small(sampling__realisation=number)) for number in (2, 3)]
     depths = [float(run.depth[-1]) for run in runs]
     assert abs(depths[0] - depths[1]) > 0.02 * depths[0]  # twice the tolerance
@@ -151,7 +150,7 @@ def test_that_of_two_runs_one_is_deeper_or_it_is_open():
     assert (same.value, same.low, same.high) == (0.5, 0.0, 1.0)
 
 
-def test_that_a_comparison_knows_how_long_the_tests_are(swept):
+def test_comparison_detects_unequal_test_lengths(swept):
     run = wearsim.run(small(passes=2000))
     assert compare(swept, ["low", "high"]).equally_long
     found = compare([swept[0], run], ["low", "run"])
@@ -160,14 +159,14 @@ def test_that_a_comparison_knows_how_long_the_tests_are(swept):
     assert found.rows[1].time == pytest.approx(2.0 / 3.0 * found.rows[0].time)
 
 
-def test_that_another_seed_is_not_paired(swept, tmp_path):
+def test_ensembles_of_different_seeds_are_not_paired(swept, tmp_path):
     other = ensemble(small(seed=3), 6, tmp_path / "other.h5", **SERIAL)
     row = compare([swept[0], other], ["a", "b"]).rows[1]
     assert row.paired is None
     assert row.deeper is not None
 
 
-def test_that_what_cannot_be_compared_is_told(swept):
+def test_invalid_comparison_raises_value_error(swept):
     with pytest.raises(ValueError, match="a has no 'colour'; it has depth"):
         compare(swept, ["a", "b"], "colour")
     with pytest.raises(ValueError, match="two or more"):

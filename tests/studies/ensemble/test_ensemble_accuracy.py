@@ -1,4 +1,4 @@
-"""RealisationRunner of ensembles beside tests in which every pass is solved by itself."""
+"""Accuracy of realisations compared with tests in which every pass is solved."""
 
 from __future__ import annotations
 
@@ -20,32 +20,32 @@ SHORT = {
 }
 
 
-def test_that_five_members_are_within_a_percent_of_single_passes(tmp_path):
-    members = ensemble(wearsim.load_scenario(ALL, SHORT), 5, tmp_path / "e.h5", scheduler="serial")
-    assert members.count == 5
+def test_realisations_agree_with_per_pass_reference(tmp_path):
+    result = ensemble(wearsim.load_scenario(ALL, SHORT), 5, tmp_path / "e.h5", scheduler="serial")
+    assert result.count == 5
     for number in range(5):
         chosen = {"sampling.realisation": number, "evolution.stepper": "per-pass"}
-        truth = wearsim.run(wearsim.load_scenario(ALL, {**SHORT, **chosen}))
+        reference = wearsim.run(wearsim.load_scenario(ALL, {**SHORT, **chosen}))
         for name in ("depth", "worn_volume"):
-            true = float(getattr(truth, name)[-1])
-            assert members.at_end(name)[number] == pytest.approx(true, rel=0.01)
+            expected = float(getattr(reference, name)[-1])
+            assert result.at_end(name)[number] == pytest.approx(expected, rel=0.01)
 
 
-def test_that_draws_at_every_pass_average_out(tmp_path):
-    """The fewer the passes the more they leave: by the root of their number."""
+def test_per_pass_scatter_decreases_with_passes(tmp_path):
+    """The scatter is inversely proportional to the square root of the number of passes."""
     inputs = {
         "load__normal_force": LOAD,
         "friction__coefficient": FRICTION,
         "creepage__longitudinal": CREEPAGE,
         "creepage__misalignment": SLACK,
     }
-    inputs = {key: {**law, "persistence": "per-pass"} for key, law in inputs.items()}
+    inputs = {key: {**table, "persistence": "per-pass"} for key, table in inputs.items()}
     passes = 1500
     scenario = scenario_of(
         passes, contact__strips=31, evolution__stepper="per-pass", outputs__records=1, **inputs
     )
     volume = ensemble(scenario, 10, tmp_path / "e.h5").at_end("worn_volume")
     spread = volume.std(ddof=1) / volume.mean()
-    # one contact of the paper scatters by 0.44; ten tests tell their spread to a quarter of it
+    # one contact of the paper scatters by 0.44; the scatter of ten tests is known to a quarter
     assert spread == pytest.approx(0.44 / np.sqrt(passes), rel=0.75)
     assert spread * np.sqrt(passes / 1.35e6) < 0.01

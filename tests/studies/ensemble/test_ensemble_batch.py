@@ -1,4 +1,4 @@
-"""RealisationRunner of an ensemble: what is observed of each, alone and together."""
+"""Results of an ensemble's realisations, stepped individually and in batches."""
 
 from dataclasses import replace
 
@@ -24,8 +24,8 @@ CASES = {
 }
 
 
-def members_of(count, **changes):
-    """Return realisations on strips that hold them all, ready to be run."""
+def runs_of(count, **changes):
+    """Return runs of realisations on common strips."""
     common = {"evolution__tolerance": 1e-2, "outputs__records": 6, "passes": 3000}
     scenario = scenario_of(**{**common, **changes})
     drawer = Drawer(scenario, "monte-carlo")
@@ -38,38 +38,38 @@ def members_of(count, **changes):
     return [RealisationRun(k, one.values, one, *built[k]) for k, one in enumerate(draws)]
 
 
-def bits(found):
-    """Return everything that was observed, to the last bit."""
-    return found.rows, found.scalars, found.profile.tobytes()
+def bits(results):
+    """Return all results of a test, for bitwise comparison."""
+    return results.rows, results.scalars, results.profile.tobytes()
 
 
 @pytest.mark.parametrize("case", list(CASES))
-def test_that_what_is_observed_is_the_same_to_the_bit_in_any_company(case):
-    members = members_of(6, **CASES[case])
-    assert len(batch_groups(members)) == 1
-    alone = [bits(observe([member])[0]) for member in members]
+def test_results_are_bitwise_independent_of_the_batch(case):
+    runs = runs_of(6, **CASES[case])
+    assert len(batch_groups(runs)) == 1
+    alone = [bits(observe([run])[0]) for run in runs]
     random = np.random.default_rng(1)
     for size in (6, 4, 2):
-        company = random.permutation(6)[:size].tolist()
-        found = observe([members[k] for k in company])
-        assert [bits(one) for one in found] == [alone[k] for k in company]
+        batch = random.permutation(6)[:size].tolist()
+        found = observe([runs[k] for k in batch])
+        assert [bits(one) for one in found] == [alone[k] for k in batch]
 
 
 @pytest.mark.parametrize("case", list(CASES))
-def test_that_a_member_together_is_the_run_of_itself(case):
-    members = members_of(3, **CASES[case])
-    for member, found in zip(members, observe(members), strict=True):
-        run = observe_single(member)
-        assert found.scalars == pytest.approx(run.scalars, rel=1e-9)
-        assert found.profile == pytest.approx(run.profile, rel=1e-11, abs=1e-300)
-        assert len(found.rows) == len(run.rows)
-        for row, expected in zip(found.rows, run.rows, strict=True):
+def test_batched_results_agree_with_individual_runs(case):
+    runs = runs_of(3, **CASES[case])
+    for run, found in zip(runs, observe(runs), strict=True):
+        single = observe_single(run)
+        assert found.scalars == pytest.approx(single.scalars, rel=1e-9)
+        assert found.profile == pytest.approx(single.profile, rel=1e-11, abs=1e-300)
+        assert len(found.rows) == len(single.rows)
+        for row, expected in zip(found.rows, single.rows, strict=True):
             assert row == pytest.approx(expected, rel=1e-11)
 
 
-def test_that_members_are_recorded_at_the_same_passes():
-    members = members_of(4, **CASES["one contact"])
-    found = observe(members)
+def test_realisations_are_recorded_at_the_same_passes():
+    runs = runs_of(4, **CASES["one contact"])
+    found = observe(runs)
     assert len({len(one.rows) for one in found}) == 1
     for one in found:
         depths = [row["depth"] for row in one.rows]
@@ -77,33 +77,33 @@ def test_that_members_are_recorded_at_the_same_passes():
         assert (np.diff(depths) > 0.0).all()
 
 
-def test_that_members_that_differ_in_more_than_inputs_go_apart():
-    members = members_of(4, **ONE)
-    stepper = StabilisedStepper(members[0].stepper.control)
-    other = members_of(1, **ONE)[0]  # on strips and with a model of its own
-    groups = batch_groups([members[0], replace(members[1], stepper=stepper), *members[2:], other])
-    assert [[member.number for member in group] for group in groups] == [[0, 2, 3], [1], [0]]
+def test_incompatible_realisations_are_in_separate_groups():
+    runs = runs_of(4, **ONE)
+    stepper = StabilisedStepper(runs[0].stepper.control)
+    other = runs_of(1, **ONE)[0]  # with separate strips and model
+    groups = batch_groups([runs[0], replace(runs[1], stepper=stepper), *runs[2:], other])
+    assert [[run.number for run in group] for group in groups] == [[0, 2, 3], [1], [0]]
 
 
-def test_that_a_group_is_no_larger_than_its_strips_allow(monkeypatch):
+def test_group_size_is_limited_by_number_of_strips(monkeypatch):
     monkeypatch.setattr("wearsim.studies.ensemble.batch.MAX_STRIPS", 2 * 71)
-    assert [len(group) for group in batch_groups(members_of(5, **ONE))] == [2, 2, 1]
+    assert [len(group) for group in batch_groups(runs_of(5, **ONE))] == [2, 2, 1]
 
 
-def test_that_a_member_that_fails_leaves_the_others_as_they_are():
-    members = members_of(4, **CASES["one contact"])
-    heavy = replace(members[1].problem.inputs, normal_force_offset=np.array([[1e5]]))
-    members[1] = replace(members[1], problem=replace(members[1].problem, inputs=heavy))
-    found = observe(members)
+def test_failed_realisation_does_not_change_others():
+    runs = runs_of(4, **CASES["one contact"])
+    heavy = replace(runs[1].problem.inputs, normal_force_offset=np.array([[1e5]]))
+    runs[1] = replace(runs[1], problem=replace(runs[1].problem, inputs=heavy))
+    found = observe(runs)
     assert str(found[1]).startswith("the contact reaches the edge of its strips")
     for k in (0, 2, 3):
-        assert bits(found[k]) == bits(observe([members[k]])[0])
+        assert bits(found[k]) == bits(observe([runs[k]])[0])
 
 
-def test_that_a_plugin_that_breaks_ends_its_own_member_alone(monkeypatch):
-    members = members_of(3, **ONE)
+def test_plugin_error_fails_one_realisation_only(monkeypatch):
+    runs = runs_of(3, **ONE)
 
-    class Broken(type(members[1].problem.load)):
+    class Broken(type(runs[1].problem.load)):
         def __init__(self):
             pass
 
@@ -115,8 +115,8 @@ def test_that_a_plugin_that_breaks_ends_its_own_member_alone(monkeypatch):
         def force(self, time):
             return np.full_like(time, 300.0)
 
-    members[1] = replace(members[1], problem=replace(members[1].problem, load=Broken()))
-    found = observe(members)
+    runs[1] = replace(runs[1], problem=replace(runs[1].problem, load=Broken()))
+    found = observe(runs)
     assert isinstance(found[1], ZeroDivisionError)
     for k in (0, 2):
-        assert bits(found[k]) == bits(observe([members[k]])[0])
+        assert bits(found[k]) == bits(observe([runs[k]])[0])

@@ -1,4 +1,4 @@
-"""Whatever kills an ensemble, and whenever: its file opens, and goes on to the same bits."""
+"""Killed ensembles: the file can be read, and the resumed ensemble is bitwise identical."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ def test_killed_ensemble_resumes_bit_for_bit(tmp_path: Path, extent: str) -> Non
     assert {stages[number] for number in killed_at} == set(stages) - {"after write"}
     for row in rows:
         assert row["killed"][0] == signal.SIGKILL
-        assert row["unlike"] == []
+        assert row["differences"] == []
     if extent == "all":
         assert stages.count("before write") > 50
         assert killed_at == {n for n, stage in enumerate(stages) if stage != "after write"}
-    # fresh, after the first batch, and after the last
+    # no file, no realisation, after the first and after the last
     assert {-1, 0, 1, 2} <= {row["done"] for row in rows}
 
 
@@ -33,7 +33,7 @@ def test_ensemble_killed_at_any_moment_resumes_bit_for_bit(tmp_path: Path) -> No
     rows = rows_of("killed_ensemble.py", "moments", tmp_path, 10)
     assert len(rows) == 10
     for row in rows:
-        assert row["unlike"] == []
+        assert row["differences"] == []
         assert set(row["killed"]) <= {signal.SIGPROF, 0}
     assert sum(signal.SIGPROF in row["killed"] for row in rows) >= 5
-    assert sum(0 <= row["done"] < 8 for row in rows) >= 2  # some in the midst of it
+    assert sum(0 <= row["done"] < 8 for row in rows) >= 2  # some between start and end

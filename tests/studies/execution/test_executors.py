@@ -1,4 +1,4 @@
-"""Batches done by others: all of them, once, in no order, and whoever is killed."""
+"""Executors: every batch is run once, also if workers are killed."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from wearsim.studies.execution.base import AHEAD, named
 from wearsim.studies.execution.factory import available_processors, executor
 
 HERE = Path(__file__).parents[1]
-CREWS = [("serial", None), ("threads", 2), ("threads", 1), ("processes", 2), ("processes", 1)]
+EXECUTORS = [("serial", None), ("threads", 2), ("threads", 1), ("processes", 2), ("processes", 1)]
 TWOS = ["threads", "processes"]
 
 
@@ -41,72 +41,70 @@ def batches_of(size: int, count: int) -> Iterator[list[int]]:
 def squares(found: Iterator[tuple[list[int], list[tuple[int, int]]]]) -> dict[int, int]:
     rows = [pair for numbers, results in found for pair in zip(numbers, results, strict=True)]
     numbers = [number for number, _ in rows]
-    assert len(set(numbers)) == len(numbers)  # each once
+    assert len(set(numbers)) == len(numbers)  # each exactly once
     return {number: square for number, (square, _) in rows}
 
 
-@pytest.mark.parametrize(("scheduler", "workers"), [*CREWS, ("processes", 3)])
+@pytest.mark.parametrize(("scheduler", "workers"), [*EXECUTORS, ("processes", 3)])
 @pytest.mark.parametrize("size", [1, 7, 100])
-def test_that_results_do_not_depend_on_who_does_them(
+def test_results_do_not_depend_on_the_executor(
     scheduler: str, workers: int | None, size: int
 ) -> None:
-    with executor(scheduler, workers) as crew:
-        found = squares(crew.results(Squares(), batches_of(size, 60)))
+    with executor(scheduler, workers) as pool:
+        found = squares(pool.results(Squares(), batches_of(size, 60)))
     assert found == {number: number * number for number in range(60)}
 
 
-def test_that_one_executor_does_several_works() -> None:
-    with executor("processes", 2) as crew:
-        assert squares(crew.results(Squares(), iter([]))) == {}
+def test_executor_can_be_used_repeatedly() -> None:
+    with executor("processes", 2) as pool:
+        assert squares(pool.results(Squares(), iter([]))) == {}
         for count in (3, 8):
-            assert len(squares(crew.results(Squares(), batches_of(1, count)))) == count
+            assert len(squares(pool.results(Squares(), batches_of(1, count)))) == count
 
 
 @pytest.mark.parametrize("scheduler", TWOS)
-def test_that_batches_come_as_they_are_done(scheduler: str, tmp_path: Path) -> None:
+def test_batches_are_returned_as_they_finish(scheduler: str, tmp_path: Path) -> None:
     order = []
-    with executor(scheduler, 2) as crew:
-        for numbers, _ in crew.results(Held(tmp_path), batches_of(1, 6)):
+    with executor(scheduler, 2) as pool:
+        for numbers, _ in pool.results(Held(tmp_path), batches_of(1, 6)):
             order += numbers
-            if len(order) == 4:  # the batch behind the one held back may wait for it
+            if len(order) == 4:  # one batch may be queued behind the delayed one
                 (tmp_path / "go").touch()
     assert order.index(0) >= 4
     assert sorted(order) == list(range(6))
 
 
-@pytest.mark.parametrize(("scheduler", "workers"), CREWS)
-def test_that_no_more_batches_are_taken_than_workers_need(
-    scheduler: str, workers: int | None
-) -> None:
+@pytest.mark.parametrize(("scheduler", "workers"), EXECUTORS)
+def test_number_of_batches_in_progress_is_limited(scheduler: str, workers: int | None) -> None:
     taken = itertools.count()
-    with executor(scheduler, workers) as crew:
-        found = crew.results(Squares(), ([next(taken)] for _ in itertools.count()))
+    with executor(scheduler, workers) as pool:
+        found = pool.results(Squares(), ([next(taken)] for _ in itertools.count()))
         for received in range(1, 40):
             next(found)
             out = int(repr(taken)[6:-1]) - received
-            assert out <= AHEAD * crew.workers
+            assert out <= AHEAD * pool.workers
         found.close()
 
 
-def test_that_workers_are_other_processes_with_one_thread_each() -> None:
+def test_workers_are_processes_with_one_thread_each() -> None:
     before = dict(os.environ)
-    with executor("processes", 2) as crew:
-        assert crew.describe == "2 processes"
-        found = list(crew.results(Squares(0.05), batches_of(1, 8)))
+    with executor("processes", 2) as pool:
+        assert pool.describe == "2 processes"
+        found = list(pool.results(Squares(0.05), batches_of(1, 8)))
         pids = {pid for _, results in found for _, pid in results}
         assert len(pids) == 2
         assert os.getpid() not in pids
-        for _, results in crew.results(surroundings, batches_of(1, 4)):
+        for _, results in pool.results(surroundings, batches_of(1, 4)):
             assert results == [("1", True)]
     assert dict(os.environ) == before
-    with executor("processes", 1) as crew:  # a process more would be of no use
-        ((_, results),) = crew.results(Squares(), iter([[3]]))
+    with executor("processes", 1) as pool:  # a single worker needs no separate process
+        ((_, results),) = pool.results(Squares(), iter([[3]]))
     assert results == [(9, os.getpid())]
 
 
-def test_that_there_are_as_many_workers_as_processors_are_ours() -> None:
-    with executor("threads") as crew:
-        assert crew.workers == available_processors()
+def test_default_is_one_worker_per_available_processor() -> None:
+    with executor("threads") as pool:
+        assert pool.workers == available_processors()
     if hasattr(os, "sched_setaffinity"):
         ours = os.sched_getaffinity(0)
         try:
@@ -117,71 +115,71 @@ def test_that_there_are_as_many_workers_as_processors_are_ours() -> None:
 
 
 @pytest.mark.parametrize("size", [1, 4])
-def test_that_a_killed_process_costs_nothing(tmp_path: Path, size: int) -> None:
-    told: list[str] = []
-    with executor("processes", 2, tell=told.append) as crew:
-        found = list(crew.results(Deadly(tmp_path, at=9, times=2), batches_of(size, 24)))
+def test_batches_of_a_killed_process_are_repeated(tmp_path: Path, size: int) -> None:
+    messages: list[str] = []
+    with executor("processes", 2, tell=messages.append) as pool:
+        found = list(pool.results(Deadly(tmp_path, at=9, times=2), batches_of(size, 24)))
     numbers = [number for batch, _ in found for number in batch]
     assert sorted(numbers) == list(range(24))
     assert all(results == [n * n for n in batch] for batch, results in found)
     assert len(list(tmp_path.glob("killed *"))) == 2
-    assert all(len(file.read_text()) == 1 for file in tmp_path.glob("done *"))  # none done twice
+    assert all(len(file.read_text()) == 1 for file in tmp_path.glob("done *"))  # none was run twice
     name = "realisation 9" if size == 1 else "realisations 8 to 11"
     cause = "was killed by SIGKILL (out of memory?)"
-    assert told == [f"a worker process {cause}; {name} will be done again"] * 2
+    assert messages == [f"a worker process {cause}; {name} will be done again"] * 2
 
 
-def test_that_a_process_killed_as_it_sends_costs_nothing(tmp_path: Path) -> None:
-    with executor("processes", 2) as crew:
+def test_batch_of_process_killed_while_sending_is_repeated(tmp_path: Path) -> None:
+    with executor("processes", 2) as pool:
         work = KilledAsItSends(tmp_path, 1_000_000)
-        found = {numbers[0]: rows for numbers, rows in crew.results(work, batches_of(1, 6))}
+        found = {numbers[0]: rows for numbers, rows in pool.results(work, batches_of(1, 6))}
     assert (tmp_path / "killed").exists()
     assert sorted(found) == list(range(6))
     assert all(results == [bytes(1_000_000)] for results in found.values())
 
 
-def test_that_a_batch_that_kills_every_process_ends_the_study(tmp_path: Path) -> None:
+def test_batch_that_kills_every_process_raises(tmp_path: Path) -> None:
     work = Deadly(tmp_path, at=5, times=10)
-    with executor("processes", 2) as crew, pytest.raises(WorkerError) as caught:
-        list(crew.results(work, batches_of(2, 200)))
+    with executor("processes", 2) as pool, pytest.raises(WorkerError) as caught:
+        list(pool.results(work, batches_of(2, 200)))
     assert str(caught.value).startswith("3 worker processes died of realisations 4 to 5, the last")
     assert caught.value.realisations == (4, 5)
     assert caught.value.exit_code == 1
     assert len(list(tmp_path.glob("killed *"))) == 3
-    assert list(tmp_path.glob("done *"))  # the other process went on
+    assert list(tmp_path.glob("done *"))  # the other process continued
 
 
-@pytest.mark.parametrize(("scheduler", "workers"), CREWS)
-def test_that_an_error_of_the_work_arrives_as_it_is(scheduler: str, workers: int | None) -> None:
-    problems = [Mistake("load", "normal_force", "must be above zero")]
-    work = Raising(ScenarioError, "rig.toml", problems)
-    with executor(scheduler, workers) as crew, pytest.raises(ScenarioError) as caught:
-        list(crew.results(work, batches_of(1, 10)))
+@pytest.mark.parametrize(("scheduler", "workers"), EXECUTORS)
+def test_error_of_the_work_is_raised_unchanged(scheduler: str, workers: int | None) -> None:
+    mistakes = [Mistake("load", "normal_force", "must be above zero")]
+    work = Raising(ScenarioError, "rig.toml", mistakes)
+    with executor(scheduler, workers) as pool, pytest.raises(ScenarioError) as caught:
+        list(pool.results(work, batches_of(1, 10)))
     assert caught.value.file == "rig.toml"
-    assert caught.value.mistakes == problems
+    assert caught.value.mistakes == mistakes
 
 
-def test_that_an_error_that_cannot_be_sent_is_told() -> None:
-    with executor("processes", 2) as crew:
+def test_error_that_cannot_be_pickled_is_reported() -> None:
+    with executor("processes", 2) as pool:
         work = Raising(UnsendableError, "this", "that")
         with pytest.raises(WorkerError, match="UnsendableError: this and that"):
-            list(crew.results(work, batches_of(1, 10)))
+            list(pool.results(work, batches_of(1, 10)))
         with pytest.raises(LookupError, match="cannot be read here"):
-            list(crew.results(Unreadable(), batches_of(1, 10)))
+            list(pool.results(Unreadable(), batches_of(1, 10)))
 
 
 @pytest.mark.parametrize("scheduler", TWOS)
 def test_closed_study_does_not_wait_for_its_batches(scheduler: str, tmp_path: Path) -> None:
-    with executor(scheduler, 2) as crew:
-        found = crew.results(Held(tmp_path), batches_of(1, 100))
+    with executor(scheduler, 2) as pool:
+        found = pool.results(Held(tmp_path), batches_of(1, 100))
         next(found)
         found.close()
     assert not (tmp_path / "done").exists()
-    (tmp_path / "go").touch()  # a thread that still waits ends here
+    (tmp_path / "go").touch()  # ends a thread that is still waiting
 
 
 def alive(pid: int) -> bool:
-    """Return whether a process runs; one that is dead and not yet buried does not."""
+    """Return whether a process is running and not a zombie."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
     except OSError:
@@ -197,7 +195,7 @@ def alive(pid: int) -> bool:
         pytest.param("dask", signal.SIGINT, marks=pytest.mark.slow),
     ],
 )
-def test_that_no_worker_outlives_the_study(scheduler: str, number: signal.Signals) -> None:
+def test_workers_end_with_the_study(scheduler: str, number: signal.Signals) -> None:
     with subprocess.Popen(
         interruptible(HERE / "executor_run.py", scheduler),
         cwd=HERE.parents[1],
@@ -209,14 +207,14 @@ def test_that_no_worker_outlives_the_study(scheduler: str, number: signal.Signal
         pids = {int(running.stdout.readline()) for _ in range(8)}
         assert len(pids) == 2
         assert all(map(alive, pids))
-        if number == signal.SIGINT:  # as a terminal does, to all of them
+        if number == signal.SIGINT:  # a terminal sends it to the whole process group
             os.killpg(running.pid, number)
         else:
             running.send_signal(number)
-        said = running.communicate()[1]
+        output = running.communicate()[1]
     assert running.returncode == -number
-    assert said.count("KeyboardInterrupt") == (number == signal.SIGINT), said
-    for _ in range(6000):  # two minutes, if they do outlive it
+    assert output.count("KeyboardInterrupt") == (number == signal.SIGINT), output
+    for _ in range(6000):  # a time limit of two minutes
         if not any(map(alive, pids)):
             break
         time.sleep(0.02)
@@ -224,12 +222,12 @@ def test_that_no_worker_outlives_the_study(scheduler: str, number: signal.Signal
 
 
 @pytest.mark.parametrize("scheduler", ["processes", pytest.param("dask", marks=pytest.mark.slow)])
-def test_that_a_script_is_told_to_guard_its_study(tmp_path: Path, scheduler: str) -> None:
+def test_unguarded_script_is_reported(tmp_path: Path, scheduler: str) -> None:
     script = tmp_path / "script.py"
     script.write_text(
         "from wearsim.studies.execution.factory import executor\n"
-        f"with executor({scheduler!r}, 2) as crew:\n"
-        "    list(crew.results(print, iter([[1], [2]])))\n"
+        f"with executor({scheduler!r}, 2) as pool:\n"
+        "    list(pool.results(print, iter([[1], [2]])))\n"
     )
     done = subprocess.run(
         [sys.executable, str(script)],
@@ -246,7 +244,7 @@ def test_that_a_script_is_told_to_guard_its_study(tmp_path: Path, scheduler: str
 
 
 @pytest.mark.parametrize(
-    ("scheduler", "workers", "said"),
+    ("scheduler", "workers", "message"),
     [
         ("proceses", None, "there is no scheduler 'proceses', expected processes, threads, serial"),
         ("udp://host:1", None, "address of a Dask scheduler such as tcp://host:8786"),
@@ -256,18 +254,20 @@ def test_that_a_script_is_told_to_guard_its_study(tmp_path: Path, scheduler: str
         ("tcp://host:1", 3, "the workers of tcp://host:1 are all used; leave out the number 3"),
     ],
 )
-def test_that_a_wrong_choice_is_told(scheduler: str, workers: int | None, said: str) -> None:
-    with pytest.raises(ValueError, match=said), executor(scheduler, workers):
+def test_invalid_scheduler_raises_value_error(
+    scheduler: str, workers: int | None, message: str
+) -> None:
+    with pytest.raises(ValueError, match=message), executor(scheduler, workers):
         pass
 
 
-def test_that_realisations_are_named_in_few_words() -> None:
+def test_realisations_are_described_briefly() -> None:
     assert named([4]) == "realisation 4"
     assert named(range(4, 8)) == "realisations 4 to 7"
     assert named([8, 4, 6]) == "3 realisations from 4 to 8"
 
 
-def test_that_half_a_worker_is_none() -> None:
+def test_fractional_number_of_workers_raises_type_error() -> None:
     with (
         pytest.raises(TypeError, match=r"a whole number such as 4, got 2\.5"),
         executor("threads", 2.5),

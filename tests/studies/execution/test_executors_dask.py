@@ -1,4 +1,4 @@
-"""Batches done by Dask: by processes of a real cluster, which come, go and are killed."""
+"""Executor for Dask clusters whose workers join, leave and are killed."""
 
 from __future__ import annotations
 
@@ -28,116 +28,116 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module", autouse=True)
-def hasty() -> Iterator[None]:
-    """Look at clusters more often than users need."""
+def frequent_checks() -> Iterator[None]:
+    """Shorten the interval between looks at the workers of a cluster."""
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(executors_cluster, "LOOKING", 0.1)
         yield
 
 
 @pytest.fixture(scope="module")
-def address(hasty: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+def address(frequent_checks: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """A scheduler with two workers."""
     folder = tmp_path_factory.mktemp("cluster")
     with ExitStack() as stack:
         where, _ = stack.enter_context(scheduler(folder))
         for _ in range(2):
             stack.enter_context(worker(where, folder))
-        with executor(where) as crew:
-            _wait_for(crew, 2)
+        with executor(where) as cluster:
+            _wait_for(cluster, 2)
         yield where
 
 
-def _wait_for(crew: executors_cluster.Cluster, workers: int) -> None:
-    while crew.workers != workers:
+def _wait_for(cluster: executors_cluster.Cluster, workers: int) -> None:
+    while cluster.workers != workers:
         time.sleep(0.1)
 
 
-def test_that_a_cluster_does_every_batch_once(address: str) -> None:
+def test_cluster_runs_every_batch_once(address: str) -> None:
     batches = [list(range(first, first + 3)) for first in range(0, 90, 3)]
-    with executor(address) as crew:
-        assert crew.describe == f"dask {address}, 2 workers"
-        found = list(crew.results(Squares(0.01), iter(batches)))
+    with executor(address) as cluster:
+        assert cluster.describe == f"dask {address}, 2 workers"
+        found = list(cluster.results(Squares(0.01), iter(batches)))
     assert sorted(numbers for numbers, _ in found) == batches
     for numbers, results in found:
         assert [square for square, _ in results] == [number * number for number in numbers]
     assert len({pid for _, results in found for _, pid in results}) == 2
 
 
-def test_that_no_more_batches_are_taken_than_a_cluster_needs(address: str) -> None:
+def test_number_of_batches_in_progress_is_limited(address: str) -> None:
     taken: list[int] = []
-    with executor(address) as crew:
+    with executor(address) as cluster:
         endless = (taken.append(number) or [number] for number in itertools.count())
-        found = crew.results(Squares(), endless)
+        found = cluster.results(Squares(), endless)
         for received in range(1, 20):
             next(found)
             assert len(taken) - received <= AHEAD * 2
         found.close()
 
 
-def test_that_a_work_on_a_cluster_raises_its_own_error(address: str) -> None:
-    problems = [Mistake("load", "normal_force", "must be above zero")]
-    with executor(address) as crew, pytest.raises(ScenarioError) as caught:
-        list(crew.results(Raising(ScenarioError, "rig.toml", problems), iter([[1]])))
-    assert caught.value.mistakes == problems
+def test_error_of_the_work_is_raised_unchanged(address: str) -> None:
+    mistakes = [Mistake("load", "normal_force", "must be above zero")]
+    with executor(address) as cluster, pytest.raises(ScenarioError) as caught:
+        list(cluster.results(Raising(ScenarioError, "rig.toml", mistakes), iter([[1]])))
+    assert caught.value.mistakes == mistakes
 
 
-def test_that_a_killed_worker_costs_nothing(tmp_path: Path) -> None:
+def test_batches_of_a_killed_worker_are_repeated(tmp_path: Path) -> None:
     with (
         scheduler(tmp_path) as (where, _),
         worker(where, tmp_path),
         worker(where, tmp_path),
-        executor(where) as crew,
+        executor(where) as cluster,
     ):
-        _wait_for(crew, 2)
+        _wait_for(cluster, 2)
         work = Deadly(tmp_path, at=13, times=1)
-        found = dict(crew.results(work, iter([(number,) for number in range(40)])))
-        _wait_for(crew, 1)
+        found = dict(cluster.results(work, iter([(number,) for number in range(40)])))
+        _wait_for(cluster, 1)
     assert (tmp_path / "killed 0").exists()
     assert found == {(number,): [number * number] for number in range(40)}
 
 
-def test_that_a_study_goes_on_when_new_workers_take_over(tmp_path: Path) -> None:
-    told: list[str] = []
+def test_study_continues_with_new_workers(tmp_path: Path) -> None:
+    messages: list[str] = []
     with scheduler(tmp_path) as (where, _), ExitStack() as stack:
 
         def join(message: str) -> None:
-            told.append(message)
+            messages.append(message)
             stack.enter_context(worker(where, tmp_path))
 
-        # the only worker dies, and with it the only copy of the work; another comes
-        with executor(where, tell=join) as crew:
+        # the only worker ends with the only copy of the work, and another one joins
+        with executor(where, tell=join) as cluster:
             work = Deadly(tmp_path, at=5, times=1)
-            found = dict(crew.results(work, iter([(number,) for number in range(12)])))
+            found = dict(cluster.results(work, iter([(number,) for number in range(12)])))
     assert found == {(number,): [number * number] for number in range(12)}
-    assert told == [f"waiting for workers: there are none at {where}"] * 2
+    assert messages == [f"waiting for workers: there are none at {where}"] * 2
 
 
-def test_that_a_cluster_without_workers_is_not_waited_for_in_silence(
+def test_cluster_without_workers_raises_after_a_time_limit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(executors_cluster, "PATIENCE", 0.3)
     with scheduler(tmp_path) as (where, _):
-        said = f"the scheduler at {where} has had no workers for 0.3 s; start some with: dask"
-        with pytest.raises(WorkerError, match=re.escape(said)), executor(where):
+        expected = f"the scheduler at {where} has had no workers for 0.3 s; start some with: dask"
+        with pytest.raises(WorkerError, match=re.escape(expected)), executor(where):
             pass
 
 
-def test_that_a_scheduler_that_is_killed_is_named(tmp_path: Path) -> None:
+def test_killed_scheduler_is_reported(tmp_path: Path) -> None:
     with (
         dask.config.set({"distributed.comm.timeouts.connect": "0.5s"}),
         scheduler(tmp_path) as (where, process),
         worker(where, tmp_path),
-        executor(where) as crew,
+        executor(where) as cluster,
     ):
-        found = crew.results(Squares(0.01), ([number] for number in itertools.count()))
+        found = cluster.results(Squares(0.01), ([number] for number in itertools.count()))
         next(found)
         process.kill()
         with pytest.raises(WorkerError, match=f"the scheduler at {where} is gone"):
             list(found)
 
 
-def test_that_another_wearsim_on_a_worker_is_told(tmp_path: Path) -> None:
+def test_other_version_on_a_worker_is_reported(tmp_path: Path) -> None:
     other = tmp_path / "site" / "wearsim-99.9.dist-info"
     other.mkdir(parents=True)
     (other / "METADATA").write_text("Metadata-Version: 2.1\nName: wearsim\nVersion: 99.9\n")
@@ -150,18 +150,18 @@ def test_that_another_wearsim_on_a_worker_is_told(tmp_path: Path) -> None:
         pass
 
 
-def test_that_another_wearsim_on_a_worker_that_joins_late_is_told(
+def test_other_version_on_a_late_worker_is_reported(
     address: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with executor(address) as crew:
+    with executor(address) as cluster:
         monkeypatch.setattr(executors_cluster, "version", lambda name: "99.9")
         with pytest.raises(WorkerError, match=r"wearsim 99\.9 is here, and "):
-            list(crew.results(Squares(), iter([[1]])))
+            list(cluster.results(Squares(), iter([[1]])))
 
 
 @contextmanager
 def _mute_server() -> Iterator[str]:
-    """Provide the address of a server that is no scheduler: it never says a word."""
+    """Provide the address of a server that is no scheduler and sends nothing."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         held = []
         threading.Thread(target=lambda: held.append(server.accept()[0]), daemon=True).start()
@@ -170,36 +170,36 @@ def _mute_server() -> Iterator[str]:
             connection.close()
 
 
-def test_that_an_address_without_scheduler_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_address_without_scheduler_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(executors_dask, "CONNECTING", 0.5)
     with socket.create_server(("127.0.0.1", 0)) as server:
         free = f"tcp://127.0.0.1:{server.getsockname()[1]}"
     with _mute_server() as mute:
-        for nobody in (free, mute, "tcp://no-such-host.invalid:8786"):
-            with pytest.raises(WorkerError) as caught, executor(nobody):
+        for unused in (free, mute, "tcp://no-such-host.invalid:8786"):
+            with pytest.raises(WorkerError) as caught, executor(unused):
                 pass
-            assert str(caught.value).startswith(f"no Dask scheduler answers at {nobody} within")
+            assert str(caught.value).startswith(f"no Dask scheduler answers at {unused} within")
             assert "\n" not in str(caught.value)
 
 
-def test_that_missing_dask_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_dask_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
-    said = r'pip install "wearsim\[cluster\]"'
+    expected = r'pip install "wearsim\[cluster\]"'
     for chosen in ("dask", "tcp://127.0.0.1:8786"):
-        with pytest.raises(WorkerError, match=said), executor(chosen):
+        with pytest.raises(WorkerError, match=expected), executor(chosen):
             pass
 
 
-def test_that_a_cluster_of_our_own_does_every_batch_and_names_what_kills_it(
+def test_local_cluster_runs_batches_and_reports_killers(
     tmp_path: Path,
 ) -> None:
     with (
         dask.config.set({"distributed.scheduler.allowed-failures": 0}),
-        executor("dask", 2) as crew,
+        executor("dask", 2) as cluster,
     ):
-        assert crew.workers == 2
-        found = dict(crew.results(Squares(), iter([(number,) for number in range(20)])))
+        assert cluster.workers == 2
+        found = dict(cluster.results(Squares(), iter([(number,) for number in range(20)])))
         with pytest.raises(WorkerError, match="died of realisation 3 again") as caught:
-            list(crew.results(Deadly(tmp_path, at=3, times=9), iter([(3,)])))
+            list(cluster.results(Deadly(tmp_path, at=3, times=9), iter([(3,)])))
     assert {n: rows[0][0] for (n,), rows in found.items()} == {n: n * n for n in range(20)}
     assert caught.value.realisations == (3,)

@@ -1,4 +1,4 @@
-"""The contact a user looks at is the one that a run begins with."""
+"""Consistency of contact studies and runs, and checks before a run."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def groove(folder):
         {"drive": "free", "bearing_torque": "50 N mm", "differential_slip": True},
     ],
 )
-def test_that_a_run_begins_with_the_contact_that_the_user_was_shown(tmp_path, creepage):
+def test_run_starts_with_contact_of_contact_study(tmp_path, creepage):
     overrides = {
         "cylinder.profile": groove(tmp_path),
         "creepage": creepage,
@@ -37,13 +37,13 @@ def test_that_a_run_begins_with_the_contact_that_the_user_was_shown(tmp_path, cr
         "contact.width": "22 mm",
     }
     scenario = wearsim.load_scenario(SCENARIOS / "rig-450min.toml", overrides=overrides)
-    shown = wearsim.solve_contact(scenario)
+    single = wearsim.solve_contact(scenario)
     result = wearsim.run(scenario)
-    assert result.power[0] == pytest.approx(3.0 * shown.power, rel=1e-9)
-    assert result.longitudinal_creepage[0] == pytest.approx(shown.longitudinal_creepage, rel=1e-9)
+    assert result.power[0] == pytest.approx(3.0 * single.power, rel=1e-9)
+    assert result.longitudinal_creepage[0] == pytest.approx(single.longitudinal_creepage, rel=1e-9)
 
 
-def test_that_the_end_of_a_logged_run_is_told_at_one_load():
+def test_final_record_and_history_have_the_same_load():
     scenario = wearsim.load_scenario(
         SCENARIOS / "rig-logged-load.toml", overrides={"operation.duration": "30 min"}
     )
@@ -53,7 +53,7 @@ def test_that_the_end_of_a_logged_run_is_told_at_one_load():
     assert 3.0 * result.dissipation[-1].sum() * spacing == pytest.approx(result.power[-1], rel=1e-8)
 
 
-def test_that_a_log_that_falls_to_nothing_is_refused_before_the_run(tmp_path):
+def test_log_falling_to_zero_is_refused_before_the_run(tmp_path):
     log = tmp_path / "log.csv"
     log.write_text("time [min], load [N]\n0, 300\n100, 300\n101, -5\n102, 300\n450, 300\n")
     scenario = wearsim.load_scenario(
@@ -63,7 +63,7 @@ def test_that_a_log_that_falls_to_nothing_is_refused_before_the_run(tmp_path):
         plan(scenario)
 
 
-def test_that_options_without_meaning_are_told():
+def test_options_without_meaning_are_refused():
     for changes, key in (
         ({"evolution.stepper": "per-pass", "evolution.step": 100}, "step"),
         ({"evolution.stepper": "implicit", "evolution.allow_unstable": True}, "allow_unstable"),
@@ -73,7 +73,7 @@ def test_that_options_without_meaning_are_told():
             assemble_problem(scenario)
 
 
-def test_that_the_strips_of_a_contact_can_be_moved():
+def test_centre_of_the_strips_can_be_set():
     scenario = wearsim.load_scenario(
         SCENARIOS / "rig-450min.toml", overrides={"contact.centre": "0.2 mm"}
     )

@@ -1,4 +1,4 @@
-"""Runs with random inputs: what is drawn when, expectations over passes, processes, restart."""
+"""Runs with random inputs: draws, expectations over passes, processes and restart."""
 
 import numpy as np
 import pytest
@@ -31,12 +31,12 @@ ALL_PER_PASS = {
 }
 
 
-def deepest(state):
+def depth_of(state):
     """Return the depth of the groove [m]."""
     return float(state.cylinder_depth.max())
 
 
-def test_that_a_test_runs_with_what_was_drawn_for_it():
+def test_run_uses_the_drawn_values():
     random = scenario_of(
         load__normal_force=LOAD, friction__coefficient=FRICTION, contact__strips=61
     )
@@ -47,10 +47,10 @@ def test_that_a_test_runs_with_what_was_drawn_for_it():
         contact__strips=61,
     )
     assert drawn["load.normal_force"] != pytest.approx(307.0, abs=1e-6)
-    assert deepest(end_of(random)[1]) == deepest(end_of(plain)[1])
+    assert depth_of(end_of(random)[1]) == depth_of(end_of(plain)[1])
 
 
-def test_that_a_wear_factor_or_a_spring_can_be_drawn_too():
+def test_wear_factor_and_stiffness_can_be_random():
     factor = {"distribution": "lognormal", "median": "2e-9 1/Pa", "factor": 1.5}
     stiffness = {"distribution": "uniform", "low": "600 N/mm", "high": "800 N/mm"}
     scenario = scenario_of(
@@ -64,7 +64,7 @@ def test_that_a_wear_factor_or_a_spring_can_be_drawn_too():
     assert result.worn_volume[-1] == pytest.approx(balance, rel=1e-12)
 
 
-def test_that_another_realisation_or_seed_is_another_test():
+def test_realisation_and_seed_change_the_draws():
     def force(**changes):
         drawn = draw(scenario_of(load__normal_force=LOAD, **changes)).scenario.drawn
         return drawn["load.normal_force"]
@@ -73,7 +73,7 @@ def test_that_another_realisation_or_seed_is_another_test():
     assert force() == force(friction__coefficient=FRICTION)
 
 
-def test_that_every_roller_has_its_own_slack():
+def test_rollers_have_separate_misalignments():
     slack = {**SLACK, "persistence": "per-roller"}
     friction = {**FRICTION, "persistence": "per-roller"}
     scenario = scenario_of(creepage__misalignment=slack, friction__coefficient=friction)
@@ -82,37 +82,37 @@ def test_that_every_roller_has_its_own_slack():
     for name in ("yaw", "tilt", "friction"):
         assert len(np.unique(getattr(problem.inputs, name))) == 3
     assert np.hypot(problem.inputs.yaw, problem.inputs.tilt).max() < 2e-3
-    # each roller touches where its tilt has moved it: R_crown x tilt, to the other side
+    # the contact of each roller is shifted by -R_crown x tilt
     forces = [contact.line_load for contact in fresh_state(problem).contacts]
     centres = [float(np.dot(problem.grid.y, q) / q.sum()) for q in forces]
     assert centres == pytest.approx(-0.5 * problem.inputs.tilt[:, 0], abs=2e-5)
-    assert deepest(state) > 0.0
+    assert depth_of(state) > 0.0
 
 
 @pytest.mark.parametrize("drawn", [("creepage__misalignment",), tuple(ALL_PER_PASS)])
-def test_that_the_expectation_over_passes_agrees_with_drawing_every_pass(drawn):
+def test_expectation_over_passes_agrees_with_per_pass_draws(drawn):
     inputs = {name: ALL_PER_PASS[name] for name in drawn}
-    _, truth = end_of(scenario_of(evolution__stepper="per-pass", contact__strips=91, **inputs))
+    _, reference = end_of(scenario_of(evolution__stepper="per-pass", contact__strips=91, **inputs))
     fresh, _, _ = assemble_problem(scenario_of(contact__strips=91, **inputs))
     step = round(10.0 * stability_limit(fresh, fresh_state(fresh)))
     problem, state = end_of(scenario_of(evolution__step=step, contact__strips=91, **inputs))
     assert state.steps < 20
-    assert abs(deepest(state) - deepest(truth)) <= state.depth_error[0]
-    volumes = total_worn_volume(problem, state), total_worn_volume(problem, truth)
+    assert abs(depth_of(state) - depth_of(reference)) <= state.depth_error[0]
+    volumes = total_worn_volume(problem, state), total_worn_volume(problem, reference)
     assert abs(volumes[0] - volumes[1])[0] <= state.volume_error[0]
-    assert state.depth_error[0] < 0.02 * deepest(state)
+    assert state.depth_error[0] < 0.02 * depth_of(state)
 
 
-def test_that_the_step_hardly_matters_to_an_expectation_however_long_it_is():
+def test_expectation_is_insensitive_to_the_step():
     inputs = {"creepage__misalignment": ALL_PER_PASS["creepage__misalignment"]}
     depths = [
-        deepest(end_of(scenario_of(evolution__step=step, contact__strips=91, **inputs))[1])
+        depth_of(end_of(scenario_of(evolution__step=step, contact__strips=91, **inputs))[1])
         for step in (250, 1000, 3000)
     ]
     assert depths == pytest.approx([depths[0]] * 3, rel=3e-3)
 
 
-def test_that_an_explicit_expectation_of_that_length_is_unstable():
+def test_long_explicit_step_is_unstable():
     inputs = {
         "evolution__stepper": "explicit",
         "evolution__step": 400,
@@ -125,28 +125,28 @@ def test_that_an_explicit_expectation_of_that_length_is_unstable():
     assert any(text.startswith("unstable") for text in result.warnings)
 
 
-def test_that_more_nodes_bring_the_error_of_the_quadrature_down():
+def test_more_nodes_reduce_the_quadrature_error():
     errors = []
     for nodes in (8, 128):
         _, state = end_of(
             scenario_of(passes=2000, evolution__nodes=nodes, evolution__step=1000, **ALL_PER_PASS)
         )
-        errors.append(state.quadrature[0, 0] / deepest(state))
+        errors.append(state.quadrature[0, 0] / depth_of(state))
     assert errors[1] < 0.2 * errors[0]
 
 
-def test_that_a_wandering_load_agrees_with_its_per_pass_truth():
+def test_processes_agree_with_per_pass_reference():
     load = {**WANDERING, "marginal": LOAD}
     friction = {**WANDERING, "marginal": FRICTION, "persistence": "per-roller"}
     inputs = {"load__normal_force": load, "friction__coefficient": friction, "contact__strips": 61}
-    _, truth = end_of(scenario_of(evolution__stepper="per-pass", **inputs))
+    _, reference = end_of(scenario_of(evolution__stepper="per-pass", **inputs))
     problem, state = end_of(scenario_of(**inputs))
     assert len(problem.varying) == 4
-    assert abs(deepest(state) - deepest(truth)) <= state.depth_error[0]
-    assert deepest(state) == pytest.approx(deepest(truth), rel=2e-3)
+    assert abs(depth_of(state) - depth_of(reference)) <= state.depth_error[0]
+    assert depth_of(state) == pytest.approx(depth_of(reference), rel=2e-3)
 
 
-def test_that_passes_draw_the_same_however_often_they_are_recorded():
+def test_per_pass_draws_do_not_depend_on_records():
     inputs = {**ALL_PER_PASS, "evolution__stepper": "per-pass", "passes": 900}
     few = wearsim.run(scenario_of(outputs__records=1, **inputs))
     many = wearsim.run(scenario_of(outputs__records=9, **inputs))
@@ -156,7 +156,7 @@ def test_that_passes_draw_the_same_however_often_they_are_recorded():
 
 
 @pytest.mark.parametrize("stepper", ["implicit", "per-pass"])
-def test_that_a_stopped_test_with_random_inputs_goes_on_as_if_unbroken(tmp_path, stepper):
+def test_resumed_random_run_equals_unbroken_run(tmp_path, stepper):
     scenario = scenario_of(
         passes=1500,
         evolution__stepper=stepper,
@@ -167,64 +167,64 @@ def test_that_a_stopped_test_with_random_inputs_goes_on_as_if_unbroken(tmp_path,
         creepage__misalignment={**SLACK, "persistence": "per-roller"},
     )
     whole = wearsim.run(scenario, tmp_path / "whole.h5")
-    asked = iter([False, False, True])
+    requests = iter([False, False, True])
     with pytest.raises(Interrupted):
-        wearsim.run(scenario, tmp_path / "part.h5", stop_requested=lambda: next(asked, True))
+        wearsim.run(scenario, tmp_path / "part.h5", stop_requested=lambda: next(requests, True))
     assert not open_results(tmp_path / "part.h5").finished
     resumed = wearsim.resume(tmp_path / "part.h5")
-    apart = set(differences(whole.raw, resumed.raw)) - {"wall_seconds", "created"}
-    assert not apart
+    changed = set(differences(whole.raw, resumed.raw)) - {"wall_seconds", "created"}
+    assert not changed
 
 
-def test_that_a_field_is_refused_by_a_run():
+def test_run_refuses_friction_field():
     field = {"distribution": "white", "marginal": FRICTION}
     with pytest.raises(CapabilityError, match="resolved within one contact"):
         assemble_problem(scenario_of(friction__coefficient=field))
 
 
-def test_that_a_latin_hypercube_is_refused_by_a_run():
+def test_run_refuses_latin_hypercube():
     with pytest.raises(ScenarioError, match="a study of many realisations"):
         assemble_problem(scenario_of(load__normal_force=LOAD, sampling__plan="latin-hypercube"))
 
 
-def test_that_a_process_far_too_fast_is_refused():
+def test_process_with_too_many_steps_is_refused():
     load = {**WANDERING, "correlation_time": "1 us", "marginal": LOAD}
     with pytest.raises(ScenarioError, match="a longer correlation_time"):
         assemble_problem(scenario_of(passes=100_000, load__normal_force=load))
 
 
 @pytest.mark.parametrize("key", ["load__normal_force", "friction__coefficient"])
-def test_that_a_wandering_input_is_part_of_the_estimated_error(key, monkeypatch):
+def test_error_estimate_includes_variation_of_processes(key, monkeypatch):
     marginal = LOAD if "load" in key else FRICTION
     inputs = {"contact__strips": 61, key: {**WANDERING, "marginal": marginal}}
-    # in full slip wear is linear in friction, and its mean is all there is to it
+    # in full slip wear is linear in friction and depends on its mean only
     scenario = scenario_of(evolution__step=1500, creepage__longitudinal=3e-4, **inputs)
     _, state = end_of(scenario)
     monkeypatch.setattr(
         "wearsim.evolution.error_control.step_doubling.variation_bias", lambda *_: None
     )
-    _, blind = end_of(scenario)
-    # what the input does within a step moves the twin, and leaves the test as it is
-    assert (blind.cylinder_depth == state.cylinder_depth).all()
-    assert blind.depth_error[0] < state.depth_error[0] < 0.05 * deepest(state)
+    _, without = end_of(scenario)
+    # variation within a step changes the error estimate, and not the solution
+    assert (without.cylinder_depth == state.cylinder_depth).all()
+    assert without.depth_error[0] < state.depth_error[0] < 0.05 * depth_of(state)
 
 
-@pytest.mark.parametrize("rollers", ["alike", "apart"])
-def test_that_a_wandering_load_stays_within_the_stated_error(rollers):
+@pytest.mark.parametrize("rollers", ["identical", "different"])
+def test_run_with_random_load_is_within_its_error_estimate(rollers):
     slack = {"creepage__misalignment": {**SLACK, "persistence": "per-roller"}}
     inputs = {"load__normal_force": {**WANDERING, "marginal": LOAD}, "contact__strips": 61}
-    inputs |= slack if rollers == "apart" else {}
+    inputs |= slack if rollers == "different" else {}
     problem, fine = end_of(scenario_of(evolution__tolerance=1e-4, **inputs))
     for tolerance in (3e-3, 3e-2):
         _, state = end_of(scenario_of(evolution__tolerance=tolerance, **inputs))
-        apart = abs(deepest(state) - deepest(fine))
-        assert apart <= state.depth_error[0] + fine.depth_error[0]
-        assert state.depth_error[0] <= tolerance * deepest(state)
+        difference = abs(depth_of(state) - depth_of(fine))
+        assert difference <= state.depth_error[0] + fine.depth_error[0]
+        assert state.depth_error[0] <= tolerance * depth_of(state)
         volumes = [total_worn_volume(problem, one) for one in (state, fine)]
         assert abs(volumes[0] - volumes[1]) <= state.volume_error[0] + fine.volume_error[0]
 
 
-def test_that_a_record_means_the_same_whatever_the_stepper():
+def test_records_are_comparable_between_steppers():
     slack = {"creepage__misalignment": ALL_PER_PASS["creepage__misalignment"]}
     inputs = {**slack, "passes": 3000, "contact__strips": 91}
     expected = wearsim.run(scenario_of(**inputs))
@@ -232,7 +232,7 @@ def test_that_a_record_means_the_same_whatever_the_stepper():
     power = drawn.dissipated_energy[-1] / drawn.time[-1]
     assert drawn.power[-1] == pytest.approx(power, rel=0.05)
     assert drawn.power[-1] == pytest.approx(expected.power[-1], rel=0.02)
-    # how wide the load lies over many passes; each pass by itself leaves the profile rough
+    # the width of the load averaged over many passes, since single passes roughen the profile
     widths = []
     for result in (expected, drawn):
         load = result.raw.records["line_load"][-1, 0, 0, 0]
@@ -240,45 +240,45 @@ def test_that_a_record_means_the_same_whatever_the_stepper():
     assert widths[1] == pytest.approx(widths[0], rel=0.03)
 
 
-def test_that_the_strips_hold_the_groove_of_the_roller_with_the_most_friction():
+def test_strips_cover_groove_of_greatest_friction():
     friction = {"distribution": "uniform", "low": 0.05, "high": 1.0, "persistence": "per-roller"}
     scenario = scenario_of(friction__coefficient=friction, seed=3)
     plain, _, _ = assemble_problem(scenario_of())
     problem, state = end_of(scenario)
     assert problem.inputs.friction.max() > 0.5
     assert np.ptp(problem.grid.y) > 1.3 * np.ptp(plain.grid.y)
-    assert deepest(state) > 0.0
+    assert depth_of(state) > 0.0
 
 
 @pytest.mark.parametrize(
-    "law",
+    "creepage",
     [
         {**WANDERING, "marginal": {"distribution": "normal", "mean": 0.0, "std": 1e-3}},
         {"distribution": "normal", "mean": 0.0, "std": 1e-3, "persistence": "per-pass"},
     ],
 )
-def test_that_the_strips_hold_the_groove_of_a_creepage_about_zero(law):
-    changes = {"creepage__longitudinal": law, "evolution__tolerance": 1e-2}
+def test_strips_cover_groove_of_creepage_about_zero(creepage):
+    changes = {"creepage__longitudinal": creepage, "evolution__tolerance": 1e-2}
     problem, state = end_of(scenario_of(passes=20_000, **changes))
     worn = problem.grid.y[state.cylinder_depth[0, 0, 0] > 0.0]
     fresh = assemble_problem(scenario_of(passes=20_000, creepage__longitudinal=0.0))[0].grid.y[-1]
     assert fresh < worn[-1] < problem.grid.y[-1]
 
 
-def test_that_nodes_are_refused_where_there_is_nothing_to_expect():
+def test_nodes_without_expectation_are_refused():
     for changes in ({}, {"evolution__stepper": "per-pass", **ALL_PER_PASS}):
         with pytest.raises(ScenarioError, match="without an expectation over passes"):
             assemble_problem(scenario_of(evolution__nodes=16, **changes))
 
 
-def test_step_is_shortened_where_its_coarse_twin_fails(monkeypatch):
+def test_step_is_shortened_where_coarse_solution_fails(monkeypatch):
     friction = {**FRICTION, "persistence": "per-pass"}
     problem, stepper, _ = assemble_problem(scenario_of(passes=600, friction__coefficient=friction))
     fresh = fresh_state(problem)
     plain = stepper.advance(problem, fresh, 600.0).end
     original, failures = (
         errors_of_steps.half_quadrature_start,
-        [StepError("the twin did not settle", {})],
+        [StepError("the coarse solution did not converge", {})],
     )
 
     def fails_once(*arguments):

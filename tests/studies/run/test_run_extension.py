@@ -1,4 +1,4 @@
-"""A test extended far beyond the strips that were chosen for it."""
+"""Extension of a test beyond its initial strips."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from tests.evolution import SCENARIOS
 
 
 @pytest.mark.parametrize("stepper", ["implicit", "per-pass"])
-def test_that_a_test_can_be_extended_until_its_groove_outgrows_its_strips(tmp_path, stepper):
+def test_extended_test_gets_additional_strips(tmp_path, stepper):
     short = wearsim.load_scenario(
         SCENARIOS / "rig-450min.toml",
         overrides={
@@ -27,7 +27,7 @@ def test_that_a_test_can_be_extended_until_its_groove_outgrows_its_strips(tmp_pa
     np.testing.assert_array_equal(result.y[margin:-margin], first.y)
     np.testing.assert_array_equal(result.profiles[1][margin:-margin], first.profiles[1])
     assert result.profiles[1][:margin].max() == 0.0
-    # a run of that length from the start has other strips, and the same depth
+    # an unextended run of that length has other strips, and the same depth
     whole = wearsim.run(
         wearsim.load_scenario(
             SCENARIOS / "rig-450min.toml",

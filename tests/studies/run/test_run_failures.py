@@ -1,4 +1,4 @@
-"""Runs that are interrupted, fail, or may not begin."""
+"""Runs that are interrupted, fail, or cannot start."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from study_examples import LOADS, STEPPERS, short, unlike
+from study_examples import LOADS, STEPPERS, run_differences, short
 
 from wearsim.errors import (
     CapabilityError,
@@ -23,7 +23,7 @@ from wearsim.results import Result, open_results, read_results, write_results
 from wearsim.results.io import atomic_write
 from wearsim.scenario import Scenario, parse_scenario
 from wearsim.studies.run import recorder
-from wearsim.studies.run import run as replay
+from wearsim.studies.run import run as studies
 from wearsim.studies.run.events import Event, Warned
 
 pytestmark = pytest.mark.usefixtures("small_chunks", "quick_disk")
@@ -31,8 +31,8 @@ pytestmark = pytest.mark.usefixtures("small_chunks", "quick_disk")
 OFTEN = {"outputs.checkpoint_every": "1e-9 s"}
 
 
-class Press:
-    """Stands in for a function and has the user press Ctrl-C at one of its calls."""
+class InterruptAtCall:
+    """Replacement of a function that raises KeyboardInterrupt at one of its calls."""
 
     def __init__(self, function: Callable[..., object], at: int, late: bool = False) -> None:
         self.function, self.left, self.late = function, at, late
@@ -48,7 +48,7 @@ class Press:
 
 
 PLACES = [
-    (implicit, "implicit_step"),  # three in a step: two halves, and the twin's whole
+    (implicit, "implicit_step"),  # three in a step: two halves and the coarse solution
     (recorder, "take_side_step"),
     (recorder, "record_row"),
     (recorder, "history_row"),
@@ -58,13 +58,13 @@ PLACES = [
 @pytest.fixture(scope="module")
 def nine_records() -> tuple[Scenario, Result]:
     scenario = short(outputs__records=9, evolution__tolerance=0.005)
-    return scenario, replay.run(scenario)
+    return scenario, studies.run(scenario)
 
 
 @pytest.mark.parametrize("late", [False, True])
 @pytest.mark.parametrize("at", [2, 7])
 @pytest.mark.parametrize(("module", "name"), PLACES, ids=[name for _, name in PLACES])
-def test_that_an_interrupt_anywhere_in_a_step_leaves_the_step_before(
+def test_interrupt_in_a_step_keeps_the_previous_step(
     module: object,
     name: str,
     at: int,
@@ -75,9 +75,9 @@ def test_that_an_interrupt_anywhere_in_a_step_leaves_the_step_before(
 ) -> None:
     scenario, unbroken = nine_records
     with monkeypatch.context() as patch:
-        patch.setattr(module, name, Press(getattr(module, name), at, late))
+        patch.setattr(module, name, InterruptAtCall(getattr(module, name), at, late))
         with pytest.raises(Interrupted, match=r"stopped at pass \d+ of 6000; continue with"):
-            replay.run(scenario, path)
+            studies.run(scenario, path)
     stopped = open_results(path)
     assert not stopped.finished
     rows = len(stopped.passes)
@@ -85,39 +85,39 @@ def test_that_an_interrupt_anywhere_in_a_step_leaves_the_step_before(
         np.testing.assert_array_equal(array, unbroken.raw.history[variable][:rows])
     assert stopped.record_passes[-1] <= stopped.passes[-1] == stopped.raw.checkpoint["passes"]
     assert stopped.steps == rows - 1
-    assert unlike(replay.resume(path), unbroken) == []
+    assert run_differences(studies.resume(path), unbroken) == []
 
 
 def _stages(scenario: Scenario, path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Return every call of the writer's seam over a whole run, which goes to `path`."""
+    """Return the write stages of a whole run to `path`."""
     seen: list[str] = []
     with monkeypatch.context() as patch:
         patch.setattr(atomic_write, "on_write_stage", seen.append)
-        replay.run(scenario, path)
+        studies.run(scenario, path)
     return seen
 
 
-def test_that_an_interrupt_while_writing_leaves_a_file_that_goes_on(
+def test_interrupt_while_writing_leaves_resumable_file(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scenario = short(evolution__step=3000, **OFTEN)
-    unbroken = replay.run(scenario)
+    unbroken = studies.run(scenario)
     stages = _stages(scenario, path, monkeypatch)
     per_write = stages.index("before open", 1)
-    assert len(stages) == 4 * per_write  # fresh, two steps, finished
-    in_the_midst = range(per_write + 1, 2 * per_write + 1)
+    assert len(stages) == 4 * per_write  # initial state, two steps, finished
+    within_a_write = range(per_write + 1, 2 * per_write + 1)
     at_the_end = range(len(stages) - 3, len(stages) + 1)  # around the rename and after it
-    for at in (*in_the_midst, *at_the_end):
+    for at in (*within_a_write, *at_the_end):
         with monkeypatch.context() as patch:
-            patch.setattr(atomic_write, "on_write_stage", Press(lambda _: None, at))
+            patch.setattr(atomic_write, "on_write_stage", InterruptAtCall(lambda _: None, at))
             with pytest.raises(Interrupted, match="continue with"):
-                replay.run(scenario, path, force=True)
+                studies.run(scenario, path, force=True)
         assert list(path.parent.iterdir()) == [path]
         if at % 3 == 0:
-            assert unlike(replay.resume(path), unbroken) == []
+            assert run_differences(studies.resume(path), unbroken) == []
 
 
-def test_that_an_interrupt_of_the_first_write_leaves_a_fresh_file_or_none(
+def test_interrupt_of_first_write_leaves_initial_file_or_none(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scenario = short(evolution__step=3000)
@@ -126,15 +126,15 @@ def test_that_an_interrupt_of_the_first_write_leaves_a_fresh_file_or_none(
     for at in (1, renamed, renamed + 1):
         path.unlink(missing_ok=True)
         with monkeypatch.context() as patch:
-            patch.setattr(atomic_write, "on_write_stage", Press(lambda _: None, at))
+            patch.setattr(atomic_write, "on_write_stage", InterruptAtCall(lambda _: None, at))
             with pytest.raises(KeyboardInterrupt):
-                replay.run(scenario, path)
+                studies.run(scenario, path)
         assert path.exists() == (at > renamed)
     assert open_results(path).passes.tolist() == [0.0]
-    assert unlike(replay.resume(path), replay.run(scenario)) == []
+    assert run_differences(studies.resume(path), studies.run(scenario)) == []
 
 
-# a log that falls to nothing takes the load off a groove that the spring has given way into
+# with a falling log, contact is lost in a groove that has unloaded the spring
 LOST = {
     "load": {"kind": "recorded", "file": "load.csv", "stiffness": "20000 N/mm"},
     "operation.passes": 20_000,
@@ -149,81 +149,79 @@ def _lost(stepper: str) -> Scenario:
 
 
 @pytest.mark.parametrize("stepper", ["implicit", "stabilised", "explicit", "compiled passes"])
-def test_that_a_run_that_loses_its_load_keeps_its_last_good_state(stepper: str, path: Path) -> None:
+def test_lost_contact_keeps_the_last_accepted_state(stepper: str, path: Path) -> None:
     scenario = _lost(stepper)
     with pytest.raises(SolverError, match="contact is lost at pass") as caught:
-        replay.run(scenario, path)
+        studies.run(scenario, path)
     assert caught.value.state
     left = open_results(path)
     assert not left.finished
-    # the load falls below what the spring has lost some time after the second minute
+    # the load falls below the loss of the spring after the second minute
     assert 6000.0 < left.passes[-1] < 9000.0
     assert (left.normal_force > 0.0).all()
     assert left.record_passes[-1] <= left.passes[-1] == left.raw.checkpoint["passes"]
     assert np.isfinite(left.depth).all()
-    # trying again neither helps nor harms
+    # a second attempt fails in the same way and leaves the file unchanged
     with pytest.raises(SolverError, match="contact is lost at pass"):
-        replay.resume(path)
-    assert unlike(open_results(path), left) == []
+        studies.resume(path)
+    assert run_differences(open_results(path), left) == []
 
 
-def test_that_a_failure_without_a_file_is_told_all_the_same() -> None:
+def test_failure_without_a_file_is_raised() -> None:
     with pytest.raises(SolverError, match="contact is lost"):
-        replay.run(_lost("compiled passes"))
+        studies.run(_lost("compiled passes"))
 
 
-def test_that_a_run_of_too_many_steps_keeps_those_it_took(path: Path) -> None:
+def test_run_of_too_many_steps_keeps_the_steps(path: Path) -> None:
     with pytest.raises(StepError, match="5 steps have reached pass"):
-        replay.run(short(evolution__max_steps=5), path)
+        studies.run(short(evolution__max_steps=5), path)
     left = open_results(path)
     assert (left.steps, len(left.passes), left.finished) == (5, 6, False)
 
 
-def test_that_a_failure_after_a_resume_keeps_what_was_done(
-    path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    unbroken = replay.run(short())
+def test_failure_after_resume_keeps_the_steps(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    unbroken = studies.run(short())
     with pytest.raises(Interrupted):
-        replay.run(short(), path, stop_requested=lambda: True)
+        studies.run(short(), path, stop_requested=lambda: True)
     steps = iter(range(100))
     wear = implicit.ImplicitStepper.advance
 
     def fail(self: object, *args: object) -> object:
         if next(steps) == 4:
-            raise StepError("no luck")
+            raise StepError("no step")
         return wear(self, *args)
 
     with monkeypatch.context() as patch:
         patch.setattr(implicit.ImplicitStepper, "advance", fail)
-        with pytest.raises(StepError, match="no luck"):
-            replay.resume(path)
+        with pytest.raises(StepError, match="no step"):
+            studies.resume(path)
     assert open_results(path).steps == 5
-    assert unlike(replay.resume(path), unbroken) == []
+    assert run_differences(studies.resume(path), unbroken) == []
 
 
-@pytest.mark.parametrize("content", [b"precious", None])
-def test_that_an_existing_file_is_never_overwritten_unasked(
+@pytest.mark.parametrize("content", [b"content", None])
+def test_existing_file_is_overwritten_by_force_only(
     content: bytes | None, path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if content is None:
-        replay.run(short(), path)
+        studies.run(short(), path)
         content = path.read_bytes()
     path.write_bytes(content)
 
     def work(*_: object) -> None:
-        raise AssertionError("work was done before the output was looked at")
+        raise AssertionError("the run was assembled before the output was checked")
 
     with monkeypatch.context() as patch:
-        patch.setattr(replay, "assemble_problem", work)
+        patch.setattr(studies, "assemble_problem", work)
         with pytest.raises(ResultsFileError, match="already exists; --force replaces it"):
-            replay.run(short(), path)
+            studies.run(short(), path)
     assert path.read_bytes() == content
-    assert replay.run(short(), path, force=True).finished
-    assert unlike(open_results(path), replay.run(short())) == []
+    assert studies.run(short(), path, force=True).finished
+    assert run_differences(open_results(path), studies.run(short())) == []
 
 
-def test_that_a_scenario_that_cannot_start_leaves_an_old_file_alone(path: Path) -> None:
-    path.write_bytes(b"precious")
+def test_invalid_scenario_leaves_existing_file_unchanged(path: Path) -> None:
+    path.write_bytes(b"content")
     wrong: list[tuple[type[Exception], dict[str, object]]] = [
         (ScenarioError, {"contact.width": "1 mm"}),
         (ScenarioError, {**LOADS["recorded and thermal"], "operation.passes": 60_000}),
@@ -234,14 +232,14 @@ def test_that_a_scenario_that_cannot_start_leaves_an_old_file_alone(path: Path) 
     ]
     for error, overrides in wrong:
         with pytest.raises(error):
-            replay.run(short(**overrides), path, force=True)
-        assert path.read_bytes() == b"precious"
+            studies.run(short(**overrides), path, force=True)
+        assert path.read_bytes() == b"content"
 
 
-def test_that_a_log_that_is_too_short_is_told_with_both_times(path: Path) -> None:
+def test_short_log_error_states_both_times(path: Path) -> None:
     recorded = LOADS["recorded and thermal"]
     with pytest.raises(ScenarioError) as caught:
-        replay.run(short(**recorded, operation__duration="15 min"), path)
+        studies.run(short(**recorded, operation__duration="15 min"), path)
     assert str(caught.value) == (
         "rig.toml: [load] recorded: the log does not cover the test, got 0 to 12 min,"
         " expected 0 to 15 min; log longer or shorten operation.duration"
@@ -249,48 +247,48 @@ def test_that_a_log_that_is_too_short_is_told_with_both_times(path: Path) -> Non
     assert not path.exists()
 
 
-def test_that_a_test_cannot_be_extended_past_its_log(path: Path) -> None:
-    replay.run(short(**LOADS["recorded and thermal"]), path)
+def test_test_cannot_be_extended_past_its_log(path: Path) -> None:
+    studies.run(short(**LOADS["recorded and thermal"]), path)
     before = path.read_bytes()
     with pytest.raises(ScenarioError, match="the log does not cover the test"):
-        replay.resume(path, until=780.0)
+        studies.resume(path, until=780.0)
     assert path.read_bytes() == before
 
 
 def _stopped(path: Path) -> None:
     with pytest.raises(Interrupted):
-        replay.run(short(), path, stop_requested=lambda: True)
+        studies.run(short(), path, stop_requested=lambda: True)
 
 
 def _warnings(path: Path) -> list[str]:
     events: list[Event] = []
-    result = replay.resume(path, on_event=events.append)
-    told = [event.message for event in events if isinstance(event, Warned)]
-    assert list(result.warnings) == told == list(open_results(path).warnings)
-    return told
+    result = studies.resume(path, on_event=events.append)
+    messages = [event.message for event in events if isinstance(event, Warned)]
+    assert list(result.warnings) == messages == list(open_results(path).warnings)
+    return messages
 
 
-def test_that_the_same_software_goes_on_without_a_word(path: Path) -> None:
+def test_same_software_resumes_without_warning(path: Path) -> None:
     _stopped(path)
     assert _warnings(path) == []
 
 
-def test_that_other_software_is_told_once(path: Path) -> None:
+def test_changed_software_causes_one_warning_each(path: Path) -> None:
     _stopped(path)
     data = read_results(path)
     older = data.software | {"numpy": "1.0", "wearsim": "0.0.1"}
     write_results(path, replace(data, software=older))
     now = data.software["numpy"]
-    told = _warnings(path)
-    assert len(told) == 2
+    messages = _warnings(path)
+    assert len(messages) == 2
     assert (
         f"this file was written with numpy 1.0 and continues with {now}: the last digits may"
         " differ from those of an unbroken run"
-    ) in told
+    ) in messages
 
 
 @pytest.mark.parametrize(("distribution", "number"), [("rollers", "2.0"), ("rollers", "0.1.0")])
-def test_that_another_plugin_of_the_same_name_is_told(
+def test_changed_plugin_of_same_name_causes_a_warning(
     distribution: str, number: str, path: Path
 ) -> None:
     _stopped(path)
@@ -298,8 +296,8 @@ def test_that_another_plugin_of_the_same_name_is_told(
     rows = [dict(row) for row in data.plugins]
     rows[0] |= {"distribution": distribution, "version": number}
     write_results(path, replace(data, plugins=rows))
-    (told,) = _warnings(path)
-    assert told == (
+    (message,) = _warnings(path)
+    assert message == (
         f"this file was written with the contact model 'slender' of {distribution} {number} and"
         " continues with wearsim: the last digits may differ from those of an unbroken run"
     )

@@ -1,4 +1,4 @@
-"""Whatever kills a run, and whenever: its file opens, and goes on to the same bits."""
+"""Killed runs: the file can be read, and the resumed run is bitwise identical."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from killed_scripts import ROOT, rows_of
-from study_examples import RIG, unlike
+from study_examples import RIG, run_differences
 
 import wearsim
 from tests.interruptible import interruptible
@@ -25,7 +25,7 @@ pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork and 
 def test_run_killed_while_writing_resumes_bit_for_bit(tmp_path: Path, extent: str) -> None:
     head, *rows = rows_of("killed_run.py", "stages", tmp_path, extent)
     stages = head["stages"]
-    # fresh bodies, two steps, and the end: four files, each written through all stages
+    # initial state, two steps, and the end: four writes through all stages
     assert {stage.split(maxsplit=1)[1] for stage in stages} == set(atomic_write.STAGES)
     assert stages.count("before rename") == stages.count("after rename") == 4
     assert stages.count("before write") > 4
@@ -34,10 +34,10 @@ def test_run_killed_while_writing_resumes_bit_for_bit(tmp_path: Path, extent: st
     assert extent == "each stage" or killed_at == list(range(len(stages)))
     for row in rows:
         assert row["killed"][0] == signal.SIGKILL
-        assert row["unlike"] == []
-        if len(row["killed"]) == 1:  # the file is that of the last rename, neither older nor newer
+        assert row["differences"] == []
+        if len(row["killed"]) == 1:  # the file is that of the last rename
             renamed = stages[: row["number"] + 1].count("after rename")
-            assert row["stood"] == [-1.0, 0.0, 3000.0, 6000.0, 6000.0][renamed]
+            assert row["resumed_from"] == [-1.0, 0.0, 3000.0, 6000.0, 6000.0][renamed]
     twice = sum(row["killed"][1:] == [signal.SIGKILL] for row in rows)
     assert twice >= (5 if extent == "all" else 2)
 
@@ -47,10 +47,12 @@ def test_run_killed_at_any_moment_resumes_bit_for_bit(tmp_path: Path) -> None:
     rows = rows_of("killed_run.py", "moments", tmp_path, 20)
     assert len(rows) == 20
     for row in rows:
-        assert row["unlike"] == []
+        assert row["differences"] == []
         assert set(row["killed"]) <= {signal.SIGPROF, 0}
     assert sum(signal.SIGPROF in row["killed"] for row in rows) >= 10
-    assert sum(0.0 <= row["stood"] < 6000.0 for row in rows) >= 3  # some in the midst of it
+    assert (
+        sum(0.0 <= row["resumed_from"] < 6000.0 for row in rows) >= 3
+    )  # some between start and end
 
 
 @pytest.fixture(scope="module")
@@ -76,10 +78,10 @@ def test_run_stopped_by_signal_resumes_bit_for_bit(
         while not path.exists() and running.poll() is None:
             time.sleep(0.005)
         running.send_signal(number)
-        said = running.communicate()[1]
-    assert running.returncode == 130, said
-    assert f"wearsim resume {path}" in said
+        output = running.communicate()[1]
+    assert running.returncode == 130, output
+    assert f"wearsim resume {path}" in output
     stopped = open_results(path)
     assert 0.0 < stopped.passes[-1] < 120_000
     assert not stopped.finished
-    assert unlike(wearsim.resume(path), unbroken) == []
+    assert run_differences(wearsim.resume(path), unbroken) == []

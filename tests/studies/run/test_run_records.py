@@ -1,4 +1,4 @@
-"""Records: where the cadence says, and never in the way of a step."""
+"""Records follow their schedule and do not change the steps."""
 
 from __future__ import annotations
 
@@ -6,23 +6,23 @@ import math
 
 import numpy as np
 import pytest
-from study_examples import LOADS, ROLLERS, STEPPERS, short, unlike
+from study_examples import LOADS, ROLLERS, STEPPERS, run_differences, short
 
 from wearsim.errors import StepError
 from wearsim.evolution.error_control.step_doubling import StepDoublingStepper
 from wearsim.evolution.steppers.per_pass import PerPassStepper
 from wearsim.results import Result
-from wearsim.studies.run import run as replay
+from wearsim.studies.run import run as studies
 
 pytestmark = pytest.mark.usefixtures("small_chunks")
 
 PASSES = 6000
-CADENCES: dict[str, dict[str, object]] = {
+SCHEDULES: dict[str, dict[str, object]] = {
     "five": {"outputs.records": 5},
     "fifty": {"outputs.records": 50},
     "log": {"outputs.records": 12, "outputs.spacing": "log"},
     "passes": {"outputs.every_passes": 1700},
-    "time": {"outputs.every": "36 s"},  # 1800 passes, but for the round-off
+    "time": {"outputs.every": "36 s"},  # 1800 passes, except for round-off
     "default": {},
 }
 EXPECTED = {
@@ -33,26 +33,27 @@ EXPECTED = {
     "time": np.array([0, 1800, 3600, 5400, 6000]),
     "default": np.arange(0, 6001, 1500),
 }
-# what a cadence is seen in; everything else must be the same bits
-OWN = {"sha256", "scenario_text"}
+# values that depend on the schedule; all others must be bitwise identical
+DEPENDENT = {"sha256", "scenario_text"}
 
 
 def _runs(**overrides: object) -> dict[str, Result]:
     return {
-        name: replay.run(short(**{**overrides, **cadence})) for name, cadence in CADENCES.items()
+        name: studies.run(short(**{**overrides, **schedule}))
+        for name, schedule in SCHEDULES.items()
     }
 
 
 @pytest.mark.parametrize("load", LOADS)
 @pytest.mark.parametrize("stepper", ["implicit", "stabilised", "explicit"])
-def test_that_records_never_move_a_step(stepper: str, load: str) -> None:
+def test_records_do_not_change_steps(stepper: str, load: str) -> None:
     runs = _runs(**{**ROLLERS["wearing"], **LOADS[load], **STEPPERS[stepper]})
     first = runs["five"]
     for name, run in runs.items():
-        apart = [item for item in unlike(run, first) if not item.startswith("records.")]
-        assert set(apart) <= OWN, name
+        changed = [item for item in run_differences(run, first) if not item.startswith("records.")]
+        assert set(changed) <= DEPENDENT, name
         np.testing.assert_allclose(run.record_passes, EXPECTED[name], rtol=1e-12)
-        # records of the same moment are the same bits, whoever asked for them
+        # records at the same passes are bitwise identical in all schedules
         for here, there in zip(*_shared(run, first), strict=True):
             for variable in run.raw.records:
                 np.testing.assert_array_equal(
@@ -61,14 +62,14 @@ def test_that_records_never_move_a_step(stepper: str, load: str) -> None:
 
 
 def _shared(one: Result, other: Result) -> tuple[list[int], list[int]]:
-    """Return which records two runs made after the same passes."""
+    """Return the numbers of the records that two runs made at the same passes."""
     _, here, there = np.intersect1d(one.record_passes, other.record_passes, return_indices=True)
     assert len(here) >= 2
     return here.tolist(), there.tolist()
 
 
 def _short_side_steps(monkeypatch: pytest.MonkeyPatch, longest: float) -> None:
-    """Let side steps longer than `longest` passes fail."""
+    """Make side steps longer than `longest` passes fail."""
     side_step = StepDoublingStepper.side_step
 
     def step(self, problem, state, passes):
@@ -79,33 +80,33 @@ def _short_side_steps(monkeypatch: pytest.MonkeyPatch, longest: float) -> None:
     monkeypatch.setattr(StepDoublingStepper, "side_step", step)
 
 
-def test_that_a_record_out_of_reach_of_one_step_is_reached_in_halves(
+def test_failing_side_step_is_halved(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     scenario = short(**{"outputs.records": 12, "outputs.spacing": "log"})
-    whole = replay.run(scenario)
+    whole = studies.run(scenario)
     _short_side_steps(monkeypatch, 40.0)
-    halves = replay.run(scenario)
-    assert {name.partition(".")[0] for name in unlike(halves, whole)} <= {"records"}
+    halves = studies.run(scenario)
+    assert {name.partition(".")[0] for name in run_differences(halves, whole)} <= {"records"}
     np.testing.assert_array_equal(halves.record_passes, whole.record_passes)
-    apart = np.abs(halves.profiles - whole.profiles).max()
-    assert 0.0 < apart < 1e-3 * whole.depth[-1]
+    difference = np.abs(halves.profiles - whole.profiles).max()
+    assert 0.0 < difference < 1e-3 * whole.depth[-1]
 
 
-def test_that_a_record_out_of_reach_of_any_step_ends_the_run(
+def test_record_without_side_step_fails_the_run(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     _short_side_steps(monkeypatch, 0.0)
     with pytest.raises(StepError, match="too many"):
-        replay.run(short(**{"outputs.records": 12, "outputs.spacing": "log"}))
+        studies.run(short(**{"outputs.records": 12, "outputs.spacing": "log"}))
 
 
 @pytest.mark.parametrize("stepper", ["compiled passes", "passes in Python"])
-def test_that_records_never_move_a_pass(stepper: str) -> None:
-    cadences = {"outputs.records": 7}, {"outputs.every_passes": 13}, {"outputs.spacing": "log"}
+def test_records_do_not_change_per_pass_steps(stepper: str) -> None:
+    schedules = {"outputs.records": 7}, {"outputs.every_passes": 13}, {"outputs.spacing": "log"}
     common = {**ROLLERS["wearing"], **LOADS["spring"], **STEPPERS[stepper]}
     common["operation.passes"] = 100
-    first, *others = [replay.run(short(**{**common, **cadence})) for cadence in cadences]
+    first, *others = [studies.run(short(**{**common, **schedule})) for schedule in schedules]
     for other in others:
         state, expected = other.raw.checkpoint, first.raw.checkpoint
         for name in ("cylinder_depth", "roller_depth", "terms", "passes", "steps", "energy"):
@@ -113,24 +114,24 @@ def test_that_records_never_move_a_pass(stepper: str) -> None:
         for name, array in first.raw.records.items():
             exact = name.endswith("profile") or name.startswith("record")
             found, last = other.raw.records[name][-1], array[-1]
-            # a contact solved anew from another start is the same to the end of Newton's steps
+            # contacts solved from different initial values agree within the Newton tolerance
             tolerance = 0.0 if exact else 2e-8 * np.abs(last).max()
             np.testing.assert_allclose(found, last, rtol=0.0, atol=tolerance, err_msg=name)
 
 
 @pytest.mark.parametrize("stepper", ["compiled passes", "passes in Python"])
-def test_that_passes_one_by_one_are_recorded_whole_and_done_once(
+def test_per_pass_stepper_records_whole_passes(
     stepper: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(*_: object) -> None:
-        raise AssertionError("a record needs no step of its own where the run pauses for it")
+        raise AssertionError("the per-pass stepper stops at records and needs no side step")
 
     monkeypatch.setattr(PerPassStepper, "side_step", refuse)
     common = {**STEPPERS[stepper], "operation.passes": 100}
-    for cadence in ({"outputs.records": 7}, {"outputs.records": 30, "outputs.spacing": "log"}):
-        run = replay.run(short(**{**common, **cadence}))
+    for schedule in ({"outputs.records": 7}, {"outputs.records": 30, "outputs.spacing": "log"}):
+        run = studies.run(short(**{**common, **schedule}))
         due = [100 * k / 7 for k in range(8)]
-        if "outputs.spacing" in cadence:
+        if "outputs.spacing" in schedule:
             due = [0.0, *(100 ** (k / 30) for k in range(1, 31))]
         expected = sorted({math.ceil(round(passes, 9)) for passes in due})
         assert run.record_passes.tolist() == expected
@@ -140,8 +141,8 @@ def test_that_passes_one_by_one_are_recorded_whole_and_done_once(
 
 @pytest.mark.parametrize("rollers", ROLLERS)
 @pytest.mark.parametrize("stepper", STEPPERS)
-def test_that_records_begin_fresh_and_end_with_the_end(stepper: str, rollers: str) -> None:
-    run = replay.run(short(**{**ROLLERS[rollers], **LOADS["spring"], **STEPPERS[stepper]}))
+def test_records_cover_initial_and_final_state(stepper: str, rollers: str) -> None:
+    run = studies.run(short(**{**ROLLERS[rollers], **LOADS["spring"], **STEPPERS[stepper]}))
     records, checkpoint = run.raw.records, run.raw.checkpoint
     assert records["record_passes"][0] == 0.0
     assert not records["cylinder_depth_profile"][0].any()
@@ -159,16 +160,16 @@ def test_that_records_begin_fresh_and_end_with_the_end(stepper: str, rollers: st
 
 
 @pytest.mark.parametrize("every", ["10 s", "7.5 s", "1 s"])
-def test_that_an_interval_of_time_makes_no_second_last_record(every: str) -> None:
-    # 1000 rpm is 50 passes a second, less a round-off, as is then the last record's place
-    run = replay.run(short(operation__duration="30 s", outputs__every=every))
+def test_time_interval_gives_no_duplicate_last_record(every: str) -> None:
+    # 1000 rpm is 50 passes per second less round-off, which also affects the last record
+    run = studies.run(short(operation__duration="30 s", outputs__every=every))
     seconds = float(every.split(maxsplit=1)[0])
     np.testing.assert_allclose(run.record_time, np.arange(0.0, 30.1, seconds), atol=1e-9)
     assert run.record_passes[-2] < run.raw.total_passes - 1.0
 
 
-def test_that_records_lie_on_the_way_of_the_steps() -> None:
-    run = replay.run(short(evolution__tolerance=1e-4, outputs__records=23))
+def test_records_agree_with_interpolated_history() -> None:
+    run = studies.run(short(evolution__tolerance=1e-4, outputs__records=23))
     between = np.interp(run.record_passes, run.passes, run.depth)
     np.testing.assert_allclose(run.profiles.max(axis=1), between, rtol=2e-3)
     loads = run.line_load.sum(axis=1) * (run.y[1] - run.y[0])

@@ -80,9 +80,9 @@ class Realisations:
         self.model.prepare(self.grid, (scenario.cylinder.material, scenario.roller.material))
         self._curvature = 1.0 / scenario.cylinder.radius + 1.0 / scenario.roller.radius
         self._height = start_height(scenario.cylinder.profile, self.grid)
-        self.friction_points = 0
-        if self._field is not None:
-            self.friction_points = self._checked_points(self._field, columns)
+        self.friction_points = (
+            0 if self._field is None else self._checked_points(self._field, columns)
+        )
 
     def loads(self, first: int, count: int) -> FloatArray:
         """Return the loads of consecutive realisations, shape (count,) [N]."""

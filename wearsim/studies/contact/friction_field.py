@@ -40,10 +40,16 @@ class LocalFriction:
         self._scenario, self._item, self._field = scenario, item, item.distribution
         self._stream = Stream(scenario.seed, item.name, "field")
         if not model.capabilities.friction_field:
+            specs = [
+                registry().get(ContactModelSpec, name)
+                for name in registry().names(ContactModelSpec)
+            ]
+            names = [f"'{spec.name}'" for spec in specs if spec.capabilities.friction_field]
+            models = f"contact.model = {' or '.join(names)}" if names else "another distribution"
             raise CapabilityError(
                 f"{scenario.file}: contact model '{scenario.contact.model}' does not support"
                 f" friction that varies within the contact, {item.name} with distribution ="
-                f" '{item.kind}'; choose {_supporting_models()}"
+                f" '{item.kind}'; choose {models}"
             )
         if scenario.creepage.drive != "creepage":
             raise CapabilityError(
@@ -97,13 +103,6 @@ class LocalFriction:
             friction[row] = self._field.values(x[row], y, uniforms)
         carried = self._field.frame != "contact"
         return replace(points, friction=friction, friction_carried=carried)
-
-
-def _supporting_models() -> str:
-    """Return the settings of the models that support a friction field."""
-    specs = [registry().get(ContactModelSpec, name) for name in registry().names(ContactModelSpec)]
-    names = [f"'{spec.name}'" for spec in specs if spec.capabilities.friction_field]
-    return f"contact.model = {' or '.join(names)}" if names else "another distribution"
 
 
 def finer_grid(

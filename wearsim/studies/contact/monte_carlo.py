@@ -132,11 +132,10 @@ class _Study:
     def interrupted(self) -> Interrupted:
         """Write the completed realisations and return the error of an interrupted study."""
         self.close()
-        rest = "nothing was written"
-        if self.path:
-            rest = f"they are in {self.path}; plot them with: wearsim plot {self.path}"
+        stored = f"they are in {self.path}; plot them with: wearsim plot {self.path}"
         return Interrupted(
-            f"stopped after {self.done} of {self.contacts.count} realisations; {rest}"
+            f"stopped after {self.done} of {self.contacts.count} realisations;"
+            f" {stored if self.path else 'nothing was written'}"
         )
 
     def close(self) -> DissipationData:
@@ -183,17 +182,25 @@ class _Study:
         return data
 
     def _warnings(self, kept: int) -> list[str]:
-        warnings = []
-        if self.scenario.operation.rollers > 1:
-            warnings.append("only the contact of the first roller is considered")
-        if self.scenario.sampling.plan != "monte-carlo":
-            warnings.append(
-                "standard errors and intervals are those of plain Monte Carlo, which are not exact"
-                f" for {self.scenario.sampling.plan}"
-            )
-        if kept < self.done:
-            warnings.append(
-                f"P_l(y) of the first {kept} of {self.done} realisations is stored, and its band is"
-                " computed from them; its mean and std are those of all"
-            )
-        return warnings
+        plan = self.scenario.sampling.plan
+        warnings = (
+            (
+                self.scenario.operation.rollers > 1,
+                "only the contact of the first roller is considered",
+            ),
+            (
+                plan != "monte-carlo",
+                (
+                    "standard errors and intervals are those of plain Monte Carlo, which are not"
+                    f" exact for {plan}"
+                ),
+            ),
+            (
+                kept < self.done,
+                (
+                    f"P_l(y) of the first {kept} of {self.done} realisations is stored; its band is"
+                    " computed from them; its mean and std are those of all"
+                ),
+            ),
+        )
+        return [text for applies, text in warnings if applies]

@@ -65,9 +65,8 @@ class ContactStudy:
 
 def _grid(scenario: Scenario, model: ContactModel, load: float, profile: Profile | None) -> Grid:
     """Return the strips of the scenario, of the profile's whole width, or of the model's choice."""
-    choice, centre = scenario.contact, contact_centres(scenario)[0]
-    if choice.centre is not None:
-        centre = choice.centre
+    choice = scenario.contact
+    centre = choice.centre if choice.centre is not None else contact_centres(scenario)[0]
     half_width = fresh_patch(scenario, load).b
     if choice.width is None and profile is not None:
         return profile_grid(profile, half_width, choice.strips)

@@ -232,9 +232,8 @@ def _paired(result: EnsembleResult, first: Comparable | None, observable: str) -
 
 def _of_run(result: Result, observable: str) -> Interval:
     """Return a run's value with its estimated error, or with zero width if there is none."""
-    value, error = float(_values(result, observable)[1][0]), 0.0
-    if observable in _ERRORS:
-        error = float(np.max(result.values(_ERRORS[observable])[-1]))
+    value, name = float(_values(result, observable)[1][0]), _ERRORS.get(observable)
+    error = 0.0 if name is None else float(np.max(result.values(name)[-1]))
     return Interval(value, value - error, value + error)
 
 

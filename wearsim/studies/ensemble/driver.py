@@ -71,39 +71,53 @@ def ensemble_warnings(result: EnsembleResult, target: Target | None, reached: bo
     -------
     list of str
     """
-    warnings = []
+    beyond = 0
     if result.count:
         deepest = np.maximum(result.at_end("depth"), result.at_end("roller_depth"))
         beyond = int((result.values("depth_error") > result.raw.tolerance * deepest).sum())
-        if beyond:
-            warnings.append(
+    processes = [item["name"] for item in result.raw.groups if item["role"] == "process"]
+    warnings = (
+        (
+            beyond > 0,
+            (
                 f"the estimated error of depth exceeds the tolerance in {beyond} of {result.count}"
                 " realisations; lower evolution.tolerance"
-            )
-        if result.numbers[-1] >= result.kept:
-            warnings.append(
+            ),
+        ),
+        (
+            result.count > 0 and result.numbers[-1] >= result.kept,
+            (
                 f"only the profiles of the first {result.kept} realisations are stored; the mean"
                 " profile and its band are computed from them"
-            )
-    if result.scenario.sampling.correlation:
-        warnings.append(
-            "some inputs are correlated: the sensitivity to one of them includes the effect of the"
-            " inputs correlated with it, so that the parts may add up to more than the total"
-        )
-    if result.plan == "control-variate" and result.failed:
-        warnings.append(
-            f"{result.failed} realisations failed, and the mean of the control variate includes"
-            " them: estimates are those of plain Monte Carlo"
-        )
-    processes = [item["name"] for item in result.raw.groups if item["role"] == "process"]
-    if processes and result.plan in {"sobol", "latin-hypercube"}:
-        warnings.append(
-            f"{' and '.join(processes)} follow random processes, whose paths are sampled by plain"
-            f" Monte Carlo: {result.plan} applies to the other inputs only"
-        )
-    if target is not None and not reached:
-        warnings.append(f"{target} was not reached by {result.asked} realisations")
-    return warnings
+            ),
+        ),
+        (
+            bool(result.scenario.sampling.correlation),
+            (
+                "some inputs are correlated: the sensitivity to one of them includes the effect of"
+                " the inputs correlated with it, so that the parts may add up to more than 1"
+            ),
+        ),
+        (
+            result.plan == "control-variate" and result.failed > 0,
+            (
+                f"{result.failed} realisations failed, and the mean of the control variate includes"
+                " them: estimates are those of plain Monte Carlo"
+            ),
+        ),
+        (
+            bool(processes) and result.plan in {"sobol", "latin-hypercube"},
+            (
+                f"{' and '.join(processes)} follow random processes, whose paths are sampled by"
+                f" plain Monte Carlo: {result.plan} applies to the other inputs only"
+            ),
+        ),
+        (
+            target is not None and not reached,
+            f"{target} was not reached by {result.asked} realisations",
+        ),
+    )
+    return [text for applies, text in warnings if applies]
 
 
 class EnsembleWork:

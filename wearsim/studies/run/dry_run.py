@@ -11,24 +11,6 @@ from wearsim.studies.run.grid import fresh_patch
 TableRows = list[tuple[str, str]]
 
 
-def _bodies(scenario: Scenario) -> TableRows:
-    roller, cylinder = scenario.roller, scenario.cylinder
-    pair = combine(cylinder.material, roller.material)
-    elasticity = (
-        f"contact modulus {pair.contact_modulus / 1e9:.4g} GPa,"
-        f" shear modulus {pair.shear_modulus / 1e9:.4g} GPa"
-    )
-    return [
-        (
-            "roller",
-            f"radius {roller.radius * 1e3:.6g} mm, crown radius {roller.crown_radius * 1e3:.6g} mm",
-        ),
-        ("cylinder", f"radius {cylinder.radius * 1e3:.6g} mm"),
-        ("elasticity", elasticity),
-        ("rolling speed", f"{scenario.rolling_speed:.4g} m/s"),
-    ]
-
-
 def _creepage(scenario: Scenario) -> str:
     creepage = scenario.creepage
     if creepage.drive == "free":
@@ -52,22 +34,6 @@ def _random(scenario: Scenario) -> TableRows:
     words += [f"rank correlation of {', '.join(pairs)}"] if pairs else []
     rows = [(f"random {item.name}", item.describe()) for item in scenario.random]
     return [*rows, ("sampling", ", ".join(words))]
-
-
-def _contact(scenario: Scenario, load: float) -> TableRows:
-    patch, choice = fresh_patch(scenario, load), scenario.contact
-    model = described_model(choice.model, scenario.text)
-    size = (
-        f"{2e3 * patch.a:.4g} x {2e3 * patch.b:.4g} mm,"
-        f" peak pressure {patch.peak_pressure / 1e6:.4g} MPa"
-    )
-    return [
-        ("friction", f"{scenario.friction.coefficient:.4g}"),
-        ("creepage", _creepage(scenario)),
-        *_random(scenario),
-        ("contact model", f"{model}: {choice.spec.summary}"),
-        ("initial patch (Hertz)", size),
-    ]
 
 
 def _test(scenario: Scenario) -> TableRows:
@@ -117,8 +83,30 @@ def plan(scenario: Scenario) -> TableRows:
     if load.stiffness > 0.0:
         values += f", less {load.stiffness / 1e3:.4g} N/mm of descent"
     values += "".join(f", plus {term.name}" for term in scenario.load.terms)
-    rows = [*_bodies(scenario), ("load", f"{scenario.load.kind}, {values}")]
-    rows += _contact(scenario, high)
+    roller, cylinder, choice = scenario.roller, scenario.cylinder, scenario.contact
+    pair, patch = combine(cylinder.material, roller.material), fresh_patch(scenario, high)
+    radii = f"radius {roller.radius * 1e3:.6g} mm, crown radius {roller.crown_radius * 1e3:.6g} mm"
+    moduli = (
+        f"contact modulus {pair.contact_modulus / 1e9:.4g} GPa,"
+        f" shear modulus {pair.shear_modulus / 1e9:.4g} GPa"
+    )
+    size = (
+        f"{2e3 * patch.a:.4g} x {2e3 * patch.b:.4g} mm,"
+        f" peak pressure {patch.peak_pressure / 1e6:.4g} MPa"
+    )
+    model = described_model(choice.model, scenario.text)
+    rows = [
+        ("roller", radii),
+        ("cylinder", f"radius {cylinder.radius * 1e3:.6g} mm"),
+        ("elasticity", moduli),
+        ("rolling speed", f"{scenario.rolling_speed:.4g} m/s"),
+        ("load", f"{scenario.load.kind}, {values}"),
+        ("friction", f"{scenario.friction.coefficient:.4g}"),
+        ("creepage", _creepage(scenario)),
+        *_random(scenario),
+        ("contact model", f"{model}: {choice.spec.summary}"),
+        ("initial patch (Hertz)", size),
+    ]
     if is_run:
         return rows + _test(scenario)
     check_model(scenario, scenario.contact.build())

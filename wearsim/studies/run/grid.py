@@ -206,9 +206,7 @@ def run_grid(scenario: Scenario, load: float, maxima: InputMaxima = NO_RANDOM_IN
         shift += scenario.roller.crown_radius * maxima.tilt
     half = shift + 1.1 * predicted_half_width(scenario, load, maxima) + 1.3 * patch.b
     width = choice.width if choice.width is not None else 2.0 * half
-    strips = choice.strips
-    if strips is None:
-        strips = strips_over(width, patch.b, scenario.evolution.tolerance)
+    strips = choice.strips or strips_over(width, patch.b, scenario.evolution.tolerance)
     if width < 2.0 * (shift + patch.b):
         needed = f"at least {2e3 * (shift + patch.b):.4g} mm"
         mistake = Mistake(

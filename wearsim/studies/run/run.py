@@ -168,9 +168,7 @@ class _RunInProgress:
         data: RunData | None = None,
         state: WearState | None = None,
     ) -> None:
-        grid = None
-        if data is not None:
-            grid = Grid(data.static["y"], float(data.checkpoint["spacing"]))
+        grid = None if data is None else Grid(data.static["y"], float(data.checkpoint["spacing"]))
         self.scenario, self.path = scenario, path
         self.problem, self.stepper, self.stepper_name = assemble_problem(scenario, grid)
         self.on_event: Watcher = on_event or (lambda event: None)

@@ -1,4 +1,4 @@
-"""The cadence of records by itself."""
+"""Record schedules."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from wearsim.studies.run.recorder import RecordSchedule
 
 
 def _all(schedule: RecordSchedule, stop: float) -> list[float]:
-    """Return every record up to the end of the test, which is one whatever the cadence."""
+    """Return all records up to the end of the test, which is always recorded."""
     found = [0.0]
     while True:
         due = schedule.next_record(found[-1])
@@ -26,9 +26,7 @@ def _all(schedule: RecordSchedule, stop: float) -> list[float]:
 
 @given(stop=st.integers(2, 10**8), count=st.integers(1, 400), log=st.booleans())
 @settings(deadline=None, max_examples=100)
-def test_that_a_number_of_records_is_kept_to_and_the_last_ends_the_test(
-    stop: int, count: int, log: bool
-) -> None:
+def test_number_of_records_is_as_requested(stop: int, count: int, log: bool) -> None:
     schedule = RecordSchedule(0.0 if log else stop / count, float(stop), count)
     found = _all(schedule, stop)
     assert len(found) == count + 1
@@ -46,7 +44,7 @@ def test_that_a_number_of_records_is_kept_to_and_the_last_ends_the_test(
     log=st.booleans(),
 )
 @settings(deadline=None, max_examples=100)
-def test_that_the_next_record_is_later_and_near(
+def test_next_record_is_within_one_interval(
     interval: float, start: float, base: float, count: int, log: bool
 ) -> None:
     schedule = RecordSchedule(0.0 if log else interval, base, count)
@@ -64,7 +62,7 @@ def test_that_the_next_record_is_later_and_near(
 
 @given(interval=st.floats(0.1, 1e5), skipped=st.integers(1, 10**6))
 @settings(deadline=None)
-def test_that_equal_intervals_do_not_drift(interval: float, skipped: int) -> None:
+def test_equal_intervals_do_not_drift(interval: float, skipped: int) -> None:
     schedule = RecordSchedule(interval, 1.0, 1)
     passes = skipped * interval
     for number in range(skipped + 1, skipped + 30):
@@ -74,9 +72,7 @@ def test_that_equal_intervals_do_not_drift(interval: float, skipped: int) -> Non
 
 @given(interval=st.floats(1.0, 1e5), places=st.lists(st.floats(0.0, 1e5), min_size=1))
 @settings(deadline=None)
-def test_that_a_record_is_the_same_from_wherever_it_is_foreseen(
-    interval: float, places: list[float]
-) -> None:
+def test_next_record_does_not_depend_on_position(interval: float, places: list[float]) -> None:
     schedule = RecordSchedule(interval, 1.0, 1)
     for place in places:
         due = schedule.next_record(place)
@@ -95,14 +91,14 @@ def test_that_a_record_is_the_same_from_wherever_it_is_foreseen(
         ({"outputs.every": "0.1 min"}, [300.0, 600.0]),
     ],
 )
-def test_that_a_scenario_sets_the_cadence(outputs: dict[str, object], first: list[float]) -> None:
+def test_scenario_sets_the_schedule(outputs: dict[str, object], first: list[float]) -> None:
     schedule = RecordSchedule.of(short(**outputs), 6000.0)
     found = [schedule.next_record(0.0)]
     found.append(schedule.next_record(found[0]))
     assert found == pytest.approx(first, rel=1e-14)
 
 
-def test_that_twenty_records_are_made_where_none_are_asked_for() -> None:
+def test_default_is_twenty_records() -> None:
     from wearsim.scenario import parse_scenario
 
     text = short().text.replace("records = 4", "")
@@ -110,14 +106,14 @@ def test_that_twenty_records_are_made_where_none_are_asked_for() -> None:
     assert RecordSchedule.of(scenario, 6000.0).next_record(0.0) == 300.0
 
 
-def test_that_a_test_of_one_pass_has_a_cadence() -> None:
+def test_test_of_one_pass_has_a_schedule() -> None:
     schedule = RecordSchedule.of(short(outputs__spacing="log"), 1.0)
     assert schedule.next_record(0.0) > 0.0
 
 
 @pytest.mark.parametrize("speed", ["1000 rpm", "990 rpm", "333 rpm", "1234.5 rpm"])
 @pytest.mark.parametrize("every", ["1 s", "1 min", "7.5 s"])
-def test_that_whole_passes_are_recorded_as_such(speed: str, every: str) -> None:
+def test_whole_passes_are_recorded_without_round_off(speed: str, every: str) -> None:
     schedule = RecordSchedule.of(short(operation__speed=speed, outputs__every=every), 1.0)
     passes = 0.0
     for _ in itertools.repeat(None, 2000):

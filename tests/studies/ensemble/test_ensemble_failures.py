@@ -1,0 +1,143 @@
+"""Failed realisations of ensembles: storage, repetition and effect on others."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import wearsim
+from tests.studies.ensemble_cases import differences, partly_failing, small
+from wearsim.results import open_ensemble
+from wearsim.studies.ensemble import driver as ensemble_work
+from wearsim.studies.ensemble.api import ensemble, resume_ensemble
+
+SERIAL = {"scheduler": "serial"}
+
+
+def test_failed_realisations_are_stored_with_errors(tmp_path):
+    result = ensemble(partly_failing(), 12, tmp_path / "failures.h5", **SERIAL)
+    assert 0 < result.failed < 12
+    assert result.count + result.failed == 12
+    assert result.finished
+    assert all(text for text in result.errors.values())
+    assert np.isfinite(result.at_end("depth")).all()
+    assert result.estimate("depth").count == result.count
+
+
+def test_only_failed_realisations_run_again(tmp_path, monkeypatch):
+    from wearsim.studies.ensemble.realisation import RealisationRunner
+
+    whole = ensemble(small(), 8, tmp_path / "whole.h5", **SERIAL)
+    run = RealisationRunner._prepare
+
+    def failing(self, number, *rest):
+        if number in {2, 5}:
+            raise wearsim.errors.StepError("no step is short enough")
+        return run(self, number, *rest)
+
+    monkeypatch.setattr(RealisationRunner, "_prepare", failing)
+    path = tmp_path / "failing.h5"
+    assert sorted(ensemble(small(), 8, path, **SERIAL).errors) == [2, 5]
+    assert resume_ensemble(path, **SERIAL).failed == 2  # failed ones are run again on request only
+
+    def failing_if_done_again(self, number, *rest):
+        if number not in {2, 5}:
+            raise wearsim.errors.StepError("has been completed before")
+        return run(self, number, *rest)
+
+    monkeypatch.setattr(RealisationRunner, "_prepare", failing_if_done_again)
+    again = resume_ensemble(path, failed=True, **SERIAL)
+    assert differences(again, whole) == []
+
+
+def test_kill_during_repetition_of_failed_loses_nothing(tmp_path, monkeypatch):
+    from wearsim.studies.ensemble.realisation import RealisationRunner
+
+    monkeypatch.setattr(ensemble_work.EnsembleWork, "_batch_size", lambda self: 1)
+    whole = ensemble(small(), 6, tmp_path / "whole.h5", **SERIAL)
+    run = RealisationRunner._prepare
+
+    def failing(self, number, *rest):
+        if number in {2, 4}:
+            raise wearsim.errors.StepError("no step is short enough")
+        return run(self, number, *rest)
+
+    monkeypatch.setattr(RealisationRunner, "_prepare", failing)
+    path = tmp_path / "failing.h5"
+    ensemble(small(), 6, path, **SERIAL)
+
+    def killed(self, number, *rest):
+        if number == 4:
+            raise SystemExit  # like a kill, nothing is written after it
+        return run(self, number, *rest)
+
+    monkeypatch.setattr(RealisationRunner, "_prepare", killed)
+    with pytest.raises(SystemExit):
+        resume_ensemble(path, failed=True, **SERIAL)
+    assert not open_ensemble(path).finished
+    monkeypatch.setattr(RealisationRunner, "_prepare", run)
+    assert differences(resume_ensemble(path, **SERIAL), whole) == []
+
+
+def test_repeated_realisations_count_for_the_target(tmp_path, monkeypatch):
+    from wearsim.studies.ensemble.realisation import RealisationRunner
+
+    monkeypatch.setattr("wearsim.studies.ensemble.designs.FIRST_ANALYSIS", 32)
+    whole = ensemble(small(), 90, tmp_path / "whole.h5", until="depth.mean 8%", **SERIAL)
+    run = RealisationRunner._prepare
+
+    def failing(self, number, *rest):
+        if number % 9 == 0:
+            raise wearsim.errors.StepError("no step is short enough")
+        return run(self, number, *rest)
+
+    monkeypatch.setattr(RealisationRunner, "_prepare", failing)
+    path = tmp_path / "failing.h5"
+    ensemble(small(), 90, path, until="depth.mean 8%", **SERIAL)
+    monkeypatch.setattr(RealisationRunner, "_prepare", run)
+    again = resume_ensemble(path, failed=True, **SERIAL)
+    estimate = again.estimate("depth").mean
+    assert again.finished
+    assert again.failed == 0
+    assert estimate.half_width <= 0.08 * estimate.value
+    np.testing.assert_array_equal(again.at_end("depth")[:32], whole.at_end("depth")[:32])
+
+
+def test_nonfinite_value_fails_one_realisation_only(tmp_path, monkeypatch):
+    from wearsim.studies.ensemble import realisation
+
+    observe = realisation.observe
+
+    def observe_with_nan(group):
+        results = observe(group)
+        for run, result in zip(group, results, strict=True):
+            if run.number == 1:
+                result.rows[-1]["peak_pressure"] = np.nan
+        return results
+
+    monkeypatch.setattr(realisation, "observe", observe_with_nan)
+    result = ensemble(small(), 3, tmp_path / "e.h5", **SERIAL)
+    assert result.errors == {1: "peak_pressure is not finite at record 2"}
+    assert result.finished
+
+
+def test_unexpected_error_fails_one_realisation_only(tmp_path, monkeypatch):
+    from wearsim.studies.ensemble.realisation import RealisationRunner
+
+    run = RealisationRunner._prepare
+
+    def failing(self, number, *rest):
+        return run(self, number, *rest) if number != 1 else 1 / 0
+
+    monkeypatch.setattr(RealisationRunner, "_prepare", failing)
+    result = ensemble(small(), 3, tmp_path / "e.h5", **SERIAL)
+    assert result.errors == {1: "ZeroDivisionError: division by zero"}
+
+
+def test_control_variate_is_omitted_after_failures(tmp_path):
+    result = ensemble(partly_failing(), 12, tmp_path / "e.h5", plan="control-variate", **SERIAL)
+    assert 0 < result.failed < 12
+    estimate = result.estimate("depth")
+    assert estimate.variance_saved is None
+    assert estimate.mean.value == pytest.approx(result.at_end("depth").mean())
+    assert any("plain Monte Carlo" in text for text in result.warnings)
