@@ -1,4 +1,4 @@
-"""The built-in distributions: their numbers, what they refuse, and how they are registered."""
+"""Built-in distributions: values, refused options and registration."""
 
 from __future__ import annotations
 
@@ -60,12 +60,12 @@ def distribution(request: pytest.FixtureRequest) -> Distribution:
     return made
 
 
-def test_that_all_are_registered_under_their_roles() -> None:
+def test_distributions_are_registered_with_their_roles() -> None:
     roles = {name: registry().get(RandomInputSpec, name).role for name in (*NAMES, "disc")}
     assert roles == dict.fromkeys(NAMES, "scalar") | {"disc": "joint"}
 
 
-def test_that_a_million_draws_have_the_mean_and_the_std(
+def test_million_samples_have_the_mean_and_std(
     distribution: Distribution, uniforms: FloatArray
 ) -> None:
     draws = distribution.quantile(uniforms)
@@ -76,7 +76,7 @@ def test_that_a_million_draws_have_the_mean_and_the_std(
         assert abs((centred**2).mean() / distribution.std**2 - 1.0) < 4.0 * fourth / 1e3
 
 
-def test_that_quantiles_go_from_end_to_end_and_rise(distribution: Distribution) -> None:
+def test_quantiles_increase_over_the_support(distribution: Distribution) -> None:
     values = distribution.quantile(np.linspace(0.0, 1.0, 201))
     assert (values[0], values[-1]) == distribution.support
     assert np.all(np.diff(values) >= 0.0)
@@ -84,7 +84,7 @@ def test_that_quantiles_go_from_end_to_end_and_rise(distribution: Distribution) 
 
 
 @pytest.mark.parametrize(
-    ("name", "options", "law"),
+    ("name", "options", "expected"),
     [
         ("normal", {"mean": -3.0, "std": 2.0}, stats.norm(-3.0, 2.0)),
         ("lognormal", {"median": 300.0, "factor": 1.4}, stats.lognorm(math.log(1.4), scale=300.0)),
@@ -101,69 +101,71 @@ def test_that_quantiles_go_from_end_to_end_and_rise(distribution: Distribution) 
         ),
     ],
 )
-def test_that_laws_are_scipys(name: str, options: dict[str, object], law: Any) -> None:
+def test_quantiles_and_moments_equal_those_of_scipy(
+    name: str, options: dict[str, object], expected: Any
+) -> None:
     made = build(name, **options)
     probabilities = np.array([1e-6, 0.01, 0.4, 0.9, 0.9999])
-    assert made.quantile(probabilities) == pytest.approx(law.ppf(probabilities), rel=1e-9)
-    assert made.mean == pytest.approx(law.mean(), rel=1e-9)
-    assert made.std == pytest.approx(law.std(), rel=1e-7)
+    assert made.quantile(probabilities) == pytest.approx(expected.ppf(probabilities), rel=1e-9)
+    assert made.mean == pytest.approx(expected.mean(), rel=1e-9)
+    assert made.std == pytest.approx(expected.std(), rel=1e-7)
 
 
-def test_that_mean_and_std_of_a_lognormal_are_of_the_value_itself() -> None:
+def test_lognormal_mean_and_std_are_those_of_the_value() -> None:
     made = build("lognormal", mean=300.0, std=90.0)
     assert (made.mean, made.std) == (pytest.approx(300.0), pytest.approx(90.0))
     assert build("lognormal", median=2.0, factor=1.5).quantile(np.array(0.5)) == pytest.approx(2.0)
 
 
-def test_that_maxent_keeps_mean_and_std_where_a_truncated_normal_does_not() -> None:
+def test_maxent_keeps_the_mean_unlike_truncated_normal() -> None:
     known = build("maxent", support=[0.0, 1.0], mean=1e-3, std=9e-4)
     cut = build("truncated-normal", support=[0.0, 1.0], parent_mean=1e-3, parent_std=9e-4)
     assert known.mean == pytest.approx(1e-3, rel=1e-12)
     assert cut.mean == pytest.approx(1.22e-3, rel=5e-3)
 
 
-def test_that_options_are_measured_like_their_host() -> None:
+def test_options_have_the_unit_of_the_replaced_value() -> None:
     made = build("maxent", NEWTON, support=["0 N", "inf"], mean="0.307 kN", std="32 N")
     assert made.support == (0.0, math.inf)
     assert (made.mean, made.std) == (pytest.approx(307.0), pytest.approx(32.0))
 
 
-def test_that_warnings_of_a_law_are_passed_on() -> None:
-    (told,) = build("maxent", support=[0.0, 1.0], mean=1e-3, std=1.1e-3).warnings
-    assert "spike" in told
+def test_warnings_of_the_distribution_are_passed_on() -> None:
+    (warning,) = build("maxent", support=[0.0, 1.0], mean=1e-3, std=1.1e-3).warnings
+    assert "spike" in warning
     assert build("normal", mean=0.0, std=1.0).warnings == ()
 
 
-def test_that_samples_of_a_table_are_read_in_the_unit_of_the_host() -> None:
+def test_table_samples_have_the_unit_of_the_replaced_value() -> None:
     made = build("table", {**NEWTON, "read": reader(SAMPLES)}, file="data.csv")
     assert made.support == (100.0, 800.0)
     assert made.quantile(np.array([0.3, 0.5, 0.8])) == pytest.approx([200.0, 300.0, 600.0])
 
 
-def test_that_samples_of_a_table_count_alike() -> None:
+def test_table_samples_have_equal_weights() -> None:
     samples = [0.05, 0.1, 0.1, 0.1, 0.3]
     text = "value\n" + "\n".join(str(sample) for sample in samples)
     made = build("table", {"read": reader(text)}, file="data.csv")
     assert made.mean == pytest.approx(0.13, rel=1e-14)
-    # sample i stands at (i - 1/2)/n, and beyond the first and the last the quantiles are level
+    # sample i is at (i - 1/2)/n, and beyond the first and the last the quantiles are constant
     middles = (np.arange(5) + 0.5) / 5.0
     assert made.quantile(middles) == pytest.approx(samples, rel=1e-14)
     assert made.quantile(np.array([0.0, 0.05, 0.95, 1.0])).tolist() == [0.05, 0.05, 0.3, 0.3]
-    # the law is linear between them: its variance is theirs less a sixth of the squared gaps' mean
+    # linear interpolation reduces the variance by 1/6 of the mean squared difference
     inner = np.square(np.diff(samples)).sum() / 6.0 / 5.0
     assert made.std**2 == pytest.approx(np.var(samples) - inner, rel=1e-13)
 
 
-def test_that_a_table_of_quantiles_is_linear_between_them() -> None:
+def test_table_quantiles_are_interpolated_linearly() -> None:
     made = build("table", {"read": reader(QUANTILES)}, file="data.csv")
     assert made.quantile(np.array([0.25, 0.75])) == pytest.approx([1.5, 3.5])
-    # half of the draws uniform on 1 to 2, half on 2 to 5
+    # half of the samples are uniform on 1 to 2, half on 2 to 5
     assert made.mean == pytest.approx(0.5 * 1.5 + 0.5 * 3.5)
     assert made.std**2 == pytest.approx(0.5 * (7.0 / 3.0 + 13.0) - 2.5**2)
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "message"),
     [
         ("probability, value\n0.1, 1\n1, 2\n", "must go from 0 to 1, got 0.1 to 1"),
         ("probability, value\n0, 3\n1, 2\n", "column 'value' must not decrease, got 2 after 3"),
@@ -172,14 +174,14 @@ def test_that_a_table_of_quantiles_is_linear_between_them() -> None:
         ("number\n1\n2\n", "column 'value' is missing"),
     ],
 )
-def test_that_a_bad_table_is_told(text: str, told: str) -> None:
+def test_mistakes_in_a_table_are_reported(text: str, message: str) -> None:
     with pytest.raises(ScenarioError, match=r"data\.csv") as caught:
         build("table", {"read": reader(text)}, file="data.csv")
-    assert told in str(caught.value)
+    assert message in str(caught.value)
 
 
 @pytest.mark.parametrize(
-    ("name", "context", "options", "told"),
+    ("name", "context", "options", "message"),
     [
         (
             "maxent",
@@ -207,21 +209,21 @@ def test_that_a_bad_table_is_told(text: str, told: str) -> None:
         ),
     ],
 )
-def test_that_what_cannot_be_is_refused(
-    name: str, context: dict[str, Any] | None, options: dict[str, object], told: str
+def test_infeasible_options_are_refused(
+    name: str, context: dict[str, Any] | None, options: dict[str, object], message: str
 ) -> None:
     with pytest.raises(ValidationError) as caught:
         build(name, context, **options)
-    assert told in str(caught.value)
+    assert message in str(caught.value)
 
 
-def test_that_the_disc_is_filled_evenly(uniforms: FloatArray) -> None:
+def test_disc_is_uniformly_distributed(uniforms: FloatArray) -> None:
     disc: JointDistribution = build("disc", radius=0.002)
     assert disc.components == ("yaw", "tilt")
     points = disc.values(uniforms.reshape(-1, 2)) / 0.002
     square = (points**2).sum(axis=1)
     angle = np.arctan2(points[:, 1], points[:, 0]) / np.pi
-    # evenly filled: area within a radius and angle are uniform, and know nothing of each other
+    # uniform on the disc: the area within a radius and the angle are uniform and independent
     assert stats.kstest(square, "uniform").pvalue > 1e-3
     assert stats.kstest(angle, stats.uniform(-1.0, 2.0).cdf).pvalue > 1e-3
     assert abs(np.corrcoef(square, angle)[0, 1]) < 4.0 / math.sqrt(len(square))
@@ -230,7 +232,7 @@ def test_that_the_disc_is_filled_evenly(uniforms: FloatArray) -> None:
     assert np.all(np.abs(points) <= np.array(disc.reach) / 0.002)
 
 
-def test_that_the_disc_turns_over_with_its_uniforms() -> None:
+def test_disc_is_antisymmetric_in_the_uniform_numbers() -> None:
     disc = build("disc", radius=0.002)
     uniform = np.random.default_rng(2).random((100, 2))
     assert disc.values(1.0 - uniform) == pytest.approx(-disc.values(uniform), abs=1e-17)

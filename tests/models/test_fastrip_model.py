@@ -1,4 +1,4 @@
-"""FaStrip as a tangential theory, against the exact theory and on the strips of any contact."""
+"""FaStrip as a tangential theory: against exact theory, and on the strips of any contact."""
 
 import math
 from dataclasses import replace
@@ -44,7 +44,7 @@ def rms(values):
 @pytest.mark.parametrize(
     ("kind", "bound", "worst"), [("paper", 2e-3, 3e-3), ("partial", 5e-3, 0.012)]
 )
-def test_that_the_rigs_power_is_that_of_the_exact_theory(kind, bound, worst):
+def test_rig_power_agrees_with_exact_theory(kind, bound, worst):
     found = errors(rows("rig_random", kind=kind), contact)
     assert rms(found) < bound
     assert np.abs(found).max() < worst
@@ -52,7 +52,7 @@ def test_that_the_rigs_power_is_that_of_the_exact_theory(kind, bound, worst):
 
 @pytest.mark.bench
 @pytest.mark.parametrize("kind", ["paper", "partial"])
-def test_that_the_rigs_power_is_spread_over_the_strips_as_in_the_exact_theory(kind):
+def test_rig_dissipation_profile_agrees_with_exact_theory(kind):
     y_over_b, exact = strips_of(kind)
     distances = []
     for number, case in enumerate(rows("rig_random", kind=kind)):
@@ -69,12 +69,12 @@ def hard(case):
 
 
 @pytest.mark.bench
-def test_that_hard_cases_stay_within_three_percent_rms():
+def test_hard_cases_are_within_three_percent_rms():
     cases = rows("hard_cases")
     found = errors(cases, hard)
     assert rms(found) < 0.02
     assert np.abs(found).max() < 0.055
-    # strip theory's own ground: long across rolling, or creepage that outweighs spin
+    # the range of strip theory: long across rolling, or creepage that dominates spin
     long = np.array([case["b_m"] >= 4.9 * case["a_m"] for case in cases])
     assert np.abs(found[long]).max() < 0.01
 
@@ -82,7 +82,7 @@ def test_that_hard_cases_stay_within_three_percent_rms():
 @pytest.mark.bench
 @pytest.mark.parametrize("name", ["hertz", "flat", "bump_1um", "bump_10um", "parabola"])
 @pytest.mark.parametrize("creepage", ["mean", "partial", "combined"])
-def test_that_it_takes_the_strips_of_a_worn_profile(name, creepage):
+def test_strips_of_a_worn_profile_are_supported(name, creepage):
     worn = worn_profile(name)
     y = worn["y"]
     strips = Strips(
@@ -97,7 +97,7 @@ def test_that_it_takes_the_strips_of_a_worn_profile(name, creepage):
 
 @pytest.mark.bench
 @pytest.mark.parametrize("creepage", [(4e-4, 5e-4, 0.05), (2e-4, -1e-4, 0.9), (1e-3, 5e-4, 30.0)])
-def test_that_power_is_the_work_of_the_rigid_slip(creepage):
+def test_power_is_the_work_of_the_rigid_slip(creepage):
     xi, eta, phi = creepage
     case = {"N_N": 300.0, "mu": 0.1, "xi": xi, "eta": eta, "phi_per_m": phi}
     *_, found = contact(case)
@@ -108,7 +108,7 @@ def test_that_power_is_the_work_of_the_rigid_slip(creepage):
 
 @pytest.mark.bench
 @pytest.mark.parametrize("curvatures", [RIG, (20.0, 20.0), (2.0, 60.0)])
-def test_that_no_strip_grows(curvatures):
+def test_no_strip_has_negative_dissipation(curvatures):
     rng, model = np.random.default_rng(11), HertzModel(FastripTheory(), 41)
     grid = model.suggest_grid(curvatures[1], curvatures[0], 300.0, MATERIALS)
     model.prepare(grid, MATERIALS)
@@ -123,10 +123,10 @@ def test_that_no_strip_grows(curvatures):
         assert found.dissipation.min() >= 0.0
         assert found.power == pytest.approx(work, rel=1e-9)
         resting += np.count_nonzero(found.dissipation == 0.0)
-    assert resting > 0  # such as would have grown
+    assert resting > 0  # strips with negative work occur
 
 
-def test_that_work_is_spread_without_negative_parts_and_keeps_its_sum():
+def test_spread_work_is_not_negative_and_keeps_its_sum():
     rng = np.random.default_rng(3)
     for shift in (3.0, 1.0, 0.1, -0.5):
         work = rng.normal(size=50) + shift
@@ -138,7 +138,7 @@ def test_that_work_is_spread_without_negative_parts_and_keeps_its_sum():
 
 
 @pytest.mark.bench
-def test_that_creepage_that_varies_across_the_track_is_nearly_spins_longitudinal_part():
+def test_varying_creepage_approximates_longitudinal_spin():
     case = {"N_N": 300.0, "mu": 0.1, "xi": 4e-4, "eta": 0.0, "phi_per_m": 0.2}
     model, gap, point, turning = contact(case)
     varied = replace(point, creepage=Creepage(4e-4, variation=-0.2 * turning.y))
@@ -149,7 +149,7 @@ def test_that_creepage_that_varies_across_the_track_is_nearly_spins_longitudinal
 
 
 @pytest.mark.bench
-def test_that_a_bearing_torque_finds_its_creepage_and_skids_past_friction():
+def test_bearing_torque_is_balanced_or_the_roller_skids():
     case = {"N_N": 300.0, "mu": 0.1, "xi": 0.0, "eta": 2e-4, "phi_per_m": 0.1}
     model, gap, point, _ = contact(case)
     torque = replace(point, bearing_torque=0.1, rolling_radius=np.full(60, 20e-3))
@@ -161,7 +161,7 @@ def test_that_a_bearing_torque_finds_its_creepage_and_skids_past_friction():
 
 @pytest.mark.bench
 @pytest.mark.parametrize("creepage", [(6e-4, 3e-4, 0.05), (2e-4, 0.0, 0.5), (1e-3, 5e-4, 8.0)])
-def test_that_the_fields_are_the_inside_of_the_solution(creepage):
+def test_fields_integrate_to_the_solution(creepage):
     xi, eta, phi = creepage
     case = {"N_N": 300.0, "mu": 0.1, "xi": xi, "eta": eta, "phi_per_m": phi}
     model, gap, point, solution = contact(case, mx=400)
@@ -181,7 +181,7 @@ def test_that_the_fields_are_the_inside_of_the_solution(creepage):
 
 
 @pytest.mark.bench
-def test_that_spin_too_strong_for_strip_theory_makes_no_great_jump_on_a_long_contact():
+def test_transition_to_fastsim_at_large_spin_is_small():
     peak = 1.5 * 300.0 / (math.pi * 1.363e-4 * 1.545e-3)
     limit = 2.0 * 0.1 * peak / (1.363e-4 * PAIR.shear_modulus * 1.517)
     powers = []
@@ -192,7 +192,7 @@ def test_that_spin_too_strong_for_strip_theory_makes_no_great_jump_on_a_long_con
 
 
 @pytest.mark.bench
-def test_that_a_grid_of_any_width_gives_the_same():
+def test_solution_is_independent_of_the_grid_width():
     case = {"N_N": 300.0, "mu": 0.1, "xi": 4e-4, "eta": 3e-4, "phi_per_m": 0.1}
     exact = contact(case, strips=1000)[-1].power
     model = HertzModel(FastripTheory(), 60)

@@ -29,7 +29,7 @@ RIG = (90.0, 2.0)  # relative curvatures along and across
 
 
 def contact(grid=None, creepage=(1e-3, 0.0, 0.0), load=300.0, mu=0.1, shape=None, **options):
-    """Solve the rig's contact; `options` in the words of a scenario."""
+    """Solve the rig's contact; `options` as in a scenario."""
     model = HertzFastsim(HertzFastsimOptions(**options))
     if grid is None:
         grid = model.suggest_grid(RIG[1], RIG[0], load, MATERIALS)
@@ -49,32 +49,32 @@ def balance(point, solution):
 
 
 @pytest.mark.bench
-def test_that_the_mean_problem_dissipates_0_073873_watts_in_closed_form():
+def test_mean_problem_power_in_closed_form_is_0_073873_watts():
     *_, solution = contact(kalker="line-limit", my=1000)
     assert solution.power == pytest.approx(0.073873, rel=1e-5)
 
 
 @pytest.mark.bench
-def test_that_50_by_50_fastsim_is_within_a_thousandth_of_it():
+def test_fastsim_50_by_50_is_within_a_thousandth_of_it():
     *_, solution = contact(kalker="line-limit", closed_form="never")
     assert solution.power == pytest.approx(0.073873, rel=1e-3)
 
 
 @pytest.mark.bench
-def test_that_the_table_moves_the_mean_problem_by_less_than_two_thousandths():
+def test_kalker_table_changes_the_power_by_under_0_002():
     power = {name: contact(kalker=name)[-1].power for name in ("table", "line-limit")}
     assert 1e-4 < power["table"] / power["line-limit"] - 1.0 < 2e-3
 
 
 @pytest.mark.bench
-def test_that_given_coefficients_take_the_place_of_the_table():
+def test_given_coefficients_replace_the_table():
     limit = {"c11": math.pi**2 / 2.8, "c22": math.pi**2 / 4.0, "c23": 0.471}
     given_power = contact(kalker_coefficients=limit)[-1].power
     assert given_power == pytest.approx(contact(kalker="line-limit")[-1].power, rel=1e-12)
 
 
 @pytest.mark.bench
-def test_that_the_element_sum_reads_low_and_says_so_by_its_order():
+def test_element_sum_is_too_low_and_of_first_order():
     exact = contact(kalker="line-limit", my=1000)[-1].power
     low = [
         contact(kalker="line-limit", dissipation="element-sum", mx=n, my=n)[-1].power / exact - 1.0
@@ -85,7 +85,7 @@ def test_that_the_element_sum_reads_low_and_says_so_by_its_order():
 
 
 @pytest.mark.bench
-def test_that_the_patch_is_that_of_hertz():
+def test_patch_is_that_of_hertz():
     *_, solution = contact()
     patch = hertz(45.0, 1.0, 300.0, PAIR.contact_modulus)
     assert solution.peak_pressure == pytest.approx(patch.peak_pressure, rel=1e-9)
@@ -100,7 +100,7 @@ GRIDS = st.builds(lambda half, strips: Grid.spanning(-half, half, strips),
 @pytest.mark.bench
 @settings(deadline=None, max_examples=40)
 @given(GRIDS, st.floats(-0.8e-3, 0.8e-3), st.floats(-1e-3, 1e-3), st.floats(-0.5, 0.5))
-def test_that_any_grid_carries_the_whole_load_and_keeps_the_energy_balance(grid, yc, eta, phi):
+def test_load_and_energy_balance_hold_on_any_grid(grid, yc, eta, phi):
     _, _, point, solution = contact(grid, (1e-3, eta, phi), shape=lambda y: 2e-6 + (y - yc) ** 2)
     assert solution.line_load.sum() * grid.spacing == pytest.approx(300.0, rel=1e-12)
     assert solution.power == pytest.approx(balance(point, solution), rel=1e-12)
@@ -110,7 +110,7 @@ def test_that_any_grid_carries_the_whole_load_and_keeps_the_energy_balance(grid,
 
 @pytest.mark.bench
 @pytest.mark.parametrize("bound", ["parabolic", "elliptic"])
-def test_that_strips_partly_covered_keep_the_power_smooth(bound):
+def test_power_is_smooth_with_partly_covered_strips(bound):
     exact = contact(my=1000, bound=bound)[-1].power
     for half in np.linspace(3.0e-3, 3.2e-3, 9):
         power = contact(Grid.spanning(-half, half, 81), bound=bound)[-1].power
@@ -119,7 +119,7 @@ def test_that_strips_partly_covered_keep_the_power_smooth(bound):
 
 @pytest.mark.bench
 @pytest.mark.parametrize("closed_form", ["exact", "always", "never"])
-def test_that_mirroring_the_contact_mirrors_the_solution(closed_form):
+def test_mirrored_contact_has_the_mirrored_solution(closed_form):
     grid = Grid.spanning(-3e-3, 3e-3, 60)
     solutions = [
         contact(
@@ -146,8 +146,8 @@ def test_that_mirroring_the_contact_mirrors_the_solution(closed_form):
         ("elliptic", "partial", 0.078, 0.025),
     ],
 )
-def test_that_its_error_against_the_exact_theory_is_the_one_we_know(bound, kind, rms, from_contact):
-    # CONTACT's own FASTSIM takes flexibilities that change with creepage, hence the small distance
+def test_error_against_exact_theory_is_the_known_one(bound, kind, rms, from_contact):
+    # the FASTSIM of CONTACT has flexibilities that depend on creepage, hence the small difference
     exact, other = [], []
     for case in rows("rig_random", kind=kind):
         creepage = (case["xi"], case["eta"], case["phi_per_m"])
@@ -160,7 +160,7 @@ def test_that_its_error_against_the_exact_theory_is_the_one_we_know(bound, kind,
 
 @pytest.mark.bench
 @pytest.mark.parametrize(("bound", "rms"), [("parabolic", 0.093), ("elliptic", 0.030)])
-def test_that_hard_cases_stay_as_far_off_as_kalker_is(bound, rms):
+def test_errors_of_hard_cases_are_those_of_kalkers_fastsim(bound, rms):
     errors = []
     for case in rows("hard_cases"):
         creepage = Creepage(case["xi"], case["eta"], case["phi_per_m"])
@@ -177,7 +177,7 @@ def test_that_hard_cases_stay_as_far_off_as_kalker_is(bound, rms):
 @pytest.mark.bench
 @pytest.mark.parametrize("flexibility", ["three", "one"])
 @pytest.mark.parametrize(("bound", "rate"), [("parabolic", 0.12), ("elliptic", 0.25)])
-def test_that_steps_converge_on_the_quadrature_of_the_reference(bound, rate, flexibility):
+def test_march_converges_to_the_reference_quadrature(bound, rate, flexibility):
     whole = table("mean_problem")
     c11 = 8.0 * whole["a_m"] / (3.0 * 1.6889956260024387e-15 * PAIR.shear_modulus)
     given = {"c11": c11, "c22": 2.5, "c23": 0.5}
@@ -198,7 +198,7 @@ def test_that_steps_converge_on_the_quadrature_of_the_reference(bound, rate, fle
 
 
 @pytest.mark.bench
-def test_that_one_flexibility_is_the_weighted_mean_of_three_along_the_creepage():
+def test_one_flexibility_is_the_weighted_mean_of_three():
     xi, eta = 3e-4, -4e-4
     *_, solution = contact(creepage=(xi, eta, 0.0), flexibility="one", my=400)
     assert solution.force_y / solution.force_x == pytest.approx(eta / xi, rel=1e-12)
@@ -214,7 +214,7 @@ def test_that_one_flexibility_is_the_weighted_mean_of_three_along_the_creepage()
 
 @pytest.mark.bench
 @pytest.mark.parametrize("creepage", [(5e-4, 0.0, 0.0), (0.0, 5e-4, 0.0), (0.0, 0.0, 0.7)])
-def test_that_one_flexibility_is_kalkers_own_where_one_creepage_acts(creepage):
+def test_one_flexibility_is_kalkers_for_a_single_creepage(creepage):
     one, three = (
         contact(creepage=creepage, flexibility=name, closed_form="never")[-1]
         for name in ("one", "three")
@@ -223,8 +223,8 @@ def test_that_one_flexibility_is_kalkers_own_where_one_creepage_acts(creepage):
 
 
 @pytest.mark.bench
-def test_that_one_flexibility_leaves_full_sliding_to_the_creepage():
-    # with three the traction keeps to what would adhere
+def test_one_flexibility_in_gross_sliding_follows_creepage():
+    # with three the traction has the direction of that with adhesion
     creepage = (0.012, 0.016, 0.0)
     *_, one = contact(creepage=creepage, flexibility="one")
     *_, three = contact(creepage=creepage)
@@ -239,7 +239,7 @@ def groove(depth, offset=0.0):
 
 @pytest.mark.bench
 @pytest.mark.parametrize("depth", [1e-6, 5e-6, 17e-6, 48e-6])
-def test_that_a_worn_profile_widens_the_patch_and_still_carries_the_load(depth):
+def test_worn_profile_has_a_wider_patch_with_the_same_load(depth):
     grid = Grid.spanning(-9e-3, 9e-3, 181)
     _, _, point, solution = contact(grid, shape=groove(depth, 2e-4))
     assert solution.line_load.sum() * grid.spacing == pytest.approx(300.0, rel=1e-12)
@@ -249,7 +249,7 @@ def test_that_a_worn_profile_widens_the_patch_and_still_carries_the_load(depth):
 
 
 @pytest.mark.bench
-def test_that_a_solution_does_not_depend_on_where_it_started():
+def test_solution_is_independent_of_the_initial_guess():
     grid = Grid.spanning(-9e-3, 9e-3, 181)
     model, gap, point, cold = contact(grid, shape=groove(17e-6))
     warm = model.solve(gap, RIG[0], point, None, cold)
@@ -267,33 +267,33 @@ def test_that_a_solution_does_not_depend_on_where_it_started():
         (lambda y: np.where(y > 0.0, np.nan, y**2), "not finite"),
     ],
 )
-def test_that_what_hertz_cannot_solve_is_told_with_its_state(shape, match):
+def test_profiles_without_hertz_solution_raise_with_state(shape, match):
     with pytest.raises(ContactError, match=match) as caught:
         contact(Grid.spanning(-3e-3, 3e-3, 61), shape=shape)
     assert {"gap", "normal_force"} <= set(caught.value.state)
 
 
 @pytest.mark.bench
-def test_that_an_input_that_is_not_a_number_is_an_error():
+def test_nan_input_is_an_error():
     with pytest.raises(ContactError, match="power is not finite"):
         contact(creepage=(math.nan, 0.0, 0.0))
 
 
 @pytest.mark.bench
-def test_that_a_lost_contact_is_an_error():
+def test_lost_contact_is_an_error():
     with pytest.raises(ContactError, match="contact is lost"):
         contact(Grid.spanning(-3e-3, 3e-3, 61), load=0.0)
 
 
 @pytest.mark.bench
-def test_that_a_wear_compliance_is_refused():
+def test_wear_compliance_is_refused():
     model, gap, point, _ = contact()
     with pytest.raises(CapabilityError, match="stepper = 'stabilised'"):
         model.solve(gap, RIG[0], point, np.zeros_like(gap))
 
 
 @pytest.mark.bench
-def test_that_a_prescribed_patch_sets_pressure_and_power():
+def test_prescribed_patch_determines_pressure_and_power():
     patch = {"a": "0.2 mm", "b": "2 mm"}
     _, _, point, solution = contact(patch=patch)
     assert solution.peak_pressure == pytest.approx(1.5 * 300.0 / (math.pi * 2e-4 * 2e-3))
@@ -312,7 +312,7 @@ def test_that_a_prescribed_patch_sets_pressure_and_power():
 
 
 @pytest.mark.bench
-def test_that_a_bearing_torque_finds_its_creepage():
+def test_bearing_torque_determines_the_creepage():
     model, gap, _, _ = contact()
     point = OperatingPoint(
         300.0, SPEED, Creepage(0.0), 0.1, bearing_torque=0.1, rolling_radius=np.full(50, 20e-3)
@@ -332,7 +332,7 @@ def test_that_a_bearing_torque_finds_its_creepage():
 
 
 @pytest.mark.bench
-def test_that_friction_may_differ_from_strip_to_strip():
+def test_friction_may_differ_from_strip_to_strip():
     model, gap, _, whole = contact()
     friction = np.where(np.arange(50) < 25, 0.1, 0.05)
     half = model.solve(gap, RIG[0], OperatingPoint(300.0, SPEED, Creepage(1e-3), friction))
@@ -341,7 +341,7 @@ def test_that_friction_may_differ_from_strip_to_strip():
 
 
 @pytest.mark.bench
-def test_that_creepage_may_vary_from_strip_to_strip():
+def test_creepage_may_vary_from_strip_to_strip():
     model, gap, _, _ = contact()
     y = model.suggest_grid(RIG[1], RIG[0], 300.0, MATERIALS).y
     creepage = Creepage(1e-3, variation=200.0 * y**2)
@@ -359,7 +359,7 @@ def test_that_creepage_may_vary_from_strip_to_strip():
 
 @pytest.mark.bench
 @pytest.mark.parametrize("bound", ["parabolic", "elliptic"])
-def test_that_the_fields_are_the_inside_of_the_solution(bound):
+def test_fields_integrate_to_the_solution(bound):
     creepage = (6e-4, 3e-4, 0.0)
     model, gap, point, solution = contact(creepage=creepage, bound=bound, closed_form="never")
     fields = model.fields(solution, gap, RIG[0], point, points_along=801)
@@ -373,7 +373,7 @@ def test_that_the_fields_are_the_inside_of_the_solution(bound):
     power = np.trapezoid(fields.power_density, fields.x, axis=0).sum() * spacing
     assert power == pytest.approx(solution.power, rel=1e-2)
     traction = np.hypot(fields.traction_x, fields.traction_y)
-    # a parabola over an ellipse: up to 4/3 of the pressure, and for all strips together no more
+    # a parabolic bound exceeds mu p by up to 4/3 in a strip, but not in the sum of all strips
     excess = 1.0 if bound == "elliptic" else 4.0 / 3.0
     assert np.all(traction <= 0.1 * excess * fields.pressure + 1e-3)
     assert fields.pressure.max() == pytest.approx(solution.peak_pressure, rel=2e-3)
@@ -385,7 +385,7 @@ CONTACTS = 60
 
 
 def draws(contacts=CONTACTS, seed=0):
-    """Return operating points like the paper's: load, creepage, yaw and tilt, and friction."""
+    """Return operating points as in the paper: load, creepage, yaw, tilt and friction."""
     random = np.random.default_rng(seed)
     radius, angle = 2e-3 * np.sqrt(random.random(contacts)), 2 * np.pi * random.random(contacts)
     return OperatingPoints(
@@ -399,7 +399,7 @@ def draws(contacts=CONTACTS, seed=0):
 
 
 def batch(points, shape=None, half=3e-3, strips=50, **options):
-    """Solve the rig's contacts under `points` together, on one gap or on the shape of each."""
+    """Solve the contacts of the rig at `points` as a batch, on one gap or on several."""
     model, grid = HertzFastsim(HertzFastsimOptions(**options)), Grid.spanning(-half, half, strips)
     model.prepare(grid, MATERIALS)
     gap = np.broadcast_to(grid.y**2, (1, 1, len(points), strips))
@@ -410,7 +410,7 @@ def batch(points, shape=None, half=3e-3, strips=50, **options):
 
 def assert_same(found, expected):
     for name, value in vars(expected).items():
-        # adhesion is counted in points; a moment is what is left of the forces times their arms
+        # adhesion is counted in points; a moment is a small difference of forces times arms
         scale = 300.0 * 3e-3 if name == "spin_moment" else np.abs(value).max()
         assert getattr(found, name) == pytest.approx(value, rel=0.0, abs=1e-13 * scale), name
         assert type(getattr(found, name)) is type(value)
@@ -432,7 +432,7 @@ OPTIONS = [
 @pytest.mark.bench
 @pytest.mark.parametrize("spin", [True, False])
 @pytest.mark.parametrize("options", OPTIONS)
-def test_that_a_batch_is_solved_as_each_contact_alone(options, spin):
+def test_batch_equals_single_solutions(options, spin):
     points = draws() if spin else replace(draws(), spin=np.zeros(CONTACTS))
     model, gap, found = batch(points, **options)
     assert found.stack("line_load").shape == (1, 1, CONTACTS, 50)
@@ -442,7 +442,7 @@ def test_that_a_batch_is_solved_as_each_contact_alone(options, spin):
 
 @pytest.mark.bench
 @pytest.mark.parametrize("flexibility", ["three", "one"])
-def test_that_a_batch_takes_any_gaps_friction_per_strip_and_varied_creepage(flexibility):
+def test_batch_supports_any_gap_friction_and_creepage(flexibility):
     random = np.random.default_rng(1)
     shapes = [groove(depth, offset) for depth, offset in random.random((CONTACTS, 2)) * 3e-6]
     points = replace(
@@ -456,7 +456,7 @@ def test_that_a_batch_takes_any_gaps_friction_per_strip_and_varied_creepage(flex
 
 
 @pytest.mark.bench
-def test_that_a_list_of_points_is_solved_as_their_columns():
+def test_list_of_points_equals_columns():
     points = draws()
     model, gap, found = batch(points)
     listed = model.solve_batch(gap, RIG[0], list(points))
@@ -465,13 +465,13 @@ def test_that_a_list_of_points_is_solved_as_their_columns():
     assert np.array_equal(part.stack("dissipation"), found.stack("dissipation")[:, :, 10:20])
 
 
-def test_that_columns_of_different_lengths_are_refused():
+def test_columns_of_different_lengths_are_refused():
     with pytest.raises(ValueError, match="spin has 2 values for 60 contacts"):
         replace(draws(), spin=np.zeros(2))
 
 
 @pytest.mark.bench
-def test_that_a_batch_under_bearing_torques_is_solved_too():
+def test_batch_with_bearing_torques_is_solved():
     model, gap, _, _ = contact()
     points = [
         OperatingPoint(
@@ -493,7 +493,7 @@ def test_that_a_batch_under_bearing_torques_is_solved_too():
         ({"lateral": math.nan}, "power is not finite"),
     ],
 )
-def test_that_a_batch_names_the_contact_that_fails(change, match):
+def test_batch_error_names_the_failed_contact(change, match):
     points = draws()
     for name, value in change.items():
         getattr(points, name)[17] = value
@@ -504,7 +504,7 @@ def test_that_a_batch_names_the_contact_that_fails(change, match):
 
 
 @pytest.mark.bench
-def test_that_a_batch_needs_a_curvature_along_rolling_and_friction_of_a_shape_it_knows():
+def test_batch_refuses_wrong_curvature_and_friction_shape():
     points = draws()
     model, gap, _ = batch(points)
     with pytest.raises(ContactError, match="curvature along rolling is -1 1/m"):
@@ -518,27 +518,27 @@ def test_that_a_batch_needs_a_curvature_along_rolling_and_friction_of_a_shape_it
 
 
 @pytest.mark.bench
-def test_that_leaving_out_the_spins_slip_along_rolling_costs_what_we_say():
+def test_neglect_of_lateral_spin_slip_has_the_stated_error():
     points = draws(300)
     powers = {
         name: batch(points, None, 1.8e-3, strips, closed_form=form, mx=mx)[2].stack("power").ravel()
         for name, form, strips, mx in (
-            ("truth", "never", 200, 200),
+            ("reference", "never", 200, 200),
             ("strips", "always", 200, 200),
             ("quick", "always", 24, 50),
         )
     }
-    truth = powers["truth"]
-    error = powers["strips"] / truth - 1.0
+    reference = powers["reference"]
+    error = powers["strips"] / reference - 1.0
     assert np.sqrt(np.mean(error**2)) < 2.5e-3
     assert np.abs(error).max() < 0.03
     for name, tolerance in (("strips", 2e-4), ("quick", 1e-3)):
-        assert powers[name].mean() == pytest.approx(truth.mean(), rel=tolerance)
-        assert powers[name].std() == pytest.approx(truth.std(), rel=tolerance)
+        assert powers[name].mean() == pytest.approx(reference.mean(), rel=tolerance)
+        assert powers[name].std() == pytest.approx(reference.std(), rel=tolerance)
 
 
 @pytest.mark.bench
-def test_that_the_closed_form_with_spin_keeps_the_energy_balance():
+def test_closed_form_with_spin_keeps_the_energy_balance():
     *_, point, solution = contact(creepage=(6e-4, 3e-4, 0.2), closed_form="always")
     assert solution.power == pytest.approx(balance(point, solution), rel=1e-12)
 
@@ -548,7 +548,7 @@ FIELD_OPTIONS = [{}, {"bound": "elliptic"}, {"dissipation": "element-sum"}]
 
 @pytest.mark.bench
 @pytest.mark.parametrize("options", FIELD_OPTIONS)
-def test_that_a_uniform_field_of_friction_is_one_coefficient(options):
+def test_uniform_friction_field_equals_one_coefficient(options):
     options = options | {"closed_form": "never"}
     model, gap, point, expected = contact(creepage=(4e-4, 5e-4, 0.3), **options)
     for carried in (False, True):
@@ -560,18 +560,18 @@ def test_that_a_uniform_field_of_friction_is_one_coefficient(options):
 
 
 @pytest.mark.bench
-def test_that_carried_friction_gives_the_mean_over_its_particles():
+def test_carried_friction_is_the_mean_over_particles():
     model, gap, point, _ = contact(creepage=(4e-4, 5e-4, 0.0), mx=6)
     friction = np.random.default_rng(3).uniform(0.05, 0.2, (6, 50))
     found = model.solve(gap, RIG[0], replace(point, friction=friction, friction_carried=True))
-    alone = [model.solve(gap, RIG[0], replace(point, friction=row)) for row in friction]
+    singles = [model.solve(gap, RIG[0], replace(point, friction=row)) for row in friction]
     for name in ("dissipation", "force_x", "force_y", "adhesion_fraction", "power"):
-        mean = np.mean([getattr(solution, name) for solution in alone], axis=0)
+        mean = np.mean([getattr(solution, name) for solution in singles], axis=0)
         assert getattr(found, name) == pytest.approx(mean, rel=1e-13), name
 
 
 def noise(points_along, strips, carried=False, contacts=12):
-    """Return the mean power, and its standard error, with friction drawn for every point."""
+    """Return the mean power and its standard error with random friction at each point."""
     random = np.random.default_rng(points_along)
     same = np.ones(contacts)
     points = OperatingPoints(
@@ -594,15 +594,15 @@ def noise(points_along, strips, carried=False, contacts=12):
     ("cells", "expected"),
     [(25, 0.0689), (50, 0.0653), (100, 0.0614), (200, 0.0569), (400, 0.0527), (800, 0.0487)],
 )
-def test_that_white_noise_falls_with_its_grid_as_we_know(cells, expected):
+def test_white_noise_power_decreases_with_grid_refinement(cells, expected):
     mean, deviation = noise(cells, strips=50)
     assert deviation < 0.01 * expected
     assert mean == pytest.approx(expected, rel=0.02)
 
 
 @pytest.mark.bench
-def test_that_white_noise_carried_through_the_contact_has_a_limit():
-    # that limit is the mean of the power over the coefficient's own distribution
+def test_carried_white_noise_has_a_continuum_limit():
+    # the limit is the mean of the power over the distribution of the coefficient
     nodes, weights = np.polynomial.hermite_e.hermegauss(21)
     powers = [contact(mu=0.1 + 0.02 * z, kalker="line-limit")[-1].power for z in nodes]
     limit = np.dot(weights, powers) / weights.sum()
@@ -613,7 +613,7 @@ def test_that_white_noise_carried_through_the_contact_has_a_limit():
 
 
 @pytest.mark.bench
-def test_that_friction_is_asked_for_where_the_steps_of_the_march_end():
+def test_friction_points_are_the_ends_of_the_steps():
     model, gap, point, solution = contact(Grid.spanning(-3e-3, 3e-3, 60), mx=10)
     x, y = model.friction_points(gap, RIG[0], point)
     assert np.array_equal(y, solution.y)
@@ -632,7 +632,7 @@ def test_that_friction_is_asked_for_where_the_steps_of_the_march_end():
 
 
 @pytest.mark.bench
-def test_that_the_fields_know_friction_that_differs_from_point_to_point():
+def test_fields_support_friction_per_point():
     model, gap, point, _ = contact(creepage=(6e-4, 3e-4, 0.1), mx=200)
     friction = np.random.default_rng(4).uniform(0.05, 0.15, (200, 50))
     local = replace(point, friction=friction)
@@ -641,7 +641,7 @@ def test_that_the_fields_know_friction_that_differs_from_point_to_point():
     assert fields.x.shape == (201, 50)
     spacing = solution.y[1] - solution.y[0]
     force = np.trapezoid(fields.traction_x, fields.x, axis=0).sum() * spacing
-    # the solution has the corners back that trapeziums cut off at the edges
+    # the solution includes the corners that the trapezoidal rule omits at the edges
     assert force == pytest.approx(solution.force_x, rel=1e-4)
     bound = friction[::-1] * 4.0 / 3.0 * fields.pressure[:-1]
     assert np.all(np.hypot(fields.traction_x, fields.traction_y)[:-1] <= bound + 1e-3)
@@ -652,7 +652,7 @@ def test_that_the_fields_know_friction_that_differs_from_point_to_point():
 
 
 def hertz_strips(strips=81):
-    """Return the strips of the rig's patch as another normal contact would give them."""
+    """Return the strips of the patch of the rig as plain `Strips`."""
     patch = hertz(45.0, 1.0, 300.0, PAIR.contact_modulus)
     grid = Grid.spanning(-1.1 * patch.b, 1.1 * patch.b, strips)
     load = np.diff(
@@ -665,28 +665,28 @@ def hertz_strips(strips=81):
 
 
 @pytest.mark.bench
-def test_that_an_ellipse_cut_into_strips_has_nearly_its_own_equivalent():
+def test_equivalent_ellipse_of_an_ellipse_is_nearly_itself():
     patch, strips = hertz_strips(401)
     a, b = equivalent_ellipse(strips)
-    # the line contact's a(y) of Hertz's load is half a per cent from Hertz's
+    # a(y) of a line contact with the Hertzian line load differs by 0.5 % from Hertz's
     assert (a, b) == pytest.approx((patch.a, patch.b), rel=1e-2)
 
 
 @pytest.mark.bench
-def test_that_other_strips_give_nearly_the_power_of_the_ellipse():
+def test_other_strips_have_nearly_the_power_of_the_ellipse():
     _, strips = hertz_strips(401)
     point = OperatingPoint(300.0, SPEED, Creepage(1e-3), 0.1)
     for bound in ("parabolic", "elliptic"):
         found = complete(FastsimTheory(bound), strips, PAIR, point)
         expected = contact(bound=bound)[-1].power
-        # Kalker's parabola loads a strip by 4/3 (1 - y^2/b^2)^(1/2) of Hertz's: more of it slides
+        # Kalker's parabola has 4/3 (1 - y^2/b^2)^(1/2) of Hertz's line load: more of it slips
         assert found.power == pytest.approx(expected, rel=0.05 if bound == "parabolic" else 0.01)
         assert found.power == pytest.approx(balance(point, found), rel=1e-12)
 
 
 @pytest.mark.bench
 @pytest.mark.parametrize("name", ["flat", "bump_1um", "bump_10um", "parabola"])
-def test_that_fastsim_takes_the_strips_of_a_worn_profile(name):
+def test_fastsim_supports_strips_of_a_worn_profile(name):
     worn = worn_profile(name)
     y = worn["y"]
     strips = Strips(
@@ -697,7 +697,7 @@ def test_that_fastsim_takes_the_strips_of_a_worn_profile(name):
     assert found.power == pytest.approx(worn["P_over_V_mean"], rel=0.05)
 
 
-def test_that_the_options_are_checked_and_every_key_is_described():
+def test_options_are_validated_and_described():
     for bad in ({"mx": 1}, {"my": 2}, {"bound": "flat"}, {"kalker_coefficients": {"c11": -1.0}}):
         with pytest.raises(ValidationError):
             HertzFastsimOptions(**bad)
@@ -706,7 +706,7 @@ def test_that_the_options_are_checked_and_every_key_is_described():
     assert HertzFastsimOptions(patch={"a": "0.1 mm", "b": "1 mm"}).patch.b == 1e-3
 
 
-def test_that_the_spec_builds_the_model_it_names():
+def test_spec_builds_its_model():
     model = SPEC.factory(SPEC.options())
     assert isinstance(model, HertzFastsim)
     assert SPEC.name == "hertz-fastsim"

@@ -20,7 +20,7 @@ THEORIES = ("strip", "fastrip", "fastsim")
 
 
 def contact(grid=None, creepage=(1e-3, 0.0, 0.0), load=300.0, mu=0.1, shape=None, **options):
-    """Solve the rig's contact; `options` in the words of a scenario."""
+    """Solve the rig's contact; `options` as in a scenario."""
     model = SPEC.factory(SPEC.options(**options))
     if grid is None:
         grid = model.suggest_grid(RIG[1], RIG[0], load, MATERIALS)
@@ -31,7 +31,7 @@ def contact(grid=None, creepage=(1e-3, 0.0, 0.0), load=300.0, mu=0.1, shape=None
 
 
 @pytest.mark.bench
-def test_that_the_patch_is_that_of_hertz():
+def test_patch_is_that_of_hertz():
     *_, solution = contact()
     patch = hertz(45.0, 1.0, 300.0, PAIR.contact_modulus)
     assert solution.peak_pressure == pytest.approx(patch.peak_pressure, rel=1e-9)
@@ -43,7 +43,7 @@ def test_that_the_patch_is_that_of_hertz():
 @pytest.mark.bench
 @pytest.mark.parametrize("creepage", [(5e-4, 2e-4, 0.0), (5e-4, 2e-4, 0.3)])
 @pytest.mark.parametrize("bound", ["parabolic", "elliptic"])
-def test_that_with_fastsim_it_is_the_papers_model(bound, creepage):
+def test_with_fastsim_it_equals_hertz_fastsim(bound, creepage):
     *_, found = contact(creepage=creepage, tangential="fastsim", bound=bound)
     model = HertzFastsim(HertzFastsimOptions(bound=bound))
     grid = model.suggest_grid(RIG[1], RIG[0], 300.0, MATERIALS)
@@ -55,7 +55,7 @@ def test_that_with_fastsim_it_is_the_papers_model(bound, creepage):
 
 @pytest.mark.bench
 @pytest.mark.parametrize("tangential", THEORIES)
-def test_that_strips_partly_covered_keep_forces_and_power_smooth(tangential):
+def test_power_is_smooth_with_partly_covered_strips(tangential):
     chosen = {"tangential": tangential, "creepage": (6e-4, 3e-4, 0.05)}
     exact = contact(my=1000, **chosen)[-1]
     for half in np.linspace(3.0e-3, 3.2e-3, 9):
@@ -66,7 +66,7 @@ def test_that_strips_partly_covered_keep_forces_and_power_smooth(tangential):
 
 @pytest.mark.bench
 @pytest.mark.parametrize("tangential", THEORIES)
-def test_that_strips_may_end_anywhere_about_the_patchs_edge(tangential):
+def test_strips_may_end_anywhere_near_the_patch_edge(tangential):
     rng, b = np.random.default_rng(5), 1.5e-3
     patch = Patch(a="0.14 mm", b="1.5 mm")
     model = HertzModel(SPEC.factory(SPEC.options(tangential=tangential)).theory, 50, patch)
@@ -80,12 +80,12 @@ def test_that_strips_may_end_anywhere_about_the_patchs_edge(tangential):
     for _ in range(150):
         strips, beyond = int(rng.integers(60, 90)), int(rng.integers(1, 4))
         off = rng.choice((-1.0, 1.0)) * 10.0 ** rng.uniform(-18.0, -6.0)
-        half = b * (1.0 + off) * strips / (strips - 2 * beyond)  # an edge lies at b (1 + off)
+        half = b * (1.0 + off) * strips / (strips - 2 * beyond)  # an edge is at b (1 + off)
         assert power(Grid.spanning(-half, half, strips)) == pytest.approx(exact, rel=3e-3)
 
 
 @pytest.mark.bench
-def test_that_a_strip_that_carries_anything_has_a_half_length_whose_square_is_positive():
+def test_loaded_strips_have_a_positive_squared_half_length():
     ellipse = hertz(45.0, 1.0, 300.0, PAIR.contact_modulus)
     for covered in 10.0 ** np.arange(-30.0, 0.0):
         for load, half_length in ((1e-30, 1e-12), (0.0, 1e-12), (1e-30, 0.0)):
@@ -110,7 +110,7 @@ def test_that_a_strip_that_carries_anything_has_a_half_length_whose_square_is_po
 
 @pytest.mark.bench
 @pytest.mark.parametrize("tangential", THEORIES)
-def test_that_all_slide_with_the_whole_of_friction_whatever_is_covered(tangential):
+def test_gross_sliding_has_full_friction_at_any_coverage(tangential):
     grid = Grid.spanning(-2.05e-3, 2.05e-3, 23)
     *_, solution = contact(grid, (0.05, 0.0, 0.0), tangential=tangential)
     assert solution.force_x == pytest.approx(-30.0, rel=2e-2)
@@ -123,7 +123,7 @@ def test_that_all_slide_with_the_whole_of_friction_whatever_is_covered(tangentia
 
 @pytest.mark.bench
 @pytest.mark.parametrize("tangential", THEORIES)
-def test_that_power_is_the_work_of_the_rigid_slip(tangential):
+def test_power_is_the_work_of_the_rigid_slip(tangential):
     _, _, point, found = contact(
         Grid.spanning(-2.7e-3, 2.7e-3, 77), (4e-4, 5e-4, 0.2), tangential=tangential
     )
@@ -132,7 +132,7 @@ def test_that_power_is_the_work_of_the_rigid_slip(tangential):
 
 
 @pytest.mark.bench
-def test_that_strips_are_the_default_and_near_the_exact_theory():
+def test_default_strip_theory_is_near_exact_theory():
     model, *_ = contact()
     assert isinstance(model.theory, StripTheory)
     errors = []
@@ -145,7 +145,7 @@ def test_that_strips_are_the_default_and_near_the_exact_theory():
 
 @pytest.mark.bench
 @pytest.mark.parametrize("tangential", THEORIES)
-def test_that_a_worn_profile_is_fitted_anew(tangential):
+def test_worn_profile_is_fitted_again(tangential):
     def groove(y):
         return y**2 + 0.95 * np.maximum(17e-6 - (y - 2e-4) ** 2, 0.0)
 
@@ -159,7 +159,7 @@ def test_that_a_worn_profile_is_fitted_anew(tangential):
 
 @pytest.mark.bench
 @pytest.mark.parametrize("tangential", THEORIES)
-def test_that_friction_torque_and_creepage_may_be_local(tangential):
+def test_friction_torque_and_creepage_may_be_local(tangential):
     model, gap, _, whole = contact(tangential=tangential)
     friction = np.where(np.arange(50) < 25, 0.1, 0.05)
     half = model.solve(gap, RIG[0], OperatingPoint(300.0, 2.618, Creepage(1e-3), friction))
@@ -175,14 +175,14 @@ def test_that_friction_torque_and_creepage_may_be_local(tangential):
 
 @pytest.mark.bench
 @pytest.mark.parametrize("tangential", THEORIES)
-def test_that_fields_hold_the_load_and_the_traction(tangential):
+def test_fields_integrate_to_load_and_traction(tangential):
     grid = Grid.spanning(-2.2e-3, 2.2e-3, 60)
     model, gap, point, solution = contact(grid, (6e-4, 0.0, 0.0), tangential=tangential)
     fields = model.fields(solution, gap, RIG[0], point, points_along=401)
     half = hertz(45.0, 1.0, 300.0, PAIR.contact_modulus).b
     edges = np.append(-2.2e-3, solution.y + 0.5 * grid.spacing)
     width = np.diff(np.clip(edges, -half, half))
-    if tangential == "strip":  # which takes strips whole
+    if tangential == "strip":  # which does not support partly covered strips
         width[width > 0.0] = grid.spacing
     load = np.dot(np.trapezoid(fields.pressure, fields.x, axis=0), width)
     assert load == pytest.approx(300.0, rel=5e-3)
@@ -191,14 +191,14 @@ def test_that_fields_hold_the_load_and_the_traction(tangential):
 
 
 @pytest.mark.bench
-def test_that_a_batch_is_solved_as_each_contact_alone():
-    model, gap, point, alone = contact(creepage=(4e-4, 3e-4, 0.1), tangential="fastrip")
+def test_batch_equals_single_solutions():
+    model, gap, point, single = contact(creepage=(4e-4, 3e-4, 0.1), tangential="fastrip")
     found = model.solve_batch(np.array([gap, gap]), RIG[0], [point, point])
-    assert found.stack("dissipation")[1] == pytest.approx(alone.dissipation, rel=1e-14)
+    assert found.stack("dissipation")[1] == pytest.approx(single.dissipation, rel=1e-14)
 
 
 @pytest.mark.bench
-def test_that_what_it_cannot_do_is_told():
+def test_missing_capabilities_are_refused():
     model, gap, point, _ = contact()
     with pytest.raises(CapabilityError, match="hertz takes no wear compliance"):
         model.solve(gap, RIG[0], point, np.zeros_like(gap))
@@ -213,7 +213,7 @@ def test_that_what_it_cannot_do_is_told():
                 contact(tangential=tangential, **bad)
 
 
-def test_that_the_spec_builds_the_model_it_names():
+def test_spec_builds_its_model():
     assert SPEC.name == "hertz"
     assert isinstance(SPEC.factory(SPEC.options()), HertzModel)
     assert SPEC.capabilities == HertzModel.capabilities

@@ -12,7 +12,7 @@ from wearsim.uq.sampling.philox import Stream
 
 
 class Gumbel(Distribution):
-    """A skew law with closed forms all through."""
+    """Skewed distribution with closed forms."""
 
     def quantile(self, probability):
         return -np.log(-np.log(probability))
@@ -32,23 +32,25 @@ def uniforms(realisation):
 
 
 def scores(values):
-    """Return the normal scores of the law's values."""
+    """Return the normal scores of Gumbel values."""
     return stats.norm.ppf(np.exp(-np.exp(-values)))
 
 
 @pytest.mark.parametrize("spacing", [{}, {"spacing": "6 s"}, {"spacing": "15 s"}])
-def test_that_scores_forget_themselves_exponentially(spacing):
+def test_correlation_of_scores_is_exponential(spacing):
     made = process(correlation_time="1 min", **spacing)
     runs, points = 4000, 13
     paths = scores(np.array([made.path(points, uniforms(k)) for k in range(runs)]))
     time = made.spacing * np.arange(points)
-    found = np.mean(paths * paths[:, :1], axis=0)
+    correlation = np.mean(paths * paths[:, :1], axis=0)
     expected = np.exp(-time / 60.0)
     # the product of two scores of correlation r has the variance 1 + r^2
-    np.testing.assert_array_less(np.abs(found - expected), 4.0 * np.sqrt((1 + expected**2) / runs))
+    np.testing.assert_array_less(
+        np.abs(correlation - expected), 4.0 * np.sqrt((1 + expected**2) / runs)
+    )
 
 
-def test_that_it_has_its_marginal_at_every_time():
+def test_marginal_holds_at_every_time():
     made = process(correlation_time="1 min")
     path = made.path(200_000, uniforms(0))
     thinned = path[:: 10 * 10]  # ten correlation times apart
@@ -57,14 +59,14 @@ def test_that_it_has_its_marginal_at_every_time():
     assert stats.kstest(starts, "gumbel_r").pvalue > 1e-4
 
 
-def test_that_a_level_lasts_for_the_whole_path_and_leaves_the_marginal():
+def test_level_is_constant_and_keeps_the_marginal():
     made = process(correlation_time="1 min", level=0.6)
     runs, far = 4000, 20 * 20  # twenty correlation times apart
     ends = scores(np.array([made.path(far + 1, uniforms(k))[[0, far]] for k in range(runs)]))
     assert stats.kstest(ends[:, 1], "norm").pvalue > 1e-3
-    # what is left of the correlation is the level's
-    found = np.mean(ends[:, 0] * ends[:, 1])
-    assert found == pytest.approx(0.6, abs=4.0 * np.sqrt((1 + 0.6**2) / runs))
+    # the remaining correlation is that of the level
+    correlation = np.mean(ends[:, 0] * ends[:, 1])
+    assert correlation == pytest.approx(0.6, abs=4.0 * np.sqrt((1 + 0.6**2) / runs))
     plain = process(correlation_time="1 min", level=0.0)
     assert (
         plain.path(9, uniforms(3)) == process(correlation_time="1 min").path(9, uniforms(3))
@@ -72,14 +74,14 @@ def test_that_a_level_lasts_for_the_whole_path_and_leaves_the_marginal():
 
 
 @pytest.mark.parametrize("points", [1, 2, 3, 100, 777])
-def test_that_a_longer_path_begins_with_the_shorter_one(points):
+def test_longer_path_starts_with_the_shorter_one(points):
     made = process(correlation_time="5 min")
     np.testing.assert_array_equal(
         made.path(points, uniforms(3)), made.path(1000, uniforms(3))[:points]
     )
 
 
-def test_that_the_first_value_is_the_draw_itself():
+def test_first_value_is_the_quantile_of_the_first_number():
     made = process(correlation_time="5 min")
     first = uniforms(9)(0, 1)
     np.testing.assert_allclose(
@@ -87,17 +89,17 @@ def test_that_the_first_value_is_the_draw_itself():
     )
 
 
-def test_that_its_time_grid_is_a_twentieth_of_its_memory_unless_given():
+def test_default_spacing_is_1_20_of_the_correlation_time():
     assert process(correlation_time="5 min").spacing == 15.0
     assert process(correlation_time="5 min", spacing="1 min").spacing == 60.0
 
 
-def test_that_a_spacing_beyond_a_quarter_of_the_correlation_time_is_refused():
+def test_spacing_above_a_quarter_of_the_time_is_refused():
     with pytest.raises(ValidationError, match=r'does not resolve.*"16 s".*60 s.*"15 s"'):
         process(correlation_time="1 min", spacing="16 s")
 
 
-def test_that_it_is_found_by_name_and_passes_on_warnings():
+def test_process_is_registered_and_passes_on_warnings():
     spec = registry().get(RandomInputSpec, "ornstein-uhlenbeck")
     made = spec.factory(spec.options(correlation_time="1 min"), Gumbel())
     assert spec.role == "process"

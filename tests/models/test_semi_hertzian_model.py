@@ -1,4 +1,4 @@
-"""The contact model `semi-hertzian`: against the exact theory, and through a whole wear test."""
+"""The contact model `semi-hertzian`: against exact theory, and in a whole wear test."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from wearsim_bench.exact_solutions import CREEPAGES, STEEL, WORN, worn_profile
 MATERIALS = (STEEL, STEEL)
 RIG = 90.0
 VARIANTS = ("kik-piotrowski", "ayasse-chollet", "analyn")
-# on the profiles of `WORN`, in their order: L1 of the line load, from above [%]
+# upper limits of the L1 error of the line load on the profiles of `WORN`, in their order [%]
 LINE_LOAD = {
     "kik-piotrowski": (18.0, 12.0, 14.5, 11.5, 12.0),
     "ayasse-chollet": (0.1, 7.5, 5.0, 5.0, 10.5),
@@ -35,7 +35,7 @@ def contact(variant="analyn", grid=None, gap=None, creepage=None, curvature=RIG,
 
 
 def carried_on(exact, y):
-    """Return a worn profile, carried on beyond its data by the parabola through their ends."""
+    """Return a worn profile, extrapolated by the parabola through the ends of its data."""
     gap = np.interp(y, exact["y"], exact["w"])
     for beyond, end in (
         (y < exact["y"][0], slice(0, 12)),
@@ -62,7 +62,7 @@ def difference(exact, solution, name, attribute, power=1):
 @pytest.mark.bench
 @pytest.mark.parametrize("variant", VARIANTS)
 @pytest.mark.parametrize("name", WORN)
-def test_that_worn_profiles_carry_nearly_the_line_load_of_the_exact_theory(variant, name):
+def test_worn_line_loads_are_near_exact_theory(variant, name):
     exact, solution = on_worn(variant, name, {"longitudinal": 1e-3})
     allowed = LINE_LOAD[variant][WORN.index(name)] / 100.0
     assert difference(exact, solution, "q", "line_load") < allowed
@@ -76,7 +76,7 @@ def test_that_worn_profiles_carry_nearly_the_line_load_of_the_exact_theory(varia
 @pytest.mark.bench
 @pytest.mark.parametrize("variant", VARIANTS)
 @pytest.mark.parametrize("case", list(CREEPAGES))
-def test_that_worn_profiles_dissipate_nearly_like_the_exact_theory(variant, case):
+def test_worn_dissipation_is_near_exact_theory(variant, case):
     longitudinal, lateral, spin = CREEPAGES[case]
     kik = variant == "kik-piotrowski"
     for name in WORN:
@@ -91,7 +91,7 @@ def test_that_worn_profiles_dissipate_nearly_like_the_exact_theory(variant, case
 @pytest.mark.bench
 @pytest.mark.parametrize("variant", VARIANTS)
 @pytest.mark.parametrize("tangential", ["strip", "fastrip", "fastsim"])
-def test_that_power_is_the_work_of_the_rigid_slip(variant, tangential):
+def test_power_is_the_work_of_the_rigid_slip(variant, tangential):
     creepage = {"longitudinal": -3e-4, "lateral": 2e-4, "spin": 0.4}
     *_, solution = contact(variant, creepage=creepage, tangential=tangential)
     work = -2.6 * (
@@ -105,7 +105,7 @@ def test_that_power_is_the_work_of_the_rigid_slip(variant, tangential):
 
 @pytest.mark.bench
 @pytest.mark.parametrize("variant", VARIANTS)
-def test_that_the_fields_add_up_to_the_strips(variant):
+def test_fields_integrate_to_the_strips(variant):
     model, gap, point, solution = contact(variant, creepage={"longitudinal": 2e-4})
     fields = model.fields(solution, gap, RIG, point, points_along=2001)
     spacing = np.diff(solution.y)[0]
@@ -121,13 +121,13 @@ def test_that_the_fields_add_up_to_the_strips(variant):
 
 @pytest.mark.bench
 @pytest.mark.parametrize("variant", VARIANTS)
-def test_that_a_free_roller_carries_its_bearing_torque(variant):
+def test_free_roller_balances_its_bearing_torque(variant):
     *_, solution = contact(variant, creepage={"longitudinal": 0.0, "bearing_torque": 0.3})
     assert -0.02 * solution.force_x == pytest.approx(0.3, rel=1e-9)
 
 
 @pytest.mark.bench
-def test_that_the_variants_promise_what_they_keep():
+def test_variants_have_their_capabilities():
     model, gap, point, hard = contact()
     assert SPEC.capabilities == model.capabilities
     assert model.capabilities.wear_compliance
@@ -139,7 +139,7 @@ def test_that_the_variants_promise_what_they_keep():
 
 @pytest.mark.bench
 @pytest.mark.parametrize("variant", VARIANTS)
-def test_that_a_solution_does_not_depend_on_where_it_starts(variant):
+def test_solution_is_independent_of_the_initial_guess(variant):
     model, gap, point, solution = contact(variant)
     _, _, _, other = contact(variant, gap=lambda y: 0.7 * y**2)
     again = model.solve(gap, RIG, point, None, other)
@@ -147,7 +147,7 @@ def test_that_a_solution_does_not_depend_on_where_it_starts(variant):
 
 
 @pytest.mark.bench
-def test_that_a_contact_at_the_edge_of_its_strips_is_an_error():
+def test_contact_at_the_edge_of_its_strips_is_an_error():
     with pytest.raises(
         ContactError, match=r"raise contact\.width or move contact\.centre"
     ) as caught:
@@ -156,19 +156,19 @@ def test_that_a_contact_at_the_edge_of_its_strips_is_an_error():
 
 
 @pytest.mark.bench
-def test_that_strips_too_narrow_are_an_error():
+def test_too_narrow_strips_are_an_error():
     with pytest.raises(ContactError, match=r"lower contact\.strips"):
         contact(grid=Grid.spanning(-1.8e-5, 1.8e-5, 51))
 
 
 @pytest.mark.bench
-def test_that_what_is_not_finite_is_an_error():
+def test_input_that_is_not_finite_is_an_error():
     with pytest.raises(ContactError, match="not finite"):
         contact(gap=lambda y: np.where(y > 0.0, np.nan, y**2))
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
-def test_that_a_wear_test_runs_implicitly_to_the_depth_of_line_contact(variant):
+def test_implicit_wear_test_reaches_the_slender_depth(variant):
     depth = {}
     for model in ("semi-hertzian", "slender"):
         own = {"contact__variant": variant} if model == "semi-hertzian" else {}

@@ -1,4 +1,4 @@
-"""Half-lengths of `slender` that follow more than the local load: against the exact theory."""
+"""Coupled half-lengths of `slender` against exact theory."""
 
 from dataclasses import replace
 from functools import cache
@@ -20,7 +20,7 @@ MODULUS = combine(*MATERIALS).contact_modulus
 RIG, LOAD = 90.0, 300.0
 POINT = OperatingPoint(LOAD, 2.618, Creepage(longitudinal=1e-3), 0.1, None, None)
 STRIPS = 80
-FAR = 1e-3  # a gap that nothing closes: there is no roller beyond its end
+FAR = 1e-3  # a gap that does not close: beyond the end of the roller
 
 
 def solved(gap, wide, strips, curvature=RIG, **options):
@@ -32,13 +32,13 @@ def solved(gap, wide, strips, curvature=RIG, **options):
 
 @cache
 def exact_of(gap, wide):
-    """Return the exact theory's answer to a gap profile."""
+    """Return the solution of exact theory for a gap profile."""
     grid = Grid.spanning(-wide, wide, 3 * STRIPS)
     return half_space.solve(gap(grid.y), grid.y, RIG, LOAD, MODULUS, 0.28e-3, 48)
 
 
 def missed(gap, wide, **options):
-    """Return the errors of q and a (L1), approach and p0 against the exact theory."""
+    """Return the errors of q and a (L1), approach and p0 against exact theory."""
     exact = exact_of(gap, wide)
     found = solved(gap, wide, STRIPS, **options)
 
@@ -64,7 +64,7 @@ def missed(gap, wide, **options):
         (1.2317, 10.0, (1e-3, 4e-3, 2e-4, 3e-4)),
     ],
 )
-def test_that_an_ellipse_of_any_axis_ratio_is_hertz(across, ratio, bounds):
+def test_ellipse_of_any_axis_ratio_is_hertzian(across, ratio, bounds):
     patch = hertz(0.5 * RIG, across, LOAD, MODULUS)
     assert patch.b / patch.a == pytest.approx(ratio, rel=1e-3)
     found = solved(lambda y: across * y**2, 1.2 * patch.b, 81)
@@ -82,7 +82,7 @@ GROOVE = 8e-6
 
 
 def offset(groove):
-    """Return a roller 1 mm off the middle of the groove that it wore."""
+    """Return the gap of a roller with an offset of 1 mm from its groove."""
     return lambda y: (y - 1e-3) ** 2 + groove(y)
 
 
@@ -102,7 +102,7 @@ PROFILES = {
     "two patches": (lambda y: y**2 + 10e-6 * np.exp(-((y / 0.4e-3) ** 2)), 2.4e-3),
     "two short patches": (lambda y: 8.5 * (np.abs(y) - 0.5e-3) ** 2, 1.2e-3),
 }
-# of q and a (L1), approach and p0; at an edge the exact pressure is singular and p0 means nothing
+# of q and a (L1), approach and p0; at an edge the exact pressure is singular and p0 is infinite
 BOUNDS = {
     "ends within the contact": (0.015, 0.01, 4e-3, np.inf),
     "ends on both sides": (0.02, 0.015, 4e-3, np.inf),
@@ -119,20 +119,20 @@ BOUNDS = {
 
 
 @pytest.mark.parametrize("name", PROFILES)
-def test_that_edges_shifts_and_several_patches_are_near_the_exact_theory(name):
+def test_edges_offsets_and_patches_are_near_exact_theory(name):
     errors = missed(*PROFILES[name])
     assert (np.array(errors) < BOUNDS[name]).all(), errors
 
 
 @pytest.mark.parametrize("name", PROFILES)
-def test_that_strips_that_feel_each_other_are_nearer_than_strips_by_themselves(name):
+def test_coupled_lengths_are_more_accurate_than_local_ones(name):
     coupled, local = missed(*PROFILES[name]), missed(*PROFILES[name], half_length="local")
-    # what is left of the line load is mostly the strips' own width
+    # the remaining error of the line load is mostly that of the strip width
     assert (np.array(coupled) < np.array([0.65, 0.65, 0.5, 1.0]) * local).all()
 
 
 @pytest.mark.parametrize("name", WORN)
-def test_that_worn_profiles_have_the_half_lengths_of_the_exact_theory(name):
+def test_worn_half_lengths_agree_with_exact_theory(name):
     exact = worn_profile(name)
     found = solved(lambda y: np.interp(y, exact["y"], exact["w"]), 4e-3, 321, curvature=45.0)
     q = np.interp(exact["y"], found.y, found.line_load)
@@ -146,7 +146,7 @@ def test_that_worn_profiles_have_the_half_lengths_of_the_exact_theory(name):
 
 
 @pytest.mark.parametrize("strips", [81, 82])
-def test_that_a_mirrored_profile_gives_the_mirrored_half_lengths(strips):
+def test_mirrored_profile_has_mirrored_half_lengths(strips):
     gap = PROFILES["groove with an edge"][0]
     one = solved(gap, 5e-3, strips)
     other = solved(lambda y: gap(-y), 5e-3, strips)
@@ -157,29 +157,29 @@ def test_that_a_mirrored_profile_gives_the_mirrored_half_lengths(strips):
         np.testing.assert_allclose(mirrored[::-1], values, rtol=1e-10)
 
 
-def test_that_local_half_lengths_follow_the_line_load_alone():
+def test_local_half_lengths_depend_on_own_line_load_only():
     found = solved(lambda y: 8.5 * y**2, 0.8e-3, 81, half_length="local")
     expected = np.sqrt(4.0 * found.line_load / (np.pi * MODULUS * RIG))
     np.testing.assert_allclose(found.half_length, expected, rtol=1e-12)
     assert found.peak_pressure == pytest.approx(0.5 * MODULUS * RIG * expected.max(), rel=1e-12)
 
 
-def test_that_strips_wider_than_long_are_by_themselves():
+def test_strips_wider_than_long_are_independent():
     wide = solved(lambda y: 1e-3 * y**2, 50e-3, 40)
-    alone = solved(lambda y: 1e-3 * y**2, 50e-3, 40, half_length="local")
-    np.testing.assert_allclose(wide.half_length, alone.half_length, rtol=1e-3)
+    single = solved(lambda y: 1e-3 * y**2, 50e-3, 40, half_length="local")
+    np.testing.assert_allclose(wide.half_length, single.half_length, rtol=1e-3)
 
 
-def test_that_every_way_of_solving_gives_the_same_half_lengths():
+def test_all_solve_methods_give_equal_half_lengths():
     model, grid = SPEC.factory(SlenderOptions()), Grid.spanning(-1e-3, 1e-3, 61)
     model.prepare(grid, MATERIALS)
     gap = 8.5 * grid.y**2
-    alone = model.solve(gap, RIG, POINT)
+    single = model.solve(gap, RIG, POINT)
     batch = model.solve_batch(np.stack([gap, gap]), RIG, [POINT, POINT]).solutions
     driven = replace(POINT, bearing_torque=0.1, rolling_radius=np.full(61, 0.02))
     for other in (*batch, model.solve(gap, RIG, driven)):
-        np.testing.assert_array_equal(other.half_length, alone.half_length)
-        assert other.peak_pressure == pytest.approx(alone.peak_pressure, rel=1e-14)
-    fields = model.fields(alone, gap, RIG, POINT)
-    np.testing.assert_allclose(fields.x[-1], alone.half_length, rtol=1e-14)
-    assert fields.pressure.max() == pytest.approx(alone.peak_pressure, rel=1e-3)
+        np.testing.assert_array_equal(other.half_length, single.half_length)
+        assert other.peak_pressure == pytest.approx(single.peak_pressure, rel=1e-14)
+    fields = model.fields(single, gap, RIG, POINT)
+    np.testing.assert_allclose(fields.x[-1], single.half_length, rtol=1e-14)
+    assert fields.pressure.max() == pytest.approx(single.peak_pressure, rel=1e-3)

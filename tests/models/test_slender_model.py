@@ -1,4 +1,4 @@
-"""The contact model `slender` against the exact theory, and its balances."""
+"""The contact model `slender` against exact theory, and its balances."""
 
 import math
 from dataclasses import fields, replace
@@ -31,7 +31,7 @@ def contact(grid=None, gap=None, creepage=None, load=300.0, curvature=RIG, mu=0.
 
 
 @pytest.mark.bench
-def test_that_the_rigs_power_is_within_a_hundredth_of_the_exact_theory():
+def test_rig_power_is_within_1_percent_of_exact_theory():
     *_, solution = contact()
     assert solution.power == pytest.approx(0.0771, rel=1e-2)
     assert solution.line_load.sum() * np.diff(solution.y)[0] == pytest.approx(300.0, rel=1e-10)
@@ -48,7 +48,7 @@ def test_that_the_rigs_power_is_within_a_hundredth_of_the_exact_theory():
         {"longitudinal": 0.0, "spin": 1.0},
     ],
 )
-def test_that_power_is_the_work_of_the_rigid_slip(creepage, tangential):
+def test_power_is_the_work_of_the_rigid_slip(creepage, tangential):
     *_, point, solution = contact(creepage=creepage, tangential=tangential)
     creep = point.creepage
     work = -SPEED * (
@@ -64,7 +64,7 @@ def test_that_power_is_the_work_of_the_rigid_slip(creepage, tangential):
 
 
 @pytest.mark.bench
-def test_that_forces_and_slip_have_the_signs_of_the_exact_theory():
+def test_forces_and_slip_have_the_signs_of_exact_theory():
     for row in rows("mean_problem", case="combined"):
         *_, solution = contact(
             gap=lambda y: 0.5 * y**2,
@@ -78,14 +78,14 @@ def test_that_forces_and_slip_have_the_signs_of_the_exact_theory():
         )
         assert solution.force_x == pytest.approx(row["Fx_N"], rel=5e-3)
         assert solution.force_y == pytest.approx(row["Fy_N"], rel=5e-3)
-        # the moment is small between two large parts
+        # the moment is a small difference of two large terms
         assert solution.spin_moment == pytest.approx(row["Mz_Nm"], rel=0.1)
         assert solution.power / SPEED == pytest.approx(row["P_over_V_N"], rel=3e-3)
 
 
 @pytest.mark.bench
 @pytest.mark.parametrize("name", WORN)
-def test_that_worn_profiles_carry_the_line_load_of_the_exact_theory(name):
+def test_worn_line_loads_agree_with_exact_theory(name):
     exact = worn_profile(name)
     *_, solution = contact(
         grid=Grid.spanning(-4e-3, 4e-3, 321),
@@ -100,7 +100,7 @@ def test_that_worn_profiles_carry_the_line_load_of_the_exact_theory(name):
 @pytest.mark.bench
 @pytest.mark.parametrize("name", WORN)
 @pytest.mark.parametrize("case", list(CREEPAGES))
-def test_that_worn_profiles_dissipate_like_the_exact_theory(name, case):
+def test_worn_dissipation_agrees_with_exact_theory(name, case):
     exact = worn_profile(name)
     xi, eta, phi = CREEPAGES[case]
     *_, solution = contact(
@@ -112,7 +112,7 @@ def test_that_worn_profiles_dissipate_like_the_exact_theory(name, case):
     assert solution.power / SPEED == pytest.approx(exact[f"P_over_V_{case}"], rel=6e-3)
     rows_exact = exact[f"P_l_over_V_{case}"]
     ours = np.interp(exact["y"], solution.y, solution.dissipation) / SPEED
-    # the parabola has a kink, at which its line load alone is off by as much
+    # the parabola has a kink, at which the error of the line load is as large
     limit = 0.035 if name == "parabola" else 0.016
     assert np.linalg.norm(ours - rows_exact) < limit * np.linalg.norm(rows_exact)
 
@@ -128,7 +128,7 @@ def test_that_worn_profiles_dissipate_like_the_exact_theory(name, case):
         {"longitudinal": 0.0, "spin": 20.0},
     ],
 )
-def test_that_the_fields_add_up_to_the_strips(creepage):
+def test_fields_integrate_to_the_strips(creepage):
     model, gap, point, solution = contact(creepage=creepage)
     fields = model.fields(solution, gap, RIG, point, points_along=4001)
     spacing = np.diff(solution.y)[0]
@@ -137,7 +137,7 @@ def test_that_the_fields_add_up_to_the_strips(creepage):
         return np.trapezoid(values, fields.x, axis=0).sum() * spacing
 
     assert total(fields.pressure) == pytest.approx(300.0, rel=1e-4)
-    # where directions vary along a strip, tractions are cut to their bound
+    # where the direction varies along a strip, tractions are cut off at their bound
     exact = 1e-4 if len(creepage) == 1 else 2e-3
     size = 0.1 * 300.0  # the friction force
     assert total(fields.traction_x) == pytest.approx(solution.force_x, rel=0.0, abs=exact * size)
@@ -154,7 +154,7 @@ def test_that_the_fields_add_up_to_the_strips(creepage):
 
 
 @pytest.mark.bench
-def test_that_spin_and_its_slip_profile_are_the_same_thing():
+def test_spin_equals_its_creepage_variation():
     grid = Grid.spanning(-1.9e-3, 1.9e-3, 101)
     spin = {"longitudinal": 3e-4, "spin": 0.5}
     profile = {"longitudinal": 3e-4, "spin": 0.5, "variation": -0.5 * grid.y + 7.0}
@@ -164,7 +164,7 @@ def test_that_spin_and_its_slip_profile_are_the_same_thing():
 
 
 @pytest.mark.bench
-def test_that_a_mirrored_contact_has_mirrored_dissipation_and_opposite_moment():
+def test_mirrored_contact_has_mirrored_dissipation():
     grid = Grid.spanning(-3e-3, 3e-3, 100)
     one = {"longitudinal": 3e-4, "lateral": 1e-4, "spin": 0.5}
     two = {"longitudinal": 3e-4, "lateral": -1e-4, "spin": -0.5}
@@ -177,7 +177,7 @@ def test_that_a_mirrored_contact_has_mirrored_dissipation_and_opposite_moment():
 
 @pytest.mark.bench
 @pytest.mark.parametrize("torque", [0.0, 1e-3, 0.1, 0.5, -0.3])
-def test_that_a_free_roller_carries_its_bearing_torque(torque):
+def test_free_roller_balances_its_bearing_torque(torque):
     *_, solution = contact(creepage={"longitudinal": 0.0, "bearing_torque": torque, "spin": 0.2})
     assert -0.02 * solution.force_x == pytest.approx(torque, rel=1e-9, abs=1e-12)
     if torque == 0.0:
@@ -185,13 +185,13 @@ def test_that_a_free_roller_carries_its_bearing_torque(torque):
 
 
 @pytest.mark.bench
-def test_that_a_roller_that_must_skid_is_an_error():
+def test_skidding_roller_is_an_error():
     with pytest.raises(ContactError, match=r"the roller skids: its bearing torque of 0\.7 N m"):
         contact(creepage={"longitudinal": 0.0, "bearing_torque": 0.7})
 
 
 @pytest.mark.bench
-def test_that_a_contact_at_the_edge_of_its_strips_is_an_error():
+def test_contact_at_the_edge_of_its_strips_is_an_error():
     with pytest.raises(
         ContactError, match=r"raise contact\.width or move contact\.centre"
     ) as caught:
@@ -200,13 +200,13 @@ def test_that_a_contact_at_the_edge_of_its_strips_is_an_error():
 
 
 @pytest.mark.bench
-def test_that_strips_too_narrow_are_an_error():
+def test_too_narrow_strips_are_an_error():
     with pytest.raises(ContactError, match=r"lower contact\.strips"):
         contact(grid=Grid.spanning(-1.8e-5, 1.8e-5, 51))
 
 
 @pytest.mark.bench
-def test_that_friction_may_be_given_per_strip():
+def test_friction_may_be_given_per_strip():
     grid = Grid.spanning(-1.9e-3, 1.9e-3, 101)
     local = np.where(grid.y > 0.0, 0.2, 0.1)
     *_, mixed = contact(grid=grid, creepage={"longitudinal": 5e-3}, mu=local)
@@ -224,12 +224,12 @@ def test_that_friction_may_be_given_per_strip():
         {"longitudinal": 4e-4, "variation": np.linspace(-1e-4, 2e-4, 121)},
     ],
 )
-def test_that_a_contact_alone_is_that_of_a_batch_to_the_bit(creepage, warm):
+def test_single_solution_equals_batch_bit_for_bit(creepage, warm):
     mu = np.linspace(0.05, 0.15, 121) if "spin" in creepage else 0.1
     model, gap, point, start = contact(creepage=dict(creepage), mu=mu)
     near = start if warm else None
     point, compliance = replace(point, normal_force=310.0), np.full_like(gap, 1e-13)
-    alone = model.solve(gap, RIG, point, compliance, near)
+    single = model.solve(gap, RIG, point, compliance, near)
     others = [point, replace(point, normal_force=280.0)]
     batch = model.solve_batch(
         np.stack([gap, gap]),
@@ -239,11 +239,11 @@ def test_that_a_contact_alone_is_that_of_a_batch_to_the_bit(creepage, warm):
         [near, near] if warm else None,
     )
     for item in fields(ContactSolution):
-        assert np.array_equal(getattr(alone, item.name), getattr(batch[0], item.name))
+        assert np.array_equal(getattr(single, item.name), getattr(batch[0], item.name))
 
 
 @pytest.mark.bench
-def test_that_power_that_is_not_finite_is_an_error_naming_its_contact():
+def test_infinite_power_is_an_error_naming_the_contact():
     model, gap, point, _ = contact()
     bad = replace(point, creepage=Creepage(np.nan))
     with pytest.raises(ContactError, match=r"^the dissipated power is not finite"):
@@ -253,7 +253,7 @@ def test_that_power_that_is_not_finite_is_an_error_naming_its_contact():
 
 
 @pytest.mark.bench
-def test_that_wear_compliance_makes_the_contact_softer_and_conserves_the_load():
+def test_wear_compliance_reduces_pressure_and_keeps_load():
     model, gap, point, hard = contact(grid=Grid.spanning(-4e-3, 4e-3, 81))
     soft = model.solve(gap, RIG, point, np.full(81, 5e-11), hard)
     assert soft.line_load.sum() == pytest.approx(hard.line_load.sum(), rel=1e-12)
@@ -261,6 +261,6 @@ def test_that_wear_compliance_makes_the_contact_softer_and_conserves_the_load():
     assert (soft.line_load > 0).sum() > (hard.line_load > 0).sum()
 
 
-def test_that_only_strip_theory_claims_the_compiled_loop():
+def test_only_strip_theory_has_the_compiled_loop():
     assert Slender(StripTheory()).capabilities.pass_loop
     assert not SPEC.factory(SlenderOptions(tangential="fastsim")).capabilities.pass_loop

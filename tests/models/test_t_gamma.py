@@ -1,4 +1,4 @@
-"""The wear law by T gamma over A: its regimes, and tests that run through them."""
+"""Wear law by T gamma over A: regimes, and wear tests that pass through them."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ MILD = 5.3e-9 / 7850.0  # m^3/J
 
 
 def contact(index, half_length=1e-4):
-    """Return a contact whose strips dissipate `index` [Pa] per area and rolled distance."""
+    """Return a contact with the dissipation `index` [Pa] per area and rolled distance."""
     index = np.asarray(index, dtype=float)
     strips = np.full_like(index, half_length)
     numbers = dict.fromkeys(
@@ -37,7 +37,7 @@ def depths(index, **options):
     return law.depth_per_pass("cylinder", contact(index), SPEED)
 
 
-def test_that_the_published_rates_come_back():
+def test_published_rates_are_reproduced():
     # ug per m rolled and mm^2 of contact, at T gamma over A in N/mm^2
     index = np.array([0.0, 5.0, 10.3, 20.0, 77.0, 87.2])
     rate = np.array([0.0, 5.3 * 5.0, 5.3 * 10.3, 55.0, 55.0, 55.0 + 61.9 * 10.0])
@@ -45,7 +45,7 @@ def test_that_the_published_rates_come_back():
     np.testing.assert_allclose(per_area * 1e3, rate, rtol=1e-12)
 
 
-def test_that_the_regimes_meet():
+def test_rate_is_continuous_between_regimes():
     regimes = Regimes()
     for threshold in (regimes.severe / regimes.mild, regimes.catastrophic_from):
         below, above = regimes.rate(threshold * np.array([1.0 - 1e-9, 1.0 + 1e-9]))
@@ -53,28 +53,28 @@ def test_that_the_regimes_meet():
     assert regimes.severe / regimes.mild == pytest.approx(10.4e6, rel=5e-3)  # as published
 
 
-def test_that_nothing_wears_outside_the_contact_or_with_factor_zero():
+def test_wear_is_zero_outside_contact_or_with_factor_zero():
     law = TGamma(TGammaOptions(roller={"factor": 0.0}))
     outside = contact([1e6, 1e6], half_length=0.0)
     assert law.depth_per_pass("cylinder", outside, SPEED).tolist() == [0.0, 0.0]
     assert law.depth_per_pass("roller", contact([1e6, 9e7]), SPEED).tolist() == [0.0, 0.0]
 
 
-def test_that_rates_are_read_with_their_units():
+def test_rates_are_read_with_their_units():
     read = Regimes(mild="5.3 ug/J", severe="55 ug/(m mm^2)", catastrophic_from="77.2 N/mm^2")
     assert read.model_dump() == pytest.approx(Regimes().model_dump())
     with pytest.raises(ValidationError, match="wrong dimension"):
         Regimes(mild="5.3 ug")
 
 
-def test_that_regimes_out_of_order_are_refused():
+def test_regimes_out_of_order_are_refused():
     with pytest.raises(ValidationError, match=r"before severe wear .* at least .* 10\.38"):
         Regimes(catastrophic_from="5 N/mm^2")
     with pytest.raises(ValidationError, match=r"such as \"55 ug/\(m mm\^2\)\""):
         Regimes(severe="55 um")
 
 
-def test_that_a_mildly_worn_test_is_archards():
+def test_mild_wear_is_archard_wear():
     law = {"wear": {"law": "t-gamma", "roller": {"factor": 0.5}}}
     problem, state = worn(operation__duration="30 min", **law)
     energy = {"k_over_h": f"{MILD!r} 1/Pa"}, {"k_over_h": f"{0.5 * MILD!r} 1/Pa"}
@@ -88,8 +88,8 @@ def test_that_a_mildly_worn_test_is_archards():
     ("creepage", "regime", "passes"),
     [(0.06, "severe", 600), (0.2, "severe", 600), (0.4, "catastrophic", 6000)],
 )
-def test_that_implicit_steps_agree_with_every_pass_by_itself(creepage, regime, passes):
-    """Strips in the middle wear severely, and mildly at the patch's ends."""
+def test_implicit_steps_agree_with_per_pass_steps(creepage, regime, passes):
+    """Severe wear in the middle of the patch, mild wear at its ends."""
     changes = {
         "wear": {"law": "t-gamma", "roller": {"factor": 0.0}},
         "creepage__longitudinal": creepage,
@@ -101,10 +101,10 @@ def test_that_implicit_steps_agree_with_every_pass_by_itself(creepage, regime, p
     index = start.contacts[0].dissipation.max() / (2.0 * start.contacts[0].half_length.max())
     assert (index / problem.kinematics.rolling_speed > 77.2e6) == (regime == "catastrophic")
     implicit, _ = stepped(problem, stepper, stop)
-    truth, _ = stepped(problem, PerPassStepper(), stop)
-    greatest = truth.cylinder_depth.max()
-    apart = np.abs(implicit.cylinder_depth - truth.cylinder_depth).max()
-    assert apart < 5e-3 * greatest
+    reference, _ = stepped(problem, PerPassStepper(), stop)
+    greatest = reference.cylinder_depth.max()
+    difference = np.abs(implicit.cylinder_depth - reference.cylinder_depth).max()
+    assert difference < 5e-3 * greatest
     assert abs(implicit.cylinder_depth.max() - greatest) < implicit.depth_error[0]
     assert implicit.depth_error[0] < 2e-3 * greatest
-    assert implicit.solves < 0.7 * truth.solves
+    assert implicit.solves < 0.7 * reference.solves

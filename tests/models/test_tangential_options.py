@@ -1,4 +1,4 @@
-"""The options that choose a tangential theory, and what they refuse."""
+"""Options that select a tangential theory, and refused options."""
 
 import pytest
 from pydantic import ValidationError
@@ -24,11 +24,11 @@ material = "steel"
 """
 
 
-def test_that_strips_are_the_default():
+def test_strip_theory_is_the_default():
     assert isinstance(tangential_theory(TangentialOptions()), StripTheory)
 
 
-def test_that_each_name_builds_its_theory_with_its_options():
+def test_each_name_builds_its_theory_with_its_options():
     fastrip = tangential_theory(TangentialOptions(tangential="fastrip", mx=30))
     assert isinstance(fastrip, FastripTheory)
     assert fastrip.mx == 30
@@ -50,19 +50,19 @@ def test_that_each_name_builds_its_theory_with_its_options():
         ("fastrip", "flexibility", "one"),
     ],
 )
-def test_that_an_option_the_theory_has_no_use_for_is_refused(tangential, key, value):
+def test_unused_option_is_refused(tangential, key, value):
     with pytest.raises(ValidationError) as caught:
         TangentialOptions(tangential=tangential, **{key: value})
     (error,) = caught.value.errors()
     assert error["loc"] == (key,)
     assert f'is not used with tangential = "{tangential}"' in error["msg"]
     assert 'tangential = "fastsim"' in error["msg"]
-    if tangential == "strip":  # which is the default too
+    if tangential == "strip":  # the default
         with pytest.raises(ValidationError, match="is not used"):
             TangentialOptions(**{key: value})
 
 
-def test_that_an_unknown_theory_is_the_only_mistake_told():
+def test_unknown_theory_is_the_only_mistake_reported():
     with pytest.raises(ValidationError) as caught:
         TangentialOptions(tangential="fastsin", bound="elliptic")
     assert [error["loc"] for error in caught.value.errors()] == [("tangential",)]
@@ -72,7 +72,7 @@ def test_that_an_unknown_theory_is_the_only_mistake_told():
 
 
 @pytest.mark.parametrize("model", ["slender", "hertz"])
-def test_that_a_scenario_names_the_key_and_the_remedy_once(model):
+def test_scenario_error_names_key_and_remedy_once(model):
     with pytest.raises(ScenarioError) as caught:
         parse_scenario(
             RIG + f'[contact]\nmodel = "{model}"\ntangential = "fastrip"\nbound = "parabolic"\n',
@@ -80,12 +80,12 @@ def test_that_a_scenario_names_the_key_and_the_remedy_once(model):
             {}.__getitem__,
             {},
         )
-    told = [p for p in caught.value.mistakes if p.key == "bound"]
-    assert len(told) == 1
-    assert told[0].table == "contact"
-    assert 'tangential = "fastsim"' in told[0].expected
+    mistakes = [p for p in caught.value.mistakes if p.key == "bound"]
+    assert len(mistakes) == 1
+    assert mistakes[0].table == "contact"
+    assert 'tangential = "fastsim"' in mistakes[0].expected
 
 
-def test_that_every_option_is_described():
+def test_every_option_is_described():
     for field in TangentialOptions.model_fields.values():
         assert field.description

@@ -1,4 +1,4 @@
-"""Fixtures of the plugins: others installed beside the built-in ones, for one test."""
+"""Fixtures that install plugins next to the built-in ones for one test."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Install = Callable[..., None]
 
 @pytest.fixture
 def install(monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
-    """Return a function that installs made-up entry points next to those of wearsim alone."""
+    """Return a function that installs made-up entry points next to those of wearsim only."""
     real = [
         point
         for point in entry_points(group=manager.PROJECT)
@@ -33,7 +33,7 @@ def install(monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
 
 @pytest.fixture
 def tiny(monkeypatch: pytest.MonkeyPatch, install: Install) -> None:
-    """Install the third party's plugin of `data/tiny`."""
+    """Install the third-party plugin of `data/tiny`."""
     monkeypatch.syspath_prepend(DATA / "tiny")
 
     def load():

@@ -1,4 +1,4 @@
-"""Plugins made up on the spot, and a scenario to use them in."""
+"""Plugins defined in tests, and a scenario that uses them."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ TABLES = {
 
 
 class Point:
-    """An entry point of a distribution that is not installed."""
+    """Entry point of a distribution that is not installed."""
 
     def __init__(
         self,

@@ -1,4 +1,4 @@
-"""Capabilities are honest: a built-in model does what it claims and refuses the rest."""
+"""Built-in contact models have the capabilities that they claim, and refuse others."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MODELS = {
 
 
 class Case:
-    """A model, prepared, and a contact to solve."""
+    """Prepared contact model with a contact to solve."""
 
     def __init__(self, name: str) -> None:
         model = "slender" if name.startswith("slender") else "hertz-fastsim"
@@ -44,7 +44,7 @@ def case(request):
     return Case(request.param)
 
 
-def test_that_a_spec_claims_no_less_than_its_models(case):
+def test_spec_has_at_least_the_capabilities_of_its_models(case):
     assert set(case.model.capabilities.names()) <= set(case.spec.describe())
 
 
@@ -68,12 +68,12 @@ def test_coupled(case):
             case.model.solve_coupled(gap, CURVATURE, points, wear)
         return
     one, other = case.model.solve_coupled(gap, CURVATURE, points, wear)
-    alone = case.solve(POINT, 2 * wear.total[0])
+    single = case.solve(POINT, 2 * wear.total[0])
     assert one.line_load == pytest.approx(other.line_load, rel=1e-9)
-    assert one.line_load == pytest.approx(alone.line_load, rel=1e-6, abs=1e-3)
+    assert one.line_load == pytest.approx(single.line_load, rel=1e-6, abs=1e-3)
 
 
-def test_that_many_sets_are_coupled_as_each_by_itself(case):
+def test_coupled_sets_equal_single_solutions(case):
     if not case.model.capabilities.coupled:
         pytest.skip("solves one contact at a time")
     softness = np.array([1e-13, 5e-13, 0.0])[:, None, None, None]
@@ -85,9 +85,9 @@ def test_that_many_sets_are_coupled_as_each_by_itself(case):
     again = list(case.model.solve_coupled_batch(gap, CURVATURE, points, wear, found))
     for k in range(3):
         own = slice(2 * k, 2 * k + 2)
-        alone = case.model.solve_coupled(gap[k], CURVATURE, points[own], wear.at(k))
+        single = case.model.solve_coupled(gap[k], CURVATURE, points[own], wear.at(k))
         warm = case.model.solve_coupled(gap[k], CURVATURE, points[own], wear.at(k), found[own])
-        for one, other in zip([*found[own], *again[own]], [*alone, *warm], strict=True):
+        for one, other in zip([*found[own], *again[own]], [*single, *warm], strict=True):
             assert (one.line_load == other.line_load).all()
             assert one.power == other.power
 
@@ -133,7 +133,7 @@ def test_friction_field(case):
     assert carried.power != pytest.approx(changed.power, rel=1e-3)
 
 
-def test_that_many_contacts_are_solved_as_each_alone(case):
+def test_batch_equals_single_solutions(case):
     loads = np.array([250.0, 300.0, 320.0])
     points = OperatingPoints(loads, np.full(3, 1e-3), 3e-4 + 0 * loads, 0.02 + 0 * loads,
                              np.full(3, 0.1), 2.618)  # fmt: skip
@@ -141,11 +141,11 @@ def test_that_many_contacts_are_solved_as_each_alone(case):
     batch = case.model.solve_batch(gaps, CURVATURE, points)
     assert batch.stack("y").shape == batch.stack("line_load").shape == gaps.shape
     for k, found in enumerate(batch.solutions):
-        alone = case.solve(points[k])
-        assert found.dissipation == pytest.approx(alone.dissipation, rel=1e-12, abs=1e-12)
-        assert batch.stack("power")[0, 0, k] == found.power == pytest.approx(alone.power)
+        single = case.solve(points[k])
+        assert found.dissipation == pytest.approx(single.dissipation, rel=1e-12, abs=1e-12)
+        assert batch.stack("power")[0, 0, k] == found.power == pytest.approx(single.power)
         assert [type(value) for value in vars(found).values()] == [
-            type(value) for value in vars(alone).values()
+            type(value) for value in vars(single).values()
         ]
     bad = replace(points, normal_force=np.array([300.0, 300.0, 1e7]))
     with pytest.raises(ContactError, match=r"^realisation 2: "):

@@ -1,4 +1,4 @@
-"""docs/plugins.md: every hook has a section whose example runs and keeps its promises."""
+"""docs/plugins.md: each hook has a section whose example runs and passes the checks."""
 
 from __future__ import annotations
 
@@ -69,13 +69,13 @@ def documented(install, monkeypatch):
     return documented
 
 
-def keeps(checks, bench):
+def run_checks(checks, fixture):
     for check in checks:
-        check(bench)
+        check(fixture)
 
 
 @pytest.mark.parametrize("hook", [name for name in vars(hookspecs.HookSpecs) if "wearsim" in name])
-def test_that_every_hook_is_documented_and_tested(hook):
+def test_every_hook_is_documented_and_tested(hook):
     code = blocks(section(f"`{hook}`"), "python")[0]
     assert f"@hookimpl\ndef {hook}():" in code
     assert f'documented("{hook}")' in Path(__file__).read_text(), f"no test here runs {hook}"
@@ -83,10 +83,10 @@ def test_that_every_hook_is_documented_and_tested(hook):
     assert f"| `{hook}` |" in section("How plugins are found")
 
 
-def test_that_the_documented_contact_model_keeps_its_promises_and_runs(documented):
+def test_documented_contact_model_passes_the_checks_and_runs(documented):
     tables = documented("wearsim_contact_models")
     spec = registry().get(ContactModelSpec, "plastic")
-    keeps(CONTACT_MODEL, ContactFixture(ConfiguredSpec(spec)))
+    run_checks(CONTACT_MODEL, ContactFixture(ConfiguredSpec(spec)))
     scenario = rig(**tables)
     assert scenario.contact.options.hardness == 1.2e9
     solution = wearsim.solve_contact(scenario)
@@ -99,10 +99,10 @@ def test_that_the_documented_contact_model_keeps_its_promises_and_runs(documente
 
 
 @pytest.mark.parametrize("stepper", ["auto", "per-pass"])
-def test_that_the_documented_wear_law_keeps_its_promises_and_runs(documented, stepper):
+def test_documented_wear_law_passes_the_checks_and_runs(documented, stepper):
     tables = documented("wearsim_wear_laws")
     spec = registry().get(WearLawSpec, "threshold")
-    keeps(WEAR_LAW, WearLawFixture(ConfiguredSpec(spec, {"k_over_h": "1.1e-11 1/Pa"})))
+    run_checks(WEAR_LAW, WearLawFixture(ConfiguredSpec(spec, {"k_over_h": "1.1e-11 1/Pa"})))
     changes = {"evolution.stepper": stepper, "operation.duration": "12 s"}
     result = wearsim.run(rig(changes, **tables))
     free = wearsim.run(rig(changes | {"wear.threshold": "0 J/m^2"}, **tables))
@@ -111,40 +111,40 @@ def test_that_the_documented_wear_law_keeps_its_promises_and_runs(documented, st
 
 
 @pytest.mark.parametrize("stepper", ["auto", "per-pass"])
-def test_that_the_documented_loads_keep_their_promises_and_run(documented, stepper):
+def test_documented_loads_pass_the_checks_and_run(documented, stepper):
     tables = documented("wearsim_loads")
     wave = {"normal_force": "300 N", "amplitude": "20 N", "period": "90 s"}
     warmth = {"time_constant": "1 min"}
-    keeps(
+    run_checks(
         loads.BY_ROLE["base"], LoadFixture(ConfiguredSpec(registry().get(LoadSpec, "wave"), wave))
     )
-    keeps(
+    run_checks(
         loads.BY_ROLE["term"],
         LoadFixture(ConfiguredSpec(registry().get(LoadSpec, "warmth"), warmth)),
     )
     result = wearsim.run(rig({"evolution.stepper": stepper}, **tables))
-    # a time constant and more under some 0.08 W at 50 N/W, beside a wave of 20 N
+    # two time constants of a lag of 0.0785 W x 50 N/W, plus a wave of 20 N
     wave_now = 20.0 * np.sin(2.0 * np.pi * 120.0 / 90.0)
     warm_now = 50.0 * 0.0785 * (1.0 - np.exp(-2.0))
     assert result.normal_force[-1] == pytest.approx(300.0 + wave_now + warm_now, rel=5e-3)
 
 
-def test_that_the_documented_random_inputs_keep_their_promises_and_run(documented):
+def test_documented_random_inputs_pass_the_checks_and_run(documented):
     tables = documented("wearsim_random_inputs")
 
     def chosen(name, raw, kind=None):
         return ConfiguredSpec(registry().get(RandomInputSpec, name), raw, kind)
 
     triangle = chosen("triangle", {"mode": "300 N", "width": "30 N"}, FORCE)
-    keeps(random_inputs.BY_ROLE["scalar"], RandomInputFixture(triangle))
+    run_checks(random_inputs.BY_ROLE["scalar"], RandomInputFixture(triangle))
     assert triangle.spec.factory(triangle.options).std == pytest.approx(30.0 / 6**0.5, rel=1e-4)
     slack = chosen("slack", {"yaw": "1 mrad", "tilt": "0.5 mrad"}, ANGLE)
-    keeps(random_inputs.BY_ROLE["joint"], RandomInputFixture(slack))
+    run_checks(random_inputs.BY_ROLE["joint"], RandomInputFixture(slack))
     friction = chosen("triangle", {"mode": 0.1, "width": 0.02})
     stripes = RandomInputFixture(chosen("stripes", {}), friction)
-    keeps(random_inputs.BY_ROLE["field"], stripes)
+    run_checks(random_inputs.BY_ROLE["field"], stripes)
     steady = RandomInputFixture(chosen("steady", {"spacing": "10 s"}), friction)
-    keeps(random_inputs.BY_ROLE["process"], steady)
+    run_checks(random_inputs.BY_ROLE["process"], steady)
     text = "".join(f"\n[{name}]\n{body}" for name, body in tables.items())
     scenario = rig_with(text)
     result = wearsim.run(scenario)
@@ -155,18 +155,18 @@ def test_that_the_documented_random_inputs_keep_their_promises_and_run(documente
 
 
 def rig_with(tables: str):
-    """Return a short test whose load, misalignment and friction stand in tables of their own."""
+    """Return a short test with load, misalignment and friction in separate tables."""
     base = rig().text.replace("coefficient = 0.1\n", "").replace('normal_force = "300 N"\n', "")
     return wearsim.scenario.parse_scenario(base + tables, "rig.toml", {}.__getitem__)
 
 
-def test_that_every_capability_is_in_the_table():
+def test_every_capability_is_in_the_table():
     text = PAGE[PAGE.index("### Optional capabilities") :]
     rows = re.findall(r"^\| `(\w+)` \|", text[: text.index("\n## ")], flags=re.MULTILINE)
     assert rows == list(vars(Capabilities()))
 
 
-def test_that_every_check_is_in_the_table():
+def test_every_check_is_in_the_table():
     rows = re.findall(r"^\| `([\w-]+)` \| (.*) \|$", section("Conformance tests"), re.MULTILINE)
     assert rows == [(check.name, check.requirement) for check in CONTACT_MODEL]
 
@@ -198,13 +198,13 @@ def test_documented_verb_runs(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("title", ["Options and units", "Conformance tests"])
-def test_that_the_other_examples_run(title):
+def test_other_examples_run(title):
     for code in blocks(section(title), "python"):
         exec(compile(code, "docs/plugins.md", "exec", dont_inherit=True), {})
 
 
-def test_that_the_message_on_the_page_is_what_the_kit_says():
-    (told,) = blocks(section("Conformance tests"), "")
+def test_documented_message_is_that_of_the_check():
+    (message,) = blocks(section("Conformance tests"), "")
     check = CONTACT_MODEL["strips-carry-the-load"]
-    flat = " ".join(told.split())
+    flat = " ".join(message.split())
     assert flat.endswith(f"Violated requirement: {check.requirement} ({check.specified_in})")

@@ -1,4 +1,4 @@
-"""The example in every hook's docstring runs as it stands, and no hook goes without one."""
+"""The docstring of each hook has an example that runs unchanged."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from wearsim.testing.wear_laws import WEAR_LAW, WearLawFixture
 
 
 def example_of(hook: str) -> str:
-    """Return the code of a hook's docstring."""
+    """Return the example code of a hook's docstring."""
     text = inspect.getdoc(getattr(hookspecs.HookSpecs, hook)) or ""
     marker = ".. code-block:: python\n"
     assert marker in text, f"{hook} shows no example"
@@ -33,7 +33,7 @@ def example_of(hook: str) -> str:
 
 @pytest.fixture
 def example(install, monkeypatch, request):
-    """Install the example of a hook, as an author who copied it would."""
+    """Install the example of a hook."""
 
     def example(hook: str) -> ModuleType:
         made = ModuleType(f"my_{hook}")
@@ -45,13 +45,13 @@ def example(install, monkeypatch, request):
     return example
 
 
-def test_that_every_hook_is_in_the_list_of_these_tests():
+def test_every_hook_is_listed_in_these_tests():
     specified = {name for name in vars(hookspecs.HookSpecs) if name.startswith("wearsim_")}
     assert specified == set(HOOKS)
 
 
 @pytest.mark.parametrize("hook", HOOKS)
-def test_that_every_hook_is_documented(hook):
+def test_every_hook_is_documented(hook):
     text = inspect.getdoc(getattr(hookspecs.HookSpecs, hook)) or ""
     assert text[0].isupper()
     assert "Returns\n-------\n" in text
@@ -59,12 +59,12 @@ def test_that_every_hook_is_documented(hook):
 
 
 @pytest.mark.parametrize("hook", HOOKS)
-def test_that_every_hook_is_tested(hook):
+def test_every_hook_is_tested(hook):
     used = f'example("{hook}")'
     assert used in Path(__file__).read_text(), f"no test here runs the example of {hook}"
 
 
-def test_that_the_example_of_a_contact_model_runs(example, monkeypatch):
+def test_example_of_a_contact_model_runs(example, monkeypatch):
     package, own = ModuleType("my_package"), ModuleType("my_package.foundation")
     monkeypatch.syspath_prepend(Path(__file__).parent / "data" / "tiny")
     own.Foundation = importlib.import_module("wearsim_tiny").Foundation
@@ -80,7 +80,7 @@ def test_that_the_example_of_a_contact_model_runs(example, monkeypatch):
 
 
 @pytest.mark.parametrize("stepper", ["implicit", "stabilised", "explicit", "per-pass"])
-def test_that_the_example_of_a_wear_law_runs(example, stepper):
+def test_example_of_a_wear_law_runs(example, stepper):
     example("wearsim_wear_laws")
     scenario = rig(
         {"evolution.stepper": stepper, "operation.duration": "6 s"},
@@ -88,13 +88,13 @@ def test_that_the_example_of_a_wear_law_runs(example, stepper):
     )
     assert registry().registered(WearLawSpec, "constant-depth").distribution == "my-package"
     result = wearsim.run(scenario)
-    # 300 passes wear the middle of the cylinder, and every roller by its share of 25/20/3
+    # 300 passes wear the cylinder; the depth of each roller is 25/20/3 of that
     assert result.depth[-1] == pytest.approx(300 * 1e-11, rel=1e-9)
     assert result.roller_depth[-1] == pytest.approx(300 * 1e-11 * 25 / 20 / 3, rel=1e-9)
 
 
 @pytest.mark.parametrize("stepper", ["implicit", "stabilised", "explicit", "per-pass"])
-def test_that_the_example_of_a_load_runs(example, stepper):
+def test_example_of_a_load_runs(example, stepper):
     example("wearsim_loads")
     scenario = rig({"evolution.stepper": stepper}, load='kind = "ramp"\nstart = 200.0\nslope = 0.5')
     assert registry().registered(LoadSpec, "ramp").distribution == "my-package"
@@ -104,7 +104,7 @@ def test_that_the_example_of_a_load_runs(example, stepper):
 
 
 @pytest.mark.parametrize("place", [0, 30])
-def test_that_an_option_of_a_load_that_seldom_differs_is_seen_to_change_the_contact(example, place):
+def test_rarely_differing_load_option_changes_the_contact(example, place):
     example("wearsim_loads")
     starts = ["200"] * 30
     starts.insert(place, "199" if place == 0 else "201")
@@ -116,26 +116,26 @@ def test_that_an_option_of_a_load_that_seldom_differs_is_seen_to_change_the_cont
 
 
 @pytest.mark.parametrize(
-    ("hook", "kind", "name", "checks", "bench"),
+    ("hook", "kind", "name", "checks", "fixture"),
     [
         ("wearsim_wear_laws", WearLawSpec, "constant-depth", WEAR_LAW, WearLawFixture),
         ("wearsim_loads", LoadSpec, "ramp", loads.BY_ROLE["base"], LoadFixture),
     ],
 )
-def test_that_the_examples_keep_their_promises(example, hook, kind, name, checks, bench):
+def test_examples_pass_the_checks(example, hook, kind, name, checks, fixture):
     example(hook)
     chosen = ConfiguredSpec(registry().get(kind, name))
     for check in checks:
-        check(bench(chosen))
+        check(fixture(chosen))
 
 
-def test_that_the_example_of_a_random_input_runs(example):
+def test_example_of_a_random_input_runs(example):
     example("wearsim_random_inputs")
     spec = registry().get(RandomInputSpec, "flat")
-    bench = RandomInputFixture(ConfiguredSpec(spec, {"low": 2.0, "high": 4.0}))
+    fixture = RandomInputFixture(ConfiguredSpec(spec, {"low": 2.0, "high": 4.0}))
     for check in random_inputs.BY_ROLE["scalar"]:
-        check(bench)
-    flat = bench.thing
+        check(fixture)
+    flat = fixture.instance
     assert flat.quantile(np.array([0.25, 0.5])) == pytest.approx([2.5, 3.0])
     assert (*flat.support, flat.mean) == pytest.approx((2.0, 4.0, 3.0))
     assert flat.std == pytest.approx(1.0 / np.sqrt(3.0), rel=1e-6)

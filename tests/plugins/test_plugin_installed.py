@@ -1,4 +1,4 @@
-"""Distributions found on Python's path by their entry points, in processes of their own."""
+"""Distributions found on the Python path by their entry points, in separate processes."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def write_rig(folder: Path, contact: str) -> Path:
     return path
 
 
-def test_that_an_installed_plugin_is_listed_with_its_distribution():
+def test_installed_plugin_is_listed_with_its_distribution():
     done = wearsim("plugins", "--json", plugins=("tiny",))
     assert done.returncode == 0, done.stderr
     listed = json.loads(done.stdout)
@@ -45,7 +45,7 @@ def test_that_an_installed_plugin_is_listed_with_its_distribution():
     assert listed["broken"] == []
 
 
-def test_that_a_broken_distribution_is_listed_with_its_cause():
+def test_broken_distribution_is_listed_with_its_cause():
     done = wearsim("plugins", "--json", plugins=("broken", "tiny"))
     assert done.returncode == 0, done.stderr
     listed = json.loads(done.stdout)
@@ -55,12 +55,12 @@ def test_that_a_broken_distribution_is_listed_with_its_cause():
     assert broken["cause"] == "ModuleNotFoundError: No module named 'a_library_nobody_has'"
 
 
-def test_that_a_run_uses_an_installed_plugin_and_its_file_names_it(tmp_path):
+def test_run_stores_the_name_of_the_plugin_it_uses(tmp_path):
     path = write_rig(tmp_path, 'model = "foundation"\nwidth = "8 mm"\nstrips = 81')
     done = wearsim("run", path, "-o", tmp_path / "rig.h5", "--json", plugins=("tiny",))
     assert done.returncode == 0, done.stderr
-    told = json.loads(done.stdout)
-    assert (told["model"], told["stepper"]) == ("foundation", "stabilised")
+    output = json.loads(done.stdout)
+    assert (output["model"], output["stepper"]) == ("foundation", "stabilised")
     shown = wearsim("show", tmp_path / "rig.h5", plugins=("tiny",))
     assert "wearsim-tiny" in shown.stdout
     resumed = wearsim("resume", tmp_path / "rig.h5", "--until", "2 min", plugins=())
@@ -69,7 +69,7 @@ def test_that_a_run_uses_an_installed_plugin_and_its_file_names_it(tmp_path):
     assert "install it and resume again" in resumed.stderr
 
 
-def test_that_asking_for_a_missing_plugin_tells_what_failed_to_load(tmp_path):
+def test_missing_plugin_error_names_what_failed_to_load(tmp_path):
     path = write_rig(tmp_path, 'model = "sparse"')
     done = wearsim("check", path, plugins=("broken",))
     assert done.returncode == 2

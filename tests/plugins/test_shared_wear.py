@@ -1,4 +1,4 @@
-"""Who wears which body, and the same with as few bodies as there need be."""
+"""Wear of shared bodies, and its reduction to the smallest number of bodies."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ def opened(own, members, shared, line_load):
 
 @settings(max_examples=80, deadline=None)
 @given(st.integers(1, 6), st.integers(1, 3), st.integers(1, 4), st.integers(0, 10**6))
-def test_that_the_reduced_wear_opens_the_same_gaps(contacts, stations, rollers, seed):
+def test_reduced_wear_opens_the_same_gaps(contacts, stations, rollers, seed):
     random = np.random.default_rng(seed)
     bodies = np.stack(
         [random.integers(0, stations, contacts), random.integers(0, rollers, contacts)], axis=1
@@ -39,21 +39,21 @@ def test_that_the_reduced_wear_opens_the_same_gaps(contacts, stations, rollers, 
     assert (numbers == np.arange(len(numbers))).all()
 
 
-def test_that_a_body_touched_once_is_no_shared_body():
+def test_body_of_one_contact_is_not_shared():
     three = SharedWear(np.array([[0, 0], [0, 1], [0, 2]]), np.ones((3, 2, 4)))
     own, members, _ = three.reduced
     assert (own == 1.0).all()
     assert members.tolist() == [[0, -1], [0, -1], [0, -1]]
 
 
-def test_that_cylinder_and_roller_of_the_same_contacts_are_one_body():
+def test_cylinder_and_roller_of_the_same_contacts_merge():
     own, members, shared = SharedWear(np.zeros((4, 2), dtype=int), np.ones((4, 2, 3))).reduced
     assert not own.any()
     assert (members[:, 0] == 0).all()
     assert (shared[:, 0] == 2.0).all()
 
 
-def test_that_many_are_reduced_as_each_by_itself():
+def test_groups_equal_the_reduction_of_single_sets():
     random = np.random.default_rng(0)
     bodies = np.array([[0, 0], [0, 0], [0, 1]])
     wears = np.array([[1, 1], [1, 0], [0, 1], [0, 0], [1, 1], [0, 1]])[:, None, :, None]
@@ -62,11 +62,11 @@ def test_that_many_are_reduced_as_each_by_itself():
     opening, seen = many.opening(line_load), []
     for numbers, own, members, shared in many.groups:
         for place, number in enumerate(numbers.tolist()):
-            alone = many.at(number)
-            expected = alone.reduced
+            single = many.at(number)
+            expected = single.reduced
             assert (own[place] == expected[0]).all()
             assert (members == expected[1]).all()
             assert (shared[place] == expected[2]).all()
-            assert (opening[number] == alone.opening(line_load[number])).all()
+            assert (opening[number] == single.opening(line_load[number])).all()
             seen.append(number)
     assert sorted(seen) == list(range(6))

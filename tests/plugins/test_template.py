@@ -1,4 +1,4 @@
-"""The template that comes with wearsim: what it may import, how long it is, and what it runs."""
+"""Plugin template of wearsim: imports, length, and runs with its model."""
 
 from __future__ import annotations
 
@@ -53,43 +53,43 @@ def imported(path: Path) -> set[str]:
 
 
 @pytest.mark.parametrize("path", sorted(FOLDER.rglob("*.py")), ids=lambda path: path.name)
-def test_that_it_imports_what_is_meant_for_authors_alone(path):
+def test_template_imports_public_modules_only(path):
     own = {"wearsim_template"} if path != MODULE else set()
     standard = set(sys.stdlib_module_names)
     for name in imported(path) - own:
         assert name in ALLOWED or name.split(".")[0] in (standard | {"numpy", "scipy"}), name
 
 
-def test_that_it_is_short():
+def test_template_is_short():
     assert len(MODULE.read_text().splitlines()) < 100
 
 
-def test_that_its_tests_are_one_line_of_the_kit():
+def test_template_tests_use_one_line_of_the_kit():
     text = (FOLDER / "tests" / "test_winkler.py").read_text()
     assert "test_winkler = contact_model_tests(SPEC)\n" in text
 
 
 @pytest.mark.usefixtures("template")
-def test_that_it_replays_the_rig_with_stabilised_steps():
+def test_template_runs_the_rig_with_stabilised_steps():
     result = wearsim.run(rig(contact='model = "winkler"'))
     assert (result.stepper, result.finished) == ("stabilised", True)
-    # all slides: mu N V |xi| per roller, for three rollers
+    # gross sliding: mu N V |xi| per roller, for three rollers
     assert result.power[-1] == pytest.approx(3 * 0.1 * 300.0 * 2.618 * 1e-3, rel=1e-4)
     assert result.worn_volume[-1] == pytest.approx(1.1e-11 * result.dissipated_energy[-1], rel=1e-9)
 
 
 @pytest.mark.usefixtures("template")
-def test_that_its_stabilised_steps_agree_with_every_pass_by_itself():
+def test_stabilised_steps_agree_with_per_pass_steps():
     short = {"operation.duration": "12 s"}
     contact = 'model = "winkler"\nfoundation_modulus = "800 GPa/mm"'
     steps = wearsim.run(rig(short, contact=contact))
-    truth = wearsim.run(rig(short | {"evolution.stepper": "per-pass"}, contact=contact))
-    assert steps.depth[-1] == pytest.approx(float(truth.depth[-1]), rel=2e-3)
+    reference = wearsim.run(rig(short | {"evolution.stepper": "per-pass"}, contact=contact))
+    assert steps.depth[-1] == pytest.approx(float(reference.depth[-1]), rel=2e-3)
 
 
 @pytest.mark.usefixtures("template")
 @pytest.mark.parametrize(
-    ("option", "told"),
+    ("option", "message"),
     [
         ('foundation_modulus = "1 GPa"', "foundation_modulus: wrong dimension"),
         ('foundation_modulus = "0 GPa/mm"', "must be above zero"),
@@ -97,13 +97,13 @@ def test_that_its_stabilised_steps_agree_with_every_pass_by_itself():
         ('depth = "1 mm"', "depth: unknown key"),
     ],
 )
-def test_that_its_options_are_validated_with_their_units(option, told):
+def test_options_are_validated_with_their_units(option, message):
     with pytest.raises(wearsim.errors.ScenarioError) as caught:
         rig(contact=f'model = "winkler"\n{option}')
-    assert told in str(caught.value)
+    assert message in str(caught.value)
 
 
-def test_that_names_become_those_of_the_new_plugin():
+def test_names_are_replaced_by_those_of_the_new_plugin():
     text = "wearsim-template wearsim_template Winkler winkler test_winkler"
     assert renamed(text, "a-b") == "wearsim-a-b wearsim_a_b AB a-b test_a_b"
 
@@ -112,14 +112,14 @@ AWKWARD = ["soft-winkler", "winkler-template", "template", "winkler", "wink-wink
 
 
 @pytest.mark.parametrize("name", AWKWARD)
-def test_that_a_name_that_holds_the_templates_own_is_replaced_once(name):
+def test_name_containing_a_template_name_is_replaced_once(name):
     under, camel = name.replace("-", "_"), name.title().replace("-", "")
     text = "wearsim-template wearsim_template Winkler winkler test_winkler"
     assert renamed(text, name) == (f"wearsim-{name} wearsim_{under} {camel} {name} test_{under}")
 
 
 @pytest.mark.parametrize("name", AWKWARD)
-def test_that_a_plugin_of_an_awkward_name_is_imported_and_solves(name, tmp_path, monkeypatch):
+def test_plugin_with_an_awkward_name_is_imported_and_solves(name, tmp_path, monkeypatch):
     written = write_plugin(name, tmp_path)
     code = [ast.parse(path.read_text()) for path in written if path.suffix == ".py"]
     assert len(code) == 2
@@ -130,13 +130,13 @@ def test_that_a_plugin_of_an_awkward_name_is_imported_and_solves(name, tmp_path,
     monkeypatch.delitem(sys.modules, made.__name__)
     (yielded,) = made.wearsim_contact_models()
     assert (yielded.name, made.SPEC) == (name, yielded)
-    # what stands in the test beside it, under names of its own
+    # the test of the plugin has the new names
     tests = tmp_path / f"wearsim-{name}" / "tests" / f"test_{under}.py"
     monkeypatch.setitem(sys.modules, made.__name__, made)
     assert f"test_{under}" in runpy.run_path(str(tests))
     CONTACT_MODEL["strips-carry-the-load"](ContactFixture(ConfiguredSpec(yielded)))
 
 
-def test_that_no_name_is_refused_that_only_words_of_a_docstring_have():
+def test_words_in_docstrings_do_not_clash():
     assert clash("springs") is None
     assert clash("strip") is None

@@ -1,4 +1,4 @@
-"""A plugin made by `wearsim new`, installed into an environment of its own, used from the shell."""
+"""Plugin written by `wearsim new`, installed in a separate environment, used from the shell."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from pathlib import Path
 
 import pytest
 
-pytestmark = pytest.mark.slow  # an environment is made and installed into
+pytestmark = pytest.mark.slow  # creates an environment and installs into it
 
 SCENARIO = Path(__file__).parents[2] / "scenarios" / "rig-450min.toml"
 
 
 def run(*command: object, folder: Path) -> str:
-    """Return what a command says; it must succeed."""
+    """Return the output of a command that must succeed."""
     environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
     done = subprocess.run(
         [str(part) for part in command],
@@ -33,14 +33,14 @@ def run(*command: object, folder: Path) -> str:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a folder with an environment `venv` that holds the new plugin `sponge`.
+    """Return a folder with an environment `venv` in which the new plugin `sponge` is installed.
 
     The environment sees the packages of the one that runs the tests, and nothing is fetched.
     """
     folder = tmp_path_factory.mktemp("author")
     run(sys.executable, "-m", "venv", "--without-pip", folder / "venv", folder=folder)
     python = folder / "venv" / "bin" / "python"
-    # a path added by hand is no site directory: addsitedir also follows its links to sources
+    # addsitedir, since a path in sys.path does not process the .pth files of editable installs
     packages = {sysconfig.get_path("purelib"), sysconfig.get_path("platlib")}
     own = run(python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))", folder=folder)
     lines = [f"import site; site.addsitedir({path!r})" for path in sorted(packages)]
@@ -59,7 +59,7 @@ def wearsim(folder: Path, *arguments: object) -> str:
     return run(folder / "venv" / "bin" / "python", "-m", "wearsim", *arguments, folder=folder)
 
 
-def test_that_it_is_listed_with_its_distribution(folder: Path) -> None:
+def test_plugin_is_listed_with_its_distribution(folder: Path) -> None:
     listed = json.loads(wearsim(folder, "plugins", "--json"))
     (own,) = (item for item in listed["plugins"] if item["name"] == "sponge")
     assert (own["distribution"], own["version"]) == ("wearsim-sponge", "0.1.0")
@@ -67,20 +67,20 @@ def test_that_it_is_listed_with_its_distribution(folder: Path) -> None:
     assert listed["broken"] == []
 
 
-def test_that_the_environment_beside_it_knows_nothing_of_it(folder: Path) -> None:
+def test_plugin_is_absent_from_the_outer_environment(folder: Path) -> None:
     listed = json.loads(run(sys.executable, "-m", "wearsim", "plugins", "--json", folder=folder))
     assert "sponge" not in {item["name"] for item in listed["plugins"]}
 
 
-def test_that_a_scenario_with_it_is_checked(folder: Path) -> None:
-    told = wearsim(folder, "check", SCENARIO, "--set", "contact.model=sponge")
-    assert "sponge: elastic foundation that slides everywhere" in " ".join(told.split())
+def test_scenario_with_the_plugin_is_checked(folder: Path) -> None:
+    output = wearsim(folder, "check", SCENARIO, "--set", "contact.model=sponge")
+    assert "sponge: elastic foundation in gross sliding" in " ".join(output.split())
 
 
-def test_that_the_450_minute_test_runs_to_its_end_and_its_file_names_it(folder: Path) -> None:
+def test_whole_rig_test_runs_and_stores_the_plugin_name(folder: Path) -> None:
     model = ["--set", "contact.model=sponge"]
-    told = wearsim(folder, "run", SCENARIO, *model, "-o", "sponge.h5", "--json", "--quiet")
-    result = json.loads(told)
+    output = wearsim(folder, "run", SCENARIO, *model, "-o", "sponge.h5", "--json", "--quiet")
+    result = json.loads(output)
     assert (result["model"], result["stepper"], result["finished"]) == (
         "sponge",
         "stabilised",
@@ -90,12 +90,12 @@ def test_that_the_450_minute_test_runs_to_its_end_and_its_file_names_it(folder: 
     assert "wearsim-sponge" in wearsim(folder, "show", "sponge.h5")
 
 
-def test_that_its_own_tests_pass(folder: Path) -> None:
+def test_tests_of_the_plugin_pass(folder: Path) -> None:
     python = folder / "venv" / "bin" / "python"
-    told = run(
+    output = run(
         *(python, "-m", "pytest", "-q", "-p", "no:cacheprovider"),
         *("-W", "error", folder / "wearsim-sponge" / "tests"),
         folder=folder,
     )
-    assert " passed" in told
-    assert "skipped" not in told
+    assert " passed" in output
+    assert "skipped" not in output

@@ -1,4 +1,4 @@
-"""The model keeps what every contact model promises, and what its README says of it."""
+"""Requirements on the contact model, and the foundation modulus of its README."""
 
 import numpy as np
 import pytest
@@ -11,12 +11,12 @@ test_winkler = contact_model_tests(SPEC)
 test_softer_winkler = contact_model_tests(SPEC, {"foundation_modulus": "500 GPa/mm"})
 
 
-def test_that_a_strip_of_the_half_length_carries_what_hertz_gives_it():
+def test_strip_of_the_half_length_has_its_hertzian_load():
     a, curvature = 0.1e-3, 90.0
     model = SPEC.factory(SPEC.options(half_length="0.1 mm"))
     model.prepare(Grid.spanning(-3e-3, 3e-3, 3), (STEEL, STEEL))
     hertz = np.pi / 4.0 * STEEL.youngs_modulus / (2.0 * (1.0 - 0.3**2)) * curvature * a**2
-    point = OperatingPoint(hertz * 2e-3, 1.0, Creepage(1e-3), 0.1)  # one strip of 2 mm, alone
+    point = OperatingPoint(hertz * 2e-3, 1.0, Creepage(1e-3), 0.1)  # a single strip of 2 mm
     solution = model.solve(np.array([1.0, 0.0, 1.0]), curvature, point)
     assert solution.half_length[1] == pytest.approx(a, rel=1e-9)
     assert solution.line_load[1] == pytest.approx(hertz, rel=1e-9)

@@ -1,4 +1,4 @@
-"""The contact model `winkler`: an elastic foundation, strip by strip, that slides everywhere."""
+"""The contact model `winkler`: an elastic foundation, strip by strip, in gross sliding."""
 
 from typing import Annotated
 
@@ -12,14 +12,14 @@ Modulus = Annotated[float, ws.Quantity(ws.Kind("a modulus", "Pa/m", "1000 GPa/mm
 
 
 class WinklerOptions(ws.Options):
-    """What may stand beside ``model = "winkler"``, validated with its units."""
+    """Options of the contact model `winkler`, validated with their units."""
 
-    half_length: ws.PositiveLength = ws.Field(0.13e-3, description="of a strip that Hertz loads so")
+    half_length: ws.PositiveLength = ws.Field(0.13e-3, description="of a strip with Hertzian load")
     foundation_modulus: Modulus | None = ws.Field(None, description="instead: pressure per depth")
 
 
 class Winkler(ws.ContactModel):
-    """Springs side by side: the pressure is the modulus times the depth, friction mu times it."""
+    """Independent springs: the pressure is the modulus times the depth, friction mu times it."""
 
     capabilities = ws.Capabilities(creepage_variation=True, local_friction=True)
 
@@ -27,13 +27,13 @@ class Winkler(ws.ContactModel):
         self.options = options
 
     def prepare(self, grid, materials):
-        """Take the strips; by default K = 3 pi E*/(8 a), see README.md."""
+        """Set strips and modulus; by default K = 3 pi E*/(8 a), see README.md."""
         compliance = sum((1.0 - m.poisson_ratio**2) / m.youngs_modulus for m in materials)  # 1/E*
         by_hertz = 3.0 * np.pi / (8.0 * compliance * self.options.half_length)
         self.grid, self.modulus = grid, self.options.foundation_modulus or by_hertz
 
     def solve(self, gap, longitudinal_curvature, point, wear_compliance=None, warm=None):
-        """Solve one contact; there is one answer, whatever `warm` is."""
+        """Solve one contact; `warm` is not used."""
         ws.refuse_unclaimed(self, point, wear_compliance)
         force, spacing = point.normal_force, self.grid.spacing
         if not (0.0 < force < np.inf and np.isfinite(gap).all()):
@@ -46,7 +46,7 @@ class Winkler(ws.ContactModel):
         def excess(approach):
             return stiffness * (depth(approach) ** 1.5).sum() * spacing - force
 
-        # one strip that carries it all would sink in this far
+        # approach at which a single strip carries the load
         reach = (force / spacing / stiffness) ** (2.0 / 3.0)
         low = float(gap.min())
         approach = brentq(excess, low, low + 1.01 * reach, xtol=1e-20, rtol=1e-14)
@@ -55,7 +55,7 @@ class Winkler(ws.ContactModel):
         return self._slide(depth(approach), stiffness, longitudinal_curvature, point, approach)
 
     def _slide(self, depth, stiffness, longitudinal_curvature, point, approach):
-        """Sum up strips that all slide, each against its own rigid slip."""
+        """Return the solution of sliding strips, with the local rigid slip of each."""
         y, load, creepage = self.grid.y, stiffness * depth**1.5, point.creepage
         half_length = np.sqrt(2.0 * depth / longitudinal_curvature)
         varies = -creepage.spin * y if creepage.variation is None else creepage.variation
@@ -79,7 +79,7 @@ class Winkler(ws.ContactModel):
 
 
 SPEC = ws.ContactModelSpec(
-    *("winkler", WinklerOptions, "elastic foundation that slides everywhere"),
+    *("winkler", WinklerOptions, "elastic foundation in gross sliding"),
     factory=Winkler,
     capabilities=Winkler.capabilities,
 )

@@ -1,3 +1,3 @@
-"""A plugin whose author forgot a dependency."""
+"""Plugin with a missing dependency."""
 
 import a_library_nobody_has  # noqa: F401

@@ -1,4 +1,4 @@
-"""A third party's plugin: an elastic foundation, a wear law without shear and a drifting load."""
+"""Third-party plugin: an elastic foundation, a wear law by line load and a drifting load."""
 
 import numpy as np
 from scipy.optimize import brentq
@@ -17,7 +17,7 @@ from wearsim.types import ContactSolution
 
 
 class Foundation(ContactModel):
-    """Springs side by side, sliding everywhere; it claims nothing beyond `solve`."""
+    """Independent springs in gross sliding, without optional capabilities."""
 
     def __init__(self, foundation_modulus):
         self.modulus = foundation_modulus
@@ -32,7 +32,7 @@ class Foundation(ContactModel):
 
     def solve(self, gap, longitudinal_curvature, point, wear_compliance=None, warm=None):
         if wear_compliance is not None:
-            raise ValueError("a caller must not give what is not claimed")
+            raise ValueError("wear compliance without the capability")
         spacing, force = self.grid.spacing, point.normal_force
 
         def excess(approach):
@@ -66,7 +66,7 @@ class FoundationOptions(Options):
 
 
 class Abrasion(WearLaw):
-    """Depth per pass in proportion to the line load, on the cylinder alone."""
+    """Depth per pass proportional to the line load, on the cylinder only."""
 
     def __init__(self, options):
         self.factor = options.factor
@@ -80,7 +80,7 @@ class AbrasionOptions(Options):
 
 
 class Drift(LoadTerm):
-    """A load that grows with dissipated energy and never comes to rest."""
+    """Load that increases with the dissipated energy without limit."""
 
     def __init__(self, options):
         self.rate = options.rate
@@ -109,12 +109,19 @@ def wearsim_contact_models():
 @hookimpl
 def wearsim_wear_laws():
     yield WearLawSpec(
-        name="abrasion", factory=Abrasion, options=AbrasionOptions, summary="wear by load alone"
+        name="abrasion",
+        factory=Abrasion,
+        options=AbrasionOptions,
+        summary="wear proportional to line load",
     )
 
 
 @hookimpl
 def wearsim_loads():
     yield LoadSpec(
-        name="drift", factory=Drift, options=DriftOptions, role="term", summary="load by energy"
+        name="drift",
+        factory=Drift,
+        options=DriftOptions,
+        role="term",
+        summary="load by dissipated energy",
     )
