@@ -21,7 +21,6 @@ from tests.benchmarks import (
 from tests.benchmarks.report import QUICK, TABLES
 from wearsim.studies.contact.monte_carlo import dissipation
 
-pytestmark = pytest.mark.bench
 
 
 def test_speed_of_hertz(benchmark):

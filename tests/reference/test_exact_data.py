@@ -5,8 +5,6 @@ import pytest
 
 from wearsim_bench.exact_solutions import CREEPAGES, WORN, rows, strips_of, table, worn_profile
 
-pytestmark = pytest.mark.bench
-
 
 @pytest.mark.parametrize("name", WORN)
 def test_worn_profiles_sum_to_their_load_and_power(name):

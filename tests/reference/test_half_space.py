@@ -5,7 +5,6 @@ import pytest
 
 from tests.reference import half_space
 from wearsim.mechanics.hertz.ellipse import hertz
-from wearsim_bench.exact_solutions import WORN, worn_profile
 
 MODULUS = 200e9 / (2.0 * (1.0 - 0.3**2))
 
@@ -38,19 +37,3 @@ def test_elliptic_contact_equals_hertz(across):
     assert difference(found.half_length, patch.half_length(y)) < 4e-3
     assert found.approach == pytest.approx(patch.approach, rel=1e-4)
     assert found.peak_pressure == pytest.approx(patch.peak_pressure, rel=1e-3)
-
-
-@pytest.mark.bench
-@pytest.mark.parametrize("name", WORN)
-def test_worn_profile_equals_solution_of_contact(name):
-    exact = worn_profile(name)
-    edge = np.abs(exact["y"]).max()
-    y = (np.arange(400) + 0.5) / 200.0 * edge - edge
-    gap = np.interp(y, exact["y"], exact["w"])
-    found = half_space.solve(gap, y, 45.0, 300.0, MODULUS, 1.2 * exact["a"].max())
-    q = np.interp(exact["y"], y, found.line_load)
-    a = np.interp(exact["y"], y, found.half_length)
-    assert difference(q, exact["q"]) < 3e-3
-    assert difference(a, exact["a"]) < 3e-3
-    assert found.approach == pytest.approx(exact["approach"], rel=2e-5)
-    assert found.peak_pressure == pytest.approx(exact["peak_pressure"], rel=1e-3)

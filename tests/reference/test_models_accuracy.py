@@ -13,8 +13,6 @@ from wearsim_bench.contact.accuracy import (
 )
 from wearsim_bench.exact_solutions import WORN
 
-pytestmark = pytest.mark.bench
-
 VARIANTS = ("kik-piotrowski", "ayasse-chollet", "analyn")
 #: rms and worst error of the power, and the median L2 error of P_l(y)
 DRAWN = {

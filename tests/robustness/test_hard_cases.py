@@ -7,8 +7,6 @@ from wearsim_bench.hard_cases.evaluation import evaluate
 from wearsim_bench.hard_cases.friction_field import friction_field
 from wearsim_bench.hard_cases.runs import Plan
 
-pytestmark = pytest.mark.bench
-
 CASES = {case.name: case for case in hard_cases(SHORT)}
 PLAN = Plan.of(quick=True, changes={})
 
@@ -18,7 +16,7 @@ SLOW = {
     "2000 strips",
     "creepage through zero in time",
     "friction per pass, 50 % scatter",
-    "spring unloaded to nothing",
+    "spring unloaded to zero",
 }
 
 

@@ -1,4 +1,4 @@
-"""Contact models measured against the exact theory: who is measured, and what their errors are."""
+"""Topic `contact`: methods, errors and failures."""
 
 import json
 import sys
@@ -27,14 +27,12 @@ from wearsim_bench.contact.worn_profiles import measure
 from wearsim_bench.exact_solutions import rows
 from wearsim_bench.measure.measurement import Effort
 
-pytestmark = pytest.mark.bench
-
 QUICK = Effort(quick=True, repetitions=1)
 GROUPS = ["fresh rig", "partial slip with spin", *HARD, "worn profiles"]
 
 
 class ChoosyOptions(ws.Options):
-    """Choices of all kinds, and one that means nothing without another."""
+    """Choices of all kinds, one of which requires another."""
 
     shape: Literal["round", "flat"] = "round"
     fine: bool = False
@@ -44,40 +42,40 @@ class ChoosyOptions(ws.Options):
     @classmethod
     def _flat_only(cls, value, info):
         if value and info.data["shape"] != "flat":
-            raise ValueError("fine means nothing unless flat")
+            raise ValueError("fine requires flat")
         return value
 
 
-class Mistaken(ws.ContactModel):
-    """A model whose author has made a mistake."""
+class Faulty(ws.ContactModel):
+    """A model whose `solve` raises a TypeError."""
 
     def __init__(self, options):
         self.options = options
 
     def prepare(self, grid, materials):
-        """Take nothing."""
+        """Do nothing."""
 
     def solve(self, gap, longitudinal_curvature, point, wear_compliance=None, warm=None):
-        """Fail."""
+        """Raise a TypeError."""
         return len(None)
 
 
-def made_up():
-    made = ModuleType("made_up")
-    spec = ContactModelSpec("choosy", ChoosyOptions, "a mistake", factory=Mistaken)
-    made.wearsim_contact_models = ws.hookimpl(lambda: [spec], specname="wearsim_contact_models")
-    return made
+def faulty_plugin():
+    module = ModuleType("faulty_plugin")
+    spec = ContactModelSpec("choosy", ChoosyOptions, "a faulty model", factory=Faulty)
+    module.wearsim_contact_models = ws.hookimpl(lambda: [spec], specname="wearsim_contact_models")
+    return module
 
 
 @pytest.fixture(scope="module")
 def plugins(tmp_path_factory):
-    """Install the template's model, and one with a mistake."""
+    """Install the model of the template, and a faulty one."""
     real = manager.entry_points
-    made = SimpleNamespace(name="made-up", value="made-up", load=made_up, dist=None)
+    point = SimpleNamespace(name="faulty", value="faulty", load=faulty_plugin, dist=None)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys, "path", sys.path.copy())
         install_template(tmp_path_factory.mktemp("site"))
-        patch.setattr(manager, "entry_points", lambda group: [*real(group=group), made])
+        patch.setattr(manager, "entry_points", lambda group: [*real(group=group), point])
         registry.cache_clear()
         yield
     sys.modules.pop("wearsim_template", None)
@@ -85,46 +83,46 @@ def plugins(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def told():
+def progress():
     return []
 
 
 @pytest.fixture(scope="module")
-def topic(plugins, told):
-    return contact(QUICK, lambda what, part: told.append((what, part)))
+def topic(plugins, progress):
+    return contact(QUICK, lambda what, part: progress.append((what, part)))
 
 
 @pytest.mark.usefixtures("topic")
-def test_that_every_model_stands_in_every_group_and_is_told_of(topic, told):
+def test_all_models_are_measured_in_all_groups(topic, progress):
     assert topic.groups == GROUPS
     for group in GROUPS:
         named = {item.method.split(",")[0] for item in topic.of(group)}
         assert named == set(registry().names(ContactModelSpec)) >= {"slender", "winkler"}
-    parts = [part for _, part in told]
+    parts = [part for _, part in progress]
     assert parts == sorted(parts)
     assert parts[0] == 0.0
     assert parts[-1] < 1.0
 
 
 @pytest.mark.usefixtures("plugins")
-def test_that_every_choice_of_every_option_is_measured():
-    found = methods()
-    assert len({method.name for method in found}) == len(found)
+def test_all_choices_of_all_options_are_measured():
+    every = methods()
+    assert len({method.name for method in every}) == len(every)
     for name in registry().names(ContactModelSpec):
-        own = [method for method in found if method.model == name]
-        options = own[0].spec.options
+        of_model = [method for method in every if method.model == name]
+        options = of_model[0].spec.options
         theories = issubclass(options, TangentialOptions) and name != COMPARISON_MODEL
         for key, info in options.model_fields.items():
             values = {info.default, *get_args(info.annotation)}
             if get_args(info.annotation) and not (
                 theories and key in TangentialOptions.model_fields
             ):
-                chosen = {getattr(options(**method.options), key) for method in own}
+                chosen = {getattr(options(**method.options), key) for method in of_model}
                 assert chosen >= {value for value in values if isinstance(value, str)}, (name, key)
 
 
 @pytest.mark.usefixtures("plugins")
-def test_that_a_choice_stands_beside_the_one_that_gives_it_a_meaning():
+def test_choice_is_combined_with_the_choice_it_requires():
     names = [method.name for method in methods("choosy")]
     assert names == [
         "choosy",
@@ -134,31 +132,29 @@ def test_that_a_choice_stands_beside_the_one_that_gives_it_a_meaning():
     ]
 
 
-def test_that_choices_of_tractions_alone_are_left_out_with_worn_profiles():
+def test_worn_profiles_omit_tangential_choices():
     names = {method.name for method in normal_methods()}
     assert "slender, strip, half length local" in names
     assert "semi-hertzian, kik-piotrowski, strip" in names
     assert {name for name in names if name.startswith("hertz")} == {"hertz, strip", "hertz-fastsim"}
 
 
-def test_that_a_mistake_is_told_and_stops_nothing(topic):
+def test_faulty_model_does_not_stop_the_benchmark(topic):
     for item in topic.measurements:
-        mistaken = item.method.startswith("choosy")
-        assert ("raised TypeError: object of type 'NoneType'" in item.failed) == mistaken
+        faulty = item.method.startswith("choosy")
+        assert ("raised TypeError: object of type 'NoneType'" in item.failed) == faulty
 
 
-def test_that_a_method_that_refuses_a_case_says_why_and_has_no_figures(topic):
+def test_failed_method_has_a_reason_and_no_numbers(topic):
     refused = [item for item in topic.of("worn profiles") if item.method == "hertz, strip"]
     assert len(refused) == 1
-    assert (
-        "no answer to 1 of 2; bump 10um, partial: the gap's fitted curvature" in refused[0].failed
-    )
+    assert "1 of 2 fail; bump 10um, partial: the gap's fitted curvature" in refused[0].failed
     assert refused[0].seconds is None
     assert not refused[0].errors
     assert "51 to 161 strips" in refused[0].setting
 
 
-def test_that_all_others_have_times_and_errors(topic):
+def test_other_methods_have_times_and_errors(topic):
     whole = [item for item in topic.measurements if not item.failed]
     assert len(whole) > len(topic.measurements) / 2
     for item in whole:
@@ -169,26 +165,26 @@ def test_that_all_others_have_times_and_errors(topic):
     json.dumps(topic.as_json(), allow_nan=False)
 
 
-def test_that_the_models_that_start_from_a_solution_nearby_are_timed_so(topic):
+def test_warm_starts_are_timed_for_models_that_use_them(topic):
     warm = {item.method for item in topic.measurements if "warm_seconds" in item.counts}
     assert warm == {"slender, strip", "slender, strip, half length local"}
 
 
-def test_that_a_warm_start_that_comes_to_something_else_has_failed(monkeypatch):
-    right = slender.Slender.solve
+def test_warm_start_with_another_result_is_a_failure(monkeypatch):
+    solve = slender.Slender.solve
 
-    def elsewhere(self, gap, longitudinal_curvature, point, wear_compliance=None, warm=None):
+    def depends_on_start(self, gap, longitudinal_curvature, point, wear_compliance=None, warm=None):
         if warm is not None:
             point = replace(point, friction=1.01 * point.friction)
-        return right(self, gap, longitudinal_curvature, point, wear_compliance, warm)
+        return solve(self, gap, longitudinal_curvature, point, wear_compliance, warm)
 
-    monkeypatch.setattr(slender.Slender, "solve", elsewhere)
+    monkeypatch.setattr(slender.Slender, "solve", depends_on_start)
     found = measure("draws", elliptic_cases("paper")[:1], Method("slender"), 41, 1)
-    assert "warm-started it comes to something else by 1.0e-02 in power" in found.failed
+    assert "the warm start changes the power by 1.0e-02" in found.failed
     assert found.seconds is None
 
 
-def test_that_the_defaults_are_the_strips_of_a_run_and_of_a_contact(topic):
+def test_defaults_are_the_strips_of_a_run_and_a_contact(topic):
     scenario = load_scenario(SCENARIOS / "rig-450min.toml")
     of_run = fresh_patch(scenario, 300.0).b / run_grid(scenario, 300.0).spacing
     for group in GROUPS[:2]:
@@ -206,7 +202,7 @@ def test_that_the_defaults_are_the_strips_of_a_run_and_of_a_contact(topic):
         assert case.patch.b / fewer.spacing == pytest.approx(of_run, rel=0.05)
 
 
-def test_that_errors_of_a_group_are_those_of_its_contacts():
+def test_errors_of_a_group_are_those_of_its_contacts():
     cases = elliptic_cases("paper")
     found = measure("draws", cases, Method("hertz"), 50, 1).errors
     whole = random_case_errors(build_model("hertz", my=50), "paper")
@@ -218,21 +214,21 @@ def test_that_errors_of_a_group_are_those_of_its_contacts():
     assert found["worst_power"] == np.abs(np.array(powers) / exact - 1.0).max()
 
 
-def test_that_hertz_has_hertzs_pressure_and_width():
+def test_hertz_model_has_exact_pressure_and_width():
     for kind in ("paper", "hard"):
         errors = measure("ellipses", elliptic_cases(kind), Method("hertz"), 81, 1).errors
         assert errors["peak_pressure"] < 1e-12
         assert errors["width"] < 1e-4
 
 
-def test_that_marches_take_as_many_steps_as_there_are_strips():
-    march = Method("hertz", {"tangential": "fastsim"})
-    assert march.setting(41) == "41 x 41"
-    assert march.build(41).theory.mx == 41
+def test_steps_along_rolling_equal_the_strips():
+    fastsim = Method("hertz", {"tangential": "fastsim"})
+    assert fastsim.setting(41) == "41 x 41"
+    assert fastsim.build(41).theory.mx == 41
     assert Method("hertz").setting(41) == "41 strips"
 
 
-def test_that_more_strips_are_nearer_to_the_exact_theory():
+def test_errors_decrease_with_the_number_of_strips():
     coarse, fine = (
         measure("worn", list(worn_cases("flat").values()), Method("slender"), strips, 1).errors
         for strips in (41, 321)
@@ -241,20 +237,20 @@ def test_that_more_strips_are_nearer_to_the_exact_theory():
     assert fine["width"] < coarse["width"]
 
 
-def test_that_a_value_that_is_not_finite_is_an_error():
+def test_nonfinite_value_raises_contact_error():
     case = elliptic_cases("paper")[0]
     solution, grid = solved(build_model("hertz"), case)
     solution.dissipation[3] = np.nan
-    with pytest.raises(ContactError, match="dissipation is not finite"):
+    with pytest.raises(ContactError, match="dissipation: not finite"):
         errors_of(solution, grid, case)
 
 
 @pytest.mark.usefixtures("plugins")
-def test_that_one_model_alone_is_measured_beside_the_default():
+def test_plugin_option_measures_one_model_and_the_default():
     found = contact(Effort(quick=True, repetitions=1, plugin="winkler"), lambda what, part: None)
     assert {item.method for item in found.measurements} == {"winkler", "slender, strip"}
 
 
-def test_that_a_model_that_is_not_there_is_missed():
+def test_unknown_model_raises_plugin_error():
     with pytest.raises(PluginError, match="'winklerr'"):
         contact(Effort(quick=True, plugin="winklerr"), lambda what, part: None)

@@ -1,4 +1,4 @@
-"""The verdicts on hard cases: that they see what is wrong, and what they are made of."""
+"""Hard cases: detection of errors, mirrored scenarios, verdicts."""
 
 import json
 from dataclasses import replace
@@ -13,20 +13,24 @@ from wearsim.scenario.examples import shipped_scenario
 from wearsim.studies.run.run import run
 from wearsim_bench.figures.hard_cases import hard_markdown
 from wearsim_bench.hard_cases import measures
-from wearsim_bench.hard_cases.cases import HardCase, crown_radius_of, hard_cases, profile, roughness
-from wearsim_bench.hard_cases.judgement import judged
+from wearsim_bench.hard_cases.cases import (
+    RobustnessCase,
+    crown_radius_of,
+    hard_cases,
+    profile,
+    roughness,
+)
+from wearsim_bench.hard_cases.evaluation import evaluate
 from wearsim_bench.hard_cases.runs import Plan, is_symmetric, mirror_image
 from wearsim_bench.hard_cases.topic import hard
-from wearsim_bench.hard_cases.verdict import CHECKS, Check, Verdict
+from wearsim_bench.hard_cases.verdict import CRITERIA, Criterion, Verdict
 from wearsim_bench.measure.measurement import Effort
-
-pytestmark = pytest.mark.bench
 
 PASSES = 6000
 PLAN = Plan(PASSES, finer=1, steps=5, doublings=2, tighter=False, changes={})
-PLAIN = HardCase("plain", {})
-ASKEW = HardCase(
-    "askew",
+PLAIN = RobustnessCase("plain", {})
+ASYMMETRIC = RobustnessCase(
+    "asymmetric",
     {
         "roller.offset": ["-1 mm", "0 mm", "0.3 mm"],
         "creepage.tilt": ["1 mrad", "-2 mrad", "0.5 mrad"],
@@ -42,14 +46,14 @@ def plain():
     return scenario, run(scenario)
 
 
-def doctored(result, kind, name, change):
-    """Return a result of which one array is another."""
+def modified(result, kind, name, change):
+    """Return a result with one array changed."""
     raw = result.raw
     arrays = {**getattr(raw, kind), name: change(getattr(raw, kind)[name].copy())}
     return Result(replace(raw, **{kind: arrays}), None)
 
 
-def test_that_a_sound_run_keeps_its_balances(plain):
+def test_balances_of_a_run_hold(plain):
     scenario, result = plain
     assert measures.is_finite(result)
     assert measures.volume_balance(result, scenario) < 1e-12
@@ -59,68 +63,68 @@ def test_that_a_sound_run_keeps_its_balances(plain):
     assert measures.load_balance(result) < 1e-12
 
 
-def test_that_volume_which_no_energy_wore_off_is_seen(plain):
+def test_volume_error_is_detected(plain):
     scenario, result = plain
-    wrong = doctored(result, "history", "worn_volume", lambda v: 1.001 * v)
+    wrong = modified(result, "history", "worn_volume", lambda v: 1.001 * v)
     assert measures.volume_balance(wrong, scenario) == pytest.approx(1e-3, rel=1e-2)
 
 
-def test_that_energy_which_no_strip_dissipated_is_seen(plain):
-    wrong = doctored(plain[1], "records", "dissipation", lambda p: 1.001 * p)
+def test_energy_error_is_detected(plain):
+    wrong = modified(plain[1], "records", "dissipation", lambda p: 1.001 * p)
     assert measures.energy_balance(wrong) == pytest.approx(1e-3, rel=1e-6)
 
 
-def test_that_load_which_no_strip_carries_is_seen(plain):
-    wrong = doctored(plain[1], "records", "line_load", lambda q: 1.001 * q)
+def test_load_error_is_detected(plain):
+    wrong = modified(plain[1], "records", "line_load", lambda q: 1.001 * q)
     assert measures.load_balance(wrong) == pytest.approx(1e-3, rel=1e-6)
 
 
-def test_that_power_which_no_force_does_is_seen(plain):
+def test_work_error_is_detected(plain):
     scenario, result = plain
-    wrong = doctored(result, "checkpoint", "contact_force_x", lambda force: 1.001 * force)
+    wrong = modified(result, "checkpoint", "contact_force_x", lambda force: 1.001 * force)
     assert measures.work_balance(wrong, scenario) == pytest.approx(1e-3, rel=1e-6)
 
 
-def test_that_a_sawtooth_is_seen(plain):
+def test_oscillation_is_detected(plain):
     fine = run(PLAN.scenario(PLAIN, evolution__step=6000, contact__strips=80))
-    assert measures.roughest(fine) < 0.02
+    assert measures.max_oscillation(fine) < 0.02
 
-    def jagged(q):
+    def sawtooth(q):
         q[..., ::2] *= 0.9
         return q
 
-    assert measures.roughest(doctored(fine, "records", "line_load", jagged)) > 0.1
+    assert measures.max_oscillation(modified(fine, "records", "line_load", sawtooth)) > 0.1
 
 
-def test_that_a_groove_that_wanders_is_seen(plain):
+def test_drift_of_a_groove_is_detected(plain):
     def shifted(worn):
         return np.roll(worn, 1, axis=-1)
 
     assert measures.drift(plain[1]) < 1e-12
-    wrong = doctored(plain[1], "records", "cylinder_depth_profile", shifted)
+    wrong = modified(plain[1], "records", "cylinder_depth_profile", shifted)
     assert measures.drift(wrong) > 1e-3
     assert measures.asymmetry(wrong, plain[1]) > 1e-3
 
 
 @pytest.mark.parametrize("wrong", [np.nan, np.inf, -1e-9])
-def test_that_a_depth_that_is_none_is_seen(plain, wrong):
-    def spoilt(worn):
+def test_invalid_depth_is_detected(plain, wrong):
+    def invalid(worn):
         worn[-1, ..., 3] = wrong
         return worn
 
-    assert not measures.is_finite(doctored(plain[1], "records", "cylinder_depth_profile", spoilt))
+    assert not measures.is_finite(modified(plain[1], "records", "cylinder_depth_profile", invalid))
 
 
-def test_that_patches_are_counted_in_turn(plain):
+def test_patches_are_counted_in_sequence(plain):
     def split(q):
         q[3:5, ..., q.shape[-1] // 2] = 0.0
         return q
 
     assert measures.patches(plain[1]) == (1,)
-    assert measures.patches(doctored(plain[1], "records", "line_load", split)) == (1, 2, 1)
+    assert measures.patches(modified(plain[1], "records", "line_load", split)) == (1, 2, 1)
 
 
-def test_that_means_over_wider_strips_are_compared(plain):
+def test_change_compares_means_over_wider_strips(plain):
     fine = run(PLAN.scenario(PLAIN, evolution__step=1200, contact__strips=80))
     coarse = plain[1].profiles[-1]
     means = fine.profiles[-1].reshape(-1, 2).mean(axis=1)
@@ -129,13 +133,13 @@ def test_that_means_over_wider_strips_are_compared(plain):
     assert 0.0 < expected < 0.05
 
 
-def test_that_the_order_is_that_of_a_power_of_the_step():
+def test_order_of_a_power_of_the_step():
     assert measures.order([4e-3, 1e-3, 2.5e-4]) == pytest.approx(2.0)
     assert measures.order([1e-3, 0.0]) is None
 
 
-def test_that_a_mirror_image_of_the_mirror_image_is_the_scene():
-    scenario = PLAN.scenario(ASKEW)
+def test_mirroring_twice_restores_the_scenario():
+    scenario = PLAN.scenario(ASYMMETRIC)
     image = mirror_image(scenario)
     assert image.roller.offset == (0.001, 0.0, -0.0003)
     assert image.contact.centre == -scenario.contact.centre
@@ -146,9 +150,9 @@ def test_that_a_mirror_image_of_the_mirror_image_is_the_scene():
     assert is_symmetric(PLAN.scenario(PLAIN))
 
 
-def test_that_a_profile_is_mirrored_to_the_bit():
+def test_profile_is_mirrored_exactly():
     rough = profile(roughness, finer=4)
-    case = HardCase("rough", {"cylinder.profile": "r.csv"}, {"r.csv": rough})
+    case = RobustnessCase("rough", {"cylinder.profile": "r.csv"}, {"r.csv": rough})
     scenario = PLAN.scenario(case)
     image = mirror_image(scenario).cylinder.profile
     np.testing.assert_array_equal(image.y, -scenario.cylinder.profile.y[::-1])
@@ -156,7 +160,7 @@ def test_that_a_profile_is_mirrored_to_the_bit():
     assert not is_symmetric(scenario)
 
 
-def test_that_roughness_has_the_height_and_the_correlation_of_measured_ones():
+def test_roughness_has_the_stated_rms_and_correlation():
     y = np.linspace(-16.0, 16.0, 6401)
     heights = roughness(y)
     assert heights.std() == pytest.approx(0.5, rel=0.02)
@@ -166,82 +170,84 @@ def test_that_roughness_has_the_height_and_the_correlation_of_measured_ones():
 
 
 @pytest.mark.parametrize("ratio", [200.0, 1.0, 0.3])
-def test_that_a_crown_radius_gives_the_patch_that_is_asked_for(ratio):
+def test_crown_radius_gives_the_requested_patch(ratio):
     along = 0.5 * (1.0 / 0.025 + 1.0 / 0.020)
     patch = hertz(along, 0.5 / crown_radius_of(ratio), 300.0, 1e11)
     assert patch.b / patch.a == pytest.approx(ratio, rel=1e-9)
 
 
-def test_that_a_scene_that_ends_with_an_error_does_not_hold():
-    narrow = HardCase("narrow", {"contact.width": "1 mm"})
-    verdict = judged(narrow, PLAN)
+def test_unexpected_error_fails_the_case():
+    narrow = RobustnessCase("narrow", {"contact.width": "1 mm"})
+    verdict = evaluate(narrow, PLAN)
     assert not verdict.holds
-    assert "does not fit" in verdict.said
-    assert verdict.trouble.startswith("stopped: ")
+    assert "does not fit" in verdict.error
+    assert verdict.unexpected.startswith("stopped: ")
 
 
-def test_that_an_error_without_the_cause_does_not_hold():
-    narrow = HardCase("narrow", {"contact.width": "1 mm"}, refused=("[contact] width", "moon"))
-    assert judged(narrow, PLAN).failures == ("the error does not name moon",)
+def test_error_without_the_required_words_fails():
+    narrow = RobustnessCase(
+        "narrow", {"contact.width": "1 mm"}, refused=("[contact] width", "moon")
+    )
+    assert evaluate(narrow, PLAN).failures == ("the error does not name moon",)
 
 
-def test_that_running_on_where_an_error_is_due_does_not_hold():
-    assert "ran to its end" in judged(HardCase("plain", {}, refused=("width",)), PLAN).trouble
+def test_missing_error_fails_the_case():
+    assert "completed" in evaluate(RobustnessCase("plain", {}, refused=("width",)), PLAN).unexpected
 
 
-def test_that_patches_that_never_were_do_not_hold():
-    verdict = judged(HardCase("plain", {}, patches=(1, 2, 1)), PLAN)
+def test_missing_patches_fail_the_case():
+    verdict = evaluate(RobustnessCase("plain", {}, patches=(1, 2, 1)), PLAN)
     assert verdict.failures == ("patches (1,), expected (1, 2, 1)",)
 
 
 @pytest.mark.parametrize(
-    ("check", "failure"),
+    ("criterion", "failure"),
     [
-        (Check("load", 2e-9, 1e-9), "load 2.0e-09 > 1e-09"),
-        (Check("load", np.nan, 1e-9), "load nan > 1e-09"),
-        (Check("steps", 1e-3, 2e-2, -0.5), "steps 1.0e-03 does not fall (order -0.5)"),
-        (Check("steps", 1e-3, 2e-2, -0.5, floor=2e-3), ""),
-        (Check("steps", 1e-3, 2e-2, 1.0), ""),
+        (Criterion("load", 2e-9, 1e-9), "load 2.0e-09 > 1e-09"),
+        (Criterion("load", np.nan, 1e-9), "load nan > 1e-09"),
+        (Criterion("steps", 1e-3, 2e-2, -0.5), "steps 1.0e-03 does not decrease (order -0.5)"),
+        (Criterion("steps", 1e-3, 2e-2, -0.5, floor=2e-3), ""),
+        (Criterion("steps", 1e-3, 2e-2, 1.0), ""),
     ],
 )
-def test_that_a_check_tells_what_does_not_hold(check, failure):
-    assert check.failure == failure
-    assert check.holds == (not failure)
+def test_criterion_describes_its_failure(criterion, failure):
+    assert criterion.failure == failure
+    assert criterion.holds == (not failure)
 
 
-def test_that_cases_have_names_of_their_own():
+def test_names_of_cases_are_unique():
     names = [case.name for case in hard_cases(PASSES)]
     assert len(set(names)) == len(names)
 
 
-def test_that_all_verdicts_stand_in_json_and_in_markdown(monkeypatch):
-    refused = HardCase("narrow", {"contact.width": "1 mm"}, refused=("[contact] width",))
+def test_verdicts_in_json_and_markdown(monkeypatch):
+    refused = RobustnessCase("narrow", {"contact.width": "1 mm"}, refused=("[contact] width",))
     monkeypatch.setattr(hard_module, "hard_cases", lambda passes: (PLAIN, refused))
-    told = []
-    verdicts = hard(Effort(quick=True), lambda name, part: told.append((name, part)))
-    assert [name for name, _ in told[:2]] == ["plain", "narrow"]
-    assert told[-1][1] == 1.0
+    progress = []
+    verdicts = hard(Effort(quick=True), lambda name, part: progress.append((name, part)))
+    assert [name for name, _ in progress[:2]] == ["plain", "narrow"]
+    assert progress[-1][1] == 1.0
     assert all(verdict.holds for verdict in verdicts)
     kept = json.loads(json.dumps([verdict.as_json() for verdict in verdicts]))
     assert [item["case"] for item in kept] == [verdict.case for verdict in verdicts]
     checks = {check["name"] for check in kept[0]["checks"]}
-    assert checks == set(CHECKS) - {"tolerance"}  # which only the whole looks at
+    assert checks == set(CRITERIA) - {"tolerance"}  # not part of the quick evaluation
     text = hard_markdown(verdicts)
-    assert text.startswith(f"{len(verdicts)} of {len(verdicts)} hold.")
+    assert text.startswith(f"{len(verdicts)} of {len(verdicts)} pass.")
     assert all(f"| {verdict.case} |" in text for verdict in verdicts)
 
 
-def test_that_a_case_that_does_not_hold_stands_out_in_markdown():
-    wrong = Verdict("wrong", checks=(Check("load", 1.0, 1e-9),))
-    assert "**does not hold**: load 1.0e+00 > 1e-09" in hard_markdown((wrong,))
+def test_failed_case_is_bold_in_markdown():
+    wrong = Verdict("wrong", criteria=(Criterion("load", 1.0, 1e-9),))
+    assert "**failed**: load 1.0e+00 > 1e-09" in hard_markdown((wrong,))
 
 
-def test_that_hard_cases_run_with_a_model_of_choice(monkeypatch):
+def test_hard_cases_run_with_another_model(monkeypatch):
     monkeypatch.setattr(hard_module, "hard_cases", lambda passes: (PLAIN,))
     effort = Effort(quick=True, plugin="semi-hertzian")
     (verdict,) = hard(effort, lambda name, part: None)
-    assert verdict.check("volume").holds
+    assert verdict.criterion("volume").holds
     assert verdict.figures["depth_m"] > 0.0
-    slender = judged(PLAIN, Plan.of(quick=True, changes={}))
+    slender = evaluate(PLAIN, Plan.of(quick=True, changes={}))
     assert verdict.figures["depth_m"] != slender.figures["depth_m"]
     assert shipped_scenario("rig-450min").contact.model == "slender"

@@ -1,4 +1,4 @@
-"""Sampling plans against each other: laws whose truth is known, and the studies that are timed."""
+"""Topic `sampling`: errors on a problem with exact results, and timed studies."""
 
 import numpy as np
 import pytest
@@ -13,36 +13,34 @@ from wearsim.studies.run.draws import Drawer
 from wearsim.uq.sampling.plans import PLANS, REPLICATES
 from wearsim.uq.sampling.sampler import Sampler
 from wearsim_bench.measure.measurement import Effort
-from wearsim_bench.sampling.errors import MEAN, PROBABILITY, QUANTILE, Study, Truth, truths
-from wearsim_bench.sampling.jobs import CheapDraws, Part, rig
+from wearsim_bench.sampling.errors import MEAN, PROBABILITY, QUANTILE, Reference, Study, references
+from wearsim_bench.sampling.jobs import ControlDraws, Part, rig
 from wearsim_bench.sampling.topic import (
     DEFAULT,
     METHODS,
     QUICK,
-    Size,
+    StudySizes,
     measurements,
     sampling,
     studies_of,
 )
 
-pytestmark = pytest.mark.bench
-
 LOW, HIGH, FACTOR = 0.08, 0.12, 1.5
-SIZE = Size((16, 64, 256), 16)
+SIZES = StudySizes((16, 64, 256), 16)
 
 
 @pytest.fixture(scope="module")
 def full_slip():
-    """Return studies of the closed form of full slip, two of whose inputs are drawn.
+    """Return studies of the closed form of full slip with two random inputs.
 
-    The control is the closed form at the mean friction: what one of the inputs does.
+    The control variate is the closed form at the mean friction.
     """
-    found = {}
-    for asked in SIZE.studies:
+    results = {}
+    for planned in SIZES.studies:
         scenario = shipped_scenario(
             "rig-450min",
             {
-                "seed": asked.seed,
+                "seed": planned.seed,
                 "friction.coefficient": {"distribution": "uniform", "low": LOW, "high": HIGH},
                 "wear.cylinder.k_over_h": {
                     "distribution": "lognormal",
@@ -51,16 +49,16 @@ def full_slip():
                 },
             },
         )
-        columns = Drawer(scenario, asked.plan, asked.tests).columns(0, asked.tests)
-        depths = closed_form_depths(scenario, columns, asked.tests)
-        at_mean = {**columns, "friction.coefficient": np.full(asked.tests, 0.5 * (LOW + HIGH))}
-        controls = closed_form_depths(scenario, at_mean, asked.tests)
+        columns = Drawer(scenario, planned.plan, planned.tests).columns(0, planned.tests)
+        depths = closed_form_depths(scenario, columns, planned.tests)
+        at_mean = {**columns, "friction.coefficient": np.full(planned.tests, 0.5 * (LOW + HIGH))}
+        controls = closed_form_depths(scenario, at_mean, planned.tests)
         known = full_slip_depth(scenario, 0.5 * (LOW + HIGH)) * mean_factor()
-        for part in asked.parts:
-            own = slice(part.first, part.first + part.count)
-            found[part] = np.array([depths[own], controls[own]])
-        found[SIZE.controls[asked.replicate]] = np.array([known, 0.0])
-    return scenario, studies_of(SIZE, found)
+        for part in planned.parts:
+            tests = slice(part.first, part.first + part.count)
+            results[part] = np.array([depths[tests], controls[tests]])
+        results[SIZES.controls[planned.replicate]] = np.array([known, 0.0])
+    return scenario, studies_of(SIZES, results)
 
 
 def full_slip_depth(scenario, friction):
@@ -71,7 +69,7 @@ def full_slip_depth(scenario, friction):
 
 
 def mean_factor():
-    """Return the mean of K/H^(2/3), by that of its median, as a log-normal law has it."""
+    """Return the mean of (K/H)^(2/3) over that of its median, for a log-normal distribution."""
     return np.exp(0.5 * (2.0 / 3.0 * np.log(FACTOR)) ** 2)
 
 
@@ -93,60 +91,60 @@ def exact(scenario):
     return {MEAN: mean, QUANTILE: quantile}
 
 
-def test_that_all_tests_together_tell_what_quadrature_does(full_slip):
+def test_reference_values_agree_with_quadrature(full_slip):
     scenario, studies = full_slip
-    found = truths([study for some in studies.values() for study in some])
+    values = references([study for some in studies.values() for study in some])
     for group, value in exact(scenario).items():
-        assert 0.0 < found[group].error < 4e-3 * value
-        assert abs(found[group].value - value) < 4.0 * found[group].error
+        assert 0.0 < values[group].error < 4e-3 * value
+        assert abs(values[group].value - value) < 4.0 * values[group].error
 
 
 @pytest.fixture(scope="module")
 def rows(full_slip):
-    """Return what is measured of the closed form, with the truth exact."""
+    """Return the measurements of the closed form with exact reference values."""
     scenario, studies = full_slip
-    known = {group: Truth(value, 0.0) for group, value in exact(scenario).items()}
-    return list(measurements(SIZE, studies, known, {}))
+    known = {group: Reference(value, 0.0) for group, value in exact(scenario).items()}
+    return list(measurements(SIZES, studies, known, {}))
 
 
-def test_that_errors_are_those_of_the_theory_of_each_plan(full_slip, rows):
+def test_errors_agree_with_theory(full_slip, rows):
     _, studies = full_slip
     errors = {(row.group, row.method, row.setting): row.errors["error"] for row in rows}
     depths = np.concatenate([study.depths for study in studies["monte-carlo", 256]])
     spread = float(depths.std() / depths.mean())
-    for tests in SIZE.tests:
+    for tests in SIZES.tests:
         plain, hypercube, sobol, control = (
             errors[MEAN, method, f"n = {tests}"] for method in METHODS.values()
         )
         expected = spread / np.sqrt(tests)
-        chance = 1.0 / np.sqrt(2.0 * SIZE.replicates * SIZE.tests[-1] / tests)
+        chance = 1.0 / np.sqrt(2.0 * SIZES.replicates * SIZES.tests[-1] / tests)
         assert plain == pytest.approx(expected, rel=4.0 * chance)
         assert max(hypercube, control) < 0.5 * expected
-        # of 16 points each of the independent sequences has but two; then they gain more and more
+        # with 16 points each independent sequence has only two
         assert sobol < {16: 0.8, 64: 0.4, 256: 0.2}[tests] * expected
 
 
-def test_that_intervals_hold_the_truth_as_often_as_they_say(rows):
+def test_coverage_of_the_intervals(rows):
     (row,) = (
         row
         for row in rows
         if (row.group, row.method, row.setting) == (MEAN, "Monte Carlo", "n = 16")
     )
-    assert row.counts["studies"] == 16 * SIZE.replicates
+    assert row.counts["studies"] == 16 * SIZES.replicates
     assert row.counts["held"] == pytest.approx(0.95, abs=0.05)
 
 
-def test_that_it_is_said_how_well_an_error_is_known(rows):
-    found = [row.counts for row in rows if (row.group, row.method) == (MEAN, "Monte Carlo")]
-    for counts in found:
-        # the mean of n squares of a normal error is known to sqrt(2/n), its root to half of that
+def test_standard_error_of_the_rms(rows):
+    every = [row.counts for row in rows if (row.group, row.method) == (MEAN, "Monte Carlo")]
+    for counts in every:
+        # relative standard error of the mean of n squares: sqrt(2/n); of its root: half of it
         assert counts["known"] == pytest.approx(np.sqrt(0.5 / counts["studies"]), rel=0.7)
-    assert [counts["studies"] for counts in found] == [
-        SIZE.replicates * SIZE.tests[-1] / tests for tests in SIZE.tests
+    assert [counts["studies"] for counts in every] == [
+        SIZES.replicates * SIZES.tests[-1] / tests for tests in SIZES.tests
     ]
 
 
-def test_that_every_block_of_a_sobol_study_is_spread_as_evenly_as_the_first():
+def test_blocks_of_a_sobol_study_are_equidistributed():
     sampler = Sampler(3, [("load.normal_force", 1)], "sobol", replicates=REPLICATES)
     uniform = sampler.uniforms(0, 512)["load.normal_force"][:, 0]
     whole = Study(0, uniform, uniform, (0.5, 0.0))
@@ -157,28 +155,28 @@ def test_that_every_block_of_a_sobol_study_is_spread_as_evenly_as_the_first():
     assert sum(len(block.depths) for block in whole.blocks(128)) == 512
 
 
-def test_that_no_two_studies_share_a_seed():
-    seeds = [asked.seed for asked in QUICK.studies]
+def test_seeds_of_studies_are_different():
+    seeds = [planned.seed for planned in QUICK.studies]
     assert len(set(seeds)) == len(seeds)
-    assert {asked.plan for asked in QUICK.studies} == set(PLANS)
+    assert {planned.plan for planned in QUICK.studies} == set(PLANS)
 
 
-def test_that_tests_are_those_of_an_ensemble(tmp_path):
-    found = Part("monte-carlo", seed=0, total=512, first=1, count=2).done()
+def test_parts_equal_an_ensemble(tmp_path):
+    values = Part("monte-carlo", seed=0, total=512, first=1, count=2).run()
     result = ensemble(rig(0), 3, tmp_path / "e.h5", plan="control-variate", scheduler="serial")
-    np.testing.assert_array_equal(found[0], result.at_end("depth")[1:])
-    np.testing.assert_array_equal(found[1], result.values("control")[1:])
-    mean, error = CheapDraws(0, 100_000).done()
+    np.testing.assert_array_equal(values[0], result.at_end("depth")[1:])
+    np.testing.assert_array_equal(values[1], result.values("control")[1:])
+    mean, error = ControlDraws(0, 100_000).run()
     assert abs(mean - result.raw.control["mean"]) < 4.0 * error
 
 
 @pytest.mark.slow
-def test_that_every_plan_and_size_is_measured():
-    told = []
-    topic = sampling(Effort(quick=True, repetitions=1), lambda what, part: told.append(part))
+def test_all_plans_and_sizes_are_measured():
+    progress = []
+    topic = sampling(Effort(quick=True, repetitions=1), lambda what, part: progress.append(part))
     assert topic.groups == [MEAN, QUANTILE]
-    assert told == sorted(told)
-    assert told[-1] == pytest.approx(1.0)
+    assert progress == sorted(progress)
+    assert progress[-1] == pytest.approx(1.0)
     for group in topic.groups:
         rows = topic.of(group)
         assert {row.method for row in rows} == set(METHODS.values())

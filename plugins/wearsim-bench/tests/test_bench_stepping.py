@@ -1,4 +1,4 @@
-"""Steppers measured against every pass by itself: who is measured, and what their errors are."""
+"""Topic `stepping`: references, errors and failures."""
 
 import json
 from dataclasses import replace
@@ -13,52 +13,50 @@ from wearsim.scenario.tables.plain import EvolutionTable
 from wearsim_bench.contact.methods import DEFAULT_MODEL, Method
 from wearsim_bench.measure.measurement import Effort
 from wearsim_bench.stepping import groups as stepping_groups
-from wearsim_bench.stepping.groups import EVERY_PASS, Bench, of_model, of_steppers
-from wearsim_bench.stepping.runs import End, Ready, WearTest, errors_of
+from wearsim_bench.stepping.groups import EVERY_PASS, StepperBenchmark, of_model, of_steppers
+from wearsim_bench.stepping.runs import EndState, PreparedTest, WearTest, errors_of
 from wearsim_bench.stepping.solvers import SOLVERS, solved_by
 from wearsim_bench.stepping.topic import RIG, SPRING, stepping
-
-pytestmark = pytest.mark.bench
 
 QUICK = Effort(quick=True, repetitions=1)
 SHORT = WearTest(RIG, 0.2)  # 600 passes
 STEPPERS = set(get_args(EvolutionTable.model_fields["stepper"].annotation)) - {"auto"}
 
 
-def bench(model, test=SHORT):
-    return Bench("problems", test, Method(model), 1)
+def benchmark_of(model, test=SHORT):
+    return StepperBenchmark("problems", test, Method(model), 1)
 
 
 def end_of(test=SHORT, **changes):
-    ready = Ready(test.asked(changes))
-    return ready, ready.stepped(ready.stop)
+    prepared = PreparedTest(test.scenario_with(changes))
+    return prepared, prepared.stepped(prepared.stop)
 
 
 @pytest.fixture(scope="module")
-def told():
+def progress():
     return []
 
 
 @pytest.fixture(scope="module")
-def topic(plugins, told):  # noqa: F811
-    return stepping(QUICK, lambda what, part: told.append((what, part)))
+def topic(plugins, progress):  # noqa: F811
+    return stepping(QUICK, lambda what, part: progress.append((what, part)))
 
 
-def test_that_every_stepper_and_solver_stands_beside_the_truth(topic, told):
+def test_all_steppers_and_solvers_are_measured(topic, progress):
     steppers = topic.groups[:3]
     assert [name.split(",")[0] for name in steppers] == ["rig", "spring", "three rollers"]
     for group in steppers:
         assert {item.method for item in topic.of(group)} == STEPPERS | set(SOLVERS)
-        truth = next(item for item in topic.of(group) if item.method == EVERY_PASS)
-        assert truth.seconds > 0.0
-        assert not truth.errors
+        reference = next(item for item in topic.of(group) if item.method == EVERY_PASS)
+        assert reference.seconds > 0.0
+        assert not reference.errors
         assert [item for item in topic.of(group) if item.failed] == []
-    parts = [part for _, part in told]
+    parts = [part for _, part in progress]
     assert parts == sorted(parts)
     assert parts[-1] <= 1.0
 
 
-def test_that_every_contact_model_is_held_against_its_own_truth(topic):
+def test_contact_models_have_separate_references(topic):
     group = next(name for name in topic.groups if name.startswith("contact models"))
     named = {item.method.split(",")[0] for item in topic.of(group)}
     assert named == set(registry().names(ContactModelSpec)) >= {DEFAULT_MODEL, "winkler"}
@@ -69,7 +67,7 @@ def test_that_every_contact_model_is_held_against_its_own_truth(topic):
             assert 0.0 < item.errors["depth"] < 2e-3
 
 
-def test_that_what_a_scenario_gets_is_marked_once_in_every_group(topic):
+def test_default_is_marked_once_per_group(topic):
     for group in topic.groups:
         marked = [item for item in topic.of(group) if item.default]
         assert len(marked) == 1, group
@@ -78,7 +76,7 @@ def test_that_what_a_scenario_gets_is_marked_once_in_every_group(topic):
     json.dumps(topic.as_json())
 
 
-def test_that_more_strips_and_closer_tolerances_are_nearer(topic):
+def test_errors_decrease_with_strips_and_tolerances(topic):
     rig = {(item.method, item.setting): item for item in topic.of(topic.groups[0])}
     for method in {*STEPPERS, *SOLVERS} - {EVERY_PASS}:
         loose, close = (rig[method, f"tolerance {power}"] for power in ("1e-1", "1e-3"))
@@ -92,87 +90,90 @@ def test_that_more_strips_and_closer_tolerances_are_nearer(topic):
 
 @pytest.mark.parametrize("changes", [{}, SPRING], ids=["constant", "spring"])
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_that_a_solver_converges_to_every_pass_by_itself(solver, changes):
-    ready, truth = end_of(WearTest(RIG, 2.0, changes), **{"evolution.stepper": EVERY_PASS})
+def test_solvers_converge_to_individual_passes(solver, changes):
+    prepared, reference = end_of(WearTest(RIG, 2.0, changes), **{"evolution.stepper": EVERY_PASS})
     loose, close = (
         errors_of(
-            End(ready.problem, solved_by(solver, ready.problem, ready.stop, tolerance)), truth
+            EndState(
+                prepared.problem, solved_by(solver, prepared.problem, prepared.stop, tolerance)
+            ),
+            reference,
         )
         for tolerance in (1e-2, 1e-6)
     )
     assert close["profile"] < 0.2 * loose["profile"]
-    # a pass is a step of Euler's method: of first order in the wear of one
+    # a pass is a step of Euler's method, of first order in its wear
     assert max(close.values()) < 3e-5
 
 
-def test_that_bodies_which_wear_together_are_solved_together():
+def test_wear_of_both_bodies_is_solved():
     both = {"wear.roller.k_over_h": "1.1e-11 1/Pa"}
-    ready, truth = end_of(WearTest(RIG, 2.0, both), **{"evolution.stepper": EVERY_PASS})
-    found = End(ready.problem, solved_by("LSODA", ready.problem, ready.stop, 1e-6))
-    assert truth.state.roller_depth.max() > 0.0
-    assert max(errors_of(found, truth).values()) < 3e-5
+    prepared, reference = end_of(WearTest(RIG, 2.0, both), **{"evolution.stepper": EVERY_PASS})
+    end = EndState(prepared.problem, solved_by("LSODA", prepared.problem, prepared.stop, 1e-6))
+    assert reference.state.roller_depth.max() > 0.0
+    assert max(errors_of(end, reference).values()) < 3e-5
 
 
-def test_that_a_model_without_compiled_passes_has_a_truth_that_passes_agree_with():
-    test = bench("hertz")
+def test_solver_reference_agrees_with_individual_passes():
+    test = benchmark_of("hertz")
     strips = SHORT.grid().strips
     row, converged = test.exact(strips)
     assert row.method == "LSODA"
     assert row.counts["truth"] == converged.own["profile"]
-    ready = test.ready(strips, stepper=EVERY_PASS)
-    assert max(errors_of(converged.end, ready.stepped(ready.stop)).values()) < 2e-4
+    prepared = test.prepared(strips, stepper=EVERY_PASS)
+    assert max(errors_of(converged.end, prepared.stepped(prepared.stop)).values()) < 2e-4
 
 
-def test_that_the_truth_of_a_model_without_compiled_passes_is_converged():
+def test_solver_reference_is_converged():
     long = WearTest(RIG, 45.0)
-    test = bench("hertz", long)
+    test = benchmark_of("hertz", long)
     _, converged = test.exact(long.grid().strips)
     assert all(0.0 < error < 3e-6 for error in converged.own.values())
-    # nearer to it than it is to the truth none can be told to be
+    # errors are at least those of the reference
     assert converged.errors_of(converged.end) == converged.own
     (row,) = of_model(test, (1e-2,))
     assert row.errors["profile"] > converged.own["profile"] == row.counts["truth"]
 
 
-def test_that_a_solver_that_asks_for_too_many_contacts_is_stopped():
-    ready = Ready(SHORT.asked({}))
-    with pytest.raises(StepError, match="more than 5 contacts"):
-        solved_by("LSODA", ready.problem, ready.stop, 1e-6, most=5)
+def test_limit_of_contact_solves_stops_a_solver():
+    prepared = PreparedTest(SHORT.scenario_with({}))
+    with pytest.raises(StepError, match="more than 5 contact solves"):
+        solved_by("LSODA", prepared.problem, prepared.stop, 1e-6, most=5)
 
 
-def test_that_errors_are_parts_of_the_exact_ones():
-    ready, end = end_of()
+def test_errors_are_relative():
+    prepared, end = end_of()
     state = end.state
     deeper = replace(state, cylinder_depth=1.01 * state.cylinder_depth)
-    found = errors_of(End(ready.problem, deeper), end)
-    assert found == pytest.approx({"depth": 0.01, "profile": 0.01, "volume": 0.01})
+    errors = errors_of(EndState(prepared.problem, deeper), end)
+    assert errors == pytest.approx({"depth": 0.01, "profile": 0.01, "volume": 0.01})
     assert set(errors_of(end, end).values()) == {0.0}
 
 
-def test_that_a_refusal_is_shown_once_and_with_its_reason():
-    found = list(of_steppers(bench("hertz"), (1e-1, 1e-2)))
-    refused = [item for item in found if item.failed]
+def test_refusal_is_reported_once():
+    rows = list(of_steppers(benchmark_of("hertz"), (1e-1, 1e-2)))
+    refused = [item for item in rows if item.failed]
     assert [item.method for item in refused] == ["implicit"]
     assert "contact model 'hertz' takes no wear compliance" in refused[0].failed
     braked = {"creepage": {"drive": "free", "bearing_torque": "100 N m"}}
-    (row,) = of_model(bench(DEFAULT_MODEL, WearTest(RIG, 0.2, braked)), (1e-3,))
+    (row,) = of_model(benchmark_of(DEFAULT_MODEL, WearTest(RIG, 0.2, braked)), (1e-3,))
     assert row.failed.startswith("the roller skids")
 
 
-def test_that_a_stepper_with_too_many_steps_goes_no_further(monkeypatch):
+def test_stepper_with_many_steps_skips_low_tolerances(monkeypatch):
     monkeypatch.setattr(stepping_groups, "MOST_STEPS", 5)
-    found = list(of_steppers(bench(DEFAULT_MODEL), (1e-1, 1e-3, 1e-4)))
-    settings = [item.setting for item in found if item.method == "explicit"]
+    rows = list(of_steppers(benchmark_of(DEFAULT_MODEL), (1e-1, 1e-3, 1e-4)))
+    settings = [item.setting for item in rows if item.method == "explicit"]
     assert settings == ["tolerance 1e-1", "tolerance 1e-3"]
 
 
 @pytest.mark.usefixtures("plugins")
-def test_that_one_model_is_measured_by_itself_beside_the_default():
-    found = stepping(replace(QUICK, plugin="winkler"), lambda what, part: None)
-    *steppers, models = found.groups
-    assert {item.method.split(",")[0] for item in found.of(models)} == {"winkler", DEFAULT_MODEL}
+def test_plugin_option_measures_one_model():
+    topic = stepping(replace(QUICK, plugin="winkler"), lambda what, part: None)
+    *steppers, models = topic.groups
+    assert {item.method.split(",")[0] for item in topic.of(models)} == {"winkler", DEFAULT_MODEL}
     for group in steppers:
-        assert {item.method for item in found.of(group)} >= {"stabilised", "explicit", *SOLVERS}
-        assert EVERY_PASS not in {item.method for item in found.of(group)}
-    with pytest.raises(PluginError, match="nobody"):
-        stepping(replace(QUICK, plugin="nobody"), lambda what, part: None)
+        assert {item.method for item in topic.of(group)} >= {"stabilised", "explicit", *SOLVERS}
+        assert EVERY_PASS not in {item.method for item in topic.of(group)}
+    with pytest.raises(PluginError, match="unknown-model"):
+        stepping(replace(QUICK, plugin="unknown-model"), lambda what, part: None)

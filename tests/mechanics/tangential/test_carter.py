@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.materials import STEEL
 from tests.mechanics.tangential.line_contact import rolling_strip
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.mechanics.tangential.carter import SPIN_LIMIT, TURNED, mean_direction, strip_force
-from wearsim_bench.exact_solutions import STEEL, rows
 
 PAIR = combine(STEEL, STEEL)
 MODULI = PAIR.contact_modulus, PAIR.shear_modulus
@@ -32,18 +32,6 @@ def work(slip_x, slip_y, spin, found):
     return -(found[0] * slip_x + found[1] * slip_y + spin * A * found[2])
 
 
-@pytest.mark.bench
-def test_strip_force_meets_carters_law():
-    for part in (0.1, 0.4, 0.9, 1.0, 1.5):
-        expected = 1.0 - (1.0 - min(part, 1.0)) ** 2
-        for d_x, d_y in ((part, 0.0), (0.0, part)):
-            found = force(*scaled(d_x, d_y, 0.0))
-            assert found[:2] == pytest.approx([-expected * (d_x > 0), -expected * (d_y > 0)])
-    exact = rows("carter")[0]["exact"]
-    assert force(*scaled(0.4, 0.0, 0.0))[0] == pytest.approx(-exact, rel=1e-12)
-
-
-@pytest.mark.bench
 @pytest.mark.parametrize("psi", [-0.3, 0.1, 0.3])
 def test_lateral_creepage_with_spin_is_carter_of_other_stiffness(psi):
     # for lateral traction only, its reduction by 1 - psi in the adhesion zone is exact
@@ -54,7 +42,6 @@ def test_lateral_creepage_with_spin_is_carter_of_other_stiffness(psi):
         assert found[2] == pytest.approx((1.0 - psi) * (1.0 - t) ** 2 * t, rel=1e-12)
 
 
-@pytest.mark.bench
 def test_small_creepage_meets_the_linear_theory():
     slip_x, slip_y, spin = 1e-9, -2e-9, 3e-5
     force_x, force_y, moment, adhering = strip_force(
@@ -75,7 +62,6 @@ CASES = [
 ]
 
 
-@pytest.mark.bench
 def test_strip_force_meets_numerical_solution():
     errors = {0.0: [], 0.08: [], 0.2: []}
     for d, angle, psi in CASES:
@@ -90,7 +76,6 @@ def test_strip_force_meets_numerical_solution():
     assert np.abs(errors[0.2]).max() < 5e-3
 
 
-@pytest.mark.bench
 @pytest.mark.parametrize("turn", [0.0, 0.3, 1.0, 3.0])
 def test_full_sliding_traction_follows_the_local_slip(turn):
     slip_x, slip_y = 0.5, 0.3
@@ -125,7 +110,6 @@ def test_mean_direction_for_small_rotation_is_its_series():
 sizes = st.floats(-6.0, 6.0).map(lambda x: np.sign(x) * 10.0 ** (abs(x) - 4.0) if x else 0.0)
 
 
-@pytest.mark.bench
 @given(sizes, sizes, sizes, st.floats(0.01, 0.8))
 def test_traction_opposes_slip_within_the_bound(d_x, d_y, psi, friction):
     slip = scaled(d_x, d_y, psi)
@@ -136,7 +120,6 @@ def test_traction_opposes_slip_within_the_bound(d_x, d_y, psi, friction):
     assert 0.0 <= strip_force(A, Q, friction, STEEPNESS, *slip, *MODULI)[3] <= 2.0 * A
 
 
-@pytest.mark.bench
 @given(sizes, sizes, sizes)
 def test_mirrored_strip_has_mirrored_forces(d_x, d_y, psi):
     slip_x, slip_y, spin = scaled(d_x, d_y, psi)
@@ -149,7 +132,6 @@ def test_mirrored_strip_has_mirrored_forces(d_x, d_y, psi):
     assert turned == (-force_x, force_y, moment, adhering)
 
 
-@pytest.mark.bench
 @given(sizes, sizes, sizes)
 def test_force_is_lipschitz_in_creepage(d_x, d_y, psi):
     here = force(*scaled(d_x, d_y, psi))
@@ -157,7 +139,6 @@ def test_force_is_lipschitz_in_creepage(d_x, d_y, psi):
     assert np.abs(near - here).max() < 1e-6
 
 
-@pytest.mark.bench
 @pytest.mark.parametrize("psi", [0.0, 0.3, SPIN_LIMIT, 2.0])
 @pytest.mark.parametrize("angle", [0.0, 0.3, 0.8, 1.5])
 def test_force_is_continuous_at_the_onset_of_full_sliding(angle, psi):
@@ -175,7 +156,6 @@ def test_force_is_continuous_at_the_onset_of_full_sliding(angle, psi):
     np.testing.assert_allclose(at(low * (1.0 - 1e-9)), at(high * (1.0 + 1e-9)), atol=1e-7)
 
 
-@pytest.mark.bench
 def test_strip_without_creepage_adheres_and_without_friction_slides():
     assert strip_force(A, Q, MU, STEEPNESS, 0.0, 0.0, 0.0, *MODULI) == (0.0, 0.0, 0.0, 2.0 * A)
     assert strip_force(A, Q, 0.0, STEEPNESS, 1e-3, 1e-3, 1.0, *MODULI) == (0.0, 0.0, 0.0, 0.0)

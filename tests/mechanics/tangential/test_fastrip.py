@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.materials import STEEL
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.mechanics.tangential.fastrip import fastrip, fastrip_fields
 from wearsim.mechanics.tangential.fastsim import march
@@ -16,7 +17,6 @@ from wearsim.mechanics.tangential.kalker_coefficients import (
     one_flexibility,
 )
 from wearsim.mechanics.tangential.strip_with_spin import Motion, amended_moduli, strip_of
-from wearsim_bench.exact_solutions import STEEL, rows, table
 
 PAIR = combine(STEEL, STEEL)
 SHEAR, NU = PAIR.shear_modulus, PAIR.poisson_ratio
@@ -61,7 +61,6 @@ class Ellipse:
         return fastrip_fields(self.half_length, self.bound_peak, self.motion, self.moduli, points)
 
 
-@pytest.mark.bench
 @pytest.mark.parametrize(("a", "b"), [(A, B), (3e-4, 3e-4), (1e-3, 2e-4)])
 def test_small_creepage_meets_kalkers_coefficients(a, b):
     small = 1e-9
@@ -83,7 +82,6 @@ def test_long_contact_has_the_moduli_of_a_plane():
     assert found.spin_across == pytest.approx((1.0 + 0.3 * logarithm) / 0.7, rel=1e-5)
 
 
-@pytest.mark.bench
 @pytest.mark.parametrize("axis", ["longitudinal", "lateral"])
 def test_single_creepage_is_carters_closed_form_for_any_steps(axis):
     ellipse = Ellipse(5e-4) if axis == "longitudinal" else Ellipse(0.0, 5e-4)
@@ -116,7 +114,6 @@ def about_sliding_throughout(ellipse, number):
     return strip(low * (1.0 - 1e-9)), strip(high * (1.0 + 1e-9))
 
 
-@pytest.mark.bench
 def test_direction_is_continuous_at_the_onset_of_full_sliding():
     rng, found = np.random.default_rng(2), []
     for xi, eta, phi in rng.normal(size=(30, 3)) * (5e-4, 5e-4, 1.0):
@@ -130,7 +127,6 @@ def test_direction_is_continuous_at_the_onset_of_full_sliding():
         assert sliding.direction_y == pytest.approx(adhering.direction_y, abs=1e-5)
 
 
-@pytest.mark.bench
 def test_full_sliding_force_is_friction_times_load():
     ellipse = Ellipse(0.03, -0.04)
     *force, _, power = ellipse.totals(1)
@@ -160,31 +156,6 @@ def from_contact(cases, *, published):
     return np.array(powers) / [case["fastrip_P_over_V_N"] for case in cases] - 1.0
 
 
-@pytest.mark.bench
-def test_fastrip_of_contact_agrees_for_weak_spin():
-    errors = from_contact(rows("rig_random", kind="paper"), published=False)
-    assert np.sqrt(np.mean(errors**2)) < 0.003
-    whole = table("mean_problem")
-    mean = [{**whole, **case} for case in whole["rows"]]
-    assert from_contact(mean, published=False) == pytest.approx(0.0, abs=5e-3)
-    # without spin; the coefficients of CONTACT at a/b = 10 are different
-    without_spin = [
-        c for c in rows("hard_cases") if c["phi_per_m"] == 0.0 and c["b_m"] > 0.2 * c["a_m"]
-    ]
-    assert len(without_spin) == 6
-    assert from_contact(without_spin, published=False) == pytest.approx(0.0, abs=1e-3)
-
-
-@pytest.mark.bench
-def test_strong_spin_differs_from_contact_by_the_amendment_only():
-    partial = rows("rig_random", kind="partial")
-    errors = from_contact(partial, published=True)
-    assert np.sqrt(np.mean(errors**2)) < 0.009
-    own = from_contact(partial, published=False)
-    assert np.sqrt(np.mean(own**2)) > 5.0 * np.sqrt(np.mean(errors**2))
-
-
-@pytest.mark.bench
 def test_few_steps_are_sufficient():
     ellipses = [
         Ellipse(*case) for case in ((6e-4, 5e-4, 0.05), (3e-4, -2e-4, 0.6), (0.0, 0.0, 0.8))
@@ -198,7 +169,6 @@ def test_few_steps_are_sufficient():
 CREEPAGES = st.tuples(st.floats(-2e-3, 2e-3), st.floats(-2e-3, 2e-3), st.floats(-1.5, 1.5))
 
 
-@pytest.mark.bench
 @settings(deadline=None, max_examples=60)
 @given(CREEPAGES)
 def test_traction_is_within_the_bound_and_slip_opposes_it(creepage):
@@ -212,7 +182,6 @@ def test_traction_is_within_the_bound_and_slip_opposes_it(creepage):
     assert np.allclose(traction[slip > 0.0], bound[slip > 0.0], rtol=1e-9)
 
 
-@pytest.mark.bench
 @settings(deadline=None, max_examples=60)
 @given(CREEPAGES)
 def test_mirrored_contact_is_mirrored_and_power_is_positive(creepage):
@@ -225,7 +194,6 @@ def test_mirrored_contact_is_mirrored_and_power_is_positive(creepage):
     assert here.totals()[3] >= -1e-12 * LOAD * max(map(abs, creepage))
 
 
-@pytest.mark.bench
 @pytest.mark.parametrize("creepage", [(4e-4, 5e-4, 0.05), (2e-4, 0.0, 0.6), (5e-3, 5e-3, 0.1)])
 def test_fields_integrate_to_the_sums(creepage):
     ellipse = Ellipse(*creepage)
@@ -239,7 +207,6 @@ def test_fields_integrate_to_the_sums(creepage):
     assert found == pytest.approx(moment, abs=1e-3 * scale * ellipse.a)
 
 
-@pytest.mark.bench
 def test_strips_without_adhesion_by_spin_are_solved_by_fastsim():
     ellipse = Ellipse(1e-3, 5e-4, 20.0)
     share = 1.0 / ellipse.flexibility
@@ -256,7 +223,6 @@ def test_strips_without_adhesion_by_spin_are_solved_by_fastsim():
     assert not ellipse.fields().any()
 
 
-@pytest.mark.bench
 def test_strips_without_contact_friction_or_creepage_have_no_force():
     still = Ellipse()
     assert not still.rows()[:3].any()

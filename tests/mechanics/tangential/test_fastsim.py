@@ -26,7 +26,6 @@ from wearsim.mechanics.tangential.fastsim_fields import (
     march_local_fields,
 )
 from wearsim.mechanics.tangential.kalker_coefficients import flexibilities, line_limit_coefficients
-from wearsim_bench.exact_solutions import rows, table
 
 SHEAR = 200e9 / 2.6
 SPEED = 1000.0 * 2.0 * math.pi / 60.0 * 25e-3
@@ -295,21 +294,6 @@ def test_closed_form_power_of_the_mean_problem():
 def test_50_by_50_points_meet_the_closed_form_within_1e_3():
     case = rig(strips=50)
     assert case.power(march(*case.arguments, 50)) == pytest.approx(0.073873, rel=1e-3)
-
-
-@pytest.mark.bench
-@pytest.mark.parametrize("bound", ["par", "ell"])
-@pytest.mark.parametrize("case", rows("mean_problem")[:2], ids=lambda case: case["case"])
-def test_closed_form_meets_the_fastsim_quadrature_of_contact(case, bound):
-    mean = table("mean_problem")
-    here = rig(
-        strips=4000,
-        xi=case["xi"],
-        elliptic=bound == "ell",
-        curvatures=(mean["A_per_m"], mean["B_per_m"]),
-    )
-    found = here.power(closed_form(*here.arguments[:5])) / SPEED
-    assert found == pytest.approx(case[f"fastsim_{bound}_exact_P_over_V_N"], rel=2e-6)
 
 
 def errors(points, **problem):

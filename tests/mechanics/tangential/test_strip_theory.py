@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.materials import STEEL
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.mechanics.tangential.strip_interaction import strip_elasticity
 from wearsim.mechanics.tangential.strip_theory import (
@@ -13,13 +14,9 @@ from wearsim.mechanics.tangential.strip_theory import (
     solve_strips,
     strip_contacts,
 )
-from wearsim_bench.exact_solutions import STEEL, rows, strips_of, table
-
-pytestmark = pytest.mark.bench
 
 PAIR = combine(STEEL, STEEL)
 ELASTICITY = strip_elasticity(PAIR.contact_modulus, PAIR.shear_modulus)
-MEAN = table("mean_problem")
 
 
 def ellipse(a, b, load, strips=200):
@@ -49,48 +46,6 @@ def errors(found):
     """Return rms and worst of the relative errors of pairs (ours, exact)."""
     relative = np.array([ours / exact - 1.0 for ours, exact in found])
     return np.sqrt((relative**2).mean()), np.abs(relative).max()
-
-
-@pytest.mark.parametrize(
-    ("kind", "rms", "worst", "row_error"),
-    [("paper", 5e-4, 1.2e-3, 3e-3), ("partial", 2.2e-3, 6.5e-3, 5e-3)],
-)
-def test_power_for_random_inputs_meets_the_exact_theory(kind, rms, worst, row_error):
-    powers, distances = [], []
-    y_over_b, dissipation = strips_of(kind)
-    for row, exact in zip(rows("rig_random", kind=kind), dissipation, strict=True):
-        y, found = solve_row(row["a_m"], row["b_m"], row["N_N"], row["mu"], row)
-        powers.append((found.work.sum() * (y[1] - y[0]), row["P_over_V_N"]))
-        ours = np.interp(y_over_b * row["b_m"], y, found.work, left=0.0, right=0.0)
-        distances.append(np.linalg.norm(ours - exact) / np.linalg.norm(exact))
-    assert len(powers) == 40
-    found_rms, found_worst = errors(powers)
-    assert found_rms < rms
-    assert found_worst < worst
-    assert np.median(distances) < row_error
-    assert np.max(distances) < 0.03
-
-
-def test_power_of_hard_cases_on_wide_patches_meets_exact_theory():
-    powers = []
-    for row in rows("hard_cases"):
-        if row["b_m"] >= 2.99 * row["a_m"]:
-            y, found = solve_row(row["a_m"], row["b_m"], row["N_N"], row["mu"], row)
-            powers.append((found.work.sum() * (y[1] - y[0]), row["P_over_V_N"]))
-    assert len(powers) == 7
-    rms, worst = errors(powers)
-    assert rms < 5e-3
-    assert worst < 1.2e-2
-
-
-@pytest.mark.parametrize("row", rows("mean_problem"), ids=lambda row: row["case"])
-def test_forces_and_power_of_the_rig_meet_the_exact_theory(row):
-    patch = [MEAN[key] for key in ("a_m", "b_m", "N_N", "mu")]
-    y, found = solve_row(*patch, row)
-    spacing = y[1] - y[0]
-    assert found.force_x.sum() * spacing == pytest.approx(row["Fx_N"], rel=4e-3)
-    assert found.force_y.sum() * spacing == pytest.approx(row["Fy_N"], rel=4e-3, abs=1e-6)
-    assert found.work.sum() * spacing == pytest.approx(row["P_over_V_N"], rel=2e-3)
 
 
 creepages = st.floats(-4.0, 4.0).map(lambda x: np.sign(x) * 1e-3 * 10.0 ** (abs(x) - 3.0))

@@ -1,1 +1,1 @@
-"""Measurements of speed against error, and the hard cases."""
+"""Benchmarks of time against error, and the hard cases."""

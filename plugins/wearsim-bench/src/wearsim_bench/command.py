@@ -1,4 +1,4 @@
-"""`wearsim bench`: what every model, stepper and plan costs, and how near it comes."""
+"""`wearsim bench`: time and error of contact models, steppers and sampling plans."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from wearsim.cli.arguments import Force, Json, Quiet
 from wearsim.cli.output import note, refuse_existing
 
 if TYPE_CHECKING:
-    from wearsim_bench.measure.measurement import Effort, Tell, Topic
+    from wearsim_bench.measure.measurement import Effort, OnProgress, Topic
     from wearsim_bench.output import Output
 
 
-class Name(StrEnum):
+class TopicName(StrEnum):
     """The topics of `wearsim bench`."""
 
     contact = "contact"
@@ -28,9 +28,9 @@ class Name(StrEnum):
     savings = "savings"
 
 
-MODELS = (Name.contact, Name.stepping, Name.growth)  # topics that measure one model if asked
+MODEL_TOPICS = (TopicName.contact, TopicName.stepping, TopicName.growth)  # accept --plugin
 Topics: TypeAlias = Annotated[
-    list[Name] | None,
+    list[TopicName] | None,
     typer.Argument(
         metavar="[TOPIC]...",
         help="contact, stepping, sampling, growth, savings; all of them by default.",
@@ -40,20 +40,20 @@ Topics: TypeAlias = Annotated[
 Plugin: TypeAlias = Annotated[
     str | None,
     typer.Option(
-        metavar="NAME", help="Only this contact model, beside the default.", show_default=False
+        metavar="NAME", help="Only this contact model and the default.", show_default=False
     ),
 ]
 Hard: TypeAlias = Annotated[
-    bool, typer.Option("--hard", help="Run the hard cases, and tell which of them hold.")
+    bool, typer.Option("--hard", help="Run the hard cases and list which of them pass.")
 ]
 Quick: TypeAlias = Annotated[
     bool, typer.Option("--quick", help="Few cases and short tests: seconds instead of minutes.")
 ]
 All: TypeAlias = Annotated[
-    bool, typer.Option("--all", help="Show all that was measured, not the best of it alone.")
+    bool, typer.Option("--all", help="Show all measurements, not only the best ones.")
 ]
 Folder: TypeAlias = Annotated[
-    Path, typer.Option("--output", "-o", metavar="DIR", help="Where figures, JSON and tables go.")
+    Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for figures, JSON and tables.")
 ]
 
 
@@ -76,15 +76,15 @@ def bench(
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
-    """Measure speed beside error: models, steppers, plans, growth; --hard for hard cases."""
-    asked = list(dict.fromkeys(topics or ([] if hard else Name)))
+    """Measure time and error of models, steppers and sampling plans; --hard runs the hard cases."""
+    selected = list(dict.fromkeys(topics or ([] if hard else TopicName)))
     if plugin is not None:
-        asked = _with_a_model(asked, topics, plugin)
+        selected = _topics_of_model(selected, topics, plugin)
     endings = (".json", ".md", ".png")
-    wanted = [output / (topic.value + ending) for topic in asked for ending in endings]
-    wanted += [output / f"hard{ending}" for ending in endings[:2] if hard]
-    _refuse_places(output, wanted)
-    for path in wanted:
+    paths = [output / (topic.value + ending) for topic in selected for ending in endings]
+    paths += [output / f"hard{ending}" for ending in endings[:2] if hard]
+    _check_paths(output, paths)
+    for path in paths:
         refuse_existing(path, force)
     from wearsim_bench.measure.machine import this_machine
     from wearsim_bench.measure.measurement import Effort
@@ -92,77 +92,78 @@ def bench(
 
     effort = Effort(quick, 1 if quick else 5, plugin)
     machine = this_machine()
-    shown = Output(output, machine, effort, show_all, json)
-    shown.begin()
+    results = Output(output, machine, effort, show_all, json)
+    results.begin()
     try:
-        for topic in asked:
-            with telling(topic.value, quiet) as tell:
-                found = _function(topic)(effort, tell)
-            shown.topic(found)
-        holds = not hard or _hard_cases_hold(effort, shown, quiet)
+        for topic in selected:
+            with progress_bar(topic.value, quiet) as on_progress:
+                measured = _measuring_function(topic)(effort, on_progress)
+            results.topic(measured)
+        passed = not hard or _run_hard_cases(effort, results, quiet)
     finally:
-        shown.end()  # what was finished is told, whatever became of the rest
-    if not holds:
+        results.end()  # after an error too: completed topics are written
+    if not passed:
         raise typer.Exit(1)
 
 
-def _hard_cases_hold(effort: Effort, shown: Output, quiet: bool) -> bool:
-    """Run the hard cases, show them, and return whether all are as they should be."""
+def _run_hard_cases(effort: Effort, results: Output, quiet: bool) -> bool:
+    """Run the hard cases, write the verdicts, and return whether all pass."""
     from wearsim_bench.hard_cases.topic import hard as run_hard_cases
 
-    with telling("hard cases", quiet) as tell:
-        verdicts = run_hard_cases(effort, tell)
-    shown.hard(verdicts)
+    with progress_bar("hard cases", quiet) as on_progress:
+        verdicts = run_hard_cases(effort, on_progress)
+    results.hard(verdicts)
     return all(verdict.holds for verdict in verdicts)
 
 
-def _refuse_places(folder: Path, wanted: list[Path]) -> None:
-    """Raise where a folder or a file stands in the way that --force does not take out of it."""
+def _check_paths(folder: Path, paths: list[Path]) -> None:
+    """Raise if the folder is a file, or an output path is a folder."""
     if folder.exists() and not folder.is_dir():
         raise typer.BadParameter(f"{folder} is a file; name a folder", param_hint="-o")
-    for path in wanted:
+    for path in paths:
         if path.is_dir():
             raise typer.BadParameter(f"{path} is a folder; name another", param_hint="-o")
 
 
-def _with_a_model(asked: list[Name], topics: list[Name] | None, plugin: str) -> list[Name]:
-    """Return the topics that measure one model; those that cannot are left out, or refused."""
+def _topics_of_model(
+    selected: list[TopicName], topics: list[TopicName] | None, plugin: str
+) -> list[TopicName]:
+    """Return the selected topics that measure contact models; refuse others that were named."""
     from wearsim.plugins import ContactModelSpec, registry
 
     known = registry().names(ContactModelSpec)
     if plugin not in known:
         raise typer.BadParameter(
-            f"'{plugin}' is no contact model that is installed; there are {', '.join(known)}",
+            f"no installed contact model is named '{plugin}'; there are {', '.join(known)}",
             param_hint="--plugin",
         )
     for name in topics or ():
-        if name not in MODELS:
+        if name not in MODEL_TOPICS:
             raise typer.BadParameter(
-                f"{name.value} does not measure contact models; leave --plugin out, or name"
-                f" {', '.join(topic.value for topic in MODELS)}",
+                f"{name.value} does not measure contact models; omit --plugin, or name"
+                f" {', '.join(topic.value for topic in MODEL_TOPICS)}",
                 param_hint="--plugin",
             )
-    return [name for name in asked if name in MODELS]
+    return [name for name in selected if name in MODEL_TOPICS]
 
 
-def _function(name: Name) -> Callable[[Effort, Tell], Topic]:
-    """Return what measures a topic."""
+def _measuring_function(name: TopicName) -> Callable[[Effort, OnProgress], Topic]:
     from importlib import import_module
 
-    function: Callable[[Effort, Tell], Topic] = getattr(
+    function: Callable[[Effort, OnProgress], Topic] = getattr(
         import_module(f"wearsim_bench.{name.value}.topic"), name.value
     )
     return function
 
 
 @contextmanager
-def telling(name: str, quiet: bool) -> Iterator[Tell]:
-    """Give what shows how far a topic has come, on stderr.
+def progress_bar(name: str, quiet: bool) -> Iterator[OnProgress]:
+    """Yield a function that shows the progress of a topic on stderr.
 
     Parameters
     ----------
     name : str
-        The topic's.
+        Name of the topic.
     quiet : bool
         Show nothing.
     """
@@ -186,7 +187,7 @@ def telling(name: str, quiet: bool) -> Iterator[Tell]:
         with Progress(*columns, console=screen, transient=True) as progress:
             task = progress.add_task(name, total=1.0)
 
-            def tell(what: str, part: float) -> None:
+            def on_progress(what: str, part: float) -> None:
                 progress.update(task, description=f"{name}: {what}", completed=part)
 
-            yield tell
+            yield on_progress

@@ -1,4 +1,4 @@
-"""Exact contact solutions to hold models against; `data/README.md` tells source and error."""
+"""Exact contact solutions; `data/README.md` states their sources and errors."""
 
 import json
 from functools import cache
@@ -19,32 +19,32 @@ CREEPAGES = {
     "combined": (4e-4, 5e-4, 0.05),
 }
 
-#: errors of the data, relative, as `data/README.md` has them: of the strips' P_l(y), of the power
+#: relative errors of the data from `data/README.md`: of P_l(y) and of the power
 STRIPS_ERROR = 3e-3
 POWER_ERRORS = (1e-3, 4e-3)
-PURE_SPIN_ERROR = 8e-3  # at most, of the hard cases
+PURE_SPIN_ERROR = 8e-3  # upper bound for the hard cases
 
 
 @cache
 def table(name: str) -> dict[str, Any]:
-    """Return a JSON file of the data by its name, such as "hertz"; its cases are in `rows`."""
-    found: dict[str, Any] = json.loads((DATA / f"{name}.json").read_text(encoding="utf-8"))
-    return found
+    """Return a JSON file of the data, such as "hertz"; its cases are in `rows`."""
+    data: dict[str, Any] = json.loads((DATA / f"{name}.json").read_text(encoding="utf-8"))
+    return data
 
 
 def rows(name: str, **where: Any) -> list[dict[str, Any]]:
-    """Return the rows of a JSON file whose values are those of `where`."""
+    """Return the rows of a JSON file with the values in `where`."""
     return [r for r in table(name)["rows"] if all(r[key] == value for key, value in where.items())]
 
 
 @cache
 def strips_of(kind: str) -> tuple[FloatArray, FloatArray]:
-    """Return y over b, (124,), and P_l over V [N/m], (cases, 124), of elliptic cases.
+    """Return y/b, shape (124,), and P_l/V [N/m], shape (cases, 124), of elliptic contacts.
 
     Parameters
     ----------
     kind : str
-        "paper" or "partial", the draws of `rig_random`, or "hard", those of `hard_cases`.
+        "paper" or "partial" for the draws of `rig_random`, or "hard" for `hard_cases`.
     """
     name = "hard_cases" if kind == "hard" else "rig_random"
     with np.load(DATA / f"{name}_rows.npz") as file:
@@ -55,8 +55,9 @@ def strips_of(kind: str) -> tuple[FloatArray, FloatArray]:
 def worn_profile(name: str) -> dict[str, Any]:
     """Return a worn profile by its name in `WORN`.
 
-    Its keys: y, w, q, a, approach, peak_pressure, and per creepage P_l_over_V_* and P_over_V_*.
+    The keys are y, w, q, a, approach, peak_pressure, and for each
+    creepage P_l_over_V_* and P_over_V_*.
     """
     with np.load(DATA / f"worn_{name}.npz") as file:
-        found = {key: np.array(file[key], dtype=np.float64) for key in file.files}
-    return {key: float(value) if value.ndim == 0 else value for key, value in found.items()}
+        data = {key: np.array(file[key], dtype=np.float64) for key in file.files}
+    return {key: float(value) if value.ndim == 0 else value for key, value in data.items()}

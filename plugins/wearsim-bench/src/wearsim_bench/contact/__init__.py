@@ -1,1 +1,1 @@
-"""Contact models against exact solutions."""
+"""Benchmark of contact models against exact solutions."""

@@ -1,4 +1,4 @@
-"""How near contact models come to the exact theory: the errors that tests and tables hold."""
+"""Errors of contact models relative to exact solutions, as used by tests and tables."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ WORN_STRIPS = 321
 
 @dataclass(frozen=True)
 class CaseErrors:
-    """Errors of one contact, relative to the exact theory; all but that of P_l(y) have a sign.
+    """Relative errors of one contact; all except that of P_l(y) are signed.
 
-    Power, P_l(y) (L2 over the strips), width and greatest pressure.
+    Power, P_l(y) (L2 over the strips), width and peak pressure.
     """
 
     power: float
@@ -32,7 +32,7 @@ class CaseErrors:
 
 @dataclass(frozen=True)
 class PowerErrors:
-    """Errors over many contacts: of the power, rms and worst, and L2 of P_l(y), median."""
+    """Relative errors over a set of contacts: rms and largest of power, median L2 of P_l(y)."""
 
     rms: float
     worst: float
@@ -41,10 +41,10 @@ class PowerErrors:
 
 @dataclass(frozen=True)
 class WornErrors:
-    """Errors on a worn profile, relative to the exact theory.
+    """Relative errors on a worn profile.
 
-    L1 of the line load, mean of the half-length's error over its mean, errors of approach and peak
-    pressure, and for every creepage the L2 error of P_l(y) and that of the power.
+    L1 errors of line load and half-length, errors of approach and peak pressure, and for each
+    creepage the L2 error of P_l(y) and the error of the power.
     """
 
     line_load: float
@@ -55,8 +55,8 @@ class WornErrors:
     power: dict[str, float]
 
 
-def built(name: str, **options: Any) -> ContactModel:
-    """Return a contact model by its registered name, not yet prepared."""
+def build_model(name: str, **options: Any) -> ContactModel:
+    """Return a contact model by its registered name, not prepared."""
     spec = registry().get(ContactModelSpec, name)
     return spec.factory(spec.options(**options))
 
@@ -64,7 +64,7 @@ def built(name: str, **options: Any) -> ContactModel:
 def solved(
     model: ContactModel, case: Case, strips: int | None = None
 ) -> tuple[ContactSolution, Grid]:
-    """Prepare a model and solve a case, by default on strips of the model's choice."""
+    """Prepare a model and solve a case, by default on the strips suggested by the model."""
     grid = case.grid(model, strips)
     model.prepare(grid, MATERIALS)
     return model.solve(case.gap_at(grid.y), case.longitudinal_curvature, case.point), grid
@@ -88,9 +88,9 @@ def errors_of(solution: ContactSolution, grid: Grid, case: Case) -> CaseErrors:
         width=contact_width(solution.line_load, grid.spacing) / exact.width - 1.0,
         peak_pressure=solution.peak_pressure / exact.peak_pressure - 1.0,
     )
-    wrong = [name for name, error in vars(errors).items() if not np.isfinite(error)]
-    if wrong:
-        raise ContactError(f"what it gives for {', '.join(wrong)} is not finite", vars(errors))
+    invalid = [name for name, error in vars(errors).items() if not np.isfinite(error)]
+    if invalid:
+        raise ContactError(f"{', '.join(invalid)}: not finite", vars(errors))
     return errors
 
 
@@ -100,29 +100,29 @@ def l2(found: FloatArray, exact: FloatArray) -> float:
 
 
 def rms(errors: Iterable[float]) -> float:
-    """Return the root of the mean square of errors."""
+    """Return the root mean square of errors."""
     return float(np.sqrt(np.mean(np.square(list(errors)))))
 
 
-def drawn_errors(model: ContactModel, kind: str) -> PowerErrors:
-    """Return the errors over the 40 draws of `rig_random` of a kind, `paper` or `partial`."""
-    return _over(model, elliptic_cases(kind))
+def random_case_errors(model: ContactModel, kind: str) -> PowerErrors:
+    """Return the errors over the 40 draws of `rig_random` of a kind, "paper" or "partial"."""
+    return _errors_over(model, elliptic_cases(kind))
 
 
-def hard_errors(model: ContactModel, least_ratio: float) -> PowerErrors:
-    """Return the errors over the hard cases whose b/a is at least so much."""
+def hard_case_errors(model: ContactModel, least_ratio: float) -> PowerErrors:
+    """Return the errors over the hard cases with b/a of at least `least_ratio`."""
     cases = elliptic_cases("hard")
-    return _over(model, [c for c in cases if c.patch.b >= least_ratio * c.patch.a])
+    return _errors_over(model, [c for c in cases if c.patch.b >= least_ratio * c.patch.a])
 
 
-def _over(model: ContactModel, cases: Iterable[Case]) -> PowerErrors:
+def _errors_over(model: ContactModel, cases: Iterable[Case]) -> PowerErrors:
     return summed([errors_of(*solved(model, case), case) for case in cases])
 
 
-def summed(found: Sequence[CaseErrors]) -> PowerErrors:
-    """Return the errors over many contacts from those of each."""
-    powers = [errors.power for errors in found]
-    strips = float(np.median([errors.dissipation for errors in found]))
+def summed(cases: Sequence[CaseErrors]) -> PowerErrors:
+    """Combine the errors of single contacts."""
+    powers = [errors.power for errors in cases]
+    strips = float(np.median([errors.dissipation for errors in cases]))
     return PowerErrors(rms(powers), float(np.abs(powers).max()), strips)
 
 
@@ -132,16 +132,16 @@ def worn_errors(model: ContactModel, name: str) -> WornErrors:
     Raises
     ------
     ContactError
-        If the model has no answer on it.
+        If the model has no solution.
     """
     exact, cases = worn_profile(name), worn_cases(name)
-    found = {slip: solved(model, case, WORN_STRIPS) for slip, case in cases.items()}
-    errors = {slip: errors_of(*found[slip], case) for slip, case in cases.items()}
-    solution, grid = found["mean"]
+    solutions = {slip: solved(model, case, WORN_STRIPS) for slip, case in cases.items()}
+    errors = {slip: errors_of(*solutions[slip], case) for slip, case in cases.items()}
+    solution, grid = solutions["mean"]
 
     def l1(values: FloatArray, key: str) -> float:
-        true = np.interp(grid.y, exact["y"], exact[key], left=0.0, right=0.0)
-        return float(np.abs(values - true).sum() / true.sum())
+        reference = np.interp(grid.y, exact["y"], exact[key], left=0.0, right=0.0)
+        return float(np.abs(values - reference).sum() / reference.sum())
 
     return WornErrors(
         line_load=l1(solution.line_load, "q"),

@@ -1,4 +1,4 @@
-"""Contacts to be solved, and what the exact theory says of each."""
+"""Benchmark contacts with their exact solutions."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from wearsim_bench.exact_solutions import CREEPAGES, STEEL, WORN, rows, strips_o
 
 MATERIALS = (STEEL, STEEL)
 
-WORN_WIDTH = 8e-3  # m, of the strips of worn profiles: room for models that see them too wide
+WORN_WIDTH = 8e-3  # m, total width of the strips, also for models that overestimate the width
 
-_WORN_CURVATURE, _WORN_B = 45.0, 0.5  # 1/m, twice the data's A, and the B of their crown
+_WORN_CURVATURE, _WORN_B = 45.0, 0.5  # 1/m, 2 A of the data, and B of the crown
 
 _WORN_LOAD, _WORN_FRICTION = 300.0, 0.1
 
 
 @dataclass(frozen=True)
 class Exact:
-    """What the exact theory says of a contact at V = 1 m/s.
+    """Exact solution of a contact at V = 1 m/s.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ class Exact:
     y, dissipation : ndarray, shape (rows,)
         P_l(y) [W/m].
     width, peak_pressure : float
-        Extent of the contact across rolling [m], greatest pressure [Pa].
+        Width of the contact across rolling [m], peak pressure [Pa].
     """
 
     power: float
@@ -55,14 +55,17 @@ class Case:
     Parameters
     ----------
     name : str
+        Description of the contact.
     gap_at : callable
         Gap [m] at y [m].
     gap_curvature, longitudinal_curvature : float
         Relative curvatures across and along rolling, of the unworn bodies [1/m].
     point : OperatingPoint
+        Load, creepage, friction and speed.
     exact : Exact
+        Exact solution.
     span : float, optional
-        Width of a profile [m], all of it cut into strips; where left out, the model suggests them.
+        Width of the strips on a profile [m]; None for strips suggested by the model.
     """
 
     name: str
@@ -75,13 +78,13 @@ class Case:
 
     @property
     def patch(self) -> HertzContact:
-        """The patch of the unworn bodies."""
+        """Contact patch of the unworn bodies."""
         along, across = 0.5 * self.longitudinal_curvature, 0.5 * self.gap_curvature
         modulus = combine(*MATERIALS).contact_modulus
         return hertz(along, across, self.point.normal_force, modulus)
 
     def grid(self, model: ContactModel, strips: int | None = None) -> Grid:
-        """Return the strips that a single contact gets, or so many of them over the same width."""
+        """Return the default strips of a single contact, or another number over the same width."""
         if self.span is not None:
             ends = np.array([-0.5, 0.5]) * self.span
             usual = profile_grid(Profile(ends, np.zeros(2)), self.patch.b, None)
@@ -101,20 +104,20 @@ def elliptic_cases(kind: str) -> tuple[Case, ...]:
     Parameters
     ----------
     kind : str
-        As of `exact.strips_of`: "paper", "partial" or "hard".
+        "paper", "partial" or "hard", see `exact_solutions.strips_of`.
     """
-    found = rows("hard_cases") if kind == "hard" else rows("rig_random", kind=kind)
+    data = rows("hard_cases") if kind == "hard" else rows("rig_random", kind=kind)
     y_over_b, strips = strips_of(kind)
     return tuple(
         _elliptic(f"{row['kind'].replace('_', ' ')} {number}", row, y_over_b, exact)
-        for number, (row, exact) in enumerate(zip(found, strips, strict=True))
+        for number, (row, exact) in enumerate(zip(data, strips, strict=True))
     )
 
 
 def _elliptic(
     name: str, row: dict[str, Any], y_over_b: FloatArray, dissipation: FloatArray
 ) -> Case:
-    """Return a contact of a row of the data; width and peak pressure are Hertz's closed forms."""
+    """Return the contact of a row of the data; width and peak pressure are those of Hertz."""
     modulus = combine(*MATERIALS).contact_modulus
     patch = hertz(row["A_per_m"], row["B_per_m"], row["N_N"], modulus)
     creepage = Creepage(row["xi"], row["eta"], row["phi_per_m"])
@@ -136,7 +139,7 @@ def _parabola(curvature: float, y: FloatArray) -> FloatArray:
 
 @cache
 def worn_cases(name: str) -> dict[str, Case]:
-    """Return a worn profile of the data under each of its creepages, by name in `CREEPAGES`."""
+    """Return the cases of a worn profile by name of the creepage in `CREEPAGES`."""
     data = worn_profile(name)
     width = contact_width(data["q"], float(data["y"][1] - data["y"][0]))
     return {
@@ -160,36 +163,36 @@ def worn_cases(name: str) -> dict[str, Case]:
 
 
 def all_worn_cases() -> tuple[Case, ...]:
-    """Return every worn profile under every creepage."""
+    """Return the cases of all worn profiles and creepages."""
     return tuple(case for name in WORN for case in worn_cases(name).values())
 
 
 def _worn_gap(name: str, y: FloatArray) -> FloatArray:
     data = worn_profile(name)
     gap = np.interp(y, data["y"], data["w"])
-    # beyond the data, where there is no contact, all profiles go on as the crown does
+    # outside the data and the contact, all profiles continue as the crown
     end = data["y"][-1]
     return np.asarray(gap + _WORN_B * (np.maximum(np.abs(y), end) ** 2 - end**2))
 
 
-_SHOWN = 4  # strips from an edge inwards that show how the line load falls
+_EDGE_STRIPS = 4  # strips at an edge from which its position is extrapolated
 
-_ALIKE = 0.1  # of the second strip's line load: how far the first may be from the parabola's
+_SLACK = 0.1  # deviation from the parabola, relative to the line load of the second strip
 
 
 def contact_width(line_load: FloatArray, spacing: float) -> float:
-    """Return the distance between a contact's outermost edges [m].
+    """Return the distance between the outermost edges of a contact [m].
 
-    A strip at an edge is in contact in part, and models differ in what they give it: the line load
-    at its middle, or the mean over it. So the edge is where the parabola through the line loads of
-    the next three strips vanishes, which on an ellipse is exact for both. Where the first strip
-    carries neither what that parabola has at its middle nor its mean, the line load does not fall
-    like a parabola, and the straight line through the first two takes its place.
+    A strip at an edge is partly in contact, and models give it either the line load at its
+    midpoint or the mean over it. The edge is therefore the zero of the parabola through the line
+    loads of the next three strips, which is exact for an ellipse in both cases. If the first strip
+    carries neither the midpoint value nor the mean of this parabola, the straight line through
+    the first two strips is used instead.
 
     Parameters
     ----------
     line_load : ndarray, shape (strips,)
-        q [N/m], some of it positive.
+        q [N/m], with at least one positive value.
     spacing : float
         Width of a strip [m].
     """
@@ -199,23 +202,24 @@ def contact_width(line_load: FloatArray, spacing: float) -> float:
 
 
 def _edge(line_load: FloatArray) -> float:
-    """Return how far, in strips, the edge lies outside the middle of the first strip."""
-    shown = line_load[:_SHOWN].tolist()
-    parabolic = _edge_of_parabola(shown) if len(shown) == _SHOWN and min(shown) > 0.0 else None
-    edge = _edge_of_line(shown) if parabolic is None else parabolic
+    """Return the distance of the edge from the midpoint of the first strip, in strips."""
+    first = line_load[:_EDGE_STRIPS].tolist()
+    use_parabola = len(first) == _EDGE_STRIPS and min(first) > 0.0
+    parabolic = _edge_of_parabola(first) if use_parabola else None
+    edge = _edge_of_line(first) if parabolic is None else parabolic
     return min(max(edge, -0.5), 1.0)
 
 
-def _edge_of_line(shown: list[float]) -> float:
-    """Return the same by a straight line, or the outer side of the strip where there is none."""
-    if len(shown) < 2 or shown[1] <= shown[0]:
+def _edge_of_line(line_load: list[float]) -> float:
+    """Return this distance by linear extrapolation, or half a strip if that is impossible."""
+    if len(line_load) < 2 or line_load[1] <= line_load[0]:
         return 0.5
-    return shown[0] / (shown[1] - shown[0])
+    return line_load[0] / (line_load[1] - line_load[0])
 
 
-def _edge_of_parabola(shown: list[float]) -> float | None:
-    """Return the same by a parabola through all but the first, if that one agrees with it."""
-    first, second, third, fourth = shown
+def _edge_of_parabola(line_load: list[float]) -> float | None:
+    """Return this distance by the parabola through strips 2 to 4, if strip 1 agrees with it."""
+    first, second, third, fourth = line_load
     bend = fourth - 2.0 * third + second
     slope = third - second - 0.5 * bend  # at the second strip
     discriminant = slope**2 - 2.0 * bend * second
@@ -228,6 +232,6 @@ def _edge_of_parabola(shown: list[float]) -> float | None:
         second - slope + 0.5 * bend,
         steepness * covered * (edge + 0.5 - 0.5 * covered),
     )
-    slack = _ALIKE * second
+    slack = _SLACK * second
     agrees = min(at_middle, mean) - slack <= first <= max(at_middle, mean) + slack
     return edge if agrees else None

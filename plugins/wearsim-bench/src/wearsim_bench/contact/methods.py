@@ -1,4 +1,4 @@
-"""The contact models that are registered, each with every choice its options offer."""
+"""All registered contact models with all choices of their options."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from wearsim_bench.contact.accuracy import solved
 from wearsim_bench.contact.cases import worn_cases
 
 DEFAULT_MODEL = str(ContactTable.model_fields["model"].default)
-HOST = "hertz"  # whose normal contact is exact on ellipses: there tangential theories are compared
+COMPARISON_MODEL = "hertz"  # used to compare tangential theories: exact normal contact on ellipses
 _RESOLUTION = ("mx", "my")  # options that follow the number of strips
-_NAMES = ("variant", "tangential")  # options whose values say by themselves what they are
-_STRIPS = 81  # on which it shows whether a choice changes the normal contact
+_NAMES = ("variant", "tangential")  # options shown by their value only
+_STRIPS = 81  # for the comparison of normal contacts
 
 
 @dataclass(frozen=True)
@@ -30,9 +30,9 @@ class Method:
     Parameters
     ----------
     model : str
-        Its registered name.
+        Registered name.
     options : mapping of str to Any
-        Those that are not left at their defaults.
+        Options with non-default values.
     """
 
     model: str
@@ -40,12 +40,12 @@ class Method:
 
     @property
     def spec(self) -> ContactModelSpec:
-        """The model's spec."""
+        """Spec of the model."""
         return registry().get(ContactModelSpec, self.model)
 
     @property
     def name(self) -> str:
-        """The model and its choices: "hertz, fastsim, bound parabolic"."""
+        """Model and choices: "hertz, fastsim, bound parabolic"."""
         fields = self.spec.options.model_fields
         known = [
             key
@@ -59,15 +59,15 @@ class Method:
 
     @property
     def default(self) -> bool:
-        """Whether it is what a scenario gets that asks for nothing."""
+        """Whether this is the default of a scenario."""
         return self.model == DEFAULT_MODEL and not self.options
 
     def build(self, strips: int | None = None) -> ContactModel:
-        """Return the model, not yet prepared; options of resolution follow the strips."""
+        """Return the model, not prepared; `mx` and `my` are set to the number of strips."""
         return self.spec.factory(self.spec.options(**self._resolved(strips)))
 
     def setting(self, strips: int) -> str:
-        """Return how finely it solves: "81 strips", or "81 x 81" where it marches."""
+        """Return the resolution: "81 strips", or "81 x 81" with steps along rolling."""
         steps = self._resolved(strips).get("mx")
         return f"{strips} strips" if steps is None else f"{steps} x {strips}"
 
@@ -82,16 +82,16 @@ class Method:
 
 
 def methods(plugin: str | None = None) -> list[Method]:
-    """Return the registered contact models with all their choices, each choice by itself.
+    """Return the registered contact models with all their choices, one choice at a time.
 
-    A choice that means nothing beside the others' defaults stands beside the one that gives it a
-    meaning: `bound = "parabolic"` beside `tangential = "fastsim"`. Choices of a tangential theory
-    are varied in one model alone, as what they change is the same in all.
+    A choice that is invalid with the defaults of the other options is combined with the choice it
+    requires: `bound = "parabolic"` with `tangential = "fastsim"`. Choices of a tangential theory
+    are varied in one model only, since their effect is the same in all.
 
     Parameters
     ----------
     plugin : str, optional
-        The one model to return, beside the default.
+        Model to return in addition to the default; None for all.
 
     Raises
     ------
@@ -99,37 +99,37 @@ def methods(plugin: str | None = None) -> list[Method]:
         If there is no such model.
     """
     if plugin is None:
-        names, host = registry().names(ContactModelSpec), HOST
+        names, varied = registry().names(ContactModelSpec), COMPARISON_MODEL
     else:
         registry().get(ContactModelSpec, plugin)
-        names, host = list(dict.fromkeys((plugin, DEFAULT_MODEL))), plugin
+        names, varied = list(dict.fromkeys((plugin, DEFAULT_MODEL))), plugin
     return [
         method
         for name in names
-        for method in _methods_of(name, with_theories=name == host)
+        for method in _methods_of(name, with_theories=name == varied)
         if plugin in (None, name) or method.default
     ]
 
 
 def normal_methods(plugin: str | None = None) -> list[Method]:
-    """Return those of `methods` that differ in the normal contact; the others tell nothing new."""
-    own = [method for method in methods(plugin) if not _of_theory(method)]
-    plain = {method.model: _flat(method) for method in own if not method.options}
+    """Return the `methods` that differ in the normal contact."""
+    candidates = [method for method in methods(plugin) if not _of_theory(method)]
+    defaults = {method.model: _flat(method) for method in candidates if not method.options}
     return [
         method
-        for method in own
-        if not method.options or not _same(plain[method.model], _flat(method))
+        for method in candidates
+        if not method.options or not _same(defaults[method.model], _flat(method))
     ]
 
 
 def _methods_of(name: str, *, with_theories: bool) -> list[Method]:
     options = registry().get(ContactModelSpec, name).options
-    found = [Method(name), *(Method(name, chosen) for chosen in _choices(options))]
-    return [method for method in found if with_theories or not _of_theory(method)]
+    every = [Method(name), *(Method(name, choice) for choice in _choices(options))]
+    return [method for method in every if with_theories or not _of_theory(method)]
 
 
 def _of_theory(method: Method) -> bool:
-    """Return whether a method chooses a tangential theory that every model of strips offers."""
+    """Return whether a method varies a tangential theory common to all models of strips."""
     shared = TangentialOptions.model_fields
     return issubclass(method.spec.options, TangentialOptions) and any(
         key in shared for key in method.options
@@ -137,22 +137,22 @@ def _of_theory(method: Method) -> bool:
 
 
 def _choices(options: type[Options]) -> list[dict[str, Any]]:
-    """Return every value other than the default, alone or beside the choice that it needs."""
-    alone = [
+    """Return all non-default values, each alone or with the choice that it requires."""
+    single = [
         {key: value}
         for key, info in options.model_fields.items()
         for value in _values(info.annotation)
         if value != info.default
     ]
-    found = []
-    for choice in alone:
-        beside = [other | choice for other in alone if other.keys() != choice.keys()]
-        found += [tried for tried in (choice, *beside) if _valid(options, tried)][:1]
-    return found
+    choices = []
+    for choice in single:
+        pairs = [other | choice for other in single if other.keys() != choice.keys()]
+        choices += [tried for tried in (choice, *pairs) if _valid(options, tried)][:1]
+    return choices
 
 
 def _values(annotation: Any) -> Iterator[Any]:
-    """Yield what an option can be chosen from, if it is a choice."""
+    """Yield the possible values of an option, if it is a choice."""
     if annotation is bool:
         yield from (False, True)
     elif get_origin(annotation) is Literal:
@@ -165,7 +165,7 @@ def _values(annotation: Any) -> Iterator[Any]:
 def _valid(options: type[Options], values: dict[str, Any]) -> bool:
     try:
         options(**values)
-    except Exception:  # whatever a validator of a plugin raises, the value is refused
+    except Exception:  # a validator of a plugin may raise any exception
         return False
     return True
 
@@ -175,15 +175,15 @@ def _word(value: object) -> str:
 
 
 def _flat(method: Method) -> ContactSolution | None:
-    """Return the contact of the profile worn flat, if the model has an answer."""
+    """Return the contact on the flat worn profile, or None if the model has no solution."""
     try:
         return solved(method.build(_STRIPS), worn_cases("flat")["mean"], _STRIPS)[0]
-    except Exception:  # it is told where the method is measured
+    except Exception:  # reported when the method is measured
         return None
 
 
 def _same(one: ContactSolution | None, other: ContactSolution | None) -> bool:
-    """Return whether two normal contacts are the same."""
+    """Return whether two normal contacts are identical."""
     if one is None or other is None:
         return one is other
     return np.array_equal(one.line_load, other.line_load) and np.array_equal(

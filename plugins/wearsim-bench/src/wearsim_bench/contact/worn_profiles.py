@@ -1,4 +1,4 @@
-"""One contact model on one number of strips: its errors over a group of cases, and its time."""
+"""Errors and time of one contact model with one number of strips over a group of cases."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from wearsim_bench.exact_solutions import POWER_ERRORS
 from wearsim_bench.measure.measurement import Measurement
 from wearsim_bench.measure.timing import timed
 
-_LESS = 0.99  # of the load, under which a warm start was solved
-_SAME_LOADS = 1e-5  # L2 of the line loads, within which a warm start must come to the cold one's
-#: of the power: in pure spin loads that differ by 1e-8 are seen to change it by 1e-4
+_WARM_LOAD = 0.99  # load of the warm start, relative to that of the case
+_SAME_LOADS = 1e-5  # L2 difference allowed between line loads of warm and cold starts
+#: allowed difference of power: in pure spin, line loads that differ by 1e-8 change it by 1e-4
 _SAME_POWER = POWER_ERRORS[0]
-_TABLES = (influence_table, curvature_table)  # which a process makes once for a number of strips
+_TABLES = (influence_table, curvature_table)  # cached tables for a number of strips
 
 
 @dataclass(frozen=True)
 class _Solved:
-    """A case that has an answer: how to have it again, from nothing and from one nearby."""
+    """A solved case: functions for cold and warm starts, errors, and preparation time."""
 
     cold: Callable[[], ContactSolution]
     warm: Callable[[], ContactSolution] | None
@@ -44,40 +44,43 @@ def measure(
     group : str
         Name of the group.
     cases : sequence of Case
+        The contacts.
     method : Method
+        The contact model.
     strips : int
+        Number of strips.
     repetitions : int
-        Of every solve; the least time counts.
+        Repetitions of every solve; the smallest time is used.
 
     Returns
     -------
     Measurement
-        Without times and errors if one of the cases has no answer: the others may be easier.
+        Without times and errors if a case fails, since the other cases may be easier.
     """
-    solved, refused = [], []
-    for known in _TABLES:
-        known.cache_clear()
+    solved, failures = [], []
+    for table in _TABLES:
+        table.cache_clear()
     for case in cases:
         try:
             solved.append(_solve(case, method, strips))
-        except Exception as error:  # a mistake of a plugin is told, and stops nothing
-            refused.append(f"{case.name}: {why(error)}")
+        except Exception as error:  # a faulty plugin must not stop the benchmark
+            failures.append(f"{case.name}: {failure_reason(error)}")
     setting = method.setting(strips)
-    if refused:
-        told = refused[0]
+    if failures:
+        reason = failures[0]
         if len(cases) > 1:
-            told = f"no answer to {len(refused)} of {len(cases)}; {told}"
-        return Measurement(group, method.name, setting, failed=told)
+            reason = f"{len(failures)} of {len(cases)} fail; {reason}"
+        return Measurement(group, method.name, setting, failed=reason)
     counts = {"prepare_seconds": solved[0].preparing}
     warm = [item.warm for item in solved if item.warm is not None]
     if warm:
         counts["warm_seconds"] = _mean_of_least(warm, repetitions)
     seconds = _mean_of_least([item.cold for item in solved], repetitions)
-    return Measurement(group, method.name, setting).found(seconds, _summed(solved), counts)
+    return Measurement(group, method.name, setting).with_results(seconds, _summed(solved), counts)
 
 
-def why(error: Exception) -> str:
-    """Return in a line why there is no answer; what is no error of wearsim's is a mistake."""
+def failure_reason(error: Exception) -> str:
+    """Return an error in one line; errors other than WearsimError with their type."""
     line = (str(error).strip().splitlines() or [""])[0]
     if isinstance(error, WearsimError):
         return line.split(";", maxsplit=1)[0]
@@ -95,19 +98,23 @@ def _solve(case: Case, method: Method, strips: int) -> _Solved:
 
     solution = solve()
     errors = errors_of(solution, grid, case)
-    less = model.solve(gap, curvature, replace(point, normal_force=_LESS * point.normal_force))
-    started = solve(less)
+    nearby = model.solve(
+        gap, curvature, replace(point, normal_force=_WARM_LOAD * point.normal_force)
+    )
+    started = solve(nearby)
     used = started.iterations != solution.iterations or started.power != solution.power
     power = abs(started.power / solution.power - 1.0)
     loads = l2(started.line_load, solution.line_load)
-    if not (power <= _SAME_POWER and loads <= _SAME_LOADS):  # nor if it is no number
-        told = f"by {power:.1e} in power, {loads:.1e} in line loads"
-        raise ContactError(f"warm-started it comes to something else {told}", {"warm": started})
-    return _Solved(solve, (lambda: solve(less)) if used else None, errors, preparing)
+    if not (power <= _SAME_POWER and loads <= _SAME_LOADS):  # also if NaN
+        raise ContactError(
+            f"the warm start changes the power by {power:.1e}, the line loads by {loads:.1e}",
+            {"warm": started},
+        )
+    return _Solved(solve, (lambda: solve(nearby)) if used else None, errors, preparing)
 
 
 def _mean_of_least(functions: Sequence[Callable[[], object]], repetitions: int) -> float:
-    """Return the mean of the least times [s], in rounds: a disturbance then spoils one of each."""
+    """Return the mean of the smallest times [s] of several functions, timed in rounds."""
     rounds = [[timed(function) for function in functions] for _ in range(repetitions)]
     return float(np.min(rounds, axis=0).mean())
 

@@ -1,1 +1,1 @@
-"""Figures and tables of the benchmarks."""
+"""Figures and tables of benchmarks."""

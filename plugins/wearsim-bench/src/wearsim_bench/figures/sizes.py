@@ -1,4 +1,4 @@
-"""Figures of what grows with a study, and of what a problem is spared."""
+"""Figures of time and memory against the size of a study, and of savings."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from wearsim.report.parts.style import BLUE, GREEN, ORANGE, figure_style, name_a
 from wearsim_bench.measure.measurement import Measurement, Topic
 
 _NUMBER = re.compile(r"\d[\d.]*(?:e[+-]?\d+)?")
-_ACROSS, _PANEL = 3, (4.2, 3.4)  # panels side by side, and the size of one [in]
+_ACROSS, _PANEL = 3, (4.2, 3.4)  # panels per row, and their size [in]
 _BAR, _WIDTH = 0.22, 12.0  # in
 
 
 def growth_figure(topic: Topic, under: str) -> Figure:
-    """Return how time and memory grow, a panel for each group.
+    """Return a figure of time and memory, with a panel for each group.
 
     Parameters
     ----------
     topic : Topic
-        Whose settings hold a number each, and whose counts tell `peak_bytes`.
+        Topic with one number in each setting, and with the count `peak_bytes`.
     under : str
-        What stands under the title.
+        Text under the title.
     """
     down = ceil(len(topic.groups) / _ACROSS)
     with figure_style():
@@ -42,7 +42,7 @@ def growth_figure(topic: Topic, under: str) -> Figure:
 
 
 def _draw_growth(axes: Axes, items: list[Measurement], group: str) -> None:
-    """Draw time and memory against what grows, for each method."""
+    """Draw time and memory against size, for each method."""
     methods = list(dict.fromkeys(item.method for item in items))
     for method, marker in zip(methods, cycle("osD^v"), strict=False):
         timed = [item for item in items if item.method == method and item.seconds is not None]
@@ -61,19 +61,19 @@ def _draw_growth(axes: Axes, items: list[Measurement], group: str) -> None:
 
 def _size(item: Measurement) -> float:
     """Return the number in a setting, "641 strips" or "n = 100"."""
-    found = _NUMBER.search(item.setting)
-    return float(found[0]) if found else float("nan")
+    match = _NUMBER.search(item.setting)
+    return float(match[0]) if match else float("nan")
 
 
 def savings_figure(topic: Topic, under: str) -> Figure:
-    """Return how many times as fast every saving is, a bar for each.
+    """Return a bar chart of the speed-up of every saving.
 
     Parameters
     ----------
     topic : Topic
-        Whose counts tell `times`.
+        Topic with the count `times`.
     under : str
-        What stands under the title.
+        Text under the title.
     """
     items = [item for item in topic.measurements if "times" in item.counts]
     names = [f"{item.group}: {item.method}, {item.setting}" for item in items]

@@ -1,4 +1,4 @@
-"""What a benchmark measured, as rows of text: for the shell and for Markdown."""
+"""Tables of measurements for the terminal and for Markdown."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ from wearsim_bench.measure.machine import Machine
 from wearsim_bench.measure.measurement import Effort, Measurement, Topic
 
 FRONT, DEFAULT = "*", "default"
-MARKS = f"{FRONT} none is better in time and error both; {DEFAULT}: what a scenario gets"
-FEW = 12  # measurements of a group that are all shown
+MARKS = f"{FRONT} Pareto front of time and error; {DEFAULT}: default of a scenario"
+FEW = 12  # groups of up to this many measurements are shown in full
 _ROUNDING = 1e-10
 
 
 @dataclass(frozen=True)
-class Line:
-    """One line of a table.
+class TableRow:
+    """One row of a table.
 
     Parameters
     ----------
     cells : tuple of str
-        A text for each of `heads`.
+        One text for each of `column_heads`.
     front, default : bool
-        Whether none beats it, and whether it is what a scenario gets that asks for nothing.
+        Whether it is on the Pareto front, and whether it is the default of a scenario.
     failed : bool
-        Whether the last cell tells why there is no answer.
+        Whether the last cell holds the reason of a failure.
     """
 
     cells: tuple[str, ...]
@@ -36,36 +36,40 @@ class Line:
 
 
 def has_front(topic: Topic) -> bool:
-    """Return whether a topic sets methods against each other, not sizes or ways of one."""
+    """Return whether a topic compares methods, rather than sizes or alternatives of one method."""
     return not {"times", "peak_bytes"} & set(topic.counts)
 
 
-def heads(topic: Topic) -> list[str]:
-    """Return the heads of a topic's columns."""
+def column_heads(topic: Topic) -> list[str]:
+    """Return the column heads of a topic."""
     costs = [topic.seconds, "in yardsticks"]
-    return ["what", "setting", *costs, *topic.errors.values(), *topic.counts.values(), ""]
+    return ["method", "setting", *costs, *topic.errors.values(), *topic.counts.values(), ""]
 
 
-def lines(topic: Topic, group: str, yardstick: float, *, whole: bool = False) -> list[Line]:
-    """Return the lines of one group of problems.
+def table_rows(
+    topic: Topic, group: str, yardstick: float, *, whole: bool = False
+) -> list[TableRow]:
+    """Return the rows of one group of problems.
 
     Parameters
     ----------
     topic : Topic
+        The topic.
     group : str
+        The group.
     yardstick : float
-        The machine's [s].
+        Reference time of the machine [s].
     whole : bool
-        All that was measured; otherwise those that none beats, the default, and of every other
-        method the setting that comes nearest.
+        Return all measurements; otherwise the Pareto front, the default, and the most accurate
+        setting of every other method.
     """
     front = {id(item) for item in topic.front(group)} if has_front(topic) else set()
-    items = topic.of(group) if whole else chosen(topic, group)
-    return [_line(topic, item, yardstick, id(item) in front) for item in items]
+    items = topic.of(group) if whole else selected(topic, group)
+    return [_row(topic, item, yardstick, id(item) in front) for item in items]
 
 
-def chosen(topic: Topic, group: str) -> list[Measurement]:
-    """Return what is worth a line: front, default, and the nearest setting of every method."""
+def selected(topic: Topic, group: str) -> list[Measurement]:
+    """Return the Pareto front, the default, and the best setting of every other method."""
     items, kept = topic.of(group), {id(item) for item in topic.front(group)}
     if len(items) <= FEW or not has_front(topic):
         return items
@@ -76,18 +80,19 @@ def chosen(topic: Topic, group: str) -> list[Measurement]:
     return [item for item in items if id(item) in kept or item.default]
 
 
-def _line(topic: Topic, item: Measurement, yardstick: float, front: bool) -> Line:
+def _row(topic: Topic, item: Measurement, yardstick: float, front: bool) -> TableRow:
     marks = " ".join([FRONT] * front + [DEFAULT] * item.default)
     if item.failed:
         empty = (NOTHING,) * (1 + len(topic.errors) + len(topic.counts))
         cells = (item.method, item.setting, NOTHING, *empty, item.failed)
-        return Line(cells, front, item.default, failed=True)
+        return TableRow(cells, front, item.default, failed=True)
     time = NOTHING if item.seconds is None else brief(item.seconds)
-    lengths = NOTHING if item.seconds is None else f"{item.seconds / yardstick:.3g}"
+    ratio = NOTHING if item.seconds is None else f"{item.seconds / yardstick:.3g}"
     errors = [percent(item.errors.get(name)) for name in topic.errors]
-    counts = [counted(name, item.counts.get(name)) for name in topic.counts]
-    told = (item.method, item.setting, time, lengths, *errors, *counts, marks)
-    return Line(told, front, item.default)
+    counts = [count_text(name, item.counts.get(name)) for name in topic.counts]
+    return TableRow(
+        (item.method, item.setting, time, ratio, *errors, *counts, marks), front, item.default
+    )
 
 
 def percent(value: float | None) -> str:
@@ -97,8 +102,8 @@ def percent(value: float | None) -> str:
     return shown(value, "%", 2)
 
 
-def counted(name: str, value: float | None) -> str:
-    """Return a count; where its name ends in seconds or bytes, with a unit."""
+def count_text(name: str, value: float | None) -> str:
+    """Return a count; with a unit if its name ends in seconds or bytes."""
     if value is None:
         return NOTHING
     if name.endswith("seconds"):
@@ -109,38 +114,40 @@ def counted(name: str, value: float | None) -> str:
 
 
 def markdown(topic: Topic, machine: Machine, effort: Effort, *, whole: bool = False) -> str:
-    """Return a topic's tables as Markdown, one for each group.
+    """Return the tables of a topic as Markdown, one for each group.
 
     Parameters
     ----------
     topic : Topic
+        The topic.
     machine : Machine
+        The machine of the measurements.
     effort : Effort
-        What was spent.
+        Number of cases and repetitions.
     whole : bool
-        As of `lines`.
+        Return all measurements, see `table_rows`.
     """
     parts = [f"## {topic.title}", topic.about, measured_on(machine, effort)]
     parts += [f"{MARKS}."] if has_front(topic) else []
     for group in topic.groups:
-        rows = (line.cells for line in lines(topic, group, machine.yardstick, whole=whole))
-        parts += [f"### {group[:1].upper()}{group[1:]}", markdown_table(heads(topic), rows)]
+        rows = (row.cells for row in table_rows(topic, group, machine.yardstick, whole=whole))
+        parts += [f"### {group[:1].upper()}{group[1:]}", markdown_table(column_heads(topic), rows)]
     return "\n\n".join(parts) + "\n"
 
 
 def measured_on(machine: Machine, effort: Effort) -> str:
-    """Return a sentence on the machine, its yardstick, and what was spent."""
+    """Return a sentence on the machine, its yardstick, and the extent of the benchmark."""
     times = "timed once" if effort.repetitions == 1 else f"best of {effort.repetitions}"
     texts = [f"Measured on {machine}; one yardstick is {brief(machine.yardstick)}; {times}"]
-    texts += ["quick: few cases and short tests, which only show what there is"] * effort.quick
+    texts += ["quick: few cases and short tests, for a trial run"] * effort.quick
     texts += [f"contact model {effort.plugin}"] * (effort.plugin is not None)
     return "; ".join(texts) + "."
 
 
 def markdown_table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """Return a Markdown table."""
-    told = [columns, ["---"] * len(columns), *rows]
-    return "\n".join(f"| {' | '.join(map(_escaped, cells))} |" for cells in told)
+    every = [columns, ["---"] * len(columns), *rows]
+    return "\n".join(f"| {' | '.join(map(_escaped, cells))} |" for cells in every)
 
 
 def _escaped(cell: str) -> str:

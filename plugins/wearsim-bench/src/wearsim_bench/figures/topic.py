@@ -1,4 +1,4 @@
-"""The figure of a benchmark: time against error, and the front of those that none beats."""
+"""Figures of time against error with the Pareto front."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
-from wearsim.report.parts.style import GREY, figure_style, name_axes, say
+from wearsim.report.parts.style import GREY, figure_style, name_axes, write_message
 from wearsim_bench.figures.sizes import growth_figure, savings_figure
 from wearsim_bench.figures.table import measured_on
 from wearsim_bench.measure.machine import Machine
 from wearsim_bench.measure.measurement import Effort, Measurement, Topic
 
-ACROSS = 2  # panels side by side
-_LETTERS = 120  # in a line under the title
-_FRONT, _DEFAULT = "none is better", "the default"
+ACROSS = 2  # panels per row
+_LETTERS = 120  # characters per line under the title
+_FRONT, _DEFAULT = "Pareto front", "default"
 _LEGEND = 2.6  # in
 _PANEL = (4.9, 3.9)  # in
 _MARKERS = "osD^vP*X<>ph"
-_LEAST = 1e-8  # an error at which round-off is drawn
+_SMALLEST = 1e-8  # lower bound of the errors drawn
 
 
 def bench_figure(topic: Topic, machine: Machine, effort: Effort) -> Figure:
@@ -32,17 +32,17 @@ def bench_figure(topic: Topic, machine: Machine, effort: Effort) -> Figure:
     Parameters
     ----------
     topic : Topic
+        The topic.
     machine : Machine
-        What it was measured on.
+        The machine of the measurements.
     effort : Effort
-        What was spent.
+        Number of cases and repetitions.
 
     Returns
     -------
     Figure
         A panel for each group of problems: a line for each method, a point for each setting, the
-        front drawn through, the default ringed; or how time and memory grow, or how many times as
-        fast a saving is.
+        Pareto front, a ring around the default; or time and memory against size, or speed-ups.
     """
     under = fill(measured_on(machine, effort), _LETTERS)
     if "peak_bytes" in topic.counts:
@@ -68,7 +68,7 @@ def bench_figure(topic: Topic, machine: Machine, effort: Effort) -> Figure:
 
 def _colours(topic: Topic) -> dict[str, tuple[str, str]]:
     """Return a colour and a marker for every method, the same in all panels."""
-    # the strongest colours go to what is the default somewhere
+    # defaults first, so that they get the strongest colours
     items = sorted(topic.measurements, key=lambda item: not item.default)
     methods = list(dict.fromkeys(item.method for item in items))
     wheel = colormaps["tab20" if len(methods) > 10 else "tab10"].colors  # type: ignore[attr-defined]
@@ -82,26 +82,33 @@ def _draw(axes: Axes, topic: Topic, group: str, colours: dict[str, tuple[str, st
     """Draw one group of problems."""
     items = [i for i in topic.of(group) if i.seconds is not None and topic.error in i.errors]
     if not items:
-        say(axes, group, ["nothing could be measured"])
+        write_message(axes, group, ["no measurements"])
         return
     for method in dict.fromkeys(item.method for item in items):
-        own = [item for item in items if item.method == method]
+        of_method = [item for item in items if item.method == method]
         colour, marker = colours[method]
         axes.plot(
-            *_places(own, topic.error), color=colour, marker=marker, ms=4, lw=0.8, label=method
+            *_coordinates(of_method, topic.error),
+            color=colour,
+            marker=marker,
+            ms=4,
+            lw=0.8,
+            label=method,
         )
-    front = _places(topic.front(group), topic.error)
+    front = _coordinates(topic.front(group), topic.error)
     axes.plot(*front, color="k", lw=2.2, alpha=0.25, zorder=1, label=_FRONT)
     default = [item for item in items if item.default]
     if default:
-        axes.plot(*_places(default, topic.error), "o", ms=11, mfc="none", mec=GREY, label=_DEFAULT)
+        axes.plot(
+            *_coordinates(default, topic.error), "o", ms=11, mfc="none", mec=GREY, label=_DEFAULT
+        )
     axes.set_xscale("log")
     axes.set_yscale("log")
     name_axes(axes, group, f"{topic.seconds} [s]", f"{topic.errors[topic.error]} [%]")
 
 
 def _write_legend(figure: Figure) -> None:
-    """Name all lines once, beside the panels; what all panels share comes last."""
+    """Write one legend next to the panels, with the entries common to all panels last."""
     named: dict[str, Artist] = {}
     for axes in figure.axes:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
@@ -113,7 +120,7 @@ def _write_legend(figure: Figure) -> None:
         figure.legend(named.values(), named.keys(), loc="outside right center", fontsize=8.0)
 
 
-def _places(items: list[Measurement], error: str) -> tuple[list[float], list[float]]:
+def _coordinates(items: list[Measurement], error: str) -> tuple[list[float], list[float]]:
     """Return times [s] and errors [%]."""
     times = [item.seconds for item in items if item.seconds is not None]
-    return times, [100.0 * max(item.errors[error], _LEAST) for item in items]
+    return times, [100.0 * max(item.errors[error], _SMALLEST) for item in items]

@@ -1,1 +1,1 @@
-"""Time and memory against problem size."""
+"""Benchmark of time and memory against the size of a study."""

@@ -1,4 +1,4 @@
-"""What grows in a study, step by step: strips, passes, records, realisations and workers."""
+"""Sizes of studies: strips, passes, records, realisations and workers."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from wearsim.scenario.tables.plain import DEFAULT_RECORDS
 from wearsim.studies.run.assemble import strips_of_run
 from wearsim.studies.run.draws import draw
 from wearsim_bench.contact.methods import DEFAULT_MODEL
-from wearsim_bench.growth.point import Work
+from wearsim_bench.growth.point import Workload
 from wearsim_bench.measure.machine import cores
 from wearsim_bench.measure.measurement import Effort
 from wearsim_bench.sampling.jobs import CHEAP
@@ -23,18 +23,18 @@ REALISATIONS, WORKERS = "realisations", "workers"
 
 @dataclass(frozen=True)
 class Sizes:
-    """How far everything grows.
+    """Sizes of a scaling benchmark.
 
     Parameters
     ----------
     strips, passes, single_passes, records, realisations : tuple of int
-        Rising; `single_passes` where each pass is solved by itself.
+        Increasing; `single_passes` are solved individually.
     tests : int
-        Of an ensemble whose workers grow.
+        Realisations of the ensemble run with different numbers of workers.
     workers : int
-        Of it, at most; no more than there are processors.
+        Largest number of workers, limited by the number of processors.
     true_strips, true_passes : int
-        Of the test whose passes are solved one by one, against which depths are held.
+        Strips and passes of the reference test, whose passes are solved individually.
     """
 
     strips: tuple[int, ...] = (21, 41, 81, 161, 321, 641)
@@ -63,18 +63,20 @@ QUICK = Sizes(
 
 @dataclass(frozen=True)
 class Point:
-    """One size of what grows.
+    """One study of a scaling benchmark.
 
     Parameters
     ----------
     group, method, setting : str
-        As of a `Measurement`.
+        See `Measurement`.
     size : float
+        Number of strips, passes, records, realisations or workers.
     model : str
         Name of the contact model.
-    work : Work
+    work : Workload
+        The study to run.
     default : bool
-        Whether it is what a scenario gets that asks for nothing.
+        Whether this is the default of a scenario.
     """
 
     group: str
@@ -82,18 +84,12 @@ class Point:
     setting: str
     size: float
     model: str
-    work: Work
+    work: Workload
     default: bool = False
 
 
 def points(sizes: Sizes, effort: Effort) -> list[Point]:
-    """Return all points, group by group and rising in each method.
-
-    Parameters
-    ----------
-    sizes : Sizes
-    effort : Effort
-    """
+    """Return all studies, group by group, with increasing size for each method."""
     models = list(dict.fromkeys((DEFAULT_MODEL, effort.plugin or DEFAULT_MODEL)))
     groups = (_strips, _passes, _records, _realisations, _workers)
     return [
@@ -104,21 +100,21 @@ def points(sizes: Sizes, effort: Effort) -> list[Point]:
     ]
 
 
-def truth(sizes: Sizes, model: str) -> Work:
-    """Return the test of the rig whose passes are solved one by one, and leave the same groove."""
+def reference_workload(sizes: Sizes, model: str) -> Workload:
+    """Return the reference test: the same groove, with individually solved passes."""
     single = {"evolution.stepper": "per-pass", "contact.strips": sizes.true_strips}
     return _test(model, {**single, **same_groove(sizes.true_passes)}, 1)
 
 
 def same_groove(passes: int) -> dict[str, object]:
-    """Return the changes by which so many passes wear the rig like its own."""
+    """Return changes of the rig so that this number of passes wears the same groove."""
     scenario = shipped_scenario(RIG)
     law = scenario.wear.build() if scenario.wear is not None else None
     factor = law.depth_per_dissipation("cylinder", scenario.rolling_speed) if law else None
     if factor is None:
         raise ValueError(f"the wear law of {RIG} is not linear")
-    hastened = factor * scenario.rolling_speed * scenario.total_passes / passes
-    return {"operation.passes": passes, "wear.cylinder.k_over_h": f"{hastened!r} 1/Pa"}
+    k_over_h = factor * scenario.rolling_speed * scenario.total_passes / passes
+    return {"operation.passes": passes, "wear.cylinder.k_over_h": f"{k_over_h!r} 1/Pa"}
 
 
 def _strips(sizes: Sizes, model: str, repetitions: int) -> Iterator[Point]:
@@ -153,18 +149,18 @@ def _realisations(sizes: Sizes, model: str, repetitions: int) -> Iterator[Point]
 
 
 def _workers(sizes: Sizes, model: str, repetitions: int) -> Iterator[Point]:
-    there = min(cores(), sizes.workers)
-    doubling: Sequence[int] = [2**k for k in range(there.bit_length())]
-    for count in sorted({*doubling, there}):
+    most = min(cores(), sizes.workers)
+    doubling: Sequence[int] = [2**k for k in range(most.bit_length())]
+    for count in sorted({*doubling, most}):
         work = _ensemble(model, sizes.tests, count, repetitions)
-        chosen = count == there and model == DEFAULT_MODEL
-        told = f"{count} worker" if count == 1 else f"{count} workers"
-        yield Point(WORKERS, model, told, count, model, work, chosen)
+        chosen = count == most and model == DEFAULT_MODEL
+        setting = f"{count} worker" if count == 1 else f"{count} workers"
+        yield Point(WORKERS, model, setting, count, model, work, chosen)
 
 
-def _test(model: str, changes: Mapping[str, object], repetitions: int) -> Work:
-    return Work(RIG, {"contact.model": model, **changes}, repetitions=repetitions)
+def _test(model: str, changes: Mapping[str, object], repetitions: int) -> Workload:
+    return Workload(RIG, {"contact.model": model, **changes}, repetitions=repetitions)
 
 
-def _ensemble(model: str, count: int, workers: int, repetitions: int) -> Work:
-    return Work(SCATTERED, {**CHEAP, "contact.model": model}, count, workers, repetitions)
+def _ensemble(model: str, count: int, workers: int, repetitions: int) -> Workload:
+    return Workload(SCATTERED, {**CHEAP, "contact.model": model}, count, workers, repetitions)

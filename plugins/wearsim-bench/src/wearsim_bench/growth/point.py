@@ -1,8 +1,8 @@
-"""One point of the growth of costs, in a process of its own, whose peak of memory is then its own.
+"""One study of a scaling benchmark, run in a separate process to measure its peak memory.
 
-``python -m wearsim_bench.growth.point WORK FILE`` takes a `Work` as JSON and writes a `Cost` as
-JSON to a file, since a plugin may print what it likes. A short test goes before, which is not
-counted, so that nothing is compiled or loaded while time runs.
+``python -m wearsim_bench.growth.point WORKLOAD FILE`` takes a `Workload` as JSON and writes a
+`Cost` as JSON to a file, since plugins may write to stdout. An untimed short test is run first, so
+that compilation and imports are not timed.
 """
 
 from __future__ import annotations
@@ -26,26 +26,26 @@ from wearsim.studies.run.run import run
 from wearsim_bench.measure.memory import family_peak_bytes, peak_bytes
 from wearsim_bench.measure.timing import timed
 
-LONG = 1.0  # s, from which on it is timed once
-SHORT = 100  # passes of the test that goes before
+LONG = 1.0  # s, longer studies are timed once
+SHORT = 100  # passes of the untimed test
 
 
 @dataclass(frozen=True)
-class Work:
-    """What a point does: a wear test, or an ensemble of them.
+class Workload:
+    """A wear test or an ensemble of wear tests.
 
     Parameters
     ----------
     scenario : str
-        Name of a shipped one.
+        Name of a shipped scenario.
     changes : dict of str to object
-        Values by dotted key.
+        Changed values by dotted key.
     realisations : int, optional
-        Tests of an ensemble; without it there is one test.
+        Realisations of an ensemble; None for a single test.
     workers : int
-        Processes that an ensemble's tests run in.
+        Worker processes of an ensemble.
     repetitions : int
-        Of the timing, unless it takes long; the least counts.
+        Repetitions of the timing of short studies; the smallest time is used.
     """
 
     scenario: str
@@ -54,30 +54,30 @@ class Work:
     workers: int = 1
     repetitions: int = 1
 
-    def asked(self, changes: Mapping[str, object] | None = None) -> Scenario:
+    def scenario_with(self, changes: Mapping[str, object] | None = None) -> Scenario:
         """Return the scenario with further changes."""
         return shipped_scenario(self.scenario, {**self.changes, **(changes or {})})
 
 
 @dataclass(frozen=True)
 class Cost:
-    """What a point has taken, and what came of it.
+    """Time, memory and result of a study.
 
     Parameters
     ----------
     seconds : float
-        Least time [s].
+        Smallest time [s].
     peak_bytes, added_bytes : int or None
-        Most memory of all its processes, and how much of that is more than one of them holds with
-        nothing but its modules; None where the system does not tell.
+        Peak memory of all processes, and the part above that of one process after its imports;
+        None if not available.
     file_bytes : int
-        Of the results.
+        Size of the results file.
     depth : float
-        At the end; of an ensemble its mean [m].
+        Final depth; for an ensemble the mean [m].
     stated : float
-        Its error as the results state it, relative; of an ensemble the mean over its tests.
+        Relative error estimate of the results; for an ensemble the mean over its tests.
     half_width : float or None
-        Half of the 95 % interval of an ensemble's mean depth, relative.
+        Relative half-width of the 95 % confidence interval of the mean depth.
     """
 
     seconds: float
@@ -89,90 +89,85 @@ class Cost:
     half_width: float | None = None
 
 
-class _Point:
-    """A point: it does its work again and again, and keeps the most memory that is seen."""
+class _WorkloadRunner:
+    """Repeated run of a workload, with the peak memory."""
 
-    def __init__(self, work: Work, folder: Path) -> None:
+    def __init__(self, work: Workload, folder: Path) -> None:
         self.work, self.path = work, folder / "results.h5"
         self.peak = 0
-        self.answer: dict[str, float] = {}
+        self.result: dict[str, float] = {}
 
-    def look(self, *_: object) -> None:
-        """See how much memory there is by now."""
+    def update_peak(self, *_: object) -> None:
+        """Update the peak memory."""
         self.peak = max(self.peak, family_peak_bytes(self.work.workers) or 0)
 
     def warm(self) -> None:
-        """Do a short part of the work, so that all is compiled and loaded."""
-        short = {"operation.passes": min(SHORT, self.work.asked().total_passes)}
-        scenario = self.work.asked({**short, "outputs.records": 1})
+        """Run a short part of the workload, for compilation and imports."""
+        short = {"operation.passes": min(SHORT, self.work.scenario_with().total_passes)}
+        scenario = self.work.scenario_with({**short, "outputs.records": 1})
         if self.work.realisations is None:
             run(scenario, self.path, force=True)
         else:
             ensemble(scenario, 2, self.path, force=True, scheduler="serial")
 
     def once(self) -> None:
-        """Do the work."""
+        """Run the workload once."""
         (self._test if self.work.realisations is None else self._ensemble)()
 
     def _test(self) -> None:
-        result = run(self.work.asked(), self.path, force=True)
+        result = run(self.work.scenario_with(), self.path, force=True)
         depth = float(result.depth[-1].max())
-        self.answer = {"depth": depth, "stated": float(result.depth_error[-1].max()) / depth}
+        self.result = {"depth": depth, "stated": float(result.depth_error[-1].max()) / depth}
 
     def _ensemble(self) -> None:
         several = self.work.workers > 1
-        found = ensemble(
-            self.work.asked(),
+        results = ensemble(
+            self.work.scenario_with(),
             self.work.realisations or 1,
             self.path,
             force=True,
             workers=self.work.workers,
-            on_progress=self.look if several else None,
+            on_progress=self.update_peak if several else None,
         )
-        mean = found.estimate("depth").mean
-        stated = float(np.mean(found.values("depth_error") / found.at_end("depth")))
-        self.answer = {"depth": mean.value, "stated": stated}
+        mean = results.estimate("depth").mean
+        stated = float(np.mean(results.values("depth_error") / results.at_end("depth")))
+        self.result = {"depth": mean.value, "stated": stated}
         if np.isfinite(mean.half_width):
-            self.answer["half_width"] = mean.half_width / mean.value
+            self.result["half_width"] = mean.half_width / mean.value
 
 
-def cost_of(work: Work) -> Cost:
-    """Return what some work takes in this process, which has done nothing before.
-
-    Parameters
-    ----------
-    work : Work
-    """
+def cost_of(work: Workload) -> Cost:
+    """Return the cost of a workload in this process, which must be a new one."""
     bare = peak_bytes()
     with TemporaryDirectory() as folder:
-        point = _Point(work, Path(folder))
-        point.warm()
-        seconds = timed(point.once)
-        point.look()
+        runner = _WorkloadRunner(work, Path(folder))
+        runner.warm()
+        seconds = timed(runner.once)
+        runner.update_peak()
         if seconds < LONG:
-            seconds = min([seconds, *(timed(point.once) for _ in range(work.repetitions - 1))])
-        size = point.path.stat().st_size
+            seconds = min([seconds, *(timed(runner.once) for _ in range(work.repetitions - 1))])
+        size = runner.path.stat().st_size
     known = bare is not None
     return Cost(
         seconds=seconds,
-        peak_bytes=point.peak if known else None,
-        added_bytes=point.peak - bare if bare is not None else None,
+        peak_bytes=runner.peak if known else None,
+        added_bytes=runner.peak - bare if bare is not None else None,
         file_bytes=size,
-        depth=point.answer["depth"],
-        stated=point.answer["stated"],
-        half_width=point.answer.get("half_width"),
+        depth=runner.result["depth"],
+        stated=runner.result["stated"],
+        half_width=runner.result.get("half_width"),
     )
 
 
 def main(arguments: list[str], write: Callable[[str], Any]) -> None:
-    """Do the work that is given as JSON, and write what it takes, or why it cannot be done."""
+    """Run the workload given as JSON, and write its cost or the reason of its failure."""
     try:
-        told = asdict(cost_of(Work(**json.loads(arguments[0]))))
+        cost = asdict(cost_of(Workload(**json.loads(arguments[0]))))
     except WearsimError as error:
-        told = {"failed": str(error).splitlines()[0]}
+        cost = {"failed": str(error).splitlines()[0]}
     except Exception as error:
-        told = {"failed": f"raised {type(error).__name__}: {error}".splitlines()[0]}
-    write(json.dumps(told))
+        cost = {"failed": f"raised {type(error).__name__}: {error}".splitlines()[0]}
+    write(json.dumps(cost))
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""How time and memory grow: with strips, passes, records, realisations and workers."""
+"""Time and memory against strips, passes, records, realisations and workers."""
 
 from __future__ import annotations
 
@@ -14,22 +14,30 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from wearsim.studies.execution.processes import ONE_THREAD
-from wearsim_bench.growth.cases import QUICK, REALISATIONS, WORKERS, Point, Sizes, points, truth
-from wearsim_bench.growth.point import Cost, Work
-from wearsim_bench.measure.machine import cores
-from wearsim_bench.measure.measurement import Effort, Measurement, Tell, Topic
-
-LIMIT = 120.0  # s, that a point may take
-POINT = "wearsim_bench.growth.point"  # what the process of a point runs
-ABOUT = (
-    "Whole studies from a scenario to a file, each in a fresh process, after a short one that does"
-    " not count. Single tests are those of the rig: passes come with a wear factor that leaves the"
-    " same groove, and depths are held against that of every pass solved by itself. Ensembles are"
-    " of cheap tests of all that scatters; their error is half the 95 % interval of the mean."
-    " The order of time is its slope against what grows, on logarithmic scales. Memory is the most"
-    " that all processes of a study hold, pages that they share counted for each of them."
+from wearsim_bench.growth.cases import (
+    QUICK,
+    REALISATIONS,
+    WORKERS,
+    Point,
+    Sizes,
+    points,
+    reference_workload,
 )
-ERRORS = {"depth": "depth", "stated": "depth, as stated"}
+from wearsim_bench.growth.point import Cost, Workload
+from wearsim_bench.measure.machine import cores
+from wearsim_bench.measure.measurement import Effort, Measurement, OnProgress, Topic
+
+LIMIT = 120.0  # s, time limit of a study
+POINT = "wearsim_bench.growth.point"  # module run by the process of a study
+ABOUT = (
+    "Complete studies from a scenario to a file, each in a new process after an untimed short one."
+    " Single tests are those of the rig. The wear factor is scaled with the number of passes so"
+    " that the groove is the same; depths are compared with a test of individually solved passes."
+    " Ensembles consist of short tests with all random inputs; their error is half the 95 %"
+    " confidence interval of the mean. The order of time is its slope against size on logarithmic"
+    " scales. Memory is the sum of the peaks of all processes; shared pages are counted for each."
+)
+ERRORS = {"depth": "depth", "stated": "depth, estimated"}
 COUNTS = {
     "order": "order of time",
     "peak_bytes": "memory",
@@ -38,29 +46,33 @@ COUNTS = {
 }
 
 
-def growth(effort: Effort, tell: Tell) -> Topic:
-    """Measure what studies take as they grow.
+def growth(effort: Effort, on_progress: OnProgress) -> Topic:
+    """Measure time and memory of studies of increasing size.
 
     Parameters
     ----------
     effort : Effort
-    tell : callable
-        Gets what is being measured, and which part is done.
+        Number of cases and repetitions.
+    on_progress : callable
+        Called with a description and the completed fraction.
     """
     sizes = QUICK if effort.quick else Sizes()
-    asked = points(sizes, effort)
-    models = list(dict.fromkeys(point.model for point in asked))
-    works = [*(truth(sizes, model) for model in models), *(point.work for point in asked)]
-    told = [*("every pass by itself" for _ in models), *(f"{p.group}: {p.setting}" for p in asked)]
-    found: list[Cost | str] = []
-    # what is only to show what there is need not have the machine for itself
+    studies = points(sizes, effort)
+    models = list(dict.fromkeys(point.model for point in studies))
+    works = [
+        *(reference_workload(sizes, model) for model in models),
+        *(point.work for point in studies),
+    ]
+    names = [*("reference" for _ in models), *(f"{p.group}: {p.setting}" for p in studies)]
+    costs: list[Cost | str] = []
+    # timings of a quick benchmark may disturb each other
     with ThreadPoolExecutor(cores() if effort.quick else 1) as pool:
-        for words, cost in zip(told, pool.map(measured, works), strict=True):
-            found.append(cost)
-            tell(words, len(found) / len(works))
-    true = {
+        for name, cost in zip(names, pool.map(measured, works), strict=True):
+            costs.append(cost)
+            on_progress(name, len(costs) / len(works))
+    depths = {
         model: cost.depth
-        for model, cost in zip(models, found, strict=False)
+        for model, cost in zip(models, costs, strict=False)
         if isinstance(cost, Cost)
     }
     return Topic(
@@ -71,86 +83,82 @@ def growth(effort: Effort, tell: Tell) -> Topic:
         error="depth",
         errors=ERRORS,
         counts=COUNTS,
-        measurements=tuple(measurements(asked, found[len(models) :], true)),
+        measurements=tuple(measurements(studies, costs[len(models) :], depths)),
     )
 
 
-def measured(work: Work) -> Cost | str:
-    """Return what work takes in a process of its own, or why it cannot be done.
-
-    Parameters
-    ----------
-    work : Work
-    """
+def measured(work: Workload) -> Cost | str:
+    """Return the cost of a workload in a separate process, or the reason of its failure."""
     path = os.pathsep.join(part for part in sys.path if part)
     environment = {**os.environ, **ONE_THREAD, "PYTHONPATH": path}
     with TemporaryDirectory() as folder:
-        answer = Path(folder) / "cost.json"
-        command = [sys.executable, "-m", POINT, json.dumps(asdict(work)), str(answer)]
+        output = Path(folder) / "cost.json"
+        command = [sys.executable, "-m", POINT, json.dumps(asdict(work)), str(output)]
         try:
             done = subprocess.run(
                 command, env=environment, capture_output=True, text=True, timeout=LIMIT, check=False
             )
         except subprocess.TimeoutExpired:
             return f"took longer than {LIMIT:g} s"
-        last = (done.stderr.strip().splitlines() or ["nothing was said"])[-1]
+        last = (done.stderr.strip().splitlines() or ["no message"])[-1]
         if done.returncode:
             return f"ended with exit code {done.returncode}: {last}"
         try:
-            told = json.loads(answer.read_text(encoding="utf-8"))
-            return str(told["failed"]) if "failed" in told else Cost(**told)
+            cost = json.loads(output.read_text(encoding="utf-8"))
+            return str(cost["failed"]) if "failed" in cost else Cost(**cost)
         except (OSError, ValueError, TypeError) as error:
-            return f"ended without an answer ({type(error).__name__}): {last}"
+            return f"ended without a result ({type(error).__name__}): {last}"
 
 
 def measurements(
-    asked: Sequence[Point], found: Sequence[Cost | str], true: Mapping[str, float]
+    studies: Sequence[Point], costs: Sequence[Cost | str], depths: Mapping[str, float]
 ) -> list[Measurement]:
-    """Return what was measured, with the order of growth between neighbours.
+    """Return the measurements, with the order of time between neighbouring sizes.
 
     Parameters
     ----------
-    asked : sequence of Point
-        The sizes of each method rising.
-    found : sequence of Cost or str
-        What each takes, or why it cannot be done.
-    true : mapping of str to float
-        Depth that every pass solved by itself leaves, by contact model, where it is known [m].
+    studies : sequence of Point
+        Studies with increasing size for each method.
+    costs : sequence of Cost or str
+        Their costs, or reasons of failure.
+    depths : mapping of str to float
+        Depth of the reference test by contact model, where it is known [m].
     """
     rows: list[Measurement] = []
     before: dict[tuple[str, str], tuple[float, float]] = {}
-    for point, cost in zip(asked, found, strict=True):
+    for point, cost in zip(studies, costs, strict=True):
         row = Measurement(point.group, point.method, point.setting, default=point.default)
         if isinstance(cost, str):
             rows.append(replace(row, failed=cost))
             continue
-        sizes = ("peak_bytes", "added_bytes", "file_bytes")
-        told = {name: getattr(cost, name) for name in sizes}
-        counts = {name: float(value) for name, value in told.items() if value is not None}
+        sizes = {name: getattr(cost, name) for name in ("peak_bytes", "added_bytes", "file_bytes")}
+        counts = {name: float(value) for name, value in sizes.items() if value is not None}
         line = point.group, point.method
         if line in before:
             size, seconds = before[line]
             counts["order"] = math.log(cost.seconds / seconds) / math.log(point.size / size)
         before[line] = point.size, cost.seconds
-        errors = errors_of(point, cost, true.get(point.model))
-        rows.append(row.found(cost.seconds, errors, counts))
+        errors = errors_of(point, cost, depths.get(point.model))
+        rows.append(row.with_results(cost.seconds, errors, counts))
     return rows
 
 
-def errors_of(point: Point, cost: Cost, true: float | None) -> dict[str, float]:
-    """Return the errors of one point's depth, as far as they are known.
+def errors_of(point: Point, cost: Cost, reference: float | None) -> dict[str, float]:
+    """Return the known errors of the depth of one study.
 
     Parameters
     ----------
     point : Point
+        The study.
     cost : Cost
-    true : float, optional
-        Depth of a single test [m].
+        Its cost and results.
+    reference : float, optional
+        Depth of the reference test [m], for single tests.
     """
     errors = {"stated": cost.stated}
     if point.group in {REALISATIONS, WORKERS}:
         if cost.half_width is not None:
             errors["depth"] = cost.half_width
-    elif true is not None:
-        errors["depth"] = abs(cost.depth / true - 1.0)
+    elif reference is not None:
+        errors["depth"] = abs(cost.depth / reference - 1.0)
     return errors

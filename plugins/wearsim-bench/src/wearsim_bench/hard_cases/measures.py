@@ -1,4 +1,4 @@
-"""What hard cases are measured by: balances, smoothness, symmetry, and convergence."""
+"""Measures for hard cases: balances, smoothness, symmetry and convergence."""
 
 from __future__ import annotations
 
@@ -15,30 +15,25 @@ from wearsim.studies.run.draws import draw
 from wearsim.types import FloatArray
 
 PROFILES = ("cylinder_depth_profile", "roller_depth_profile")
-_ENOUGH = 20  # strips in contact, whose parabola has second differences of 2 %
-_NOTHING = 1e-12  # relative: round-off
+_MIN_STRIPS = 20  # strips in contact, for which a parabola has second differences of 2 %
+_ROUND_OFF = 1e-12  # relative
 
 
 def is_finite(result: Result) -> bool:
-    """Return whether every number that a run has kept is finite, and no depth below zero."""
+    """Return whether all results of a run are finite and no depth is negative."""
     raw = result.raw
     arrays = [*raw.history.values(), *raw.records.values()]
-    worn = all((raw.records[name] >= 0.0).all() for name in PROFILES)
-    return worn and all(np.isfinite(array).all() for array in arrays)
+    non_negative = all((raw.records[name] >= 0.0).all() for name in PROFILES)
+    return non_negative and all(np.isfinite(array).all() for array in arrays)
 
 
 def volume_balance(result: Result, scenario: Scenario) -> float | None:
-    """Return the greatest |V - (K/H) E| of the cylinder or the rollers, over V at the end.
-
-    Parameters
-    ----------
-    result : Result
-    scenario : Scenario
+    """Return the largest |V - (K/H) E| of cylinder or rollers, relative to the final V.
 
     Returns
     -------
     float, optional
-        None where wear is no multiple of dissipation, 0 where nothing wears.
+        None if wear is not proportional to dissipation, 0 without wear.
     """
     history, law = result.raw.history, scenario.wear.build() if scenario.wear else None
     on_rollers = np.einsum("r,srn->sn", result.raw.static["multiplicity"], _roller_volume(result))
@@ -47,91 +42,96 @@ def volume_balance(result: Result, scenario: Scenario) -> float | None:
         factor = law.depth_per_dissipation(body, 1.0) if law is not None else None  # type: ignore[arg-type]
         if factor is None:
             return None
-        apart = np.abs(volume - factor * history["dissipated_energy"]).max()
-        worst = max(worst, _over(float(apart), float(volume[-1].max())))
+        difference = np.abs(volume - factor * history["dissipated_energy"]).max()
+        worst = max(worst, _relative(float(difference), float(volume[-1].max())))
     return worst
 
 
 def load_balance(result: Result) -> float:
-    """Return the greatest |sum q dy - N|/N where a record falls on the end of a step."""
+    """Return the largest |sum q dy - N|/N over the records at ends of steps."""
     raw = result.raw
     at = {passes: row for row, passes in enumerate(raw.history["passes"].tolist())}
     carried = raw.records["line_load"].sum(axis=-1).mean(axis=1) * _spacing(result)
     worst = 0.0
     for passes, loads in zip(raw.records["record_passes"].tolist(), carried, strict=True):
         if passes in at:
-            wanted = raw.history["normal_force"][at[passes]]
-            worst = max(worst, float((np.abs(loads - wanted) / wanted).max()))
+            expected = raw.history["normal_force"][at[passes]]
+            worst = max(worst, float((np.abs(loads - expected) / expected).max()))
     return worst
 
 
 def energy_balance(result: Result) -> float:
-    """Return |sum of P_l dy times the time since the last record - E|/E of a run.
+    """Return |sum of P_l dy dt - E|/E of a run, with dt the time since the previous record.
 
-    It is round-off where the records of a run fall on the ends of its half steps, at a load that
-    does not change.
+    It is of the order of round-off if the records are at the ends of half steps and the load is
+    constant.
     """
     raw = result.raw
     power = np.einsum("r,ksrny->k", raw.static["multiplicity"], raw.records["dissipation"])
     stations = raw.records["dissipation"].shape[1]
     time = np.diff(raw.records["record_time"])
     energy = float(raw.history["dissipated_energy"][-1, 0])
-    found = float(power[1:] @ time) * _spacing(result) / stations
-    return _over(abs(found - energy), energy)
+    integral = float(power[1:] @ time) * _spacing(result) / stations
+    return _relative(abs(integral - energy), energy)
 
 
 def work_balance(result: Result, scenario: Scenario) -> float:
-    """Return the greatest |P + V (xi F_x + eta F_y + phi M_z)|/P of the contacts at the end.
+    """Return the largest |P + V (xi F_x + eta F_y + phi M_z)|/P of the final contacts.
 
     Parameters
     ----------
     result : Result
+        Results of a run.
     scenario : Scenario
-        With a creepage that varies over the strips by spin alone.
+        Its scenario; the creepage must vary over the strips by spin only.
     """
-    held = result.raw.checkpoint
+    checkpoint = result.raw.checkpoint
     creepage, speed = scenario.creepage, scenario.rolling_speed
     yaw, tilt = (scenario.per_roller(v) for v in (creepage.yaw, creepage.tilt))
     worst = 0.0
     for number, roller in enumerate(merged_rollers(draw(scenario))[0]):
         spin = tilt[roller] / scenario.roller.radius
-        along = float(held["contact_longitudinal_creepage"][number])
-        forces = [float(held[f"contact_{n}"][number]) for n in ("force_x", "force_y")]
-        moment, power = (float(held[f"contact_{n}"][number]) for n in ("spin_moment", "power"))
+        along = float(checkpoint["contact_longitudinal_creepage"][number])
+        forces = [float(checkpoint[f"contact_{n}"][number]) for n in ("force_x", "force_y")]
+        moment, power = (
+            float(checkpoint[f"contact_{n}"][number]) for n in ("spin_moment", "power")
+        )
         work = -speed * (along * forces[0] + yaw[roller] * forces[1] + spin * moment)
-        worst = max(worst, _over(abs(power - work), power))
+        worst = max(worst, _relative(abs(power - work), power))
     return worst
 
 
 def records_half_steps(result: Result) -> bool:
-    """Return whether the records of a run with forced steps fall on the ends of its half steps."""
+    """Return whether the records of a run with fixed steps are at the ends of half steps."""
     raw = result.raw
-    apart, steps = np.diff(raw.records["record_passes"]), np.diff(raw.history["passes"])
-    return len(apart) == 2 * len(steps) and bool(np.array_equal(apart, np.repeat(0.5 * steps, 2)))
+    intervals, steps = np.diff(raw.records["record_passes"]), np.diff(raw.history["passes"])
+    return len(intervals) == 2 * len(steps) and bool(
+        np.array_equal(intervals, np.repeat(0.5 * steps, 2))
+    )
 
 
-def roughest(result: Result) -> float:
-    """Return the greatest `oscillation` of a line load over all records and contacts.
+def max_oscillation(result: Result) -> float:
+    """Return the largest `oscillation` of the line load over all records and contacts.
 
-    Contacts of few strips are left out: there the honest curvature of q is large.
+    Contacts of few strips are omitted: their second differences are large without oscillation.
     """
     line_load = result.raw.records["line_load"]
     rows = line_load.reshape(-1, line_load.shape[-1])
-    return max((oscillation(row) for row in rows if (row > 0.0).sum() >= _ENOUGH), default=0.0)
+    return max((oscillation(row) for row in rows if (row > 0.0).sum() >= _MIN_STRIPS), default=0.0)
 
 
 def drift(result: Result) -> float:
-    """Return how far a groove's centre is from y = 0 at most, over the groove's width."""
+    """Return the largest distance of the groove's centre from y = 0, relative to its width."""
     y, worn = result.y, result.raw.records["cylinder_depth_profile"][:, 0, 0]
     worst = 0.0
     for row in worn:
-        wide = float(np.ptp(y[row > 0.0])) if (row > 0.0).any() else 0.0
-        worst = max(worst, _over(abs(centroid(y, row)), wide + _spacing(result)))
+        width = float(np.ptp(y[row > 0.0])) if (row > 0.0).any() else 0.0
+        worst = max(worst, _relative(abs(centroid(y, row)), width + _spacing(result)))
     return worst
 
 
 def patches(result: Result) -> tuple[int, ...]:
-    """Return how many patches the first roller's contact has had, one number after another."""
+    """Return the sequence of the number of contact patches of the first roller."""
     loaded = result.raw.records["line_load"][:, 0, 0, 0] > 0.0
     edges = np.diff(loaded.astype(int), axis=1, prepend=0)
     counts = (edges == 1).sum(axis=1).tolist()
@@ -139,24 +139,24 @@ def patches(result: Result) -> tuple[int, ...]:
 
 
 def asymmetry(result: Result, mirrored: Result) -> float:
-    """Return how far a run's last profiles are from those of its mirror image, relative."""
+    """Return the largest relative difference of the final profiles of two mirrored runs."""
     worst = 0.0
     for name in PROFILES:
         one, other = (item.raw.records[name][-1] for item in (result, mirrored))
-        # rollers keep their numbers, only y is turned about
-        worst = max(worst, _over(float(np.abs(one - other[..., ::-1]).max()), float(one.max())))
+        # only y is reversed, not the order of the rollers
+        worst = max(worst, _relative(float(np.abs(one - other[..., ::-1]).max()), float(one.max())))
     return worst
 
 
 def change(coarse: Result, fine: Result) -> float:
-    """Return the part of the worn area that lies elsewhere in a finer run's last profile.
+    """Return the relative L1 difference of the final profile from that of a finer run.
 
-    Where one has a multiple of the other's strips, the means over the wider strips are compared;
-    of the two bodies, the one that wears more counts.
+    If the finer run has a multiple of the strips, means over the wider strips are compared. The
+    body with more wear is used.
     """
     name = max(PROFILES, key=lambda name: float(fine.raw.records[name][-1].max()))
     one, other = (item.raw.records[name][-1] for item in (coarse, fine))
-    return _apart(one, other.reshape(*one.shape, -1).mean(axis=-1))
+    return _relative_difference(one, other.reshape(*one.shape, -1).mean(axis=-1))
 
 
 def changes(runs: Sequence[Result]) -> list[float]:
@@ -165,48 +165,48 @@ def changes(runs: Sequence[Result]) -> list[float]:
 
 
 def changes_of(values: Sequence[FloatArray]) -> list[float]:
-    """Return the L1 difference from each array to the next one, over the norm of the latter."""
-    return [_apart(coarse, fine) for coarse, fine in pairwise(values)]
+    """Return the relative L1 difference of each array from the next one."""
+    return [_relative_difference(coarse, fine) for coarse, fine in pairwise(values)]
 
 
-def moved(first: Result, second: Result) -> float:
-    """Return by how much depth or volume of either body differ between two runs, relative."""
+def observable_change(first: Result, second: Result) -> float:
+    """Return the largest relative difference in depth and volume between two runs."""
     worst = 0.0
     for names in (("depth", "roller_depth"), ("worn_volume", "roller_worn_volume")):
         one, other = (
             max(float(item.raw.history[name][-1].max()) for name in names)
             for item in (first, second)
         )
-        worst = max(worst, _over(abs(one - other), other))
+        worst = max(worst, _relative(abs(one - other), other))
     return worst
 
 
-def promised(result: Result) -> float:
-    """Return the relative error that a run says it may have: its tolerance, or what it warns of."""
+def stated_error(result: Result) -> float:
+    """Return the tolerance of a run, or its error estimate if that is larger."""
     final = result.final
-    told = [greatest(final[f"relative_{name}_error"]) for name in ("depth", "volume")]
-    return max(result.raw.tolerance, *told)
+    estimates = [greatest(final[f"relative_{name}_error"]) for name in ("depth", "volume")]
+    return max(result.raw.tolerance, *estimates)
 
 
 def greatest(value: float | list[float]) -> float:
-    """Return a number, or the greatest of several."""
+    """Return a number, or the largest of several."""
     return max(value) if isinstance(value, list) else value
 
 
 def order(changes: list[float]) -> float | None:
-    """Return the order with which changes fall from one halving to the next.
+    """Return the observed order of convergence.
 
     Parameters
     ----------
     changes : list of float
-        From each run to the next one, twice as fine.
+        Changes from each run to the next one, which is refined by 2.
 
     Returns
     -------
     float, optional
-        The mean over all halvings; None where there are no two changes above round-off.
+        Mean over all refinements; None without two changes above round-off.
     """
-    if len(changes) < 2 or min(changes) < _NOTHING:
+    if len(changes) < 2 or min(changes) < _ROUND_OFF:
         return None
     return float(np.log2(changes[0] / changes[-1])) / (len(changes) - 1)
 
@@ -219,11 +219,11 @@ def _spacing(result: Result) -> float:
     return float(result.raw.checkpoint["spacing"])
 
 
-def _apart(one: FloatArray, other: FloatArray) -> float:
-    """Return the L1 difference of two arrays over the norm of the other."""
-    return _over(float(np.abs(one - other).sum()), float(np.abs(other).sum()))
+def _relative_difference(one: FloatArray, other: FloatArray) -> float:
+    """Return the L1 norm of the difference relative to that of `other`."""
+    return _relative(float(np.abs(one - other).sum()), float(np.abs(other).sum()))
 
 
-def _over(apart: float, size: float) -> float:
-    """Return a relative difference; 0 of 0 is none."""
-    return apart / size if size > 0.0 else (0.0 if apart == 0.0 else float("inf"))
+def _relative(difference: float, size: float) -> float:
+    """Return a relative difference; 0/0 is 0."""
+    return difference / size if size > 0.0 else (0.0 if difference == 0.0 else float("inf"))

@@ -1,4 +1,4 @@
-"""The runs that a hard case is judged by: as it is, finer, and in the mirror."""
+"""Runs of a hard case: unchanged, refined and mirrored."""
 
 from __future__ import annotations
 
@@ -11,30 +11,30 @@ from wearsim.results import Result
 from wearsim.scenario import Drawn, Scenario, parse_scenario
 from wearsim.studies.run.run import run
 from wearsim.types import Profile
-from wearsim_bench.hard_cases.cases import LONG, SHORT, HardCase
+from wearsim_bench.hard_cases.cases import LONG, SHORT, RobustnessCase
 
-TIGHTER = 10.0  # times lower a tolerance, for steps a third as long
+TIGHTER = 10.0  # factor on the tolerance, for steps a third as long
 _MIRRORED = "mirrored.csv"
 
 
 @dataclass(frozen=True)
 class Plan:
-    """How long and how fine the runs of hard cases are.
+    """Length and resolution of the runs of hard cases.
 
     Parameters
     ----------
     passes : int
-        Of a test.
+        Roller passes of a test.
     finer : int
-        Times the coarsest strips on which steps are chosen or forced.
+        Refinement of the coarsest strips for runs with adaptive and fixed steps.
     steps : int
-        That the coarsest forced steps make of a test.
+        Smallest number of fixed steps of a test.
     doublings : int
-        Of the strips.
+        Number of refinements of the strips.
     tighter : bool
-        Whether a run is compared with one of a lower tolerance.
+        Whether a run is compared with one of lower tolerance.
     changes : mapping of str to object
-        What all runs have besides.
+        Changes common to all runs.
     """
 
     passes: int
@@ -46,75 +46,69 @@ class Plan:
 
     @classmethod
     def of(cls, quick: bool, changes: Mapping[str, object]) -> Plan:
-        """Return the plan of a test run, or of the whole."""
+        """Return the plan of a quick or a full evaluation."""
         if quick:
             return cls(SHORT, 1, 5, 2, False, {"evolution.tolerance": 5e-3, **changes})
         return cls(LONG, 2, 10, 3, True, changes)
 
-    def run(self, case: HardCase, **others: object) -> Result:
-        """Run a case with further changes; two underscores stand for the dot of a key."""
+    def run(self, case: RobustnessCase, **others: object) -> Result:
+        """Run a case with further changes; two underscores represent the dot of a key."""
         return run(self.scenario(case, **others))
 
-    def scenario(self, case: HardCase, **others: object) -> Scenario:
-        """Return a case's scenario, see `run`."""
+    def scenario(self, case: RobustnessCase, **others: object) -> Scenario:
+        """Return the scenario of a case, see `run`."""
         changes = dict(self.changes)
         if case.strips and not case.refused:
             changes["contact.strips"] = case.strips * self.finer
         changes |= {key.replace("__", "."): value for key, value in others.items()}
         return case.scenario(self.passes, changes)
 
-    def chosen(self, case: HardCase) -> list[Result]:
-        """Return a case's run with steps of its choice, and one with a lower tolerance if asked."""
+    def adaptive(self, case: RobustnessCase) -> list[Result]:
+        """Run a case with adaptive steps, and again with a lower tolerance if `tighter`."""
         records = {"outputs__records": 20, "outputs__spacing": "log"}
-        found = [self.run(case, **records)]
+        runs = [self.run(case, **records)]
         if self.tighter and case.strips:
-            tolerance = found[0].raw.tolerance / TIGHTER
-            found.append(self.run(case, evolution__tolerance=tolerance, **records))
-        return found
+            tolerance = runs[0].raw.tolerance / TIGHTER
+            runs.append(self.run(case, evolution__tolerance=tolerance, **records))
+        return runs
 
-    def forced(self, case: HardCase) -> list[Result]:
-        """Return a case's runs with equal steps, each half as long as the last.
+    def fixed(self, case: RobustnessCase) -> list[Result]:
+        """Run a case with equal steps, which are halved from run to run.
 
-        They record the ends of their half steps, where these are whole passes.
+        The ends of half steps are recorded if they are whole passes.
         """
         halvings = (0, 1, 2) if case.strips else (0,)
-        found = []
+        runs = []
         for halving in halvings:
             step = self._coarsest_step(case) >> halving
             every = {"outputs__every_passes": max(1, step // 2)}
-            found.append(self.run(case, evolution__step=step, **every))
-        return found
+            runs.append(self.run(case, evolution__step=step, **every))
+        return runs
 
-    def refined(self, case: HardCase) -> list[Result]:
-        """Return a case's runs with equal steps, each on twice as many strips as the last."""
+    def refined(self, case: RobustnessCase) -> list[Result]:
+        """Run a case with equal steps on strips that are doubled from run to run."""
         if not case.strips:
             return []
         step = self._coarsest_step(case)
         counts = [case.strips << doubling for doubling in range(self.doublings + 1)]
         return [self.run(case, evolution__step=step, contact__strips=n) for n in counts]
 
-    def mirrored(self, case: HardCase) -> Result:
-        """Return the run of a case's mirror image, with the coarsest of the forced steps.
+    def mirrored(self, case: RobustnessCase) -> Result:
+        """Run the mirror image of a case with the coarsest fixed steps.
 
-        Steps of a run's choice hang on round-off, and their mirror image on its amplification.
+        Adaptive steps would amplify differences of round-off.
         """
         return run(mirror_image(self.scenario(case, evolution__step=self._coarsest_step(case))))
 
-    def _coarsest_step(self, case: HardCase) -> int:
-        """Return the passes of the coarsest step, which must be halved twice."""
+    def _coarsest_step(self, case: RobustnessCase) -> int:
+        """Return the passes of the coarsest step; at least 4, since it is halved twice."""
         return max(case.passes(self.passes) // (self.steps * case.steps), 4)
 
 
 def mirror_image(scenario: Scenario) -> Scenario:
-    """Return a scenario with y turned about.
+    """Return a scenario mirrored in y; random angles are not supported.
 
-    Offsets, angles, the strips' middle and the profile change sides; yaw and tilt are a lateral
-    creepage and a spin, which a mirror turns about.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Without random angles.
+    Offsets, yaw, tilt, the centre of the strips and the profile are mirrored.
     """
     creepage, choice, files = scenario.creepage, scenario.contact, dict(scenario.files)
     changes: dict[str, object] = {
@@ -135,11 +129,11 @@ def is_symmetric(scenario: Scenario) -> bool:
     """Return whether a scenario is its own mirror image."""
     creepage, profile = scenario.creepage, scenario.cylinder.profile
     numbers = [scenario.roller.offset, creepage.yaw, creepage.tilt, scenario.contact.centre or 0.0]
-    straight = not any(np.any(number) for number in numbers)
+    symmetric = not any(np.any(number) for number in numbers)
     if profile is None:
-        return straight
-    turned = np.array_equal(profile.y, -profile.y[::-1])
-    return straight and turned and np.array_equal(profile.height, profile.height[::-1])
+        return symmetric
+    even_grid = np.array_equal(profile.y, -profile.y[::-1])
+    return symmetric and even_grid and np.array_equal(profile.height, profile.height[::-1])
 
 
 def _negative(value: Drawn, unit: str) -> str | list[str]:

@@ -1,4 +1,4 @@
-"""What is held of a hard case: measured numbers, the bounds they keep, and the verdict."""
+"""Criteria of a hard case with their bounds, and the verdict."""
 
 from __future__ import annotations
 
@@ -6,37 +6,38 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-LEAST_ORDER = 0.4  # a path of a random process lets errors fall no faster than the root of a step
+MIN_ORDER = 0.4  # with a random process, errors decrease as the square root of the step
 
-#: what is measured, in the order of columns, and what it is
-CHECKS: Mapping[str, str] = {
-    "volume": "worn volume less K/H times dissipated energy",
-    "energy": "energy less the sum of P_l dy over strips and half steps",
-    "work": "power less that of the forces on the creepages",
-    "load": "sum of q dy less the load",
-    "oscillation": "second difference of q on the finest strips, over its peak",
-    "drift": "centre of a symmetric groove, over its width",
+#: criteria in the order of columns, with their definitions
+CRITERIA: Mapping[str, str] = {
+    "volume": "worn volume minus K/H times dissipated energy",
+    "energy": "energy minus the sum of P_l dy over strips and half steps",
+    "work": "power minus that of the forces and creepages",
+    "load": "sum of q dy minus the load",
+    "oscillation": "second difference of q on the finest strips, relative to its peak",
+    "drift": "centre of a symmetric groove, relative to its width",
     "tolerance": "change of depth and volume with a tenth of the tolerance",
-    "steps": "change of the profile from halving forced steps",
+    "steps": "change of the profile from halving fixed steps",
     "strips": "change of the profile from doubling strips",
-    "mirror": "profile less that of the mirrored test",
+    "mirror": "profile minus that of the mirrored test",
 }
 
 
 @dataclass(frozen=True)
-class Check:
-    """A relative number that may not be above a bound.
+class Criterion:
+    """A relative error with an upper bound.
 
     Parameters
     ----------
     name : str
-        A key of `CHECKS`.
+        A key of `CRITERIA`.
     value, bound : float
-        What was found, and the most that holds.
+        The error and its upper bound.
     order : float, optional
-        Of convergence, where the value is a change from one refinement to the next.
+        Order of convergence, if the value is a change from one refinement to the next.
     floor : float
-        Change below which the order is noise: the edge of a contact falls anywhere in a strip.
+        Change below which no order is required: the position of a contact edge within a strip is
+        arbitrary.
     """
 
     name: str
@@ -46,65 +47,66 @@ class Check:
     floor: float = 0.0
 
     @property
-    def falls(self) -> bool:
-        """Whether the change falls with refinement, or is too small to tell."""
-        return self.order is None or self.value <= self.floor or self.order >= LEAST_ORDER
+    def converges(self) -> bool:
+        """Whether the change decreases with refinement or is below the floor."""
+        return self.order is None or self.value <= self.floor or self.order >= MIN_ORDER
 
     @property
     def holds(self) -> bool:
-        """Whether the bound is kept; never by a value that is not a number."""
-        return self.value <= self.bound and self.falls
+        """Whether the criterion is met; False for NaN."""
+        return self.value <= self.bound and self.converges
 
     @property
     def failure(self) -> str:
-        """What does not hold, or nothing."""
+        """Description of a failure; empty if the criterion is met."""
         if self.holds:
             return ""
         if self.value <= self.bound:
-            return f"{self.name} {self.value:.1e} does not fall (order {self.order:.1f})"
+            return f"{self.name} {self.value:.1e} does not decrease (order {self.order:.1f})"
         return f"{self.name} {self.value:.1e} > {self.bound:.0e}"
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What became of a hard case.
+    """Outcome of a hard case.
 
     Parameters
     ----------
     case : str
-        Its name.
-    said : str
-        Text of the error it ended with; empty where it ran to its end.
-    trouble : str
-        What went wrong that no number tells: an error where none was expected, or the reverse.
-    checks : tuple of Check
+        Name of the case.
+    error : str
+        Message of the error that ended it; empty if it completed.
+    unexpected : str
+        Unexpected outcome: an error where none is expected, or the reverse.
+    criteria : tuple of Criterion
+        Measured criteria.
     figures : mapping of str to float
-        The end of the test in SI, for those who want to see that it is one.
+        Final results in SI units.
     """
 
     case: str
-    said: str = ""
-    trouble: str = ""
-    checks: tuple[Check, ...] = ()
+    error: str = ""
+    unexpected: str = ""
+    criteria: tuple[Criterion, ...] = ()
     figures: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def failures(self) -> tuple[str, ...]:
-        """Everything that does not hold."""
-        told = (self.trouble, *(check.failure for check in self.checks))
-        return tuple(text for text in told if text)
+        """Descriptions of all failures."""
+        texts = (self.unexpected, *(item.failure for item in self.criteria))
+        return tuple(filter(None, texts))
 
     @property
     def holds(self) -> bool:
-        """Whether the case is as it should be."""
+        """Whether the case passed."""
         return not self.failures
 
-    def check(self, name: str) -> Check | None:
-        """Return a check by name, or None where it does not apply."""
-        return next((check for check in self.checks if check.name == name), None)
+    def criterion(self, name: str) -> Criterion | None:
+        """Return a criterion by name, or None if it does not apply."""
+        return next((item for item in self.criteria if item.name == name), None)
 
     def as_json(self) -> dict[str, Any]:
-        """Return everything as what JSON can hold."""
-        checks = [{**asdict(check), "holds": check.holds} for check in self.checks]
+        """Return the verdict for JSON."""
+        checks = [{**asdict(item), "holds": item.holds} for item in self.criteria]
         words = {"case": self.case, "holds": self.holds, "failures": list(self.failures)}
-        return {**words, "said": self.said, "checks": checks, "figures": dict(self.figures)}
+        return {**words, "said": self.error, "checks": checks, "figures": dict(self.figures)}

@@ -1,1 +1,1 @@
-"""Timings, memory, the machine, and measured points."""
+"""Timings, memory, machine and measurements."""

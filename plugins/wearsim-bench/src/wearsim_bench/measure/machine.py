@@ -1,4 +1,4 @@
-"""What a benchmark ran on: the processor, the libraries, and a yardstick to compare machines by."""
+"""Machine of a benchmark: processor, libraries, and a reference time for comparisons."""
 
 from __future__ import annotations
 
@@ -20,18 +20,20 @@ _SIZE, _SWEEPS = 128, 16
 
 @dataclass(frozen=True)
 class Machine:
-    """A machine, as far as timings depend on it.
+    """Properties of a machine that affect timings.
 
     Parameters
     ----------
     processor : str
+        Name of the processor.
     cores : int
-        As many as this process may use.
+        Number of cores available to this process.
     python : str
+        Version of Python.
     libraries : dict of str to str
-        Versions by name.
+        Versions of the libraries by name.
     yardstick : float
-        Least time of a fixed piece of compiled arithmetic on one core [s].
+        Smallest time of a fixed compiled computation on one core [s].
     """
 
     processor: str
@@ -46,12 +48,12 @@ class Machine:
 
 
 def this_machine(repetitions: int = 5) -> Machine:
-    """Return the machine that this process runs on, its yardstick measured.
+    """Return the machine of this process, with the measured yardstick.
 
     Parameters
     ----------
     repetitions : int
-        Of the yardstick; the least counts.
+        Repetitions of the yardstick; the smallest time is used.
     """
     libraries = {name: version(name) for name in LIBRARIES}
     seconds = yardstick_seconds(repetitions)
@@ -59,33 +61,30 @@ def this_machine(repetitions: int = 5) -> Machine:
 
 
 def cores() -> int:
-    """Return how many processors this process may use."""
+    """Return the number of processors available to this process."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
 def yardstick_seconds(repetitions: int) -> float:
-    """Return the least time of the yardstick [s]: some 0.3 million multiplications and divisions.
-
-    Parameters
-    ----------
-    repetitions : int
-    """
+    """Return the smallest time of the yardstick [s], some 0.3 million multiplications."""
     matrix, vector = np.ones((_SIZE, _SIZE)), np.ones(_SIZE)
     return best_short(lambda: yardstick(matrix, vector, _SWEEPS), repetitions)
 
 
 @kernel
 def yardstick(matrix: FloatArray, vector: FloatArray, sweeps: int) -> float:
-    """Return the norm after some sweeps of x <- M x / |x|: what a contact's kernel is made of.
+    """Return the norm after some sweeps of x <- M x / |x|, an operation typical of contact kernels.
 
     Parameters
     ----------
     matrix : ndarray, shape (n, n)
+        M.
     vector : ndarray, shape (n,)
-        A start, which is overwritten.
+        Initial x, overwritten.
     sweeps : int
+        Number of sweeps.
     """
     n = vector.shape[0]
     held, norm = np.empty(n), 0.0

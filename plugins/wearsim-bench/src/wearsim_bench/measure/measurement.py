@@ -1,4 +1,4 @@
-"""What a benchmark has measured: costs beside errors, and who is beaten by nobody."""
+"""Measured times and errors, and the Pareto front."""
 
 from __future__ import annotations
 
@@ -7,22 +7,22 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
-#: gets what is being measured, and which part of the topic is done, 0 to 1
-Tell = Callable[[str, float], object]
+#: called with a description of the current measurement and the completed fraction of the topic
+OnProgress = Callable[[str, float], object]
 
 
 @dataclass(frozen=True)
 class Effort:
-    """How much to spend.
+    """Extent of a benchmark.
 
     Parameters
     ----------
     quick : bool
-        Few cases, short tests: numbers that only show what there is.
+        Few cases and short tests, for a trial run.
     repetitions : int
-        Of each timing; the least counts.
+        Repetitions of each timing; the smallest time is used.
     plugin : str, optional
-        The one contact model to be measured, beside the default.
+        Contact model to measure in addition to the default; None for all.
     """
 
     quick: bool = False
@@ -32,26 +32,26 @@ class Effort:
 
 @dataclass(frozen=True)
 class Measurement:
-    """One method with one setting, on one group of problems.
+    """Time and errors of one method with one setting on one group of problems.
 
     Parameters
     ----------
     group : str
-        The problems: "partial slip with spin".
+        Group of problems: "partial slip with spin".
     method : str
-        What was measured: "slender, strip". Methods are lines in a figure.
+        Method: "slender, strip"; a line in a figure.
     setting : str
-        How finely: "81 strips"; settings are points on a line.
+        Resolution or tolerance: "81 strips"; a point on a line.
     seconds : float, optional
-        Least time [s]; None where nothing could be timed.
+        Smallest time [s]; None if it was not timed.
     errors : mapping of str to float
-        Relative errors by name, not negative; one that is not known is left out.
+        Relative errors by name, not negative; unknown errors are omitted.
     counts : mapping of str to float
-        What else was counted, by name: solves, bytes.
+        Other numbers by name: solves, bytes.
     default : bool
-        Whether this is what a scenario gets that asks for nothing.
+        Whether this is the default method and setting of a scenario.
     failed : str
-        Why there is no answer, if there is none.
+        Reason of a failure; empty if there is none.
 
     Raises
     ------
@@ -69,23 +69,22 @@ class Measurement:
     failed: str = ""
 
     def __post_init__(self) -> None:
-        """Refuse what would beat all others by being no number, and what JSON cannot hold."""
         time = {} if self.seconds is None else {"time": self.seconds}
         errors = {f"error '{name}'": value for name, value in self.errors.items()}
         counts = {f"count '{name}'": value for name, value in self.counts.items()}
         for name, value in {**time, **errors, **counts}.items():
             if not math.isfinite(value):
-                raise ValueError(f"its {name} is {value}, not finite")
+                raise ValueError(f"the {name} is {value}, not finite")
             if value < 0.0 and name not in counts:
-                raise ValueError(f"its {name} is {value:g}, negative")
+                raise ValueError(f"the {name} is {value:g}, negative")
 
-    def found(
+    def with_results(
         self,
         seconds: float | None,
         errors: Mapping[str, float],
         counts: Mapping[str, float] | None = None,
     ) -> Measurement:
-        """Return it with what was found, or failed where that is not what it should be."""
+        """Return the measurement with results, or as failed if one of them is invalid."""
         try:
             return replace(self, seconds=seconds, errors=errors, counts=counts or {})
         except ValueError as error:
@@ -94,25 +93,26 @@ class Measurement:
 
 @dataclass(frozen=True)
 class Topic:
-    """What was measured of one thing, and how it is to be read.
+    """Measurements of one topic, with titles and column heads.
 
     Parameters
     ----------
     name : str
-        As at the shell: "contact".
+        Name on the command line: "contact".
     title : str
-        What stands above it.
+        Title of figure and tables.
     about : str
-        A sentence or two: what is timed, and what errors are against.
+        Definition of the time and of the errors.
     seconds : str
-        What the time is of: "one contact".
+        The timed operation: "one contact".
     error : str
-        The error against which time is set.
+        Name of the error that is plotted against time.
     errors, counts : mapping of str to str
         Column heads of errors and counts by name, in the order of columns.
     measurements : tuple of Measurement
+        The measurements, group by group.
     floor : float
-        Error of that which `error` is against: who is nearer than it cannot be told to be.
+        Relative error of the reference; smaller errors cannot be distinguished.
     """
 
     name: str
@@ -127,21 +127,21 @@ class Topic:
 
     @property
     def groups(self) -> list[str]:
-        """The groups of problems, in the order they were measured."""
+        """Groups of problems in the order of measurement."""
         return list(dict.fromkeys(item.group for item in self.measurements))
 
     def of(self, group: str) -> list[Measurement]:
-        """Return what was measured on a group of problems."""
+        """Return the measurements of a group of problems."""
         return [item for item in self.measurements if item.group == group]
 
     def front(self, group: str) -> list[Measurement]:
-        """Return those that none beats in time and error both, the quickest first."""
+        """Return the Pareto front of time and error of a group, the fastest first."""
         return pareto(self.of(group), self.error, self.floor)
 
     def as_json(self) -> dict[str, Any]:
-        """Return everything as what JSON can hold, SI; `front` marks those that none beats."""
-        best = {id(item) for group in self.groups for item in self.front(group)}
-        rows = [{**asdict(item), "front": id(item) in best} for item in self.measurements]
+        """Return the topic for JSON, in SI units; `front` marks the Pareto front."""
+        in_front = {id(item) for group in self.groups for item in self.front(group)}
+        rows = [{**asdict(item), "front": id(item) in in_front} for item in self.measurements]
         words = {"title": self.title, "about": self.about, "seconds": self.seconds}
         against = {"error": self.error, "floor": self.floor}
         heads = {"errors": dict(self.errors), "counts": dict(self.counts)}
@@ -149,24 +149,24 @@ class Topic:
 
 
 def pareto(items: Iterable[Measurement], error: str, floor: float = 0.0) -> list[Measurement]:
-    """Return those that none beats in time and error both, the quickest first.
+    """Return the Pareto front of time and error, the fastest first.
 
     Parameters
     ----------
     items : iterable of Measurement
-        Those without a time, or without that error, are left out.
+        Items without a time or without this error are ignored.
     error : str
         Name of the error.
     floor : float
-        Errors below it count as equal to it, so that the quicker of them wins.
+        Smaller errors are treated as equal to it.
     """
 
-    def apart(item: Measurement) -> float:
+    def error_of(item: Measurement) -> float:
         return max(item.errors[error], floor)
 
     known = [item for item in items if item.seconds is not None and error in item.errors]
     front: list[Measurement] = []
-    for item in sorted(known, key=lambda item: (item.seconds, apart(item))):
-        if not front or apart(item) < apart(front[-1]):
+    for item in sorted(known, key=lambda item: (item.seconds, error_of(item))):
+        if not front or error_of(item) < error_of(front[-1]):
             front.append(item)
     return front

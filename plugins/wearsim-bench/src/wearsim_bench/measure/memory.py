@@ -1,4 +1,4 @@
-"""The most memory that processes have held at a time, as their system counts it."""
+"""Peak memory of processes, as reported by the operating system."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ _PROCESSES = Path("/proc")
 
 
 def peak_bytes() -> int | None:
-    """Return the most memory that this process has held at a time, or None where none is told.
+    """Return the peak memory of this process [bytes], or None if it is not available.
 
-    Linux keeps a process's peak in its status. `getrusage` has one as well, but begins with that of
-    the process which started this one; elsewhere there is nothing else.
+    Linux reports it in the status of the process. `getrusage`, used on other systems, starts with
+    the peak of the parent process.
     """
     own = _status_bytes(_PROCESSES / "self" / "status", "VmHWM")
     return own if own is not None else _used(of_children=False)
 
 
 def family_peak_bytes(workers: int) -> int | None:
-    """Return the sum of such peaks over this process and those that it has started.
+    """Return the sum of the peaks of this process and its descendants [bytes].
 
-    Pages that several of them share count once for each.
+    Shared pages are counted for every process.
 
     Parameters
     ----------
     workers : int
-        How many there are; where only the largest of them is told, each counts like it.
+        Number of worker processes; used where only the peak of the largest one is available.
     """
     own = peak_bytes()
     if own is None:
@@ -42,18 +42,18 @@ def _peak_of(process: int) -> int:
 
 
 def _descendants(process: int) -> list[int]:
-    """Return all that a process has started, and what they have started in turn."""
+    """Return the process ids of all descendants."""
     children: dict[int, list[int]] = {}
     for folder in _PROCESSES.iterdir():
         if folder.name.isdecimal():
             parent = _status_number(folder / "status", "PPid")
             children.setdefault(parent or 0, []).append(int(folder.name))
-    found, ahead = list[int](), [process]
-    while ahead:
-        own = children.get(ahead.pop(), [])
-        found += own
-        ahead += own
-    return found
+    descendants, pending = list[int](), [process]
+    while pending:
+        started = children.get(pending.pop(), [])
+        descendants += started
+        pending += started
+    return descendants
 
 
 def _status_bytes(status: Path, name: str) -> int | None:
@@ -62,7 +62,7 @@ def _status_bytes(status: Path, name: str) -> int | None:
 
 
 def _status_number(status: Path, name: str) -> int | None:
-    """Return a number of a process's status, or None where there is none or it has ended."""
+    """Return a number in the status of a process, or None if it has ended."""
     try:
         lines = status.read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:
@@ -74,7 +74,7 @@ def _status_number(status: Path, name: str) -> int | None:
 def _used(*, of_children: bool) -> int | None:
     if sys.platform == "win32":
         return None
-    import resource  # noqa: PLC0415  (Windows has none)
+    import resource  # noqa: PLC0415  (not available on Windows)
 
     whose = resource.RUSAGE_CHILDREN if of_children else resource.RUSAGE_SELF
     peak = resource.getrusage(whose).ru_maxrss

@@ -1,4 +1,4 @@
-"""How long a call takes: the least of several, since other work on a machine only adds."""
+"""Timing of calls: the smallest of several times, since other processes only add to it."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping
 from typing import TypeVar
 
 T = TypeVar("T")
-_LEAST = 0.02  # s, that a timing should last
-_LONG = 1.0  # s, after which a call is not repeated any more
+_SHORTEST = 0.02  # s, minimum duration of a timing
+_LONG = 1.0  # s, total time after which a call is not repeated
 
 
 def timed(function: Callable[[], object]) -> float:
@@ -19,52 +19,54 @@ def timed(function: Callable[[], object]) -> float:
 
 
 def best(function: Callable[[], object], repetitions: int) -> float:
-    """Return the least wall time of `function` [s], after one call that is not counted."""
+    """Return the smallest wall time of `function` [s], after one untimed call."""
     function()
     return min(timed(function) for _ in range(repetitions))
 
 
-def least(function: Callable[[], T], repetitions: int) -> tuple[T, float]:
-    """Return what a function returns, compiled already, and its least wall time [s].
+def timed_result(function: Callable[[], T], repetitions: int) -> tuple[T, float]:
+    """Return the result of a function and its smallest wall time [s].
 
-    It is called so many times at most; one that takes long is called once.
+    There is no untimed call: the function must be compiled. It is called `repetitions` times at
+    most, and once if it takes long.
     """
     start = time.perf_counter()
-    found = function()
+    result = function()
     seconds = spent = time.perf_counter() - start
     for _ in range(repetitions - 1):
         if spent > _LONG:
             break
-        took = timed(function)
-        seconds, spent = min(seconds, took), spent + took
-    return found, seconds
+        duration = timed(function)
+        seconds, spent = min(seconds, duration), spent + duration
+    return result, seconds
 
 
 def best_short(function: Callable[[], object], repetitions: int) -> float:
-    """Return the least mean wall time [s] of a function too short to be timed by itself."""
+    """Return the smallest mean wall time of a short function [s], timed over many calls."""
     return best_of({"": function}, repetitions)[""]
 
 
 def best_of(functions: Mapping[str, Callable[[], object]], repetitions: int) -> dict[str, float]:
-    """Return the least mean wall times [s] of several functions, however short, by name.
+    """Return the smallest mean wall times of several functions by name [s].
 
-    They are timed in rounds: a disturbance then spoils one of each. Each is called once before.
+    Short functions are timed over many calls, after one untimed call. The functions are timed in
+    rounds, so that a disturbance affects one time of each.
     """
-    many = {name: _as_long_as_counts(function) for name, function in functions.items()}
+    loops = {name: _repeated(function) for name, function in functions.items()}
     rounds = [
-        {name: timed(call) / calls for name, (call, calls) in many.items()}
+        {name: timed(call) / calls for name, (call, calls) in loops.items()}
         for _ in range(repetitions)
     ]
-    return {name: min(found[name] for found in rounds) for name in functions}
+    return {name: min(times[name] for times in rounds) for name in functions}
 
 
-def _as_long_as_counts(function: Callable[[], object]) -> tuple[Callable[[], None], int]:
-    """Return what calls a function so often that it can be timed, and how often that is."""
+def _repeated(function: Callable[[], object]) -> tuple[Callable[[], None], int]:
+    """Return a loop over a function that lasts `_SHORTEST`, and its number of calls."""
     function()
-    calls = max(1, int(_LEAST / max(timed(function), 1e-7)))
+    calls = max(1, int(_SHORTEST / max(timed(function), 1e-7)))
 
-    def many() -> None:
+    def loop() -> None:
         for _ in range(calls):
             function()
 
-    return many, calls
+    return loop, calls

@@ -1,1 +1,1 @@
-"""Sampling designs against their limit."""
+"""Benchmark of sampling plans."""

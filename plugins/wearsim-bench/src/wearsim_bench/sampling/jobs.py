@@ -1,4 +1,4 @@
-"""The work on sampling plans: tests whose depth is wanted, and whole studies that are timed."""
+"""Jobs of the sampling benchmark: parts of studies, control draws, and timed studies."""
 
 from __future__ import annotations
 
@@ -20,48 +20,49 @@ from wearsim.studies.ensemble.api import ensemble
 from wearsim.studies.ensemble.batch import MAX_BATCH
 from wearsim.studies.ensemble.control_variate import DRAWS, closed_form_depths, control_of
 from wearsim.studies.ensemble.designs import EnsemblePlan
-from wearsim.studies.ensemble.grid import shared_grid
-from wearsim.studies.ensemble.realisation import RealisationRunner
+from wearsim.studies.ensemble.realisation import RealisationRunner, shared_grid
 from wearsim.studies.execution.factory import executor
 from wearsim.studies.run.draws import Drawer
 from wearsim.types import FloatArray, Grid
 from wearsim.uq.sampling.plans import PlanName
-from wearsim_bench.measure.measurement import Tell
+from wearsim_bench.measure.measurement import OnProgress
 
 RIG = "rig-ensemble"
 CHEAP: Mapping[str, object] = {
-    "creepage.misalignment.persistence": "per-test",  # alike rollers are one contact
+    "creepage.misalignment.persistence": "per-test",  # identical rollers are solved as one contact
     "contact.strips": 31,
     "outputs.records": 1,
 }
-"""What makes a test of the rig cheap, and leaves what scatters."""
+"""Changes that shorten a test of the rig and keep all random inputs."""
 
 
 def rig(seed: int, changes: Mapping[str, object] | None = None) -> Scenario:
-    """Return the rig with all that scatters, in cheap tests.
+    """Return the rig with all random inputs, with short tests.
 
     Parameters
     ----------
     seed : int
-        Of its draws.
+        Seed of the draws.
     changes : mapping of str to object, optional
-        Further values by dotted key.
+        Further changes by dotted key.
     """
     return shipped_scenario(RIG, {**CHEAP, "seed": seed, **(changes or {})})
 
 
 @dataclass(frozen=True)
 class Part:
-    """Tests on end of one study.
+    """Consecutive tests of one study.
 
     Parameters
     ----------
     plan : str
+        The sampling plan.
     seed : int
-        The study's.
+        Seed of the study.
     total : int
-        Tests of the whole study.
+        Number of tests of the whole study.
     first, count : int
+        First test, and number of tests of this part.
     """
 
     plan: PlanName
@@ -72,11 +73,11 @@ class Part:
 
     @property
     def cost(self) -> float:
-        """How long it takes, about, in tests."""
+        """Approximate cost, in tests."""
         return float(self.count)
 
-    def done(self) -> FloatArray:
-        """Return the depth at the end of every test and in closed form, shape (2, count) [m].
+    def run(self) -> FloatArray:
+        """Return final depths and their closed-form approximations, shape (2, count) [m].
 
         Raises
         ------
@@ -84,27 +85,28 @@ class Part:
             If a test fails.
         """
         scenario = rig(self.seed)
-        members = RealisationRunner(scenario, self.plan, self.total, _grid())
+        runner = RealisationRunner(scenario, self.plan, self.total, _grid())
         numbers = range(self.first, self.first + self.count)
-        outcomes = members(numbers)
+        outcomes = runner(numbers)
         failed = [outcome for outcome in outcomes if outcome.error]
         if failed:
             where = f"{self.plan}, seed {self.seed}, realisation {failed[0].number}"
             raise SolverError(f"{len(failed)} tests failed, the first ({where}): {failed[0].error}")
         depths = np.array([outcome.observables["depth"][-1] for outcome in outcomes])
-        columns = members.drawer.columns(self.first, self.count)
+        columns = runner.drawer.columns(self.first, self.count)
         return np.array([depths, closed_form_depths(scenario, columns, self.count)])
 
 
 @dataclass(frozen=True)
-class CheapDraws:
-    """The draws that tell the mean of a study's control variate.
+class ControlDraws:
+    """Draws for the mean of the control variate of a study.
 
     Parameters
     ----------
     seed : int
-        The study's.
+        Seed of the study.
     draws : int
+        Number of draws.
     """
 
     seed: int
@@ -112,32 +114,33 @@ class CheapDraws:
 
     @property
     def cost(self) -> float:
-        """How long it takes, about, in tests."""
+        """Approximate cost, in tests."""
         return 50.0 * self.draws / DRAWS
 
-    def done(self) -> FloatArray:
-        """Return the mean of the control and that mean's standard error [m].
+    def run(self) -> FloatArray:
+        """Return the mean of the control variate and its standard error [m].
 
         Raises
         ------
         SolverError
             If there is no closed form.
         """
-        found = control_of(Drawer(rig(self.seed), "monte-carlo"), self.draws)
-        if found is None:
-            raise SolverError(f"the wear law of {RIG} has no full slip in closed form")
-        return np.array([found.mean, found.std / np.sqrt(found.draws)])
+        control = control_of(Drawer(rig(self.seed), "monte-carlo"), self.draws)
+        if control is None:
+            raise SolverError(f"the wear law of {RIG} has no closed form for full slip")
+        return np.array([control.mean, control.std / np.sqrt(control.draws)])
 
 
 @dataclass(frozen=True)
 class Timing:
-    """A whole study, from its scenario to the statistics in its file, to be timed.
+    """Timing of a complete study, from the scenario to the statistics in its file.
 
     Parameters
     ----------
     plan : str
+        The sampling plan.
     total : int
-        Tests.
+        Number of tests.
     """
 
     plan: EnsemblePlan
@@ -145,76 +148,74 @@ class Timing:
 
     @property
     def cost(self) -> float:
-        """How long it takes, about, in tests."""
+        """Approximate cost, in tests."""
         return 50.0 + self.total
 
-    def done(self) -> FloatArray:
-        """Return the processor time that it takes [s]."""
+    def run(self) -> FloatArray:
+        """Return the processor time [s]."""
         with TemporaryDirectory() as folder:
-            path, begun = Path(folder) / "ensemble.h5", time.process_time()
+            path, start = Path(folder) / "ensemble.h5", time.process_time()
             ensemble(rig(0), self.total, path, plan=self.plan, scheduler="serial")
-            return np.array(time.process_time() - begun)
+            return np.array(time.process_time() - start)
 
 
-Job: TypeAlias = Part | CheapDraws | Timing
+Job: TypeAlias = Part | ControlDraws | Timing
 
 
 def parts(plan: PlanName, seed: int, total: int) -> list[Part]:
-    """Return a study in parts of as many tests as gain from being stepped together."""
+    """Return the parts of a study, each of the largest batch size."""
     firsts = range(0, total, MAX_BATCH)
     return [Part(plan, seed, total, k, min(MAX_BATCH, total - k)) for k in firsts]
 
 
 class Jobs:
-    """Does jobs by their numbers; it can be sent to another process.
-
-    Parameters
-    ----------
-    jobs : sequence of Job
-    """
+    """Function that runs jobs by number; it can be pickled."""
 
     def __init__(self, jobs: Sequence[Job]) -> None:
         self.jobs = tuple(jobs)
 
     def __call__(self, numbers: Sequence[int]) -> list[FloatArray]:
-        """Return what the jobs of these numbers come to."""
+        """Return the results of the jobs with these numbers."""
         _warm()
-        return [self.jobs[number].done() for number in numbers]
+        return [self.jobs[number].run() for number in numbers]
 
 
 @lru_cache(maxsize=1)
 def _warm() -> None:
-    """Have all compiled and loaded in this process."""
-    Timing("sobol", 2).done()
+    """Compile and import everything in this process."""
+    Timing("sobol", 2).run()
 
 
 @lru_cache(maxsize=1)
 def _grid() -> Grid:
-    """Return the strips of all studies, the same so that all have one truth."""
+    """Return the strips of all studies; they are identical so that the reference is common."""
     return shared_grid(rig(0))
 
 
-def all_done(jobs: Sequence[Job], tell: Tell, scheduler: str = "processes") -> list[FloatArray]:
-    """Return what jobs come to, in their order.
+def run_jobs(
+    jobs: Sequence[Job], on_progress: OnProgress, scheduler: str = "processes"
+) -> list[FloatArray]:
+    """Return the results of jobs, in their order.
 
     Parameters
     ----------
     jobs : sequence of Job
-    tell : callable
-        Gets what is being measured, and which part is done.
+        The jobs.
+    on_progress : callable
+        Called with a description and the completed fraction.
     scheduler : str
-        Who does them, as of `wearsim.studies.execution.factory.executor`.
+        Scheduler of `wearsim.studies.execution.factory.executor`.
     """
     order = sorted(range(len(jobs)), key=lambda number: -jobs[number].cost)
-    total, so_far = sum(job.cost for job in jobs), 0.0
-    found: dict[int, FloatArray] = {}
-    tell("whole tests of the rig", 0.0)
+    total, completed = sum(job.cost for job in jobs), 0.0
+    results: dict[int, FloatArray] = {}
+    on_progress("tests of the rig", 0.0)
     with (
         executor(scheduler) as pool,
-        closing(pool.results(Jobs(jobs), ([number] for number in order))) as done,
+        closing(pool.results(Jobs(jobs), ([number] for number in order))) as batches,
     ):
-        for numbers, results in done:
-            found.update(zip(numbers, results, strict=True))
-            so_far += sum(jobs[number].cost for number in numbers)
-            tell("whole tests of the rig", so_far / total)
-    return [found[number] for number in range(len(jobs))]
+        for numbers, values in batches:
+            results.update(zip(numbers, values, strict=True))
+            completed += sum(jobs[number].cost for number in numbers)
+            on_progress("tests of the rig", completed / total)
+    return [results[number] for number in range(len(jobs))]

@@ -1,4 +1,4 @@
-"""Sampling plans against each other: error of an ensemble's mean and quantile against its cost."""
+"""Sampling plans: errors of mean and quantile of ensembles against time."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from wearsim.studies.ensemble.control_variate import DRAWS
 from wearsim.studies.ensemble.designs import BASE_PLANS, EnsemblePlan
 from wearsim.types import FloatArray
 from wearsim.uq.sampling.plans import PLANS, PlanName
-from wearsim_bench.measure.measurement import Effort, Measurement, Tell, Topic
-from wearsim_bench.sampling.errors import MEAN, QUANTILE, Study, Truth, plan_error, truths
-from wearsim_bench.sampling.jobs import CheapDraws, Job, Part, Timing, all_done, parts
+from wearsim_bench.measure.measurement import Effort, Measurement, OnProgress, Topic
+from wearsim_bench.sampling.errors import MEAN, QUANTILE, Reference, Study, plan_error, references
+from wearsim_bench.sampling.jobs import ControlDraws, Job, Part, Timing, parts, run_jobs
 
 METHODS: Mapping[EnsemblePlan, str] = {
     "monte-carlo": "Monte Carlo",
@@ -27,66 +27,70 @@ METHODS: Mapping[EnsemblePlan, str] = {
 }
 DEFAULT = str(SamplingTable.model_fields["plan"].default)
 GROUPS = (MEAN, QUANTILE)
-AGAIN = 2  # Latin hypercubes of each size but the greatest, for each replicate
+AGAIN = 2  # Latin hypercubes per replicate, for each size except the largest
 
 Studies: TypeAlias = Mapping[tuple[PlanName, int], Sequence[Study]]
-"""By plan and tests of a study; of Monte Carlo and Sobol those of the greatest size."""
+"""Studies by plan and number of tests; for Monte Carlo and Sobol of the largest size only."""
 
 
 @dataclass(frozen=True)
-class Size:
-    """How much is measured.
+class StudySizes:
+    """Numbers of tests, replicates and draws.
 
     Parameters
     ----------
     tests : tuple of int
-        Of a study; powers of two, rising.
+        Numbers of tests of a study; increasing powers of two.
     replicates : int
-        Independent studies of each plan.
-    cheap_draws : int
-        That tell the mean of the control.
+        Number of independent studies of each plan.
+    control_draws : int
+        Draws for the mean of the control variate.
     """
 
     tests: tuple[int, ...]
     replicates: int
-    cheap_draws: int = DRAWS
+    control_draws: int = DRAWS
 
     @property
-    def controls(self) -> list[CheapDraws]:
-        """The cheap draws of each replicate."""
-        return [CheapDraws(number, self.cheap_draws) for number in range(self.replicates)]
+    def controls(self) -> list[ControlDraws]:
+        """Draws of the control variate for each replicate."""
+        return [ControlDraws(number, self.control_draws) for number in range(self.replicates)]
 
     @property
-    def studies(self) -> list[Asked]:
-        """The studies whose tests are run.
+    def studies(self) -> list[PlannedStudy]:
+        """Studies to run.
 
-        The smaller ones of Monte Carlo and Sobol stand in the greatest; Latin hypercubes do not.
+        The smaller studies of Monte Carlo and Sobol are blocks of the largest ones.
         """
-        greatest, found = self.tests[-1], list[Asked]()
+        largest, studies = self.tests[-1], list[PlannedStudy]()
         for plan in PLANS:
-            for tests in self.tests if plan == "latin-hypercube" else (greatest,):
-                again = 1 if tests == greatest else AGAIN
+            for tests in self.tests if plan == "latin-hypercube" else (largest,):
+                again = 1 if tests == largest else AGAIN
                 for number in range(again * self.replicates):
-                    found.append(Asked(number % self.replicates, len(found), plan, tests))
-        return found
+                    studies.append(
+                        PlannedStudy(number % self.replicates, len(studies), plan, tests)
+                    )
+        return studies
 
 
-WHOLE = Size((16, 32, 64, 128, 256, 512), 8)
-QUICK = Size((16, 32), 2, cheap_draws=100_000)
+FULL = StudySizes((16, 32, 64, 128, 256, 512), 8)
+QUICK = StudySizes((16, 32), 2, control_draws=100_000)
 
 
 @dataclass(frozen=True)
-class Asked:
-    """A study whose tests are run.
+class PlannedStudy:
+    """A study to run.
 
     Parameters
     ----------
     replicate : int
-        Of what is measured; studies of the same one may share the mean of the control.
+        Number of the replicate, whose studies share the mean of the control variate.
     seed : int
-        Its own, so that no two studies share a path of a process.
+        Seed, different for all studies.
     plan : str
+        The sampling plan.
     tests : int
+        Number of tests.
     """
 
     replicate: int
@@ -96,111 +100,117 @@ class Asked:
 
     @property
     def parts(self) -> list[Part]:
-        """Its tests, in parts."""
+        """Parts of the study."""
         return parts(self.plan, self.seed, self.tests)
 
 
-def sampling(effort: Effort, tell: Tell) -> Topic:
+def sampling(effort: Effort, on_progress: OnProgress) -> Topic:
     """Measure every sampling plan over the size of a study.
 
     Parameters
     ----------
     effort : Effort
-    tell : callable
-        Gets what is being measured, and which part is done.
+        Number of cases and repetitions.
+    on_progress : callable
+        Called with a description and the completed fraction.
 
     Raises
     ------
     SolverError
         If a test fails.
     WorkerError
-        If worker processes break down.
+        If worker processes fail.
     """
-    size = QUICK if effort.quick else WHOLE
-    timings = [Timing(plan, count) for plan in METHODS for count in size.tests]
-    tests = [part for asked in size.studies for part in asked.parts]
-    jobs: list[Job] = [*timings, *size.controls, *tests]
-    found = dict(zip(jobs, all_done(jobs, tell), strict=True))
-    seconds = {(item.plan, item.total): float(found[item]) for item in timings}
-    studies = studies_of(size, found)
-    every = [study for some in studies.values() for study in some]
-    known = truths(every)
-    sizes = [len(study.depths) for study in every]
+    sizes = QUICK if effort.quick else FULL
+    timings = [Timing(plan, count) for plan in METHODS for count in sizes.tests]
+    tests = [part for study in sizes.studies for part in study.parts]
+    jobs: list[Job] = [*timings, *sizes.controls, *tests]
+    results = dict(zip(jobs, run_jobs(jobs, on_progress), strict=True))
+    seconds = {(item.plan, item.total): float(results[item]) for item in timings}
+    studies = studies_of(sizes, results)
+    every = [study for group in studies.values() for study in group]
+    known = references(every)
+    counts = [len(study.depths) for study in every]
     return Topic(
         name="sampling",
-        title="Ensembles of wear tests: every sampling plan",
-        about=_about(known, max(sizes) / sum(sizes)),
+        title="Ensembles of wear tests: sampling plans",
+        about=_about(known, max(counts) / sum(counts)),
         seconds="one study, one core",
         error="error",
-        errors={"error": "error, rms", "claimed": "95 % claimed"},
-        counts={"held": "intervals that hold it", "studies": "studies", "known": "rms known to"},
-        measurements=tuple(measurements(size, studies, known, seconds)),
+        errors={"error": "error, rms", "claimed": "95 % half-width"},
+        counts={"held": "coverage", "studies": "studies", "known": "standard error of rms"},
+        measurements=tuple(measurements(sizes, studies, known, seconds)),
     )
 
 
-def studies_of(size: Size, found: Mapping[Job, FloatArray]) -> Studies:
-    """Return the studies, put together from what jobs have come to.
+def studies_of(sizes: StudySizes, results: Mapping[Job, FloatArray]) -> Studies:
+    """Assemble the studies from the results of jobs.
 
     Parameters
     ----------
-    size : Size
-    found : mapping of Job to ndarray
-        What the parts of all studies and the cheap draws have come to.
+    sizes : StudySizes
+        Sizes of the studies.
+    results : mapping of Job to ndarray
+        Results of the parts of all studies and of the control draws.
     """
     studies: dict[tuple[PlanName, int], list[Study]] = {}
-    for asked in size.studies:
-        values = np.concatenate([found[part] for part in asked.parts], axis=1)
-        mean, error = (float(value) for value in found[size.controls[asked.replicate]])
-        study = Study(asked.replicate, values[0], values[1], (mean, error))
-        studies.setdefault((asked.plan, asked.tests), []).append(study)
+    for planned in sizes.studies:
+        values = np.concatenate([results[part] for part in planned.parts], axis=1)
+        mean, error = (float(value) for value in results[sizes.controls[planned.replicate]])
+        study = Study(planned.replicate, values[0], values[1], (mean, error))
+        studies.setdefault((planned.plan, planned.tests), []).append(study)
     return studies
 
 
 def measurements(
-    size: Size,
+    sizes: StudySizes,
     studies: Studies,
-    known: Mapping[str, Truth],
+    known: Mapping[str, Reference],
     seconds: Mapping[tuple[EnsemblePlan, int], float],
 ) -> Iterator[Measurement]:
     """Yield the errors of every plan and size.
 
     Parameters
     ----------
-    size : Size
+    sizes : StudySizes
+        Sizes of the studies.
     studies : mapping
-        As `studies_of` returns them.
-    known : mapping of str to Truth
-        By group.
+        Result of `studies_of`.
+    known : mapping of str to Reference
+        Reference values by group.
     seconds : mapping of (str, int) to float
-        Time of a study by plan and tests [s].
+        Time of a study by plan and number of tests [s].
     """
-    for group, (plan, method), tests in product(GROUPS, METHODS.items(), size.tests):
-        found = plan_error(_of_size(size, studies, plan, tests), plan, group, known[group])
-        claimed = {"claimed": found.claimed} if math.isfinite(found.claimed) else {}
+    for group, (plan, method), tests in product(GROUPS, METHODS.items(), sizes.tests):
+        result = plan_error(_of_size(sizes, studies, plan, tests), plan, group, known[group])
+        claimed = {"claimed": result.claimed} if math.isfinite(result.claimed) else {}
         row = Measurement(group, method, f"n = {tests}", default=plan == DEFAULT)
-        counts = {"held": found.held, "studies": float(found.studies), "known": found.known}
-        yield row.found(seconds.get((plan, tests)), {"error": found.rms, **claimed}, counts)
+        counts = {"held": result.held, "studies": float(result.studies), "known": result.known}
+        yield row.with_results(seconds.get((plan, tests)), {"error": result.rms, **claimed}, counts)
 
 
-def _of_size(size: Size, studies: Studies, plan: EnsemblePlan, tests: int) -> Sequence[Study]:
-    """Return the studies of so many tests, which may stand in greater ones."""
+def _of_size(
+    sizes: StudySizes, studies: Studies, plan: EnsemblePlan, tests: int
+) -> Sequence[Study]:
+    """Return the studies of this number of tests, or blocks of larger studies."""
     base = BASE_PLANS[plan]
     if (base, tests) in studies:
         return studies[base, tests]
-    return [block for study in studies[base, size.tests[-1]] for block in study.blocks(tests)]
+    return [block for study in studies[base, sizes.tests[-1]] for block in study.blocks(tests)]
 
 
-def _about(known: Mapping[str, Truth], share: float) -> str:
-    """Return what errors are against, and the greatest share that one study has in it."""
-    told = "; ".join(
-        f"{group} {1e6 * truth.value:.4g} um to {truth.error / truth.value:.2%}"
-        for group, truth in known.items()
+def _about(known: Mapping[str, Reference], share: float) -> str:
+    """Describe the reference values; `share` is the largest share of one study in them."""
+    values = "; ".join(
+        f"{group} {1e6 * item.value:.4g} um +- {item.error / item.value:.2%}"
+        for group, item in known.items()
     )
     return (
-        "Whole tests of the rig with all that scatters, its rollers alike. Time is the processor"
-        " time of one study in one process, from its scenario to the statistics in its file, taken"
-        " once. Errors are the rms of many studies, relative to what all their tests together tell"
-        f" with the closed form as a control: {told} (standard errors). No study is more than"
-        f" {share:.1%} of those tests, and by no more does that lessen its error. `rms known to` is"
-        " the standard error of the rms relative to it."
+        "Tests of the rig with all random inputs and identical rollers. Time is the processor time"
+        " of one study in one process, from the scenario to the statistics in its file, measured"
+        " once. Errors are the rms over many studies, relative to the reference: the estimate from"
+        f" the tests of all studies with the closed form as control variate, {values} (standard"
+        f" errors). A study contains at most {share:.1%} of these tests, which reduces its error by"
+        " at most that much. Coverage is the fraction of 95 % intervals that contain the reference;"
+        " the standard error of the rms is relative to it."
     )

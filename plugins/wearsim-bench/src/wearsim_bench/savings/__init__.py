@@ -1,1 +1,1 @@
-"""Cost saved where a problem needs less."""
+"""Benchmark of savings: omitted computations that a problem does not require."""

@@ -1,4 +1,4 @@
-"""Savings within one contact: closed forms, full slip, strips outside it, fields, friction."""
+"""Savings in one contact: closed forms, full slip, strips outside it, fields, friction."""
 
 from __future__ import annotations
 
@@ -14,25 +14,26 @@ from wearsim.plugins import ContactModelSpec, registry
 from wearsim.scenario.examples import shipped_scenario
 from wearsim.studies.contact.single import study_contact
 from wearsim.types import Creepage, FloatArray, Grid, OperatingPoint
-from wearsim_bench.contact.methods import HOST, Method, methods
-from wearsim_bench.savings.pairs import Pair, Ways
+from wearsim_bench.contact.methods import COMPARISON_MODEL, Method, methods
+from wearsim_bench.savings.saving import Alternatives, Saving
 
-FINE = 1000  # steps of the march that the others are held against
-TIMES = 3  # as many strips
-CONTACTS = 20  # solved at once
-_SLIGHT = 1e-9  # 1/m: no spin to speak of, but a spin
-_SPIN = 0.05  # 1/m, that of a tilt of 1 mrad
+FINE = 1000  # steps along rolling of the reference
+TIMES = 3  # factor on the number of strips
+CONTACTS = 20  # batch size
+_SLIGHT = 1e-9  # 1/m, a negligible spin that is not zero
+_SPIN = 0.05  # 1/m, for a tilt of 1 mrad
 _SLIDING = 0.1  # creepage at which no part of the contact adheres
 
 
-class Rig:
-    """The rig's mean contact on strips that span 1.2 times its patch, more of them, or finer ones.
+class MeanContact:
+    """Mean contact of the rig, by default on strips over 1.2 times its patch.
 
     Parameters
     ----------
     method : Method
+        The contact model.
     wide, fine : int
-        How many times as wide, and as fine, the strips' grid is.
+        Factors on width and resolution of the strips.
     """
 
     def __init__(self, method: Method, wide: int = 1, fine: int = 1) -> None:
@@ -47,8 +48,8 @@ class Rig:
         self.model = method.build()
         self.model.prepare(self.grid, materials)
 
-    def many(self, name: str, point: OperatingPoint) -> Callable[[], FloatArray]:
-        """Return what solves many such contacts at once, and returns a field of the solutions."""
+    def batch(self, name: str, point: OperatingPoint) -> Callable[[], FloatArray]:
+        """Return a function that solves a batch of contacts and returns one solution field."""
         points = OperatingPoints.of([point] * CONTACTS) or [point] * CONTACTS
         gaps = np.repeat(self.gap[None], CONTACTS, axis=0)
         return lambda: rows_of(self.model.solve_batch(gaps, self.curvature, points), name)
@@ -58,15 +59,17 @@ class Rig:
         return self.model.solve(self.gap, self.curvature, point).dissipation
 
     def with_fields(self, point: OperatingPoint) -> FloatArray:
-        """Return P_l(y) as `dissipation` does, tractions and slip being found too."""
+        """Return P_l(y) like `dissipation`, after computing tractions and slip too."""
         solution = self.model.solve(self.gap, self.curvature, point)
         self.model.fields(solution, self.gap, self.curvature, point)
         return solution.dissipation
 
 
 def _theories() -> list[Method]:
-    """Return the tangential theories on the model that compares them, and as the paper has it."""
-    return [method for method in methods() if method.model == HOST] + [Method("hertz-fastsim")]
+    """Return the tangential theories on the comparison model, and `hertz-fastsim`."""
+    return [method for method in methods() if method.model == COMPARISON_MODEL] + [
+        Method("hertz-fastsim")
+    ]
 
 
 def _models() -> list[Method]:
@@ -77,8 +80,8 @@ def _slipping(point: OperatingPoint, longitudinal: float, spin: float) -> Operat
     return replace(point, creepage=Creepage(longitudinal, 0.0, spin))
 
 
-def _marched(method: Method) -> Method | None:
-    """Return the method with a march of many steps, or None where it does not march."""
+def _many_steps(method: Method) -> Method | None:
+    """Return the method with many steps along rolling, or None if it has no such steps."""
     fields = method.spec.options.model_fields
     fine = {**method.options, "mx": FINE}
     if "mx" not in fields:
@@ -90,109 +93,115 @@ def _marched(method: Method) -> Method | None:
     return Method(method.model, fine)
 
 
-def closed_forms() -> Iterator[Pair]:
-    """Yield every theory without spin, and with next to none, where no closed form holds."""
+def closed_forms() -> Iterator[Saving]:
+    """Yield all theories without spin, and with negligible spin and no closed form."""
     for method in _theories():
-        yield Pair("no spin", method.name, partial(_closed_form, method))
+        yield Saving("no spin", method.name, partial(_closed_form, method))
 
 
-def _closed_form(method: Method) -> Ways:
-    rig = Rig(method)
+def _closed_form(method: Method) -> Alternatives:
+    rig = MeanContact(method)
     none, some = (
         _slipping(rig.point, rig.point.creepage.longitudinal, spin) for spin in (0.0, _SLIGHT)
     )
     ways = {
-        "no spin": rig.many("dissipation", none),
-        "next to none": rig.many("dissipation", some),
+        "no spin": rig.batch("dissipation", none),
+        "negligible spin": rig.batch("dissipation", some),
     }
-    return Ways(ways, _limit(method, some))
+    return Alternatives(ways, _limit(method, some))
 
 
 def _limit(method: Method, point: OperatingPoint) -> Callable[[], FloatArray] | None:
-    """Return what finds P_l(y) by a march of many steps, or None where the method has none."""
-    fine = _marched(method)
+    """Return a function for P_l(y) with many steps along rolling, or None if not available."""
+    fine = _many_steps(method)
     if fine is None:
         return None
-    # without any spin it would be the closed form
-    marched = _slipping(point, point.creepage.longitudinal, _SLIGHT)
-    return Rig(fine).many("dissipation", marched)
+    # a nonzero spin, to avoid the closed form
+    reference = _slipping(point, point.creepage.longitudinal, _SLIGHT)
+    return MeanContact(fine).batch("dissipation", reference)
 
 
-def full_slip() -> Iterator[Pair]:
-    """Yield every theory that marches where all slides, and where part of the contact adheres."""
+def full_slip() -> Iterator[Saving]:
+    """Yield all theories with steps along rolling, in full slip and with partial adhesion."""
     for method in _theories():
-        fine = _marched(method)
+        fine = _many_steps(method)
         if fine is not None:
-            yield Pair("full slip", method.name, partial(_slides, method, fine))
+            yield Saving("full slip", method.name, partial(_full_slip, method, fine))
 
 
-def _slides(method: Method, fine: Method) -> Ways:
-    rig = Rig(method)
-    slips = {"all slides": _SLIDING, "part adheres": rig.point.creepage.longitudinal}
+def _full_slip(method: Method, fine: Method) -> Alternatives:
+    rig = MeanContact(method)
+    slips = {"full slip": _SLIDING, "partial adhesion": rig.point.creepage.longitudinal}
     ways = {
-        name: _relative(rig, Rig(fine), _slipping(rig.point, slip, _SPIN))
+        name: _relative(rig, MeanContact(fine), _slipping(rig.point, slip, _SPIN))
         for name, slip in slips.items()
     }
-    return Ways(ways, lambda: np.ones(CONTACTS))
+    return Alternatives(ways, lambda: np.ones(CONTACTS))
 
 
-def _relative(rig: Rig, fine: Rig, point: OperatingPoint) -> Callable[[], FloatArray]:
-    """Return what finds the power over that which is found on a fine march."""
-    power, exact = rig.many("power", point), fine.many("power", point)()
+def _relative(
+    rig: MeanContact, fine: MeanContact, point: OperatingPoint
+) -> Callable[[], FloatArray]:
+    """Return a function for the power relative to that with many steps."""
+    power, exact = rig.batch("power", point), fine.batch("power", point)()
     return lambda: power() / exact
 
 
-def uniform_friction() -> Iterator[Pair]:
-    """Yield every model under one coefficient of friction, and under one at every point."""
+def uniform_friction() -> Iterator[Saving]:
+    """Yield all models with one friction coefficient, and with one at every point."""
     for method in _models():
         if method.spec.capabilities.local_friction:
-            yield Pair("uniform friction", method.name, partial(_one_friction, method))
+            yield Saving("uniform friction", method.name, partial(_one_friction, method))
 
 
-def _one_friction(method: Method) -> Ways:
-    rig = Rig(method)
+def _one_friction(method: Method) -> Alternatives:
+    rig = MeanContact(method)
     mu = np.full(_friction_shape(method, rig), rig.point.friction)
     place = "strip" if mu.ndim == 1 else "point"
     ways = {
-        "one": rig.many("dissipation", rig.point),
-        f"one per {place}": rig.many("dissipation", replace(rig.point, friction=mu)),
+        "one": rig.batch("dissipation", rig.point),
+        f"one per {place}": rig.batch("dissipation", replace(rig.point, friction=mu)),
     }
-    return Ways(ways, _limit(method, rig.point))
+    return Alternatives(ways, _limit(method, rig.point))
 
 
-def _friction_shape(method: Method, rig: Rig) -> tuple[int, ...]:
+def _friction_shape(method: Method, rig: MeanContact) -> tuple[int, ...]:
     if not method.spec.capabilities.friction_field:
         return (rig.grid.strips,)
     return rig.model.friction_points(rig.gap, rig.curvature, rig.point)[0].shape
 
 
-def strips_outside() -> Iterator[Pair]:
-    """Yield every model with strips outside the contact, without them, and with all in contact."""
+def strips_outside() -> Iterator[Saving]:
+    """Yield all models with strips outside the contact, without them, and with all in contact."""
     for method in _models():
-        yield Pair("strips outside", method.name, partial(_outside, method))
+        yield Saving("strips outside", method.name, partial(_outside, method))
 
 
-def _outside(method: Method) -> Ways:
-    wide, alone, fine = Rig(method, wide=TIMES), Rig(method), Rig(method, fine=TIMES)
+def _outside(method: Method) -> Alternatives:
+    wide, usual, fine = (
+        MeanContact(method, wide=TIMES),
+        MeanContact(method),
+        MeanContact(method, fine=TIMES),
+    )
     ways = {
-        f"{TIMES} x as many, outside": wide.many("power", wide.point),
-        "strips about the patch": alone.many("power", alone.point),
-        f"{TIMES} x as many, finer": fine.many("power", fine.point),
+        f"{TIMES} x as many, outside": wide.batch("power", wide.point),
+        "strips at the patch": usual.batch("power", usual.point),
+        f"{TIMES} x as many, finer": fine.batch("power", fine.point),
     }
-    return Ways(ways)
+    return Alternatives(ways)
 
 
-def fields() -> Iterator[Pair]:
-    """Yield every model that knows the inside of a contact, asked for it and not."""
+def fields() -> Iterator[Saving]:
+    """Yield all models with fields inside the contact, without and with their computation."""
     for method in _models():
         if method.spec.capabilities.fields:
-            yield Pair("fields", method.name, partial(_inside, method))
+            yield Saving("fields", method.name, partial(_fields, method))
 
 
-def _inside(method: Method) -> Ways:
-    rig = Rig(method)
+def _fields(method: Method) -> Alternatives:
+    rig = MeanContact(method)
     ways = {
         "strips": partial(rig.dissipation, rig.point),
-        "fields too": partial(rig.with_fields, rig.point),
+        "with fields": partial(rig.with_fields, rig.point),
     }
-    return Ways(ways)
+    return Alternatives(ways)

@@ -1,4 +1,4 @@
-"""Savings within a whole test or study: alike rollers, records, random inputs without effect."""
+"""Savings in a test or study: identical rollers, records, random inputs without effect."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from wearsim.studies.contact.draws import draw_contacts
 from wearsim.studies.run.run import run
 from wearsim.types import FloatArray
 from wearsim.uq.sampling.sampler import Sampler
-from wearsim_bench.savings.pairs import Pair, Ways
-from wearsim_bench.stepping.runs import Ready, WearTest
+from wearsim_bench.savings.saving import Alternatives, Saving
+from wearsim_bench.stepping.runs import PreparedTest, WearTest
 
 RIG, MINUTES, QUICK_MINUTES = "rig-450min", 22.5, 0.5
 STEPPERS = ("implicit", "stabilised", "per-pass")
-APART = ["0 mm", "1e-9 mm", "2e-9 mm"]  # rollers that are alike, and told apart
+OFFSETS = ["0 mm", "1e-9 mm", "2e-9 mm"]  # prevent the merging of identical rollers
 RECORDS = 200
 DRAWS, QUICK_DRAWS = 100_000, 1000
 _WEAR = {
@@ -31,38 +31,40 @@ _WEAR = {
 }
 
 
-def alike_rollers(quick: bool) -> Iterator[Pair]:
-    """Yield every stepper with three rollers merged into one, and with the same three apart."""
+def identical_rollers(quick: bool) -> Iterator[Saving]:
+    """Yield all steppers with three identical rollers, merged into one and separate."""
     for stepper in STEPPERS:
-        yield Pair("alike rollers", stepper, partial(_rollers, quick, stepper))
+        yield Saving("identical rollers", stepper, partial(_rollers, quick, stepper))
 
 
-def _rollers(quick: bool, stepper: str) -> Ways:
+def _rollers(quick: bool, stepper: str) -> Alternatives:
     test = WearTest(RIG, QUICK_MINUTES if quick else MINUTES)
     changes: dict[str, object] = {"evolution.stepper": stepper}
-    merged, apart = (
-        _profile(Ready(test.asked({**changes, **further})))
-        for further in ({}, {"roller.offset": APART})
+    merged, separate = (
+        _profile(PreparedTest(test.scenario_with({**changes, **further})))
+        for further in ({}, {"roller.offset": OFFSETS})
     )
-    return Ways({"merged": merged, "each by itself": apart})
+    return Alternatives({"merged": merged, "separate": separate})
 
 
-def _profile(ready: Ready) -> Callable[[], FloatArray]:
+def _profile(prepared: PreparedTest) -> Callable[[], FloatArray]:
     def profile() -> FloatArray:
-        return ready.stepped(ready.stop).state.cylinder_depth.ravel()
+        return prepared.stepped(prepared.stop).state.cylinder_depth.ravel()
 
     return profile
 
 
-def records(quick: bool) -> Iterator[Pair]:
-    """Yield a test recorded as by default, at its end alone, and at many moments."""
+def records(quick: bool) -> Iterator[Saving]:
+    """Yield a test with the default records, with one record, and with many records."""
     test = WearTest(RIG, QUICK_MINUTES if quick else MINUTES)
-    ways = {
-        f"{DEFAULT_RECORDS} times": partial(_recorded, test.asked({})),
-        "at the end": partial(_recorded, test.asked({"outputs": {"records": 1}})),
-        f"{RECORDS} times": partial(_recorded, test.asked({"outputs": {"records": RECORDS}})),
+    alternatives = {
+        f"{DEFAULT_RECORDS} times": partial(_recorded, test.scenario_with({})),
+        "at the end": partial(_recorded, test.scenario_with({"outputs": {"records": 1}})),
+        f"{RECORDS} times": partial(
+            _recorded, test.scenario_with({"outputs": {"records": RECORDS}})
+        ),
     }
-    yield Pair("records", "one test", lambda: Ways(ways))
+    yield Saving("records", "one test", lambda: Alternatives(alternatives))
 
 
 def _recorded(scenario: Scenario) -> FloatArray:
@@ -70,15 +72,15 @@ def _recorded(scenario: Scenario) -> FloatArray:
     return np.ravel(profiles[-1])
 
 
-def idle_inputs(quick: bool) -> Iterator[Pair]:
-    """Yield the draws of a study of one contact, without and with an input that does not act."""
+def idle_inputs(quick: bool) -> Iterator[Saving]:
+    """Yield the draws of a study of one contact, without and with an input that has no effect."""
     count = QUICK_DRAWS if quick else DRAWS
     scenario = shipped_scenario("paper-monte-carlo", {"wear": _WEAR})
-    ways = {
+    alternatives = {
         "not drawn": partial(_drawn, scenario, count),
-        "drawn too": partial(_all_drawn, scenario, count),
+        "drawn": partial(_all_drawn, scenario, count),
     }
-    yield Pair("idle inputs", f"{count} draws", lambda: Ways(ways))
+    yield Saving("idle inputs", f"{count} draws", lambda: Alternatives(alternatives))
 
 
 def _drawn(scenario: Scenario, count: int) -> FloatArray:
@@ -86,11 +88,11 @@ def _drawn(scenario: Scenario, count: int) -> FloatArray:
 
 
 def _all_drawn(scenario: Scenario, count: int) -> FloatArray:
-    found = draw_contacts(scenario, count)
-    idle = [item for item in scenario.random if not set(item.keys) <= found.values.keys()]
+    drawn = draw_contacts(scenario, count)
+    idle = [item for item in scenario.random if not set(item.keys) <= drawn.values.keys()]
     inputs = [(item.name, item.dimension) for item in idle]
     sampler = Sampler(scenario.seed, inputs, scenario.sampling.plan, total=count)
     uniforms = sampler.uniforms(0, count)
     for item in idle:
         item.values(uniforms[item.name])
-    return np.concatenate(list(found.values.values()))
+    return np.concatenate(list(drawn.values.values()))

@@ -1,1 +1,1 @@
-"""Steppers against converged runs."""
+"""Benchmark of steppers against converged runs."""

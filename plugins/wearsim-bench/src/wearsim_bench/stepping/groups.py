@@ -1,4 +1,4 @@
-"""What is stepped, and how: every stepper, every contact model, every number of strips."""
+"""Measurements of steppers, contact models and numbers of strips."""
 
 from __future__ import annotations
 
@@ -11,65 +11,68 @@ from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.steppers.per_pass import is_compiled
 from wearsim.scenario.tables.plain import DEFAULT_TOLERANCE, EvolutionTable
 from wearsim_bench.contact.methods import Method
-from wearsim_bench.contact.worn_profiles import why
+from wearsim_bench.contact.worn_profiles import failure_reason
 from wearsim_bench.measure.measurement import Measurement
-from wearsim_bench.measure.timing import least
-from wearsim_bench.stepping.runs import End, Ready, WearTest, errors_of
+from wearsim_bench.measure.timing import timed_result
+from wearsim_bench.stepping.runs import EndState, PreparedTest, WearTest, errors_of
 from wearsim_bench.stepping.solvers import SOLVERS, Solver, solved_by
 
 EVERY_PASS = "per-pass"
-CONVERGED = 1e-7  # tolerance of the solver that is the truth where passes are not compiled
-#: what the truth is checked by: itself ten times as loose, and a solver that shares no code
+CONVERGED = 1e-7  # tolerance of the reference solver if the loop over passes is not compiled
+#: checks of the reference: ten times the tolerance, and an independent solver
 _CHECKS: tuple[tuple[Solver, float], ...] = (("LSODA", 1e-6), ("BDF", CONVERGED))
-CLOSE = 1e-5  # tolerance at which a solver's error is next to none beside that of the strips
-MOST_STEPS = 1500  # after which a stepper is not asked for still closer tolerances
-_FEW = 1e-4  # of the passes, stepped first so that nothing compiles while it is timed
+CLOSE = 1e-5  # tolerance at which the error is negligible compared with that of the strips
+MOST_STEPS = 1500  # steps above which lower tolerances are not tried
+_WARM_UP = 1e-4  # fraction of the passes of an untimed run, for compilation
 _STEPPERS = tuple(
     name
     for name in get_args(EvolutionTable.model_fields["stepper"].annotation)
     if name not in {"auto", EVERY_PASS}
 )
-#: takes passes, and steps a test from fresh bodies over as many
-Steps = Callable[[float], End]
+#: steps a test from fresh bodies over a number of passes
+Steps = Callable[[float], EndState]
 
 
 @dataclass(frozen=True)
-class Truth:
-    """The end that others are held against.
+class Reference:
+    """Reference state at the end of a test.
 
     Parameters
     ----------
-    end : End
+    end : EndState
+        The final state.
     own : mapping of str to float
-        Its own errors as `errors_of` has them, by name; none of every pass by itself.
+        Errors of the reference as in `errors_of`; empty for individually solved passes.
     """
 
-    end: End
+    end: EndState
     own: Mapping[str, float]
 
-    def errors_of(self, found: End) -> dict[str, float]:
-        """Return the errors of another end, none less than the truth's own."""
-        apart = errors_of(found, self.end)
-        return {name: max(error, self.own.get(name, 0.0)) for name, error in apart.items()}
+    def errors_of(self, state: EndState) -> dict[str, float]:
+        """Return the errors of a final state, at least those of the reference."""
+        errors = errors_of(state, self.end)
+        return {name: max(error, self.own.get(name, 0.0)) for name, error in errors.items()}
 
     @property
     def known(self) -> dict[str, float]:
-        """To how much of the profile the truth is known, as a count; none if it is exact."""
+        """Error of the reference profile as a count; empty if it is exact."""
         return {"truth": self.own["profile"]} if self.own else {}
 
 
 @dataclass(frozen=True)
-class Bench:
-    """A test that is stepped by one contact model, and how often each way is timed.
+class StepperBenchmark:
+    """Benchmark of steppers on one wear test with one contact model.
 
     Parameters
     ----------
     group : str
-        Name of the group that its measurements belong to.
+        Group of the measurements.
     test : WearTest
+        The wear test.
     model : Method
         The contact model.
     repetitions : int
+        Repetitions of each timing.
     """
 
     group: str
@@ -77,71 +80,74 @@ class Bench:
     model: Method
     repetitions: int
 
-    def ready(self, strips: int, **evolution: object) -> Ready:
-        """Return the test on so many strips, with keys of its table [evolution]."""
+    def prepared(self, strips: int, **evolution: object) -> PreparedTest:
+        """Return the test on `strips` strips, with keys of the table [evolution]."""
         contact = {"model": self.model.model, "strips": strips, **self.model.options}
-        return Ready(self.test.asked({"contact": contact, "evolution": evolution}))
+        return PreparedTest(self.test.scenario_with({"contact": contact, "evolution": evolution}))
 
-    def exact(self, strips: int) -> tuple[Measurement, Truth]:
-        """Return the end that the others are held against, and what it took.
+    def exact(self, strips: int) -> tuple[Measurement, Reference]:
+        """Return the measurement of the reference, and the reference.
 
-        Every pass by itself where there is compiled code for it, else what LSODA converges to. Its
-        own errors are then how far it is from BDF of the same tolerance, which shares no code with
-        it, or from itself ten times as loose, whichever is more.
+        It solves every pass individually if the loop over passes is compiled, and otherwise uses
+        LSODA. The error of the latter is the larger of its differences from BDF at the same
+        tolerance and from LSODA at ten times the tolerance.
 
         Raises
         ------
         SolverError, CapabilityError
-            If it has none.
+            If the reference cannot be computed.
         """
-        ready = self.ready(strips, stepper=EVERY_PASS)
-        if is_compiled(ready.problem):
-            ready.stepped(1.0)
-            end, seconds = least(lambda: ready.stepped(ready.stop), 1)
-            return self._row(EVERY_PASS, "every pass", seconds, end), Truth(end, {})
-        steps = partial(by_solver, "LSODA", ready.problem, CONVERGED)
-        end, seconds = least(lambda: steps(ready.stop), 1)
+        prepared = self.prepared(strips, stepper=EVERY_PASS)
+        if is_compiled(prepared.problem):
+            prepared.stepped(1.0)
+            end, seconds = timed_result(lambda: prepared.stepped(prepared.stop), 1)
+            return self._row(EVERY_PASS, "every pass", seconds, end), Reference(end, {})
+        steps = partial(by_solver, "LSODA", prepared.problem, CONVERGED)
+        end, seconds = timed_result(lambda: steps(prepared.stop), 1)
         looser, other = (
-            errors_of(by_solver(solver, ready.problem, tolerance, ready.stop), end)
+            errors_of(by_solver(solver, prepared.problem, tolerance, prepared.stop), end)
             for solver, tolerance in _CHECKS
         )
-        truth = Truth(end, {name: max(looser[name], other[name]) for name in looser})
+        reference = Reference(end, {name: max(looser[name], other[name]) for name in looser})
         setting = f"converged, {_power(CONVERGED)}"
-        return self._row("LSODA", setting, seconds, end, known=truth.known), truth
+        return self._row("LSODA", setting, seconds, end, known=reference.known), reference
 
     def measured(
         self,
         method: str,
         setting: str,
         prepare: Callable[[], tuple[Steps, float]],
-        exact: Truth,
+        exact: Reference,
         default: bool = False,
     ) -> Measurement:
-        """Return error and time of one way to step the test.
+        """Return error and time of one method.
 
         Parameters
         ----------
         method, setting : str
+            Stepper or solver, and its tolerance or number of strips.
         prepare : callable
-            Returns what steps the test, and its passes.
-        exact : Truth
+            Returns a function that steps the test, and the number of passes.
+        exact : Reference
+            The reference.
         default : bool
+            Whether this is the default of a scenario.
         """
         try:
             steps, stop = prepare()
-            steps(max(_FEW * stop, 1.0))
-            end, seconds = least(lambda: steps(stop), self.repetitions)
+            steps(max(_WARM_UP * stop, 1.0))
+            end, seconds = timed_result(lambda: steps(stop), self.repetitions)
             errors = exact.errors_of(end)
             return self._row(method, setting, seconds, end, errors, default, exact.known)
         except Exception as error:
-            return Measurement(self.group, method, setting, failed=why(error))
+            return Measurement(self.group, method, setting, failed=failure_reason(error))
 
     def _row(
         self,
         method: str,
         setting: str,
         seconds: float,
-        end: End,
+        end: EndState,
         errors: Mapping[str, float] | None = None,
         default: bool = False,
         known: Mapping[str, float] | None = None,
@@ -159,69 +165,66 @@ class Bench:
         )
 
 
-def by_solver(solver: Solver, problem: WearProblem, tolerance: float, passes: float) -> End:
-    """Step a problem over some passes by a solver of scipy's; parameters as of `solved_by`."""
-    return End(problem, solved_by(solver, problem, passes, tolerance))
+def by_solver(solver: Solver, problem: WearProblem, tolerance: float, passes: float) -> EndState:
+    """Step a wear problem by a solver of scipy; see `solved_by`."""
+    return EndState(problem, solved_by(solver, problem, passes, tolerance))
 
 
-def of_steppers(bench: Bench, tolerances: Sequence[float]) -> Iterator[Measurement]:
-    """Yield every stepper and solver over tolerances, all on the strips of the default one.
+def of_steppers(bench: StepperBenchmark, tolerances: Sequence[float]) -> Iterator[Measurement]:
+    """Yield all steppers and solvers over tolerances, on the default strips.
 
     Parameters
     ----------
-    bench : Bench
+    bench : StepperBenchmark
+        The benchmark.
     tolerances : sequence of float
-        The coarsest first. A way that fails at several for one reason is told once; one that takes
-        more than `MOST_STEPS` goes no further.
+        Decreasing tolerances. Failures for the same reason are reported once; after more than
+        `MOST_STEPS` steps, lower tolerances are skipped.
     """
     strips = bench.test.grid().strips
     try:
         row, exact = bench.exact(strips)
     except Exception as error:
-        yield Measurement(bench.group, EVERY_PASS, "every pass", failed=why(error))
+        yield Measurement(bench.group, EVERY_PASS, "every pass", failed=failure_reason(error))
         return
     yield row
-    usual = bench.ready(strips).name
+    usual = bench.prepared(strips).name
     for method in (*_STEPPERS, *SOLVERS):
-        told = set()
+        failures = set()
         for tolerance in tolerances:
-            found = bench.measured(
+            measurement = bench.measured(
                 method,
                 f"tolerance {_power(tolerance)}",
                 partial(_prepared, bench, strips, method, tolerance),
                 exact,
                 default=method == usual and tolerance == DEFAULT_TOLERANCE,
             )
-            if found.failed not in told or not found.failed:
-                yield found
-            told.add(found.failed)
-            if found.counts.get("steps", 0) > MOST_STEPS:
+            if measurement.failed not in failures or not measurement.failed:
+                yield measurement
+            failures.add(measurement.failed)
+            if measurement.counts.get("steps", 0) > MOST_STEPS:
                 break
 
 
-def _prepared(bench: Bench, strips: int, method: str, tolerance: float) -> tuple[Steps, float]:
+def _prepared(
+    bench: StepperBenchmark, strips: int, method: str, tolerance: float
+) -> tuple[Steps, float]:
     solver = next((name for name in SOLVERS if name == method), None)
     if solver is not None:
-        ready = bench.ready(strips)
-        return partial(by_solver, solver, ready.problem, tolerance), ready.stop
-    ready = bench.ready(strips, stepper=method, tolerance=tolerance)
-    return ready.stepped, ready.stop
+        prepared = bench.prepared(strips)
+        return partial(by_solver, solver, prepared.problem, tolerance), prepared.stop
+    prepared = bench.prepared(strips, stepper=method, tolerance=tolerance)
+    return prepared.stepped, prepared.stop
 
 
-def of_model(bench: Bench, tolerances: Sequence[float]) -> Iterator[Measurement]:
-    """Yield a contact model with the stepper it gets, held against its own end and no other's.
-
-    Parameters
-    ----------
-    bench : Bench
-    tolerances : sequence of float
-    """
+def of_model(bench: StepperBenchmark, tolerances: Sequence[float]) -> Iterator[Measurement]:
+    """Yield a contact model with its default stepper, relative to its own reference."""
     strips, name = bench.test.grid().strips, bench.model.name
     try:
         _, exact = bench.exact(strips)
-        usual = bench.ready(strips).name
+        usual = bench.prepared(strips).name
     except Exception as error:
-        yield Measurement(bench.group, name, "every pass", failed=why(error))
+        yield Measurement(bench.group, name, "every pass", failed=failure_reason(error))
         return
     for tolerance in tolerances:
         yield bench.measured(
@@ -233,23 +236,26 @@ def of_model(bench: Bench, tolerances: Sequence[float]) -> Iterator[Measurement]
         )
 
 
-def of_strips(bench: Bench, counts: Sequence[int]) -> Iterator[Measurement]:
-    """Yield numbers of strips, by the default steps and by steps whose error is next to none.
+def of_strips(bench: StepperBenchmark, counts: Sequence[int]) -> Iterator[Measurement]:
+    """Yield numbers of strips, with default steps and with steps of negligible error.
 
-    They are held against twice as many strips as there are by default.
+    The reference has twice the default number of strips.
 
     Parameters
     ----------
-    bench : Bench
+    bench : StepperBenchmark
+        The benchmark.
     counts : sequence of int
-        Numbers of strips, besides that of the default.
+        Numbers of strips in addition to the default.
     """
     default = bench.test.grid().strips
     try:
-        finest = bench.ready(2 * default + 1)
-        exact = Truth(by_solver("LSODA", finest.problem, CLOSE, finest.stop), {})
+        finest = bench.prepared(2 * default + 1)
+        exact = Reference(by_solver("LSODA", finest.problem, CLOSE, finest.stop), {})
     except Exception as error:
-        yield Measurement(bench.group, "LSODA", f"{2 * default + 1} strips", failed=why(error))
+        yield Measurement(
+            bench.group, "LSODA", f"{2 * default + 1} strips", failed=failure_reason(error)
+        )
         return
     for method, tolerance in ((finest.name, DEFAULT_TOLERANCE), ("LSODA", CLOSE)):
         for strips in sorted({*counts, default}):
@@ -263,5 +269,5 @@ def of_strips(bench: Bench, counts: Sequence[int]) -> Iterator[Measurement]:
 
 
 def _power(tolerance: float) -> str:
-    """Return a tolerance in as few characters as it takes: "1e-3"."""
+    """Return a tolerance as "1e-3"."""
     return f"{tolerance:.0e}".replace("e-0", "e-")

@@ -1,4 +1,4 @@
-"""Wear tests that are stepped from fresh bodies to their end, and how far apart two ends are."""
+"""Wear tests stepped from fresh bodies, and differences of their final states."""
 
 from __future__ import annotations
 
@@ -31,59 +31,64 @@ class WearTest:
     Parameters
     ----------
     scenario : str
-        Its name.
+        Name of the scenario.
     minutes : float
-        Simulated time.
+        Simulated time [min].
     changes : mapping of str to object, optional
-        Values by dotted key.
+        Changed values by dotted key.
     """
 
     scenario: str
     minutes: float
     changes: Mapping[str, object] = field(default_factory=dict)
 
-    def asked(self, changes: Mapping[str, object]) -> Scenario:
+    def scenario_with(self, changes: Mapping[str, object]) -> Scenario:
         """Return the scenario with further changes."""
         duration = {"operation.duration": f"{self.minutes!r} min"}
         return shipped_scenario(self.scenario, {**self.changes, **duration, **changes})
 
     def grid(self) -> Grid:
-        """Return the strips that the test has by default."""
-        return strips_of_run(draw(self.asked({})))
+        """Return the default strips of the test."""
+        return strips_of_run(draw(self.scenario_with({})))
 
 
 @dataclass(frozen=True)
-class End:
-    """The end of a wear test: its problem and its state there."""
+class EndState:
+    """Wear problem and final state of a test."""
 
     problem: WearProblem
     state: WearState
 
     def profiles_at(self, y: FloatArray) -> FloatArray:
-        """Return the worn depths of all bodies at some positions [m], one after another."""
-        own = self.problem.grid.y
+        """Return the worn depths of all bodies at positions y [m], concatenated."""
+        grid = self.problem.grid.y
         depths = [
-            np.apply_along_axis(lambda worn: np.interp(y, own, worn), -1, getattr(self.state, name))
+            np.apply_along_axis(
+                lambda worn: np.interp(y, grid, worn), -1, getattr(self.state, name)
+            )
             for name in DEPTHS
         ]
         return np.concatenate([depth.ravel() for depth in depths])
 
 
-class Ready:
-    """A wear test of which all is built that does not count as stepping.
+class PreparedTest:
+    """A wear test prepared for stepping.
 
     Parameters
     ----------
     scenario : Scenario
+        Scenario of the test.
 
     Attributes
     ----------
     problem : WearProblem
+        The wear problem.
     stepper : Stepper
+        Its stepper.
     name : str
-        Of the stepper.
+        Name of the stepper.
     stop : float
-        Passes at the end of the test.
+        Number of passes of the test.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -91,37 +96,39 @@ class Ready:
         self.problem, self.stepper, self.name = built
         self.stop, self._max_steps = float(scenario.total_passes), scenario.evolution.max_steps
 
-    def stepped(self, passes: float) -> End:
-        """Step from fresh bodies over some passes; nothing is recorded on the way."""
+    def stepped(self, passes: float) -> EndState:
+        """Step from fresh bodies over a number of passes, without records."""
         state = fresh_state(self.problem)
         for advance in evolve(
             self.problem, state, self.stepper, passes, lambda _: np.inf, self._max_steps
         ):
             state = advance.end
-        return End(self.problem, state)
+        return EndState(self.problem, state)
 
 
-def errors_of(found: End, exact: End) -> dict[str, float]:
-    """Return how far the end of a test is from the exact one, relative.
+def errors_of(approximate: EndState, exact: EndState) -> dict[str, float]:
+    """Return the relative errors of a final state.
 
     Parameters
     ----------
-    found, exact : End
-        On the same strips, or on finer ones, which are then compared where the first has its own.
+    approximate, exact : EndState
+        Final states; profiles are compared on the strips of `approximate`.
 
     Returns
     -------
     dict of str to float
-        Greatest `depth`, `profile` (L2, of all bodies) and worn `volume` (of all bodies).
+        Errors of the largest `depth`, the `profile` (L2 over all bodies) and the worn `volume`.
     """
-    y = found.problem.grid.y
-    volumes = [total_worn_volume(end.problem, end.state) for end in (found, exact)]
+    y = approximate.problem.grid.y
+    volumes = [total_worn_volume(end.problem, end.state) for end in (approximate, exact)]
     return {
-        "depth": _apart(greatest_depth(found.state), greatest_depth(exact.state)),
-        "profile": l2(found.profiles_at(y), exact.profiles_at(y)),
-        "volume": _apart(*volumes),
+        "depth": _relative_difference(
+            greatest_depth(approximate.state), greatest_depth(exact.state)
+        ),
+        "profile": l2(approximate.profiles_at(y), exact.profiles_at(y)),
+        "volume": _relative_difference(*volumes),
     }
 
 
-def _apart(found: FloatArray, exact: FloatArray) -> float:
-    return float(np.abs(found / exact - 1.0).max())
+def _relative_difference(value: FloatArray, exact: FloatArray) -> float:
+    return float(np.abs(value / exact - 1.0).max())

@@ -1,4 +1,4 @@
-"""Wear as a stiff differential equation, for solvers that know nothing of contacts."""
+"""Wear as a stiff differential equation for general-purpose solvers."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from wearsim.types import FloatArray
 
 Solver = Literal["BDF", "LSODA"]
 SOLVERS: tuple[Solver, ...] = ("BDF", "LSODA")
-MOST_SOLVES = 20_000  # of contacts, after which a solver is stopped: several times what any needs
-_SMALL = 1e-4  # of the approach: how much a profile is changed to see the wear change
+MOST_SOLVES = 20_000  # limit on contact solves, several times the largest number required
+_SMALL = 1e-4  # increment of finite differences, relative to the approach
 
 
 class _Rates:
-    """The wear per pass of the worn depths, both over the approach of the fresh contacts.
+    """Wear per pass as a function of the depths, both scaled by the approach of fresh contacts.
 
-    Bodies that do not wear are left out. Contacts start at the last ones solved.
+    Bodies without wear are omitted. Contacts are warm-started from the last solution.
 
     Parameters
     ----------
     problem : WearProblem
-        Without terms of the load, which have a state of their own.
+        A problem without load terms, which have separate states.
     most : int
-        Contacts that are solved at most.
+        Largest number of contact solves.
     """
 
     def __init__(self, problem: WearProblem, most: int) -> None:
@@ -50,7 +50,7 @@ class _Rates:
         return self._joined({name: getattr(self.state, name) for name in DEPTHS})
 
     def state_at(self, passes: float, depths: FloatArray) -> WearState:
-        """Return the test at some depths, its contacts those last solved."""
+        """Return the state with these depths and the contacts solved last."""
         values: dict[str, Any] = {}
         first = 0
         for name in self.bodies:
@@ -61,16 +61,16 @@ class _Rates:
         return self.state.advanced_to(passes, **values)
 
     def __call__(self, passes: float, depths: FloatArray) -> FloatArray:
-        """Return the wear per pass at some depths, after some passes.
+        """Return the wear per pass at these depths and number of passes.
 
         Raises
         ------
         StepError
-            If it has been asked for too many times.
+            If the number of contact solves exceeds the limit.
         """
         if self.solves >= self.most:
             raise StepError(
-                f"the solver asked for more than {self.most} contacts", {"passes": passes}
+                f"the solver requires more than {self.most} contact solves", {"passes": passes}
             )
         state = self.state_at(passes, depths)
         contacts = solve_present(self.problem, state, present_loads(self.problem, state))
@@ -79,18 +79,18 @@ class _Rates:
         return self._joined(self._wear())
 
     def jacobian(self, passes: float, depths: FloatArray) -> FloatArray:
-        """Return how the wear per pass answers to every depth; none does where nothing wears.
+        """Return the Jacobian of the wear per pass; its columns without wear are zero.
 
-        The solver's own differences change a depth that has no effect more and more, until a
-        single strip carries the contact.
+        The finite differences of the solvers would increase the change of a depth that has no
+        effect until a single strip carries the load.
         """
         rate = self(passes, depths)
-        found = np.zeros((len(depths), len(depths)))
+        jacobian = np.zeros((len(depths), len(depths)))
         for strip in np.flatnonzero(rate):
             changed = depths.copy()
             changed[strip] += _SMALL
-            found[:, strip] = (self(passes, changed) - rate) / _SMALL
-        return found
+            jacobian[:, strip] = (self(passes, changed) - rate) / _SMALL
+        return jacobian
 
     def _joined(self, depths: dict[str, FloatArray]) -> FloatArray:
         joined: FloatArray = np.concatenate([depths[name].ravel() for name in self.bodies])
@@ -100,40 +100,41 @@ class _Rates:
 def solved_by(
     solver: Solver, problem: WearProblem, passes: float, tolerance: float, most: int = MOST_SOLVES
 ) -> WearState:
-    """Return the test after some passes, stepped by a solver of scipy's.
+    """Return the state after a number of passes, computed by a solver of scipy.
 
     Parameters
     ----------
     solver : {"BDF", "LSODA"}
+        The solver.
     problem : WearProblem
-        Without terms of the load.
+        A problem without load terms.
     passes : float
-        From fresh bodies.
+        Number of passes from fresh bodies.
     tolerance : float
-        Of each of the solver's steps, relative, and absolute as a part of the fresh approach.
+        Relative tolerance of each step, and absolute tolerance relative to the fresh approach.
     most : int
-        Contacts that are solved at most.
+        Largest number of contact solves.
 
     Returns
     -------
     WearState
-        Depths, and contact solves; `contacts` are those that were solved last, `energy` is not
-        known.
+        State with depths and number of contact solves; `contacts` are those solved last, `energy`
+        is not set.
 
     Raises
     ------
     StepError
-        If the solver gives up, or asks for too many contacts.
+        If the solver fails, or the number of contact solves exceeds the limit.
     ContactError
-        If it asks for a contact that has no solution.
+        If a contact has no solution.
     """
     from scipy.integrate import solve_ivp  # noqa: PLC0415  (slow to import)
 
     rates = _Rates(problem, most)
     options: dict[str, Any] = {"rtol": tolerance, "atol": tolerance, "jac": rates.jacobian}
     options["t_eval"] = [passes]
-    found = solve_ivp(rates, (0.0, passes), rates.start(), solver, **options)
-    if not found.success:
-        raise StepError(f"{solver} gave up: {found.message}", {"passes": found.t})
-    end = rates.state_at(passes, found.y[:, -1])
+    solution = solve_ivp(rates, (0.0, passes), rates.start(), solver, **options)
+    if not solution.success:
+        raise StepError(f"{solver} failed: {solution.message}", {"passes": solution.t})
+    end = rates.state_at(passes, solution.y[:, -1])
     return replace(end, solves=rates.solves, steps=0)
