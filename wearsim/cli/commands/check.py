@@ -7,9 +7,9 @@ from wearsim.cli.output import write_notes, write_table
 
 
 def check(scenario: ScenarioFile, settings: Settings = None) -> None:
-    """Check a scenario: print all mistakes, or a table of what will run."""
+    """Check a scenario: print all mistakes, or what will run."""
     loaded = read_scenario(scenario, settings)
-    from wearsim.studies.run.dry_run import plan
+    from wearsim.studies.dry_run import plan
 
     write_table(f"ok: {loaded.title}", plan(loaded))
     write_notes(loaded.notes)
