@@ -91,6 +91,7 @@ def _distribution(point: EntryPoint) -> str:
 
 
 def _summary(point: EntryPoint) -> str:
-    if point.dist is None or "Summary" not in point.dist.metadata:
-        return f"From {_distribution(point)}."
-    return point.dist.metadata["Summary"]
+    # the text itself: parsing all metadata as an e-mail message takes longer
+    lines = ((point.dist and point.dist.read_text("METADATA")) or "").splitlines()
+    summaries = [line.partition(": ")[2] for line in lines if line.startswith("Summary: ")]
+    return summaries[0] if summaries else f"From {_distribution(point)}."

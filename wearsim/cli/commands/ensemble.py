@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -240,4 +239,6 @@ def _are_equal(one: str, other: str) -> bool:
         factor = conversion(other_unit, unit)
     except ValueError:  # reported when the scenario is read
         return one == other
+    from fractions import Fraction
+
     return Fraction(first) == Fraction(second) * factor
