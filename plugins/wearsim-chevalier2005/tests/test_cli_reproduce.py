@@ -1,4 +1,4 @@
-"""The verb reproduce: a table, JSON in SI, the figure, and what it refuses."""
+"""Verb `reproduce`: table, JSON in SI units, figure, and refused arguments."""
 
 from __future__ import annotations
 
@@ -9,12 +9,10 @@ import pytest
 
 from tests.cli.cli_examples import Command
 
-pytestmark = pytest.mark.bench
-
 FEW = ("reproduce", "-n", "40", "--quiet")
 
 
-def test_that_paper_and_here_stand_side_by_side(command: Command, tmp_path: Path) -> None:
+def test_table_has_printed_and_computed_values(command: Command, tmp_path: Path) -> None:
     result = command(*FEW)
     assert (result.exit_code, result.stderr) == (0, "")
     lines = result.stdout.splitlines()
@@ -32,10 +30,10 @@ def test_that_paper_and_here_stand_side_by_side(command: Command, tmp_path: Path
     (speed,) = [line for line in lines if "rolling speed V  " in line]
     assert "2 to 3 m/s" in speed
     assert "2.618 m/s" in speed
-    assert not list(tmp_path.iterdir())  # nothing is written unasked
+    assert not list(tmp_path.iterdir())  # no files without -o
 
 
-def test_that_json_is_in_si_and_all_there_is(command: Command) -> None:
+def test_json_has_all_rows_in_si_units(command: Command) -> None:
     result = command(*FEW, "--json")
     data = json.loads(result.stdout)
     assert (result.stderr, data["realisations"], data["seed"]) == ("", 40, 1)
@@ -53,7 +51,7 @@ def test_that_json_is_in_si_and_all_there_is(command: Command) -> None:
     assert 0.0 < mean["standard_error"] < mean["here"]
 
 
-def test_that_the_seed_is_taken(command: Command) -> None:
+def test_seed_option_sets_the_seed(command: Command) -> None:
     first, second = (
         json.loads(command("reproduce", "-n", 2, "--seed", seed, "--json", "-q").stdout)
         for seed in (1, 2)
@@ -64,23 +62,23 @@ def test_that_the_seed_is_taken(command: Command) -> None:
     assert here[0] != here[1]
 
 
-def test_that_the_figure_is_drawn_and_an_existing_one_left(
-    command: Command, tmp_path: Path
-) -> None:
+def test_figure_is_overwritten_only_with_force(command: Command, tmp_path: Path) -> None:
     figure = tmp_path / "reproduce.png"
-    figure.write_text("mine")
+    figure.write_text("existing")
     result = command("reproduce", "-n", 2, "-o", figure, "-q")
     assert result.exit_code == 2
-    assert figure.read_text() == "mine"
+    assert figure.read_text() == "existing"
     result = command("reproduce", "-n", 2, "-o", figure, "-q", "--force")
     assert (result.exit_code, result.stderr) == (0, f"figure: {figure}\n")
     assert figure.read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"), [(("-n", "1"), "'--realisations' / '-n'"), (("-o", "x.txt"), ".png")]
+    ("arguments", "message"), [(("-n", "1"), "'--realisations' / '-n'"), (("-o", "x.txt"), ".png")]
 )
-def test_that_bad_input_is_told(command: Command, arguments: tuple[str, ...], told: str) -> None:
+def test_invalid_arguments_are_refused(
+    command: Command, arguments: tuple[str, ...], message: str
+) -> None:
     result = command("reproduce", *arguments)
     assert result.exit_code == 2
-    assert told in result.stderr
+    assert message in result.stderr

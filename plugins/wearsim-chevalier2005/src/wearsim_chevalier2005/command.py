@@ -1,4 +1,4 @@
-"""`wearsim reproduce`: the paper's numbers and figures beside those found here."""
+"""`wearsim reproduce`: comparison with the numbers and figures of the paper."""
 
 from __future__ import annotations
 
@@ -18,12 +18,14 @@ if TYPE_CHECKING:
 Count = Annotated[
     int,
     typer.Option(
-        "--realisations", "-n", min=2, metavar="N", help="Realisations of every Monte Carlo."
+        "--realisations", "-n", min=2, metavar="N", help="Realisations of each Monte Carlo study."
     ),
 ]
 Seed = Annotated[
     int | None,
-    typer.Option(min=0, metavar="SEED", help="Seed of the Monte Carlo.", show_default=False),
+    typer.Option(
+        min=0, metavar="SEED", help="Seed of the Monte Carlo studies.", show_default=False
+    ),
 ]
 _COLUMNS = {"": 28, "paper": 15, "here": 23, "why they differ": None}
 _SI = {"mm": "m", "%": "1"}
@@ -45,34 +47,34 @@ def reproduce(
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
-    """Compute the paper's numbers anew; -o draws its figures too."""
+    """Compute the numbers of the paper; -o draws its figures too."""
     check_figure(figure, force)
     from wearsim.cli.progress.realisations import counting
     from wearsim_chevalier2005.comparison import compare
     from wearsim_chevalier2005.study import reproduce as study
 
     with counting(quiet, "realisations") as counted:
-        found = study(realisations, seed, on_progress=counted)
-    rows = compare(found)
+        results = study(realisations, seed, on_progress=counted)
+    rows = compare(results)
     if figure is not None:
-        _draw(found, figure)
+        _draw(results, figure)
     if json:
-        write_json(_data(found, rows, figure))
+        write_json(_data(results, rows, figure))
         return
-    _write(found, rows)
+    _write(results, rows)
     if figure is not None:
         note(f"figure: {figure}")
 
 
-def _draw(found: Reproduction, path: Path) -> None:
+def _draw(results: Reproduction, path: Path) -> None:
     from wearsim.report.parts.saving import save_figure
     from wearsim_chevalier2005.figures import reproduction_figure
 
-    save_figure(reproduction_figure(found), path)
+    save_figure(reproduction_figure(results), path)
 
 
-def _write(found: Reproduction, rows: tuple[Row, ...]) -> None:
-    """Write the rows to stdout, a table for each part."""
+def _write(results: Reproduction, rows: tuple[Row, ...]) -> None:
+    """Write a table for each part to stdout."""
     from itertools import groupby
 
     from rich import box
@@ -84,18 +86,18 @@ def _write(found: Reproduction, rows: tuple[Row, ...]) -> None:
     screen = console()
     screen.print(REFERENCE)
     screen.print(
-        f"{count(found.all_inputs.count)} realisations, seed {found.scenario.seed}; ± is the"
-        " standard error of what comes from them\n"
+        f"{count(results.all_inputs.count)} realisations, seed {results.scenario.seed}; ± is the"
+        " standard error of values from realisations\n"
     )
-    for number, (part, those) in enumerate(groupby(rows, lambda row: row.part)):
+    for number, (part, part_rows) in enumerate(groupby(rows, lambda row: row.part)):
         table = Table(
             title=part, title_justify="left", show_header=number == 0, box=box.SIMPLE_HEAD
         )
         for head, width in _COLUMNS.items():
             table.add_column(head, width=width)
-        for row in those:
+        for row in part_rows:
             printed = "-" if row.paper is None else _as_printed(row)
-            table.add_row(row.name, printed, _found(row), row.why)
+            table.add_row(row.name, printed, _computed(row), row.why)
         screen.print(table)
 
 
@@ -108,7 +110,7 @@ def _with_unit(numbers: str, unit: str) -> str:
 
 
 def _as_printed(row: Row) -> str:
-    """Return what the paper prints, with the digits it has there."""
+    """Return the printed value with the printed digits."""
     from wearsim.report.text.units import PER_SI
 
     factor = PER_SI.get(row.unit, 1.0)
@@ -116,8 +118,8 @@ def _as_printed(row: Row) -> str:
     return _with_unit(" to ".join(numbers), row.unit)
 
 
-def _found(row: Row) -> str:
-    """Return what was found here, and how sure it is."""
+def _computed(row: Row) -> str:
+    """Return the computed value with its standard error."""
     digits = 5 if row.part == "inputs" and row.standard_error is None else 4
     text = " to ".join(_shown(value, row.unit, digits) for value in _ends(row.here))
     if row.standard_error is not None:
@@ -127,20 +129,20 @@ def _found(row: Row) -> str:
 
 
 def _shown(value: float, unit: str, digits: int) -> str:
-    """Return a number in a unit, without the unit."""
+    """Return a number converted to a unit, without the unit."""
     from wearsim.report.text.units import PER_SI, shown
 
     return shown(value, unit if unit in PER_SI else "1", digits).removesuffix(f" {unit}")
 
 
-def _data(found: Reproduction, rows: tuple[Row, ...], figure: Path | None) -> dict[str, Any]:
-    """Return the rows in SI."""
+def _data(results: Reproduction, rows: tuple[Row, ...], figure: Path | None) -> dict[str, Any]:
+    """Return the rows for JSON, in SI units."""
     from wearsim_chevalier2005.paper import REFERENCE
 
     return {
         "reference": REFERENCE,
-        "realisations": found.all_inputs.count,
-        "seed": found.scenario.seed,
+        "realisations": results.all_inputs.count,
+        "seed": results.scenario.seed,
         "rows": [
             {
                 "name": f"{row.part}: {row.name}",

@@ -1,4 +1,4 @@
-"""The paper's contact, inputs and mean problem beside what is found here."""
+"""Comparison of contact, random inputs and mean problem."""
 
 from __future__ import annotations
 
@@ -19,36 +19,36 @@ from wearsim_chevalier2005.study import Reproduction
 EXACT_POWER = 0.0771  # W, the mean problem by CONTACT (Vollebregt and Kalker), a half-space code
 
 
-def contact_rows(found: Reproduction) -> list[Row]:
-    """Return size and speed of the contact, and its traction bound."""
-    part, load = "contact", found.mean.point.normal_force
-    problems = {"": found.mean_scenario, ", printed radii": found.printed_scenario}
+def contact_rows(results: Reproduction) -> list[Row]:
+    """Return the rows of size and speed of the contact, and of its traction bound."""
+    part, load = "contact", results.mean.point.normal_force
+    problems = {"": results.mean_scenario, ", printed radii": results.printed_scenario}
     patches = {name: fresh_patch(problem, load) for name, problem in problems.items()}
     halved, literal = patches[""], patches[", printed radii"]
-    diameters = f"with {_radii(found.mean_scenario)}: the paper's radii are diameters"
+    diameters = f"with {_radii(results.mean_scenario)}: the radii of the paper are diameters"
     bound = 2.0 * load / (math.pi * halved.a * halved.b)
     return [
         beside(part, "length 2a", "mm", paper.CONTACT_LENGTH, 2.0 * halved.a, diameters),
         beside(part, "width 2b", "mm", paper.CONTACT_WIDTH, 2.0 * halved.b, "as above"),
         beside(
             part, "length 2a, printed radii", "mm", paper.CONTACT_LENGTH, 2.0 * literal.a,
-            f"with {_radii(found.printed_scenario)} taken as radii, as they are called",
+            f"with {_radii(results.printed_scenario)} taken as radii, as printed",
         ),
         beside(
             part, "width 2b, printed radii", "mm", paper.CONTACT_WIDTH, 2.0 * literal.b, "as above"
         ),
         beside(
-            part, "rolling speed V", "m/s", paper.SPEED, found.mean.point.rolling_speed,
-            "1000 rpm of the cylinder; section 3.3 leaves its number out",
+            part, "rolling speed V", "m/s", paper.SPEED, results.mean.point.rolling_speed,
+            "1000 rpm of the cylinder; the value is missing in section 3.3",
         ),
         beside(
             part, "rolling speed V, printed radii", "m/s", paper.SPEED,
-            found.as_printed.point.rolling_speed, "outside what is printed: diameters again",
+            results.as_printed.point.rolling_speed, "outside the printed range: diameters again",
         ),
         beside(
             part, "rise of p0 under the parabolic bound", "%", paper.BOUND_RISE,
             bound / halved.peak_pressure - 1.0,
-            "the same load is 2 N/(pi a b) instead of 3 N/(2 pi a b): a third more",
+            "2 N/(pi a b) instead of 3 N/(2 pi a b) for the same load: a third more",
         ),
     ]  # fmt: skip
 
@@ -59,7 +59,7 @@ def _radii(scenario: Scenario) -> str:
 
 
 def law_of(scenario: Scenario, key: str) -> MaxentDistribution:
-    """Return the law of maximum entropy that a scenario's random input draws from."""
+    """Return the maximum-entropy distribution of a random input."""
     (item,) = (item for item in scenario.random if item.name == key)
     if not isinstance(item.distribution, AnalyticDistribution):
         raise TypeError(f"{key} has no law: its distribution is {item.kind}")
@@ -67,7 +67,7 @@ def law_of(scenario: Scenario, key: str) -> MaxentDistribution:
 
 
 def printed_area(printed: paper.PrintedMultipliers, law: MaxentDistribution) -> float:
-    """Return what the density with the printed multipliers integrates to; 1 for a density."""
+    """Return the integral of the density with the printed multipliers; 1 for exact multipliers."""
     low, high = law.bulk
     x = np.linspace(low - (high - low), high + (high - low), 20001)
     x = x[(x >= law.support[0]) & (x <= law.support[1])]
@@ -75,25 +75,25 @@ def printed_area(printed: paper.PrintedMultipliers, law: MaxentDistribution) -> 
     return float(np.trapezoid(density, x))
 
 
-def input_rows(found: Reproduction) -> list[Row]:
-    """Return the laws of maximum entropy and the spread of the misalignment."""
-    load, creepage = law_of(found.scenario, LOAD), law_of(found.scenario, LONGITUDINAL)
+def input_rows(results: Reproduction) -> list[Row]:
+    """Return the rows of the maximum-entropy distributions and of the misalignment."""
+    load, creepage = law_of(results.scenario, LOAD), law_of(results.scenario, LONGITUDINAL)
     area = printed_area(paper.LOAD_MULTIPLIERS, load)
-    radius, printed_radius = found.scenario.roller.radius, paper.ROLLER_RADIUS.value
-    drawn = found.all_inputs.inputs
+    radius, printed_radius = results.scenario.roller.radius, paper.ROLLER_RADIUS.value
+    drawn = results.all_inputs.inputs
     lateral, tilt = summarise(drawn[YAW]), summarise(drawn[TILT])
     return [
         *_multipliers(
             "load N", "N", paper.LOAD_MULTIPLIERS, load,
             (
                 "agrees",
-                "cut after three digits, not rounded",
+                "truncated after three digits, not rounded",
                 f"agrees; with the printed digits the density integrates to {area:.2f}",
             ),
         ),
         *_multipliers(
             "creepage xi", "", paper.CREEPAGE_MULTIPLIERS, creepage,
-            ("the last printed digit is one off", "agrees", "cut, not rounded"),
+            ("the last printed digit differs by one", "agrees", "truncated, not rounded"),
         ),
         beside(
             "inputs", "std of lateral creepage", "1", paper.LATERAL_STD, lateral.std,
@@ -123,22 +123,22 @@ def _multipliers(
     ]
 
 
-def mean_problem_rows(found: Reproduction) -> list[Row]:
-    """Return the power of the mean problem by several routes."""
+def mean_problem_rows(results: Reproduction) -> list[Row]:
+    """Return the rows of the power of the mean problem by several methods."""
     part, printed = "mean problem", paper.MEAN_PROBLEM_POWER
-    fastsim, summed = found.mean.solution.power, found.element_sum.solution.power
-    literal = found.as_printed.solution.power
+    fastsim, summed = results.mean.solution.power, results.element_sum.solution.power
+    literal = results.as_printed.solution.power
     return [
         beside(
             part, "P_d, FASTSIM, converged", "W", printed, fastsim,
-            "integrated exactly along every strip; the paper sums over its elements",
+            "integrated exactly along every strip; the paper sums over elements",
         ),
         beside(
             part, "P_d, FASTSIM, element sum 50 x 50", "W", printed, summed,
-            "first order: depends on where in an element traction, slip and bound are taken",
+            "first order: depends on the evaluation points within an element",
         ),
         beside(
-            part, "P_d, slender", "W", printed, found.slender.solution.power,
+            part, "P_d, slender", "W", printed, results.slender.solution.power,
             f"exact half-space theory (CONTACT): {EXACT_POWER} W; FASTSIM is"
             f" {percent(1.0 - fastsim / EXACT_POWER)} below it",
         ),

@@ -1,4 +1,4 @@
-"""One number of the paper beside the one found here."""
+"""Rows of the comparison with the paper."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ Number: TypeAlias = float | tuple[float, float]
 
 @dataclass(frozen=True)
 class Row:
-    """One number of the paper beside the one found here.
+    """A printed number and the computed one.
 
     Parameters
     ----------
     part : str
-        What it belongs to.
+        Part of the comparison.
     name : str
-        What it is, unlike any other of its part.
+        Name of the quantity, unique in its part.
     unit : str
-        Unit in which an engineer reads it.
+        Unit for display.
     paper : float or tuple of float, optional
-        As printed, in SI; a range has two ends.
+        Printed value or range, in SI units.
     place : str
-        Where it stands in the paper.
+        Section or equation of the paper.
     here : float or tuple of float
-        As found here, in SI.
+        Computed value or range, in SI units.
     standard_error : float or tuple of float, optional
-        Of `here`, where it comes from realisations.
+        Standard error of `here`, for values from realisations.
     why : str
-        Why the two differ.
+        Reason of the difference.
     """
 
     part: str

@@ -1,4 +1,4 @@
-"""The paper's Monte Carlo beside what is found here."""
+"""Comparison of the Monte Carlo study."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from wearsim_chevalier2005 import paper
 from wearsim_chevalier2005.comparison_row import Row, beside, percent
 from wearsim_chevalier2005.study import VARIANTS, Reproduction, Variant
 
-_NORMAL_95 = 1.959964  # standard errors to either end of a 95 % interval
-_SURE = 4.0  # standard errors that no chance makes up
+_NORMAL_95 = 1.959964  # half-width of a 95 % interval in standard errors
+_SIGNIFICANT = 4.0  # standard errors of a significant difference
 
 _TITLES = {
     (False, False): "uniform friction",
@@ -23,12 +23,12 @@ _TITLES = {
 }
 
 
-def mean_rows(found: Reproduction) -> list[Row]:
-    """Return the mean power of every variant."""
+def mean_rows(results: Reproduction) -> list[Row]:
+    """Return the rows of the mean power of all variants."""
     rows = []
     for variant in VARIANTS:
         printed = paper.ALIGNED_MEAN_POWER if variant.aligned else paper.MEAN_POWER
-        power = found.spread[variant].summaries["power"]
+        power = results.spread[variant].summaries["power"]
         which = "no lateral creepage and spin" if variant.aligned else "all inputs random"
         title = _TITLES[variant.white, variant.element_sum]
         rows.append(
@@ -38,39 +38,37 @@ def mean_rows(found: Reproduction) -> list[Row]:
                 "W",
                 printed,
                 power.mean,
-                _why_mean(found, variant, power),
+                _why_mean(results, variant, power),
                 power.mean_error,
             )
         )
     return rows
 
 
-def _why_mean(found: Reproduction, variant: Variant, power: Summary) -> str:
+def _why_mean(results: Reproduction, variant: Variant, power: Summary) -> str:
     uniform = Variant(variant.aligned, white=False, element_sum=False)
-    less = percent(1.0 - power.mean / found.spread[uniform].summaries["power"].mean)
+    less = percent(1.0 - power.mean / results.spread[uniform].summaries["power"].mean)
     if variant.white:
-        grid = f"every cell has its own friction, as in the paper: {less} less"
+        grid = f"independent friction in every cell, as in the paper: {less} less"
         if variant.element_sum:
-            return f"{grid}; both are the paper's choices, as far as it tells them"
-        return f"{grid}, and less still on a finer grid"
+            return f"{grid}; both are the choices of the paper, as far as stated"
+        return f"{grid}, and even less on a finer grid"
     if variant.element_sum:
-        return f"reads {less} lower"
+        return f"{less} lower"
     if variant.aligned:
-        alone = found.aligned.mean_problem_power
-        return f"one coefficient per contact; all inputs at their mean give {alone:.4f} W"
-    return (
-        f"cannot be more than mu N V |creepage|, {float(found.most_power.mean()):.3f} W on average"
-    )
+        alone = results.aligned.mean_problem_power
+        return f"one coefficient per contact; {alone:.4f} W with all inputs at their mean"
+    return f"bounded by mu N V |creepage|, {float(results.max_power.mean()):.3f} W on average"
 
 
-def range_rows(found: Reproduction) -> list[Row]:
-    """Return between which powers most realisations lie."""
+def range_rows(results: Reproduction) -> list[Row]:
+    """Return the rows of the range of the power."""
     part = "range of P_d, all inputs random"
-    uniform = found.all_inputs.summaries["power"]
-    white = found.spread[Variant(aligned=False, white=True, element_sum=True)].summaries["power"]
+    uniform = results.all_inputs.summaries["power"]
+    white = results.spread[Variant(aligned=False, white=True, element_sum=True)].summaries["power"]
     rows = [
-        ("uniform friction", uniform, BAND, "the middle 95 %; P+ and P- are swapped in print"),
-        ("uniform friction", uniform, PAPER_BAND, "eq. 21 cuts 5 % off either end: 90 % are left"),
+        ("uniform friction", uniform, BAND, "central 95 %; P+ and P- are swapped in print"),
+        ("uniform friction", uniform, PAPER_BAND, "eq. 21 removes 5 % at either end: 90 % remain"),
         ("white friction, element sum", white, BAND, "the mean over the cells varies less"),
     ]
     return [
@@ -88,56 +86,57 @@ def range_rows(found: Reproduction) -> list[Row]:
 
 
 def _error(quantile: Quantile) -> float:
-    """Return a standard error that would give the quantile's 95 % interval, were it normal."""
+    """Return the standard error of a normal estimate with the 95 % interval of the quantile."""
     return (quantile.high - quantile.low) / (2.0 * _NORMAL_95)
 
 
-def convergence_rows(found: Reproduction) -> list[Row]:
-    """Return how sure mean and standard deviation are where the paper calls them converged."""
-    part, power = "convergence", found.all_inputs.power
+def convergence_rows(results: Reproduction) -> list[Row]:
+    """Return the rows of the errors at the number of realisations given in the paper."""
+    part, power = "convergence", results.all_inputs.power
     at = min(round(paper.CONVERGED_AT.value), len(power))
     called = ": called converged in print" if at == paper.CONVERGED_AT.value else ""
-    settled, whole = converge(power, np.array([at])), found.all_inputs.summaries["power"]
-    mean, std = float(settled.mean_error[0]), float(settled.std_error[0])
+    estimates, summary = converge(power, np.array([at])), results.all_inputs.summaries["power"]
+    mean, std = float(estimates.mean_error[0]), float(estimates.std_error[0])
     place = paper.CONVERGED_AT.place
     return [
         Row(
             part, f"standard error of the mean at {at}", "W", None, place, mean, None,
-            f"{percent(mean / whole.mean)} of the mean{called}",
+            f"{percent(mean / summary.mean)} of the mean{called}",
         ),
         Row(
             part, f"standard error of the std at {at}", "W", None, place, std, None,
-            f"{percent(std / whole.std)} of the standard deviation",
+            f"{percent(std / summary.std)} of the standard deviation",
         ),
         beside(
             part, "realisations for the mean to 1 %", "1", paper.CONVERGED_AT,
-            (whole.std / (0.01 * whole.mean)) ** 2, "until its standard error is 1 % of it",
+            (summary.std / (0.01 * summary.mean)) ** 2, "for a standard error of 1 % of the mean",
         ),
     ]  # fmt: skip
 
 
-def bound_rows(found: Reproduction) -> list[Row]:
-    """Return how the printed powers stand to the most that the printed inputs can give."""
-    part, limit = "most power there can be, mu N V |creepage|", found.most_power
+def bound_rows(results: Reproduction) -> list[Row]:
+    """Return the rows that compare the printed powers with the upper bound."""
+    part, limit = "upper bound of the power, mu N V |creepage|", results.max_power
     summary, high = summarise(limit), paper.POWER_RANGE.high
     count, reaching = len(limit), int((limit >= high).sum())
-    # as if one more had reached and one more had not, so that none at all is not without error
+    # one success and one failure added, so that the standard error of zero counts is not zero
     smoothed = (reaching + 1.0) / (count + 2.0)
     error = math.sqrt(smoothed * (1.0 - smoothed) / count)
     beyond = (paper.MEAN_POWER.value - summary.mean) / summary.mean_error
     return [
         beside(
-            part, "its mean", "W", paper.MEAN_POWER, summary.mean,
-            f"the printed mean is {beyond:.0f} standard errors above what its inputs can give"
-            if beyond > _SURE else "too few realisations to tell it from the printed mean",
+            part, "mean", "W", paper.MEAN_POWER, summary.mean,
+            f"the printed mean is {beyond:.0f} standard errors above this upper bound"
+            if beyond > _SIGNIFICANT
+            else "too few realisations to distinguish it from the printed mean",
             summary.mean_error,
         ),
         Row(
-            part, "its greatest", "W", high, paper.POWER_RANGE.place, summary.greatest, None,
-            f"of {count} realisations, against the upper end of the paper's range",
+            part, "largest", "W", high, paper.POWER_RANGE.place, summary.greatest, None,
+            f"of {count} realisations, compared with the upper end of the range in the paper",
         ),
         beside(
             part, f"realisations that could reach {high:g} W", "%", paper.ABOVE_RANGE,
-            reaching / count, "eq. 21 has 5 % of them beyond the upper end of the range", error,
+            reaching / count, "in eq. 21, 5 % are above the upper end of the range", error,
         ),
     ]  # fmt: skip

@@ -1,4 +1,4 @@
-"""The paper's figures of random inputs and of the power they give, drawn anew."""
+"""Panels of the random inputs and of the power."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ MM, W_MM = PER_SI["mm"], PER_SI["W/mm"]
 CLASSES = round(paper.CLASSES.value)
 MOST_LINES = 1000
 _BARS = 20
-_SETTLING = 10  # realisations before which an estimate is too wild to set the scale
+_FIRST = 10  # realisations below which an estimate does not set the scale
 _Y = "y across [mm]"
 
 
-def draw_inputs(panels: dict[str, Axes], found: Reproduction) -> None:
-    """Draw the load's law and realisations, and bars of lateral creepage and spin."""
-    _draw_load_law(panels["9a"], found)
-    loads = found.all_inputs.values("normal_force")
+def draw_inputs(panels: dict[str, Axes], results: Reproduction) -> None:
+    """Draw the load, and histograms of lateral creepage and spin."""
+    _draw_load_distribution(panels["9a"], results)
+    loads = results.all_inputs.values("normal_force")
     axes = panels["9b"]
     axes.plot(np.arange(1, len(loads) + 1), loads, ".", ms=2.5, color=BLUE)
     for away in (-1.0, 0.0, 1.0):
         _mark_level(axes, paper.LOAD_MEAN.value + away * paper.LOAD_STD.value)
-    name_axes(axes, "Fig. 9b: its realisations; mean, mean ± std", "realisation", "N [N]")
-    drawn, radius = found.all_inputs.inputs, found.scenario.roller.radius
+    name_axes(axes, "Fig. 9b: realisations of N; mean, mean ± std", "realisation", "N [N]")
+    drawn, radius = results.all_inputs.inputs, results.scenario.roller.radius
     _draw_bars(panels["11a"], drawn[YAW], paper.LATERAL_STD.value)
     name_axes(panels["11a"], "Fig. 11a: lateral creepage; ± std", "eta", "realisations")
     panels["11a"].ticklabel_format(axis="x", scilimits=(0, 0))
@@ -44,18 +44,18 @@ def draw_inputs(panels: dict[str, Axes], found: Reproduction) -> None:
     name_axes(panels["11b"], "Fig. 11b: spin; ± std", "phi [1/m]", "realisations")
 
 
-def _draw_load_law(axes: Axes, found: Reproduction) -> None:
-    law, printed = law_of(found.scenario, LOAD), paper.LOAD_MULTIPLIERS
+def _draw_load_distribution(axes: Axes, results: Reproduction) -> None:
+    law, printed = law_of(results.scenario, LOAD), paper.LOAD_MULTIPLIERS
     low, high = law.bulk
     n = np.linspace(max(law.support[0], low - 0.2 * (high - low)), high, 401)
-    loads = found.all_inputs.values("normal_force")
+    loads = results.all_inputs.values("normal_force")
     axes.hist(loads, CLASSES, density=True, color=BLUE, alpha=0.3, label="realisations")
     axes.plot(n, law.density(n), color=BLUE, label="maximum entropy")
     rounded = np.exp(-(printed.l0 + printed.l1 * n + printed.l2 * n * n))
-    axes.plot(n, rounded, color=RED, ls="--", label="with the printed digits")
+    axes.plot(n, rounded, color=RED, ls="--", label="printed multipliers")
     _name_lines(axes, "upper left")
     axes.set_ylim(top=1.25 * axes.get_ylim()[1])
-    name_axes(axes, "Fig. 9a: law of the load N", "N [N]", "density [1/N]")
+    name_axes(axes, "Fig. 9a: distribution of the load N", "N [N]", "density [1/N]")
 
 
 def _draw_bars(axes: Axes, values: FloatArray, std: float) -> None:
@@ -64,36 +64,36 @@ def _draw_bars(axes: Axes, values: FloatArray, std: float) -> None:
         _mark_place(axes, place)
 
 
-def draw_settling(panels: dict[str, Axes], found: Reproduction) -> None:
+def draw_convergence(panels: dict[str, Axes], results: Reproduction) -> None:
     """Draw mean and standard deviation of the power against the number of realisations."""
-    settled = found.all_inputs.convergence()
-    estimates = {
-        "mean": (settled.mean, settled.mean_error),
-        "std": (settled.std, settled.std_error),
+    estimates = results.all_inputs.convergence()
+    curves = {
+        "mean": (estimates.mean, estimates.mean_error),
+        "std": (estimates.std, estimates.std_error),
     }
-    for name, (value, error) in estimates.items():
+    for name, (value, error) in curves.items():
         axes = panels[f"14 {name}"]
         axes.fill_between(
-            settled.count, value - error, value + error, color=BLUE, alpha=0.25, lw=0,
+            estimates.count, value - error, value + error, color=BLUE, alpha=0.25, lw=0,
             label="± standard error",
         )  # fmt: skip
-        axes.plot(settled.count, value, color=BLUE)
-        late = (settled.count >= min(_SETTLING, settled.count[-1])) & np.isfinite(error)
+        axes.plot(estimates.count, value, color=BLUE)
+        late = (estimates.count >= min(_FIRST, estimates.count[-1])) & np.isfinite(error)
         low, high = float((value - error)[late].min()), float((value + error)[late].max())
         if name == "mean":
             _mark_level(axes, paper.MEAN_POWER.value)
             high = max(high, paper.MEAN_POWER.value)
         axes.set_ylim(low - 0.08 * (high - low), high + 0.08 * (high - low))
-        axes.set_xlim(0.0, float(settled.count[-1]))
-        if settled.count[-1] >= paper.CONVERGED_AT.value:
+        axes.set_xlim(0.0, float(estimates.count[-1]))
+        if estimates.count[-1] >= paper.CONVERGED_AT.value:
             _mark_place(axes, paper.CONVERGED_AT.value)
         _name_lines(axes, "upper right" if name == "std" else "lower right")
         name_axes(axes, f"Fig. 14: {name} of $P_d$ [W]", "realisations", "")
 
 
-def draw_powers(panels: dict[str, Axes], found: Reproduction) -> None:
+def draw_powers(panels: dict[str, Axes], results: Reproduction) -> None:
     """Draw the distribution of the power with all inputs, and without misalignment."""
-    whole = found.all_inputs
+    whole = results.all_inputs
     axes = panels["15a"]
     weights = np.full(whole.count, 1.0 / whole.count)
     axes.hist(whole.power, CLASSES, weights=weights, color=BLUE, alpha=0.6, edgecolor="white")
@@ -102,36 +102,37 @@ def draw_powers(panels: dict[str, Axes], found: Reproduction) -> None:
     axes = panels["15b"]
     across = _across(whole.power, paper.POWER_RANGE.high)
     axes.plot(across, smoothed(whole.power, across), color=BLUE, label="all inputs")
-    axes.plot(across, normal(whole.power, across), color=ORANGE, label="normal law, same std")
-    limit = smoothed(found.most_power, across)
+    axes.plot(across, normal(whole.power, across), color=ORANGE, label="normal, same std")
+    limit = smoothed(results.max_power, across)
     axes.plot(across, limit, color=GREEN, lw=1.0, label=r"bound $\mu N V$|creepage|")
     axes.set_ylim(0.0, 1.3 * axes.get_ylim()[1])
     _name_lines(axes, "upper right")
     name_axes(axes, "Fig. 15b: density of $P_d$", "$P_d$ [W]", "density [1/W]")
     _mark_power(axes, whole, paper.MEAN_POWER.value, paper.POWER_RANGE.value)
-    axes, aligned = panels["16"], found.aligned
+    axes, aligned = panels["16"], results.aligned
     across = _across(aligned.power, paper.ALIGNED_MEAN_POWER.value)
     axes.hist(aligned.power, CLASSES, density=True, color=BLUE, alpha=0.3, label="realisations")
     axes.plot(across, smoothed(aligned.power, across), color=BLUE, label="density")
-    axes.plot(across, normal(aligned.power, across), color=ORANGE, label="normal law, same std")
+    axes.plot(across, normal(aligned.power, across), color=ORANGE, label="normal, same std")
     _name_lines(axes, "upper right")
     name_axes(axes, "Fig. 16: without misalignment", "$P_d$ [W]", "density [1/W]")
     _mark_power(axes, aligned, paper.ALIGNED_MEAN_POWER.value, ())
 
 
 def _across(power: FloatArray, beyond: float) -> FloatArray:
-    """Return powers to draw a density at, which go on beyond what is printed."""
+    """Return the powers at which a density is drawn, up to above the printed range."""
     return np.linspace(0.0, 1.08 * max(float(power.max()), beyond), 400)
 
 
 def smoothed(values: FloatArray, across: FloatArray) -> FloatArray:
-    """Return the density of realisations, smoothed with a Gaussian kernel.
+    """Return a Gaussian kernel estimate of the density of realisations.
 
     Parameters
     ----------
     values : ndarray, shape (realisations,)
+        The realisations.
     across : ndarray, shape (points,)
-        Where.
+        Points of the density.
 
     Returns
     -------
@@ -139,7 +140,7 @@ def smoothed(values: FloatArray, across: FloatArray) -> FloatArray:
 
     Notes
     -----
-    The kernel's width is 1.06 std n^(-1/5): Silverman, Density Estimation (1986), eq. 3.28.
+    The kernel width is 1.06 std n^(-1/5): Silverman, Density Estimation (1986), eq. 3.28.
     """
     width = 1.06 * float(values.std(ddof=1)) * len(values) ** -0.2
     density: FloatArray = np.zeros_like(across)
@@ -150,7 +151,7 @@ def smoothed(values: FloatArray, across: FloatArray) -> FloatArray:
 
 
 def normal(values: FloatArray, across: FloatArray) -> FloatArray:
-    """Return the density of the normal law with the mean and std of realisations."""
+    """Return the density of the normal distribution with mean and std of the realisations."""
     std = float(values.std(ddof=1))
     score = (across - float(values.mean())) / std
     density: FloatArray = np.exp(-0.5 * score**2) / (std * math.sqrt(math.tau))
@@ -166,9 +167,9 @@ def _mark_power(
     axes.set_xlim(left=0.0)
 
 
-def draw_rows(panels: dict[str, Axes], found: Reproduction) -> None:
-    """Draw the power per axial length of the realisations, its mean and its 95 % band."""
-    result = found.all_inputs
+def draw_rows(panels: dict[str, Axes], results: Reproduction) -> None:
+    """Draw the power per axial length of the realisations, their mean and 95 % band."""
+    result = results.all_inputs
     y, rows = result.y * MM, result.dissipation[:MOST_LINES]
     axes = panels["17a"]
     opacity = float(np.clip(15.0 / len(rows), 0.08, 1.0))
@@ -183,7 +184,7 @@ def draw_rows(panels: dict[str, Axes], found: Reproduction) -> None:
     axes.fill_between(y, low, high, color=BLUE, alpha=0.25, lw=0, label="2.5 to 97.5 %")
     axes.plot(y, mean, color="black", label="mean")
     _name_lines(axes, "upper right")
-    name_axes(axes, "Fig. 17b: their mean and 95 % band", _Y, r"$P_l$ [W/mm]")
+    name_axes(axes, "Fig. 17b: mean and 95 % band", _Y, r"$P_l$ [W/mm]")
     for name in ("17a", "17b"):
         panels[name].set_ylim(0.0, 1.05 * W_MM * float(rows.max()))
         panels[name].margins(x=0.0)
@@ -198,6 +199,6 @@ def _mark_level(axes: Axes, level: float) -> None:
 
 
 def _name_lines(axes: Axes, where: Literal["upper left", "upper right", "lower right"]) -> None:
-    """Write a legend that hides what runs behind it."""
+    """Write a legend on an opaque background."""
     legend = axes.legend(loc=where, frameon=True, framealpha=1.0, edgecolor="none")
     legend.set_zorder(3.0)

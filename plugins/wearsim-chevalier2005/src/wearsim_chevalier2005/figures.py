@@ -1,6 +1,6 @@
-"""The paper's figures drawn anew, from what is found here; what it prints is marked in them.
+"""Figures of the paper, drawn from the computed results with the printed numbers marked.
 
-Drawn here: the mean problem and the contact with white friction.
+This module draws the mean problem and the contact with white friction.
 """
 
 from __future__ import annotations
@@ -47,30 +47,20 @@ PANELS: list[Any] = [
 _X, _Y = "x along rolling [mm]", "y across [mm]"
 
 
-def reproduction_figure(found: Reproduction) -> Figure:
-    """Return the paper's figures 7 to 9 and 11 to 17, drawn anew.
-
-    Parameters
-    ----------
-    found : Reproduction
-
-    Returns
-    -------
-    Figure
-        A panel for each part of a figure, titled as the paper numbers it.
-    """
+def reproduction_figure(results: Reproduction) -> Figure:
+    """Return figures 7 to 9 and 11 to 17 of the paper, with a panel for each part of a figure."""
     with figure_style():
         layout = ConstrainedLayoutEngine(hspace=0.035, wspace=0.03)
         figure = Figure(figsize=SIZE, layout=layout)
         panels = figure.subplot_mosaic(PANELS)
-        _draw_mean_problem(panels, found.mean)
-        _draw_chaos(panels, found.mean, found.chaotic)
-        spread.draw_inputs(panels, found)
-        spread.draw_settling(panels, found)
-        spread.draw_powers(panels, found)
-        spread.draw_rows(panels, found)
-        _write_notes(panels["notes"], found)
-        figure.suptitle("The paper's figures, drawn anew from what is computed here", fontsize=14.0)
+        _draw_mean_problem(panels, results.mean)
+        _draw_white_friction(panels, results.mean, results.white_friction)
+        spread.draw_inputs(panels, results)
+        spread.draw_convergence(panels, results)
+        spread.draw_powers(panels, results)
+        spread.draw_rows(panels, results)
+        _write_notes(panels["notes"], results)
+        figure.suptitle("Figures of the paper, computed here", fontsize=14.0)
         figure.supxlabel(paper.REFERENCE, fontsize=9.0, color=GREY)
     return figure
 
@@ -88,13 +78,13 @@ def _draw_mean_problem(panels: dict[str, Axes], study: ContactStudy) -> None:
     name_axes(panels["8a"], r"Fig. 8a: dissipated power [W/mm$^2$]", _Y, _X)
     for name in ("7b", "7c", "8a"):
         _draw_printed_ellipse(panels[name])
-    _draw_strips(panels["8b"], study, BLUE, f"{shown(study.solution.power, 'W')} in all")
+    _draw_strips(panels["8b"], study, BLUE, f"{shown(study.solution.power, 'W')} in total")
     panels["8b"].legend(loc="lower center")
     name_axes(panels["8b"], r"Fig. 8b: power per axial length $P_l$(y)", _Y, r"$P_l$ [W/mm]")
 
 
 def _draw_areas(axes: Axes, study: ContactStudy) -> None:
-    """Draw every element on the contact made round: adhesion or slip."""
+    """Draw the elements in adhesion and slip, on axes scaled to a circle."""
     fields, a, b = study.fields, *_half_axes(study)
     assert fields is not None
     y, x = np.broadcast_to(fields.y / b, fields.x.shape), fields.x / a
@@ -112,12 +102,12 @@ def _draw_areas(axes: Axes, study: ContactStudy) -> None:
 
 
 def _half_axes(study: ContactStudy) -> tuple[float, float]:
-    """Return half the contact's length and width, its strips spanning it."""
+    """Return half the length and half the width of the contact."""
     return float(study.solution.half_length.max()), 0.5 * study.grid.spacing * study.grid.strips
 
 
 def _draw_map(axes: Axes, study: ContactStudy, value: FloatArray) -> None:
-    """Draw a field element by element, so that nothing of its grain is lost."""
+    """Draw a field element by element, without interpolation."""
     fields = study.fields
     assert fields is not None
     y = np.broadcast_to(fields.y, fields.x.shape)
@@ -141,46 +131,50 @@ def _draw_strips(axes: Axes, study: ContactStudy, colour: str, label: str) -> No
     axes.margins(x=0.0)
 
 
-def _draw_chaos(panels: dict[str, Axes], mean: ContactStudy, chaotic: ContactStudy) -> None:
-    fields = chaotic.fields
+def _draw_white_friction(
+    panels: dict[str, Axes], mean: ContactStudy, white_friction: ContactStudy
+) -> None:
+    fields = white_friction.fields
     assert fields is not None
-    _draw_map(panels["12a"], chaotic, -fields.traction_x * MPA)
+    _draw_map(panels["12a"], white_friction, -fields.traction_x * MPA)
     name_axes(panels["12a"], r"Fig. 12a: $\tau_x$ [MPa], white friction", _Y, _X)
-    _draw_map(panels["12b"], chaotic, fields.slip_x * chaotic.point.rolling_speed * MM)
+    _draw_map(
+        panels["12b"], white_friction, fields.slip_x * white_friction.point.rolling_speed * MM
+    )
     name_axes(panels["12b"], "Fig. 12b: slip $w_x$ [mm/s], white friction", _Y, _X)
     axes = panels["13"]
-    smooth, rough = (shown(study.solution.power, "W") for study in (mean, chaotic))
+    smooth, rough = (shown(study.solution.power, "W") for study in (mean, white_friction))
     _draw_strips(axes, mean, BLUE, f"uniform friction, {smooth}")
-    _draw_strips(axes, chaotic, ORANGE, f"white friction, {rough}")
+    _draw_strips(axes, white_friction, ORANGE, f"white friction, {rough}")
     axes.legend(loc="lower center")
     name_axes(axes, r"Fig. 13: $P_l$(y), all other inputs at their mean", _Y, r"$P_l$ [W/mm]")
 
 
-def _write_notes(axes: Axes, found: Reproduction) -> None:
-    """Tell in the last panel what the colours and the numbers of all others are."""
+def _write_notes(axes: Axes, results: Reproduction) -> None:
+    """Write the legend and the numbers common to all panels."""
     axes.axis("off")
     handles = [
         Line2D([], [], color=RED, ls="--", label="printed in the paper"),
-        Line2D([], [], color=BLUE, label="found here"),
-        Line2D([], [], color="black", label="mean found here"),
+        Line2D([], [], color=BLUE, label="computed here"),
+        Line2D([], [], color="black", label="computed mean"),
         Line2D([], [], color=GREEN, label="bound $\\mu N V$|creepage|"),
     ]
     axes.legend(handles=handles, loc="upper left", fontsize=10.0)
     means = {
-        "all inputs": found.all_inputs.summaries["power"],
-        "without misalignment": found.aligned.summaries["power"],
+        "all inputs": results.all_inputs.summaries["power"],
+        "without misalignment": results.aligned.summaries["power"],
     }
     lines = [
-        f"{count(found.all_inputs.count)} realisations, seed {found.scenario.seed};",
+        f"{count(results.all_inputs.count)} realisations, seed {results.scenario.seed};",
         "one friction coefficient per contact,",
-        "but for the white friction of Fig. 12 and 13",
+        "except for the white friction of Fig. 12 and 13",
         "",
         *(
             f"{name}: {shown(power.mean, 'W')} ± {shown(power.mean_error, 'W', 2)}"
             for name, power in means.items()
         ),
         "",
-        "No input is tuned towards what is printed.",
+        "No input is fitted to the printed results.",
     ]
     text = axes.text(0.02, 0.68, "\n".join(lines), transform=axes.transAxes, va="top")
-    text.set(linespacing=1.5, fontsize=10.0, in_layout=False)  # which may not widen its column
+    text.set(linespacing=1.5, fontsize=10.0, in_layout=False)  # must not widen its column

@@ -1,4 +1,4 @@
-"""What the paper prints: each number in SI, and where it stands.
+"""Numbers printed in the paper, in SI units, with their sections.
 
 Chevalier, Cloupet, Soize, Wear 258 (2005) 1543-1554, DOI 10.1016/j.wear.2004.11.012.
 """
@@ -12,14 +12,14 @@ REFERENCE = "Chevalier, Cloupet, Soize, Wear 258 (2005) 1543-1554, DOI 10.1016/j
 
 @dataclass(frozen=True)
 class Printed:
-    """A number that the paper prints.
+    """A printed number.
 
     Parameters
     ----------
     value : float
-        In SI.
+        Value in SI units.
     place : str
-        Where it stands in the paper.
+        Section or equation of the paper.
     """
 
     value: float
@@ -28,14 +28,14 @@ class Printed:
 
 @dataclass(frozen=True)
 class PrintedRange:
-    """Two numbers that the paper prints as a range.
+    """A printed range.
 
     Parameters
     ----------
     low, high : float
-        In SI.
+        Lower and upper end in SI units.
     place : str
-        Where they stand in the paper.
+        Section or equation of the paper.
     """
 
     low: float
@@ -44,20 +44,20 @@ class PrintedRange:
 
     @property
     def value(self) -> tuple[float, float]:
-        """Both ends."""
+        """Lower and upper end."""
         return self.low, self.high
 
 
 @dataclass(frozen=True)
 class PrintedMultipliers:
-    """The multipliers of a law of maximum entropy as the paper prints them.
+    """Printed multipliers of a maximum-entropy distribution.
 
     Parameters
     ----------
     l0, l1, l2 : float
-        In powers of the SI unit.
+        Multipliers in powers of the SI unit.
     place : str
-        Where they stand in the paper.
+        Section of the paper.
     """
 
     l0: float
@@ -69,7 +69,7 @@ class PrintedMultipliers:
 ROLLER_RADIUS = Printed(40e-3, "section 2.1")
 CROWN_RADIUS = Printed(1000e-3, "section 2.1")
 CYLINDER_RADIUS = Printed(50e-3, "section 2.1")
-SPEED = PrintedRange(2.0, 3.0, "section 1.1")  # the mean problem's own is left blank
+SPEED = PrintedRange(2.0, 3.0, "section 1.1")  # missing for the mean problem
 CONTACT_LENGTH = Printed(0.27e-3, "section 3.3")
 CONTACT_WIDTH = Printed(3.1e-3, "section 3.3")
 BOUND_RISE = Printed(0.25, "section 3.2")

@@ -1,4 +1,4 @@
-"""The paper's problems solved anew: its mean problem and its Monte Carlo, in several variants."""
+"""Mean problem and Monte Carlo study of the paper, in several variants."""
 
 from __future__ import annotations
 
@@ -32,16 +32,17 @@ _AS_PRINTED = {
 
 @dataclass(frozen=True)
 class Variant:
-    """One way of doing the paper's Monte Carlo.
+    """A variant of the Monte Carlo study.
 
     Parameters
     ----------
     aligned : bool
         Without lateral creepage and spin.
     white : bool
-        Every cell of the grid draws its own friction, as in the paper; else a contact has one.
+        Independent friction in every cell of the grid, as in the paper; otherwise one friction
+        coefficient per contact.
     element_sum : bool
-        Power as the textbook's sum over elements; else the work of the rigid slip.
+        Power as the sum over elements; otherwise the work of the rigid slip.
     """
 
     aligned: bool
@@ -59,29 +60,29 @@ VARIANTS = tuple(
 
 @dataclass(frozen=True, eq=False)
 class Reproduction:
-    """The paper's problems, solved.
+    """Solutions of the problems of the paper.
 
     Parameters
     ----------
     mean : ContactStudy
         The mean problem with its fields.
     element_sum, slender : ContactStudy
-        The same by the textbook's element sum, and by another contact model.
+        The mean problem with the element sum, and with the contact model `slender`.
     as_printed : ContactStudy
-        The same with the dimensions that the paper calls radii.
-    chaotic : ContactStudy
-        The mean problem with one realisation of white friction, and its fields.
+        The mean problem with the printed dimensions as radii.
+    white_friction : ContactStudy
+        The mean problem with one realisation of white friction, with its fields.
     mean_scenario, printed_scenario, scenario : Scenario
-        Of the mean problem, of the one with the printed radii, and of the Monte Carlo.
+        Scenarios of the mean problem, of that with the printed radii, and of the Monte Carlo study.
     spread : mapping of Variant to DissipationResult
-        The Monte Carlo, each variant from the same draws.
+        The Monte Carlo study, with the same draws for all variants.
     """
 
     mean: ContactStudy
     element_sum: ContactStudy
     slender: ContactStudy
     as_printed: ContactStudy
-    chaotic: ContactStudy
+    white_friction: ContactStudy
     mean_scenario: Scenario
     printed_scenario: Scenario
     scenario: Scenario
@@ -89,18 +90,18 @@ class Reproduction:
 
     @property
     def all_inputs(self) -> DissipationResult:
-        """The Monte Carlo of all inputs, with one friction coefficient per contact."""
+        """Monte Carlo study of all inputs, with one friction coefficient per contact."""
         return self.spread[Variant(aligned=False, white=False, element_sum=False)]
 
     @property
     def aligned(self) -> DissipationResult:
-        """The same without lateral creepage and spin."""
+        """Monte Carlo study without lateral creepage and spin."""
         return self.spread[Variant(aligned=True, white=False, element_sum=False)]
 
     @cached_property
-    def most_power(self) -> FloatArray:
-        """Power that no realisation of all inputs can exceed, shape (realisations,) [W]."""
-        return most_power(self.scenario, self.all_inputs)
+    def max_power(self) -> FloatArray:
+        """Upper bound of the power of each realisation, shape (realisations,) [W]."""
+        return max_power(self.scenario, self.all_inputs)
 
 
 def reproduce(
@@ -109,39 +110,37 @@ def reproduce(
     *,
     on_progress: Callable[[int, int], None] | None = None,
 ) -> Reproduction:
-    """Solve the paper's problems.
+    """Solve the problems of the paper.
 
     Parameters
     ----------
     realisations : int
-        Of every Monte Carlo, two or more.
+        Realisations of each variant, at least 2.
     seed : int, optional
-        In place of the scenario's.
+        Seed; by default that of the scenario.
     on_progress : callable, optional
-        Told how many realisations are done, and of how many.
-
-    Returns
-    -------
-    Reproduction
+        Called with the completed and the total number of realisations.
 
     Raises
     ------
     ValueError
-        If there are too few realisations for a spread.
+        If there are fewer than 2 realisations.
     """
     if realisations < 2:
-        raise ValueError(f"realisations must be 2 or more to have a spread, got {realisations}")
+        raise ValueError(
+            f"realisations must be 2 or more for a standard deviation, got {realisations}"
+        )
     seeded = {} if seed is None else {"seed": seed}
     scenario = shipped_scenario(MONTE_CARLO, seeded)
     white = {FRICTION: white_friction(scenario)}
     mean = shipped_scenario(MEAN_PROBLEM)
     printed = shipped_scenario(MEAN_PROBLEM, _AS_PRINTED)
     spread = {}
-    tell = on_progress or (lambda done, total: None)
+    report = on_progress or (lambda done, total: None)
     for number, variant in enumerate(VARIANTS):
 
-        def told(done: int, _: int, before: int = number * realisations) -> None:
-            tell(before + done, len(VARIANTS) * realisations)
+        def report_variant(done: int, _: int, before: int = number * realisations) -> None:
+            report(before + done, len(VARIANTS) * realisations)
 
         changes = {
             **(_ALIGNED if variant.aligned else {}),
@@ -149,13 +148,13 @@ def reproduce(
             **(_ELEMENT_SUM if variant.element_sum else {}),
         }
         varied = shipped_scenario(MONTE_CARLO, {**seeded, **changes})
-        spread[variant] = dissipation(varied, realisations, on_progress=told)
+        spread[variant] = dissipation(varied, realisations, on_progress=report_variant)
     return Reproduction(
         mean=study_contact(mean, with_fields=True),
         element_sum=study_contact(shipped_scenario(MEAN_PROBLEM, _ELEMENT_SUM)),
         slender=study_contact(shipped_scenario(MEAN_PROBLEM, {"contact": {"model": "slender"}})),
         as_printed=study_contact(printed),
-        chaotic=_chaotic(shipped_scenario(MEAN_PROBLEM, {**seeded, **white})),
+        white_friction=_with_white_friction(shipped_scenario(MEAN_PROBLEM, {**seeded, **white})),
         mean_scenario=mean,
         printed_scenario=printed,
         scenario=scenario,
@@ -164,13 +163,13 @@ def reproduce(
 
 
 def white_friction(scenario: Scenario) -> dict[str, object]:
-    """Return the scenario's friction as a table that lets every cell draw it by itself."""
+    """Return the friction table with independent friction in every cell."""
     item = next(item for item in scenario.random if item.name == FRICTION)
     return {"distribution": "white", "marginal": {"distribution": item.kind, **item.options}}
 
 
-def _chaotic(scenario: Scenario) -> ContactStudy:
-    """Return the contact with every input at its mean but friction, which is white."""
+def _with_white_friction(scenario: Scenario) -> ContactStudy:
+    """Return the mean problem with one realisation of white friction."""
     study = study_contact(scenario)
     model = scenario.contact.build()
     model.prepare(study.grid, (scenario.cylinder.material, scenario.roller.material))
@@ -185,8 +184,8 @@ def _chaotic(scenario: Scenario) -> ContactStudy:
     return replace(study, solution=solution, fields=fields, point=point)
 
 
-def most_power(scenario: Scenario, result: DissipationResult) -> FloatArray:
-    """Return the power that no contact model which keeps its energy balance can exceed.
+def max_power(scenario: Scenario, result: DissipationResult) -> FloatArray:
+    """Return an upper bound of the power for any contact model that satisfies the energy balance.
 
     Traction nowhere exceeds mu p, so that P <= mu V int p |w| dA with the rigid slip
     w = (xi - phi y, eta + phi x). The mean of |w| is at most its root mean square, which for
@@ -195,13 +194,14 @@ def most_power(scenario: Scenario, result: DissipationResult) -> FloatArray:
     Parameters
     ----------
     scenario : Scenario
+        Scenario of the study.
     result : DissipationResult
-        Its realisations, with one friction coefficient per contact.
+        Results with one friction coefficient per contact.
 
     Returns
     -------
     ndarray, shape (realisations,)
-        In W.
+        Upper bounds [W].
     """
     load, drawn = result.values("normal_force"), result.inputs
     spin = drawn[TILT] / scenario.roller.radius
