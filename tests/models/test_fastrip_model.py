@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.materials import STEEL
 from wearsim.errors import ContactError
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.models.contact.hertz import HertzModel
-from wearsim.models.tangential.base import Strips, complete, spread_work
+from wearsim.models.tangential.base import spread_work
 from wearsim.models.tangential.fastrip import FastripTheory
 from wearsim.types import Creepage, Grid, OperatingPoint
-from wearsim_bench.exact_solutions import CREEPAGES, STEEL, rows, strips_of, worn_profile
 
 MATERIALS = (STEEL, STEEL)
 PAIR = combine(*MATERIALS)
@@ -40,62 +40,10 @@ def rms(values):
     return float(np.sqrt(np.mean(np.square(values))))
 
 
-@pytest.mark.bench
-@pytest.mark.parametrize(
-    ("kind", "bound", "worst"), [("paper", 2e-3, 3e-3), ("partial", 5e-3, 0.012)]
-)
-def test_rig_power_agrees_with_exact_theory(kind, bound, worst):
-    found = errors(rows("rig_random", kind=kind), contact)
-    assert rms(found) < bound
-    assert np.abs(found).max() < worst
-
-
-@pytest.mark.bench
-@pytest.mark.parametrize("kind", ["paper", "partial"])
-def test_rig_dissipation_profile_agrees_with_exact_theory(kind):
-    y_over_b, exact = strips_of(kind)
-    distances = []
-    for number, case in enumerate(rows("rig_random", kind=kind)):
-        *_, solution = contact(case)
-        place = solution.y / (solution.y[-1] + 0.5 * (solution.y[1] - solution.y[0]))
-        expected = np.interp(place, y_over_b, exact[number])
-        off = np.linalg.norm(solution.dissipation - expected)
-        distances.append(off / np.linalg.norm(expected))
-    assert np.median(distances) < 0.022
-
-
 def hard(case):
     return contact(case, (2.0 * case["A_per_m"], 2.0 * case["B_per_m"]))
 
 
-@pytest.mark.bench
-def test_hard_cases_are_within_three_percent_rms():
-    cases = rows("hard_cases")
-    found = errors(cases, hard)
-    assert rms(found) < 0.02
-    assert np.abs(found).max() < 0.055
-    # the range of strip theory: long across rolling, or creepage that dominates spin
-    long = np.array([case["b_m"] >= 4.9 * case["a_m"] for case in cases])
-    assert np.abs(found[long]).max() < 0.01
-
-
-@pytest.mark.bench
-@pytest.mark.parametrize("name", ["hertz", "flat", "bump_1um", "bump_10um", "parabola"])
-@pytest.mark.parametrize("creepage", ["mean", "partial", "combined"])
-def test_strips_of_a_worn_profile_are_supported(name, creepage):
-    worn = worn_profile(name)
-    y = worn["y"]
-    strips = Strips(
-        y, worn["a"], worn["q"], y[1] - y[0], 45.0, worn["approach"], worn["peak_pressure"], 0
-    )
-    point = OperatingPoint(300.0, 1.0, Creepage(*CREEPAGES[creepage]), 0.1)
-    found = complete(FastripTheory(), strips, PAIR, point)
-    assert found.power == pytest.approx(worn[f"P_over_V_{creepage}"], rel=0.02)
-    expected = worn[f"P_l_over_V_{creepage}"]
-    assert np.linalg.norm(found.dissipation - expected) < 0.065 * np.linalg.norm(expected)
-
-
-@pytest.mark.bench
 @pytest.mark.parametrize("creepage", [(4e-4, 5e-4, 0.05), (2e-4, -1e-4, 0.9), (1e-3, 5e-4, 30.0)])
 def test_power_is_the_work_of_the_rigid_slip(creepage):
     xi, eta, phi = creepage
@@ -106,7 +54,6 @@ def test_power_is_the_work_of_the_rigid_slip(creepage):
     assert found.dissipation.sum() * (found.y[1] - found.y[0]) == pytest.approx(work, rel=1e-12)
 
 
-@pytest.mark.bench
 @pytest.mark.parametrize("curvatures", [RIG, (20.0, 20.0), (2.0, 60.0)])
 def test_no_strip_has_negative_dissipation(curvatures):
     rng, model = np.random.default_rng(11), HertzModel(FastripTheory(), 41)
@@ -137,7 +84,6 @@ def test_spread_work_is_not_negative_and_keeps_its_sum():
     assert np.isnan(spread_work(np.array([1.0, np.nan]))).any()
 
 
-@pytest.mark.bench
 def test_varying_creepage_approximates_longitudinal_spin():
     case = {"N_N": 300.0, "mu": 0.1, "xi": 4e-4, "eta": 0.0, "phi_per_m": 0.2}
     model, gap, point, turning = contact(case)
@@ -148,7 +94,6 @@ def test_varying_creepage_approximates_longitudinal_spin():
     )
 
 
-@pytest.mark.bench
 def test_bearing_torque_is_balanced_or_the_roller_skids():
     case = {"N_N": 300.0, "mu": 0.1, "xi": 0.0, "eta": 2e-4, "phi_per_m": 0.1}
     model, gap, point, _ = contact(case)
@@ -159,7 +104,6 @@ def test_bearing_torque_is_balanced_or_the_roller_skids():
         model.solve(gap, RIG[0], replace(torque, bearing_torque=1.0))
 
 
-@pytest.mark.bench
 @pytest.mark.parametrize("creepage", [(6e-4, 3e-4, 0.05), (2e-4, 0.0, 0.5), (1e-3, 5e-4, 8.0)])
 def test_fields_integrate_to_the_solution(creepage):
     xi, eta, phi = creepage
@@ -180,7 +124,6 @@ def test_fields_integrate_to_the_solution(creepage):
     assert share == pytest.approx(solution.adhesion_fraction, abs=0.02)
 
 
-@pytest.mark.bench
 def test_transition_to_fastsim_at_large_spin_is_small():
     peak = 1.5 * 300.0 / (math.pi * 1.363e-4 * 1.545e-3)
     limit = 2.0 * 0.1 * peak / (1.363e-4 * PAIR.shear_modulus * 1.517)
@@ -191,7 +134,6 @@ def test_transition_to_fastsim_at_large_spin_is_small():
     assert powers[1] == pytest.approx(powers[0], rel=0.015)
 
 
-@pytest.mark.bench
 def test_solution_is_independent_of_the_grid_width():
     case = {"N_N": 300.0, "mu": 0.1, "xi": 4e-4, "eta": 3e-4, "phi_per_m": 0.1}
     exact = contact(case, strips=1000)[-1].power

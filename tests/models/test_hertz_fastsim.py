@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
+from tests.materials import STEEL
 from tests.mechanics.tangential.kalker_closed_form import closed_form_parabolic
 from wearsim.contact_batch import OperatingPoints
 from wearsim.errors import CapabilityError, ContactError
@@ -20,7 +21,6 @@ from wearsim.models.contact.hertz_fastsim import SPEC, HertzFastsim, HertzFastsi
 from wearsim.models.tangential.base import Strips, complete
 from wearsim.models.tangential.fastsim import FastsimTheory
 from wearsim.types import Creepage, Grid, OperatingPoint
-from wearsim_bench.exact_solutions import STEEL, rows, table, worn_profile
 
 MATERIALS = (STEEL, STEEL)
 PAIR = combine(*MATERIALS)
@@ -48,32 +48,22 @@ def balance(point, solution):
     )
 
 
-@pytest.mark.bench
 def test_mean_problem_power_in_closed_form_is_0_073873_watts():
     *_, solution = contact(kalker="line-limit", my=1000)
     assert solution.power == pytest.approx(0.073873, rel=1e-5)
 
 
-@pytest.mark.bench
 def test_fastsim_50_by_50_is_within_a_thousandth_of_it():
     *_, solution = contact(kalker="line-limit", closed_form="never")
     assert solution.power == pytest.approx(0.073873, rel=1e-3)
 
 
-@pytest.mark.bench
-def test_kalker_table_changes_the_power_by_under_0_002():
-    power = {name: contact(kalker=name)[-1].power for name in ("table", "line-limit")}
-    assert 1e-4 < power["table"] / power["line-limit"] - 1.0 < 2e-3
-
-
-@pytest.mark.bench
 def test_given_coefficients_replace_the_table():
     limit = {"c11": math.pi**2 / 2.8, "c22": math.pi**2 / 4.0, "c23": 0.471}
     given_power = contact(kalker_coefficients=limit)[-1].power
     assert given_power == pytest.approx(contact(kalker="line-limit")[-1].power, rel=1e-12)
 
 
-@pytest.mark.bench
 def test_element_sum_is_too_low_and_of_first_order():
     exact = contact(kalker="line-limit", my=1000)[-1].power
     low = [
@@ -84,7 +74,6 @@ def test_element_sum_is_too_low_and_of_first_order():
     assert np.log2(np.divide(low[:-1], low[1:])) == pytest.approx(1.0, abs=0.05)
 
 
-@pytest.mark.bench
 def test_patch_is_that_of_hertz():
     *_, solution = contact()
     patch = hertz(45.0, 1.0, 300.0, PAIR.contact_modulus)
@@ -97,7 +86,6 @@ GRIDS = st.builds(lambda half, strips: Grid.spanning(-half, half, strips),
                   st.floats(2.4e-3, 9e-3), st.integers(31, 300))  # fmt: skip
 
 
-@pytest.mark.bench
 @settings(deadline=None, max_examples=40)
 @given(GRIDS, st.floats(-0.8e-3, 0.8e-3), st.floats(-1e-3, 1e-3), st.floats(-0.5, 0.5))
 def test_load_and_energy_balance_hold_on_any_grid(grid, yc, eta, phi):
@@ -108,7 +96,6 @@ def test_load_and_energy_balance_hold_on_any_grid(grid, yc, eta, phi):
     assert solution.approach == pytest.approx(2e-6 + 3.22274e-6, rel=1e-6)
 
 
-@pytest.mark.bench
 @pytest.mark.parametrize("bound", ["parabolic", "elliptic"])
 def test_power_is_smooth_with_partly_covered_strips(bound):
     exact = contact(my=1000, bound=bound)[-1].power
@@ -117,7 +104,6 @@ def test_power_is_smooth_with_partly_covered_strips(bound):
         assert power == pytest.approx(exact, rel=1e-3)
 
 
-@pytest.mark.bench
 @pytest.mark.parametrize("closed_form", ["exact", "always", "never"])
 def test_mirrored_contact_has_the_mirrored_solution(closed_form):
     grid = Grid.spanning(-3e-3, 3e-3, 60)
@@ -136,68 +122,6 @@ def test_mirrored_contact_has_the_mirrored_solution(closed_form):
     assert one.spin_moment == pytest.approx(-other.spin_moment, rel=1e-9, abs=1e-15)
 
 
-@pytest.mark.bench
-@pytest.mark.parametrize(
-    ("bound", "kind", "rms", "from_contact"),
-    [
-        ("parabolic", "paper", 0.037, 0.01),
-        ("elliptic", "paper", 0.0499, 0.015),
-        ("parabolic", "partial", 0.057, 0.025),
-        ("elliptic", "partial", 0.078, 0.025),
-    ],
-)
-def test_error_against_exact_theory_is_the_known_one(bound, kind, rms, from_contact):
-    # the FASTSIM of CONTACT has flexibilities that depend on creepage, hence the small difference
-    exact, other = [], []
-    for case in rows("rig_random", kind=kind):
-        creepage = (case["xi"], case["eta"], case["phi_per_m"])
-        *_, solution = contact(None, creepage, case["N_N"], case["mu"], bound=bound)
-        exact.append(solution.power / SPEED / case["P_over_V_N"] - 1.0)
-        other.append(solution.power / SPEED / case[f"fastsim_{bound[:3]}_P_over_V_N"] - 1.0)
-    assert np.sqrt(np.mean(np.square(exact))) == pytest.approx(rms, rel=0.03)
-    assert np.sqrt(np.mean(np.square(other))) < from_contact
-
-
-@pytest.mark.bench
-@pytest.mark.parametrize(("bound", "rms"), [("parabolic", 0.093), ("elliptic", 0.030)])
-def test_errors_of_hard_cases_are_those_of_kalkers_fastsim(bound, rms):
-    errors = []
-    for case in rows("hard_cases"):
-        creepage = Creepage(case["xi"], case["eta"], case["phi_per_m"])
-        curvatures = 2.0 * case["A_per_m"], 2.0 * case["B_per_m"]
-        model = HertzFastsim(HertzFastsimOptions(mx=200, my=100, bound=bound))
-        grid = model.suggest_grid(curvatures[1], curvatures[0], case["N_N"], MATERIALS)
-        model.prepare(grid, MATERIALS)
-        point = OperatingPoint(case["N_N"], 1.0, creepage, case["mu"])
-        power = model.solve(0.5 * curvatures[1] * grid.y**2, curvatures[0], point).power
-        errors.append(power / case["P_over_V_N"] - 1.0)
-    assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(rms, rel=0.03)
-
-
-@pytest.mark.bench
-@pytest.mark.parametrize("flexibility", ["three", "one"])
-@pytest.mark.parametrize(("bound", "rate"), [("parabolic", 0.12), ("elliptic", 0.25)])
-def test_march_converges_to_the_reference_quadrature(bound, rate, flexibility):
-    whole = table("mean_problem")
-    c11 = 8.0 * whole["a_m"] / (3.0 * 1.6889956260024387e-15 * PAIR.shear_modulus)
-    given = {"c11": c11, "c22": 2.5, "c23": 0.5}
-    for case in whole["rows"][:2]:
-        for mx in (10, 25, 50, 100, 200):
-            model = HertzFastsim(
-                HertzFastsimOptions(
-                    mx=mx, my=1200, bound=bound, flexibility=flexibility, closed_form="never",
-                    kalker_coefficients=given,
-                )
-            )  # fmt: skip
-            grid = model.suggest_grid(1.0, 45.0, 300.0, MATERIALS)
-            model.prepare(grid, MATERIALS)
-            point = OperatingPoint(300.0, 1.0, Creepage(case["xi"]), 0.1)
-            power = model.solve(0.5 * grid.y**2, 45.0, point).power
-            error = power / case[f"fastsim_{bound[:3]}_exact_P_over_V_N"] - 1.0
-            assert abs(error) < rate / mx**2
-
-
-@pytest.mark.bench
 def test_one_flexibility_is_the_weighted_mean_of_three():
     xi, eta = 3e-4, -4e-4
     *_, solution = contact(creepage=(xi, eta, 0.0), flexibility="one", my=400)
@@ -212,7 +136,6 @@ def test_one_flexibility_is_the_weighted_mean_of_three():
     assert solution.dissipation == pytest.approx(SPEED * 5e-4 * expected, rel=1e-9)
 
 
-@pytest.mark.bench
 @pytest.mark.parametrize("creepage", [(5e-4, 0.0, 0.0), (0.0, 5e-4, 0.0), (0.0, 0.0, 0.7)])
 def test_one_flexibility_is_kalkers_for_a_single_creepage(creepage):
     one, three = (
@@ -222,7 +145,6 @@ def test_one_flexibility_is_kalkers_for_a_single_creepage(creepage):
     assert one.dissipation == pytest.approx(three.dissipation, rel=1e-12)
 
 
-@pytest.mark.bench
 def test_one_flexibility_in_gross_sliding_follows_creepage():
     # with three the traction has the direction of that with adhesion
     creepage = (0.012, 0.016, 0.0)
@@ -237,7 +159,6 @@ def groove(depth, offset=0.0):
     return lambda y: y**2 + 0.95 * np.maximum(depth - (y - offset) ** 2, 0.0)
 
 
-@pytest.mark.bench
 @pytest.mark.parametrize("depth", [1e-6, 5e-6, 17e-6, 48e-6])
 def test_worn_profile_has_a_wider_patch_with_the_same_load(depth):
     grid = Grid.spanning(-9e-3, 9e-3, 181)
@@ -248,7 +169,6 @@ def test_worn_profile_has_a_wider_patch_with_the_same_load(depth):
     assert solution.power == pytest.approx(balance(point, solution), rel=1e-12)
 
 
-@pytest.mark.bench
 def test_solution_is_independent_of_the_initial_guess():
     grid = Grid.spanning(-9e-3, 9e-3, 181)
     model, gap, point, cold = contact(grid, shape=groove(17e-6))
@@ -256,7 +176,6 @@ def test_solution_is_independent_of_the_initial_guess():
     assert np.array_equal(warm.dissipation, cold.dissipation)
 
 
-@pytest.mark.bench
 @pytest.mark.parametrize(
     ("shape", "match"),
     [
@@ -273,26 +192,22 @@ def test_profiles_without_hertz_solution_raise_with_state(shape, match):
     assert {"gap", "normal_force"} <= set(caught.value.state)
 
 
-@pytest.mark.bench
 def test_nan_input_is_an_error():
     with pytest.raises(ContactError, match="power is not finite"):
         contact(creepage=(math.nan, 0.0, 0.0))
 
 
-@pytest.mark.bench
 def test_lost_contact_is_an_error():
     with pytest.raises(ContactError, match="contact is lost"):
         contact(Grid.spanning(-3e-3, 3e-3, 61), load=0.0)
 
 
-@pytest.mark.bench
 def test_wear_compliance_is_refused():
     model, gap, point, _ = contact()
     with pytest.raises(CapabilityError, match="stepper = 'stabilised'"):
         model.solve(gap, RIG[0], point, np.zeros_like(gap))
 
 
-@pytest.mark.bench
 def test_prescribed_patch_determines_pressure_and_power():
     patch = {"a": "0.2 mm", "b": "2 mm"}
     _, _, point, solution = contact(patch=patch)
@@ -311,7 +226,6 @@ def test_prescribed_patch_determines_pressure_and_power():
         contact(Grid.spanning(-1.5e-3, 1.5e-3, 31), patch=patch)
 
 
-@pytest.mark.bench
 def test_bearing_torque_determines_the_creepage():
     model, gap, _, _ = contact()
     point = OperatingPoint(
@@ -331,7 +245,6 @@ def test_bearing_torque_determines_the_creepage():
         )  # fmt: skip
 
 
-@pytest.mark.bench
 def test_friction_may_differ_from_strip_to_strip():
     model, gap, _, whole = contact()
     friction = np.where(np.arange(50) < 25, 0.1, 0.05)
@@ -340,7 +253,6 @@ def test_friction_may_differ_from_strip_to_strip():
     assert np.all(half.dissipation[25:] < whole.dissipation[25:])
 
 
-@pytest.mark.bench
 def test_creepage_may_vary_from_strip_to_strip():
     model, gap, _, _ = contact()
     y = model.suggest_grid(RIG[1], RIG[0], 300.0, MATERIALS).y
@@ -357,7 +269,6 @@ def test_creepage_may_vary_from_strip_to_strip():
     assert powers == pytest.approx(model.solve(gap, RIG[0], point).power, rel=1e-4)
 
 
-@pytest.mark.bench
 @pytest.mark.parametrize("bound", ["parabolic", "elliptic"])
 def test_fields_integrate_to_the_solution(bound):
     creepage = (6e-4, 3e-4, 0.0)
@@ -429,7 +340,6 @@ OPTIONS = [
 ]
 
 
-@pytest.mark.bench
 @pytest.mark.parametrize("spin", [True, False])
 @pytest.mark.parametrize("options", OPTIONS)
 def test_batch_equals_single_solutions(options, spin):
@@ -440,7 +350,6 @@ def test_batch_equals_single_solutions(options, spin):
         assert_same(found.solutions[k], model.solve(gap[0, 0, k], RIG[0], points[k]))
 
 
-@pytest.mark.bench
 @pytest.mark.parametrize("flexibility", ["three", "one"])
 def test_batch_supports_any_gap_friction_and_creepage(flexibility):
     random = np.random.default_rng(1)
@@ -455,7 +364,6 @@ def test_batch_supports_any_gap_friction_and_creepage(flexibility):
         assert_same(found.solutions[k], model.solve(gap[0, 0, k], RIG[0], points[k]))
 
 
-@pytest.mark.bench
 def test_list_of_points_equals_columns():
     points = draws()
     model, gap, found = batch(points)
@@ -470,7 +378,6 @@ def test_columns_of_different_lengths_are_refused():
         replace(draws(), spin=np.zeros(2))
 
 
-@pytest.mark.bench
 def test_batch_with_bearing_torques_is_solved():
     model, gap, _, _ = contact()
     points = [
@@ -484,7 +391,6 @@ def test_batch_with_bearing_torques_is_solved():
     assert -found.stack("force_x") * 20e-3 == pytest.approx([0.1, 0.2], rel=1e-9)
 
 
-@pytest.mark.bench
 @pytest.mark.parametrize(
     ("change", "match"),
     [
@@ -503,7 +409,6 @@ def test_batch_error_names_the_failed_contact(change, match):
     assert "gap" in caught.value.state
 
 
-@pytest.mark.bench
 def test_batch_refuses_wrong_curvature_and_friction_shape():
     points = draws()
     model, gap, _ = batch(points)
@@ -517,7 +422,6 @@ def test_batch_refuses_wrong_curvature_and_friction_shape():
         model.solve_batch(gap, RIG[0], points, np.zeros_like(gap))
 
 
-@pytest.mark.bench
 def test_neglect_of_lateral_spin_slip_has_the_stated_error():
     points = draws(300)
     powers = {
@@ -537,7 +441,6 @@ def test_neglect_of_lateral_spin_slip_has_the_stated_error():
         assert powers[name].std() == pytest.approx(reference.std(), rel=tolerance)
 
 
-@pytest.mark.bench
 def test_closed_form_with_spin_keeps_the_energy_balance():
     *_, point, solution = contact(creepage=(6e-4, 3e-4, 0.2), closed_form="always")
     assert solution.power == pytest.approx(balance(point, solution), rel=1e-12)
@@ -546,7 +449,6 @@ def test_closed_form_with_spin_keeps_the_energy_balance():
 FIELD_OPTIONS = [{}, {"bound": "elliptic"}, {"dissipation": "element-sum"}]
 
 
-@pytest.mark.bench
 @pytest.mark.parametrize("options", FIELD_OPTIONS)
 def test_uniform_friction_field_equals_one_coefficient(options):
     options = options | {"closed_form": "never"}
@@ -559,7 +461,6 @@ def test_uniform_friction_field_equals_one_coefficient(options):
         assert found.force_y == pytest.approx(expected.force_y, rel=1e-13)
 
 
-@pytest.mark.bench
 def test_carried_friction_is_the_mean_over_particles():
     model, gap, point, _ = contact(creepage=(4e-4, 5e-4, 0.0), mx=6)
     friction = np.random.default_rng(3).uniform(0.05, 0.2, (6, 50))
@@ -589,7 +490,6 @@ def noise(points_along, strips, carried=False, contacts=12):
     return power.mean(), power.std() / math.sqrt(contacts)
 
 
-@pytest.mark.bench
 @pytest.mark.parametrize(
     ("cells", "expected"),
     [(25, 0.0689), (50, 0.0653), (100, 0.0614), (200, 0.0569), (400, 0.0527), (800, 0.0487)],
@@ -600,7 +500,6 @@ def test_white_noise_power_decreases_with_grid_refinement(cells, expected):
     assert mean == pytest.approx(expected, rel=0.02)
 
 
-@pytest.mark.bench
 def test_carried_white_noise_has_a_continuum_limit():
     # the limit is the mean of the power over the distribution of the coefficient
     nodes, weights = np.polynomial.hermite_e.hermegauss(21)
@@ -612,7 +511,6 @@ def test_carried_white_noise_has_a_continuum_limit():
     assert deviation < 1e-3 * limit
 
 
-@pytest.mark.bench
 def test_friction_points_are_the_ends_of_the_steps():
     model, gap, point, solution = contact(Grid.spanning(-3e-3, 3e-3, 60), mx=10)
     x, y = model.friction_points(gap, RIG[0], point)
@@ -631,7 +529,6 @@ def test_friction_points_are_the_ends_of_the_steps():
         model.friction_points_batch(gap, RIG[0], points)
 
 
-@pytest.mark.bench
 def test_fields_support_friction_per_point():
     model, gap, point, _ = contact(creepage=(6e-4, 3e-4, 0.1), mx=200)
     friction = np.random.default_rng(4).uniform(0.05, 0.15, (200, 50))
@@ -664,7 +561,6 @@ def hertz_strips(strips=81):
     )
 
 
-@pytest.mark.bench
 def test_equivalent_ellipse_of_an_ellipse_is_nearly_itself():
     patch, strips = hertz_strips(401)
     a, b = equivalent_ellipse(strips)
@@ -672,7 +568,6 @@ def test_equivalent_ellipse_of_an_ellipse_is_nearly_itself():
     assert (a, b) == pytest.approx((patch.a, patch.b), rel=1e-2)
 
 
-@pytest.mark.bench
 def test_other_strips_have_nearly_the_power_of_the_ellipse():
     _, strips = hertz_strips(401)
     point = OperatingPoint(300.0, SPEED, Creepage(1e-3), 0.1)
@@ -682,19 +577,6 @@ def test_other_strips_have_nearly_the_power_of_the_ellipse():
         # Kalker's parabola has 4/3 (1 - y^2/b^2)^(1/2) of Hertz's line load: more of it slips
         assert found.power == pytest.approx(expected, rel=0.05 if bound == "parabolic" else 0.01)
         assert found.power == pytest.approx(balance(point, found), rel=1e-12)
-
-
-@pytest.mark.bench
-@pytest.mark.parametrize("name", ["flat", "bump_1um", "bump_10um", "parabola"])
-def test_fastsim_supports_strips_of_a_worn_profile(name):
-    worn = worn_profile(name)
-    y = worn["y"]
-    strips = Strips(
-        y, worn["a"], worn["q"], y[1] - y[0], 45.0, worn["approach"], worn["peak_pressure"], 0
-    )
-    point = OperatingPoint(300.0, 1.0, Creepage(1e-3), 0.1)
-    found = complete(FastsimTheory("elliptic"), strips, PAIR, point)
-    assert found.power == pytest.approx(worn["P_over_V_mean"], rel=0.05)
 
 
 def test_options_are_validated_and_described():

@@ -3,15 +3,14 @@
 import numpy as np
 import pytest
 
+from tests.materials import STEEL
 from wearsim.errors import CapabilityError, ContactError
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.mechanics.hertz.ellipse import hertz
 from wearsim.models.contact.equivalent_ellipse import EllipseStrips
 from wearsim.models.contact.hertz import SPEC, HertzModel, Patch
 from wearsim.models.contact.hertz_fastsim import HertzFastsim, HertzFastsimOptions
-from wearsim.models.tangential.strip_theory import StripTheory
 from wearsim.types import Creepage, Grid, OperatingPoint
-from wearsim_bench.exact_solutions import STEEL, rows
 
 MATERIALS = (STEEL, STEEL)
 PAIR = combine(*MATERIALS)
@@ -30,7 +29,6 @@ def contact(grid=None, creepage=(1e-3, 0.0, 0.0), load=300.0, mu=0.1, shape=None
     return model, gap, point, model.solve(gap, RIG[0], point)
 
 
-@pytest.mark.bench
 def test_patch_is_that_of_hertz():
     *_, solution = contact()
     patch = hertz(45.0, 1.0, 300.0, PAIR.contact_modulus)
@@ -40,7 +38,6 @@ def test_patch_is_that_of_hertz():
     assert solution.line_load.sum() * (solution.y[1] - solution.y[0]) == pytest.approx(300.0)
 
 
-@pytest.mark.bench
 @pytest.mark.parametrize("creepage", [(5e-4, 2e-4, 0.0), (5e-4, 2e-4, 0.3)])
 @pytest.mark.parametrize("bound", ["parabolic", "elliptic"])
 def test_with_fastsim_it_equals_hertz_fastsim(bound, creepage):
@@ -53,7 +50,6 @@ def test_with_fastsim_it_equals_hertz_fastsim(bound, creepage):
     assert np.array_equal(found.dissipation, expected.dissipation)
 
 
-@pytest.mark.bench
 @pytest.mark.parametrize("tangential", THEORIES)
 def test_power_is_smooth_with_partly_covered_strips(tangential):
     chosen = {"tangential": tangential, "creepage": (6e-4, 3e-4, 0.05)}
@@ -64,7 +60,6 @@ def test_power_is_smooth_with_partly_covered_strips(tangential):
         assert found.force_x == pytest.approx(exact.force_x, rel=2e-3)
 
 
-@pytest.mark.bench
 @pytest.mark.parametrize("tangential", THEORIES)
 def test_strips_may_end_anywhere_near_the_patch_edge(tangential):
     rng, b = np.random.default_rng(5), 1.5e-3
@@ -84,7 +79,6 @@ def test_strips_may_end_anywhere_near_the_patch_edge(tangential):
         assert power(Grid.spanning(-half, half, strips)) == pytest.approx(exact, rel=3e-3)
 
 
-@pytest.mark.bench
 def test_loaded_strips_have_a_positive_squared_half_length():
     ellipse = hertz(45.0, 1.0, 300.0, PAIR.contact_modulus)
     for covered in 10.0 ** np.arange(-30.0, 0.0):
@@ -108,7 +102,6 @@ def test_loaded_strips_have_a_positive_squared_half_length():
             assert strips.line_load[0] == 1e5
 
 
-@pytest.mark.bench
 @pytest.mark.parametrize("tangential", THEORIES)
 def test_gross_sliding_has_full_friction_at_any_coverage(tangential):
     grid = Grid.spanning(-2.05e-3, 2.05e-3, 23)
@@ -121,7 +114,6 @@ def test_gross_sliding_has_full_friction_at_any_coverage(tangential):
     assert sliding == pytest.approx(solution.line_load[touching], rel=tolerance)
 
 
-@pytest.mark.bench
 @pytest.mark.parametrize("tangential", THEORIES)
 def test_power_is_the_work_of_the_rigid_slip(tangential):
     _, _, point, found = contact(
@@ -131,19 +123,6 @@ def test_power_is_the_work_of_the_rigid_slip(tangential):
     assert found.power == pytest.approx(-point.rolling_speed * work, rel=1e-12)
 
 
-@pytest.mark.bench
-def test_default_strip_theory_is_near_exact_theory():
-    model, *_ = contact()
-    assert isinstance(model.theory, StripTheory)
-    errors = []
-    for case in rows("rig_random", kind="paper"):
-        creepage = case["xi"], case["eta"], case["phi_per_m"]
-        *_, found = contact(None, creepage, case["N_N"], case["mu"])
-        errors.append(found.power / 2.618 / case["P_over_V_N"] - 1.0)
-    assert np.sqrt(np.mean(np.square(errors))) < 5e-3
-
-
-@pytest.mark.bench
 @pytest.mark.parametrize("tangential", THEORIES)
 def test_worn_profile_is_fitted_again(tangential):
     def groove(y):
@@ -157,7 +136,6 @@ def test_worn_profile_is_fitted_again(tangential):
     assert wide[1] > 1.2 * wide[0]
 
 
-@pytest.mark.bench
 @pytest.mark.parametrize("tangential", THEORIES)
 def test_friction_torque_and_creepage_may_be_local(tangential):
     model, gap, _, whole = contact(tangential=tangential)
@@ -173,7 +151,6 @@ def test_friction_torque_and_creepage_may_be_local(tangential):
     assert np.isfinite(model.solve(gap, RIG[0], OperatingPoint(300.0, 1.0, varied, 0.1)).power)
 
 
-@pytest.mark.bench
 @pytest.mark.parametrize("tangential", THEORIES)
 def test_fields_integrate_to_load_and_traction(tangential):
     grid = Grid.spanning(-2.2e-3, 2.2e-3, 60)
@@ -190,14 +167,12 @@ def test_fields_integrate_to_load_and_traction(tangential):
     assert force == pytest.approx(solution.force_x, rel=1e-2)
 
 
-@pytest.mark.bench
 def test_batch_equals_single_solutions():
     model, gap, point, single = contact(creepage=(4e-4, 3e-4, 0.1), tangential="fastrip")
     found = model.solve_batch(np.array([gap, gap]), RIG[0], [point, point])
     assert found.stack("dissipation")[1] == pytest.approx(single.dissipation, rel=1e-14)
 
 
-@pytest.mark.bench
 def test_missing_capabilities_are_refused():
     model, gap, point, _ = contact()
     with pytest.raises(CapabilityError, match="hertz takes no wear compliance"):

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from tests.materials import STEEL
 from tests.studies.study_examples import short
 from wearsim.errors import ContactError
 from wearsim.models.contact.semi_hertzian import SPEC, SemiHertzianOptions
 from wearsim.studies.run import run as replay
 from wearsim.types import Creepage, Grid, OperatingPoint
-from wearsim_bench.exact_solutions import CREEPAGES, STEEL, WORN, worn_profile
 
 MATERIALS = (STEEL, STEEL)
 RIG = 90.0
@@ -46,49 +46,12 @@ def carried_on(exact, y):
     return gap
 
 
-def on_worn(variant, name, creepage):
-    exact = worn_profile(name)
-    grid = Grid.spanning(-4e-3, 4e-3, 321)
-    *_, solution = contact(variant, grid, lambda y: carried_on(exact, y), creepage, curvature=45.0)
-    return exact, solution
-
-
 def difference(exact, solution, name, attribute, power=1):
     found = np.interp(exact["y"], solution.y, getattr(solution, attribute))
     missed = np.abs(found - exact[name]) ** power
     return (missed.sum() / (exact[name] ** power).sum()) ** (1.0 / power)
 
 
-@pytest.mark.bench
-@pytest.mark.parametrize("variant", VARIANTS)
-@pytest.mark.parametrize("name", WORN)
-def test_worn_line_loads_are_near_exact_theory(variant, name):
-    exact, solution = on_worn(variant, name, {"longitudinal": 1e-3})
-    allowed = LINE_LOAD[variant][WORN.index(name)] / 100.0
-    assert difference(exact, solution, "q", "line_load") < allowed
-    bottom = exact["w"].min()
-    found = (solution.approach - bottom) / (exact["approach"] - bottom)
-    assert found == pytest.approx(1.0, abs=0.17 if name == "parabola" else 0.07)
-    if variant != "kik-piotrowski":
-        assert difference(exact, solution, "a", "half_length") < 0.07
-
-
-@pytest.mark.bench
-@pytest.mark.parametrize("variant", VARIANTS)
-@pytest.mark.parametrize("case", list(CREEPAGES))
-def test_worn_dissipation_is_near_exact_theory(variant, case):
-    longitudinal, lateral, spin = CREEPAGES[case]
-    kik = variant == "kik-piotrowski"
-    for name in WORN:
-        creepage = {"longitudinal": longitudinal, "lateral": lateral, "spin": spin}
-        exact, solution = on_worn(variant, name, creepage)
-        power = solution.power / 2.6
-        assert power == pytest.approx(exact[f"P_over_V_{case}"], rel=0.14 if kik else 0.025)
-        scaled = {**exact, "rows": 2.6 * exact[f"P_l_over_V_{case}"]}
-        assert difference(scaled, solution, "rows", "dissipation", 2) < (0.32 if kik else 0.21)
-
-
-@pytest.mark.bench
 @pytest.mark.parametrize("variant", VARIANTS)
 @pytest.mark.parametrize("tangential", ["strip", "fastrip", "fastsim"])
 def test_power_is_the_work_of_the_rigid_slip(variant, tangential):
@@ -103,7 +66,6 @@ def test_power_is_the_work_of_the_rigid_slip(variant, tangential):
     assert solution.power > 0.0
 
 
-@pytest.mark.bench
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_fields_integrate_to_the_strips(variant):
     model, gap, point, solution = contact(variant, creepage={"longitudinal": 2e-4})
@@ -119,14 +81,12 @@ def test_fields_integrate_to_the_strips(variant):
     assert total(fields.power_density) == pytest.approx(solution.power, rel=2e-3)
 
 
-@pytest.mark.bench
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_free_roller_balances_its_bearing_torque(variant):
     *_, solution = contact(variant, creepage={"longitudinal": 0.0, "bearing_torque": 0.3})
     assert -0.02 * solution.force_x == pytest.approx(0.3, rel=1e-9)
 
 
-@pytest.mark.bench
 def test_variants_have_their_capabilities():
     model, gap, point, hard = contact()
     assert SPEC.capabilities == model.capabilities
@@ -137,7 +97,6 @@ def test_variants_have_their_capabilities():
     assert soft.line_load.sum() == pytest.approx(hard.line_load.sum(), rel=1e-12)
 
 
-@pytest.mark.bench
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_solution_is_independent_of_the_initial_guess(variant):
     model, gap, point, solution = contact(variant)
@@ -146,7 +105,6 @@ def test_solution_is_independent_of_the_initial_guess(variant):
     np.testing.assert_array_equal(again.line_load, solution.line_load)
 
 
-@pytest.mark.bench
 def test_contact_at_the_edge_of_its_strips_is_an_error():
     with pytest.raises(
         ContactError, match=r"raise contact\.width or move contact\.centre"
@@ -155,13 +113,11 @@ def test_contact_at_the_edge_of_its_strips_is_an_error():
     assert set(caught.value.state) >= {"gap", "line_load", "approach"}
 
 
-@pytest.mark.bench
 def test_too_narrow_strips_are_an_error():
     with pytest.raises(ContactError, match=r"lower contact\.strips"):
         contact(grid=Grid.spanning(-1.8e-5, 1.8e-5, 51))
 
 
-@pytest.mark.bench
 def test_input_that_is_not_finite_is_an_error():
     with pytest.raises(ContactError, match="not finite"):
         contact(gap=lambda y: np.where(y > 0.0, np.nan, y**2))

@@ -6,11 +6,11 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
+from tests.materials import STEEL
 from wearsim.errors import ContactError
 from wearsim.models.contact.slender import SPEC, Slender, SlenderOptions
 from wearsim.models.tangential.strip_theory import StripTheory
 from wearsim.types import ContactSolution, Creepage, Grid, OperatingPoint
-from wearsim_bench.exact_solutions import CREEPAGES, STEEL, WORN, rows, worn_profile
 
 MATERIALS = (STEEL, STEEL)
 SPEED = 1000.0 * 2.0 * math.pi / 60.0 * 25e-3
@@ -30,14 +30,12 @@ def contact(grid=None, gap=None, creepage=None, load=300.0, curvature=RIG, mu=0.
     return model, gap, point, model.solve(gap, curvature, point)
 
 
-@pytest.mark.bench
 def test_rig_power_is_within_1_percent_of_exact_theory():
     *_, solution = contact()
     assert solution.power == pytest.approx(0.0771, rel=1e-2)
     assert solution.line_load.sum() * np.diff(solution.y)[0] == pytest.approx(300.0, rel=1e-10)
 
 
-@pytest.mark.bench
 @pytest.mark.parametrize("tangential", ["strip", "fastsim"])
 @pytest.mark.parametrize(
     "creepage",
@@ -63,61 +61,6 @@ def test_power_is_the_work_of_the_rigid_slip(creepage, tangential):
     )
 
 
-@pytest.mark.bench
-def test_forces_and_slip_have_the_signs_of_exact_theory():
-    for row in rows("mean_problem", case="combined"):
-        *_, solution = contact(
-            gap=lambda y: 0.5 * y**2,
-            curvature=45.0,
-            grid=Grid.spanning(-2.4e-3, 2.4e-3, 121),
-            creepage={
-                "longitudinal": row["xi"],
-                "lateral": row["eta"],
-                "spin": row["phi_per_m"],
-            },
-        )
-        assert solution.force_x == pytest.approx(row["Fx_N"], rel=5e-3)
-        assert solution.force_y == pytest.approx(row["Fy_N"], rel=5e-3)
-        # the moment is a small difference of two large terms
-        assert solution.spin_moment == pytest.approx(row["Mz_Nm"], rel=0.1)
-        assert solution.power / SPEED == pytest.approx(row["P_over_V_N"], rel=3e-3)
-
-
-@pytest.mark.bench
-@pytest.mark.parametrize("name", WORN)
-def test_worn_line_loads_agree_with_exact_theory(name):
-    exact = worn_profile(name)
-    *_, solution = contact(
-        grid=Grid.spanning(-4e-3, 4e-3, 321),
-        gap=lambda y: np.interp(y, exact["y"], exact["w"]),
-        curvature=45.0,
-    )
-    q = np.interp(exact["y"], solution.y, solution.line_load)
-    assert np.abs(q - exact["q"]).sum() / exact["q"].sum() < 0.03
-    assert solution.approach == pytest.approx(exact["approach"], rel=0.01)
-
-
-@pytest.mark.bench
-@pytest.mark.parametrize("name", WORN)
-@pytest.mark.parametrize("case", list(CREEPAGES))
-def test_worn_dissipation_agrees_with_exact_theory(name, case):
-    exact = worn_profile(name)
-    xi, eta, phi = CREEPAGES[case]
-    *_, solution = contact(
-        grid=Grid.spanning(-4e-3, 4e-3, 321),
-        gap=lambda y: np.interp(y, exact["y"], exact["w"]),
-        curvature=45.0,
-        creepage={"longitudinal": xi, "lateral": eta, "spin": phi},
-    )
-    assert solution.power / SPEED == pytest.approx(exact[f"P_over_V_{case}"], rel=6e-3)
-    rows_exact = exact[f"P_l_over_V_{case}"]
-    ours = np.interp(exact["y"], solution.y, solution.dissipation) / SPEED
-    # the parabola has a kink, at which the error of the line load is as large
-    limit = 0.035 if name == "parabola" else 0.016
-    assert np.linalg.norm(ours - rows_exact) < limit * np.linalg.norm(rows_exact)
-
-
-@pytest.mark.bench
 @pytest.mark.parametrize(
     "creepage",
     [
@@ -153,7 +96,6 @@ def test_fields_integrate_to_the_strips(creepage):
     assert not slip[fields.adhesion].any()
 
 
-@pytest.mark.bench
 def test_spin_equals_its_creepage_variation():
     grid = Grid.spanning(-1.9e-3, 1.9e-3, 101)
     spin = {"longitudinal": 3e-4, "spin": 0.5}
@@ -163,7 +105,6 @@ def test_spin_equals_its_creepage_variation():
     np.testing.assert_allclose(second.dissipation, first.dissipation, rtol=1e-7)
 
 
-@pytest.mark.bench
 def test_mirrored_contact_has_mirrored_dissipation():
     grid = Grid.spanning(-3e-3, 3e-3, 100)
     one = {"longitudinal": 3e-4, "lateral": 1e-4, "spin": 0.5}
@@ -175,7 +116,6 @@ def test_mirrored_contact_has_mirrored_dissipation():
     assert second.spin_moment == pytest.approx(-first.spin_moment, rel=1e-9)
 
 
-@pytest.mark.bench
 @pytest.mark.parametrize("torque", [0.0, 1e-3, 0.1, 0.5, -0.3])
 def test_free_roller_balances_its_bearing_torque(torque):
     *_, solution = contact(creepage={"longitudinal": 0.0, "bearing_torque": torque, "spin": 0.2})
@@ -184,13 +124,11 @@ def test_free_roller_balances_its_bearing_torque(torque):
         assert abs(solution.longitudinal_creepage) < 1e-12
 
 
-@pytest.mark.bench
 def test_skidding_roller_is_an_error():
     with pytest.raises(ContactError, match=r"the roller skids: its bearing torque of 0\.7 N m"):
         contact(creepage={"longitudinal": 0.0, "bearing_torque": 0.7})
 
 
-@pytest.mark.bench
 def test_contact_at_the_edge_of_its_strips_is_an_error():
     with pytest.raises(
         ContactError, match=r"raise contact\.width or move contact\.centre"
@@ -199,13 +137,11 @@ def test_contact_at_the_edge_of_its_strips_is_an_error():
     assert set(caught.value.state) >= {"gap", "line_load", "approach"}
 
 
-@pytest.mark.bench
 def test_too_narrow_strips_are_an_error():
     with pytest.raises(ContactError, match=r"lower contact\.strips"):
         contact(grid=Grid.spanning(-1.8e-5, 1.8e-5, 51))
 
 
-@pytest.mark.bench
 def test_friction_may_be_given_per_strip():
     grid = Grid.spanning(-1.9e-3, 1.9e-3, 101)
     local = np.where(grid.y > 0.0, 0.2, 0.1)
@@ -214,7 +150,6 @@ def test_friction_may_be_given_per_strip():
     np.testing.assert_allclose(mixed.dissipation, low.dissipation * local / 0.1, rtol=1e-10)
 
 
-@pytest.mark.bench
 @pytest.mark.parametrize("warm", [False, True])
 @pytest.mark.parametrize(
     "creepage",
@@ -242,7 +177,6 @@ def test_single_solution_equals_batch_bit_for_bit(creepage, warm):
         assert np.array_equal(getattr(single, item.name), getattr(batch[0], item.name))
 
 
-@pytest.mark.bench
 def test_infinite_power_is_an_error_naming_the_contact():
     model, gap, point, _ = contact()
     bad = replace(point, creepage=Creepage(np.nan))
@@ -252,7 +186,6 @@ def test_infinite_power_is_an_error_naming_the_contact():
         model.solve_batch(np.stack([gap, gap]), RIG, [point, bad])
 
 
-@pytest.mark.bench
 def test_wear_compliance_reduces_pressure_and_keeps_load():
     model, gap, point, hard = contact(grid=Grid.spanning(-4e-3, 4e-3, 81))
     soft = model.solve(gap, RIG, point, np.full(81, 5e-11), hard)
