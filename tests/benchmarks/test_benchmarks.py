@@ -22,7 +22,6 @@ from tests.benchmarks.report import QUICK, TABLES
 from wearsim.studies.contact.monte_carlo import dissipation
 
 
-
 def test_speed_of_hertz(benchmark):
     assert benchmark(contacts.rig_hertz).peak_pressure == pytest.approx(680.22e6, rel=1e-5)
 
