@@ -7,14 +7,15 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from tests.benchmarks import contacts, starts, studies, wear_tests
+from tests.benchmarks import choices, contacts, starts, studies, wear_tests
 from tests.benchmarks.table import Effort, Row, markdown
 from wearsim_bench.measure.machine import this_machine
 
 TABLES: dict[str, list[Callable[[Effort], list[Row]]]] = {
+    "Which model and stepper": [choices.choice_rows],
     "One contact": [
         contacts.hertz_rows,
         contacts.mean_rows,
@@ -33,14 +34,16 @@ TABLES: dict[str, list[Callable[[Effort], list[Row]]]] = {
 QUICK = Effort(repetitions=1, part=0.005)
 
 
-def report(effort: Effort, on_progress: Callable[[str], object]) -> str:
-    """Measure everything and return the report; call `on_progress` with each finished table."""
+def report(
+    effort: Effort, on_progress: Callable[[str], object], titles: Iterable[str] = TABLES
+) -> str:
+    """Measure some tables and return the report; call `on_progress` with each finished table."""
     text = f"Measured on {this_machine()}; best of {effort.repetitions}.\n"
     if effort.quick:
         text += "\nShortened tests: these numbers only show that the report works.\n"
     on_progress(text)
-    for title, functions in TABLES.items():
-        rows = [row for function in functions for row in function(effort)]
+    for title in titles:
+        rows = [row for function in TABLES[title] for row in function(effort)]
         table = "\n" + markdown(title, rows)
         on_progress(table)
         text += table
@@ -54,13 +57,17 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument(
         "-o", "--output", type=Path, metavar="FILE.md", help="also write it to this file"
     )
+    parser.add_argument(
+        "--table", action="append", choices=list(TABLES), help="only this table; may be repeated"
+    )
     options = parser.parse_args(arguments)
 
     def on_progress(text: str) -> None:
         sys.stdout.write(text)
         sys.stdout.flush()
 
-    text = report(QUICK if options.quick else Effort(), on_progress)
+    effort = QUICK if options.quick else Effort()
+    text = report(effort, on_progress, options.table or TABLES)
     if options.output is not None:
         options.output.parent.mkdir(parents=True, exist_ok=True)
         options.output.write_text(text, encoding="utf-8")

@@ -1,0 +1,96 @@
+"""The documentation: what it prints runs, and what it names exists."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from wearsim.cli.app import app
+from wearsim.results.dissipation.schema import DISSIPATION
+from wearsim.results.ensemble.schema import ENSEMBLE
+from wearsim.results.run.schema import RUN
+
+ROOT = Path(__file__).parents[1]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+README = PAGES[0].read_text(encoding="utf-8")
+
+
+def blocks(text: str, language: str) -> list[str]:
+    """Return the fenced blocks of a language."""
+    fenced = re.findall(r"^```(\w*)\n(.*?)^```$", text, flags=re.DOTALL | re.MULTILINE)
+    return [block for name, block in fenced if name == language]
+
+
+def test_readme_is_one_and_a_half_screens():
+    assert len(README.splitlines()) <= 120
+
+
+def test_readme_scenario_gives_the_printed_output(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    (scenario,) = blocks(README, "toml")
+    (tmp_path / "rig.toml").write_text(scenario)
+    done = CliRunner().invoke(app, ["run", "rig.toml"])
+    assert done.exit_code == 0, done.output
+    (printed,) = [block for block in blocks(README, "") if "wearsim run rig.toml" in block]
+    for line in printed.splitlines()[1:]:
+        if "wall time" not in line and "tolerance" not in line:
+            assert " ".join(line.split()) in " ".join(done.output.split()), line
+    (code,) = blocks(README, "python")
+    exec(compile(code, "README.md", "exec"), {})
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_lead_to_files(page: Path):
+    text = page.read_text(encoding="utf-8")
+    targets = [target for target in re.findall(r"\]\(([^)#]+)", text) if "://" not in target]
+    missing = [target for target in targets if not (page.parent / target).exists()]
+    assert not missing
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_test_files_that_pages_name_exist(page: Path):
+    text = page.read_text(encoding="utf-8")
+    named = re.findall(r"`((?:tests|plugins|scenarios|docs|constraints)/[\w./-]+)`", text)
+    missing = [name for name in named if not (ROOT / name).exists()]
+    missing += [
+        name
+        for name in re.findall(r"python -m (tests[\w.]+)", text)
+        if not (ROOT / name.replace(".", "/")).with_suffix(".py").exists()
+    ]
+    assert not missing
+
+
+def test_files_of_the_architecture_exist():
+    text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    files = {path.relative_to(ROOT).as_posix() for path in ROOT.glob("wearsim/**/*")}
+    for name in re.findall(r"`([\w/]+(?:\.py|/))`", text):
+        path = name.rstrip("/")
+        assert (
+            any(file == path or file.endswith(f"/{path}") for file in files)
+            or (ROOT / path).exists()
+        ), name
+
+
+def test_layout_numbers_are_documented():
+    text = (ROOT / "docs" / "compatibility.md").read_text(encoding="utf-8")
+    for schema in (RUN, DISSIPATION, ENSEMBLE):
+        assert f"| `{schema.format}` | {schema.version} |" in text
+
+
+def test_guide_names_every_verb():
+    text = (ROOT / "docs" / "guide.md").read_text(encoding="utf-8")
+    shown = CliRunner().invoke(app, ["--help"]).output
+    verbs = re.findall(r"^  ([a-z]+)  ", shown.split("Commands:")[1], flags=re.MULTILINE)
+    assert len(verbs) >= 14
+    missing = [verb for verb in verbs if not re.search(rf"wearsim {verb}\b", text)]
+    assert not missing
+
+
+def test_answers_to_the_twelve_questions_exist():
+    questions = tomllib.loads((ROOT / "tests" / "questions.toml").read_text())["question"]
+    assert len(questions) == 12
+    assert all((ROOT / question["file"]).is_file() for question in questions)
