@@ -1,9 +1,9 @@
-# make demo    replay the 450-minute wear test: a summary, results and a figure in out/
-# make test    what a change can break, in minutes: style, types, layers, tests
-# make test-slow   the other tests: kills at every write, hard cases, installs, Dask
-# make bench   a quarter of an hour: speed against error, hard cases; writes out/bench/, out/benchmarks.md, out/models.md
-# make bench-ensembles   a quarter of an hour: why persistence matters, what ensembles cost
-# make clean   remove what these made, the environment included
+# make demo            run the 450-minute wear test: summary, results and figure in out/
+# make test            lint, types, import contracts and the quick tests: 5 minutes on 2 cores
+# make test-slow       the other tests: every kill of the writers, hard cases, installs, Dask: 18 minutes
+# make bench           speed against error, hard cases: out/bench/, out/benchmarks.md, out/models.md; a quarter of an hour
+# make bench-ensembles persistence and cost of ensembles: out/persistence.md, out/ensembles.md; a quarter of an hour
+# make clean           remove what these targets made, including the environment
 
 PYTHON ?= python3
 VENV := .venv
@@ -40,7 +40,7 @@ bench-ensembles: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.benchmarks.persistence -o out/persistence.md
 	$(BIN)/python -m tests.benchmarks.ensembles -o out/ensembles.md
 
-# the two stamps tell what the environment holds; a change of pyproject.toml renews it
+# the stamps record what the environment holds; a change of any pyproject.toml renews it
 $(VENV)/bin/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
 		|| { echo "wearsim needs Python 3.11 or newer; set PYTHON=/path/to/python3"; exit 1; }
