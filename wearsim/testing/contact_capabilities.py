@@ -270,7 +270,7 @@ def _pass_loop(fixture: ContactFixture) -> PassLoop:
     """Return two alternating rollers with a spring, a lagging term, tilt and spin."""
     case, y, shape = fixture.case, fixture.grid.y, (2, fixture.grid.strips)
     overlap = fixture.solution.approach - float(fixture.gap.min())
-    # the greatest wear of a pass is 1e-4 of the approach
+    # the largest wear of a pass is 1e-4 of the approach
     factor = 1e-4 * overlap * case.rolling_speed / float(fixture.solution.dissipation.max())
     ramp = np.linspace(-1.0, 1.0, _PASSES)
     return PassLoop(

@@ -13,7 +13,7 @@ from wearsim.studies.run.grid import fresh_patch
 from wearsim.uq.distributions.base import MaxentDistribution
 from wearsim.uq.estimation.moments import summarise
 from wearsim_chevalier2005 import paper
-from wearsim_chevalier2005.comparison_row import Row, beside, percent
+from wearsim_chevalier2005.comparison_row import Row, percent, printed_row
 from wearsim_chevalier2005.study import Reproduction
 
 EXACT_POWER = 0.0771  # W, the mean problem by CONTACT (Vollebregt and Kalker), a half-space code
@@ -28,24 +28,24 @@ def contact_rows(results: Reproduction) -> list[Row]:
     diameters = f"with {_radii(results.mean_scenario)}: the radii of the paper are diameters"
     bound = 2.0 * load / (math.pi * halved.a * halved.b)
     return [
-        beside(part, "length 2a", "mm", paper.CONTACT_LENGTH, 2.0 * halved.a, diameters),
-        beside(part, "width 2b", "mm", paper.CONTACT_WIDTH, 2.0 * halved.b, "as above"),
-        beside(
+        printed_row(part, "length 2a", "mm", paper.CONTACT_LENGTH, 2.0 * halved.a, diameters),
+        printed_row(part, "width 2b", "mm", paper.CONTACT_WIDTH, 2.0 * halved.b, "as above"),
+        printed_row(
             part, "length 2a, printed radii", "mm", paper.CONTACT_LENGTH, 2.0 * literal.a,
             f"with {_radii(results.printed_scenario)} taken as radii, as printed",
         ),
-        beside(
+        printed_row(
             part, "width 2b, printed radii", "mm", paper.CONTACT_WIDTH, 2.0 * literal.b, "as above"
         ),
-        beside(
+        printed_row(
             part, "rolling speed V", "m/s", paper.SPEED, results.mean.point.rolling_speed,
             "1000 rpm of the cylinder; the value is missing in section 3.3",
         ),
-        beside(
+        printed_row(
             part, "rolling speed V, printed radii", "m/s", paper.SPEED,
             results.as_printed.point.rolling_speed, "outside the printed range: diameters again",
         ),
-        beside(
+        printed_row(
             part, "rise of p0 under the parabolic bound", "%", paper.BOUND_RISE,
             bound / halved.peak_pressure - 1.0,
             "2 N/(pi a b) instead of 3 N/(2 pi a b) for the same load: a third more",
@@ -95,11 +95,11 @@ def input_rows(results: Reproduction) -> list[Row]:
             "creepage xi", "", paper.CREEPAGE_MULTIPLIERS, creepage,
             ("the last printed digit differs by one", "agrees", "truncated, not rounded"),
         ),
-        beside(
+        printed_row(
             "inputs", "std of lateral creepage", "1", paper.LATERAL_STD, lateral.std,
             "half the radius of the disc", lateral.std_error,
         ),
-        beside(
+        printed_row(
             "inputs", "std of spin", "1/m", paper.SPIN_STD, tilt.std / radius,
             f"tilt over {1e3 * radius:g} mm; over the printed {1e3 * printed_radius:g} mm it"
             f" would be {tilt.std / printed_radius:.3f}",
@@ -129,20 +129,20 @@ def mean_problem_rows(results: Reproduction) -> list[Row]:
     fastsim, summed = results.mean.solution.power, results.element_sum.solution.power
     literal = results.as_printed.solution.power
     return [
-        beside(
+        printed_row(
             part, "P_d, FASTSIM, converged", "W", printed, fastsim,
             "integrated exactly along every strip; the paper sums over elements",
         ),
-        beside(
+        printed_row(
             part, "P_d, FASTSIM, element sum 50 x 50", "W", printed, summed,
             "first order: depends on the evaluation points within an element",
         ),
-        beside(
+        printed_row(
             part, "P_d, slender", "W", printed, results.slender.solution.power,
             f"exact half-space theory (CONTACT): {EXACT_POWER} W; FASTSIM is"
             f" {percent(1.0 - fastsim / EXACT_POWER)} below it",
         ),
-        beside(
+        printed_row(
             part, "P_d, FASTSIM, printed radii", "W", printed, literal,
             f"{literal / fastsim:.1f} times as much, mostly by twice the speed",
         ),

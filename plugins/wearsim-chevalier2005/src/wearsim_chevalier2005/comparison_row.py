@@ -44,7 +44,7 @@ class Row:
     why: str
 
 
-def beside(
+def printed_row(
     part: str,
     name: str,
     unit: str,

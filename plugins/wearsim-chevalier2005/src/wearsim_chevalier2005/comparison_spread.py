@@ -9,7 +9,7 @@ import numpy as np
 from wearsim.results.dissipation.result import BAND, PAPER_BAND
 from wearsim.uq.estimation.moments import Quantile, Summary, converge, summarise
 from wearsim_chevalier2005 import paper
-from wearsim_chevalier2005.comparison_row import Row, beside, percent
+from wearsim_chevalier2005.comparison_row import Row, percent, printed_row
 from wearsim_chevalier2005.study import VARIANTS, Reproduction, Variant
 
 _NORMAL_95 = 1.959964  # half-width of a 95 % interval in standard errors
@@ -32,7 +32,7 @@ def mean_rows(results: Reproduction) -> list[Row]:
         which = "no lateral creepage and spin" if variant.aligned else "all inputs random"
         title = _TITLES[variant.white, variant.element_sum]
         rows.append(
-            beside(
+            printed_row(
                 f"mean of P_d, {which}",
                 title,
                 "W",
@@ -56,8 +56,8 @@ def _why_mean(results: Reproduction, variant: Variant, power: Summary) -> str:
     if variant.element_sum:
         return f"{less} lower"
     if variant.aligned:
-        alone = results.aligned.mean_problem_power
-        return f"one coefficient per contact; {alone:.4f} W with all inputs at their mean"
+        power_at_mean = results.aligned.mean_problem_power
+        return f"one coefficient per contact; {power_at_mean:.4f} W with all inputs at their mean"
     return f"bounded by mu N V |creepage|, {float(results.max_power.mean()):.3f} W on average"
 
 
@@ -72,7 +72,7 @@ def range_rows(results: Reproduction) -> list[Row]:
         ("white friction, element sum", white, BAND, "the mean over the cells varies less"),
     ]
     return [
-        beside(
+        printed_row(
             part,
             f"{100.0 * low:g} to {100.0 * high:g} %, {title}",
             "W",
@@ -107,7 +107,7 @@ def convergence_rows(results: Reproduction) -> list[Row]:
             part, f"standard error of the std at {at}", "W", None, place, std, None,
             f"{percent(std / summary.std)} of the standard deviation",
         ),
-        beside(
+        printed_row(
             part, "realisations for the mean to 1 %", "1", paper.CONVERGED_AT,
             (summary.std / (0.01 * summary.mean)) ** 2, "for a standard error of 1 % of the mean",
         ),
@@ -124,7 +124,7 @@ def bound_rows(results: Reproduction) -> list[Row]:
     error = math.sqrt(smoothed * (1.0 - smoothed) / count)
     beyond = (paper.MEAN_POWER.value - summary.mean) / summary.mean_error
     return [
-        beside(
+        printed_row(
             part, "mean", "W", paper.MEAN_POWER, summary.mean,
             f"the printed mean is {beyond:.0f} standard errors above this upper bound"
             if beyond > _SIGNIFICANT
@@ -135,7 +135,7 @@ def bound_rows(results: Reproduction) -> list[Row]:
             part, "largest", "W", high, paper.POWER_RANGE.place, summary.greatest, None,
             f"of {count} realisations, compared with the upper end of the range in the paper",
         ),
-        beside(
+        printed_row(
             part, f"realisations that could reach {high:g} W", "%", paper.ABOVE_RANGE,
             reaching / count, "in eq. 21, 5 % are above the upper end of the range", error,
         ),
