@@ -144,9 +144,7 @@ def test_number_of_mistakes_is_limited() -> None:
     ),
     st.sampled_from([",", ";", "\t"]),
 )
-def test_numbers_are_read_exactly_as_written(
-    rows: list[tuple[float, float]], mark: str
-) -> None:
+def test_numbers_are_read_exactly_as_written(rows: list[tuple[float, float]], mark: str) -> None:
     text = f"a [m]{mark}b [s]\n" + "".join(f"{a!r}{mark}{b!r}\n" for a, b in rows)
     columns = read_columns(text, "t.csv", {"b": "s", "a": "m"})
     assert list(zip(columns["a"], columns["b"], strict=True)) == rows

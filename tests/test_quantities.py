@@ -201,9 +201,7 @@ def test_json_schema_requires_text_with_a_unit() -> None:
     number=st.floats(allow_nan=False, allow_infinity=False, max_value=1e300, min_value=-1e300),
     unit=st.sampled_from([("mm", Fraction(1, 1000)), ("km", Fraction(1000)), ("m", Fraction(1))]),
 )
-def test_result_is_exact_to_the_last_bit(
-    number: float, unit: tuple[str, Fraction]
-) -> None:
+def test_result_is_exact_to_the_last_bit(number: float, unit: tuple[str, Fraction]) -> None:
     name, size = unit
     assert quantity(f"{number!r} {name}", "m") == float(Fraction(repr(number)) * size)
 
@@ -274,7 +272,5 @@ def test_importing_quantities_does_not_load_pint() -> None:
         (math.inf, "N", "inf"),
     ],
 )
-def test_si_value_is_written_in_engineering_units(
-    value: float, unit: str, text: str
-) -> None:
+def test_si_value_is_written_in_engineering_units(value: float, unit: str, text: str) -> None:
     assert in_engineers_unit(value, unit) == text
