@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-# a shell has what it starts in the background ignore SIGINT, and children inherit that
+# processes that a shell starts in the background ignore SIGINT, and so do their children
 _WITH_SIGINT = (
     "import os, signal, sys; signal.signal(signal.SIGINT, signal.SIG_DFL);"
     "os.execv(sys.executable, [sys.executable, *sys.argv[1:]])"

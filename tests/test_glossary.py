@@ -75,7 +75,7 @@ def test_file_variables_and_glossary_agree():
     assert stored == set(names("file variable"))
 
 
-def test_file_variable_stands_in_one_row():
+def test_file_variable_is_in_one_row():
     found = names("file variable")
     assert len(found) == len(set(found))
 

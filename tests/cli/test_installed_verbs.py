@@ -128,7 +128,7 @@ def test_help_of_an_installed_verb_has_its_name(command: Command, install: Insta
     assert "completion" not in result.output
 
 
-def test_an_installed_verb_may_have_verbs(command: Command, install: Install) -> None:
+def test_installed_verb_may_have_verbs(command: Command, install: Install) -> None:
     install("tools", GROUP)
     result = command("tools", "saw")
     assert (result.exit_code, result.stdout) == (0, "sawn\n")
@@ -160,7 +160,7 @@ def test_errors_of_an_installed_verb_set_the_exit_code(command: Command, install
     ],
     ids=["import", "crash", "exit", "no app", "no Typer app", "empty app"],
 )
-def test_a_verb_that_cannot_be_loaded_is_one_clear_error(
+def test_verb_that_cannot_be_loaded_is_one_clear_error(
     command: Command, install: Install, code: str, cause: str
 ) -> None:
     install("grind", code)
@@ -176,7 +176,7 @@ def test_a_verb_that_cannot_be_loaded_is_one_clear_error(
     assert command("plugins").exit_code == 0
 
 
-def test_the_traceback_of_a_failed_import_is_shown_on_request(
+def test_traceback_of_a_failed_import_is_shown_on_request(
     command: Command, install: Install, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("WEARSIM_TRACEBACK", "0")  # restored after the test
@@ -187,7 +187,9 @@ def test_the_traceback_of_a_failed_import_is_shown_on_request(
     assert "ZeroDivisionError" in result.stderr
 
 
-def test_a_built_in_verb_wins_over_an_installed_one(command: Command, install: Install) -> None:
+def test_built_in_verb_takes_precedence_over_installed_one(
+    command: Command, install: Install
+) -> None:
     before, module = help_lines(command)["schema"], install("schema")
     assert help_lines(command)["schema"] == before
     result = command("schema")
@@ -196,7 +198,7 @@ def test_a_built_in_verb_wins_over_an_installed_one(command: Command, install: I
     assert module not in sys.modules
 
 
-def test_a_verb_of_two_distributions_is_an_error_naming_both(
+def test_verb_of_two_distributions_is_an_error_naming_both(
     command: Command, install: Install
 ) -> None:
     modules = [install("grind", name="shop"), install("grind", name="mill", summary="Mills.")]
@@ -217,7 +219,7 @@ def test_a_verb_of_two_distributions_is_an_error_naming_both(
         ("reproduce", "wearsim-chevalier2005", "wearsim[chevalier2005]"),
     ],
 )
-def test_a_missing_verb_of_this_project_has_a_hint(
+def test_missing_verb_of_this_project_has_a_hint(
     command: Command, verb: str, distribution: str, extra: str
 ) -> None:
     assert verb not in help_lines(command)
@@ -230,7 +232,7 @@ def test_a_missing_verb_of_this_project_has_a_hint(
         assert f"pip install ./plugins/{distribution}" in message
 
 
-def test_the_hints_name_distributions_and_extras_that_exist() -> None:
+def test_hints_name_distributions_and_extras_that_exist() -> None:
     import tomllib
 
     root = Path(__file__).parents[2]
@@ -245,9 +247,7 @@ def test_the_hints_name_distributions_and_extras_that_exist() -> None:
         assert requirement == f"{distribution}=={project['version']}"
 
 
-def test_an_unknown_verb_has_no_hint_but_the_nearest_name(
-    command: Command, install: Install
-) -> None:
+def test_unknown_verb_has_only_the_nearest_name_as_hint(command: Command, install: Install) -> None:
     install("grind")
     message = message_of(command("grnid"))
     assert "No such command 'grnid'. Did you mean 'grind'?" in message
@@ -255,7 +255,7 @@ def test_an_unknown_verb_has_no_hint_but_the_nearest_name(
 
 
 @pytest.mark.bench
-def test_the_verbs_of_this_project_are_installed(command: Command) -> None:
+def test_verbs_of_this_project_are_installed(command: Command) -> None:
     names = {point.name for point in entry_points(group=installed_verbs.GROUP)}
     assert set(installed_verbs.FIRST_PARTY) <= names
     assert set(installed_verbs.FIRST_PARTY) <= set(help_lines(command))

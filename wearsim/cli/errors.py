@@ -88,7 +88,7 @@ def _state(state: dict[str, Any]) -> str:
 def _message(error: BaseException) -> str:
     if isinstance(error, SolverError) and error.state:
         return f"error: {error}\nstate at the failure: {_state(error.state)}"
-    if isinstance(error, ScenarioError | Interrupted):  # their messages start with a place
+    if isinstance(error, ScenarioError | Interrupted):  # their messages start with file or progress
         return str(error)
     if isinstance(error, WearsimError):
         return f"error: {error}"

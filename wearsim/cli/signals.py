@@ -15,7 +15,7 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 @dataclass
 class Stop:
-    """Flag that a signal sets."""
+    """Flag that is set by a signal."""
 
     received: bool = False
 

@@ -193,13 +193,13 @@ class WearState:
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, npt.NDArray[np.generic]]) -> WearState:
         """Return the state stored in the result of `to_arrays`."""
-        known = {item.name for item in fields(cls)}  # files of older versions hold further names
+        known = {item.name for item in fields(cls)}  # early files have further names
         values: dict[str, Any] = {
             name: array.item() if name in _SCALARS else np.array(array)
             for name, array in arrays.items()
             if name in known
         }
-        for name in ("quadrature", "scatter"):  # absent from files of version 0.1.0
+        for name in ("quadrature", "scatter"):  # absent from early files of layout 1
             values.setdefault(name, np.zeros((2, len(arrays["depth_error"]))))
         for name in _AUXILIARY:
             part = _with_prefix(arrays, f"{name}_")

@@ -42,7 +42,7 @@ class SharedWear:
 
     @property
     def total(self) -> FloatArray:
-        """Gap that a contact opens for itself per unit of line load, (contacts, strips)."""
+        """Increase of each contact's gap by its wear per unit of line load, (contacts, strips)."""
         return np.asarray(self.compliance.sum(axis=-2))
 
     def opening(self, line_load: FloatArray) -> FloatArray:

@@ -16,7 +16,7 @@ from wearsim.scenario import examples as shipped
 from wearsim.scenario import load_scenario
 from wearsim_chevalier2005 import paper
 from wearsim_chevalier2005.comparison import compare
-from wearsim_chevalier2005.comparison_inputs import EXACT_POWER, law_of, printed_area
+from wearsim_chevalier2005.comparison_inputs import EXACT_POWER, maxent_of, printed_area
 from wearsim_chevalier2005.comparison_row import Row
 from wearsim_chevalier2005.study import (
     VARIANTS,
@@ -79,16 +79,16 @@ def test_multipliers_follow_from_the_moments(row: FindRow) -> None:
 
 
 def test_printed_multipliers_do_not_give_unit_area(results: Reproduction) -> None:
-    printed, law = paper.LOAD_MULTIPLIERS, law_of(results.scenario, "load.normal_force")
+    printed, load = paper.LOAD_MULTIPLIERS, maxent_of(results.scenario, "load.normal_force")
 
     def density(n: float) -> float:
         return math.exp(-(printed.l0 + printed.l1 * n + printed.l2 * n * n))
 
     whole = integrate.quad(density, 0.0, 1000.0, points=[306.0], epsabs=1e-12)[0]
-    assert printed_area(printed, law) == pytest.approx(whole, rel=1e-5)
+    assert printed_area(printed, load) == pytest.approx(whole, rel=1e-5)
     assert whole < 0.9
-    l0, l1, l2 = law.multipliers
-    assert printed_area(paper.PrintedMultipliers(l0, l1, l2, ""), law) == pytest.approx(1.0)
+    l0, l1, l2 = load.multipliers
+    assert printed_area(paper.PrintedMultipliers(l0, l1, l2, ""), load) == pytest.approx(1.0)
 
 
 def test_misalignment_has_the_std_of_a_disc(row: FindRow) -> None:
@@ -251,9 +251,12 @@ def test_progress_counts_all_variants() -> None:
 def test_white_friction_keeps_the_marginal(results: Reproduction) -> None:
     white = results.spread[Variant(aligned=False, white=True, element_sum=False)]
     (item,) = [item for item in white.scenario.random if item.role == "field"]
-    (law,) = [item for item in results.scenario.random if item.name == "friction.coefficient"]
-    assert item.mean == law.mean
-    assert white_friction(results.scenario)["marginal"] == {"distribution": "maxent", **law.options}
+    (friction,) = [item for item in results.scenario.random if item.name == "friction.coefficient"]
+    assert item.mean == friction.mean
+    assert white_friction(results.scenario)["marginal"] == {
+        "distribution": "maxent",
+        **friction.options,
+    }
     assert isinstance(white, DissipationResult)
 
 

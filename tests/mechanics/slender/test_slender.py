@@ -23,7 +23,7 @@ from wearsim.types import Grid
 MODULUS = 200e9 / (2.0 * (1.0 - 0.3**2))
 CURVATURE = 90.0
 PATCH = hertz(45.0, 1.0, 300.0, MODULUS)
-BY_LOAD = 4.0 / (np.pi * MODULUS * CURVATURE)  # a^2/q of a strip by itself
+BY_LOAD = 4.0 / (np.pi * MODULUS * CURVATURE)  # a^2/q of a strip without interaction
 # difference of two converged solutions over the greatest line load: convergence is quadratic
 # for local half-lengths, and linear with a small factor for coupled ones
 RESIDUAL_LOAD = {"local": 2e-8, "coupled": 2e-8}

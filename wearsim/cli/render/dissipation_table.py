@@ -66,7 +66,7 @@ def _power_ranges(power: Summary) -> Rows:
     for low, high in ((0.025, 0.975), (0.05, 0.95)):
         ends = [power.quantile(low), power.quantile(high)]
         values = " to ".join(_watts(end.value) for end in ends)
-        # as many digits as the quantile, which would else seem to be outside its interval
+        # with the digits of the quantile, so that rounding does not put it outside its interval
         pairs = [(_watts(end.low), _watts(end.high)) for end in ends]
         intervals = [_TOO_FEW if NOTHING in pair else "..".join(pair) for pair in pairs]
         confidence = " and ".join(dict.fromkeys(intervals))

@@ -17,11 +17,12 @@ from wearsim.evolution.steppers.single_step import carried_loads, solve_present
 from wearsim.evolution.steppers.wear_increment import WearIncrement
 from wearsim.types import FloatArray, Number
 
-DEPTH_EXPONENT, VOLUME_EXPONENT = 0.5, 0.75  # lower bounds; grooves grow with 2/3 to 1, about 1
+# lower bounds: the depth grows with a power of 2/3 to 1 of the passes, the volume with about 1
+DEPTH_EXPONENT, VOLUME_EXPONENT = 0.5, 0.75
 Step: TypeAlias = Callable[[WearProblem, WearState, Number], WearState]
 """Function from a problem, a state and a number of passes to the state after them."""
 COVER = 1.5  # safety factor on an error estimate
-FIRST_ORDER_COVER = 2.0  # the same for a scheme of first order, whose estimate is hardly too large
+FIRST_ORDER_COVER = 2.0  # for schemes of first order, with less conservative estimates
 DEEP = 0.5  # depths are compared where the groove is deeper than this part of its greatest depth
 DEPTHS = ("cylinder_depth", "roller_depth")
 

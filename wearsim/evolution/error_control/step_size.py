@@ -65,7 +65,7 @@ class StepControl:
         return step * min(self.grow, max(self.shrink, aim))
 
 
-SMALLEST_STEP = 1e-6  # passes; some wear factors wear a whole groove in ten passes
+SMALLEST_STEP = 1e-6  # passes; with a great wear factor ten passes wear a whole groove
 _SMALLEST_PART = 1e-8  # of the passes done; with shorter steps a test would not end
 
 
@@ -137,7 +137,7 @@ class Trial:
             return True
         chosen = self._control.next_step(step, excess, self._order)
         if excess <= 1.0:
-            # a step cut short by the stop says little about the length of the next
+            # a step shortened by the stop does not limit the length of the next one
             self.proposed = max(chosen, self.proposed) if step < self.proposed else chosen
             return True
         self.rejected += 1

@@ -17,7 +17,7 @@ from wearsim.evolution.state import Contacts, Depths, WearState, as_batch
 from wearsim.evolution.steppers.wear_increment import WearIncrement
 from wearsim.types import FloatArray, Number
 
-REALISATION = 2  # axis
+REALISATION = 2  # axis of the realisations
 SAME_LOAD = 1e-9  # relative change of a load below which a contact is not solved again
 
 

@@ -36,7 +36,7 @@ def decay_rates(problem: WearProblem, state: WearState) -> FloatArray:
     Power iteration on the decrease of the wear per pass due to a change of the profiles. The first
     iterate alternates from strip to strip. If the line load of a strip depends on its own gap
     alone, this profile decays fastest and its decrease, in the maximum norm, is the rate.
-    Otherwise the iteration converges to the profile that does.
+    Otherwise the iteration converges to the profile that decays fastest.
 
     One iteration is sufficient if it agrees with the rate stored in the state. If the model cannot
     solve a contact on the changed profiles, the stored rate is returned.
@@ -44,7 +44,7 @@ def decay_rates(problem: WearProblem, state: WearState) -> FloatArray:
     wear = WearIncrement(present_problem(problem, state), state.contacts, 1.0)
     loaded = problem.values_of(state.contacts, "line_load") > 0.0
     alternating = np.where(loaded.any(axis=(0, 1)), (-1.0) ** np.arange(problem.grid.strips), 0.0)
-    # the two bodies share a change of the gap as they share the wear
+    # a change of the gap is divided between the bodies in the ratio of their wear
     cylinder, roller = (alternating * rate.max(axis=-1, keepdims=True) for rate in wear.depths)
     profile = cylinder, roller
     rates = state.decay if state.decay is not None else np.zeros(problem.shape[2])

@@ -13,7 +13,7 @@ from wearsim.mechanics.numerics.wear_exponent import estimate_exponents, ratio_t
 from wearsim.plugins import SharedWear
 from wearsim.types import FloatArray, Number
 
-MAX_LINEAR_EXPONENT = 1.0  # of dissipation over line load: full sliding
+MAX_LINEAR_EXPONENT = 1.0  # of dissipation as a power of line load; 1 in full sliding
 MAX_EXPONENT = 50.0  # T gamma's wear law goes as the power 44 where catastrophic wear begins
 
 

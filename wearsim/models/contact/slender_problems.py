@@ -93,7 +93,7 @@ class NormalContacts(NamedTuple):
         Parameters
         ----------
         own : ndarray, shape (sets, contacts, strips)
-            Gap that a contact opens for itself per unit of line load [m/(N/m)].
+            Increase of each contact's gap by its wear per unit of line load [m/(N/m)].
         constants : Constants
         """
         solve_each(self.gap, own_array(own), self.loads, *constants, *self._outputs)

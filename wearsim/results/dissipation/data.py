@@ -16,7 +16,7 @@ class DissipationData(StudyData):
     Parameters
     ----------
     plan : str
-        Name of the sampling plan.
+        Name of the sampling design.
     inputs : list of dict
         Dotted key and SI unit of each drawn value.
     asked : int

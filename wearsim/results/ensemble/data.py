@@ -78,7 +78,7 @@ class EnsembleData(StudyData):
     strip_width : float
         Width of a strip [m].
     plan : str
-        Name of the sampling plan.
+        Name of the sampling design.
     asked : int
         Requested number of realisations, which is the number of rows of the file.
     until : str
@@ -154,7 +154,7 @@ class EnsembleData(StudyData):
             The first realisation, and the one after the last.
         """
         if isinstance(self.variables, StoredArrays):
-            return self.variables.rows(name, start, stop)  # reads no other rows
+            return self.variables.rows(name, start, stop)  # reads these rows only
         return self.variables[name][start:stop]
 
     def columns(self, name: str, records: slice) -> FloatArray:

@@ -109,7 +109,7 @@ class EnsembleResult(StudyResult[EnsembleData]):
 
     @property
     def plan(self) -> Design:
-        """Name of the sampling plan."""
+        """Name of the sampling design."""
         return cast("Design", self.raw.plan)
 
     @property
@@ -204,7 +204,7 @@ class EnsembleResult(StudyResult[EnsembleData]):
     def inputs(self) -> dict[str, FloatArray]:
         """Drawn values by scenario key, shape (count,) or (count, rollers) [SI].
 
-        For a random process, the mean over the test.
+        The value of a random process is its mean over the test.
         """
         return {item["key"]: self.values(item["key"]) for item in self.raw.inputs}
 
@@ -235,7 +235,7 @@ class EnsembleResult(StudyResult[EnsembleData]):
 
     @property
     def design(self) -> Design:
-        """Sampling plan assumed for the intervals.
+        """Sampling design assumed for the intervals.
 
         Without the failed realisations the known mean of a control variate does not apply.
         """

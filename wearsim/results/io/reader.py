@@ -143,7 +143,7 @@ def _kind(path: str | Path, file: h5py.File) -> tuple[FileKind, Schema, str]:
 def _run_data(path: str | Path, file: h5py.File) -> RunData:
     from wearsim.results.io import hdf5_read, hdf5_write  # noqa: PLC0415
 
-    # files of version 0.1.0 have no "drawn": they have no random inputs
+    # early files of layout 1, without random inputs, have no "drawn"
     group = hdf5_write.CHECKPOINT
     attributes = read_attributes(path, file, RUN, RunData, groups=[group], optional=["drawn"])
     variables = _variables(file, RUN)

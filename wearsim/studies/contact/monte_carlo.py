@@ -49,7 +49,7 @@ def dissipation(
     Parameters
     ----------
     scenario : Scenario
-        A scenario of a run or of a single contact; `sampling.plan` is the sampling plan.
+        A scenario of a run or of a single contact; `sampling.plan` is the sampling design.
     realisations : int
         Number of realisations, at least 1.
     output : path, optional

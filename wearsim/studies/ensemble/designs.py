@@ -1,4 +1,4 @@
-"""Sampling plans of ensembles, and the sample sizes of their interim analyses."""
+"""Sampling designs of ensembles, and the sample sizes of their interim analyses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`wearsim bench`: time and error of contact models, steppers and sampling plans."""
+"""`wearsim bench`: time and error of contact models, steppers and sampling designs."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def bench(
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
-    """Measure time and error of models, steppers and sampling plans; --hard runs the hard cases."""
+    """Measure time and error of models, steppers and sampling; --hard runs the hard cases."""
     selected = list(dict.fromkeys(topics or ([] if hard else TopicName)))
     if plugin is not None:
         selected = _topics_of_model(selected, topics, plugin)

@@ -58,26 +58,26 @@ def _radii(scenario: Scenario) -> str:
     return "/".join(f"{1e3 * length:g}" for length in lengths) + " mm"
 
 
-def law_of(scenario: Scenario, key: str) -> MaxentDistribution:
+def maxent_of(scenario: Scenario, key: str) -> MaxentDistribution:
     """Return the maximum-entropy distribution of a random input."""
     (item,) = (item for item in scenario.random if item.name == key)
     if not isinstance(item.distribution, AnalyticDistribution):
-        raise TypeError(f"{key} has no law: its distribution is {item.kind}")
+        raise TypeError(f"{key} has no maximum-entropy distribution, but {item.kind}")
     return item.distribution.analytic
 
 
-def printed_area(printed: paper.PrintedMultipliers, law: MaxentDistribution) -> float:
+def printed_area(printed: paper.PrintedMultipliers, distribution: MaxentDistribution) -> float:
     """Return the integral of the density with the printed multipliers; 1 for exact multipliers."""
-    low, high = law.bulk
+    low, high = distribution.bulk
     x = np.linspace(low - (high - low), high + (high - low), 20001)
-    x = x[(x >= law.support[0]) & (x <= law.support[1])]
+    x = x[(x >= distribution.support[0]) & (x <= distribution.support[1])]
     density = np.exp(-(printed.l0 + printed.l1 * x + printed.l2 * x * x))
     return float(np.trapezoid(density, x))
 
 
 def input_rows(results: Reproduction) -> list[Row]:
     """Return the rows of the maximum-entropy distributions and of the misalignment."""
-    load, creepage = law_of(results.scenario, LOAD), law_of(results.scenario, LONGITUDINAL)
+    load, creepage = maxent_of(results.scenario, LOAD), maxent_of(results.scenario, LONGITUDINAL)
     area = printed_area(paper.LOAD_MULTIPLIERS, load)
     radius, printed_radius = results.scenario.roller.radius, paper.ROLLER_RADIUS.value
     drawn = results.all_inputs.inputs
@@ -112,11 +112,13 @@ def _multipliers(
     what: str,
     unit: str,
     printed: paper.PrintedMultipliers,
-    law: MaxentDistribution,
+    distribution: MaxentDistribution,
     why: tuple[str, str, str],
 ) -> list[Row]:
     units = ("1", f"1/{unit}", f"1/{unit}^2") if unit else ("1", "1", "1")
-    values = zip((printed.l0, printed.l1, printed.l2), law.multipliers, units, why, strict=True)
+    values = zip(
+        (printed.l0, printed.l1, printed.l2), distribution.multipliers, units, why, strict=True
+    )
     return [
         Row("inputs", f"lambda{power} of {what}", own, value, printed.place, here, None, reason)
         for power, (value, here, own, reason) in enumerate(values)

@@ -13,7 +13,7 @@ from wearsim.report.text.units import PER_SI
 from wearsim.studies.contact.draws import LOAD, TILT, YAW
 from wearsim.types import FloatArray
 from wearsim_chevalier2005 import paper
-from wearsim_chevalier2005.comparison_inputs import law_of
+from wearsim_chevalier2005.comparison_inputs import maxent_of
 
 if TYPE_CHECKING:
     from wearsim.results import DissipationResult
@@ -45,12 +45,12 @@ def draw_inputs(panels: dict[str, Axes], results: Reproduction) -> None:
 
 
 def _draw_load_distribution(axes: Axes, results: Reproduction) -> None:
-    law, printed = law_of(results.scenario, LOAD), paper.LOAD_MULTIPLIERS
-    low, high = law.bulk
-    n = np.linspace(max(law.support[0], low - 0.2 * (high - low)), high, 401)
+    distribution, printed = maxent_of(results.scenario, LOAD), paper.LOAD_MULTIPLIERS
+    low, high = distribution.bulk
+    n = np.linspace(max(distribution.support[0], low - 0.2 * (high - low)), high, 401)
     loads = results.all_inputs.values("normal_force")
     axes.hist(loads, CLASSES, density=True, color=BLUE, alpha=0.3, label="realisations")
-    axes.plot(n, law.density(n), color=BLUE, label="maximum entropy")
+    axes.plot(n, distribution.density(n), color=BLUE, label="maximum entropy")
     rounded = np.exp(-(printed.l0 + printed.l1 * n + printed.l2 * n * n))
     axes.plot(n, rounded, color=RED, ls="--", label="printed multipliers")
     _name_lines(axes, "upper left")

@@ -1,1 +1,1 @@
-"""Benchmark of sampling plans."""
+"""Benchmark of sampling designs."""

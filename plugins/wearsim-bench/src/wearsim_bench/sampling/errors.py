@@ -1,4 +1,4 @@
-"""Errors of sampling plans: studies of one size compared with the estimate from all tests."""
+"""Errors of sampling designs: studies of one size compared with the estimate from all tests."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ def plan_error(
     studies : sequence of Study
         Studies of at least two replicates.
     plan : str
-        The sampling plan.
+        The sampling design.
     group : str
         `MEAN` or `QUANTILE`.
     reference : Reference

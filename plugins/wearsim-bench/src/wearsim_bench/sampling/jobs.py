@@ -56,7 +56,7 @@ class Part:
     Parameters
     ----------
     plan : str
-        The sampling plan.
+        The sampling design.
     seed : int
         Seed of the study.
     total : int
@@ -138,7 +138,7 @@ class Timing:
     Parameters
     ----------
     plan : str
-        The sampling plan.
+        The sampling design.
     total : int
         Number of tests.
     """

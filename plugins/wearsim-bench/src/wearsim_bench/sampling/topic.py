@@ -1,4 +1,4 @@
-"""Sampling plans: errors of mean and quantile of ensembles against time."""
+"""Sampling designs: errors of mean and quantile of ensembles against time."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ class PlannedStudy:
     seed : int
         Seed, different for all studies.
     plan : str
-        The sampling plan.
+        The sampling design.
     tests : int
         Number of tests.
     """
@@ -105,7 +105,7 @@ class PlannedStudy:
 
 
 def sampling(effort: Effort, on_progress: OnProgress) -> Topic:
-    """Measure every sampling plan over the size of a study.
+    """Measure every sampling design over the size of a study.
 
     Parameters
     ----------
