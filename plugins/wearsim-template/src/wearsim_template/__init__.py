@@ -3,7 +3,6 @@
 from typing import Annotated
 
 import numpy as np
-from scipy.optimize import brentq
 
 import wearsim.plugins as ws
 from wearsim.types import ContactSolution
@@ -49,6 +48,8 @@ class Winkler(ws.ContactModel):
         # approach at which a single strip carries the load
         reach = (force / spacing / stiffness) ** (2.0 / 3.0)
         low = float(gap.min())
+        from scipy.optimize import brentq  # slow to import, and every plugin is imported at start
+
         approach = brentq(excess, low, low + 1.01 * reach, xtol=1e-20, rtol=1e-14)
         if depth(approach)[[0, -1]].any():
             raise ws.ContactError("the contact reaches the edge of its strips; raise contact.width")
