@@ -158,3 +158,33 @@ def test_any_text_gives_columns_or_a_scenario_error(text: str) -> None:
         assert error.mistakes  # noqa: PT017
     else:
         assert np.all(np.diff(columns["time"]) > 0.0)
+
+
+NUMBERS = st.floats(-1e300, 1e300)
+CELLS = st.one_of(
+    NUMBERS.map(repr),
+    st.sampled_from(
+        ["", "nan", "inf", "1e999", "1_0", "0x10", "1,5", "1 2", '"3"', "4 # note", "+.5e-3"]
+    ),
+)
+
+
+@given(st.lists(NUMBERS, min_size=2, max_size=8), st.sampled_from([",", ";", "\t"]))
+def test_regular_file_reads_as_row_by_row(values: list[float], mark: str) -> None:
+    rows = [mark.join((repr(float(k)), "text", repr(value))) for k, value in enumerate(values)]
+    text = "\n".join([mark.join(("time [s]", "note", "load [kN]")), *rows])
+    quick, slow = _outcome(text), _outcome(text + "\n# a comment line disables the quick reader")
+    assert quick == slow
+
+
+@given(st.lists(st.tuples(CELLS, CELLS), min_size=2, max_size=6))
+def test_any_cells_read_as_row_by_row(cells: list[tuple[str, str]]) -> None:
+    text = "\n".join(["time [s];load [N]", *(";".join(pair) for pair in cells)])
+    assert _outcome(text) == _outcome(text + "\n# a comment line disables the quick reader")
+
+
+def _outcome(text: str) -> object:
+    try:
+        return {name: column.tobytes() for name, column in _read(text).items()}
+    except ScenarioError as error:
+        return [str(mistake) for mistake in error.mistakes]

@@ -73,22 +73,33 @@ def read_columns(
     import numpy as np  # noqa: PLC0415  (every command of the shell imports this module)
 
     mistakes: list[Mistake] = []
-    rows, separator = _rows(text)
-    if not rows:
+    lines = text.removeprefix("\ufeff").splitlines()
+    start = next((k for k, line in enumerate(lines) if _has_cells(line)), None)
+    if start is None:
         heads = ", ".join(_head(name, unit) for name, unit in columns.items())
         expected = f"a header line such as {heads}"
         raise ScenarioError(file, [Mistake("", "", "the file is empty", None, expected)])
-    found = _find_columns(rows[0], columns, aliases or {}, mistakes)
-    values = _numbers(rows, found, separator, rising, mistakes)
-    if len(rows) < 3:
-        got = str(len(rows) - 1)
-        mistakes.append(Mistake("", "", "too few rows of numbers", got, "at least 2"))
+    separator = next((mark for mark in "\t;," if mark in lines[start]), ",")
+    header = _cells(lines[start], start, separator)
+    found = _find_columns(header, columns, aliases or {}, mistakes)
+    body = lines[start + 1 :]
+    values = None if mistakes else _regular_numbers(body, header, found, separator, rising)
+    if values is None:
+        rows = [
+            _cells(line, start + 1 + k, separator)
+            for k, line in enumerate(body)
+            if _has_cells(line)
+        ]
+        values = _numbers(rows, header, found, separator, rising, mistakes)
+        if len(rows) < 2:
+            got = str(len(rows))
+            mistakes.append(Mistake("", "", "too few rows of numbers", got, "at least 2"))
     if len(mistakes) > MAX_MISTAKES:
         rest = Mistake("", "", f"and {len(mistakes) - MAX_MISTAKES} more")
         mistakes = [*mistakes[:MAX_MISTAKES], rest]
     if mistakes:
         raise ScenarioError(file, mistakes)
-    return {column.name: np.array(values[column.name]) * column.factor for column in found}
+    return {column.name: np.asarray(values[column.name]) * column.factor for column in found}
 
 
 def _mistake(line: int, what: str, got: str | None = None, expected: str | None = None) -> Mistake:
@@ -99,19 +110,37 @@ def _head(name: str, unit: str) -> str:
     return name if unit == "1" else f"{name} [{unit}]"
 
 
-def _rows(text: str) -> tuple[list[_Row], str]:
-    """Split the text into rows, with the separator of the header."""
-    lines = [
-        (number, line)
-        for number, line in enumerate(text.lstrip("\ufeff").splitlines(), start=1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
-    separator = next((mark for mark in "\t;," if lines and mark in lines[0][1]), ",")
-    rows = []
-    for number, line in lines:
-        cells = next(csv.reader([line], delimiter=separator, skipinitialspace=True))
-        rows.append(_Row(number, [cell.strip() for cell in cells]))
-    return rows, separator
+def _has_cells(line: str) -> bool:
+    """Return whether a line is neither blank nor a comment."""
+    return bool(line.strip()) and not line.lstrip().startswith("#")
+
+
+def _cells(line: str, place: int, separator: str) -> _Row:
+    cells = next(csv.reader([line], delimiter=separator, skipinitialspace=True))
+    return _Row(place + 1, [cell.strip() for cell in cells])
+
+
+def _regular_numbers(
+    body: list[str], header: _Row, found: list[_Column], separator: str, rising: str | None
+) -> dict[str, FloatArray] | None:
+    """Read the columns by numpy's parser, or return None if anything in the file is irregular.
+
+    A file with a mistake is then read row by row, to report the mistake with its line.
+    """
+    import numpy as np  # noqa: PLC0415
+
+    marks = {line.count(separator) for line in body}
+    if marks != {len(header.cells) - 1} or any("#" in line or '"' in line for line in body):
+        return None
+    places = [column.place for column in found]
+    try:
+        table = np.loadtxt(body, delimiter=separator, usecols=places, ndmin=2, unpack=True)
+    except ValueError:
+        return None
+    values = {column.name: row for column, row in zip(found, table, strict=True)}
+    order = values.get(rising or "", np.arange(2.0))
+    regular = len(body) > 1 and np.isfinite(table).all() and (order[1:] > order[:-1]).all()
+    return values if regular else None
 
 
 def _find_columns(
@@ -166,15 +195,16 @@ def _factor(line: int, name: str, written: str | None, unit: str, mistakes: list
 
 def _numbers(
     rows: list[_Row],
+    header: _Row,
     found: list[_Column],
     separator: str,
     rising: str | None,
     mistakes: list[Mistake],
 ) -> dict[str, list[float]]:
     """Read every cell of the columns found."""
-    width = len(rows[0].cells)
+    width = len(header.cells)
     values: dict[str, list[float]] = {column.name: [] for column in found}
-    for row in rows[1:]:
+    for row in rows:
         if len(row.cells) > width:
             comma = " (is a comma meant as decimal point?)" if separator == "," else ""
             got, expected = f"{len(row.cells)} cells", f"{width}, as in the header"

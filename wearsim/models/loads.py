@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 from pydantic import Field
@@ -68,15 +69,18 @@ class ConstantLoad(Load):
         return self._force
 
 
+@lru_cache(maxsize=4)  # a log may have millions of rows, and a study builds its load several times
+def _read_log(text: str, path: str) -> PiecewiseLinear:
+    columns = read_columns(text, path, {"time": "s", "load": "N"}, rising="time")
+    return PiecewiseLinear(columns["time"], columns["load"])
+
+
 class RecordedLoad(Load):
     """Logged load, linear between its samples and integrated exactly."""
 
     def __init__(self, options: RecordedOptions) -> None:
-        columns = read_columns(
-            options.file.text, options.file.path, {"time": "s", "load": "N"}, rising="time"
-        )
         self.stiffness = options.stiffness
-        self._log = PiecewiseLinear(columns["time"], columns["load"])
+        self._log = _read_log(options.file.text, options.file.path)
 
     @property
     def span(self) -> tuple[float, float]:
