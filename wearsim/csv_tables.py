@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import difflib
 import re
+from operator import methodcaller
 from typing import TYPE_CHECKING, NamedTuple
 
 from wearsim.errors import Mistake, ScenarioError
@@ -129,8 +130,9 @@ def _regular_numbers(
     """
     import numpy as np  # noqa: PLC0415
 
-    marks = {line.count(separator) for line in body}
-    if marks != {len(header.cells) - 1} or any("#" in line or '"' in line for line in body):
+    joined = "\n".join(body)
+    marks = set(map(methodcaller("count", separator), body))
+    if marks != {len(header.cells) - 1} or "#" in joined or '"' in joined:
         return None
     places = [column.place for column in found]
     try:
