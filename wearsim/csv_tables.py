@@ -84,7 +84,9 @@ def read_columns(
     header = _cells(lines[start], start, separator)
     found = _find_columns(header, columns, aliases or {}, mistakes)
     body = lines[start + 1 :]
-    values = None if mistakes else _regular_numbers(body, header, found, separator, rising)
+    values: Mapping[str, FloatArray | list[float]] | None = None
+    if not mistakes:
+        values = _regular_numbers(body, header, found, separator, rising)
     if values is None:
         rows = [
             _cells(line, start + 1 + k, separator)
