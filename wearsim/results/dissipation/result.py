@@ -100,6 +100,10 @@ def summaries(variables: Arrays) -> dict[str, Summary]:
     ----------
     variables : dict of str to ndarray
         Variables of a dissipation study.
+
+    Returns
+    -------
+    dict of str to Summary
     """
     probabilities = tuple(sorted({*BAND, *PAPER_BAND, 0.5}))
     return {name: summarise(variables[name], probabilities) for name in SUMMARISED}

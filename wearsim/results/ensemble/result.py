@@ -221,6 +221,10 @@ class EnsembleResult(StudyResult[EnsembleData]):
             The record; by default the end of the test.
         probabilities : tuple of float
             Probabilities of the quantiles.
+
+        Returns
+        -------
+        Estimate
         """
         return self._estimate(self.independent(name, record)[1], probabilities)
 
@@ -265,7 +269,18 @@ class EnsembleResult(StudyResult[EnsembleData]):
         return np.flatnonzero(self.numbers % (len(self.raw.groups) + 2) < 2)
 
     def course(self, name: str) -> Course:
-        """Return estimates of an observable at all records, with the stored quantiles."""
+        """Return estimates of an observable at all records.
+
+        Parameters
+        ----------
+        name : str
+            Name of the observable, "depth".
+
+        Returns
+        -------
+        Course
+            Mean with its interval, standard deviation, and the quantiles `QUANTILES` [SI].
+        """
         found = [self._estimate(values, QUANTILES) for values in self._by_record(name)]
         return Course(
             passes=self.record_passes,
@@ -363,5 +378,20 @@ class EnsembleResult(StudyResult[EnsembleData]):
 
 
 def open_ensemble(path: str | Path) -> EnsembleResult:
-    """Open the file of an ensemble; see `open_results`."""
+    """Open the file of an ensemble.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+
+    Returns
+    -------
+    EnsembleResult
+
+    Raises
+    ------
+    ResultsFileError
+        If it is missing, of another kind, truncated, damaged, or written by a newer wearsim.
+    """
     return EnsembleResult(read_ensemble(path), Path(path))

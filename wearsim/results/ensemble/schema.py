@@ -159,12 +159,32 @@ def ensemble_schema(inputs: Sequence[Mapping[str, str]], control: Mapping[str, A
 
 
 def is_row(variable: Variable) -> bool:
-    """Return whether a variable of an ensemble has one row per realisation."""
+    """Return whether a variable of an ensemble has one row per realisation.
+
+    Parameters
+    ----------
+    variable : Variable
+        A variable of `ENSEMBLE`.
+
+    Returns
+    -------
+    bool
+    """
     return variable.dims[0] in {"realisation", "kept"}
 
 
 def type_of(variable: Variable) -> np.dtype[Any]:
-    """Return the type in which a variable of an ensemble is stored."""
+    """Return the type in which a variable of an ensemble is stored.
+
+    Parameters
+    ----------
+    variable : Variable
+        A variable of `ENSEMBLE`.
+
+    Returns
+    -------
+    numpy.dtype
+    """
     other = {"status": np.dtype(np.uint8), "error": np.dtype(f"S{ERROR_BYTES}")}
     return other.get(variable.name, np.dtype("<f8"))
 

@@ -42,7 +42,18 @@ def lock_or_refuse(file: IO[bytes], path: str | Path) -> None:
 
 
 def refuse_if_locked(path: str | Path) -> None:
-    """Raise a ResultsFileError if another process is writing a file, which need not exist."""
+    """Refuse a file that another process is writing.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file, which need not exist.
+
+    Raises
+    ------
+    ResultsFileError
+        If another process is writing it.
+    """
     if os.access(path, os.R_OK | os.W_OK):
         with Path(path).open("r+b", buffering=0) as file:
             lock_or_refuse(file, path)

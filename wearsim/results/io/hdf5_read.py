@@ -49,7 +49,17 @@ class Extent:
 
 
 def get_text(dataset: h5py.Dataset) -> str:
-    """Return a text dataset written by `hdf5_write`."""
+    """Return a text dataset written by `hdf5_write`.
+
+    Parameters
+    ----------
+    dataset : h5py.Dataset
+        The dataset.
+
+    Returns
+    -------
+    str
+    """
     kind = dataset.id.get_type()
     content = np.empty((), f"S{kind.get_size()}")
     dataset.id.read(h5s.ALL, h5s.ALL, content, kind)
@@ -57,13 +67,35 @@ def get_text(dataset: h5py.Dataset) -> str:
 
 
 def get_label(item: h5py.Dataset | h5py.Group, name: str) -> str:
-    """Return a text attribute written by `hdf5_write`."""
+    """Return a text attribute written by `hdf5_write`.
+
+    Parameters
+    ----------
+    item : h5py.Dataset or h5py.Group
+        Owner of the attribute.
+    name : str
+        Name of the attribute.
+
+    Returns
+    -------
+    str
+    """
     content = item.attrs[name]
     return content if isinstance(content, str) else bytes(content).decode("utf-8", ERRORS)
 
 
 def get_arrays(group: h5py.Group) -> Arrays:
-    """Return all arrays of a group by name."""
+    """Return all arrays of a group by name.
+
+    Parameters
+    ----------
+    group : h5py.Group
+        The group.
+
+    Returns
+    -------
+    dict of str to ndarray
+    """
     items = group.items()
     return {name: np.asarray(item[()]) for name, item in items if isinstance(item, h5py.Dataset)}
 

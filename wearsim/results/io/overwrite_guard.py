@@ -43,7 +43,17 @@ def refuse_inputs(
 
 
 def same_file(one: str | Path, other: str | Path) -> bool:
-    """Return whether two paths refer to the same file, which need not exist."""
+    """Return whether two paths refer to the same file.
+
+    Parameters
+    ----------
+    one, other : str or Path
+        The paths; the files need not exist.
+
+    Returns
+    -------
+    bool
+    """
     try:
         return os.path.samefile(one, other)
     except OSError:  # one of them does not exist

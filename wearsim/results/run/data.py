@@ -66,7 +66,18 @@ class RunData(StudyData):
 
 
 def differences(one: RunData, other: RunData) -> list[str]:
-    """Return the names of all fields and arrays in which two runs differ, bit for bit."""
+    """Return the names of all fields and arrays in which two runs differ, bit for bit.
+
+    Parameters
+    ----------
+    one, other : RunData
+        The runs.
+
+    Returns
+    -------
+    list of str
+        Names such as "history.depth"; empty for identical runs.
+    """
     names = [
         name
         for name in (*RunData.attribute_names(), "scenario_text", "files")
