@@ -1,19 +1,16 @@
 """The contact model `hertz-fastsim`, and FASTSIM on the strips of other contacts."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
+from hertz_fastsim_examples import MATERIALS, PAIR, RIG, SPEED, balance, contact, groove
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from tests.materials import STEEL
 from tests.mechanics.tangential.kalker_closed_form import closed_form_parabolic
-from wearsim.contact_batch import OperatingPoints
 from wearsim.errors import CapabilityError, ContactError
-from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.mechanics.hertz.ellipse import hertz
 from wearsim.mechanics.tangential.kalker_coefficients import creepage_coefficients, flexibilities
 from wearsim.models.contact.equivalent_ellipse import equivalent_ellipse
@@ -21,31 +18,6 @@ from wearsim.models.contact.hertz_fastsim import SPEC, HertzFastsim, HertzFastsi
 from wearsim.models.tangential.base import Strips, complete
 from wearsim.models.tangential.fastsim import FastsimTheory
 from wearsim.types import Creepage, Grid, OperatingPoint
-
-MATERIALS = (STEEL, STEEL)
-PAIR = combine(*MATERIALS)
-SPEED = 1000.0 * 2.0 * math.pi / 60.0 * 25e-3
-RIG = (90.0, 2.0)  # relative curvatures along and across
-
-
-def contact(grid=None, creepage=(1e-3, 0.0, 0.0), load=300.0, mu=0.1, shape=None, **options):
-    """Solve the rig's contact; `options` as in a scenario."""
-    model = HertzFastsim(HertzFastsimOptions(**options))
-    if grid is None:
-        grid = model.suggest_grid(RIG[1], RIG[0], load, MATERIALS)
-    model.prepare(grid, MATERIALS)
-    gap = grid.y**2 if shape is None else shape(grid.y)
-    point = OperatingPoint(load, SPEED, Creepage(*creepage), mu)
-    return model, gap, point, model.solve(gap, RIG[0], point)
-
-
-def balance(point, solution):
-    creepage = point.creepage
-    return -point.rolling_speed * (
-        solution.longitudinal_creepage * solution.force_x
-        + creepage.lateral * solution.force_y
-        + creepage.spin * solution.spin_moment
-    )
 
 
 def test_mean_problem_power_in_closed_form_is_0_073873_watts():
@@ -155,10 +127,6 @@ def test_one_flexibility_in_gross_sliding_follows_creepage():
     assert one.power == pytest.approx(SPEED * 30.0 * 0.02, rel=1e-3)
 
 
-def groove(depth, offset=0.0):
-    return lambda y: y**2 + 0.95 * np.maximum(depth - (y - offset) ** 2, 0.0)
-
-
 @pytest.mark.parametrize("depth", [1e-6, 5e-6, 17e-6, 48e-6])
 def test_worn_profile_has_a_wider_patch_with_the_same_load(depth):
     grid = Grid.spanning(-9e-3, 9e-3, 181)
@@ -245,14 +213,6 @@ def test_bearing_torque_determines_the_creepage():
         )  # fmt: skip
 
 
-def test_friction_may_differ_from_strip_to_strip():
-    model, gap, _, whole = contact()
-    friction = np.where(np.arange(50) < 25, 0.1, 0.05)
-    half = model.solve(gap, RIG[0], OperatingPoint(300.0, SPEED, Creepage(1e-3), friction))
-    assert half.dissipation[:25] == pytest.approx(whole.dissipation[:25], rel=1e-12)
-    assert np.all(half.dissipation[25:] < whole.dissipation[25:])
-
-
 def test_creepage_may_vary_from_strip_to_strip():
     model, gap, _, _ = contact()
     y = model.suggest_grid(RIG[1], RIG[0], 300.0, MATERIALS).y
@@ -292,260 +252,9 @@ def test_fields_integrate_to_the_solution(bound):
     assert np.all(fields.power_density >= -1e-6 * fields.power_density.max())
 
 
-CONTACTS = 60
-
-
-def draws(contacts=CONTACTS, seed=0):
-    """Return operating points as in the paper: load, creepage, yaw, tilt and friction."""
-    random = np.random.default_rng(seed)
-    radius, angle = 2e-3 * np.sqrt(random.random(contacts)), 2 * np.pi * random.random(contacts)
-    return OperatingPoints(
-        normal_force=random.normal(307.0, 32.0, contacts),
-        longitudinal=np.abs(random.normal(1e-3, 4e-4, contacts)),
-        lateral=radius * np.cos(angle),
-        spin=radius * np.sin(angle) / 20e-3,
-        friction=np.abs(random.normal(0.1, 0.02, contacts)),
-        rolling_speed=SPEED,
-    )
-
-
-def batch(points, shape=None, half=3e-3, strips=50, **options):
-    """Solve the contacts of the rig at `points` as a batch, on one gap or on several."""
-    model, grid = HertzFastsim(HertzFastsimOptions(**options)), Grid.spanning(-half, half, strips)
-    model.prepare(grid, MATERIALS)
-    gap = np.broadcast_to(grid.y**2, (1, 1, len(points), strips))
-    if shape is not None:
-        gap = np.array([shape(grid.y, k) for k in range(len(points))])[None, None]
-    return model, gap, model.solve_batch(gap, RIG[0], points)
-
-
-def assert_same(found, expected):
-    for name, value in vars(expected).items():
-        # adhesion is counted in points; a moment is a small difference of forces times arms
-        scale = 300.0 * 3e-3 if name == "spin_moment" else np.abs(value).max()
-        assert getattr(found, name) == pytest.approx(value, rel=0.0, abs=1e-13 * scale), name
-        assert type(getattr(found, name)) is type(value)
-
-
-OPTIONS = [
-    {},
-    {"closed_form": "always"},
-    {"closed_form": "never", "bound": "elliptic", "mx": 17},
-    {"dissipation": "element-sum"},
-    {"kalker": "line-limit"},
-    {"kalker_coefficients": {"c11": 4.0, "c22": 3.0, "c23": 0.5}},
-    {"patch": {"a": "0.2 mm", "b": "2 mm"}},
-    {"flexibility": "one", "closed_form": "never"},
-    {"flexibility": "one", "dissipation": "element-sum", "bound": "elliptic"},
-]
-
-
-@pytest.mark.parametrize("spin", [True, False])
-@pytest.mark.parametrize("options", OPTIONS)
-def test_batch_equals_single_solutions(options, spin):
-    points = draws() if spin else replace(draws(), spin=np.zeros(CONTACTS))
-    model, gap, found = batch(points, **options)
-    assert found.stack("line_load").shape == (1, 1, CONTACTS, 50)
-    for k in range(0, CONTACTS, 4):
-        assert_same(found.solutions[k], model.solve(gap[0, 0, k], RIG[0], points[k]))
-
-
-@pytest.mark.parametrize("flexibility", ["three", "one"])
-def test_batch_supports_any_gap_friction_and_creepage(flexibility):
-    random = np.random.default_rng(1)
-    shapes = [groove(depth, offset) for depth, offset in random.random((CONTACTS, 2)) * 3e-6]
-    points = replace(
-        draws(),
-        friction=random.uniform(0.05, 0.15, (CONTACTS, 81)),
-        variation=random.normal(size=(CONTACTS, 81)) * 1e-4,
-    )
-    model, gap, found = batch(points, lambda y, k: shapes[k](y), 9e-3, 81, flexibility=flexibility)
-    for k in range(0, CONTACTS, 4):
-        assert_same(found.solutions[k], model.solve(gap[0, 0, k], RIG[0], points[k]))
-
-
-def test_list_of_points_equals_columns():
-    points = draws()
-    model, gap, found = batch(points)
-    listed = model.solve_batch(gap, RIG[0], list(points))
-    assert np.array_equal(listed.stack("power"), found.stack("power"))
-    part = model.solve_batch(gap[:, :, 10:20], RIG[0], points[10:20])
-    assert np.array_equal(part.stack("dissipation"), found.stack("dissipation")[:, :, 10:20])
-
-
-def test_columns_of_different_lengths_are_refused():
-    with pytest.raises(ValueError, match="spin has 2 values for 60 contacts"):
-        replace(draws(), spin=np.zeros(2))
-
-
-def test_batch_with_bearing_torques_is_solved():
-    model, gap, _, _ = contact()
-    points = [
-        OperatingPoint(
-            300.0, SPEED, Creepage(0.0), 0.1, bearing_torque=torque,
-            rolling_radius=np.full(50, 20e-3),
-        )
-        for torque in (0.1, 0.2)
-    ]  # fmt: skip
-    found = model.solve_batch(np.array([gap, gap]), RIG[0], points)
-    assert -found.stack("force_x") * 20e-3 == pytest.approx([0.1, 0.2], rel=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("change", "match"),
-    [
-        ({"normal_force": 0.0}, "contact is lost"),
-        ({"normal_force": 1e5}, "extends beyond its strips"),
-        ({"lateral": math.nan}, "power is not finite"),
-    ],
-)
-def test_batch_error_names_the_failed_contact(change, match):
-    points = draws()
-    for name, value in change.items():
-        getattr(points, name)[17] = value
-    with pytest.raises(ContactError, match=f"^realisation 17: .*{match}") as caught:
-        batch(points)
-    assert caught.value.state["contact"] == [0, 0, 17]
-    assert "gap" in caught.value.state
-
-
-def test_batch_refuses_wrong_curvature_and_friction_shape():
-    points = draws()
-    model, gap, _ = batch(points)
-    with pytest.raises(ContactError, match="curvature along rolling is -1 1/m"):
-        model.solve_batch(gap, -1.0, points)
-    with pytest.raises(ValueError, match=r"friction has the shape \(7, 50\)"):
-        batch(replace(points, friction=np.full((CONTACTS, 7, 50), 0.1)))
-    with pytest.raises(ValueError, match="60 operating points for a batch of 59 contacts"):
-        model.solve_batch(gap[:, :, 1:], RIG[0], points)
-    with pytest.raises(CapabilityError, match="stepper = 'stabilised'"):
-        model.solve_batch(gap, RIG[0], points, np.zeros_like(gap))
-
-
-def test_neglect_of_lateral_spin_slip_has_the_stated_error():
-    points = draws(300)
-    powers = {
-        name: batch(points, None, 1.8e-3, strips, closed_form=form, mx=mx)[2].stack("power").ravel()
-        for name, form, strips, mx in (
-            ("reference", "never", 200, 200),
-            ("strips", "always", 200, 200),
-            ("quick", "always", 24, 50),
-        )
-    }
-    reference = powers["reference"]
-    error = powers["strips"] / reference - 1.0
-    assert np.sqrt(np.mean(error**2)) < 2.5e-3
-    assert np.abs(error).max() < 0.03
-    for name, tolerance in (("strips", 2e-4), ("quick", 1e-3)):
-        assert powers[name].mean() == pytest.approx(reference.mean(), rel=tolerance)
-        assert powers[name].std() == pytest.approx(reference.std(), rel=tolerance)
-
-
 def test_closed_form_with_spin_keeps_the_energy_balance():
     *_, point, solution = contact(creepage=(6e-4, 3e-4, 0.2), closed_form="always")
     assert solution.power == pytest.approx(balance(point, solution), rel=1e-12)
-
-
-FIELD_OPTIONS = [{}, {"bound": "elliptic"}, {"dissipation": "element-sum"}]
-
-
-@pytest.mark.parametrize("options", FIELD_OPTIONS)
-def test_uniform_friction_field_equals_one_coefficient(options):
-    options = options | {"closed_form": "never"}
-    model, gap, point, expected = contact(creepage=(4e-4, 5e-4, 0.3), **options)
-    for carried in (False, True):
-        field = replace(point, friction=np.full((50, 50), 0.1), friction_carried=carried)
-        found = model.solve(gap, RIG[0], field)
-        assert found.dissipation == pytest.approx(expected.dissipation, rel=1e-13)
-        assert found.adhesion_fraction == pytest.approx(expected.adhesion_fraction, rel=1e-12)
-        assert found.force_y == pytest.approx(expected.force_y, rel=1e-13)
-
-
-def test_carried_friction_is_the_mean_over_particles():
-    model, gap, point, _ = contact(creepage=(4e-4, 5e-4, 0.0), mx=6)
-    friction = np.random.default_rng(3).uniform(0.05, 0.2, (6, 50))
-    found = model.solve(gap, RIG[0], replace(point, friction=friction, friction_carried=True))
-    singles = [model.solve(gap, RIG[0], replace(point, friction=row)) for row in friction]
-    for name in ("dissipation", "force_x", "force_y", "adhesion_fraction", "power"):
-        mean = np.mean([getattr(solution, name) for solution in singles], axis=0)
-        assert getattr(found, name) == pytest.approx(mean, rel=1e-13), name
-
-
-def noise(points_along, strips, carried=False, contacts=12):
-    """Return the mean power and its standard error with random friction at each point."""
-    random = np.random.default_rng(points_along)
-    same = np.ones(contacts)
-    points = OperatingPoints(
-        normal_force=300.0 * same,
-        longitudinal=1e-3 * same,
-        lateral=0.0 * same,
-        spin=0.0 * same,
-        friction=random.normal(0.1, 0.02, (contacts, points_along, strips)),
-        rolling_speed=SPEED,
-        friction_carried=carried,
-    )
-    options = {"mx": points_along, "kalker": "line-limit"}
-    half = 0.5 * strips * contact(my=strips)[0]._grid.spacing
-    power = batch(points, None, half, strips, **options)[2].stack("power").ravel()
-    return power.mean(), power.std() / math.sqrt(contacts)
-
-
-@pytest.mark.parametrize(
-    ("cells", "expected"),
-    [(25, 0.0689), (50, 0.0653), (100, 0.0614), (200, 0.0569), (400, 0.0527), (800, 0.0487)],
-)
-def test_white_noise_power_decreases_with_grid_refinement(cells, expected):
-    mean, deviation = noise(cells, strips=50)
-    assert deviation < 0.01 * expected
-    assert mean == pytest.approx(expected, rel=0.02)
-
-
-def test_carried_white_noise_has_a_continuum_limit():
-    # the limit is the mean of the power over the distribution of the coefficient
-    nodes, weights = np.polynomial.hermite_e.hermegauss(21)
-    powers = [contact(mu=0.1 + 0.02 * z, kalker="line-limit")[-1].power for z in nodes]
-    limit = np.dot(weights, powers) / weights.sum()
-    for cells in (25, 100, 400):
-        mean, deviation = noise(cells, 50, carried=True)
-        assert mean == pytest.approx(limit, abs=4.0 * deviation)
-    assert deviation < 1e-3 * limit
-
-
-def test_friction_points_are_the_ends_of_the_steps():
-    model, gap, point, solution = contact(Grid.spanning(-3e-3, 3e-3, 60), mx=10)
-    x, y = model.friction_points(gap, RIG[0], point)
-    assert np.array_equal(y, solution.y)
-    expected = (1.0 - 0.2 * np.arange(1, 11))[:, None] * solution.half_length
-    assert x == pytest.approx(expected, abs=1e-18)
-    points = draws()
-    model, gap, found = batch(points, mx=10)
-    many, _ = model.friction_points_batch(gap, RIG[0], points)
-    assert many.shape == (CONTACTS, 10, 50)
-    assert np.array_equal(-many[:, -1], found.stack("half_length")[0, 0])
-    listed, _ = model.friction_points_batch(gap, RIG[0], list(points))
-    assert np.array_equal(listed, many)
-    points.normal_force[3] = -1.0
-    with pytest.raises(ContactError, match="realisation 3: the contact is lost"):
-        model.friction_points_batch(gap, RIG[0], points)
-
-
-def test_fields_support_friction_per_point():
-    model, gap, point, _ = contact(creepage=(6e-4, 3e-4, 0.1), mx=200)
-    friction = np.random.default_rng(4).uniform(0.05, 0.15, (200, 50))
-    local = replace(point, friction=friction)
-    solution = model.solve(gap, RIG[0], local)
-    fields = model.fields(solution, gap, RIG[0], local)
-    assert fields.x.shape == (201, 50)
-    spacing = solution.y[1] - solution.y[0]
-    force = np.trapezoid(fields.traction_x, fields.x, axis=0).sum() * spacing
-    # the solution includes the corners that the trapezoidal rule omits at the edges
-    assert force == pytest.approx(solution.force_x, rel=1e-4)
-    bound = friction[::-1] * 4.0 / 3.0 * fields.pressure[:-1]
-    assert np.all(np.hypot(fields.traction_x, fields.traction_y)[:-1] <= bound + 1e-3)
-    with pytest.raises(CapabilityError, match="no stationary field inside"):
-        model.fields(solution, gap, RIG[0], replace(local, friction_carried=True))
-    with pytest.raises(CapabilityError, match="without a bearing torque"):
-        model.solve(gap, RIG[0], replace(local, bearing_torque=0.1, rolling_radius=np.ones(50)))
 
 
 def hertz_strips(strips=81):

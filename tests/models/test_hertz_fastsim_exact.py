@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from test_hertz_fastsim import MATERIALS, PAIR, SPEED, contact
+from hertz_fastsim_examples import MATERIALS, PAIR, SPEED, contact
 
 from wearsim.models.contact.hertz_fastsim import HertzFastsim, HertzFastsimOptions
 from wearsim.models.tangential.base import Strips, complete

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from types import ModuleType
 
 from pydantic import Field, model_validator
@@ -18,6 +19,8 @@ from wearsim.quantities import (
     PositiveStiffness,
 )
 from wearsim.scenario import Scenario
+
+RIG = Path(__file__).parents[2] / "scenarios" / "rig-450min.toml"
 
 GOOD = """\
 title = "a rig"
@@ -54,6 +57,29 @@ law = "archard-dissipation"
 cylinder = { k_over_h = "1.1e-11 1/Pa" }
 roller = { k_over_h = "0 1/Pa" }
 """
+
+# lines of the scenario, and what replaces them to make their values random
+FORCE_LINE = 'normal_force = "300 N"'
+MU = "coefficient = 0.1"
+XI = "longitudinal = 1e-3"
+K = 'k_over_h = "1.1e-11 1/Pa"'
+
+LOAD = (FORCE_LINE, 'normal_force = {distribution = "flat", low = "200 N", high = "0.4 kN"}')
+FRICTION = (
+    MU,
+    (
+        'coefficient = {distribution = "patches", length = "50 um", persistence = "per-pass", '
+        'marginal = {distribution = "bell", mean = 0.1, std = 0.02, support = [0.01, "inf"]}}'
+    ),
+)
+SLACK = (
+    XI,
+    (
+        f"{XI}\nmisalignment = "
+        '{distribution = "square", side = "4 mrad", persistence = "per-roller"}'
+    ),
+)
+WEAR = (K, 'k_over_h = {distribution = "flat", low = "1e-11 1/Pa", high = "3e-11 1/Pa"}')
 
 
 class SlenderOptions(Options):

@@ -7,7 +7,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from scenario_examples import GOOD, Parse
+from scenario_examples import GOOD, RIG, Parse
 
 from wearsim.errors import ScenarioError
 from wearsim.scenario import load_scenario
@@ -324,3 +324,8 @@ def test_files_are_read_from_the_folder_of_the_scenario(
     (tmp_path / "log.csv").write_text("time [s],load [N]\n0,1\n1,2\n", encoding="utf-8")
     scenario = load_scenario(tmp_path / "rig.toml")
     assert scenario.files == {"log.csv": "time [s],load [N]\n0,1\n1,2\n"}
+
+
+def test_expected_multiple_is_reported():
+    with pytest.raises(ScenarioError, match="expected a multiple of 4 of at least 4"):
+        load_scenario(RIG, {"evolution.nodes": 6})

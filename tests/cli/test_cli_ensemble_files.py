@@ -1,0 +1,130 @@
+"""The commands `show`, `plot`, `export` and `resume` on the file of an ensemble."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cli_examples import Command
+
+import wearsim
+from tests.studies.ensemble_cases import small
+from wearsim.errors import Interrupted, ResultsFileError
+from wearsim.results import open_ensemble
+from wearsim.studies.ensemble.api import ensemble
+
+
+@pytest.fixture(scope="session")
+def done_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("ensemble") / "e.h5"
+    ensemble(small(), 40, path, scheduler="serial")
+    return path
+
+
+@pytest.fixture
+def done(done_once: Path, tmp_path: Path) -> Path:
+    """A copy of the file of a finished ensemble."""
+    path = tmp_path / "e.h5"
+    path.write_bytes(done_once.read_bytes())
+    return path
+
+
+def test_show_prints_the_content_of_the_file(command: Command, done: Path) -> None:
+    result = command("show", done)
+    assert result.exit_code == 0
+    for text in ("40 done, 0 failed, of 40", "software", "random creepage.misalignment", "disc"):
+        assert text in result.stdout
+    assert max(len(line.rstrip()) for line in result.stdout.splitlines()) <= 110
+    data = json.loads(command("show", done, "--json").stdout)
+    assert data["depth_m"]["count"] == 40
+    assert "[load.normal_force]" in data["scenario"]
+
+
+def test_plot_draws_an_ensemble(command: Command, done: Path) -> None:
+    assert command("plot", done).exit_code == 0
+    assert Path("e.png").read_bytes().startswith(b"\x89PNG")
+    refused = command("plot", done, "-o", "b.png", "--measured", "m.csv")
+    assert refused.exit_code == 2
+    assert "requires the file of a wear test" in refused.stderr
+
+
+def test_export_writes_realisations_courses_and_profile(command: Command, done: Path) -> None:
+    result = command("export", done, "-o", "out")
+    assert result.exit_code == 0, result.output
+    assert result.stdout.splitlines() == [
+        f"out/{name}"
+        for name in ("realisations.csv", "courses.csv", "profile.csv", "scenario.toml")
+    ]
+    kept = open_ensemble(done)
+    text = Path("out/realisations.csv").read_text().splitlines()
+    table = np.loadtxt(text[1:], delimiter=",")
+    head = text[0].split(",")
+    for title, values in {
+        "load.normal_force [N]": kept.inputs["load.normal_force"],
+        "depth [um]": kept.at_end("depth") * 1e6,
+        "width [mm]": kept.at_end("width") * 1e3,
+    }.items():
+        np.testing.assert_allclose(table[:, head.index(title)], values, rtol=1e-11)
+
+
+def test_resumed_ensemble_equals_unbroken_ensemble(command: Command) -> None:
+    whole = ensemble(small(), 12, "whole.h5", scheduler="serial")
+    with pytest.raises(Interrupted):
+        ensemble(small(), 12, "part.h5", scheduler="serial", stop_requested=lambda: True)
+    assert open_ensemble("part.h5").count < 12
+    result = command("resume", "part.h5", "--scheduler", "serial", "-q")
+    assert result.exit_code == 0, result.output
+    assert "12 done, 0 failed, of 12" in result.stdout
+    found = open_ensemble("part.h5")
+    np.testing.assert_array_equal(found.values("depth"), whole.values("depth"))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--until", "5 min"], "only wear tests can be extended"),
+        (["--scheduler", "cloud"], "no scheduler 'cloud'"),
+    ],
+)
+def test_resume_refuses_options_of_runs_for_an_ensemble(
+    command: Command, done: Path, arguments: list[str], message: str
+) -> None:
+    result = command("resume", done, *arguments)
+    assert result.exit_code == 2
+    assert message in " ".join(result.stderr.split())
+
+
+@pytest.mark.parametrize("arguments", [["--failed"], ["--workers", "2"], ["--scheduler", "serial"]])
+def test_resume_refuses_options_of_ensembles_for_a_run(
+    command: Command, finished: Path, arguments: list[str]
+) -> None:
+    result = command("resume", finished, *arguments)
+    assert result.exit_code == 2
+    assert f"for {arguments[0]}: is an option for ensembles only" in result.stderr
+
+
+def test_resume_of_a_run_names_resume_ensemble(done: Path) -> None:
+    with pytest.raises(ResultsFileError, match="which resume_ensemble continues"):
+        wearsim.resume(done)
+    assert wearsim.resume_ensemble(done).count == wearsim.open_ensemble(done).count == 40
+
+
+def test_resume_reports_that_there_is_nothing_to_do(command: Command, done: Path) -> None:
+    finished = command("resume", done, "-q")
+    assert finished.stderr.startswith("note: nothing to do: the ensemble is finished")
+    none = command("resume", done, "--failed", "-q")
+    assert none.stderr.startswith("note: nothing to do: no realisation has failed")
+
+
+def test_export_refuses_a_file_as_its_folder(command: Command, done: Path) -> None:
+    Path("a.png").write_text("mine")
+    result = command("export", done, "-o", "a.png")
+    assert result.exit_code == 2
+    assert "a.png: is a file; tables are written to a folder" in result.stderr
+
+
+def test_ensemble_opened_as_a_run_names_open_ensemble(done: Path) -> None:
+    with pytest.raises(ResultsFileError, match=r"In Python, wearsim\.open_ensemble opens it"):
+        wearsim.open_results(done)
