@@ -18,6 +18,8 @@ def values_between(
     values: Sequence[Callable[[float, float], float]], start: Number, stop: Number
 ) -> FloatArray:
     """Return ``values[v](start, stop)`` for each realisation v, with its own times [s] if given."""
+    if len(values) == 1:  # broadcasting costs more than the value
+        return np.array([values[0](first_of(start), first_of(stop))])
     first, last = (np.broadcast_to(time, len(values)).tolist() for time in (start, stop))
     return np.array([value(a, b) for value, a, b in zip(values, first, last, strict=True)])
 
