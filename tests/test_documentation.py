@@ -1,4 +1,4 @@
-"""The documentation: what it prints runs, and what it names exists."""
+"""Tests of the documentation: printed examples run, and named files exist."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""docs/plugins.md: each hook has a section whose example runs and passes the checks."""
+"""Tests of docs/plugins.md: the example of every hook runs and passes the conformance tests."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ cylinder = { k_over_h = "1.1e-11 1/Pa" }
 roller = { k_over_h = "0 1/Pa" }
 """
 
-# lines of the scenario, and what replaces them to make their values random
+# lines of the scenario, and the same lines with random values
 FORCE_LINE = 'normal_force = "300 N"'
 MU = "coefficient = 0.1"
 XI = "longitudinal = 1e-3"

@@ -1,4 +1,4 @@
-"""Invalid scenarios: all mistakes together, as `file: [table] key: what, got, expected`."""
+"""Error messages of invalid scenarios: one line for each mistake, with file, table and key."""
 
 # ruff: noqa: E501  (long messages)
 

@@ -47,7 +47,7 @@ class ChoosyOptions(ws.Options):
 
 
 class Faulty(ws.ContactModel):
-    """A model whose `solve` raises a TypeError."""
+    """Contact model with a `solve` that raises a TypeError."""
 
     def __init__(self, options):
         self.options = options

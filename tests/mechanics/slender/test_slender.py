@@ -62,7 +62,7 @@ def no_wear(count, n):
 
 
 def wear_of_one(compliance):
-    """Return the wear of a single contact whose gap opens by `compliance`, (strips,)."""
+    """Return the wear compliance of a single contact, given per strip, shape (strips,)."""
     both = np.stack([compliance, np.zeros_like(compliance)])
     return SharedWear(np.zeros((1, 2), dtype=np.int64), both[None])
 

@@ -1,4 +1,4 @@
-"""Executor for Dask clusters whose workers join, leave and are killed."""
+"""Tests of the Dask executor with starting, stopping and killed workers."""
 
 from __future__ import annotations
 

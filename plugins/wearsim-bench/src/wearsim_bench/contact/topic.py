@@ -32,9 +32,9 @@ ERRORS = {
 }
 COUNTS = {"warm_seconds": "warm-started", "prepare_seconds": "first prepared"}
 ABOUT = (
-    "Time is that of one cold-started solve on prepared strips, the mean over the contacts of a"
-    " group; a warm start is the solution at 1 % less load. Errors are relative to half-space"
-    " solutions by CONTACT, whose errors are"
+    "The time is for one solve without a starting solution, on prepared strips, averaged over"
+    " the contacts of a group. A warm start uses the solution at 1 % less load."
+    " Errors are relative to half-space solutions by CONTACT, whose errors are"
     f" {100.0 * POWER_ERRORS[0]:g} to {100.0 * POWER_ERRORS[1]:g} % in power, up to"
     f" {100.0 * PURE_SPIN_ERROR:g} % with pure spin, and {100.0 * STRIPS_ERROR:g} % in P_l(y);"
     " smaller differences are not ranked. Peak pressure and width of ellipses are compared with"
