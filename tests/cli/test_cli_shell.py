@@ -7,6 +7,7 @@ import pytest
 from cli_examples import Command
 
 import wearsim.cli.commands.check
+from wearsim.cli.verbs import BUILT_IN
 from wearsim.errors import CapabilityError, PluginError, ResultsFileError, SolverError
 
 VERBS = [
@@ -123,3 +124,9 @@ def test_traceback_is_shown_on_request(
     assert result.exit_code == 2
     assert result.stderr.startswith("Traceback")
     assert "CapabilityError: cannot" in result.stderr
+
+
+@pytest.mark.parametrize("verb", BUILT_IN)
+def test_help_line_of_a_verb_is_its_own_summary(command: Command, verb: str) -> None:
+    shown = " ".join(command(verb, "--help").output.split())
+    assert BUILT_IN[verb] in shown

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from cli_examples import Command
 
-from wearsim.cli import installed_verbs
+from wearsim.cli import verbs as installed_verbs
 from wearsim.errors import CapabilityError, PluginError
 
 Install = Callable[..., str]

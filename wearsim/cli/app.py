@@ -7,20 +7,6 @@ from typing import Annotated
 
 import typer
 
-from wearsim.cli.commands.check import check
-from wearsim.cli.commands.compare import compare
-from wearsim.cli.commands.contact import contact
-from wearsim.cli.commands.dissipation import dissipation
-from wearsim.cli.commands.ensemble import ensemble
-from wearsim.cli.commands.export import export
-from wearsim.cli.commands.maxent import maxent
-from wearsim.cli.commands.new import new
-from wearsim.cli.commands.plot import plot
-from wearsim.cli.commands.plugins import plugins
-from wearsim.cli.commands.resume import resume
-from wearsim.cli.commands.run import run
-from wearsim.cli.commands.schema import schema
-from wearsim.cli.commands.show import show
 from wearsim.cli.errors import TRACEBACK, Shell
 
 app = typer.Typer(
@@ -34,12 +20,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for verb in (
-    check, contact, dissipation, run, ensemble, resume, show, plot, compare, export, maxent,
-    plugins, schema,
-):  # fmt: skip
-    app.command()(verb)
-app.add_typer(new)
 
 
 def _show_version(requested: bool) -> None:

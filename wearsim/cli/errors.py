@@ -9,7 +9,7 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
-from wearsim.cli.installed_verbs import installation_hint, installed_verbs
+from wearsim.cli.verbs import BUILT_IN, BuiltInVerb, installation_hint, installed_verbs
 from wearsim.errors import Interrupted, ScenarioError, SolverError, WearsimError
 
 FAILED = 1
@@ -20,6 +20,10 @@ _INTERNAL = ("contact_", "coarse_step_", "half_quadrature_", "loop_")
 
 class Shell(TyperGroup):
     """Group of built-in and installed verbs that converts errors to exit codes."""
+
+    def __init__(self, **attributes: Any) -> None:
+        super().__init__(**attributes)
+        self.commands.update({name: BuiltInVerb(name) for name in BUILT_IN})
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of all verbs, built-in ones first."""
