@@ -8,7 +8,6 @@ from abc import ABC, abstractmethod
 import numpy as np
 
 from wearsim.types import FloatArray
-from wearsim.uq.distributions.quantile_table import MAX_LOG_DROP
 
 
 class MaxentDistribution(ABC):
@@ -26,6 +25,8 @@ class MaxentDistribution(ABC):
         l0, l1 and l2, in the unit of the values.
     third : {"x^2", "log x"}
         The function g.
+    antimode : tuple of float or None
+        Interior minimum of the density, and the probability above it; None if there is none.
     """
 
     family: str
@@ -34,16 +35,15 @@ class MaxentDistribution(ABC):
     std: float
     multipliers: tuple[float, float, float]
     third: str = "x^2"
+    antimode: tuple[float, float] | None = None
 
     @property
     def parent(self) -> tuple[float, float] | None:
         """Mean and standard deviation of the normal distribution before truncation, or None."""
-        return None
-
-    @property
-    def antimode(self) -> tuple[float, float] | None:
-        """Interior minimum of the density, and the probability above it; or None."""
-        return None
+        _, l1, l2 = self.multipliers
+        if self.third != "x^2" or l2 <= 0.0:
+            return None
+        return -0.5 * l1 / l2, math.sqrt(0.5 / l2)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -135,15 +135,14 @@ class Exponential(MaxentDistribution):
         Support; `high` may be infinite.
     rate : float
         Decrease of the log density per unit, above zero.
-    mean : float
-        Mean, which must agree with the other parameters.
+    mean, std : float
+        Mean and standard deviation, which must agree with the other parameters.
     """
 
-    def __init__(self, low: float, high: float, rate: float, mean: float) -> None:
+    def __init__(self, low: float, high: float, rate: float, mean: float, std: float) -> None:
         self.family = "truncated exponential" if math.isfinite(high) else "exponential"
-        self.support, self.mean, self._rate = (low, high), mean, rate
+        self.support, self.mean, self.std, self._rate = (low, high), mean, std, rate
         self._fall = rate * (high - low)
-        self.std = exponential_std(self._fall) / rate
         self._log_top = math.log(rate) - math.log(-math.expm1(-self._fall))
         self.multipliers = (0.0 - self._log_top - rate * low, rate, 0.0)
 
@@ -158,37 +157,6 @@ class Exponential(MaxentDistribution):
         return self._log_top - self._rate * (x - self.support[0])
 
 
-def exponential_std(fall: float) -> float:
-    """Return the standard deviation of the density exp(-x) truncated to [0, fall]."""
-    if fall < 0.1:  # cancellation in the closed form; truncation error of the series below 1e-15
-        square = fall * fall
-        return fall * math.sqrt(
-            1.0 / 12.0 - square / 240.0 + square**2 / 6048.0 - square**3 / 172800.0
-        )
-    if fall > MAX_LOG_DROP:
-        return 1.0
-    return math.sqrt(1.0 - (0.5 * fall / math.sinh(0.5 * fall)) ** 2)
-
-
-def exponential_fall(mean: float) -> float:
-    """Return `fall` such that exp(-fall t) on [0, 1] has this mean, above 0 and up to 1/2."""
-    if mean < 0.02:
-        return 1.0 / mean  # the truncation at 1 is below rounding
-    fall = 12.0 * (0.5 - mean)
-    for _ in range(100):
-        if fall < 0.1:
-            square = fall * fall
-            series = 1.0 - square / 60.0 + square**2 / 2520.0 - square**3 / 100800.0
-            current = 0.5 - fall / 12.0 * series
-        else:
-            current = 1.0 / fall - 1.0 / math.expm1(fall)
-        change = (current - mean) * fall**2 / exponential_std(fall) ** 2 if fall > 0.0 else 0.0
-        fall += change
-        if abs(change) <= 4e-16 * fall:
-            break
-    return fall
-
-
 class Mirrored(MaxentDistribution):
     """The distribution of -x for a given distribution of x."""
 
@@ -198,18 +166,8 @@ class Mirrored(MaxentDistribution):
         self.support = (-original.support[1], -original.support[0])
         l0, l1, l2 = original.multipliers
         self.multipliers = (l0, -l1, l2)
-
-    @property
-    def parent(self) -> tuple[float, float] | None:
-        """Mean and standard deviation of the normal distribution before truncation, or None."""
-        parent = self._original.parent
-        return None if parent is None else (-parent[0], parent[1])
-
-    @property
-    def antimode(self) -> tuple[float, float] | None:
-        """Interior minimum of the density, and the probability above it; or None."""
-        antimode = self._original.antimode
-        return None if antimode is None else (-antimode[0], 1.0 - antimode[1])
+        if original.antimode is not None:
+            self.antimode = -original.antimode[0], 1.0 - original.antimode[1]
 
     def inverse(self, below: FloatArray, above: FloatArray) -> FloatArray:
         """Return quantiles, shape (draws,), from the probabilities below and above them."""

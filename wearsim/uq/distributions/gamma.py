@@ -11,7 +11,7 @@ from wearsim.types import FloatArray
 from wearsim.uq.distributions.base import MaxentDistribution
 from wearsim.uq.distributions.quantile_table import InverseTable, Piece, panel_edges
 
-_LARGE = 50.0  # shape above which closed forms cancel and asymptotic series are used
+_LARGE = 50.0  # shape above which digamma and logarithm cancel
 
 
 class Gamma(MaxentDistribution):
@@ -32,12 +32,6 @@ class Gamma(MaxentDistribution):
         self.std = mean / math.sqrt(shape)
         rate = shape / mean
         self.multipliers = (math.lgamma(shape) - shape * math.log(rate), rate, 1.0 - shape)
-        # greatest log density of log x, reached at the mean
-        if shape < _LARGE:
-            self._log_top = shape * math.log(shape) - shape - math.lgamma(shape)
-        else:  # Stirling's series
-            series = 1.0 / 12.0 - 1.0 / (360.0 * shape**2) + 1.0 / (1260.0 * shape**4)
-            self._log_top = 0.5 * math.log(0.5 * shape / math.pi) - series / shape
 
     @cached_property
     def _table(self) -> InverseTable:
@@ -63,26 +57,23 @@ class Gamma(MaxentDistribution):
     def log_density(self, x: FloatArray) -> FloatArray:
         """Return the logarithm of the density at `x`, which must be within the support."""
         y = np.log(np.maximum(x, 1e-300) / self.mean)
-        return self._shape * (y - np.expm1(y)) - y + self._log_top - math.log(self.mean)
+        logs = self._shape * (y - np.expm1(y)) - y
+        return np.asarray(logs - self._table.log_total - math.log(self.mean))
 
 
 def gamma_shape(gap: float) -> float:
     """Return the shape k of the gamma distribution with ``log k - digamma(k) = gap`` > 0."""
-    from scipy.special import digamma, polygamma  # noqa: PLC0415  (slow to import, rarely needed)
+    from scipy.special import digamma, zeta  # noqa: PLC0415  (slow to import, rarely needed)
 
     root = math.sqrt((gap - 3.0) ** 2 + 24.0 * gap)
     shape = (3.0 - gap + root) / (12.0 * gap)  # within 1.5 %: Minka, Estimating a Gamma, 2002
-    for _ in range(20):
-        # Newton's method for 1/k, in which the function is nearly linear
-        if shape > _LARGE:
+    for _ in range(5):  # Newton's method for 1/k, in which the function is nearly linear
+        if shape > _LARGE:  # asymptotic series, without cancellation
             series = 1.0 / 12.0 - 1.0 / (120.0 * shape**2) + 1.0 / (252.0 * shape**4)
-            current = 0.5 / shape + series / shape**2
-            slope = (0.5 + 1.0 / (6.0 * shape) - 1.0 / (30.0 * shape**3)) / shape**2
+            excess = 0.5 / shape - gap + series / shape**2
+            slope = 0.5 + 1.0 / (6.0 * shape)
         else:
-            current = math.log(shape) - float(digamma(shape))
-            slope = float(polygamma(1, shape)) - 1.0 / shape
-        change = (current - gap) / (slope * shape**2)
-        shape = 1.0 / (1.0 / shape - change)
-        if abs(change) * shape <= 1e-15:
-            break
+            excess = math.log(shape) - float(digamma(shape)) - gap
+            slope = shape**2 * float(zeta(2.0, shape)) - shape
+        shape = 1.0 / (1.0 / shape - excess / slope)
     return shape

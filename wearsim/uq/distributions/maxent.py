@@ -13,8 +13,6 @@ from wearsim.uq.distributions.base import (
     MaxentDistribution,
     Mirrored,
     Uniform,
-    exponential_fall,
-    exponential_std,
 )
 from wearsim.uq.distributions.gamma import Gamma
 from wearsim.uq.distributions.truncated_normal import QuadraticExponent, TruncatedNormal, has_parent
@@ -83,9 +81,9 @@ def _check(
         not finite or math.isfinite(high - low),
         f"the support {support} is too wide: its width overflows",
     )
-    for name, value in (("mean", mean), ("std", std), ("mean_log", mean_log)):
-        if value is not None and not math.isfinite(value):
-            raise Infeasible(f"{name} must be finite, got {value:g}")
+    moments = {"mean": mean, "std": std, "mean_log": mean_log}
+    for name, value in moments.items():
+        _require(value is None or math.isfinite(value), f"{name} must be finite, got {value}")
     _check_sizes(low, high, mean, std)
     if mean_log is not None:
         _check_logarithm(low, high, mean, std, mean_log)
@@ -185,14 +183,36 @@ def _towards_lower(low: float, high: float, mean: float, std: float | None) -> M
     if math.isinf(low):
         assert std is not None
         return TruncatedNormal(low, high, mean, std)
-    part = (mean - low) / (high - low)
-    fall = math.inf if math.isinf(high) else exponential_fall(part)
-    reach = mean - low if part < 0.02 else (high - low) / (fall or 1.0)
-    widest = reach * exponential_std(fall) if fall > 0.0 else (high - low) / math.sqrt(12.0)
+    width, reach = high - low, mean - low
+    fall, widest = width / reach, reach  # of an exponential distribution without upper end
+    if fall < 50.0:  # otherwise the effect of the upper end is below rounding
+        fall = _exponential_fall(reach / width)
+        reach, widest = width / (fall or 1.0), width * _exponential_moments(fall)[1]
     if std is None or abs(std - widest) <= _ROUNDING * widest:
-        return Uniform(low, high) if fall == 0.0 else Exponential(low, high, 1.0 / reach, mean)
-    one_peak = std < widest
-    return _one_peak(low, high, mean, std) if one_peak else _two_ends(low, high, mean, std, fall)
+        if fall == 0.0:
+            return Uniform(low, high)
+        return Exponential(low, high, 1.0 / reach, mean, widest)
+    if std < widest:
+        return _one_peak(low, high, mean, std)
+    return _two_ends(low, high, mean, std, fall)
+
+
+def _exponential_moments(fall: float) -> tuple[float, float]:
+    """Return mean and standard deviation of the density exp(-fall t) truncated to [0, 1]."""
+    from scipy.special import hyp1f1  # noqa: PLC0415  (slow to import, and rarely needed)
+
+    mass, first, second = (float(hyp1f1(k, k + 1, -fall)) / k for k in (1, 2, 3))
+    mean = first / mass
+    return mean, math.sqrt(second / mass - mean * mean)
+
+
+def _exponential_fall(mean: float) -> float:
+    """Return `fall` for a mean between 0.02 and 0.5."""
+    fall = 12.0 * (0.5 - mean)  # exact to rounding near the uniform distribution
+    for _ in range(12 if fall > 1e-7 else 0):
+        current, std = _exponential_moments(fall)
+        fall += (current - mean) / std**2
+    return fall
 
 
 def _one_peak(low: float, high: float, mean: float, std: float) -> MaxentDistribution:
@@ -204,7 +224,7 @@ def _one_peak(low: float, high: float, mean: float, std: float) -> MaxentDistrib
     basis = maxent_solver.Basis(np.stack([z, z * z]), np.array([0.0, 1.0]), np.eye(2))
     slope, bend = maxent_solver.multipliers(weights, [basis], [(0.0, 0.5)])
     if bend <= 0.0:  # only by rounding
-        return Exponential(low, high, slope / std, mean)
+        return Exponential(low, high, slope / std, mean, std)
     parent = mean - 0.5 * std * slope / bend, std / math.sqrt(2.0 * bend)
     if has_parent(low, high, *parent):
         return TruncatedNormal(low, high, *parent)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import cached_property
 
 import numpy as np
 
@@ -31,32 +30,19 @@ class TruncatedNormal(MaxentDistribution):
 
         self.support = (low, high)
         self.family = "truncated normal" if math.isfinite(low) or math.isfinite(high) else "normal"
-        self._parent = mean, std = parent_mean, parent_std
-        start, stop = (low - mean) / std, (high - mean) / std
-        self._ends = float(ndtr(start)), float(ndtr(-stop))
+        self._mean, self._std = mean, std = parent_mean, parent_std
+        # beyond 40 standard deviations the density underflows
+        ends = np.clip((np.array([low, high]) - mean) / std, -40.0, 40.0)
+        self._ends = ndtr(ends * np.array([1.0, -1.0]))
         # in the tail that holds both ends, if there is one, to avoid cancellation
-        upper = float(ndtr(-start)) - float(ndtr(-stop))
-        self._mass = upper if start > 0.0 else float(ndtr(stop)) - float(ndtr(start))
-        density = [
-            math.exp(-0.5 * end * end) / math.sqrt(2.0 * math.pi) / self._mass
-            for end in (start, stop)
-        ]
-        arms = [
-            end * part if part > 0.0 else 0.0
-            for end, part in zip((start, stop), density, strict=True)
-        ]
-        shift = density[0] - density[1]
+        self._mass = float(np.ptp(ndtr(math.copysign(1.0, -ends[0]) * ends)))
+        density = np.exp(-0.5 * ends**2) / (math.sqrt(2.0 * math.pi) * self._mass)
+        shift = float(density[0] - density[1])
         self.mean = mean + std * shift
-        self.std = std * math.sqrt(1.0 + arms[0] - arms[1] - shift * shift)
-        log_mass = math.log(self._mass * std * math.sqrt(2.0 * math.pi))
+        self.std = std * math.sqrt(1.0 - float(np.diff(ends * density)[0]) - shift * shift)
+        self._log_mass = math.log(self._mass * std * math.sqrt(2.0 * math.pi))
         l2 = 0.5 / (std * std)
-        self._log_top = -log_mass
-        self.multipliers = (l2 * mean * mean + log_mass, -2.0 * l2 * mean, l2)
-
-    @property
-    def parent(self) -> tuple[float, float]:
-        """Mean and standard deviation of the normal distribution before truncation."""
-        return self._parent
+        self.multipliers = (l2 * mean * mean + self._log_mass, -2.0 * l2 * mean, l2)
 
     def inverse(self, below: FloatArray, above: FloatArray) -> FloatArray:
         """Return quantiles, shape (draws,), from the probabilities below and above them."""
@@ -65,13 +51,11 @@ class TruncatedNormal(MaxentDistribution):
         lower = self._ends[0] + below * self._mass
         upper = self._ends[1] + above * self._mass
         score = ndtri(np.minimum(lower, upper))  # of the smaller tail, to avoid cancellation
-        mean, std = self._parent
-        return mean + std * np.where(lower < upper, score, -score)
+        return self._mean + self._std * np.where(lower < upper, score, -score)
 
     def log_density(self, x: FloatArray) -> FloatArray:
         """Return the logarithm of the density at `x`, which must be within the support."""
-        mean, std = self._parent
-        return self._log_top - 0.5 * ((x - mean) / std) ** 2
+        return -self._log_mass - 0.5 * ((x - self._mean) / self._std) ** 2
 
 
 class QuadraticExponent(MaxentDistribution):
@@ -90,9 +74,9 @@ class QuadraticExponent(MaxentDistribution):
         a, of either sign.
     bend : float
         b.
-    from_above : float, optional
-        The coefficient a for distances from the upper end; it cannot be computed from large a and b
-        without cancellation.
+    from_above : float
+        The coefficient a for distances from the upper end, above zero if the density also increases
+        towards that end; it cannot be computed from large a and b without cancellation.
     top : float
         Decrease of the log density from the lower to the upper end; needed with `from_above`.
     """
@@ -104,45 +88,12 @@ class QuadraticExponent(MaxentDistribution):
         scale: float,
         fall: float,
         bend: float,
-        from_above: float | None = None,
+        from_above: float = 0.0,
         top: float = 0.0,
     ) -> None:
         self.family = "truncated normal" if bend > 0.0 else "exponential of a quadratic"
         self.support, self._scale = (low, high), scale
         self._fall, self._bend, self._from_above, self._top = fall, bend, from_above, top
-        self.mean, self.std = self._table.mean, self._table.std
-        l2 = bend / scale**2
-        slope = fall / scale
-        l0 = math.log(scale) + self._table.log_total
-        self.multipliers = (l0 - slope * low + l2 * low * low, slope - 2.0 * l2 * low, l2)
-
-    @property
-    def parent(self) -> tuple[float, float] | None:
-        """Mean and standard deviation of the normal distribution before truncation, or None."""
-        if self._bend <= 0.0:
-            return None
-        std = self._scale / math.sqrt(2.0 * self._bend)
-        return self.support[0] - self._scale * self._fall / (2.0 * self._bend), std
-
-    @property
-    def antimode(self) -> tuple[float, float] | None:
-        """Interior minimum of the density, and the probability above it; or None."""
-        if not self._has_two_peaks:
-            return None
-        least = self.support[0] - 0.5 * self._scale * self._fall / self._bend
-        return least, float(self._table.above_pieces[0])
-
-    @property
-    def _has_two_peaks(self) -> bool:
-        """Whether the density also decreases from the upper end down."""
-        return self._from_above is not None and self._from_above > 0.0
-
-    @cached_property
-    def _table(self) -> InverseTable:
-        """Quantiles of u, piecewise from both ends if the density has two peaks."""
-        low, high = self.support
-        fall, bend, width = self._fall, self._bend, (high - low) / self._scale
-        above, top = self._from_above, self._top
 
         def edges(slope: float, stop: float) -> FloatArray:
             return panel_edges(
@@ -152,14 +103,24 @@ class QuadraticExponent(MaxentDistribution):
                 stop=stop,
             )
 
-        stop = -0.5 * fall / bend if self._has_two_peaks else width
-        pieces = [Piece(low, self._scale, edges(fall, stop), lambda u: -(fall + bend * u) * u)]
-        if above is not None and self._has_two_peaks:
-            # offsets below zero, from the upper end down
-            offsets = -edges(above, -0.5 * above / bend)[::-1]
-            log_density = lambda v: -top + (above - bend * v) * v  # noqa: E731
-            pieces.append(Piece(high, self._scale, offsets, log_density))
-        return InverseTable(pieces)
+        stop = -0.5 * fall / bend if from_above > 0.0 else (high - low) / scale
+        pieces = [Piece(low, scale, edges(fall, stop), self._from_lower)]
+        if from_above > 0.0:  # offsets below zero, from the upper end down
+            offsets = -edges(from_above, -0.5 * from_above / bend)[::-1]
+            pieces.append(Piece(high, scale, offsets, self._from_upper))
+        self._table = table = InverseTable(pieces)
+        self.mean, self.std = table.mean, table.std
+        if from_above > 0.0:
+            self.antimode = low + scale * stop, float(table.above_pieces[0])
+        l1, l2 = fall / scale, bend / scale**2
+        l0 = math.log(scale) + table.log_total
+        self.multipliers = (l0 - l1 * low + l2 * low * low, l1 - 2.0 * l2 * low, l2)
+
+    def _from_lower(self, u: FloatArray) -> FloatArray:
+        return -(self._fall + self._bend * u) * u
+
+    def _from_upper(self, v: FloatArray) -> FloatArray:
+        return -self._top + (self._from_above - self._bend * v) * v
 
     def inverse(self, below: FloatArray, above: FloatArray) -> FloatArray:
         """Return quantiles, shape (draws,), from the probabilities below and above them."""
@@ -168,11 +129,10 @@ class QuadraticExponent(MaxentDistribution):
     def log_density(self, x: FloatArray) -> FloatArray:
         """Return the logarithm of the density at `x`, which must be within the support."""
         low, high = self.support
-        u = (x - low) / self._scale
-        logs = -(self._fall + self._bend * u) * u
-        if self._from_above is not None:
-            v = (high - x) / self._scale
-            logs = np.where(u <= v, logs, -self._top - (self._from_above + self._bend * v) * v)
+        u, v = (x - low) / self._scale, (x - high) / self._scale
+        logs = self._from_lower(u)
+        if self._from_above > 0.0:
+            logs = np.where(u <= -v, logs, self._from_upper(v))
         return logs - self._table.log_total - math.log(self._scale)
 
 
