@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from wearsim.uq.estimation.estimates import WeightedDistribution, fractional_ranks
-from wearsim.uq.estimation.moments import order_ranks
+from wearsim.uq.estimation.estimates import WeightedDistribution
+from wearsim.uq.estimation.moments import fractional_ranks, order_ranks
 
 
 @given(st.integers(1, 100_000), st.floats(0.001, 0.999))

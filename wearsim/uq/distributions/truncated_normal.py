@@ -51,7 +51,7 @@ class TruncatedNormal(MaxentDistribution):
         lower = self._ends[0] + below * self._mass
         upper = self._ends[1] + above * self._mass
         score = ndtri(np.minimum(lower, upper))  # of the smaller tail, to avoid cancellation
-        return self._mean + self._std * np.where(lower < upper, score, -score)
+        return np.asarray(self._mean + self._std * np.where(lower < upper, score, -score))
 
     def log_density(self, x: FloatArray) -> FloatArray:
         """Return the logarithm of the density at `x`, which must be within the support."""

@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
 from wearsim.types import FloatArray, IntArray
-from wearsim.uq.estimation.intervals import UNKNOWN, Interval, bisect, t_interval, t_quantile
-from wearsim.uq.estimation.moments import CONFIDENCE, summarise
+from wearsim.uq.estimation.intervals import UNKNOWN, Interval, t_interval, t_quantile
+from wearsim.uq.estimation.moments import fractional_ranks, summarise
 from wearsim.uq.estimation.standard_errors import (
     Control,
     Controlled,
@@ -27,7 +26,6 @@ Design: TypeAlias = Literal[
 DESIGNS: tuple[Design, ...] = get_args(Design)
 """Sampling designs for which estimates are available."""
 
-_HALVINGS = 50  # of an interval of ranks, down to rounding
 _MIN_DRAWS = 5  # independent draws below which the error of a std is not estimated
 _STEP = 0.5  # least standard error of an empirical distribution function, in units of 1/n
 _LARGEST = 1400.0  # twice the logarithm of a large finite float
@@ -254,9 +252,8 @@ class WeightedDistribution:
         order = np.argsort(values, kind="stable")
         count = len(values)
         self.ordered = values[order]
-        if weights is None:
-            self._middle = (np.arange(count) + 0.5) / count - 0.5
-        else:
+        self._middle = (np.arange(count) + 0.5) / count - 0.5
+        if weights is not None:
             middle = np.cumsum(weights[order]) - 0.5 * weights[order] - 0.5
             # negative weights must not decrease the distribution function
             self._middle = np.maximum.accumulate(middle)
@@ -264,61 +261,14 @@ class WeightedDistribution:
     def quantile(self, probability: float) -> float:
         """Return the quantile of this probability, interpolated linearly between values."""
         count = len(self.ordered)
-        if count == 1:
-            return float(self.ordered[0])
-        heights = 0.5 + self._middle * (count / (count - 1))
+        heights = 0.5 + self._middle * (count / max(count - 1, 1))
         return float(np.interp(probability, heights, self.ordered))
 
     def at(self, level: float) -> float:
         """Return the value at a mean probability; infinite beyond the first and last value."""
         count = len(self.ordered)
         heights = 0.5 + self._middle * (count / (count + 1))
-        slack = 1e-9 / count  # for rounding at integer ranks
-        if level < heights[0] - slack:
-            return -math.inf
-        if level > heights[-1] + slack:
-            return math.inf
+        beyond = level - float(np.clip(level, heights[0], heights[-1]))
+        if abs(beyond) > 1e-9 / count:  # with a margin for rounding at integer ranks
+            return math.copysign(math.inf, beyond)
         return float(np.interp(level, heights, self.ordered))
-
-
-@lru_cache(maxsize=4096)
-def fractional_ranks(
-    count: float, probability: float, confidence: float = CONFIDENCE
-) -> tuple[float, float]:
-    """Return the real ranks of the confidence limits of a quantile, for independent values.
-
-    The probability below the value of rank r has the beta distribution with the parameters r and
-    count - r + 1; between integer ranks this is a definition. The integer ranks of `order_ranks`
-    enclose these; for small samples they hold the quantile more often than the confidence.
-
-    Parameters
-    ----------
-    count : float
-        Number of independent values, or the effective sample size.
-    probability : float
-        Probability of the quantile, between 0 and 1.
-    confidence : float
-        Probability that the interval holds the quantile.
-
-    Returns
-    -------
-    low, high : float
-        Ranks between 0 and `count` + 1; there is no value below rank 1 or above rank `count`.
-
-    Notes
-    -----
-    Hutson, Journal of Applied Statistics 26 (1999), DOI 10.1080/02664769922458.
-    """
-    from scipy.special import betainc  # noqa: PLC0415  (slow to import, and rarely needed)
-
-    def rank(chance: float) -> float:
-        limits = bisect(
-            lambda rank: bool(betainc(rank, count + 1.0 - rank, probability) > chance),
-            0.0,
-            count + 1.0,
-            _HALVINGS,
-        )
-        return 0.5 * sum(limits)
-
-    miss = 0.5 * (1.0 - confidence)
-    return rank(1.0 - miss), rank(miss)

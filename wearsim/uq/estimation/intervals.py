@@ -6,7 +6,8 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from wearsim.uq.estimation.moments import CONFIDENCE
+CONFIDENCE = 0.95
+"""Confidence of all intervals."""
 
 
 @dataclass(frozen=True)

@@ -4,35 +4,29 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from wearsim.types import FloatArray, IntArray
+from wearsim.uq.estimation.intervals import CONFIDENCE, Interval, bisect
 
-CONFIDENCE = 0.95
 _SAME = 1e-9  # relative standard deviation below which values are constant
 _BLOCK = 256  # rows summed at once, independent of the batch size
-_FAR = 10.0  # standard deviations of a rank beyond which the probability is negligible
+_HALVINGS = 50  # of an interval of ranks, down to rounding
 
 
 @dataclass(frozen=True)
-class Quantile:
-    """An estimated quantile.
+class Quantile(Interval):
+    """An estimated quantile, interpolated linearly between order statistics.
 
     Parameters
     ----------
     probability : float
         Probability below it.
-    value : float
-        The estimate, interpolated linearly between order statistics.
-    low, high : float
-        Confidence interval; an end is infinite if there are too few realisations.
     """
 
     probability: float
-    value: float
-    low: float
-    high: float
 
 
 @dataclass(frozen=True)
@@ -222,17 +216,51 @@ def order_ranks(count: int, probability: float, confidence: float = CONFIDENCE) 
     -----
     David and Nagaraja, Order Statistics (2003), section 7.1.
     """
-    from scipy.special import bdtr  # noqa: PLC0415  (slow to import, and rarely needed)
+    low, high = fractional_ranks(float(count), probability, confidence)
+    return math.floor(low), math.ceil(high)
+
+
+@lru_cache(maxsize=4096)
+def fractional_ranks(
+    count: float, probability: float, confidence: float = CONFIDENCE
+) -> tuple[float, float]:
+    """Return the real ranks of the confidence limits of a quantile, for independent values.
+
+    The probability below the value of rank r has the beta distribution with the parameters r and
+    count - r + 1; between integer ranks this is a definition. The integer ranks of `order_ranks`
+    enclose these; for small samples they hold the quantile more often than the confidence.
+
+    Parameters
+    ----------
+    count : float
+        Number of independent values, or the effective sample size.
+    probability : float
+        Probability of the quantile, between 0 and 1.
+    confidence : float
+        Probability that the interval holds the quantile.
+
+    Returns
+    -------
+    low, high : float
+        Ranks between 0 and `count` + 1; there is no value below rank 1 or above rank `count`.
+
+    Notes
+    -----
+    Hutson, Journal of Applied Statistics 26 (1999), DOI 10.1080/02664769922458.
+    """
+    from scipy.special import betainc  # noqa: PLC0415  (slow to import, and rarely needed)
+
+    def rank(chance: float) -> float:
+        limits = bisect(
+            lambda rank: bool(betainc(rank, count + 1.0 - rank, probability) > chance),
+            0.0,
+            count + 1.0,
+            _HALVINGS,
+        )
+        return 0.5 * sum(limits)
 
     miss = 0.5 * (1.0 - confidence)
-    middle, far = count * probability, _FAR * math.sqrt(count * probability * (1.0 - probability))
-    first = max(math.floor(middle - far) - 1, 0)
-    below = np.arange(first, min(math.ceil(middle + far) + 1, count) + 1)
-    chance = bdtr(below.astype(np.float64), count, probability)
-    # rank r is above the quantile with the probability of fewer than r values below it
-    low = first + int(np.searchsorted(chance, miss, side="right"))
-    high = first + int(np.searchsorted(chance, 1.0 - miss, side="left")) + 1
-    return low, high
+    return rank(1.0 - miss), rank(miss)
 
 
 class RowMoments:

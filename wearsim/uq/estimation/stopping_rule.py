@@ -11,8 +11,11 @@ from wearsim.uq.estimation.estimates import Estimate
 from wearsim.uq.estimation.intervals import Interval
 
 _FEWEST = 32  # realisations; with fewer, an interval may be narrow by chance
-_STATISTICS: dict[str, Literal["mean", "std"] | float]
-_STATISTICS = {"mean": "mean", "std": "std", "median": 0.5}
+_STATISTICS: dict[str, Literal["mean", "std"] | float] = {
+    "mean": "mean",
+    "std": "std",
+    "median": 0.5,
+}
 _FORM = re.compile(
     r"(?P<observable>[a-z][a-z_]*)\.(?P<what>mean|std|median|q(?P<percent>\d+(\.\d+)?))"
     r"\s+(?P<width>\d+(\.\d*)?|\.\d+)\s*%"
@@ -56,9 +59,7 @@ class Target:
         width = float(match["width"]) / 100.0
         if not width > 0.0:
             raise ValueError(f'the target "{text}" has no width; give one above 0 %')
-        statistic = _STATISTICS.get(match["what"])
-        if statistic is None:
-            statistic = float(match["percent"]) / 100.0
+        statistic = _STATISTICS.get(match["what"]) or float(match["percent"]) / 100.0
         if isinstance(statistic, float) and not 0.0 < statistic < 1.0:
             raise ValueError(f'the quantile of the target "{text}" must be above q0 and below q100')
         return cls(match["observable"], statistic, width)
@@ -80,20 +81,17 @@ class Target:
 
     def interval(self, estimate: Estimate) -> Interval:
         """Return the interval of the statistic from an estimate of the observable."""
-        if self.statistic == "mean":
-            return estimate.mean
-        return (
-            estimate.std if isinstance(self.statistic, str) else estimate.quantile(self.statistic)
-        )
+        if not isinstance(self.statistic, str):
+            return estimate.quantile(self.statistic)
+        return {"mean": estimate.mean, "std": estimate.std}[self.statistic]
 
     def achieved(self, estimate: Estimate) -> float:
         """Return the half-width relative to the estimate; infinite if it is unknown."""
         interval = self.interval(estimate)
-        if math.isnan(interval.value) or not math.isfinite(interval.half_width):
-            return math.inf
         if interval.half_width == 0.0:
             return 0.0
-        return interval.half_width / abs(interval.value) if interval.value else math.inf
+        size = abs(interval.value)
+        return interval.half_width / size if size > 0.0 else math.inf
 
     def reached(self, estimate: Estimate) -> bool:
         """Return whether the target is reached, with at least 32 realisations.

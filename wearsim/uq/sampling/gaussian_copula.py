@@ -14,7 +14,7 @@ from wearsim.uq.sampling.plans import BELOW_ONE
 Correlation: TypeAlias = tuple[str, str, float]
 """Two inputs and Spearman's rank correlation between them."""
 
-_MIN_PIVOT = 1e-9  # pivot below which a correlation matrix is singular to rounding
+_SINGULAR = 1e-9  # eigenvalue below which a correlation matrix is singular to rounding
 
 
 class GaussianCopula:
@@ -71,7 +71,7 @@ class GaussianCopula:
                 scores = [ndtri(uniforms[name]) for name in names]
                 for i in range(1, len(names)):
                     # term by term: rounding of a matrix product depends on the batch size
-                    mixed = sum(factor[i][j] * scores[j] for j in range(i + 1))
+                    mixed = sum(factor[i, j] * scores[j] for j in range(i + 1))
                     correlated[names[i]] = np.clip(ndtr(mixed), 1.0 - BELOW_ONE, BELOW_ONE)
         return correlated
 
@@ -107,23 +107,14 @@ def _groups(pairs: Mapping[tuple[str, str], float]) -> list[list[str]]:
     return sorted(sorted(group) for group in groups)
 
 
-def _factor(names: list[str], pairs: Mapping[tuple[str, str], float]) -> list[list[float]]:
-    """Return the rows of the Cholesky factor for the normal scores."""
-    factor: list[list[float]] = []
-    for i, name in enumerate(names):
-        row: list[float] = []
-        for j in range(i):
-            wanted = 2.0 * math.sin(math.pi / 6.0 * pairs.get((names[j], name), 0.0))
-            known = sum(row[k] * factor[j][k] for k in range(j))
-            row.append((wanted - known) / factor[j][j])
-        pivot = 1.0 - sum(value * value for value in row)
-        if pivot < _MIN_PIVOT:
-            given = ", ".join(
-                f"{a} with {b}: {rank:g}" for (a, b), rank in pairs.items() if a in names
-            )
-            raise ValueError(
-                "the matrix of these rank correlations is not positive definite"
-                f" ({given}); bring them nearer to 0"
-            )
-        factor.append([*row, math.sqrt(pivot)])
-    return factor
+def _factor(names: list[str], pairs: Mapping[tuple[str, str], float]) -> FloatArray:
+    """Return the Cholesky factor for the normal scores."""
+    ranks = [[pairs.get((min(a, b), max(a, b)), float(a == b)) for b in names] for a in names]
+    matrix = 2.0 * np.sin(math.pi / 6.0 * np.array(ranks))
+    if np.linalg.eigvalsh(matrix)[0] < _SINGULAR:
+        given = ", ".join(f"{a} with {b}: {rank:g}" for (a, b), rank in pairs.items() if a in names)
+        raise ValueError(
+            "the matrix of these rank correlations is not positive definite"
+            f" ({given}); bring them nearer to 0"
+        )
+    return np.asarray(np.linalg.cholesky(matrix), dtype=np.float64)

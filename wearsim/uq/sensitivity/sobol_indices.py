@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+from numpy.polynomial.hermite_e import hermevander
+from numpy.polynomial.legendre import legvander
 
 from wearsim.types import FloatArray, IntArray
 from wearsim.uq.estimation.intervals import UNKNOWN, Interval, t_interval
@@ -231,7 +233,7 @@ def best_fit(scores: FloatArray, values: FloatArray, family: str) -> Fit:
     # columns orthonormalised successively: the first k of them span the first k terms
     transform = np.linalg.inv(lower).T
     slopes = transform.T @ moment
-    residual, leverage = np.empty((count, len(ends))), np.empty((count, len(ends)))
+    residual, leverage = np.empty((2, count, len(ends)))
     for rows, design in _designs(scores, powers, family):
         columns = design @ transform
         for k, end in enumerate(ends):
@@ -281,21 +283,13 @@ def _designs(
     for first in range(0, len(scores), _BLOCK):
         rows = slice(first, first + _BLOCK)
         degrees = _orthonormal(scores[rows], int(powers.max()), family)
-        design = np.ones((degrees.shape[1], len(powers)))
-        for number in range(scores.shape[1]):
-            design *= degrees[powers[:, number], :, number].T
-        yield rows, design
+        yield rows, math.prod(degrees.T[column, k] for k, column in enumerate(powers.T)).T
 
 
 def _orthonormal(x: FloatArray, highest: int, family: str) -> FloatArray:
-    """Return orthonormal polynomials of all degrees, (degrees, rows, m), by recurrence."""
-    values = np.ones((highest + 1, *x.shape))
-    for degree in range(highest):
-        before = values[degree - 1] if degree else 0.0
-        if family == "hermite":
-            upper, lower = (degree + 1.0) ** 0.5, degree**0.5
-        else:
-            upper = (degree + 1.0) / ((2.0 * degree + 1.0) * (2.0 * degree + 3.0)) ** 0.5
-            lower = degree / ((2.0 * degree + 1.0) * abs(2.0 * degree - 1.0)) ** 0.5
-        values[degree + 1] = (x * values[degree] - lower * before) / upper
-    return values
+    """Return orthonormal polynomials of all degrees, (rows, m, degrees)."""
+    degrees = np.arange(highest + 1)
+    if family == "hermite":
+        scale = 1.0 / np.sqrt([math.factorial(degree) for degree in degrees])
+        return np.asarray(hermevander(x, highest) * scale)
+    return np.asarray(legvander(x, highest) * np.sqrt(2.0 * degrees + 1.0))
