@@ -74,10 +74,12 @@ def panel_edges(
 
 
 class InverseTable:
-    """Quantile function of a piecewise density, with a relative error of about 1e-13.
+    """Quantile function of a piecewise density.
 
-    Within a panel the cumulative distribution is inverted as that of an exponential density which
-    agrees with the density at the panel's edges, and then corrected by a polynomial.
+    The distance from the lower end of the support has a relative error below 1e-12 for gamma
+    distributions and below 1e-10 for quadratic exponents, measured for probabilities from 1e-12 to
+    1 - 1e-9. Within a panel the cumulative distribution is inverted as that of an exponential
+    density which agrees with the density at the panel's edges, and then corrected by a polynomial.
 
     Parameters
     ----------
