@@ -283,7 +283,10 @@ def _designs(
     for first in range(0, len(scores), _BLOCK):
         rows = slice(first, first + _BLOCK)
         degrees = _orthonormal(scores[rows], int(powers.max()), family)
-        yield rows, math.prod(degrees.T[column, k] for k, column in enumerate(powers.T)).T
+        design = np.ones((degrees.shape[0], len(powers)))
+        for number, column in enumerate(powers.T):
+            design *= degrees.T[column, number].T
+        yield rows, design
 
 
 def _orthonormal(x: FloatArray, highest: int, family: str) -> FloatArray:
