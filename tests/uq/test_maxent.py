@@ -263,6 +263,16 @@ def test_stds_near_the_exponential_one_converge_to_it(short: float) -> None:
     )
 
 
+@pytest.mark.parametrize("short", [1e-15, 1e-12, 1e-8])
+def test_nearly_uniform_exponential_quantiles_have_12_digits_at_both_ends(short: float) -> None:
+    probabilities = np.array([1e-12, 1e-3, 0.4, 0.6, 0.999])
+    change = 6.0 * short * probabilities * (1.0 - probabilities)  # first order in the rate
+    rising = maximum_entropy((0.0, 1.0), 0.5 + short).quantile(probabilities)
+    assert rising == pytest.approx(probabilities + change, rel=1e-12)
+    falling = maximum_entropy((0.0, 1.0), 0.5 - short).quantile(probabilities)
+    assert falling == pytest.approx(probabilities - change, rel=1e-12)
+
+
 def test_spike_at_a_far_limit_gives_a_warning() -> None:
     (message,) = maximum_entropy((0.0, 1.0), 1e-3, 1.1e-3).warnings
     assert "a spike with a probability of 2.1e-07 is at the end 1" in message

@@ -43,11 +43,12 @@ class Disc(JointDistribution):
 
     def values(self, uniform: FloatArray) -> FloatArray:
         """Return yaw and tilt, shape (draws, 2), from uniform numbers (draws, 2)."""
-        from scipy.special import exprel, ndtri  # noqa: PLC0415  (slow to import, rarely needed)
+        from scipy.special import ndtri  # noqa: PLC0415  (slow to import, and rarely needed)
 
         scores = np.clip(ndtri(uniform), -_LARGEST_SCORE, _LARGEST_SCORE)
-        square = (scores**2).sum(axis=-1, keepdims=True)
-        return np.asarray(self._radius * np.sqrt(0.5 * exprel(-0.5 * square)) * scores)
+        # a tiny positive number replaces zero at the centre, where the limit of the ratio is used
+        square = np.maximum((scores**2).sum(axis=-1, keepdims=True), 1e-300)
+        return np.asarray(self._radius * np.sqrt(-np.expm1(-0.5 * square) / square) * scores)
 
     @property
     def mean(self) -> tuple[float, float]:

@@ -9,6 +9,8 @@ import numpy as np
 
 from wearsim.types import FloatArray
 
+_STEEP = 30.0  # fall of the log density from which the density at the upper end is below rounding
+
 
 class MaxentDistribution(ABC):
     """A distribution with density ``exp(-l0 - l1 x - l2 g(x))``, g being x^2 or log x.
@@ -91,18 +93,27 @@ class MaxentDistribution(ABC):
     def density(self, x: FloatArray) -> FloatArray:
         """Return the density at `x`, zero outside the support, shape as `x`."""
         x = np.asarray(x, dtype=np.float64)
-        low, high = self.support
-        inside = (x >= low) & (x <= high)
-        placeholder = min(max(self.mean, low), high)
-        return np.where(inside, np.exp(self.log_density(np.where(inside, x, placeholder))), 0.0)
+        inside = (x >= self.support[0]) & (x <= self.support[1])
+        return np.where(inside, np.exp(self.log_density(np.where(inside, x, self.mean))), 0.0)
 
     @abstractmethod
     def inverse(self, below: FloatArray, above: FloatArray) -> FloatArray:
         """Return quantiles, shape (draws,), from the probabilities below and above them."""
 
-    @abstractmethod
     def log_density(self, x: FloatArray) -> FloatArray:
         """Return the logarithm of the density at `x`, which must be within the support."""
+        return quadratic(x, *self._exponent)
+
+    def _set_exponent(self, centre: float, top: float, slope: float, bend: float) -> None:
+        """Set the coefficients of the log density, see `quadratic`."""
+        self._exponent = centre, top, slope, bend
+        l0 = bend * centre * centre - slope * centre - top
+        self.multipliers = (l0, slope - 2.0 * bend * centre, bend)
+
+
+def quadratic(x: FloatArray, centre: float, top: float, slope: float, bend: float) -> FloatArray:
+    """Return ``top - slope (x - centre) - bend (x - centre)^2``."""
+    return top - (slope + bend * (x - centre)) * (x - centre)
 
 
 class Uniform(MaxentDistribution):
@@ -114,16 +125,12 @@ class Uniform(MaxentDistribution):
         self.support = (low, high)
         self.mean = low + 0.5 * (high - low)
         self.std = (high - low) / math.sqrt(12.0)
-        self.multipliers = (math.log(high - low), 0.0, 0.0)
+        self._set_exponent(0.0, -math.log(high - low), 0.0, 0.0)
 
     def inverse(self, below: FloatArray, above: FloatArray) -> FloatArray:
         """Return quantiles, shape (draws,), from the probabilities below and above them."""
         low, high = self.support
         return np.where(below < 0.5, low + (high - low) * below, high - (high - low) * above)
-
-    def log_density(self, x: FloatArray) -> FloatArray:
-        """Return the logarithm of the density at `x`."""
-        return np.full_like(x, -self.multipliers[0])
 
 
 class Exponential(MaxentDistribution):
@@ -143,18 +150,18 @@ class Exponential(MaxentDistribution):
         self.family = "truncated exponential" if math.isfinite(high) else "exponential"
         self.support, self.mean, self.std, self._rate = (low, high), mean, std, rate
         self._fall = rate * (high - low)
-        self._log_top = math.log(rate) - math.log(-math.expm1(-self._fall))
-        self.multipliers = (0.0 - self._log_top - rate * low, rate, 0.0)
+        top = math.log(rate) - math.log(-math.expm1(-self._fall))
+        self._set_exponent(low, top, rate, 0.0)
 
     def inverse(self, below: FloatArray, above: FloatArray) -> FloatArray:
         """Return quantiles, shape (draws,), from the probabilities below and above them."""
-        lower = np.log1p(np.minimum(below, 0.5) * math.expm1(-self._fall))
-        upper = np.log(above + below * math.exp(-self._fall))
-        return self.support[0] - np.where(below < 0.5, lower, upper) / self._rate
-
-    def log_density(self, x: FloatArray) -> FloatArray:
-        """Return the logarithm of the density at `x`."""
-        return self._log_top - self._rate * (x - self.support[0])
+        low, high = self.support
+        lower = low - np.log1p(np.minimum(below, 0.5) * math.expm1(-self._fall)) / self._rate
+        if self._fall < _STEEP:  # the distance from the upper end without cancellation
+            upper = high - np.log1p(above * math.expm1(self._fall)) / self._rate
+        else:
+            upper = low - np.log(above + below * math.exp(-self._fall)) / self._rate
+        return np.where(below < 0.5, lower, upper)
 
 
 class Mirrored(MaxentDistribution):

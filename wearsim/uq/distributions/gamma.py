@@ -9,7 +9,7 @@ import numpy as np
 
 from wearsim.types import FloatArray
 from wearsim.uq.distributions.base import MaxentDistribution
-from wearsim.uq.distributions.quantile_table import InverseTable, Piece, panel_edges
+from wearsim.uq.distributions.quantile_table import InverseTable, Piece
 
 _LARGE = 50.0  # shape above which digamma and logarithm cancel
 
@@ -38,17 +38,12 @@ class Gamma(MaxentDistribution):
         """Quantiles of log(x/mean)."""
         k = self._shape
 
-        def edges(sign: float) -> FloatArray:
-            return sign * panel_edges(
-                slope=lambda y: k * math.expm1(sign * y),
-                curvature=lambda y: k * math.exp(sign * y),
-                drop=lambda y: k * (math.expm1(sign * y) - sign * y),
-                stop=math.inf,
-                widest=lambda y: 0.5 + 0.1 * y,
-            )
+        def log_density(y: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+            return k * (y - np.expm1(y)), -k * np.expm1(y), -k * np.exp(y)
 
-        offsets = np.concatenate([edges(-1.0)[:0:-1], edges(1.0)])
-        return InverseTable([Piece(0.0, 1.0, offsets, lambda y: k * (y - np.expm1(y)))])
+        ends = (-math.inf, math.inf)
+        pieces = [Piece(0.0, 1.0, log_density, end, lambda y: 0.5 + 0.1 * abs(y)) for end in ends]
+        return InverseTable(pieces)
 
     def inverse(self, below: FloatArray, above: FloatArray) -> FloatArray:
         """Return quantiles, shape (draws,), from the probabilities below and above them."""

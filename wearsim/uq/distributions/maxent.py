@@ -115,9 +115,12 @@ def _require(condition: bool, text: str) -> None:
 
 def _check_sizes(low: float, high: float, mean: float | None, std: float | None) -> None:
     """Raise if a square or its inverse would overflow."""
-    sizes = {"std": std, "the width of the support": high - low}
-    if mean is not None:
-        sizes |= {"the distance from the mean to the nearer end": min(mean - low, high - mean)}
+    nearer = None if mean is None else min(mean - low, high - mean)
+    sizes = {
+        "std": std,
+        "the width of the support": high - low,
+        "the distance from the mean to the nearer end": nearer,
+    }
     for name, size in sizes.items():
         if size is not None and 0.0 < size < _SMALLEST:
             raise Infeasible(f"{name} {size:g} is too small to be squared; {_OTHER_UNIT}")

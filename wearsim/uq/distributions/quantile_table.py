@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from wearsim.types import FloatArray
 
-MAX_LOG_DROP = 745.0  # exp(-745) is the smallest positive float
+_MAX_LOG_DROP = 745.0  # exp(-745) is the smallest positive float
 _MAX_PANEL_DROP = 2.0  # change of the log density over a panel
 _MAX_PANEL_BEND = 0.2  # panel width times the square root of the log density's curvature
 _NODES = 0.5 - 0.5 * np.cos(np.pi * np.arange(9) / 8)  # nodes of a panel, from 0 to 1
@@ -18,9 +19,14 @@ _POINTS = _NODES[:-1, None] + np.diff(_NODES)[:, None] * 0.5 * (1.0 + _GAUSS)
 _CHUNK = 1 << 15  # draws per block; the panel data of a block fit into the processor's cache
 
 
-@dataclass(frozen=True)
+LogDensity: TypeAlias = Callable[[Any], tuple[Any, Any, Any]]
+"""Log density at offsets, up to a constant, and its first and second derivative."""
+
+
 class Piece:
     """A part of the support, divided into panels in which the log density is nearly linear.
+
+    It reaches from offset 0 to `stop`, or to where the density underflows.
 
     Parameters
     ----------
@@ -28,49 +34,36 @@ class Piece:
         Origin of the offsets; at an end of the support, values near it keep full precision.
     scale : float
         Value per unit of offset.
-    edges : ndarray, shape (panels + 1,)
-        Offsets of the panel edges, increasing.
     log_density : callable
-        Logarithm of the density at offsets, up to a constant common to all pieces.
-    """
-
-    origin: float
-    scale: float
-    edges: FloatArray
-    log_density: Callable[[FloatArray], FloatArray]
-
-
-def panel_edges(
-    slope: Callable[[float], float],
-    curvature: Callable[[float], float],
-    drop: Callable[[float], float],
-    stop: float,
-    widest: Callable[[float], float] = lambda offset: float("inf"),
-) -> FloatArray:
-    """Return panel edges from offset 0 to `stop`, or to where the density underflows.
-
-    Parameters
-    ----------
-    slope, curvature : callable
-        First and second derivative of the log density with respect to the offset.
-    drop : callable
-        Difference of the greatest log density and the log density at an offset.
+        Log density at offsets, up to a constant common to all pieces, with two derivatives.
     stop : float
-        Last offset; may be infinite.
+        Last offset; may be negative or infinite.
     widest : callable, optional
         Greatest width of a panel that starts at an offset.
 
-    Returns
-    -------
-    ndarray, shape (panels + 1,)
+    Attributes
+    ----------
+    edges : ndarray, shape (panels + 1,)
+        Offsets of the panel edges, increasing.
     """
-    edges = [0.0]
-    while edges[-1] < stop and drop(edges[-1]) < MAX_LOG_DROP:
-        start = edges[-1]
-        rate = abs(slope(start)) / _MAX_PANEL_DROP + abs(curvature(start)) ** 0.5 / _MAX_PANEL_BEND
-        width = min(stop - start, widest(start), 1.0 / rate if rate > 0.0 else float("inf"))
-        edges.append(stop if start + width >= stop else start + width)
-    return np.array(edges)
+
+    def __init__(
+        self,
+        origin: float,
+        scale: float,
+        log_density: LogDensity,
+        stop: float,
+        widest: Callable[[float], float] = lambda offset: math.inf,
+    ) -> None:
+        self.origin, self.scale, self.log_density = origin, scale, log_density
+        last, edges, drop = abs(stop), [0.0], 0.0
+        while abs(edges[-1]) < last and drop < _MAX_LOG_DROP:
+            _, slope, curvature = log_density(edges[-1])
+            rate = abs(slope) / _MAX_PANEL_DROP + abs(curvature) ** 0.5 / _MAX_PANEL_BEND
+            width = min(widest(edges[-1]), 1.0 / max(rate, 1e-300))
+            edges.append(max(-last, min(edges[-1] + math.copysign(width, stop), last)))
+            drop = log_density(0.0)[0] - log_density(edges[-1])[0]
+        self.edges = np.sort(edges)
 
 
 class InverseTable:
@@ -187,5 +180,5 @@ def _exponential_place(
 def _node_logs(piece: Piece) -> tuple[FloatArray, FloatArray]:
     """Return the log density at the panel nodes, and at Gauss points between adjacent nodes."""
     start, width = piece.edges[:-1, None], np.diff(piece.edges)[:, None]
-    between = piece.log_density(start + width * _POINTS.ravel())
-    return piece.log_density(start + width * _NODES), between.reshape(-1, *_POINTS.shape)
+    between = piece.log_density(start + width * _POINTS.ravel())[0]
+    return piece.log_density(start + width * _NODES)[0], between.reshape(-1, *_POINTS.shape)

@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from wearsim.types import FloatArray
-from wearsim.uq.distributions.base import MaxentDistribution, Mirrored
-from wearsim.uq.distributions.quantile_table import InverseTable, Piece, panel_edges
+from wearsim.uq.distributions.base import MaxentDistribution, Mirrored, quadratic
+from wearsim.uq.distributions.quantile_table import InverseTable, LogDensity, Piece
 
 _DEEPEST = 5.0  # greatest distance of the support from the parent's mean, in parent stds
 _NARROWEST = 0.03  # least width of the support, in parent stds
@@ -40,9 +40,8 @@ class TruncatedNormal(MaxentDistribution):
         shift = float(density[0] - density[1])
         self.mean = mean + std * shift
         self.std = std * math.sqrt(1.0 - float(np.diff(ends * density)[0]) - shift * shift)
-        self._log_mass = math.log(self._mass * std * math.sqrt(2.0 * math.pi))
-        l2 = 0.5 / (std * std)
-        self.multipliers = (l2 * mean * mean + self._log_mass, -2.0 * l2 * mean, l2)
+        top = -math.log(self._mass * std * math.sqrt(2.0 * math.pi))
+        self._set_exponent(mean, top, 0.0, 0.5 / (std * std))
 
     def inverse(self, below: FloatArray, above: FloatArray) -> FloatArray:
         """Return quantiles, shape (draws,), from the probabilities below and above them."""
@@ -52,10 +51,6 @@ class TruncatedNormal(MaxentDistribution):
         upper = self._ends[1] + above * self._mass
         score = ndtri(np.minimum(lower, upper))  # of the smaller tail, to avoid cancellation
         return np.asarray(self._mean + self._std * np.where(lower < upper, score, -score))
-
-    def log_density(self, x: FloatArray) -> FloatArray:
-        """Return the logarithm of the density at `x`, which must be within the support."""
-        return -self._log_mass - 0.5 * ((x - self._mean) / self._std) ** 2
 
 
 class QuadraticExponent(MaxentDistribution):
@@ -92,35 +87,23 @@ class QuadraticExponent(MaxentDistribution):
         top: float = 0.0,
     ) -> None:
         self.family = "truncated normal" if bend > 0.0 else "exponential of a quadratic"
-        self.support, self._scale = (low, high), scale
-        self._fall, self._bend, self._from_above, self._top = fall, bend, from_above, top
+        self.support = (low, high)
 
-        def edges(slope: float, stop: float) -> FloatArray:
-            return panel_edges(
-                slope=lambda u: slope + 2.0 * bend * u,
-                curvature=lambda u: 2.0 * bend,
-                drop=lambda u: (slope + bend * u) * u,
-                stop=stop,
-            )
+        def exponent(slope: float, top: float) -> LogDensity:
+            return lambda u: (-top - (slope + bend * u) * u, -slope - 2.0 * bend * u, -2.0 * bend)
 
         stop = -0.5 * fall / bend if from_above > 0.0 else (high - low) / scale
-        pieces = [Piece(low, scale, edges(fall, stop), self._from_lower)]
-        if from_above > 0.0:  # offsets below zero, from the upper end down
-            offsets = -edges(from_above, -0.5 * from_above / bend)[::-1]
-            pieces.append(Piece(high, scale, offsets, self._from_upper))
+        pieces = [Piece(low, scale, exponent(fall, 0.0), stop)]
+        if from_above > 0.0:
+            upper = exponent(-from_above, top)
+            pieces.append(Piece(high, scale, upper, 0.5 * from_above / bend))
         self._table = table = InverseTable(pieces)
         self.mean, self.std = table.mean, table.std
+        log_total = math.log(scale) + table.log_total
+        self._set_exponent(low, -log_total, fall / scale, bend / scale**2)
         if from_above > 0.0:
             self.antimode = low + scale * stop, float(table.above_pieces[0])
-        l1, l2 = fall / scale, bend / scale**2
-        l0 = math.log(scale) + table.log_total
-        self.multipliers = (l0 - l1 * low + l2 * low * low, l1 - 2.0 * l2 * low, l2)
-
-    def _from_lower(self, u: FloatArray) -> FloatArray:
-        return -(self._fall + self._bend * u) * u
-
-    def _from_upper(self, v: FloatArray) -> FloatArray:
-        return -self._top + (self._from_above - self._bend * v) * v
+            self._upper = high, -top - log_total, -from_above / scale, bend / scale**2
 
     def inverse(self, below: FloatArray, above: FloatArray) -> FloatArray:
         """Return quantiles, shape (draws,), from the probabilities below and above them."""
@@ -128,12 +111,10 @@ class QuadraticExponent(MaxentDistribution):
 
     def log_density(self, x: FloatArray) -> FloatArray:
         """Return the logarithm of the density at `x`, which must be within the support."""
-        low, high = self.support
-        u, v = (x - low) / self._scale, (x - high) / self._scale
-        logs = self._from_lower(u)
-        if self._from_above > 0.0:
-            logs = np.where(u <= -v, logs, self._from_upper(v))
-        return logs - self._table.log_total - math.log(self._scale)
+        logs = super().log_density(x)
+        if self.antimode is None:
+            return logs
+        return np.where(x < self.antimode[0], logs, quadratic(x, *self._upper))
 
 
 def cut_normal(

@@ -11,7 +11,7 @@ import numpy as np
 
 from wearsim.types import FloatArray, IntArray
 from wearsim.uq.estimation.intervals import UNKNOWN, Interval, t_interval, t_quantile
-from wearsim.uq.estimation.moments import fractional_ranks, summarise
+from wearsim.uq.estimation.moments import are_equal, fractional_ranks
 from wearsim.uq.estimation.standard_errors import (
     Control,
     Controlled,
@@ -127,9 +127,9 @@ def estimate(
         return Estimate(0, UNKNOWN, UNKNOWN, quantiles, math.nan, math.nan, errors.method)
     if failed := int((~np.isfinite(values)).sum()):
         raise ValueError(f"{failed} of {len(values)} values are not finite; leave out failed ones")
-    summary = summarise(values)
-    if summary.is_constant:
-        mean = Interval(*[summary.mean] * 3).within(summary.least, summary.greatest)
+    least, greatest, constant = float(values.min()), float(values.max()), are_equal(values)
+    if constant:
+        mean = Interval(*[float(values.mean())] * 3).within(least, greatest)
         std = Interval(0.0, 0.0, 0.0)
         quantiles = tuple((probability, mean) for probability in probabilities)
     else:
@@ -137,14 +137,14 @@ def estimate(
         distribution = WeightedDistribution(values, errors.weights)
         quantiles = tuple((p, _quantile(distribution, values, p, errors)) for p in probabilities)
     return Estimate(
-        count=summary.count,
+        count=len(values),
         mean=mean,
         std=std,
         quantiles=quantiles,
-        least=summary.least,
-        greatest=summary.greatest,
+        least=least,
+        greatest=greatest,
         method=errors.method,
-        variance_saved=None if summary.is_constant else errors.variance_saved(values),
+        variance_saved=None if constant else errors.variance_saved(values),
     )
 
 

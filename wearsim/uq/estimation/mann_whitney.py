@@ -47,9 +47,8 @@ def superiority(first: FloatArray, second: FloatArray) -> Interval:
     low = high = chance
     if parts.sum() > 0.0:
         degrees = float(parts.sum() ** 2 / (parts**2 / np.array([n - 1, m - 1])).sum())
-        spread = chance * (1.0 - chance)
-        reach = t_quantile(degrees) * math.sqrt(float(parts.sum())) / spread
         odds = chance / (1.0 - chance)
+        reach = t_quantile(degrees) * math.sqrt(float(parts.sum())) / (chance * (1.0 - chance))
         low, high = (1.0 / (1.0 + math.exp(side) / odds) for side in (reach, -reach))
     if not _NEAR_CERTAIN < chance < 1.0 - _NEAR_CERTAIN:
         ends = _newcombe(chance, n, m)

@@ -146,6 +146,14 @@ def is_constant(mean: float, std: float, rounding: float = 0.0) -> bool:
     return std <= max(_SAME * abs(mean), rounding)
 
 
+def are_equal(values: FloatArray) -> bool:
+    """Return whether values, shape (n,), differ by no more than rounding; False for a single one.
+
+    See `is_constant`.
+    """
+    return len(values) > 1 and is_constant(float(values.mean()), float(values.std(ddof=1)))
+
+
 def converge(values: FloatArray, counts: IntArray) -> Convergence:
     """Return mean and standard deviation as functions of the number of realisations.
 

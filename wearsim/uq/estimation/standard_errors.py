@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wearsim.types import FloatArray, IntArray
-from wearsim.uq.estimation.moments import is_constant
+from wearsim.uq.estimation.moments import are_equal
 
 _MIN_REGRESSION = 10  # least number of realisations for a regression on a control variate
 
@@ -108,9 +108,7 @@ class Control(NamedTuple):
     @property
     def is_usable(self) -> bool:
         """Whether the realisations are sufficient for a regression and the values vary."""
-        return len(self.values) >= _MIN_REGRESSION and not is_constant(
-            float(self.values.mean()), float(self.values.std())
-        )
+        return len(self.values) >= _MIN_REGRESSION and not are_equal(self.values)
 
 
 class Controlled(PlanErrors):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, combinations_with_replacement
+from operator import itemgetter
 
 import numpy as np
 from numpy.polynomial.hermite_e import hermevander
@@ -13,7 +13,7 @@ from numpy.polynomial.legendre import legvander
 
 from wearsim.types import FloatArray, IntArray
 from wearsim.uq.estimation.intervals import UNKNOWN, Interval, t_interval
-from wearsim.uq.estimation.moments import is_constant
+from wearsim.uq.estimation.moments import are_equal, is_constant
 
 SMALL = 0.01
 """Index below which an effect whose interval includes 0 counts as none."""
@@ -75,7 +75,7 @@ def first_order(values: FloatArray, groups: Mapping[str, FloatArray]) -> dict[st
     if not np.isfinite(values).all():
         raise ValueError("sensitivity needs finite values; leave out failed realisations")
     values = values[:_MOST]
-    if len(values) > 1 and is_constant(float(values.mean()), float(values.std())):
+    if are_equal(values):
         return dict.fromkeys(groups, _NONE)
     return {name: _share(values, numbers[:_MOST], name) for name, numbers in groups.items()}
 
@@ -95,16 +95,15 @@ def _share(values: FloatArray, numbers: FloatArray, name: str) -> Interval:
         return UNKNOWN
     ranks = np.stack([_ranks(column) for column in varying.T], axis=1)
     deviation = values - values.mean()
-    fit = min(
-        best_fit(ndtri(ranks), deviation, "hermite"),
-        best_fit(2.0 * ranks - 1.0, deviation, "legendre"),
-        key=lambda one: one.error,
+    fits = (
+        _best_fit(ndtri(ranks), deviation, "hermite"),
+        _best_fit(2.0 * ranks - 1.0, deviation, "legendre"),
     )
-    left_out = fit.residual / (1.0 - fit.leverage)
+    _, terms, residual, left_out = min(fits, key=itemgetter(0))
     variance = float((deviation**2).sum()) / (count - 1)
     left = float((deviation * left_out).sum()) / (count - 1) / variance
-    influence = (fit.residual * left_out - left * deviation**2) / variance
-    noise = 2.0 * (fit.terms - 1) * (left / count) ** 2
+    influence = (residual * left_out - left * deviation**2) / variance
+    noise = 2.0 * (terms - 1) * (left / count) ** 2
     error = math.sqrt(float(influence.var()) / count + noise)
     return t_interval(1.0 - left, error, math.inf).within(0.0, 1.0)
 
@@ -181,32 +180,14 @@ def _ratio(part: FloatArray, square: FloatArray) -> Interval:
     return t_interval(share, error, len(part) - 1).within(0.0, 1.0)
 
 
-@dataclass(frozen=True)
-class Fit:
-    """A fitted polynomial and its leave-one-out errors.
-
-    Parameters
-    ----------
-    terms : int
-        Number of terms, with the constant.
-    error : float
-        Mean square of the leave-one-out prediction errors.
-    residual, leverage : ndarray, shape (n,)
-        Residual and leverage of each realisation.
-    """
-
-    terms: int
-    error: float
-    residual: FloatArray
-    leverage: FloatArray
-
-
 def fewest_realisations(numbers: int) -> int:
     """Return the number of realisations that a fit of so many numbers and their squares needs."""
     return _PER_TERM * (1 + 2 * numbers)
 
 
-def best_fit(scores: FloatArray, values: FloatArray, family: str) -> Fit:
+def _best_fit(
+    scores: FloatArray, values: FloatArray, family: str
+) -> tuple[float, int, FloatArray, FloatArray]:
     """Return the polynomial with the least leave-one-out error.
 
     Parameters
@@ -220,7 +201,12 @@ def best_fit(scores: FloatArray, values: FloatArray, family: str) -> Fit:
 
     Returns
     -------
-    Fit
+    error : float
+        Mean square of the leave-one-out prediction errors.
+    terms : int
+        Number of terms, with the constant.
+    residual, left_out : ndarray, shape (n,)
+        Residual and leave-one-out prediction error of each realisation.
     """
     count = len(values)
     distinct = [len(np.unique(column)) for column in scores.T]
@@ -233,15 +219,15 @@ def best_fit(scores: FloatArray, values: FloatArray, family: str) -> Fit:
     # columns orthonormalised successively: the first k of them span the first k terms
     transform = np.linalg.inv(lower).T
     slopes = transform.T @ moment
-    residual, leverage = np.empty((2, count, len(ends)))
+    residual, left_out = np.empty((2, count, len(ends)))
     for rows, design in _designs(scores, powers, family):
         columns = design @ transform
         for k, end in enumerate(ends):
             residual[rows, k] = values[rows] - columns[:, :end] @ slopes[:end]
-            leverage[rows, k] = (columns[:, :end] ** 2).sum(axis=1)
-    errors = ((residual / (1.0 - leverage)) ** 2).mean(axis=0)
+            left_out[rows, k] = residual[rows, k] / (1.0 - (columns[:, :end] ** 2).sum(axis=1))
+    errors = (left_out**2).mean(axis=0)
     best = int(np.argmin(errors))
-    return Fit(ends[best], float(errors[best]), residual[:, best], leverage[:, best])
+    return float(errors[best]), ends[best], residual[:, best], left_out[:, best]
 
 
 def _terms(distinct: list[int], most: int) -> tuple[IntArray, list[int]]:
@@ -250,30 +236,19 @@ def _terms(distinct: list[int], most: int) -> tuple[IntArray, list[int]]:
     Terms are ordered by total degree, then by the number of factors.
     """
     width = len(distinct)
-    powers, ends = [(0,) * width], list[int]()
+    powers, ends = [np.zeros(width, dtype=np.int64)], list[int]()
     for degree in range(1, _DEGREE + 1):
         for factors in range(1, min(degree, width) + 1):
             if len(powers) + math.comb(width, factors) * math.comb(degree - 1, factors - 1) > most:
                 continue
-            powers += [
-                term
-                for term in _of_degree(degree, factors, width)
-                if all(power < known for power, known in zip(term, distinct, strict=True))
-            ]
+            for chosen in combinations(range(width), factors):
+                for more in combinations_with_replacement(chosen, degree - factors):
+                    term = np.bincount([*chosen, *more], minlength=width)
+                    if (term < distinct).all():
+                        powers.append(term)
             if degree > 1:
                 ends.append(len(powers))
-    return np.array(powers, dtype=np.int64), sorted(set(ends))
-
-
-def _of_degree(degree: int, factors: int, width: int) -> Iterator[tuple[int, ...]]:
-    """Yield the powers of all terms of this degree with so many factors."""
-    for chosen in combinations(range(width), factors):
-        # compositions of the degree into parts of 1 or more
-        for cuts in combinations(range(1, degree), factors - 1):
-            powers = [0] * width
-            for number, start, stop in zip(chosen, (0, *cuts), (*cuts, degree), strict=True):
-                powers[number] = stop - start
-            yield tuple(powers)
+    return np.array(powers), sorted(set(ends))
 
 
 def _designs(
