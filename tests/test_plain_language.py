@@ -20,9 +20,8 @@ FORBIDDEN = re.compile(
     re.IGNORECASE,
 )
 ALLOWED = re.compile(r"twin[- ]disc", re.IGNORECASE)
-#: rewritten together with the storage of ensembles and the execution of batches
+#: rewritten together with the storage of ensembles
 LATER = (
-    "wearsim/studies/execution/",
     "wearsim/results/ensemble/writer.py",
     "wearsim/results/ensemble/state_slots.py",
     "wearsim/results/ensemble/stored_arrays.py",

@@ -25,8 +25,8 @@ from batch_works import (
 
 from tests.interruptible import interruptible
 from wearsim.errors import Mistake, ScenarioError, WorkerError
-from wearsim.studies.execution.base import AHEAD, named
 from wearsim.studies.execution.factory import available_processors, executor
+from wearsim.studies.execution.processes import AHEAD, named
 
 HERE = Path(__file__).parents[1]
 EXECUTORS = [("serial", None), ("threads", 2), ("threads", 1), ("processes", 2), ("processes", 1)]
@@ -117,7 +117,7 @@ def test_default_is_one_worker_per_available_processor() -> None:
 @pytest.mark.parametrize("size", [1, 4])
 def test_batches_of_a_killed_process_are_repeated(tmp_path: Path, size: int) -> None:
     messages: list[str] = []
-    with executor("processes", 2, tell=messages.append) as pool:
+    with executor("processes", 2, on_notice=messages.append) as pool:
         found = list(pool.results(Deadly(tmp_path, at=9, times=2), batches_of(size, 24)))
     numbers = [number for batch, _ in found for number in batch]
     assert sorted(numbers) == list(range(24))
@@ -221,26 +221,72 @@ def test_workers_end_with_the_study(scheduler: str, number: signal.Signals) -> N
     assert not any(map(alive, pids))
 
 
-@pytest.mark.parametrize("scheduler", ["processes", pytest.param("dask", marks=pytest.mark.slow)])
-def test_unguarded_script_is_reported(tmp_path: Path, scheduler: str) -> None:
-    script = tmp_path / "script.py"
-    script.write_text(
-        "from wearsim.studies.execution.factory import executor\n"
-        f"with executor({scheduler!r}, 2) as pool:\n"
-        "    list(pool.results(print, iter([[1], [2]])))\n"
-    )
+UNGUARDED = (
+    "from wearsim.studies.execution.factory import executor\n"
+    "def negatives(numbers):\n"
+    "    return [-number for number in numbers]\n"
+    "with executor({!r}, 2) as pool:\n"
+    "    print(sorted(pool.results(negatives, iter([[1], [2]]))))\n"
+)
+
+
+def run_unguarded(folder: Path, scheduler: str, way: str) -> subprocess.CompletedProcess[str]:
+    """Run a script without the `__main__` guard; check that it leaves no file behind."""
+    text, work, temporary = UNGUARDED.format(scheduler), folder / "work", folder / "temporary"
+    work.mkdir()
+    temporary.mkdir()
+    script = folder / "script.py"
+    script.write_text(text)
     done = subprocess.run(
-        [sys.executable, str(script)],
-        cwd=HERE.parents[1],
+        [sys.executable, *{"file": [script], "-c": ["-c", text], "stdin": ["-"]}[way]],
+        input=text if way == "stdin" else None,
+        cwd=work,
+        env=os.environ | {"PYTHONPATH": str(HERE.parents[1]), "TMPDIR": str(temporary)},
         capture_output=True,
         text=True,
         check=False,
     )
+    assert [*work.iterdir(), *temporary.iterdir()] == []
+    return done
+
+
+@pytest.mark.parametrize("way", ["file", "-c", "stdin"])
+def test_unguarded_script_runs_in_processes(tmp_path: Path, way: str) -> None:
+    done = run_unguarded(tmp_path, "processes", way)
+    assert done.stderr == ""
+    assert done.stdout == "[([1], [-1]), ([2], [-2])]\n"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("way", ["file", "-c", "stdin"])
+def test_unguarded_script_with_dask_runs_or_is_reported(tmp_path: Path, way: str) -> None:
+    done = run_unguarded(tmp_path, "dask", way)
+    if way == "-c":
+        assert done.stdout == "[([1], [-1]), ([2], [-2])]\n", done.stderr
+        return
     assert done.returncode == 1
     assert (
         'a script must run its study under `if __name__ == "__main__":`'
         in (done.stderr.splitlines()[-1])
     )
+
+
+def test_death_of_a_process_names_its_batch_only(tmp_path: Path) -> None:
+    messages: list[str] = []
+    with executor("processes", 3, on_notice=messages.append) as pool:
+        work = Deadly(tmp_path, at=4, times=1)
+        found = dict(pool.results(work, iter([(number,) for number in range(12)])))
+    assert found == {(number,): [number * number] for number in range(12)}
+    assert len(messages) == 1
+    assert "realisation 4 will be done again" in messages[0]
+    assert all(file.read_text() == "." for file in tmp_path.glob("done *"))
+    assert len(list(tmp_path.glob("done *"))) == 12
+
+
+def test_import_of_the_ensemble_api_does_not_import_loky() -> None:
+    code = "import sys, wearsim.studies.ensemble.api as _; print({'loky'} & {*sys.modules})"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "set()\n"
 
 
 @pytest.mark.parametrize(

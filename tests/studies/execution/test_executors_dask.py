@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import itertools
 import re
+import signal
 import socket
+import subprocess
 import sys
 import threading
 import time
@@ -18,11 +20,12 @@ import pytest
 from batch_works import Deadly, Raising, Squares
 from dask_cluster import scheduler, worker
 
+from tests.interruptible import interruptible
 from wearsim.errors import Mistake, ScenarioError, WorkerError
 from wearsim.studies.execution import dask as executors_cluster
 from wearsim.studies.execution import dask as executors_dask
-from wearsim.studies.execution.base import AHEAD
 from wearsim.studies.execution.factory import executor
+from wearsim.studies.execution.processes import AHEAD
 
 pytestmark = pytest.mark.slow
 
@@ -106,7 +109,7 @@ def test_study_continues_with_new_workers(tmp_path: Path) -> None:
             stack.enter_context(worker(where, tmp_path))
 
         # the only worker ends with the only copy of the work, and another one joins
-        with executor(where, tell=join) as cluster:
+        with executor(where, on_notice=join) as cluster:
             work = Deadly(tmp_path, at=5, times=1)
             found = dict(cluster.results(work, iter([(number,) for number in range(12)])))
     assert found == {(number,): [number * number] for number in range(12)}
@@ -121,6 +124,41 @@ def test_cluster_without_workers_raises_after_a_time_limit(
         expected = f"the scheduler at {where} has had no workers for 0.3 s; start some with: dask"
         with pytest.raises(WorkerError, match=re.escape(expected)), executor(where):
             pass
+
+
+def test_first_interrupt_ends_a_study_without_workers(tmp_path: Path) -> None:
+    scenario = Path(__file__).parents[3] / "scenarios" / "rig-ensemble.toml"
+    with scheduler(tmp_path) as (where, _):
+        arguments = ["ensemble", scenario, "-n", "4", "-o", "a.h5", "--scheduler", where]
+        with subprocess.Popen(
+            interruptible("-m", "wearsim", *arguments),
+            cwd=tmp_path,
+            stderr=subprocess.PIPE,
+            text=True,
+        ) as running:
+            assert running.stderr is not None
+            while "waiting for workers" not in running.stderr.readline():
+                pass
+            running.send_signal(signal.SIGINT)
+            message = running.communicate(timeout=60)[1]
+    assert running.returncode == 130
+    assert f"stopped: there are no workers at {where}" in message
+    assert not (tmp_path / "a.h5").exists()
+
+
+def test_stop_ends_a_study_whose_workers_were_lost(tmp_path: Path) -> None:
+    stop = threading.Event()
+    with (
+        scheduler(tmp_path) as (where, _),
+        worker(where, tmp_path) as process,
+        executor(where, on_notice=print, stop_requested=stop.is_set) as cluster,
+    ):
+        found = cluster.results(Squares(0.01), ([number] for number in itertools.count()))
+        next(found)
+        process.kill()
+        stop.set()
+        with pytest.raises(KeyboardInterrupt):
+            list(found)
 
 
 def test_killed_scheduler_is_reported(tmp_path: Path) -> None:

@@ -158,7 +158,7 @@ def report(result: EnsembleResult, json: bool, figure: Path | None, workers: str
     """
     from wearsim.cli.render.ensemble_table import as_json, write_ensemble
     from wearsim.cli.render.run_footer import ensemble_line
-    from wearsim.studies.execution.factory import InProcess
+    from wearsim.studies.execution.processes import InProcess
 
     if workers == InProcess.describe:
         workers = "this process, one realisation at a time"

@@ -81,8 +81,8 @@ def ensemble(
     on_progress : callable, optional
         Called with the progress after every batch.
     stop_requested : callable, optional
-        Called after every batch; True stops the ensemble. Unfinished realisations are run by
-        `resume_ensemble`.
+        Called after every batch, and while a cluster has no workers; True stops the ensemble.
+        Unfinished realisations are run by `resume_ensemble`.
     on_notice : callable, optional
         Called with a message when a worker is lost, or a cluster has no workers.
 
@@ -104,7 +104,7 @@ def ensemble(
     request = checked_request(scenario, realisations, plan, until)
     path = Path(output)
     check_output(path, force, scenario.paths)
-    with executor(scheduler, workers, tell=on_notice) as pool:
+    with executor(scheduler, workers, on_notice=on_notice, stop_requested=stop_requested) as pool:
         grid = shared_grid(scenario)
         header = _header(scenario, request, grid)
         with EnsembleFile.create(path, header, _static(scenario, grid)) as file:
@@ -212,7 +212,10 @@ def resume_ensemble(
     target = Target.parse(data.until) if data.until else None
     grid = Grid(data.variables["y"], data.strip_width)
     runner = RealisationRunner(scenario, parse_plan(data.plan), data.asked, grid)
-    with executor(scheduler, workers, tell=on_notice) as pool, EnsembleFile.open(path) as opened:
+    with (
+        executor(scheduler, workers, on_notice=on_notice, stop_requested=stop_requested) as pool,
+        EnsembleFile.open(path) as opened,
+    ):
         work = EnsembleWork(opened, runner, target, pool, on_progress, stop_requested)
         for text in changed_origins(data, scenario):
             work.warn(text)

@@ -16,7 +16,7 @@ from wearsim.results import EnsembleFile, EnsembleResult, Outcome
 from wearsim.results.ensemble.schema import DONE, FAILED, PENDING
 from wearsim.studies.ensemble.designs import interim_sizes
 from wearsim.studies.ensemble.realisation import RealisationRunner
-from wearsim.studies.execution.base import Executor
+from wearsim.studies.execution.processes import Executor
 from wearsim.uq.estimation.intervals import UNKNOWN, Interval
 from wearsim.uq.estimation.stopping_rule import Target
 

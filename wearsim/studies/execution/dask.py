@@ -1,185 +1,188 @@
-"""Batches done by the workers of a Dask cluster, which may come, go and die meanwhile."""
+"""Execution of batches by a Dask cluster, whose workers may join, leave and die."""
 
 from __future__ import annotations
 
 import asyncio
 import logging
-import pickle
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager, suppress
 from importlib.metadata import PackageNotFoundError, version
 from itertools import islice
-from queue import Empty, SimpleQueue
-from typing import TYPE_CHECKING
+from tempfile import TemporaryDirectory
 
-from wearsim.errors import WorkerError
-from wearsim.studies.execution.base import AHEAD, GUARDED, Batch, Results, Teller, Work, named
-from wearsim.studies.execution.processes import Answer, answer, starting_workers
+import cloudpickle
+import dask
+from distributed import Client, Future, KilledWorker, LocalCluster, Security, as_completed
+from distributed.client import ClosedClientError
+from distributed.comm.core import connect
 
-if TYPE_CHECKING:
-    from distributed import Client, Future, LocalCluster
+from wearsim.errors import Interrupted, WorkerError
+from wearsim.studies.execution.processes import (
+    AHEAD,
+    Answer,
+    Batch,
+    Notify,
+    Results,
+    Work,
+    named,
+    run_batch,
+    sigint_blocked,
+)
 
-
-LOOKING = 2.0
-"""Time between two looks at who is there [s]."""
-
-PATIENCE = 60.0
-"""How long a cluster may be without workers where nobody can be told [s]."""
+LOOKING = 2.0  # s between two checks of the number of workers
+POLLING = 0.05  # s between two checks for finished batches
+PATIENCE = 60.0  # s after which a cluster without workers is an error, if there are no notices
+CONNECTING = 10.0  # s, time limit for the connection to a scheduler
+GUARDED = (
+    'a script must run its study under `if __name__ == "__main__":` and cannot be read from'
+    " standard input"
+)
 
 
 class Cluster:
-    """Has batches done by the workers of a Dask cluster, as many as it has at the time.
+    """Execution by the current workers of a Dask cluster.
 
-    Dask does again what a worker was doing that is lost, thrice unless it is set otherwise.
+    Dask repeats the batches of a lost worker, by default three times.
 
     Parameters
     ----------
     client : Client
     address : str
-        Of the scheduler.
-    tell : callable, optional
-        Told when the cluster has no workers.
+        Address of the scheduler.
+    on_notice : callable, optional
+        Called with a message when the cluster has no workers.
+    stop_requested : callable
+        Called while the cluster has no workers; True stops the study.
     """
 
-    def __init__(self, client: Client, address: str, tell: Teller | None) -> None:
-        self._client, self._address, self._tell = client, address, tell
-        self._threads, self._looked = 0, -LOOKING
-        self._lacking_since: float | None = None
+    def __init__(
+        self,
+        client: Client,
+        address: str,
+        on_notice: Notify | None,
+        stop_requested: Callable[[], bool],
+    ) -> None:
+        self._client, self._address = client, address
+        self._on_notice, self._stop_requested = on_notice, stop_requested
+        self._threads, self._checked_at = 0, -LOOKING
+        self._without_workers_since: float | None = None
 
     @property
     def workers(self) -> int:
-        """How many batches the cluster does at the same time, as it is now."""
-        if time.monotonic() - self._looked > LOOKING:
-            self._look()
+        """Current number of batches run at the same time."""
+        if time.monotonic() - self._checked_at > LOOKING:
+            self._count_workers()
         return self._threads
 
     @property
     def describe(self) -> str:
-        """Where the cluster is, and how large."""
+        """Address of the scheduler and number of workers."""
         count = self.workers
         return f"dask {self._address}, {count} worker{'s' if count != 1 else ''}"
 
     def check_versions(self) -> None:
-        """Wait for a worker, and raise unless all that are there have this wearsim."""
+        """Wait for a worker, and raise if a worker has another version of wearsim."""
         while not self.workers:
-            time.sleep(min(LOOKING, 0.1))
-        found = self._client.run(version, "wearsim", on_error="return")
-        for where, theirs in found.items():
-            if isinstance(theirs, PackageNotFoundError):
-                theirs = "none"  # noqa: PLW2901
-            if isinstance(theirs, str):  # else it was lost meanwhile
-                _check_version(theirs, version("wearsim"), where)
+            if self._stop_requested():
+                raise Interrupted(f"stopped: there are no workers at {self._address}")
+            time.sleep(POLLING)
+        for where, theirs in self._client.run(version, "wearsim", on_error="return").items():
+            if isinstance(theirs, str | PackageNotFoundError):  # otherwise the worker was lost
+                _check_version(theirs if isinstance(theirs, str) else "none", where)
 
     def results(self, work: Work, batches: Iterator[Batch]) -> Results:
-        """Yield every batch with its results, as `Executor.results` says."""
-        from distributed.client import ClosedClientError  # noqa: PLC0415  (slow to import)
-
-        # a task, and not scattered data: it is made again where all who had it are gone
-        unpickled = self._client.submit(pickle.loads, pickle.dumps(work), pure=False)
-        ours = version("wearsim")
-        out: dict[Future[Answer], Batch] = {}
-        done: SimpleQueue[Future[Answer]] = SimpleQueue()
+        """Yield every batch with its results, as `Executor.results`."""
+        pickled, ours = cloudpickle.dumps(work), version("wearsim")
+        running: dict[Future[Answer], Batch] = {}
+        completed = as_completed(loop=self._client.loop, with_results=True, raise_errors=False)
         try:
             while True:
-                for numbers in islice(batches, max(AHEAD * max(self.workers, 1) - len(out), 0)):
-                    future = self._client.submit(_do, unpickled, numbers, ours, pure=False)
-                    future.add_done_callback(done.put)
-                    out[future] = numbers
-                if not out:
+                free = AHEAD * max(self.workers, 1) - len(running)
+                for numbers in islice(batches, max(free, 0)):
+                    future = self._client.submit(_run_batch, pickled, numbers, ours, pure=False)
+                    running[future] = numbers
+                    completed.add(future)
+                if not running:
                     return
-                future = self._next(done)
-                results, error = self._fetched(future, out[future])
+                while not completed.has_ready():
+                    if not self.workers and self._stop_requested():
+                        raise KeyboardInterrupt
+                    time.sleep(POLLING)
+                future, answer = next(completed)
+                # the status of the future may have changed since, with the loss of a worker
+                if not (isinstance(answer, tuple) and isinstance(answer[0], list)):
+                    raise self._failure(running[future], answer)
+                results, error = answer
                 if error is not None:
                     raise error
-                yield out.pop(future), results
+                yield running.pop(future), results
         except ClosedClientError as error:
-            raise self._gone() from error
+            raise self._unreachable() from error
         finally:
             if self._client.status == "running":
                 with suppress(OSError, TimeoutError, ClosedClientError):
-                    self._client.cancel([unpickled, *out])
+                    self._client.cancel(list(running))
 
-    def _next(self, done: SimpleQueue[Future[Answer]]) -> Future[Answer]:
-        while True:
-            try:
-                return done.get(timeout=LOOKING)
-            except Empty:
-                self._look()
+    def _failure(self, numbers: Batch, cause: object) -> WorkerError:
+        """Return the error of a batch that was cancelled or failed outside the work."""
+        if not isinstance(cause, tuple):
+            return self._unreachable()
+        _, error, _ = cause
+        if isinstance(error, WorkerError):
+            return error
+        if isinstance(error, KilledWorker):
+            return WorkerError(
+                f"workers of {self._address} died of {named(numbers)} again and again;"
+                " more memory for each may help",
+                numbers,
+            )
+        return WorkerError(
+            f"a worker of {self._address} could not run {named(numbers)}:"
+            f" {type(error).__name__}: {error}"
+        )
 
-    def _fetched(self, future: Future[Answer], numbers: Batch) -> Answer:
-        from distributed import CancelledError, KilledWorker  # noqa: PLC0415  (slow to import)
-
-        patience = LOOKING
-        while True:
-            try:
-                found: Answer = future.result(timeout=patience)
-            except KilledWorker as error:
-                raise WorkerError(
-                    f"workers of {self._address} died of {named(numbers)} again and again;"
-                    " more memory for each may help",
-                    numbers,
-                ) from error
-            except CancelledError as error:
-                raise self._gone() from error
-            except Exception as error:
-                if future.status == "error":
-                    raise WorkerError(
-                        f"a worker of {self._address} could not do {named(numbers)}:"
-                        f" {type(error).__name__}: {error}"
-                    ) from error
-                # they are long, or who had them is gone and they are made again
-                patience *= 2.0
-                time.sleep(0.1)
-                self._look()
-            else:
-                return found
-
-    def _gone(self) -> WorkerError:
+    def _unreachable(self) -> WorkerError:
         return WorkerError(f"the scheduler at {self._address} is gone")
 
-    def _look(self) -> None:
-        """See how many workers there are, and tell if there are none.
+    def _count_workers(self) -> None:
+        """Count the workers; give a notice if there are none.
 
         Raises
         ------
         WorkerError
-            If there have been none for too long, and nobody can be told; or if the scheduler is
-            gone.
+            If there were none for too long without a receiver of notices, or the scheduler ended.
         """
         try:
             self._threads = sum(self._client.nthreads().values())
         except Exception as error:
-            # the client tries to connect again for a while, then closes
+            # the client tries to reconnect for some time, then it closes
             if self._client.status not in {"running", "connecting"}:
-                raise self._gone() from error
+                raise self._unreachable() from error
             return
-        self._looked = now = time.monotonic()
+        self._checked_at = now = time.monotonic()
         if self._threads:
-            self._lacking_since = None
-            return
-        if self._lacking_since is None:
-            self._lacking_since = now
-            if self._tell is not None:
-                self._tell(f"waiting for workers: there are none at {self._address}")
-        elif self._tell is None and now - self._lacking_since > PATIENCE:
+            self._without_workers_since = None
+        elif self._without_workers_since is None:
+            self._without_workers_since = now
+            if self._on_notice is not None:
+                self._on_notice(f"waiting for workers: there are none at {self._address}")
+        elif self._on_notice is None and now - self._without_workers_since > PATIENCE:
             raise WorkerError(
                 f"the scheduler at {self._address} has had no workers for {PATIENCE:g} s; start"
                 f" some with: dask worker {self._address}"
             )
 
 
-def _do(work: Work, numbers: Batch, ours: str) -> Answer:
-    """Do a batch on a worker, if its wearsim is ours; it may have joined after the check."""
-    try:
-        _check_version(version("wearsim"), ours, "it")
-    except WorkerError as error:
-        return [], error
-    return answer(work, numbers)
+def _run_batch(pickled: bytes, numbers: Batch, ours: str) -> Answer:
+    """Run a batch on a worker, which may have joined after the check of the versions."""
+    _check_version(version("wearsim"), "that runs it", ours)
+    return run_batch(pickled, numbers)
 
 
-def _check_version(theirs: str, ours: str, where: str) -> None:
+def _check_version(theirs: str, where: str, ours: str | None = None) -> None:
+    ours = ours or version("wearsim")
     if theirs != ours:
         raise WorkerError(
             f"wearsim {ours} is here, and {theirs} on the worker {where}; results of both cannot be"
@@ -187,54 +190,54 @@ def _check_version(theirs: str, ours: str, where: str) -> None:
         )
 
 
-CONNECTING = 10.0
-"""Time for a scheduler to answer [s]."""
-
-
 @contextmanager
-def cluster(address: str | None, count: int, tell: Teller | None) -> Iterator[Cluster]:
+def cluster(
+    address: str | None,
+    count: int,
+    on_notice: Notify | None,
+    stop_requested: Callable[[], bool],
+) -> Iterator[Cluster]:
     """Provide the workers of a Dask cluster.
 
     Parameters
     ----------
     address : str, optional
-        Of its scheduler; without it, a cluster of `count` processes lives here meanwhile.
+        Address of the scheduler; without it a temporary cluster of `count` processes is started.
     count : int
-    tell : callable, optional
-        Told when the cluster has no workers.
+    on_notice : callable, optional
+        Called with a message when the cluster has no workers.
+    stop_requested : callable
+        Called while the cluster has no workers; True stops the study.
 
     Raises
     ------
     WorkerError
-        If there is no such scheduler, Dask is not installed, or another wearsim is on the workers.
+        If the scheduler is unreachable, or a worker has another version of wearsim.
+    Interrupted
+        If a stop was requested before the cluster had workers.
     """
-    try:
-        import distributed  # noqa: F401, PLC0415  (slow to import, and only an extra)
-    except ImportError as error:
-        raise WorkerError(
-            f'Dask is not installed ({error}); install it with: pip install "wearsim[cluster]"'
-        ) from error
     with ExitStack() as stack:
         if address is None:
-            address = stack.enter_context(_own(count)).scheduler_address
+            folder = stack.enter_context(TemporaryDirectory(prefix="wearsim-dask-"))
+            stack.enter_context(dask.config.set({"temporary-directory": folder}))
+            address = stack.enter_context(_local_cluster(count)).scheduler_address
         client = stack.enter_context(_connected(address))
-        found = Cluster(client, address, tell)
+        found = Cluster(client, address, on_notice, stop_requested)
         found.check_versions()
         yield found
 
 
-def _own(count: int) -> LocalCluster:
-    from distributed import LocalCluster  # noqa: PLC0415  (slow to import)
+def _local_cluster(count: int) -> LocalCluster:
 
     try:
-        with starting_workers():
+        with sigint_blocked():
             return LocalCluster(
                 n_workers=count,
                 threads_per_worker=1,
                 processes=True,
-                # no dashboard; what else it serves by HTTP is for this machine alone, at any port
+                # no dashboard; the remaining HTTP server is local, at any free port
                 scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
-                memory_limit=0,  # a share of the memory each would end members that fit
+                memory_limit=0,  # a limit would end realisations that fit into the whole memory
                 silence_logs=logging.CRITICAL,
             )
     except RuntimeError as error:
@@ -243,26 +246,20 @@ def _own(count: int) -> LocalCluster:
 
 
 def _connected(address: str) -> Client:
-    from distributed import Client  # noqa: PLC0415  (slow to import)
 
     try:
-        # in a thread, since a notebook runs an event loop in this one
-        with ThreadPoolExecutor(1) as thread:
-            thread.submit(asyncio.run, _greeted(address)).result()
+        with ThreadPoolExecutor(1) as thread:  # a notebook runs an event loop in this one
+            thread.submit(asyncio.run, _check_answer(address)).result()
         return Client(address, timeout=CONNECTING, set_as_default=False, name="wearsim")
     except Exception as error:
-        cause = next(iter(str(error).splitlines()), "there is silence")
+        cause = next(iter(str(error).splitlines()), "no answer")
         raise WorkerError(
             f"no Dask scheduler answers at {address} within {CONNECTING:g} s: {cause}"
         ) from error
 
 
-async def _greeted(address: str) -> None:
-    """Connect for a moment; a `Client` waits for ever for a server that is no scheduler."""
-    from distributed import Security  # noqa: PLC0415  (slow to import)
-    from distributed.comm.core import connect  # noqa: PLC0415  (slow to import)
-
+async def _check_answer(address: str) -> None:
+    """Connect once; a `Client` waits for ever for a server that is not a scheduler."""
     arguments = Security().get_connection_args("client")
-    answering = connect(address, timeout=CONNECTING, **arguments)
-    comm = await asyncio.wait_for(answering, CONNECTING)
+    comm = await asyncio.wait_for(connect(address, timeout=CONNECTING, **arguments), CONNECTING)
     await comm.close()

@@ -1,7 +1,7 @@
-"""Batches done by processes of this machine, each with a pipe of its own.
+"""Execution of batches on this machine, and the interface of executors.
 
-A process that dies takes down nobody else, even amid sending its results: only its own batches are
-done again. Pools whose processes share a queue cannot promise that.
+Each worker process is a loky executor with a single process and a single batch in progress, so that
+the death of a process identifies its batch and fails no other batch.
 """
 
 from __future__ import annotations
@@ -12,273 +12,285 @@ import pickle
 import signal
 import sys
 import traceback
-from collections import deque
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from functools import lru_cache
+from itertools import islice
 from multiprocessing import resource_tracker
-from multiprocessing.connection import Connection, wait
-from queue import SimpleQueue
+from multiprocessing.connection import Connection
 from threading import Thread
-from typing import TYPE_CHECKING, Any, TypeAlias, cast
+from typing import Any, Protocol, TypeAlias
 
 from wearsim.errors import WorkerError
-from wearsim.studies.execution.base import AHEAD, GUARDED, Batch, Results, Teller, Work, named
 
-if TYPE_CHECKING:
-    from multiprocessing.context import (
-        ForkServerContext,
-        ForkServerProcess,
-        SpawnContext,
-        SpawnProcess,
-    )
+# function of realisation numbers that returns one result per number; pickled for other processes
+Work: TypeAlias = Callable[[Sequence[int]], list[Any]]
+Batch: TypeAlias = Sequence[int]
+Results: TypeAlias = Generator[tuple[Batch, list[Any]], None, None]
+# results of a batch, or the error raised by the work
+Answer: TypeAlias = tuple[list[Any], Exception | None]
+Notify: TypeAlias = Callable[[str], None]
 
-    from wearsim.studies.execution.base import Batch, Work
+AHEAD = 2  # maximum number of batches taken per worker and not yet returned
+DEATHS = 3  # worker processes that may die while running a batch before the study fails
+CHECK_INTERVAL = 1.0  # s between checks for processes that died while sending results
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+# loky replaces a process that grows by 0.3 GB, which batches of many realisations may need
+_ENVIRONMENT = {**ONE_THREAD, "LOKY_MAX_MEMORY_LEAK_SIZE": "1e18"}
 
 
-DEATHS = 3
-"""Processes that may die of the same batch, or as they begin, until the study gives up."""
+class Executor(Protocol):
+    """Interface of executors of batches."""
+
+    @property
+    def workers(self) -> int:
+        """Number of batches run at the same time."""
+
+    @property
+    def describe(self) -> str:
+        """Description of the workers, such as "2 processes"."""
+
+    def results(self, work: Work, batches: Iterator[Batch]) -> Results:
+        """Yield every batch with its results, in the order in which they finish.
+
+        At most `AHEAD` batches per worker are taken before their results are requested.
+        Closing the generator, or an error in it, abandons the batches in progress.
+
+        Parameters
+        ----------
+        work : callable
+        batches : iterator of sequence of int
+
+        Raises
+        ------
+        WorkerError
+            If workers die repeatedly or have another version.
+        Exception
+            Any error raised by `work`.
+        """
 
 
-class Processes:
-    """Has batches done by processes of this machine.
+def named(numbers: Batch) -> str:
+    """Return a description of a batch for messages: "realisations 4 to 7"."""
+    first, last, count = min(numbers), max(numbers), len(numbers)
+    if count == 1:
+        return f"realisation {first}"
+    prefix = "realisations" if last - first + 1 == count else f"{count} realisations from"
+    return f"{prefix} {first} to {last}"
+
+
+class InProcess:
+    """Execution in the calling process, one batch after the other."""
+
+    workers = 1
+    describe = "1 process"
+
+    def results(self, work: Work, batches: Iterator[Batch]) -> Results:
+        """Yield every batch with its results, as `Executor.results`."""
+        for numbers in batches:
+            yield numbers, work(numbers)
+
+
+class Threads:
+    """Execution by threads, faster only as far as the work releases Python's global lock.
+
+    A thread cannot be stopped: Python waits at exit for the batches in progress.
 
     Parameters
     ----------
     workers : int
-    tell : callable, optional
-        Told of every process that is lost.
     """
 
-    def __init__(self, workers: int, tell: Teller | None = None) -> None:
+    def __init__(self, workers: int) -> None:
         self.workers = workers
-        self.describe = f"{workers} processes"
-        self._tell: Teller = tell or (lambda message: None)
+        self.describe = f"{workers} threads"
 
     def results(self, work: Work, batches: Iterator[Batch]) -> Results:
-        """Yield every batch with its results, as `Executor.results` says."""
-        crew = _Crew(work, self.workers, map(_Batch, batches), self._tell)
+        """Yield every batch with its results, as `Executor.results`."""
+        pool = ThreadPoolExecutor(self.workers, thread_name_prefix="wearsim")
+        running: dict[Future[list[Any]], Batch] = {}
         try:
-            yield from crew.results()
+            while True:
+                for numbers in islice(batches, AHEAD * self.workers - len(running)):
+                    running[pool.submit(work, numbers)] = numbers
+                if not running:
+                    return
+                future = next(iter(wait(running, return_when=FIRST_COMPLETED).done))
+                yield running.pop(future), future.result()
         finally:
-            crew.end()
+            pool.shutdown(wait=False, cancel_futures=True)
 
 
-@dataclass
-class _Batch:
-    """A batch, and how many processes have died of it."""
-
-    numbers: Batch
-    deaths: int = 0
-
-
-@dataclass
-class _Worker:
-    """A process, and the batches it has been given; it does the first."""
-
-    process: ForkServerProcess | SpawnProcess
-    given: deque[_Batch] = field(default_factory=deque)
-    begun: bool = False
-
-
-class _Crew:
-    """The processes that do one work."""
-
-    def __init__(self, work: Work, most: int, batches: Iterator[_Batch], tell: Teller) -> None:
-        self._pickled, self._most, self._tell = pickle.dumps(work), most, tell
-        self._batches = batches
-        self._again: deque[_Batch] = deque()
-        self._crew: dict[Connection, _Worker] = {}
-        self._stillborn = 0
-        self._context = _context()
-        self._context.set_forkserver_preload([work.__module__])
-
-    def results(self) -> Results:
-        """Yield every batch with its results."""
-        self._hand_out()
-        while any(worker.given for worker in self._crew.values()):
-            for ready in wait(list(self._crew)):
-                pipe = cast("Connection", ready)
-                worker = self._crew[pipe]
-                try:
-                    answer: Answer | None = pipe.recv()
-                except (EOFError, OSError):
-                    self._lose(pipe)
-                    continue
-                if answer is None:
-                    worker.begun, self._stillborn = True, 0
-                    continue
-                results, error = answer
-                if error is not None:
-                    raise error
-                yield worker.given.popleft().numbers, results
-                self._hand_out()
-            self._hand_out()
-
-    def _hand_out(self) -> None:
-        """Give batches to those who have fewest, until all have enough or there are no more."""
-        while len(self._crew) < self._most or any(
-            len(worker.given) < AHEAD for worker in self._crew.values()
-        ):
-            batch = self._again.popleft() if self._again else next(self._batches, None)
-            if batch is None:
-                return
-            pipe = self._least_busy()
-            self._crew[pipe].given.append(batch)
-            with suppress(OSError):  # it has just died, as will be seen in its turn
-                pipe.send(batch.numbers)
-
-    def _least_busy(self) -> Connection:
-        given = {pipe: len(worker.given) for pipe, worker in self._crew.items()}
-        pipe = min(given, key=given.__getitem__, default=None)
-        if pipe is None or (given[pipe] and len(given) < self._most):
-            return self._start()
-        return pipe
-
-    def _start(self) -> Connection:
-        """Start one more process, and return the pipe to it."""
-        ours, theirs = self._context.Pipe()
-        process = self._context.Process(
-            target=serve, args=(theirs, self._pickled), name="wearsim worker", daemon=True
-        )
-        try:
-            with starting_workers():
-                process.start()
-        except BaseException:
-            ours.close()
-            raise
-        finally:
-            theirs.close()
-        self._crew[ours] = _Worker(process)
-        return ours
-
-    def _lose(self, pipe: Connection) -> None:
-        """Let the batches of a dead process be done again by others."""
-        worker = self._crew.pop(pipe)
-        pipe.close()
-        worker.process.join()
-        self._again.extendleft(reversed(worker.given))
-        cause = _cause(worker.process.exitcode)
-        if not worker.begun:
-            self._stillborn += 1
-            if self._stillborn == DEATHS:
-                raise WorkerError(
-                    f"{DEATHS} worker processes in a row ended as they began, the last {cause};"
-                    f" {GUARDED}"
-                )
-        elif worker.given:
-            batch = worker.given[0]
-            batch.deaths += 1
-            if batch.deaths == DEATHS:
-                raise WorkerError(
-                    f"{DEATHS} worker processes died of {named(batch.numbers)}, the last {cause};"
-                    " fewer workers leave more memory for each",
-                    batch.numbers,
-                )
-            self._tell(f"a worker process {cause}; {named(batch.numbers)} will be done again")
-
-    def end(self) -> None:
-        """End all processes at once, whatever they are doing."""
-        for pipe, worker in self._crew.items():
-            pipe.close()
-            worker.process.kill()
-        for worker in self._crew.values():
-            worker.process.join()
-        self._crew.clear()
-
-
-def _context() -> ForkServerContext | SpawnContext:
-    """Return how processes are started; a fork would copy locks that other threads hold."""
-    if "forkserver" in multiprocessing.get_all_start_methods():
-        return multiprocessing.get_context("forkserver")
-    return multiprocessing.get_context("spawn")
-
-
-def _cause(code: int | None) -> str:
-    """Return in words how a process ended."""
-    if code is None or code >= 0:
-        return f"ended with exit code {code}"
-    name = signal.Signals(-code).name
-    return f"was killed by {name}" + (" (out of memory?)" if name == "SIGKILL" else "")
-
-
-Answer: TypeAlias = tuple[list[Any], Exception | None]
-"""The results of a batch, or what went wrong."""
-
-ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-
-
-def answer(work: Work, numbers: Batch) -> Answer:
-    """Do a batch; what is raised is returned, in a form that another process can read."""
-    try:
-        return work(numbers), None
-    except Exception as error:
-        return [], _sendable(error)
-
-
-def serve(pipe: Connection, pickled: bytes) -> None:
-    """Do the batches that come through a pipe, and send back an `Answer` to each.
-
-    The first thing sent is None: the process has begun.
+class Processes:
+    """Execution by processes of this machine.
 
     Parameters
     ----------
-    pipe : Connection
-        Its other end is the parent's alone, so that it closes with the parent, however that ends.
-    pickled : bytes
-        The `Work`.
+    workers : int
+    on_notice : callable, optional
+        Called with a message when a process died.
     """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all; the parent decides
-    batches: SimpleQueue[Batch] = SimpleQueue()
-    Thread(target=_receive, args=(pipe, batches), daemon=True).start()
-    with suppress(BrokenPipeError):
-        pipe.send(None)
+
+    def __init__(self, workers: int, on_notice: Notify | None = None) -> None:
+        self.workers = workers
+        self.describe = f"{workers} processes"
+        self._on_notice = on_notice or (lambda message: None)
+
+    def results(self, work: Work, batches: Iterator[Batch]) -> Results:
+        """Yield every batch with its results, as `Executor.results`."""
+        import cloudpickle  # noqa: PLC0415  (used with processes only)
+        from loky import BrokenProcessPool  # noqa: PLC0415  (used with processes only)
+
+        pickled = cloudpickle.dumps(work)
+        parent_end, kept_open = multiprocessing.Pipe(duplex=False)
+        repeated: list[Batch] = []
+        deaths: Counter[tuple[int, ...]] = Counter()
+        idle: list[_Worker] = []
+        running: dict[Future[Answer], _Worker] = {}
+        finished: list[tuple[Batch, list[Any]]] = []
         try:
-            work = pickle.loads(pickled)
-        except Exception as error:
-            pipe.send(([], _sendable(error)))
-            return
-        while True:
-            pipe.send(answer(work, batches.get()))
+            while True:
+                while len(running) < self.workers:
+                    numbers = repeated.pop() if repeated else next(batches, None)
+                    if numbers is None:
+                        break
+                    worker = idle.pop() if idle else _Worker(parent_end)
+                    running[worker.submit(pickled, numbers)] = worker
+                yield from finished  # after the next batches, which run meanwhile
+                finished.clear()
+                if not running:
+                    return
+                future = _first_completed(running)
+                worker = running.pop(future)
+                try:
+                    results, error = future.result()
+                except BrokenProcessPool:
+                    worker.end()
+                    repeated.append(worker.numbers)
+                    deaths[tuple(worker.numbers)] += 1
+                    self._report_death(worker, deaths[tuple(worker.numbers)])
+                    continue
+                idle.append(worker)
+                if error is not None:
+                    raise error
+                finished.append((worker.numbers, results))
+        finally:
+            kept_open.close()
+            parent_end.close()
+            for worker in [*idle, *running.values()]:
+                worker.end()
+
+    def _report_death(self, worker: _Worker, deaths: int) -> None:
+        """Notify that a batch will be repeated, or raise if it failed too often."""
+        # the exit code in the message of loky is missing on a loaded machine
+        code = worker.process.exitcode
+        cause = f"ended with exit code {code}"
+        if code < 0:
+            cause = f"was killed by {signal.Signals(-code).name}"
+            cause += " (out of memory?)" if cause.endswith("SIGKILL") else ""
+        if deaths < DEATHS:
+            self._on_notice(f"a worker process {cause}; {named(worker.numbers)} will be done again")
+        elif worker.started.exception() is not None:
+            raise WorkerError(f"{DEATHS} worker processes ended as they started, the last {cause}")
+        else:
+            raise WorkerError(
+                f"{DEATHS} worker processes died of {named(worker.numbers)}, the last {cause};"
+                " fewer workers leave more memory for each",
+                worker.numbers,
+            )
 
 
-def _receive(pipe: Connection, batches: SimpleQueue[Batch]) -> None:
-    """Take batches from the pipe, so that the parent never waits to get rid of one."""
+class _Worker:
+    """A process with one batch in progress.
+
+    Parameters
+    ----------
+    parent_end : Connection
+        Pipe that closes when the parent process ends.
+    """
+
+    numbers: Batch
+
+    def __init__(self, parent_end: Connection) -> None:
+        from loky import ProcessPoolExecutor  # noqa: PLC0415  (used with processes only)
+
+        self._pool = ProcessPoolExecutor(
+            1, initializer=_initialise, initargs=(parent_end,), env=_ENVIRONMENT
+        )
+        with sigint_blocked():
+            self.started = self._pool.submit(os.getpid)
+        (self.process,) = self._pool._processes.values()
+
+    def submit(self, pickled: bytes, numbers: Batch) -> Future[Answer]:
+        """Start a batch and return the future of its `Answer`."""
+        self.numbers = numbers
+        future: Future[Answer] = self._pool.submit(run_batch, pickled, numbers)
+        return future
+
+    def fail_if_dead(self) -> None:
+        """Fail the batch if the process is dead: loky waits for ever for an incomplete message."""
+        if not self.process.is_alive():
+            self._pool._result_queue._writer.close()
+
+    def end(self) -> None:
+        """Kill the process."""
+        self._pool._result_queue._writer.close()
+        self._pool.shutdown(kill_workers=True)
+
+
+def _first_completed(running: dict[Future[Answer], _Worker]) -> Future[Answer]:
+    while True:
+        for future in wait(running, CHECK_INTERVAL, FIRST_COMPLETED).done:
+            return future
+        for worker in running.values():
+            worker.fail_if_dead()
+
+
+def _initialise(parent_end: Connection) -> None:
+    """Prepare a worker process: ignore Ctrl-C, and end with the parent process."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    Thread(target=_end_with_parent, args=(parent_end,), daemon=True).start()
+
+
+def _end_with_parent(parent_end: Connection) -> None:
+    with suppress(EOFError, OSError):
+        parent_end.recv()
+    os._exit(0)
+
+
+def run_batch(pickled: bytes, numbers: Batch) -> Answer:
+    """Run a batch in a worker process, which unpickles the work once.
+
+    An error is returned in a form that the parent process can unpickle.
+    """
     try:
-        while True:
-            batches.put(pipe.recv())
-    except (EOFError, OSError):
-        os._exit(0)  # nobody wants the results of what is being done
+        return _unpickled(pickled)(numbers), None
+    except Exception as error:
+        error.add_note(f"in a worker:\n{''.join(traceback.format_exception(error))}")
+        try:
+            pickle.loads(pickle.dumps(error))
+        except Exception:
+            return [], WorkerError(f"{type(error).__name__}: {error}")
+        return [], error
 
 
-def _sendable(error: Exception) -> Exception:
-    """Return an error, or one that says the same, that survives pickling."""
-    error.add_note(f"in a worker:\n{''.join(traceback.format_exception(error))}")
-    try:
-        pickle.loads(pickle.dumps(error))
-    except Exception:
-        return WorkerError(f"{type(error).__name__}: {error}")
-    return error
+@lru_cache(maxsize=1)
+def _unpickled(pickled: bytes) -> Work:
+    work: Work = pickle.loads(pickled)
+    return work
 
 
 @contextmanager
-def starting_workers() -> Iterator[None]:
-    """Let processes that are started meanwhile use one thread each and never see a Ctrl-C."""
-    before = {name: os.environ.get(name) for name in ONE_THREAD}
-    os.environ.update(ONE_THREAD)
+def sigint_blocked() -> Iterator[None]:
+    """Start processes that do not receive Ctrl-C; the parent process ends them."""
+    if sys.platform == "win32":
+        yield
+        return
+    resource_tracker.ensure_running()  # unblocks signals when it starts
+    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
-        if sys.platform == "win32":
-            yield
-        else:
-            resource_tracker.ensure_running()  # unblocks signals when it starts
-            blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-            try:
-                yield
-            finally:
-                signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+        yield
     finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
+        signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
