@@ -35,9 +35,8 @@ Notify: TypeAlias = Callable[[str], None]
 
 AHEAD = 2  # maximum number of batches taken per worker and not yet returned
 DEATHS = 3  # worker processes that may die while running a batch before the study fails
-CHECK_INTERVAL = 1.0  # s between checks for processes that died while sending results
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-# loky replaces a process that grows by 0.3 GB, which batches of many realisations may need
+# by default loky replaces a process that grows by 0.3 GB, as batches of many realisations may do
 _ENVIRONMENT = {**ONE_THREAD, "LOKY_MAX_MEMORY_LEAK_SIZE": "1e18"}
 
 
@@ -162,7 +161,7 @@ class Processes:
                 finished.clear()
                 if not running:
                     return
-                future = _first_completed(running)
+                future = next(iter(wait(running, return_when=FIRST_COMPLETED).done))
                 worker = running.pop(future)
                 try:
                     results, error = future.result()
@@ -222,6 +221,8 @@ class _Worker:
         with sigint_blocked():
             self.started = self._pool.submit(os.getpid)
         (self.process,) = self._pool._processes.values()
+        # otherwise loky waits for ever for the rest of a message whose sender was killed
+        self._pool._result_queue._writer.close()
 
     def submit(self, pickled: bytes, numbers: Batch) -> Future[Answer]:
         """Start a batch and return the future of its `Answer`."""
@@ -229,23 +230,9 @@ class _Worker:
         future: Future[Answer] = self._pool.submit(run_batch, pickled, numbers)
         return future
 
-    def fail_if_dead(self) -> None:
-        """Fail the batch if the process is dead: loky waits for ever for an incomplete message."""
-        if not self.process.is_alive():
-            self._pool._result_queue._writer.close()
-
     def end(self) -> None:
         """Kill the process."""
-        self._pool._result_queue._writer.close()
         self._pool.shutdown(kill_workers=True)
-
-
-def _first_completed(running: dict[Future[Answer], _Worker]) -> Future[Answer]:
-    while True:
-        for future in wait(running, CHECK_INTERVAL, FIRST_COMPLETED).done:
-            return future
-        for worker in running.values():
-            worker.fail_if_dead()
 
 
 def _initialise(parent_end: Connection) -> None:
