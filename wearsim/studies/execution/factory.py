@@ -6,7 +6,7 @@ import operator
 import os
 import re
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 
 from wearsim.errors import WorkerError
 from wearsim.studies.execution.processes import Executor, InProcess, Notify, Processes, Threads
@@ -65,8 +65,11 @@ def executor(
             yield found
     elif scheduler == "serial" or count == 1:
         yield InProcess()
+    elif scheduler == "threads":
+        yield Threads(count)
     else:
-        yield Threads(count) if scheduler == "threads" else Processes(count, on_notice)
+        with closing(Processes(count, on_notice)) as pool:
+            yield pool
 
 
 def check_scheduler(scheduler: str, workers: int | None = None) -> None:

@@ -136,6 +136,16 @@ class Processes:
         self.workers = workers
         self.describe = f"{workers} processes"
         self._on_notice = on_notice or (lambda message: None)
+        self._parent_end, self._kept_open = multiprocessing.Pipe(duplex=False)
+        # started at once, while the study is prepared
+        self._idle = [_Worker(self._parent_end) for _ in range(workers)]
+
+    def close(self) -> None:
+        """Kill the processes."""
+        self._kept_open.close()
+        self._parent_end.close()
+        for worker in self._idle:
+            worker.end()
 
     def results(self, work: Work, batches: Iterator[Batch]) -> Results:
         """Yield every batch with its results, as `Executor.results`."""
@@ -143,10 +153,8 @@ class Processes:
         from loky import BrokenProcessPool  # noqa: PLC0415  (used with processes only)
 
         pickled = cloudpickle.dumps(work)
-        parent_end, kept_open = multiprocessing.Pipe(duplex=False)
         repeated: list[Batch] = []
         deaths: Counter[tuple[int, ...]] = Counter()
-        idle: list[_Worker] = []
         running: dict[Future[Answer], _Worker] = {}
         finished: list[tuple[Batch, list[Any]]] = []
         try:
@@ -155,7 +163,7 @@ class Processes:
                     numbers = repeated.pop() if repeated else next(batches, None)
                     if numbers is None:
                         break
-                    worker = idle.pop() if idle else _Worker(parent_end)
+                    worker = self._idle.pop() if self._idle else _Worker(self._parent_end)
                     running[worker.submit(pickled, numbers)] = worker
                 yield from finished  # after the next batches, which run meanwhile
                 finished.clear()
@@ -171,14 +179,12 @@ class Processes:
                     deaths[tuple(worker.numbers)] += 1
                     self._report_death(worker, deaths[tuple(worker.numbers)])
                     continue
-                idle.append(worker)
+                self._idle.append(worker)
                 if error is not None:
                     raise error
                 finished.append((worker.numbers, results))
         finally:
-            kept_open.close()
-            parent_end.close()
-            for worker in [*idle, *running.values()]:
+            for worker in running.values():
                 worker.end()
 
     def _report_death(self, worker: _Worker, deaths: int) -> None:
