@@ -112,13 +112,28 @@ class Quantity:
         if dimensions != si_dimensions:
             got = f"{shown(value)} ({kind_of(unit).name})"
             raise QuantityError("wrong dimension", got, self.expected)
-        result = _si(number, size / si_size)
-        if result in {float("inf"), -float("inf")}:
-            raise QuantityError("must be finite", shown(value), self.expected)
-        if _is_below(self.bound, result):
+        return self._checked(_si(number, size / si_size), shown(value))
+
+    def _checked(self, number: float, got: str) -> float:
+        if number - number != 0.0:  # infinite or not a number
+            raise QuantityError("must be finite", got, self.expected)
+        if _is_below(self.bound, number):
             what = "must be above zero" if self.bound == "positive" else "must not be negative"
-            raise QuantityError(what, shown(value), self.expected)
-        return result
+            raise QuantityError(what, got, self.expected)
+        return number
+
+    def _read(self, value: Any, info: ValidationInfo) -> float:
+        """Return a value in SI.
+
+        The validation context has the type in which a number in SI is accepted: ``{"numbers":
+        float}``, or ``{"numbers": dict}`` for ``{"si": 3.0}``, where a bare number lacks its unit.
+        """
+        numbers = (info.context or {}).get("numbers")
+        if numbers is not None and isinstance(value, numbers):
+            number = value.get("si") if isinstance(value, dict) else value
+            if isinstance(number, float):
+                return self._checked(number, shown(self.write(number)))
+        return self.parse(value)
 
     def write(self, value: float | None) -> str | None:
         """Return an SI value with its unit, as written in a scenario."""
@@ -128,7 +143,7 @@ class Quantity:
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
         write = core_schema.plain_serializer_function_ser_schema(self.write, when_used="json")
-        return core_schema.no_info_plain_validator_function(self.parse, serialization=write)
+        return core_schema.with_info_plain_validator_function(self._read, serialization=write)
 
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
@@ -285,15 +300,15 @@ class _OneOrList:
         read_one, read_list = SchemaValidator(one), SchemaValidator(several)
         write_one: Callable[[Any], Any] = one.get("serialization", {}).get("function", lambda v: v)
 
-        def read(value: object) -> Any:
+        def read(value: object, info: ValidationInfo) -> Any:
             if isinstance(value, list | tuple):
-                return read_list.validate_python(tuple(value))
-            return read_one.validate_python(value)
+                return read_list.validate_python(tuple(value), context=info.context)
+            return read_one.validate_python(value, context=info.context)
 
         def write(value: Any) -> Any:
             return [*map(write_one, value)] if isinstance(value, tuple) else write_one(value)
 
-        return core_schema.no_info_plain_validator_function(
+        return core_schema.with_info_plain_validator_function(
             read,
             json_schema_input_schema=core_schema.union_schema([one, several]),
             serialization=core_schema.plain_serializer_function_ser_schema(write, when_used="json"),
@@ -326,6 +341,8 @@ class InputFile:
 
     @classmethod
     def _read(cls, value: object, info: ValidationInfo) -> InputFile:
+        if isinstance(value, cls):
+            return value
         expected = 'the name of a text file such as "load.csv"'
         if not isinstance(value, str) or not value.strip():
             raise QuantityError("is not a file name", shown(value), expected)

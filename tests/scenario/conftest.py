@@ -8,10 +8,7 @@ import pytest
 from random_examples import SmallRandomInputs
 from scenario_examples import GOOD, Parse, SmallPlugins
 
-import wearsim.scenario.parse.key_index
 import wearsim.scenario.parse.mistakes
-import wearsim.scenario.random.parse
-import wearsim.scenario.schema
 import wearsim.scenario.tables.plugin
 from wearsim.plugins.manager import Registry
 from wearsim.scenario import Scenario, parse_scenario
@@ -22,10 +19,7 @@ def small_registry(monkeypatch: pytest.MonkeyPatch) -> Registry:
     registry = Registry([SmallPlugins(), SmallRandomInputs()])
     for module in (
         wearsim.scenario.tables.plugin,
-        wearsim.scenario.parse.key_index,
         wearsim.scenario.parse.mistakes,
-        wearsim.scenario.random.parse,
-        wearsim.scenario.schema,
     ):
         monkeypatch.setattr(module, "registry", lambda: registry)
     return registry

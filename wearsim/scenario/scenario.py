@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path, PurePath
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.scenario.random.model import RandomInput
@@ -72,7 +72,6 @@ class Scenario:
     notes: tuple[str, ...] = ()
     random: tuple[RandomInput, ...] = ()
     drawn: Mapping[str, Drawn] = field(default_factory=dict)
-    _tables: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     @property
     def name(self) -> str:

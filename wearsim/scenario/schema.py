@@ -9,23 +9,23 @@ from pydantic import BaseModel
 from pydantic.json_schema import GenerateJsonSchema, models_json_schema
 from pydantic_core import core_schema
 
-from wearsim.plugins import ContactModelSpec, LoadSpec, RandomInputSpec, Spec, WearLawSpec, registry
+from wearsim.plugins import RandomInputSpec
 from wearsim.scenario.parse.field_wording import model_at
 from wearsim.scenario.parse.key_index import REQUIRED, TABLES
-from wearsim.scenario.parse.mistakes import Table
-from wearsim.scenario.random.model import FRICTION, RandomInputTable, can_be_random
-from wearsim.scenario.random.targets import joint_target_of, random_target_of
+from wearsim.scenario.parse.mistakes import installed
+from wearsim.scenario.random.model import (
+    FRICTION,
+    WITH_MARGINAL,
+    RandomInputTable,
+    can_be_random,
+)
+from wearsim.scenario.random.targets import JointTarget, target_of
 from wearsim.scenario.tables.plain import TopTable
-from wearsim.scenario.tables.plugin import ContactTable, LoadTable, WearTable
+from wearsim.scenario.tables.plugin import PLUGIN_TABLES
 
 Schema: TypeAlias = dict[str, Any]
 Resolve: TypeAlias = Callable[[type[BaseModel]], Schema]
 
-_CHOICES: dict[str, tuple[type[Table], str, type[Spec]]] = {
-    "contact": (ContactTable, "model", ContactModelSpec),
-    "load": (LoadTable, "kind", LoadSpec),
-    "wear": (WearTable, "law", WearLawSpec),
-}
 _MARGINAL, _RANDOM, _FIELD, _JOINT = (
     "MarginalDistribution",
     "RandomInput",
@@ -33,7 +33,6 @@ _MARGINAL, _RANDOM, _FIELD, _JOINT = (
     "JointRandomInput",
 )
 _DEFINITIONS = {"scalar": _RANDOM, "process": _RANDOM, "field": _FIELD, "joint": _JOINT}
-_WITH_MARGINAL = {"field", "process"}
 
 
 class _ScenarioSchema(GenerateJsonSchema):
@@ -60,10 +59,10 @@ def scenario_schema() -> Schema:
     -------
     dict
     """
-    specs = {table: _specs(kind) for table, (_, _, kind) in _CHOICES.items()}
+    specs = {table: installed(kind) for table, (_, _, kind) in PLUGIN_TABLES.items()}
     models: list[type[BaseModel]] = [TopTable, *TABLES.values()]
     models += [spec.options for listed in specs.values() for spec in listed]
-    models += [RandomInputTable, *(spec.options for spec in _specs(RandomInputSpec))]
+    models += [RandomInputTable, *(spec.options for spec in installed(RandomInputSpec))]
     models = [part for model in models for part in _models_within(model)]
     refs, definitions = models_json_schema(
         [(model, "validation") for model in dict.fromkeys(models)],
@@ -85,7 +84,7 @@ def scenario_schema() -> Schema:
         _admit_random(model, table, shared, resolve)
     tables = {
         table: _choice(table, specs[table], resolve)
-        if table in _CHOICES
+        if table in PLUGIN_TABLES
         else {**resolve(model), "title": table}
         for table, model in TABLES.items()
     }
@@ -99,10 +98,6 @@ def scenario_schema() -> Schema:
         "additionalProperties": False,
         "$defs": _referenced(shared, tables),
     }
-
-
-def _specs(kind: type[Spec]) -> list[Any]:
-    return [registry().get(kind, name) for name in registry().names(kind)]
 
 
 def _models_within(model: type[BaseModel]) -> list[type[BaseModel]]:
@@ -130,7 +125,7 @@ def _referenced(shared: Schema, *users: object) -> Schema:
 
 def _choice(table: str, specs: list[Any], resolve: Resolve) -> Schema:
     """Return the schema of a table that chooses a plugin: one alternative per plugin."""
-    model, key, _ = _CHOICES[table]
+    model, key, _ = PLUGIN_TABLES[table]
     base = resolve(model)
     terms = {
         spec.name: {**resolve(spec.options), "description": spec.summary}
@@ -164,10 +159,10 @@ def _choice(table: str, specs: list[Any], resolve: Resolve) -> Schema:
 def _random_definitions(resolve: Resolve) -> Schema:
     """Return the definitions of the random inputs by name; those without plugins are left out."""
     made: dict[str, list[Schema]] = {name: [] for name in (_MARGINAL, _RANDOM, _FIELD, _JOINT)}
-    specs = _specs(RandomInputSpec)
+    specs = installed(RandomInputSpec)
     scalars = any(spec.role == "scalar" for spec in specs)
     for spec in specs:
-        if not scalars and spec.role in _WITH_MARGINAL:
+        if not scalars and spec.role in WITH_MARGINAL:
             continue
         made[_DEFINITIONS[spec.role]].append(_random_input(spec, resolve))
         if spec.role == "scalar":
@@ -188,7 +183,7 @@ def _random_input(spec: RandomInputSpec, resolve: Resolve, marginal: bool = Fals
     needed = ["distribution", *options.get("required", [])]
     if not marginal:
         keys["persistence"] = own["persistence"]
-    if spec.role in _WITH_MARGINAL:
+    if spec.role in WITH_MARGINAL:
         described = own["marginal"]["description"]
         keys["marginal"] = {"description": described, **_reference(_MARGINAL)}
         needed.append("marginal")
@@ -210,13 +205,13 @@ def _admit_random(
     for key, field in model.model_fields.items():
         name, inner = f"{table}.{key}", model_at(model, (key,))
         definition = _FIELD if name == FRICTION and _FIELD in definitions else _RANDOM
-        if joint_target_of(field):
+        if isinstance(target_of(field), JointTarget):
             described = properties.pop(key)["description"]
             if _JOINT in definitions:
                 properties[key] = {"description": described, **_reference(_JOINT)}
         elif inner is not None:
             _admit_random(inner, name, definitions, resolve)
-        elif can_be_random(name) and random_target_of(field) and definition in definitions:
+        elif can_be_random(name) and target_of(field) and definition in definitions:
             properties[key] = _or_random(properties[key], definition)
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from wearsim.plugins import ContactModelSpec, LoadSpec, RandomInputSpec, WearLawSpec, registry
-from wearsim.scenario.parse.mistakes import Table
+from wearsim.plugins import LoadSpec, RandomInputSpec
+from wearsim.scenario.parse.mistakes import Table, installed
 from wearsim.scenario.random.model import RandomInputTable
 from wearsim.scenario.tables.bodies import CylinderTable, RollerTable
 from wearsim.scenario.tables.plain import (
@@ -14,7 +14,7 @@ from wearsim.scenario.tables.plain import (
     OutputsTable,
     TopTable,
 )
-from wearsim.scenario.tables.plugin import ContactTable, LoadTable, WearTable
+from wearsim.scenario.tables.plugin import PLUGIN_TABLES, ContactTable, LoadTable, WearTable
 from wearsim.scenario.tables.sampling import SamplingTable
 
 TABLES: dict[str, type[Table]] = {
@@ -37,18 +37,13 @@ def keys_by_place() -> dict[str, set[str]]:
     """Return the keys of every table and of every plugin, by their place in words."""
     keys = {"the top of the file": set(TopTable.model_fields)}
     keys |= {f"[{table}]": set(model.model_fields) for table, model in TABLES.items()}
-    for kind, table, key in (
-        (ContactModelSpec, "contact", "model"),
-        (LoadSpec, "load", "kind"),
-        (WearLawSpec, "wear", "law"),
-    ):
-        for name in registry().names(kind):
-            spec = registry().get(kind, name)
+    for table, (_, key, kind) in PLUGIN_TABLES.items():
+        for spec in installed(kind):
             term = isinstance(spec, LoadSpec) and spec.role == "term"
-            place = f"[load.{name}]" if term else f'[{table}] with {key} = "{name}"'
+            place = f"[load.{spec.name}]" if term else f'[{table}] with {key} = "{spec.name}"'
             keys[place] = set(spec.options.model_fields)
     keys["a random input"] = set(RandomInputTable.model_fields)
-    for name in registry().names(RandomInputSpec):
-        options = registry().get(RandomInputSpec, name).options
-        keys[f'a random input with distribution = "{name}"'] = set(options.model_fields)
+    for spec in installed(RandomInputSpec):
+        place = f'a random input with distribution = "{spec.name}"'
+        keys[place] = set(spec.options.model_fields)
     return keys

@@ -41,13 +41,8 @@ class Mistakes:
         The mistakes, in the order in which they were found.
     notes : list of str
         Notes on the choices made for the user.
-    random : list of RandomInput
-        The valid random inputs.
-    random_keys : set of str
-        Dotted keys with a random input, valid or not.
-    means : dict of str to object
-        The values substituted for the random inputs, as a scenario holds them, by dotted key; None
-        where the key is removed.
+    random : dict of str to RandomInput or None
+        The random inputs by dotted key; None for one with mistakes.
     """
 
     def __init__(
@@ -61,9 +56,12 @@ class Mistakes:
         self._find_keys = find_keys
         self.entries: list[Mistake] = []
         self.notes: list[str] = []
-        self.random: list[RandomInput] = []
-        self.random_keys: set[str] = set()
-        self.means: dict[str, object] = {}
+        self.random: dict[str, RandomInput | None] = {}
+
+    @property
+    def random_inputs(self) -> list[RandomInput]:
+        """The random inputs without mistakes, in the order of their names."""
+        return [item for _, item in sorted(self.random.items()) if item]
 
     @cached_property
     def _keys(self) -> Mapping[str, Collection[str]]:
@@ -120,6 +118,11 @@ class Mistakes:
     def _places(self, key: str) -> str:
         """Return the tables that have a key, in words."""
         return " or ".join(place for place, keys in self._keys.items() if key in keys)
+
+
+def installed(kind: type[S]) -> list[S]:
+    """Return the plugins of a kind, in the order of their names."""
+    return [registry().get(kind, name) for name in registry().names(kind)]
 
 
 def nearest(name: str, known: Collection[str]) -> str:

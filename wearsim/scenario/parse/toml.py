@@ -13,21 +13,19 @@ from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.scenario.parse.key_index import REQUIRED, TABLES, keys_by_place
 from wearsim.scenario.parse.mistakes import Mistakes, nearest
 from wearsim.scenario.parse.overrides import apply_overrides
-from wearsim.scenario.parse.validate import validate
 from wearsim.scenario.random.model import RandomInput
-from wearsim.scenario.random.placeholders import put_all
+from wearsim.scenario.random.read import validate
 from wearsim.scenario.scenario import Scenario
 from wearsim.scenario.tables.bodies import Cylinder, Roller, read_cylinder, read_roller
 from wearsim.scenario.tables.plain import (
-    EvolutionTable,
-    FrictionTable,
     TopTable,
+    check_lists,
     read_creepage,
     read_operation,
     read_outputs,
 )
 from wearsim.scenario.tables.plugin import read_contact, read_load, read_wear
-from wearsim.scenario.tables.sampling import SamplingTable, check_correlation
+from wearsim.scenario.tables.sampling import check_correlation
 from wearsim.units import shown
 
 DUNDURS_LIMIT = 0.1
@@ -37,15 +35,12 @@ READERS: dict[str, Callable[[Mapping[str, object], Mistakes], Any]] = {
     "cylinder": read_cylinder,
     "operation": read_operation,
     "load": read_load,
-    "friction": lambda raw, mistakes: validate(mistakes, FrictionTable, raw, "friction"),
     "creepage": read_creepage,
     "contact": read_contact,
     "wear": read_wear,
-    "evolution": lambda raw, mistakes: validate(mistakes, EvolutionTable, raw, "evolution"),
     "outputs": read_outputs,
-    "sampling": lambda raw, mistakes: validate(mistakes, SamplingTable, raw, "sampling"),
 }
-"""Function that reads each table: returns None after adding the table's mistakes."""
+"""Functions that read the tables of which the model is not all."""
 
 
 def load_scenario(path: str | Path, overrides: Mapping[str, object] | None = None) -> Scenario:
@@ -128,10 +123,10 @@ def parse_scenario(
     mistakes = Mistakes(name, read_and_keep, keys_by_place)
     top = _read_top(data, mistakes)
     sections = {table: _read_table(table, data, mistakes) for table in TABLES}
-    check_lists(data, mistakes)
+    check_lists(mistakes, data)
     check_correlation(sections["sampling"], mistakes)
     mistakes.raise_any()
-    random = tuple(sorted(mistakes.random, key=lambda item: item.name))
+    random = tuple(mistakes.random_inputs)
     return Scenario(
         file=name,
         title=top.title or PurePath(name).stem,
@@ -145,7 +140,6 @@ def parse_scenario(
             *mistakes.notes,
         ),
         random=random,
-        _tables=put_all(data, mistakes.means),
         **sections,
     )
 
@@ -193,25 +187,9 @@ def _read_table(table: str, data: Mapping[str, object], mistakes: Mistakes) -> A
         expected = f"a line [{table}] and its keys below"
         mistakes.add("", table, "is not a table", shown(raw), expected)
         return None
-    return READERS[table](raw, mistakes)
-
-
-def check_lists(data: Mapping[str, Any], mistakes: Mistakes) -> None:
-    """Add a mistake for each list that does not have one value per roller."""
-
-    def raw(table: str, key: str, default: object = None) -> object:
-        keys = data.get(table)
-        return keys.get(key, default) if isinstance(keys, dict) else None
-
-    rollers = raw("operation", "rollers", 1)
-    if not isinstance(rollers, int):
-        return
-    for table, key in (("roller", "offset"), ("creepage", "yaw"), ("creepage", "tilt")):
-        value = raw(table, key)
-        if isinstance(value, list) and len(value) != rollers:
-            got = f"{len(value)} values" if len(value) != 1 else "1 value"
-            expected = f"{rollers}, the value of operation.rollers"
-            mistakes.add(table, key, "a list has one value per roller", got, expected)
+    if table in READERS:
+        return READERS[table](raw, mistakes)
+    return validate(mistakes, TABLES[table], raw, table)
 
 
 def _unused_sampling_note(data: Mapping[str, Any], random: tuple[RandomInput, ...]) -> list[str]:

@@ -34,6 +34,8 @@ OF_A_CONTACT = (*CONTACT_FIELDS, MISALIGNMENT)
 """Keys of the values that may vary from pass to pass."""
 OF_A_ROLLER = (*OF_A_CONTACT, "roller.offset")
 """Keys of the values that may differ from roller to roller."""
+WITH_MARGINAL = ("field", "process")
+"""Roles of the distributions that need a marginal distribution."""
 RANDOM_PLACES = "the values of [load], [friction], [creepage] and [wear], and roller.offset"
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Annotated, Any, get_args, get_origin
 
@@ -14,7 +15,7 @@ from wearsim.quantities import Quantity
 from wearsim.scenario.parse.field_wording import alternatives
 from wearsim.units import QuantityError, shown
 
-_INFINITE = float("inf")
+_INFINITE = math.inf
 
 
 @dataclass(frozen=True)
@@ -37,9 +38,10 @@ class RandomTarget:
     above: bool = False
     below: bool = False
 
-    def written(self, value: float) -> object:
-        """Return an SI value as a scenario holds it."""
-        return self.quantity.write(value) if self.quantity else value
+    @property
+    def components(self) -> tuple[str, ...]:
+        """Keys set together; none, since the number is that of the field."""
+        return ()
 
     @property
     def allowed(self) -> str:
@@ -54,9 +56,13 @@ class RandomTarget:
     @property
     def support(self) -> str:
         """Widest allowed support of a random input, as a scenario holds it."""
-        ends = {-_INFINITE: "-inf", _INFINITE: "inf"}
-        written = [ends.get(end, self.written(end)) for end in (self.low, self.high)]
-        return shown([int(end) if end == 0.0 else end for end in written])
+        ends: list[object] = [end if end else 0 for end in (self.low, self.high)]
+        for k, end in enumerate((self.low, self.high)):
+            if math.isinf(end):
+                ends[k] = str(end)
+            elif self.quantity:
+                ends[k] = self.quantity.write(end)
+        return shown(ends)
 
 
 @dataclass(frozen=True)
@@ -78,7 +84,7 @@ class JointTarget:
     example: str
 
     def parse(self, value: object) -> None:
-        """Reject `value`: a random input has been removed before validation."""
+        """Reject `value`: a random input is read before the validation."""
         raise QuantityError(
             "is not a random input", shown(value), f"a table such as {self.example}"
         )
@@ -94,13 +100,11 @@ class JointTarget:
         return {"type": "object"}
 
 
-def joint_target_of(field: FieldInfo) -> JointTarget | None:
-    """Return the annotation of a key that takes a joint random input, or None."""
-    return next((item for item in field.metadata if isinstance(item, JointTarget)), None)
-
-
-def random_target_of(field: FieldInfo) -> RandomTarget | None:
-    """Return the quantity and range of a field with one number, or None for another field."""
+def target_of(field: FieldInfo) -> RandomTarget | JointTarget | None:
+    """Return what a random input in a field sets, or None for a field without numbers."""
+    for mark in field.metadata:
+        if isinstance(mark, JointTarget):
+            return mark
     for part in alternatives(field):
         annotated = get_origin(part) is Annotated
         if (get_args(part)[0] if annotated else part) is float:
@@ -118,9 +122,9 @@ def _random_target(marks: list[Any]) -> RandomTarget:
         elif isinstance(mark, Gt):
             low, above = float(mark.gt), True  # type: ignore[arg-type]
         elif isinstance(mark, Ge):
-            low, above = float(mark.ge), False  # type: ignore[arg-type]
+            low = float(mark.ge)  # type: ignore[arg-type]
         elif isinstance(mark, Lt):
             high, below = float(mark.lt), True  # type: ignore[arg-type]
         elif isinstance(mark, Le):
-            high, below = float(mark.le), False  # type: ignore[arg-type]
+            high = float(mark.le)  # type: ignore[arg-type]
     return RandomTarget(quantity, low, high, above, below)

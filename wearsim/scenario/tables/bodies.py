@@ -11,9 +11,10 @@ from pydantic import Field, PlainValidator
 
 from wearsim.csv_tables import read_columns
 from wearsim.errors import ScenarioError
+from wearsim.plugins import Options
 from wearsim.quantities import InputFile, Length, PerRoller, PositiveLength, PositivePressure
 from wearsim.scenario.parse.mistakes import Mistakes, Table
-from wearsim.scenario.parse.validate import validate
+from wearsim.scenario.random.read import validate
 from wearsim.types import Material, Profile
 from wearsim.units import QuantityError, shown
 
@@ -89,24 +90,15 @@ class CylinderTable(Table):
     )
 
 
-@dataclass(frozen=True)
-class Roller:
-    """Geometry and material of the rollers.
+class Roller(Options):
+    """Geometry and material of the rollers."""
 
-    Parameters
-    ----------
-    radius, crown_radius : float
-        Rolling radius, and radius of the crown across the track [m].
-    offset : float or tuple of float
-        Axial position of the apex, one for all rollers or one per roller [m].
-    material : Material
-        Material of the rollers.
-    """
-
-    radius: float
-    crown_radius: float
-    offset: float | tuple[float, ...]
-    material: Material
+    radius: float = Field(description="Rolling radius [m].")
+    crown_radius: float = Field(description="Radius of the crown across the track [m].")
+    offset: PerRoller[Length] = Field(
+        description="Axial position of the apex, one for all rollers or one per roller [m]."
+    )
+    material: Material = Field(description="Material of the rollers.")
 
 
 @dataclass(frozen=True)
@@ -143,7 +135,9 @@ def read_roller(raw: Mapping[str, object], mistakes: Mistakes) -> Roller | None:
     crown = _radius(table.crown_radius, table.crown_diameter)
     if radius is None or crown is None:
         return None
-    return Roller(radius, crown, table.offset, table.material)
+    return Roller.model_construct(
+        radius=radius, crown_radius=crown, offset=table.offset, material=table.material
+    )
 
 
 def read_cylinder(raw: Mapping[str, object], mistakes: Mistakes) -> Cylinder | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
@@ -18,7 +18,7 @@ from wearsim.quantities import (
     Quantity,
 )
 from wearsim.scenario.parse.mistakes import Mistakes, Table
-from wearsim.scenario.parse.validate import validate
+from wearsim.scenario.random.read import validate
 from wearsim.scenario.random.targets import JointTarget
 from wearsim.units import ANGLE
 
@@ -167,15 +167,15 @@ def read_creepage(raw: Mapping[str, object], mistakes: Mistakes) -> CreepageTabl
             mistakes.add("creepage", refused, f'has no meaning with drive = "{drive}"')
     table = validate(mistakes, CreepageTable, raw, "creepage")
     if table is not None:
-        _check_angles(table, mistakes)
+        check_angles(mistakes, table)
     return table
 
 
-def _check_angles(table: CreepageTable, mistakes: Mistakes) -> None:
+def check_angles(mistakes: Mistakes, table: CreepageTable) -> None:
     """Add a mistake for each angle for which the linearised kinematics does not hold."""
     angles = {"yaw": table.yaw, "tilt": table.tilt}
     greatest = {key: float(np.abs(angle).max()) for key, angle in angles.items()}
-    for item in mistakes.random:
+    for item in mistakes.random_inputs:
         if item.name.startswith("creepage.") and item.quantity == Quantity(ANGLE):
             greatest[item.name.removeprefix("creepage.")] = item.greatest
     for key, angle in greatest.items():
@@ -194,3 +194,17 @@ def read_outputs(raw: Mapping[str, object], mistakes: Mistakes) -> OutputsTable 
     elif "spacing" in raw and given != ["records"]:
         mistakes.add("outputs", "spacing", f"goes with records, not with {given[0]}")
     return validate(mistakes, OutputsTable, raw, "outputs")
+
+
+def check_lists(mistakes: Mistakes, data: Mapping[str, Any]) -> None:
+    """Add a mistake for each list of the tables `data` without one value per roller."""
+    tables = {table: keys for table, keys in data.items() if isinstance(keys, dict)}
+    rollers = tables.get("operation", {}).get("rollers", 1)
+    for table, key in (("roller", "offset"), ("creepage", "yaw"), ("creepage", "tilt")):
+        value = tables.get(table, {}).get(key)
+        if not isinstance(value, list | tuple) or not isinstance(rollers, int):
+            continue
+        if len(value) != rollers:
+            got = f"{len(value)} values" if len(value) != 1 else "1 value"
+            expected = f"{rollers}, the value of operation.rollers"
+            mistakes.add(table, key, "a list has one value per roller", got, expected)

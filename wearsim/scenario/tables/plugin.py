@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import cast
+from typing import Any, cast
 
 from pydantic import Field
 
@@ -16,14 +16,15 @@ from wearsim.plugins import (
     LoadSpec,
     LoadTerm,
     Options,
+    Spec,
     WearLaw,
     WearLawSpec,
     registry,
 )
 from wearsim.quantities import Length, PositiveLength
-from wearsim.scenario.parse.mistakes import Mistakes, Table
-from wearsim.scenario.parse.pydantic_errors import key_of_file, split_keys
-from wearsim.scenario.parse.validate import validate
+from wearsim.scenario.parse.mistakes import Mistakes, Table, installed
+from wearsim.scenario.parse.validate import key_of_file, split_keys
+from wearsim.scenario.random.read import validate
 from wearsim.units import shown
 
 
@@ -141,86 +142,100 @@ class WearChoice:
         return self.spec.factory(self.options)
 
 
+PLUGIN_TABLES: dict[str, tuple[type[Table], str, type[Spec]]] = {
+    "contact": (ContactTable, "model", ContactModelSpec),
+    "load": (LoadTable, "kind", LoadSpec),
+    "wear": (WearTable, "law", WearLawSpec),
+}
+"""Tables that choose a plugin: model of their own keys, key with its name, kind of plugin."""
+
+
+def _choose(
+    mistakes: Mistakes, table: str, raw: Mapping[str, object]
+) -> tuple[Any, Any, dict[str, object]]:
+    """Return the model of a table's own keys, the spec that it chooses and the other keys.
+
+    The first two are None after adding their mistakes.
+    """
+    model, key, kind = PLUGIN_TABLES[table]
+    own, rest = split_keys(raw, model)
+    name = own.get(key, model.model_fields[key].default)
+    spec = None
+    values = validate(mistakes, model, own, table)
+    if isinstance(name, str):
+        spec = mistakes.find_plugin(kind, name, table, key)
+    return values, spec, rest
+
+
 def _default_model(mistakes: Mistakes) -> str:
     """Return the model of a scenario that names none: one for a friction field if there is any."""
     default = str(ContactTable.model_fields["model"].default)
-    field = next((item for item in mistakes.random if item.role == "field"), None)
-    if field is None:
-        return default
-    known = [registry().get(ContactModelSpec, n) for n in registry().names(ContactModelSpec)]
-    name = next((spec.name for spec in known if spec.capabilities.friction_field), None)
-    if name is None:
+    field = next((item for item in mistakes.random_inputs if item.role == "field"), None)
+    able = [s.name for s in installed(ContactModelSpec) if s.capabilities.friction_field]
+    if field is None or not able:
         return default
     mistakes.notes.append(
-        f"contact.model is '{name}': {field.name} is a field, {field.kind}, which '{default}' does"
-        " not support"
+        f"contact.model is '{able[0]}': {field.name} is a field, {field.kind}, which '{default}'"
+        " does not support"
     )
-    return name
+    return able[0]
 
 
 def read_contact(raw: Mapping[str, object], mistakes: Mistakes) -> ContactChoice | None:
     """Return the contact model, or None after adding the mistakes of the table [contact]."""
-    own, rest = split_keys(raw, ContactTable)
-    if "model" not in own:
-        own["model"] = _default_model(mistakes)
-    name = own["model"]
-    table = validate(mistakes, ContactTable, own, "contact")
-    spec = None
-    if isinstance(name, str):
-        spec = mistakes.find_plugin(ContactModelSpec, name, "contact", "model")
+    raw = {"model": _default_model(mistakes), **raw} if "model" not in raw else raw
+    own, spec, rest = _choose(mistakes, "contact", raw)
     options = validate(mistakes, spec.options, rest, "contact", ContactTable) if spec else None
-    if table is None or options is None:
+    if own is None or options is None:
         return None
-    return ContactChoice(table.model, options, table.strips, table.width, table.centre)
+    return ContactChoice(own.model, options, own.strips, own.width, own.centre)
 
 
 def read_wear(raw: Mapping[str, object], mistakes: Mistakes) -> WearChoice | None:
     """Return the wear law, or None after adding the mistakes of the table [wear]."""
-    own, rest = split_keys(raw, WearTable)
-    table = validate(mistakes, WearTable, own, "wear")
-    spec = mistakes.find_plugin(WearLawSpec, table.law, "wear", "law") if table else None
+    own, spec, rest = _choose(mistakes, "wear", raw)
     options = validate(mistakes, spec.options, rest, "wear", WearTable) if spec else None
-    return WearChoice(table.law, options) if table and options is not None else None
+    return WearChoice(own.law, options) if own and options is not None else None
 
 
 def read_load(raw: Mapping[str, object], mistakes: Mistakes) -> LoadChoice | None:
     """Return the load with its terms, or None after adding the mistakes of the table [load]."""
-    own, rest = split_keys(raw, LoadTable)
-    table = validate(mistakes, LoadTable, own, "load")
-    spec = mistakes.find_plugin(LoadSpec, table.kind, "load", "kind") if table else None
+    own, spec, rest = _choose(mistakes, "load", raw)
+    kinds = {known.name: known.role for known in installed(LoadSpec)}
     tables = {
         key: value
         for key, value in rest.items()
         if isinstance(value, dict)
-        and ("distribution" not in value or _is_term(key))
-        and (key not in spec.options.model_fields if spec else key in registry().names(LoadSpec))
+        and ("distribution" not in value or kinds.get(key) == "term")
+        and (key not in spec.options.model_fields if spec else key in kinds)
     }
     terms = [_read_term(name, options, mistakes) for name, options in tables.items()]
-    if table is None or spec is None:
+    if own is None or spec is None:
         return None
     if spec.role == "term":
         what = f"'{spec.name}' is a term, added by a table [load.{spec.name}]"
         mistakes.add("load", "kind", what)
         return None
     rest = {key: value for key, value in rest.items() if key not in tables}
-    for name in [key for key in rest if key not in spec.options.model_fields and _is_term(key)]:
-        expected = f"a table [load.{name}]"
-        mistakes.add("load", name, "is a term of the load", shown(rest.pop(name)), expected)
+    for name in [key for key in rest if key not in spec.options.model_fields]:
+        if kinds.get(name) == "term":
+            got, expected = shown(rest.pop(name)), f"a table [load.{name}]"
+            mistakes.add("load", name, "is a term of the load", got, expected)
     options = validate(mistakes, spec.options, rest, "load", LoadTable)
     if options is None:
         return None
+    load = LoadChoice(own.kind, options, tuple(term for term in terms if term is not None))
+    check_load(mistakes, load)
+    return load
+
+
+def check_load(mistakes: Mistakes, load: LoadChoice) -> None:
+    """Add the mistakes of a file that the load reads."""
     try:
-        spec.factory(options)  # for the mistakes of a file that the load reads
+        load.build()
     except ScenarioError as error:
-        mistakes.add_file(error, "load", key_of_file(rest, error.file))
-        return None
-    if None in terms:
-        return None
-    return LoadChoice(table.kind, options, tuple(term for term in terms if term is not None))
-
-
-def _is_term(name: str) -> bool:
-    return name in registry().names(LoadSpec) and registry().get(LoadSpec, name).role == "term"
+        files = {key: getattr(value, "path", None) for key, value in load.options}
+        mistakes.add_file(error, "load", key_of_file(files, error.file))
 
 
 def _read_term(name: str, raw: dict[str, object], mistakes: Mistakes) -> TermChoice | None:

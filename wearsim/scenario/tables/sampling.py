@@ -32,7 +32,7 @@ class SamplingTable(Table):
 
 def check_correlation(table: SamplingTable | None, mistakes: Mistakes) -> None:
     """Add the mistakes of the correlations; all random inputs must have been read."""
-    known = {item.name: item for item in mistakes.random}
+    known = {item.name: item for item in mistakes.random_inputs}
     rows = table.correlation if table else ()
     valid = [
         _is_valid((first, second), f"correlation (entry {count})", known, mistakes)
@@ -40,7 +40,7 @@ def check_correlation(table: SamplingTable | None, mistakes: Mistakes) -> None:
     ]
     if rows and all(valid):
         try:
-            GaussianCopula(rows, {item.name: item.dimension for item in mistakes.random})
+            GaussianCopula(rows, {item.name: item.dimension for item in mistakes.random_inputs})
         except ValueError as error:
             mistakes.add("sampling", "correlation", str(error))
 
@@ -50,7 +50,7 @@ def _is_valid(
 ) -> bool:
     """Check one pair of random inputs; an input that has mistakes itself adds none here."""
     for name in pair:
-        if name not in mistakes.random_keys:
+        if name not in mistakes.random:
             hint = nearest(name, known) or f" (known: {', '.join(sorted(known)) or 'none'})"
             mistakes.add("sampling", key, f"'{name}' is not a random input{hint}")
     if not known.keys() >= set(pair):

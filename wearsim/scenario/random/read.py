@@ -1,0 +1,291 @@
+"""Reading of random inputs: a table that may hold them, and the table of one of them."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Mapping
+from typing import Any, TypeAlias
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from wearsim.errors import ScenarioError
+from wearsim.plugins import Distribution, JointDistribution, RandomInputSpec
+from wearsim.quantities import Quantity
+from wearsim.scenario.parse.field_wording import form, model_at
+from wearsim.scenario.parse.mistakes import Mistakes, installed
+from wearsim.scenario.parse.validate import M, key_of_file, split_keys, validate_options
+from wearsim.scenario.random.model import (
+    CONTACT_FIELDS,
+    FRICTION,
+    MISALIGNMENT,
+    OF_A_CONTACT,
+    OF_A_ROLLER,
+    RANDOM_PLACES,
+    WITH_MARGINAL,
+    Persistence,
+    RandomInput,
+    RandomInputTable,
+    amount,
+    can_be_random,
+)
+from wearsim.scenario.random.targets import JointTarget, RandomTarget, target_of
+from wearsim.units import QuantityError, shown
+
+Loc: TypeAlias = tuple[str | int, ...]
+
+_NOT_RANDOM = f"a value; only {RANDOM_PLACES} can be random"
+
+
+def validate(
+    mistakes: Mistakes,
+    model: type[M],
+    raw: Mapping[str, object],
+    table: str,
+    other_keys: type[BaseModel] | None = None,
+) -> M | None:
+    """Return a table, which may have random inputs, as a model, or None after adding mistakes.
+
+    The random inputs are added to `mistakes.random`, and the model has their means. The parameters
+    are those of `validate_options`.
+    """
+    values, refused = _with_means(mistakes, model, raw, table)
+    return validate_options(mistakes, model, values, table, other_keys, refused=refused)
+
+
+def _with_means(
+    mistakes: Mistakes, model: type[BaseModel], raw: Mapping[str, object], table: str, loc: Loc = ()
+) -> tuple[dict[str, object], list[Loc]]:
+    """Return a table with means instead of random inputs, and the locations of mistakes."""
+    values, refused = dict(raw), list[Loc]()
+    for key, value in raw.items():
+        field, inner, here = model.model_fields.get(key), model_at(model, (key,)), (*loc, key)
+        if field is None:
+            continue  # an unknown key, which the validation reports
+        if isinstance(value, dict) and inner and not _is_random(value, inner):
+            values[key], within = _with_means(mistakes, inner, value, f"{table}.{key}", here)
+            refused += within
+        elif isinstance(value, dict) and ("distribution" in value or target_of(field)):
+            means = _means(mistakes, field, raw, table, key)
+            values = {name: item for name, item in values.items() if name != key or not means}
+            values |= means
+            refused += [] if means else [here]
+        elif isinstance(value, list):
+            for entry, item in enumerate(value):
+                if isinstance(item, dict) and _is_random(item, inner):
+                    _refuse_entry(mistakes, table, key, entry)
+                    refused.append((*here, entry))
+    return values, refused
+
+
+def _is_random(table: Mapping[str, object], model: type[BaseModel] | None) -> bool:
+    """Return whether a table is a random input, and not a table of its field's model."""
+    return "distribution" in table and not (model and "distribution" in model.model_fields)
+
+
+def _refuse_entry(mistakes: Mistakes, table: str, key: str, entry: int) -> None:
+    expected = _NOT_RANDOM
+    if f"{table}.{key}" in OF_A_ROLLER:
+        expected = 'one random input for all rollers, with persistence = "per-roller" to differ'
+    mistakes.add(table, f"{key} (entry {entry + 1})", "cannot be random", "a table", expected)
+
+
+def _means(
+    mistakes: Mistakes, field: FieldInfo, raw: Mapping[str, Any], table: str, key: str
+) -> dict[str, object]:
+    """Add a random input, and return the means of the keys that it sets; none after mistakes."""
+    name, target = f"{table}.{key}" if table else key, target_of(field)
+    if "distribution" not in raw[key]:
+        _refuse_table(mistakes, field, raw[key], table, key)
+        return {}
+    mistakes.random[name] = None
+    if target is None or not can_be_random(name):
+        mistakes.add(table, key, "cannot be random", "a table with a distribution", _NOT_RANDOM)
+        return {}
+    item = read_random_input(mistakes, raw[key], name, target)
+    rivals = [other for other in target.components if other in raw]
+    for other in rivals:
+        what = f"is set by {key} already"
+        mistakes.add(table, other, what, shown(raw[other]), "one of the two")
+    if item is None or rivals:
+        return {}
+    if isinstance(target, RandomTarget) and not _fits(mistakes, item, target, table, key):
+        return {}
+    mistakes.random[name] = item
+    means = item.mean if item.quantity is None else [{"si": mean} for mean in item.mean]
+    return dict(zip(target.components or (key,), means, strict=True))
+
+
+def _refuse_table(
+    mistakes: Mistakes, field: FieldInfo, raw: Mapping[str, object], table: str, key: str
+) -> None:
+    """Add the mistake of a table without distribution instead of a number."""
+    name, near = f"{table}.{key}", difflib.get_close_matches("distribution", raw, n=1)
+    if not can_be_random(name):
+        mistakes.add(table, key, "is not a number", "a table", form(field))
+    elif near:
+        mistakes.add(name, near[0], "unknown key (did you mean 'distribution'?)")
+    else:
+        expected = "the name of a random input"
+        mistakes.add(name, "distribution", "is missing", None, expected)
+
+
+def _fits(
+    mistakes: Mistakes, item: RandomInput, target: RandomTarget, table: str, key: str
+) -> bool:
+    """Check the support and the mean of a random input against what its field allows."""
+    (low, high), (least, most) = item.scalar.support, item.extremes
+    reach = None
+    if low < target.low or (target.above and least <= target.low):
+        reach = f"down to {amount(low, target.quantity)}"
+    elif high > target.high or (target.below and most >= target.high):
+        reach = f"up to {amount(high, target.quantity)}"
+    if reach and low == high:
+        what, got = f"must be {target.allowed}", amount(low, target.quantity)
+        mistakes.add(table, key, what, got, f"a value {target.allowed}")
+    elif reach:
+        what = f"takes values {reach}, and must be {target.allowed}"
+        remedy = f"maxent with support {target.support} or truncated-normal"
+        mistakes.add(table, key, what, item.describe(), remedy)
+    elif not math.isfinite(item.mean[0]):
+        mistakes.add(table, key, "has no finite mean", item.describe())
+    else:
+        return True
+    return False
+
+
+def read_random_input(
+    mistakes: Mistakes, raw: Mapping[str, Any], name: str, target: RandomTarget | JointTarget
+) -> RandomInput | None:
+    """Return the random input that a table holds, or None after adding its mistakes.
+
+    Parameters
+    ----------
+    mistakes : Mistakes
+        Collects the mistakes.
+    raw : mapping of str to object
+        The table.
+    name : str
+        Dotted key of the value that it replaces.
+    target : RandomTarget or JointTarget
+        The number, or the numbers, that it sets.
+    """
+    before, quantity = len(mistakes.entries), target.quantity
+    own, options = split_keys(raw, RandomInputTable)
+    table = validate_options(mistakes, RandomInputTable, own, name)
+    kind, spec = raw["distribution"], None
+    if isinstance(kind, str):
+        spec = mistakes.find_plugin(RandomInputSpec, kind, name, "distribution")
+    if spec is None or not _check_role(mistakes, spec, name, target):
+        return None
+    if table:
+        _check_persistence(mistakes, spec, table.persistence, name)
+    marginal = None
+    if spec.role in WITH_MARGINAL:
+        marginal = _read_marginal(mistakes, raw, name, quantity)
+    elif "marginal" in raw:
+        what = f"is only for a field or a process; '{spec.name}' is neither"
+        mistakes.add(name, "marginal", what)
+    distribution = _build(mistakes, spec, options, name, quantity, marginal)
+    if isinstance(distribution, JointDistribution):
+        sets, components = distribution.components, target.components
+        if sorted(sets) != sorted(components):
+            expected = f"a distribution of {' and '.join(components)}"
+            what = f"sets {' and '.join(sets)}"
+            mistakes.add(name, "distribution", what, shown(spec.name), expected)
+    if len(mistakes.entries) > before or distribution is None or table is None:
+        return None
+    inner = str(table.marginal["distribution"]) if table.marginal else ""
+    return RandomInput(name, spec.name, table.persistence, distribution, quantity, options, inner)
+
+
+def _check_role(
+    mistakes: Mistakes, spec: RandomInputSpec, name: str, target: RandomTarget | JointTarget
+) -> bool:
+    """Check that the role of the distribution is possible for this value."""
+    roles = {"joint" if target.components else "scalar"}
+    roles |= {"process"} if name in CONTACT_FIELDS else set()
+    roles |= {"field"} if name == FRICTION else set()
+    if spec.role in roles:
+        return True
+    what = {
+        "joint": f"sets several values together, which only {MISALIGNMENT} can",
+        "field": f"varies within the contact, which only {FRICTION} can",
+        "process": f"varies in time, which only {', '.join(CONTACT_FIELDS)} can",
+    }.get(spec.role, "")
+    if target.components:
+        what = f"sets one value, but {name} sets {' and '.join(target.components)}"
+    mistakes.add(name, "distribution", what, shown(spec.name), _one_of(roles))
+    return False
+
+
+def _one_of(roles: set[str]) -> str:
+    """Return the names of the distributions with these roles, for messages."""
+    names = [shown(spec.name) for spec in installed(RandomInputSpec) if spec.role in roles]
+    return f"one of {', '.join(names)}"
+
+
+def _check_persistence(
+    mistakes: Mistakes, spec: RandomInputSpec, persistence: Persistence, name: str
+) -> None:
+    if persistence == "per-pass" and spec.role == "process":
+        what = "is not for a process, which runs through the whole test"
+    elif persistence == "per-pass" and name not in OF_A_CONTACT:
+        what = f"is only for {', '.join(OF_A_CONTACT)}"
+    elif persistence == "per-roller" and name not in OF_A_ROLLER:
+        what = f"is only for {', '.join(OF_A_ROLLER)}"
+    else:
+        return
+    allowed = '"per-test" or "per-roller"' if name in OF_A_ROLLER else '"per-test"'
+    mistakes.add(name, "persistence", what, shown(persistence), allowed)
+
+
+def _read_marginal(
+    mistakes: Mistakes, table: Mapping[str, object], name: str, quantity: Quantity | None
+) -> Distribution | None:
+    """Return the marginal distribution of a field or a process."""
+    raw, place = table.get("marginal"), f"{name}.marginal"
+    if raw is None:
+        expected = "a table with a distribution and its options"
+        mistakes.add(name, "marginal", "is missing", None, expected)
+    if not isinstance(raw, dict):
+        return None
+    keys, options = split_keys(raw, RandomInputTable)
+    kind = keys.pop("distribution", None)
+    for key in sorted(keys):
+        mistakes.add(place, key, f"belongs in [{name}], not in its marginal", shown(keys[key]))
+    if not isinstance(kind, str):
+        what = "is missing" if kind is None else "is not text"
+        got = None if kind is None else shown(kind)
+        mistakes.add(place, "distribution", what, got, _one_of({"scalar"}))
+        return None
+    spec = mistakes.find_plugin(RandomInputSpec, kind, place, "distribution")
+    if spec and spec.role != "scalar":
+        what = f"is a {spec.role}, but a marginal is the distribution of one number"
+        mistakes.add(place, "distribution", what, shown(spec.name), _one_of({"scalar"}))
+        return None
+    return _build(mistakes, spec, options, place, quantity, None) if spec else None
+
+
+def _build(
+    mistakes: Mistakes,
+    spec: RandomInputSpec,
+    raw: Mapping[str, object],
+    place: str,
+    quantity: Quantity | None,
+    marginal: Distribution | None,
+) -> Any:
+    """Build a distribution, or add the mistakes of its options and return None."""
+    options = validate_options(mistakes, spec.options, raw, place, RandomInputTable, quantity)
+    if options is None or (spec.role in WITH_MARGINAL and marginal is None):
+        return None
+    try:
+        return spec.factory(options) if marginal is None else spec.factory(options, marginal)
+    except ScenarioError as error:
+        mistakes.add_file(error, place, key_of_file(raw, error.file))
+    except QuantityError as error:
+        mistakes.add(place, "", error.what, error.got, error.expected)
+    except ValueError as error:
+        mistakes.add(place, "", str(error))
+    return None
