@@ -51,6 +51,12 @@ def _fits(value: object, schema: Schema, defs: Schema) -> bool:
     return isinstance(value, numbers) and not isinstance(value, bool)
 
 
+def _resolved(node: Schema, schema: Schema) -> Schema:
+    """Return a node with the definition that it refers to."""
+    name = node.get("$ref", "").rsplit("/", 1)[-1]
+    return {**schema["$defs"][name], **node} if name else node
+
+
 RANDOM = """
 [load]
 normal_force = {distribution = "maxent", support = ["0 N", "inf"], mean = "307 N", std = "32 N"}
@@ -155,7 +161,7 @@ def test_every_key_has_a_description() -> None:
     for node in _nodes(schema):
         if node.get("type") == "object":
             for key, field in node["properties"].items():
-                assert field.get("description"), key
+                assert _resolved(field, schema).get("description"), key
 
 
 def test_all_definitions_are_referenced_and_defined(schema: Schema) -> None:
@@ -164,21 +170,26 @@ def test_all_definitions_are_referenced_and_defined(schema: Schema) -> None:
 
 
 def test_defaults_are_written_as_in_a_scenario(schema: Schema) -> None:
-    tables = schema["properties"]
+    tables = {key: _resolved(node, schema) for key, node in schema["properties"].items()}
     assert tables["roller"]["properties"]["offset"]["default"] == "0 m"
     assert tables["outputs"]["properties"]["checkpoint_every"]["default"] == "30 s"
     assert "default" not in tables["operation"]["properties"]["duration"]
     assert not any(node.get("type") == "null" for node in _nodes(schema))
 
 
+def _alternatives(schema: Schema, table: str) -> list[Schema]:
+    nodes = _resolved(schema["properties"][table], schema)["anyOf"]
+    return [_resolved(node, schema) for node in nodes]
+
+
 def test_plugins_are_alternatives_by_name(schema: Schema) -> None:
-    contact = schema["properties"]["contact"]["anyOf"]
+    contact = _alternatives(schema, "contact")
     assert [item["properties"]["model"]["const"] for item in contact] == [
         "hertz-fastsim",
         "slender",
     ]
     assert "mx" in contact[0]["properties"]
-    loads = schema["properties"]["load"]["anyOf"]
+    loads = _alternatives(schema, "load")
     assert [item["properties"]["kind"]["const"] for item in loads] == [
         "constant",
         "recorded",

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, TypeAlias
+from typing import Any, Literal, TypeAlias, Union
 
-from pydantic import BaseModel
-from pydantic.json_schema import GenerateJsonSchema, models_json_schema
+from pydantic import BaseModel, Field, RootModel, create_model
+from pydantic.json_schema import GenerateJsonSchema
 from pydantic_core import core_schema
 
-from wearsim.plugins import RandomInputSpec
+from wearsim.plugins import Options, RandomInputSpec
 from wearsim.scenario.parse.field_wording import model_at
 from wearsim.scenario.parse.key_index import REQUIRED, TABLES
 from wearsim.scenario.parse.mistakes import installed
@@ -23,28 +22,22 @@ from wearsim.scenario.random.targets import JointTarget, target_of
 from wearsim.scenario.tables.plain import TopTable
 from wearsim.scenario.tables.plugin import PLUGIN_TABLES
 
-Schema: TypeAlias = dict[str, Any]
-Resolve: TypeAlias = Callable[[type[BaseModel]], Schema]
-
-_MARGINAL, _RANDOM, _FIELD, _JOINT = (
-    "MarginalDistribution",
-    "RandomInput",
-    "RandomFriction",
-    "JointRandomInput",
-)
-_DEFINITIONS = {"scalar": _RANDOM, "process": _RANDOM, "field": _FIELD, "joint": _JOINT}
+Model: TypeAlias = type[BaseModel]
+RandomInputs: TypeAlias = tuple[Model | None, Model | None, Model | None]
 
 
 class _ScenarioSchema(GenerateJsonSchema):
     """Pydantic's schema with defaults as a scenario holds them, without null, which TOML lacks."""
 
-    def nullable_schema(self, schema: core_schema.NullableSchema) -> Schema:
+    def nullable_schema(self, schema: core_schema.NullableSchema) -> dict[str, Any]:
         return self.generate_inner(schema["schema"])
 
-    def default_schema(self, schema: core_schema.WithDefaultSchema) -> Schema:
+    def default_schema(self, schema: core_schema.WithDefaultSchema) -> dict[str, Any]:
         result = super().default_schema(schema)
-        default = schema.get("default")
-        write = schema["schema"].get("serialization", {}).get("function")
+        default, value = schema.get("default"), schema["schema"]
+        if value["type"] == "union":  # a number or a random input
+            value = value["choices"][0]
+        write = value.get("serialization", {}).get("function")
         if default is None:
             result.pop("default", None)
         elif write is not None:
@@ -52,176 +45,100 @@ class _ScenarioSchema(GenerateJsonSchema):
         return result
 
 
-def scenario_schema() -> Schema:
+def scenario_schema() -> dict[str, Any]:
     """Return the JSON Schema (draft 2020-12) of a scenario with the installed plugins.
 
     Returns
     -------
     dict
     """
-    specs = {table: installed(kind) for table, (_, _, kind) in PLUGIN_TABLES.items()}
-    models: list[type[BaseModel]] = [TopTable, *TABLES.values()]
-    models += [spec.options for listed in specs.values() for spec in listed]
-    models += [RandomInputTable, *(spec.options for spec in installed(RandomInputSpec))]
-    models = [part for model in models for part in _models_within(model)]
-    refs, definitions = models_json_schema(
-        [(model, "validation") for model in dict.fromkeys(models)],
-        schema_generator=_ScenarioSchema,
-    )
-    shared = definitions.get("$defs", {})
-
-    def resolve(model: type[BaseModel]) -> Schema:
-        schema: Schema = shared[refs[model, "validation"]["$ref"].rsplit("/", 1)[-1]]
-        return schema
-
-    shared |= _random_definitions(resolve)
-    tables_of: dict[type[BaseModel], str] = {model: table for table, model in TABLES.items()}
-    for table, listed in specs.items():
-        for spec in listed:
-            term = getattr(spec, "role", "base") == "term"
-            tables_of.setdefault(spec.options, f"{table}.{spec.name}" if term else table)
-    for model, table in tables_of.items():
-        _admit_random(model, table, shared, resolve)
-    tables = {
-        table: _choice(table, specs[table], resolve)
-        if table in PLUGIN_TABLES
-        else {**resolve(model), "title": table}
-        for table, model in TABLES.items()
-    }
-    return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": "wearsim scenario",
-        "description": "Scenario of a wear simulation of a rolling contact, for wearsim.",
-        "type": "object",
-        "properties": {**resolve(TopTable)["properties"], **tables},
-        "required": list(REQUIRED),
-        "additionalProperties": False,
-        "$defs": _referenced(shared, tables),
-    }
+    random = _random_inputs()
+    tables: dict[str, Any] = {}
+    for table, model in TABLES.items():
+        kind = _one_of(table, _choices(table, random) if table in PLUGIN_TABLES else [])
+        kind = kind or _model(table, model.__doc__, _fields(model, table, random))
+        tables[table] = kind, Field(... if table in REQUIRED else None, description=model.__doc__)
+    described = "Scenario of a wear simulation of a rolling contact, for wearsim."
+    scenario = _model("wearsim scenario", described, {**_fields(TopTable), **tables})
+    schema = scenario.model_json_schema(schema_generator=_ScenarioSchema)
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
 
-def _models_within(model: type[BaseModel]) -> list[type[BaseModel]]:
-    """Return a model and those of the tables within it."""
-    inner = [model_at(model, (key,)) for key in model.model_fields]
-    return [model, *(part for item in inner if item for part in _models_within(item))]
+def _model(name: str, description: str | None, fields: dict[str, Any]) -> Model:
+    return create_model(name, __base__=Options, __doc__=description, **fields)
 
 
-def _referenced(shared: Schema, *users: object) -> Schema:
-    """Return the definitions that `users` refer to, directly or through other definitions."""
-    used: Schema = {}
-    pending: list[object] = list(users)
-    while pending:
-        item = pending.pop()
-        if isinstance(item, dict):
-            name = str(item.get("$ref", "")).rsplit("/", 1)[-1]
-            if name in shared and name not in used:
-                used[name] = shared[name]
-                pending.append(shared[name])
-            pending += item.values()
-        elif isinstance(item, list):
-            pending += item
-    return dict(sorted(used.items()))
+def _one_of(name: str, models: list[Model]) -> Model | None:
+    """Return a model of one of several tables, or None if there are none."""
+    kind: Any = Union[tuple(models)] if models else None  # noqa: UP007
+    return create_model(name, __base__=RootModel, root=(kind, ...)) if models else None
 
 
-def _choice(table: str, specs: list[Any], resolve: Resolve) -> Schema:
-    """Return the schema of a table that chooses a plugin: one alternative per plugin."""
-    model, key, _ = PLUGIN_TABLES[table]
-    base = resolve(model)
-    terms = {
-        spec.name: {**resolve(spec.options), "description": spec.summary}
+def _random_inputs() -> RandomInputs:
+    """Return the models of what may replace a number, the friction and several numbers."""
+    own, specs = RandomInputTable.model_fields, installed(RandomInputSpec)
+    scalars = [_random_input(spec, "{} as marginal", {}) for spec in specs if spec.role == "scalar"]
+    marginal = _one_of("MarginalDistribution", scalars)
+    drawn = {"persistence": (own["persistence"].annotation, own["persistence"])}
+    of_marginal = {"marginal": (marginal, Field(description=own["marginal"].description))}
+    inputs: dict[str, list[Model]] = {"scalar": [], "process": [], "field": [], "joint": []}
+    for spec in specs:
+        if spec.role not in WITH_MARGINAL:
+            inputs[spec.role].append(_random_input(spec, "{}", drawn))
+        elif marginal:
+            inputs[spec.role].append(_random_input(spec, "{}", {**drawn, **of_marginal}))
+    number = _one_of("RandomInput", inputs["scalar"] + inputs["process"])
+    friction = _one_of("RandomFriction", [number, *inputs["field"]] if number else [])
+    return number, friction, _one_of("JointRandomInput", inputs["joint"])
+
+
+def _random_input(spec: RandomInputSpec, name: str, keys: dict[str, Any]) -> Model:
+    """Return the model of one random input, with `keys` besides its name and its options."""
+    named = Literal[spec.name], RandomInputTable.model_fields["distribution"]
+    fields = {"distribution": named, **keys, **_fields(spec.options)}
+    return _model(name.format(spec.name), spec.summary, fields)
+
+
+def _choices(table: str, random: RandomInputs) -> list[Model]:
+    """Return the model of a table for each plugin that it may choose."""
+    base, key, kind = PLUGIN_TABLES[table]
+    named, specs = base.model_fields[key], installed(kind)
+    terms: dict[str, Any] = {}
+    options: dict[str, Any] = {}
+    for spec in specs:
+        fields = _fields(spec.options, table, random)
+        if getattr(spec, "role", "base") == "term":
+            model = _model(f"{table} {spec.name}", spec.summary, fields)
+            terms[spec.name] = model, Field(None, description=spec.summary)
+        else:
+            default = spec.name if spec.name == named.default else ...
+            name = Literal[spec.name], Field(default, description=named.description)
+            options[spec.name] = {**fields, **_fields(base), key: name}
+    return [
+        _model(f"{table} {spec.name}", spec.summary, {**terms, **options[spec.name]})
         for spec in specs
-        if getattr(spec, "role", "base") == "term"
-    }
-    alternatives = []
-    for spec in specs:
-        if spec.name in terms:
-            continue
-        options = resolve(spec.options)
-        named = [key] if spec.name != model.model_fields[key].default else []
-        alternatives.append(
-            {
-                "title": spec.name,
-                "description": spec.summary,
-                "type": "object",
-                "properties": {
-                    **terms,
-                    **options.get("properties", {}),
-                    **base["properties"],
-                    key: {**base["properties"][key], "const": spec.name},
-                },
-                "required": options.get("required", []) + named,
-                "additionalProperties": False,
-            }
-        )
-    return {"title": table, "description": model.__doc__, "anyOf": alternatives}
+        if spec.name in options
+    ]
 
 
-def _random_definitions(resolve: Resolve) -> Schema:
-    """Return the definitions of the random inputs by name; those without plugins are left out."""
-    made: dict[str, list[Schema]] = {name: [] for name in (_MARGINAL, _RANDOM, _FIELD, _JOINT)}
-    specs = installed(RandomInputSpec)
-    scalars = any(spec.role == "scalar" for spec in specs)
-    for spec in specs:
-        if not scalars and spec.role in WITH_MARGINAL:
-            continue
-        made[_DEFINITIONS[spec.role]].append(_random_input(spec, resolve))
-        if spec.role == "scalar":
-            made[_MARGINAL].append(_random_input(spec, resolve, marginal=True))
-    if made[_FIELD] and made[_RANDOM]:
-        made[_FIELD].insert(0, _reference(_RANDOM))
-    return {name: {"title": name, "anyOf": items} for name, items in made.items() if items}
-
-
-def _reference(name: str) -> Schema:
-    return {"$ref": f"#/$defs/{name}"}
-
-
-def _random_input(spec: RandomInputSpec, resolve: Resolve, marginal: bool = False) -> Schema:
-    """Return the schema of one random input, or of one that is the marginal of another."""
-    own, options = resolve(RandomInputTable)["properties"], resolve(spec.options)
-    keys: Schema = {"distribution": {**own["distribution"], "const": spec.name}}
-    needed = ["distribution", *options.get("required", [])]
-    if not marginal:
-        keys["persistence"] = own["persistence"]
-    if spec.role in WITH_MARGINAL:
-        described = own["marginal"]["description"]
-        keys["marginal"] = {"description": described, **_reference(_MARGINAL)}
-        needed.append("marginal")
-    return {
-        "title": spec.name,
-        "description": spec.summary,
-        "type": "object",
-        "properties": {**keys, **options.get("properties", {})},
-        "required": needed,
-        "additionalProperties": False,
-    }
-
-
-def _admit_random(
-    model: type[BaseModel], table: str, definitions: Schema, resolve: Resolve
-) -> None:
-    """Extend the schema of a table, in place, by random inputs for the values that take them."""
-    properties = resolve(model).get("properties", {})
+def _fields(
+    model: Model, table: str = "", random: RandomInputs = (None, None, None)
+) -> dict[str, Any]:
+    """Return a table's fields, with the type "number or random input" where that is possible."""
+    number, friction, joint = random
+    fields: dict[str, Any] = {}
     for key, field in model.model_fields.items():
-        name, inner = f"{table}.{key}", model_at(model, (key,))
-        definition = _FIELD if name == FRICTION and _FIELD in definitions else _RANDOM
-        if isinstance(target_of(field), JointTarget):
-            described = properties.pop(key)["description"]
-            if _JOINT in definitions:
-                properties[key] = {"description": described, **_reference(_JOINT)}
-        elif inner is not None:
-            _admit_random(inner, name, definitions, resolve)
-        elif can_be_random(name) and target_of(field) and definition in definitions:
-            properties[key] = _or_random(properties[key], definition)
-
-
-def _or_random(schema: Schema, definition: str) -> Schema:
-    """Return the schema of a value that may also be a random input."""
-    about = {
-        key: item for key, item in schema.items() if key in {"title", "description", "default"}
-    }
-    value = {key: item for key, item in schema.items() if key not in about}
-    alternatives = value["anyOf"] if set(value) == {"anyOf"} else [value]
-    if _reference(definition) in alternatives:  # the model of several tables
-        return schema
-    return {**about, "anyOf": [*alternatives, _reference(definition)]}
+        name, inner, target = f"{table}.{key}", model_at(model, (key,)), target_of(field)
+        kind: Any = field.annotation
+        described: Any = field
+        if isinstance(target, JointTarget):
+            kind, described = joint, Field(None, description=field.description)
+        elif target and number and can_be_random(name):
+            kind = Union[field.rebuild_annotation(), friction if name == FRICTION else number]  # noqa: UP007
+            described = Field(field.get_default(), description=field.description)
+        elif inner and can_be_random(name):
+            within = _fields(inner, table, random)
+            kind = _model(f"{inner.__name__} of {key}", inner.__doc__, within)
+        if kind:
+            fields[key] = kind, described
+    return fields
