@@ -28,7 +28,6 @@ LATER = (
     "wearsim/results/ensemble/row_encoding.py",
     "wearsim/scenario/random/placeholders.py",
     "wearsim/scenario/random/substitute.py",
-    "wearsim/studies/contact/draws.py",
 )
 SOURCES = [
     path

@@ -6,6 +6,7 @@ from wearsim.evolution.integrate import evolve
 from wearsim.evolution.state import fresh_state
 from wearsim.scenario import load_scenario
 from wearsim.studies.run.assemble import assemble_problem
+from wearsim.studies.run.draws import draw
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 
@@ -19,7 +20,7 @@ def built(name="rig-450min", **changes):
     """Return problem, stepper and passes of a scenario; `__` in a key replaces a dot."""
     overrides = {key.replace("__", "."): value for key, value in changes.items()}
     scenario = load_scenario(SCENARIOS / f"{name}.toml", overrides=overrides)
-    problem, stepper, _ = assemble_problem(scenario)
+    problem, stepper, _ = assemble_problem(draw(scenario))
     return problem, stepper, float(scenario.total_passes)
 
 

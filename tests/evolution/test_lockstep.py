@@ -14,6 +14,7 @@ from wearsim.evolution.state import fresh_state
 from wearsim.models.contact.slender import Slender
 from wearsim.scenario import load_scenario
 from wearsim.studies.run.assemble import assemble_problem, prepared_model
+from wearsim.studies.run.draws import draw
 
 PASSES = 45_000
 LOG = "time [min], load [N]\n0, 300\n5, 340\n6, 280\n15.5, 320\n"
@@ -45,9 +46,9 @@ def problems_of(changes, each=EACH):
         overrides = {k.replace("__", "."): v for k, v in {**common, **changes, **own}.items()}
         scenario = load_scenario(SCENARIOS / "rig-450min.toml", overrides=overrides)
         if model is None:
-            grid = assemble_problem(scenario)[0].grid
+            grid = assemble_problem(draw(scenario))[0].grid
             model = prepared_model(scenario, grid)
-        problem, stepper, _ = assemble_problem(scenario, grid, None, model)
+        problem, stepper, _ = assemble_problem(draw(scenario), grid, model)
         problems.append(problem)
     return problems, stepper, float(scenario.total_passes)
 

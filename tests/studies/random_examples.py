@@ -6,6 +6,7 @@ from wearsim.evolution.integrate import evolve
 from wearsim.evolution.state import fresh_state
 from wearsim.scenario import load_scenario
 from wearsim.studies.run.assemble import assemble_problem
+from wearsim.studies.run.draws import draw
 
 RIG = Path(__file__).parents[2] / "scenarios" / "rig-450min.toml"
 LOAD = {"distribution": "maxent", "support": ["0 N", "inf"], "mean": "307 N", "std": "32 N"}
@@ -25,7 +26,7 @@ def scenario_of(passes=6000, k_over_h=FAST, **changes):
 
 def end_of(scenario):
     """Run a scenario and return its problem and its last state."""
-    problem, stepper, _ = assemble_problem(scenario)
+    problem, stepper, _ = assemble_problem(draw(scenario))
     state = fresh_state(problem)
     for advance in evolve(
         problem, state, stepper, float(scenario.total_passes), lambda _: float("inf"), 10**6

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from wearsim.contact_batch import OperatingPoints
 from wearsim.evolution.problem import WearProblem
-from wearsim.types import Creepage, FloatArray, IntArray, OperatingPoint
+from wearsim.types import FloatArray, OperatingPoint
 
 
 def operating_points(
@@ -27,82 +28,45 @@ def operating_points(
     cylinder_depth, roller_depth : ndarray
         Worn depths, shapes as in `WearState` [m].
     """
-    if problem.free:
-        return [
-            operating_point(
-                problem,
-                (c, v),
-                float(loads[s, c, v]),
-                cylinder_depth[s, 0, v],
-                roller_depth[0, problem.roller[c], v],
-            )
-            for s, c, v in problem.contacts
-        ]
-    variation = _creepage_variation(
-        problem,
-        problem.roller[None, :, None],
-        problem.spin[None, :, :, None],
-        cylinder_depth,
-        problem.at_contacts(roller_depth),
-    )
-    if variation is not None:
-        shape = (*problem.shape, problem.grid.strips)
-        variation = np.broadcast_to(variation, shape).reshape(-1, shape[-1])
-    return OperatingPoints(
+    worn = problem.at_contacts(roller_depth)
+    points = OperatingPoints(
         normal_force=loads.ravel(),
         **problem.input_columns,
         rolling_speed=problem.kinematics.rolling_speed,
-        variation=variation,
+        variation=_creepage_variation(problem, cylinder_depth, worn),
     )
+    if not problem.free:
+        return points
+    torques = np.broadcast_to(problem.inputs.bearing_torque, problem.shape).ravel().tolist()
+    radii = _rolling_radius(problem, worn)
+    return [
+        replace(point, bearing_torque=torque, rolling_radius=radius)
+        for point, torque, radius in zip(points, torques, radii, strict=True)
+    ]
 
 
-def operating_point(
-    problem: WearProblem,
-    place: tuple[int, int],
-    load: float,
-    cylinder_depth: FloatArray,
-    roller_depth: FloatArray,
-) -> OperatingPoint:
-    """Return the operating point of a single contact.
+def unworn_contacts(problem: WearProblem) -> tuple[FloatArray, float, Sequence[OperatingPoint]]:
+    """Return gap [m], curvature along rolling [1/m] and operating points of the unworn bodies.
 
-    Parameters
-    ----------
-    problem : WearProblem
-    place : (int, int)
-        Contact and realisation.
-    load : float
-        Normal force [N].
-    cylinder_depth, roller_depth : ndarray, shape (strips,)
-        Worn depths of the two bodies [m].
+    The loads are those at the start of the test.
     """
-    kinematics, inputs, roller = problem.kinematics, problem.inputs, int(problem.roller[place[0]])
-    spin, radius = float(problem.spin[place]), None
-    if problem.free:
-        s = problem.from_apex[roller]
-        radius = kinematics.roller_radius - s * s / (2.0 * kinematics.crown_radius) - roller_depth
-    return OperatingPoint(
-        normal_force=load,
-        rolling_speed=kinematics.rolling_speed,
-        creepage=Creepage(
-            float(inputs.longitudinal[place]),
-            float(inputs.yaw[place]),
-            spin,
-            _creepage_variation(problem, roller, spin, cylinder_depth, roller_depth),
-        ),
-        friction=float(inputs.friction[place]),
-        bearing_torque=float(inputs.bearing_torque[place]) if problem.free else None,
-        rolling_radius=radius,
-    )
+    loads = np.broadcast_to(problem.force(0.0) + problem.inputs.normal_force_offset, problem.shape)
+    cylinder, roller = np.zeros((1, 1, 1, 1)), np.zeros((1, problem.rollers, 1, 1))
+    points = operating_points(problem, loads, cylinder, roller)
+    return problem.nominal_gap, problem.kinematics.longitudinal_curvature, points
+
+
+def _rolling_radius(problem: WearProblem, roller_depth: FloatArray) -> FloatArray:
+    """Return the rolling radius of free rollers, shape (all contacts, strips) [m]."""
+    kinematics, s = problem.kinematics, problem.from_apex[problem.roller]
+    radius = kinematics.roller_radius - s * s / (2.0 * kinematics.crown_radius) - roller_depth
+    return _of_contacts(problem, radius)
 
 
 def _creepage_variation(
-    problem: WearProblem,
-    roller: int | IntArray,
-    spin: float | FloatArray,
-    cylinder_depth: FloatArray,
-    roller_depth: FloatArray,
+    problem: WearProblem, cylinder_depth: FloatArray, roller_depth: FloatArray
 ) -> FloatArray | None:
-    """Return the variation of creepage over the strips (last axis), or None for spin alone.
+    """Return the variation of creepage, (all contacts, strips), or None for spin alone.
 
     The tilt enters differential slip once: as the shift of the contact away from the apex or,
     where it shifts nothing, as the term -phi y of the spin.
@@ -110,8 +74,16 @@ def _creepage_variation(
     if problem.slip_profile is None:
         return None
     variation: FloatArray = (
-        problem.slip_profile[roller]
+        problem.slip_profile[problem.roller]
         + roller_depth / problem.kinematics.roller_radius
         - cylinder_depth / problem.kinematics.cylinder_radius
     )
-    return variation if problem.tilt_shifts else variation - spin * problem.from_apex[roller]
+    if not problem.tilt_shifts:
+        variation = variation - problem.spin[:, :, None] * problem.from_apex[problem.roller]
+    return _of_contacts(problem, variation)
+
+
+def _of_contacts(problem: WearProblem, values: FloatArray) -> FloatArray:
+    """Return values that broadcast to all contacts as (all contacts, strips)."""
+    shape = (*problem.shape, problem.grid.strips)
+    return np.broadcast_to(values, shape).reshape(-1, shape[-1])

@@ -47,7 +47,7 @@ class WearProblem:
         Radii, speed and number of rollers.
     flat_gap : ndarray, shape (stations, rollers, realisations, strips)
         Gap of rollers without tilt before wear [m].
-    from_apex : ndarray, shape (rollers, strips)
+    from_apex : ndarray, shape (rollers, realisations or 1, strips)
         Axial distance of each strip from the roller's apex [m].
     inputs : ContactInputs
         Inputs of every contact.
@@ -62,7 +62,7 @@ class WearProblem:
         A tilt moves the contact over the crown.
     free : bool
         The creepage of the rollers follows from the bearing torque.
-    slip_profile : ndarray, shape (rollers, strips), optional
+    slip_profile : ndarray, shape (rollers, realisations or 1, strips), optional
         Differential slip of the unworn bodies without tilt, to which worn depth adds. If absent,
         creepage varies with spin alone.
     varying : sequence of Varying
@@ -127,12 +127,16 @@ class WearProblem:
     @cached_property
     def halved(self) -> WearProblem:
         """The problem with the first half of the contacts of every roller."""
-        chosen = np.flatnonzero(self.half == 0)
+        first = self.with_contacts(np.flatnonzero(self.half == 0))
+        return replace(first, weight=2.0 * first.weight)
+
+    def with_contacts(self, chosen: IntArray) -> WearProblem:
+        """Return the problem with some of its contacts, by number."""
         return replace(
             self,
             inputs=self.inputs.at(chosen),
             roller=self.roller[chosen],
-            weight=2.0 * self.weight[chosen],
+            weight=self.weight[chosen],
             half=self.half[chosen],
         )
 
@@ -155,9 +159,9 @@ class WearProblem:
         A tilted roller keeps its crown and turns about its apex: tilt adds a linear term, which
         moves the contact by R_crown times tilt.
         """
-        gap = np.take(self.flat_gap, self.roller, axis=1)
+        gap = self.at_contacts(self.flat_gap)
         if self.tilt_shifts and self.inputs.tilt.any():
-            gap = gap + self.inputs.tilt[:, :, None] * self.from_apex[self.roller][:, None, :]
+            gap = gap + self.inputs.tilt[:, :, None] * self.from_apex[self.roller]
         return gap
 
     @cached_property
@@ -246,8 +250,14 @@ class WearProblem:
             inputs = inputs.with_value_of(item, rollers, item.path.at(times)[:, None])
         if self.redraw is not None:
             inputs = self.redraw(inputs, first)
-        weight = np.ones(len(rollers))
-        return replace(self, inputs=inputs, roller=rollers, weight=weight, varying=())
+        return replace(
+            self,
+            inputs=inputs,
+            roller=rollers,
+            weight=np.ones(len(rollers)),
+            half=np.zeros(len(rollers), dtype=np.int64),
+            varying=(),
+        )
 
     @overload
     def time(self, passes: float) -> float: ...

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wearsim.contact_batch import BatchSolution, rows_of
-from wearsim.evolution.operating_points import operating_points
+from wearsim.evolution.operating_points import unworn_contacts
 from wearsim.evolution.problem import WearProblem
 from wearsim.types import ContactSolution, FloatArray, IntArray, Number
 
@@ -270,18 +270,11 @@ def fresh_state(problem: WearProblem) -> WearState:
     problem = problem.at_time(0.0, 0.0)
     stations, _, realisations = problem.shape
     n = problem.grid.strips
-    cylinder_depth = np.zeros((stations, 1, realisations, n))
-    roller_depth = np.zeros((1, problem.rollers, realisations, n))
-    loads = np.broadcast_to(problem.force(0.0) + problem.inputs.normal_force_offset, problem.shape)
-    contacts = problem.model.solve_batch(
-        problem.nominal_gap,
-        problem.kinematics.longitudinal_curvature,
-        operating_points(problem, loads, cylinder_depth, roller_depth),
-    )
+    contacts = problem.model.solve_batch(*unworn_contacts(problem))
     return WearState(
         passes=0.0,
-        cylinder_depth=cylinder_depth,
-        roller_depth=roller_depth,
+        cylinder_depth=np.zeros((stations, 1, realisations, n)),
+        roller_depth=np.zeros((1, problem.rollers, realisations, n)),
         terms=np.zeros((len(problem.terms), problem.rollers, realisations)),
         contacts=contacts,
         energy=np.zeros(realisations),

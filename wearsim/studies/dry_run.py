@@ -6,6 +6,7 @@ from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.scenario import Scenario, described_model
 from wearsim.studies.contact.single import study_contact
 from wearsim.studies.run.assemble import assemble_problem, check_model, load_range
+from wearsim.studies.run.draws import draw
 from wearsim.studies.run.grid import fresh_patch
 
 TableRows = list[tuple[str, str]]
@@ -37,7 +38,7 @@ def _random(scenario: Scenario) -> TableRows:
 
 
 def _test(scenario: Scenario) -> TableRows:
-    problem, _, stepper = assemble_problem(scenario)
+    problem, _, stepper = assemble_problem(draw(scenario))
     grid, law = problem.grid, scenario.wear
     counts = problem.kinematics.multiplicity
     identical = ", all identical" if len(counts) == 1 and counts[0] > 1 else ""

@@ -10,8 +10,8 @@ from wearsim.scenario import Scenario
 MOST_BYTES = 4_000_000_000
 """Memory limit for the results of a study."""
 
-# measured: numbers stored per realisation, and per random input of a realisation
-_NUMBERS, _NUMBERS_OF_A_DRAW = 20, 3
+# measured while the file is written: numbers per realisation, and per random input of a realisation
+_NUMBERS, _NUMBERS_OF_A_DRAW = 17, 2
 
 
 def checked_count(scenario: Scenario, realisations: int) -> int:

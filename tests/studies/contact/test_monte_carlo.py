@@ -14,11 +14,11 @@ from wearsim.errors import ContactError, Interrupted, ScenarioError
 from wearsim.results import DissipationResult, open_dissipation
 from wearsim.scenario import realise
 from wearsim.studies.contact import monte_carlo as study
-from wearsim.studies.contact.batch import Realisations
-from wearsim.studies.contact.draws import draw_contacts
+from wearsim.studies.contact.batch import Realisations, acting_inputs
 from wearsim.studies.contact.monte_carlo import dissipation
 from wearsim.studies.contact.single import study_contact
 from wearsim.studies.limits import bytes_per_realisation
+from wearsim.studies.run.draws import Drawer
 
 # mean and std [W]: converged, from another program
 PAPERS = {"no angles": (NO_ANGLES, 0.0739, 0.040), "all random": ({}, 0.1058, 0.047)}
@@ -156,7 +156,7 @@ def test_realisation_is_the_contact_with_its_values(case):
     batch = Realisations(scenario, 3)
     found = batch.solve(0, 3)
     for k in range(3):
-        values = {key: float(drawn[k]) for key, drawn in batch.draws.values.items()}
+        values = {key: float(drawn[k]) for key, drawn in batch.values.items()}
         single = study_contact(realise(scenario, values)).solution
         np.testing.assert_allclose(found.y, single.y, atol=1e-18)
         for name in ("power", "force_x", "force_y", "spin_moment", "longitudinal_creepage"):
@@ -224,10 +224,10 @@ def test_strips_cover_the_contacts_of_all_realisations():
     load = contacts.solve_mean_problem().columns["line_load"].ravel()
     assert (load > 1e-9 * load.max()).sum() == 50
     solved = contacts.solve(0, 500).columns
-    shift = 0.5 * np.abs(contacts.draws.values["creepage.tilt"]).max()
+    shift = 0.5 * np.abs(contacts.values["creepage.tilt"]).max()
     assert 2 * shift + 3.0e-3 < grid.spacing * grid.strips < 2 * shift + 4.0e-3
     loads = solved["line_load"].sum(axis=-1).ravel() * grid.spacing
-    np.testing.assert_allclose(loads, contacts.draws.values["load.normal_force"], rtol=1e-12)
+    np.testing.assert_allclose(loads, contacts.values["load.normal_force"], rtol=1e-12)
 
 
 def test_strips_of_the_scenario_are_used():
@@ -261,7 +261,7 @@ def test_realisation_without_solution_is_reported(tmp_path, monkeypatch):
     # patches of light loads are narrower than three strips
     scenario = contact(load__normal_force=positive("300 N", "280 N"), seed=3)
     contacts = Realisations(scenario, 4000)
-    loads = contacts.draws.values["load.normal_force"]
+    loads = contacts.values["load.normal_force"]
     first = min(int(k) for k in np.argsort(loads)[:8] if not _is_solved(contacts, int(k)))
     assert first >= 8  # so that a batch is completed before it
     with pytest.raises(ContactError) as caught:
@@ -348,7 +348,8 @@ def test_excessive_shift_by_tilt_is_reported(changes, text):
         dissipation(scenario, 50)
     message = str(caught.value)
     assert text in message
-    tilt = np.abs(draw_contacts(scenario, 50).values["creepage.tilt"]).max()
+    drawer = Drawer(acting_inputs(scenario)[0], "monte-carlo", 50)
+    tilt = np.abs(drawer.columns(0, 50)["creepage.tilt"]).max()
     assert f"{0.5 * tilt * 1e3:.4g} mm, crown radius x tilt = 500 mm x {tilt * 1e3:.4g}" in message
     assert "creepage.tilt_shifts_contact = false" in message
     free = contact(contact__my=50, creepage__tilt_shifts_contact=False, **changes)

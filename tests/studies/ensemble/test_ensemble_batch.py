@@ -34,7 +34,7 @@ def runs_of(count, **changes):
     half = max(float(np.abs(grid.y).max() + grid.spacing) for grid in grids)
     grid = Grid.spanning(-half, half, 71)
     model = prepared_model(scenario, grid)
-    built = [assemble_problem(one.scenario, grid, one, model)[:2] for one in draws]
+    built = [assemble_problem(one, grid, model)[:2] for one in draws]
     return [RealisationRun(k, one.values, one, *built[k]) for k, one in enumerate(draws)]
 
 

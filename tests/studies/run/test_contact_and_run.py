@@ -8,6 +8,7 @@ from tests.evolution import SCENARIOS
 from wearsim.errors import ScenarioError
 from wearsim.studies.dry_run import plan
 from wearsim.studies.run.assemble import assemble_problem
+from wearsim.studies.run.draws import draw
 
 
 def groove(folder):
@@ -70,7 +71,7 @@ def test_options_without_meaning_are_refused():
     ):
         scenario = wearsim.load_scenario(SCENARIOS / "rig-450min.toml", overrides=changes)
         with pytest.raises(ScenarioError, match=rf"\[evolution\] {key}: has no meaning"):
-            assemble_problem(scenario)
+            assemble_problem(draw(scenario))
 
 
 def test_centre_of_the_strips_can_be_set():

@@ -93,7 +93,7 @@ def test_rollers_have_separate_misalignments():
 def test_expectation_over_passes_agrees_with_per_pass_draws(drawn):
     inputs = {name: ALL_PER_PASS[name] for name in drawn}
     _, reference = end_of(scenario_of(evolution__stepper="per-pass", contact__strips=91, **inputs))
-    fresh, _, _ = assemble_problem(scenario_of(contact__strips=91, **inputs))
+    fresh, _, _ = assemble_problem(draw(scenario_of(contact__strips=91, **inputs)))
     step = round(10.0 * stability_limit(fresh, fresh_state(fresh)))
     problem, state = end_of(scenario_of(evolution__step=step, contact__strips=91, **inputs))
     assert state.steps < 20
@@ -179,18 +179,20 @@ def test_resumed_random_run_equals_unbroken_run(tmp_path, stepper):
 def test_run_refuses_friction_field():
     field = {"distribution": "white", "marginal": FRICTION}
     with pytest.raises(CapabilityError, match="resolved within one contact"):
-        assemble_problem(scenario_of(friction__coefficient=field))
+        draw(scenario_of(friction__coefficient=field))
 
 
 def test_run_refuses_latin_hypercube():
     with pytest.raises(ScenarioError, match="a study of many realisations"):
-        assemble_problem(scenario_of(load__normal_force=LOAD, sampling__plan="latin-hypercube"))
+        assemble_problem(
+            draw(scenario_of(load__normal_force=LOAD, sampling__plan="latin-hypercube"))
+        )
 
 
 def test_process_with_too_many_steps_is_refused():
     load = {**WANDERING, "correlation_time": "1 us", "marginal": LOAD}
     with pytest.raises(ScenarioError, match="a longer correlation_time"):
-        assemble_problem(scenario_of(passes=100_000, load__normal_force=load))
+        draw(scenario_of(passes=100_000, load__normal_force=load))
 
 
 @pytest.mark.parametrize("key", ["load__normal_force", "friction__coefficient"])
@@ -243,7 +245,7 @@ def test_records_are_comparable_between_steppers():
 def test_strips_cover_groove_of_greatest_friction():
     friction = {"distribution": "uniform", "low": 0.05, "high": 1.0, "persistence": "per-roller"}
     scenario = scenario_of(friction__coefficient=friction, seed=3)
-    plain, _, _ = assemble_problem(scenario_of())
+    plain, _, _ = assemble_problem(draw(scenario_of()))
     problem, state = end_of(scenario)
     assert problem.inputs.friction.max() > 0.5
     assert np.ptp(problem.grid.y) > 1.3 * np.ptp(plain.grid.y)
@@ -261,19 +263,23 @@ def test_strips_cover_groove_of_creepage_about_zero(creepage):
     changes = {"creepage__longitudinal": creepage, "evolution__tolerance": 1e-2}
     problem, state = end_of(scenario_of(passes=20_000, **changes))
     worn = problem.grid.y[state.cylinder_depth[0, 0, 0] > 0.0]
-    fresh = assemble_problem(scenario_of(passes=20_000, creepage__longitudinal=0.0))[0].grid.y[-1]
+    fresh = assemble_problem(draw(scenario_of(passes=20_000, creepage__longitudinal=0.0)))[
+        0
+    ].grid.y[-1]
     assert fresh < worn[-1] < problem.grid.y[-1]
 
 
 def test_nodes_without_expectation_are_refused():
     for changes in ({}, {"evolution__stepper": "per-pass", **ALL_PER_PASS}):
         with pytest.raises(ScenarioError, match="without an expectation over passes"):
-            assemble_problem(scenario_of(evolution__nodes=16, **changes))
+            assemble_problem(draw(scenario_of(evolution__nodes=16, **changes)))
 
 
 def test_step_is_shortened_where_coarse_solution_fails(monkeypatch):
     friction = {**FRICTION, "persistence": "per-pass"}
-    problem, stepper, _ = assemble_problem(scenario_of(passes=600, friction__coefficient=friction))
+    problem, stepper, _ = assemble_problem(
+        draw(scenario_of(passes=600, friction__coefficient=friction))
+    )
     fresh = fresh_state(problem)
     plain = stepper.advance(problem, fresh, 600.0).end
     original, failures = (

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from wearsim.evolution.operating_points import operating_point
+from wearsim.evolution.operating_points import operating_points
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.base import Advance, Stepper
@@ -89,14 +89,22 @@ def _term_rates(problem: WearProblem) -> FloatArray:
     return np.array(rates).reshape(len(lags), 1 + len(own_pass))
 
 
-def _slip_base(problem: WearProblem) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _slip_base(
+    problem: WearProblem, from_apex: FloatArray, realisation: int
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the fields `slip_base`, `spin_arm` and `slip_rates` of `PassLoop`."""
-    kinematics, zeros = problem.kinematics, np.zeros_like(problem.from_apex)
+    kinematics, zeros = problem.kinematics, np.zeros_like(from_apex)
     if problem.slip_profile is None:
         return zeros, np.repeat(problem.grid.y[None], len(zeros), axis=0), np.zeros(2)
     rates = np.array([1.0 / kinematics.roller_radius, 1.0 / kinematics.cylinder_radius])
-    arm = zeros if problem.tilt_shifts else np.ascontiguousarray(problem.from_apex)
-    return np.ascontiguousarray(problem.slip_profile), arm, rates
+    arm = zeros if problem.tilt_shifts else from_apex
+    return _of_realisation(problem, problem.slip_profile, realisation), arm, rates
+
+
+def _of_realisation(problem: WearProblem, values: FloatArray, realisation: int) -> FloatArray:
+    """Return an array of the rollers, (rollers, strips), in one realisation."""
+    shape = (len(values), problem.shape[2], problem.grid.strips)
+    return np.array(np.broadcast_to(values, shape)[:, realisation])
 
 
 def _run_compiled(problem: WearProblem, state: WearState, count: int) -> WearState:
@@ -106,7 +114,6 @@ def _run_compiled(problem: WearProblem, state: WearState, count: int) -> WearSta
     carried = np.zeros((3, *problem.shape)) if carried is None else carried.copy()
     cylinder, roller = state.cylinder_depth.copy(), state.roller_depth.copy()
     terms, energy, full_solves = state.terms.copy(), state.energy.copy(), state.full_solves
-    slip_base, spin_arm, slip_rates = _slip_base(problem)
     kinematics, speed = problem.kinematics, problem.kinematics.rolling_speed
     per_power = [problem.law.depth_per_dissipation(body, speed) or 0.0 for body in BODIES]
     ratio = kinematics.cylinder_radius / kinematics.roller_radius
@@ -116,6 +123,8 @@ def _run_compiled(problem: WearProblem, state: WearState, count: int) -> WearSta
     # every physical roller dissipates all the time, one pass per turn of the cylinder
     turn = kinematics.physical_rollers / kinematics.pass_rate
     for v in range(problem.shape[2]):
+        from_apex = _of_realisation(problem, problem.from_apex, v)
+        slip_base, spin_arm, slip_rates = _slip_base(problem, from_apex, v)
         loop = PassLoop(
             order=turn_order(problem),
             first_pass=int(state.passes),
@@ -125,8 +134,8 @@ def _run_compiled(problem: WearProblem, state: WearState, count: int) -> WearSta
             tilt=lever * inputs.tilt[:, v],
             spin=np.ascontiguousarray(passes.spin[:, v]),
             stiffness=problem.load.stiffness,
-            nominal_gap=np.ascontiguousarray(problem.flat_gap[0, :, v]),
-            from_apex=np.ascontiguousarray(problem.from_apex),
+            nominal_gap=_of_realisation(problem, problem.flat_gap[0], v),
+            from_apex=from_apex,
             longitudinal_curvature=kinematics.longitudinal_curvature,
             rolling_speed=speed,
             slip_base=slip_base,
@@ -175,15 +184,17 @@ def _run_in_python(problem: WearProblem, state: WearState, count: int) -> WearSt
     )
     turn = kinematics.physical_rollers / kinematics.pass_rate
     for number, r in enumerate(rollers):
+        one = passes.with_contacts(np.array([number]))
         multiplicity = float(kinematics.multiplicity[r])
         ratio = kinematics.cylinder_radius / kinematics.roller_radius
         ratio /= multiplicity * problem.shape[0]
         for s, _, v in np.ndindex((problem.shape[0], 1, problem.shape[2])):
-            unworn = passes.nominal_gap[s, number, v]
+            unworn = one.nominal_gap[s, 0, v]
             gap = unworn + cylinder[s, 0, v] + roller[0, r, v]
             load = float(force[number, v]) + float(terms[:, r, v].sum())
             load -= problem.load.stiffness * float(gap.min() - unworn.min())
-            point = operating_point(passes, (number, v), load, cylinder[s, 0, v], roller[0, r, v])
+            points = operating_points(one, np.full(one.shape, load), cylinder, roller)
+            point = points[s * problem.shape[2] + v]
             contacts[s, r, v] = contact = problem.model.solve(
                 gap, kinematics.longitudinal_curvature, point, None, contacts[s, r, v]
             )

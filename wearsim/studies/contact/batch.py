@@ -3,47 +3,33 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from wearsim.contact_batch import BatchSolution, OperatingPoints
 from wearsim.errors import ContactError, Mistake, ScenarioError, SolverError
+from wearsim.evolution.operating_points import unworn_contacts
 from wearsim.plugins import ContactModel
-from wearsim.scenario import Scenario
-from wearsim.studies.contact.draws import (
-    FRICTION,
-    LOAD,
-    LONGITUDINAL,
-    OFFSET,
-    TILT,
-    TORQUE,
-    YAW,
-    draw_contacts,
-)
+from wearsim.scenario import RandomInput, Scenario, realise
 from wearsim.studies.contact.friction_field import LocalFriction
-from wearsim.studies.run.assemble import (
-    check_model,
-    flat_gap,
-    load_range,
-    slip_profile,
-    start_height,
-)
+from wearsim.studies.run.assemble import build_problem, check_model, load_range
+from wearsim.studies.run.draws import Drawer, units_of
 from wearsim.studies.run.grid import (
     MOST_STRIPS,
-    contact_centres,
+    contact_positions,
     fresh_patch,
-    initial_contact_positions,
     profile_grid,
     suggested_grid,
 )
-from wearsim.types import Creepage, FloatArray, Grid, OperatingPoint
-
-Columns = Mapping[str, FloatArray]
-"""Inputs of the contacts by the scenario's key, each of shape (contacts,)."""
+from wearsim.studies.run.inputs import FIELDS, OFFSET, TILT, contact_inputs, contact_values
+from wearsim.types import FloatArray, Grid, OperatingPoint
 
 _MARGIN = 1e-9  # of a patch, against rounding at the outer edges
 _ROUNDING = 1e-12
+# probabilities between the extremes at which a random option of the load is tried
+_BETWEEN = np.array([0.01, 0.1, 0.25, 0.5, 0.75, 0.9, 0.99])
 
 
 class Realisations:
@@ -70,23 +56,17 @@ class Realisations:
         self.scenario, self.count = scenario, count
         self.model = scenario.contact.build()
         check_model(scenario, self.model)
-        self._load = load_range(scenario, scenario.load.build(), 0.0)[0]
-        self.draws = draw_contacts(scenario, count)
-        item = self.draws.field
-        self._field = LocalFriction(scenario, self.model, item) if item is not None else None
-        columns = self._columns(slice(0, count))
-        centres = initial_contact_positions(scenario, columns[OFFSET], columns[TILT])
-        self.grid = realisation_grid(scenario, self.model, self._load, columns[LOAD], centres)
+        mean_load = load_range(scenario, scenario.load.build(), 0.0)[0]
+        self._once, field, self.notes = acting_inputs(scenario)
+        drawer = Drawer(self._once, scenario.sampling.plan, count, replicates=1)
+        self.values, self.units = drawer.columns(0, count), units_of(self._once)
+        self._field = LocalFriction(scenario, self.model, field) if field is not None else None
+        drawn = self._drawn(slice(None))
+        self.loads = np.full(count, mean_load) + drawn.get("normal_force_offset", 0.0)
+        centres = contact_positions(scenario, contact_inputs(scenario, [0], drawn))
+        self.grid = realisation_grid(scenario, self.model, mean_load, self.loads, centres)
         self.model.prepare(self.grid, (scenario.cylinder.material, scenario.roller.material))
-        self._curvature = 1.0 / scenario.cylinder.radius + 1.0 / scenario.roller.radius
-        self._height = start_height(scenario.cylinder.profile, self.grid)
-        self.friction_points = (
-            0 if self._field is None else self._checked_points(self._field, columns)
-        )
-
-    def loads(self, first: int, count: int) -> FloatArray:
-        """Return the loads of consecutive realisations, shape (count,) [N]."""
-        return self._columns(slice(first, first + count))[LOAD]
+        self.friction_points = 0 if self._field is None else self._checked_points(self._field)
 
     def solve(self, first: int, count: int) -> BatchSolution:
         """Solve consecutive realisations; leading axes (1, 1, count).
@@ -113,107 +93,33 @@ class Realisations:
 
     def solve_mean_problem(self) -> BatchSolution:
         """Solve the contact with every input at its mean; leading axes (1, 1, 1)."""
-        columns = self._mean_columns()
-        return self.model.solve_batch(self._gap(columns), self._curvature, self._points(columns))
+        problem = build_problem(self.scenario, self.model, self.grid, {})
+        return self.model.solve_batch(*unworn_contacts(problem))
 
-    def _mean_columns(self) -> dict[str, FloatArray]:
-        scenario, creepage = self.scenario, self.scenario.creepage
-        means = {
-            LOAD: self._load,
-            FRICTION: scenario.friction.coefficient,
-            LONGITUDINAL: creepage.longitudinal or 0.0,
-            TORQUE: creepage.bearing_torque or 0.0,
-            YAW: scenario.per_roller(creepage.yaw)[0],
-            TILT: scenario.per_roller(creepage.tilt)[0],
-            OFFSET: scenario.per_roller(scenario.roller.offset)[0],
-        }
-        return {key: np.array([value]) for key, value in means.items()}
+    def _drawn(self, part: slice) -> dict[str, FloatArray]:
+        """Return the drawn inputs of some realisations by the names of `contact_values`."""
+        values = {key: column[part] for key, column in self.values.items()}
+        return contact_values(self._once.random, values)
 
-    def _columns(self, part: slice) -> dict[str, FloatArray]:
-        """Return the inputs of some realisations."""
-        drawn, count = self.draws.values, part.stop - part.start
-        columns = {key: np.repeat(value, count) for key, value in self._mean_columns().items()}
-        columns |= {key: values[part] for key, values in drawn.items()}
-        if LOAD in drawn:
-            mean = next(item.mean[0] for item in self.scenario.random if item.name == LOAD)
-            columns[LOAD] = self._load + (drawn[LOAD][part] - mean)
-        return columns
-
-    def _from_apex(self, columns: Columns) -> FloatArray:
-        """Return the distance from the roller's apex, (contacts, strips), or (1, strips) [m]."""
-        offset = columns[OFFSET] if OFFSET in self.draws.values else columns[OFFSET][:1]
-        return np.asarray(self.grid.y - offset[:, None])
-
-    def _gap(self, columns: Columns) -> FloatArray:
-        """Return the gaps, (1, 1, contacts, strips) [m]; of stride 0 where all are the same."""
-        s, tilt = self._from_apex(columns), columns[TILT]
-        gap = flat_gap(self.scenario, s, self._height)
-        if self.scenario.creepage.tilt_shifts_contact and tilt.any():
-            gap = gap + tilt[:, None] * s
-        return np.broadcast_to(gap, (len(tilt), self.grid.strips))[None, None]
-
-    def _variation(self, columns: Columns) -> FloatArray | None:
-        """Return the creepage's variation where there is differential slip, (contacts, strips).
-
-        The tilt acts either as the shift of the contact from the apex or, if it does not shift the
-        contact, as the spin's -phi y.
-        """
-        scenario, creepage = self.scenario, self.scenario.creepage
-        if not creepage.differential_slip:
-            return None
-        s = self._from_apex(columns)
-        slip = slip_profile(scenario, s, self._height)
-        if not creepage.tilt_shifts_contact:
-            slip = slip - columns[TILT][:, None] / scenario.roller.radius * s
-        return np.array(np.broadcast_to(slip, (len(columns[TILT]), self.grid.strips)))
-
-    def _points(self, columns: Columns) -> OperatingPoints | list[OperatingPoint]:
-        roller = self.scenario.roller
-        points = OperatingPoints(
-            normal_force=columns[LOAD],
-            longitudinal=columns[LONGITUDINAL],
-            lateral=columns[YAW],
-            spin=columns[TILT] / roller.radius,
-            friction=columns[FRICTION],
-            rolling_speed=self.scenario.rolling_speed,
-            variation=self._variation(columns),
-        )
-        if self.scenario.creepage.drive == "creepage":
-            return points
-        # a free roller, whose creepage follows from the bearing torque
-        s = self._from_apex(columns)
-        radius = roller.radius - s * s / (2.0 * roller.crown_radius)
-        arms = np.broadcast_to(radius, (len(points), self.grid.strips))
-        return [
-            OperatingPoint(
-                normal_force=point.normal_force,
-                rolling_speed=point.rolling_speed,
-                creepage=Creepage(
-                    0.0, point.creepage.lateral, point.creepage.spin, point.creepage.variation
-                ),
-                friction=point.friction,
-                bearing_torque=float(torque),
-                rolling_radius=arm,
-            )
-            for point, torque, arm in zip(points, columns[TORQUE], arms, strict=True)
-        ]
+    def _contacts(self, part: slice) -> tuple[FloatArray, float, Sequence[OperatingPoint]]:
+        """Return gaps, curvature along rolling and operating points of some realisations."""
+        drawn = {name: values[None] for name, values in self._drawn(part).items()}
+        count = part.stop - part.start
+        problem = build_problem(self.scenario, self.model, self.grid, drawn, realisations=count)
+        return unworn_contacts(problem)
 
     def _solve(self, part: slice) -> BatchSolution:
-        columns = self._columns(part)
-        gap, points = self._gap(columns), self._points(columns)
+        gap, curvature, points = self._contacts(part)
         if self._field is not None and isinstance(points, OperatingPoints):
-            x, y = self.model.friction_points_batch(gap, self._curvature, points)
+            x, y = self.model.friction_points_batch(gap, curvature, points)
             points = self._field.put(points, x, y, part.start)
-        return self.model.solve_batch(gap, self._curvature, points)
+        return self.model.solve_batch(gap, curvature, points)
 
-    def _checked_points(self, field: LocalFriction, columns: Columns) -> int:
+    def _checked_points(self, field: LocalFriction) -> int:
         """Check that the points of a strip resolve the friction field; return their number."""
-        heaviest = int(np.argmax(columns[LOAD]))
-        single = {key: values[heaviest : heaviest + 1] for key, values in columns.items()}
+        heaviest = int(np.argmax(self.loads))
         try:
-            x, _ = self.model.friction_points_batch(
-                self._gap(single), self._curvature, self._points(single)
-            )
+            x, _ = self.model.friction_points_batch(*self._contacts(slice(heaviest, heaviest + 1)))
         except SolverError as error:
             raise self._failure(heaviest, error) from error
         field.check(x[0], self.grid.spacing)
@@ -221,16 +127,74 @@ class Realisations:
 
     def _failure(self, number: int, error: SolverError) -> ContactError:
         """Return the error of one realisation, with its random inputs."""
-        units = self.draws.units
         drawn = ", ".join(
-            f"{key} {values[number]:.6g}" + (f" {units[key]}" if units[key] != "1" else "")
-            for key, values in self.draws.values.items()
+            f"{key} {values[number]:.6g}" + (f" {unit}" if unit != "1" else "")
+            for (key, values), unit in zip(self.values.items(), self.units.values(), strict=True)
         )
         return ContactError(
             f"realisation {number} of seed {self.scenario.seed} has no solution: {error}"
             f"\nits inputs: {drawn or 'none except the friction field'}",
             error.state,
         )
+
+
+def acting_inputs(
+    scenario: Scenario,
+) -> tuple[Scenario, RandomInput | None, tuple[str, ...]]:
+    """Return the random inputs that change one contact at the start of its load.
+
+    Returns
+    -------
+    once : Scenario
+        The scenario with those inputs only, each drawn once per realisation; a process is
+        represented by its marginal distribution.
+    field : RandomInput or None
+        The friction field.
+    notes : tuple of str
+        Names of the inputs without effect.
+
+    Raises
+    ------
+    ScenarioError
+        If an option of the load other than its force is random and changes the force.
+    """
+    acting = [item for item in scenario.random if _acts(scenario, item)]
+    idle = [item.name for item in scenario.random if item not in acting]
+    verb = "have" if len(idle) > 1 else "has"
+    note = f"{', '.join(idle)} {verb} no effect on the dissipation of a contact: not drawn"
+    drawn = tuple(
+        replace(
+            item,
+            persistence="per-test",
+            distribution=item.scalar if item.role == "process" else item.distribution,
+        )
+        for item in acting
+        if item.role != "field"
+    )
+    field = next((item for item in acting if item.role == "field"), None)
+    return replace(scenario, random=drawn), field, (note,) if idle else ()
+
+
+def _acts(scenario: Scenario, item: RandomInput) -> bool:
+    """Return whether a random input changes one contact at the start of its load."""
+    if set(item.keys) <= FIELDS.keys():
+        return True
+    if not item.name.startswith("load."):
+        return False
+    values = {*item.extremes, *item.scalar.quantile(_BETWEEN).tolist()}
+    start = np.zeros(1)
+    forces = {
+        float(realise(scenario, {item.name: value}).load.build().force(start)[0])
+        for value in values
+    }
+    if len(forces) == 1:
+        return False
+    table, key = item.name.split(".", 1)
+    mean = item.mean[0]
+    written = str(item.quantity.write(mean)) if item.quantity else f"{mean:g}"
+    what = "changes the load of the contact, and only load.normal_force can be random here"
+    expected = f"one value, such as {written}"
+    raise ScenarioError(scenario.file, [Mistake(table, key, what, item.kind, expected)])
 
 
 def realisation_grid(
@@ -264,7 +228,9 @@ def realisation_grid(
     choice, profile = scenario.contact, scenario.cylinder.profile
     mean_b = fresh_patch(scenario, load).b
     half_widths = mean_b * np.cbrt(np.maximum(loads, 0.0) / load)
-    centre = choice.centre if choice.centre is not None else contact_centres(scenario)[0]
+    centre = choice.centre
+    if centre is None:
+        centre = contact_positions(scenario, contact_inputs(scenario, [0])).item()
     away = np.abs(centres - centre)
     if profile is not None and choice.width is None:
         return profile_grid(profile, mean_b, choice.strips)

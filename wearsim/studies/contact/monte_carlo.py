@@ -103,9 +103,8 @@ class _Study:
         self._created = datetime.now(UTC).isoformat(timespec="seconds")
         self.scenario, self.path, self.done = scenario, path, 0
         self.contacts = Realisations(scenario, count)
-        draws = self.contacts.draws
-        if not draws.values and draws.field is None:
-            what = "; ".join(["no random input acts on the contact", *draws.notes])
+        if not self.contacts.values and not self.contacts.friction_points:
+            what = "; ".join(["no random input acts on the contact", *self.contacts.notes])
             raise ScenarioError(scenario.file, [nothing_random(what)])
         self._mean_problem = self.contacts.solve_mean_problem()
         strips = self.contacts.grid.strips
@@ -147,14 +146,14 @@ class _Study:
         variables = {
             "y": contacts.grid.y,
             **{name: values[:done] for name, values in self._scalars.items()},
-            "normal_force": contacts.loads(0, done),
+            "normal_force": contacts.loads[:done],
             "dissipation": kept,
             "dissipation_mean": mean,
             "dissipation_std": std,
             "dissipation_low": low,
             "dissipation_high": high,
             "mean_problem_dissipation": self._mean_problem.columns["dissipation"].ravel(),
-            **{key: values[:done] for key, values in contacts.draws.values.items()},
+            **{key: values[:done] for key, values in contacts.values.items()},
         }
         friction_grid = (
             f"{points} points along each of {contacts.grid.strips} strips of"
@@ -163,13 +162,13 @@ class _Study:
         data = DissipationData(
             **origin_of(scenario),
             plan=scenario.sampling.plan,
-            inputs=[{"key": key, "unit": unit} for key, unit in contacts.draws.units.items()],
+            inputs=[{"key": key, "unit": unit} for key, unit in contacts.units.items()],
             asked=contacts.count,
             finished=done == contacts.count,
             strip_width=contacts.grid.spacing,
             friction_grid=friction_grid if points else "",
             mean_problem_power=float(self._mean_problem.columns["power"].item()),
-            notes=[*scenario.notes, *contacts.draws.notes],
+            notes=[*scenario.notes, *contacts.notes],
             warnings=self._warnings(len(kept)),
             variables=variables,
             statistics=as_numbers(summaries(variables)),

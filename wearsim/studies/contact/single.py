@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 
-import numpy as np
-
 from wearsim.errors import WearsimError
-from wearsim.evolution.operating_points import operating_point
+from wearsim.evolution.operating_points import unworn_contacts
 from wearsim.plugins import ContactModel
 from wearsim.scenario import Scenario, described_model
-from wearsim.studies.run.assemble import check_model, load_range, problem_at_means
-from wearsim.studies.run.grid import contact_centres, fresh_patch, profile_grid, suggested_grid
+from wearsim.studies.run.assemble import build_problem, check_model, load_range, prepared_model
+from wearsim.studies.run.grid import contact_positions, fresh_patch, profile_grid, suggested_grid
+from wearsim.studies.run.inputs import contact_inputs
 from wearsim.types import (
     ContactFields,
     ContactSolution,
@@ -63,10 +62,12 @@ class ContactStudy:
     notes: tuple[str, ...]
 
 
-def _grid(scenario: Scenario, model: ContactModel, load: float, profile: Profile | None) -> Grid:
+def _grid(scenario: Scenario, model: ContactModel, load: float) -> Grid:
     """Return the strips of the scenario, of the profile's whole width, or of the model's choice."""
-    choice = scenario.contact
-    centre = choice.centre if choice.centre is not None else contact_centres(scenario)[0]
+    choice, profile = scenario.contact, scenario.cylinder.profile
+    centre = choice.centre
+    if centre is None:
+        centre = contact_positions(scenario, contact_inputs(scenario, [0])).item()
     half_width = fresh_patch(scenario, load).b
     if choice.width is None and profile is not None:
         return profile_grid(profile, half_width, choice.strips)
@@ -108,17 +109,18 @@ def study_contact(
     CapabilityError
         If the model does not support the scenario.
     """
+    if profile is not None:
+        scenario = replace(scenario, cylinder=replace(scenario.cylinder, profile=profile))
     model = scenario.contact.build()
     check_model(scenario, model)
     force = load_range(scenario, scenario.load.build(), 0.0)[0]
-    profile = profile if profile is not None else scenario.cylinder.profile
-    grid = _grid(scenario, model, force, profile)
-    gap, curvature, point = _problem(scenario, model, grid, force, profile)
+    grid = _grid(scenario, model, force)
+    model, gap, curvature, point = _contact(scenario, grid)
     solution = model.solve(gap, curvature, point)
     fields = model.fields(solution, gap, curvature, point) if with_fields else None
     error, seconds = None, None
     if with_error:
-        error = _grid_error(scenario, grid, force, profile, solution.power)
+        error = _grid_error(scenario, grid, solution.power)
         start = perf_counter()
         model.solve(gap, curvature, point)
         seconds = perf_counter() - start
@@ -136,28 +138,25 @@ def study_contact(
     )
 
 
-def _problem(
-    scenario: Scenario, model: ContactModel, grid: Grid, force: float, profile: Profile | None
-) -> tuple[FloatArray, float, OperatingPoint]:
-    """Prepare a model for strips; return gap [m], curvature along rolling [1/m] and the point."""
-    model.prepare(grid, (scenario.cylinder.material, scenario.roller.material))
-    load = scenario.load.build()
-    problem = problem_at_means(scenario, model, load, grid, [0], np.ones(1), profile)
-    unworn = np.zeros(grid.strips)
-    point = operating_point(problem, (0, 0), force, unworn, unworn)
-    return problem.nominal_gap[0, 0, 0], problem.kinematics.longitudinal_curvature, point
+def _contact(
+    scenario: Scenario, grid: Grid
+) -> tuple[ContactModel, FloatArray, float, OperatingPoint]:
+    """Return a model prepared for strips, gap [m], curvature along rolling [1/m] and the point."""
+    model = prepared_model(scenario, grid)
+    problem = build_problem(scenario, model, grid, {})
+    gap, curvature, points = unworn_contacts(problem)
+    return model, gap[0, 0, 0], curvature, points[0]
 
 
-def _grid_error(
-    scenario: Scenario, grid: Grid, force: float, profile: Profile | None, power: float
-) -> float | None:
+def _grid_error(scenario: Scenario, grid: Grid, power: float) -> float | None:
     """Return the relative change of the power with half as many strips."""
     ends = grid.y[0] - 0.5 * grid.spacing, grid.y[-1] + 0.5 * grid.spacing
     if grid.strips < 2 * _FEWEST or power == 0.0:
         return None
-    coarse, model = Grid.spanning(*ends, (grid.strips + 1) // 2), scenario.contact.build()
     try:
-        solution = model.solve(*_problem(scenario, model, coarse, force, profile))
+        coarse = Grid.spanning(*ends, (grid.strips + 1) // 2)
+        model, gap, curvature, point = _contact(scenario, coarse)
+        solution = model.solve(gap, curvature, point)
     except WearsimError:
         return None
     return abs(solution.power / power - 1.0)

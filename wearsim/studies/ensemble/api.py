@@ -34,7 +34,7 @@ from wearsim.studies.ensemble.realisation import RealisationRunner, shared_grid
 from wearsim.studies.execution.factory import executor
 from wearsim.studies.limits import checked_count, nothing_random
 from wearsim.studies.run.assemble import assemble_problem
-from wearsim.studies.run.draws import Drawer, units_of
+from wearsim.studies.run.draws import Drawer, draw, units_of
 from wearsim.studies.run.provenance import changed_origins, check_plugins, origin_of
 from wearsim.studies.run.recorder import RecordSchedule
 from wearsim.types import FloatArray, Grid
@@ -239,7 +239,7 @@ def _header(scenario: Scenario, request: EnsembleRequest, grid: Grid) -> Ensembl
     drawn = [item for item in scenario.random if item.name in drawer.groups]
     averaged = tuple(item for item in scenario.random if item.name not in drawer.groups)
     # a scenario that cannot run is refused before anything is written
-    _, _, stepper = assemble_problem(replace(scenario, random=averaged), grid)
+    _, _, stepper = assemble_problem(draw(replace(scenario, random=averaged)), grid)
     return EnsembleData(
         **origin_of(scenario),
         finished=False,

@@ -135,7 +135,7 @@ class RealisationRunner:
         if low <= first + margin and high >= last - margin:
             grid = self.grid
         model = self._model(draws.scenario, grid)
-        problem, stepper, _ = assemble_problem(draws.scenario, grid, draws, model)
+        problem, stepper, _ = assemble_problem(draws, grid, model)
         return RealisationRun(number, drawn, draws, problem, stepper)
 
     def _model(self, scenario: Scenario, grid: Grid) -> ContactModel:

@@ -1,7 +1,8 @@
-"""Construction of a wear problem and its stepper from a scenario."""
+"""Construction of a wear problem and its stepper from a scenario and drawn values."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,11 +21,12 @@ from wearsim.evolution.steppers.per_pass import PerPassStepper
 from wearsim.evolution.steppers.rkl2 import StabilisedStepper
 from wearsim.evolution.steppers.single_step import explicit_step
 from wearsim.plugins import ContactModel, Load
-from wearsim.scenario import Scenario, require_run
-from wearsim.studies.run.draws import Draws, draw
+from wearsim.scenario import Scenario
+from wearsim.studies.run.draws import Draws
 from wearsim.studies.run.grid import InputMaxima, run_grid
+from wearsim.studies.run.inputs import contact_inputs
 from wearsim.studies.run.pass_quadrature import MAX_NODES, minimum_nodes, redrawing, with_nodes
-from wearsim.types import FloatArray, Grid, Profile
+from wearsim.types import FloatArray, Grid
 
 ITERATION_FRACTION = 1e-3  # convergence criterion of a step's iterations, over the tolerance
 ITERATION_RANGE = 1e-8, 1e-5
@@ -105,39 +107,12 @@ def merged_rollers(draws: Draws) -> tuple[list[int], FloatArray]:
     return [rows.index(kind) for kind in kinds], np.array([float(rows.count(k)) for k in kinds])
 
 
-def start_height(profile: Profile | None, grid: Grid) -> FloatArray:
-    """Return a cylinder's height above nominal before wear, shape (strips,) [m]."""
+def start_height(scenario: Scenario, grid: Grid) -> FloatArray:
+    """Return the cylinder's height above nominal before wear, shape (strips,) [m]."""
+    profile = scenario.cylinder.profile
     if profile is None:
         return np.zeros_like(grid.y)
     return np.interp(grid.y, profile.y, profile.height)
-
-
-def flat_gap(scenario: Scenario, s: FloatArray, height: FloatArray) -> FloatArray:
-    """Return the gap without tilt before wear [m].
-
-    Parameters
-    ----------
-    scenario : Scenario
-    s : ndarray, shape (..., strips)
-        Distance from the roller's apex [m].
-    height : ndarray, shape (strips,)
-        Initial height of the cylinder, from `start_height` [m].
-    """
-    return s * s / (2.0 * scenario.roller.crown_radius) - height
-
-
-def slip_profile(scenario: Scenario, s: FloatArray, height: FloatArray) -> FloatArray:
-    """Return the differential slip without tilt before wear.
-
-    s^2/(2 R_crown R_roller), s from the roller's apex, and the initial height over R_cylinder.
-
-    Parameters
-    ----------
-    scenario, s, height
-        As for `flat_gap`.
-    """
-    slip = s * s / (2.0 * scenario.roller.crown_radius * scenario.roller.radius)
-    return slip + height / scenario.cylinder.radius
 
 
 def load_range(scenario: Scenario, load: Load, stop: float) -> tuple[float, float]:
@@ -167,34 +142,28 @@ def load_range(scenario: Scenario, load: Load, stop: float) -> tuple[float, floa
 
 
 def assemble_problem(
-    scenario: Scenario,
-    grid: Grid | None = None,
-    draws: Draws | None = None,
-    model: ContactModel | None = None,
+    draws: Draws, grid: Grid | None = None, model: ContactModel | None = None
 ) -> tuple[WearProblem, Stepper, str]:
     """Return the problem of a run, its stepper and the stepper's name.
 
     Parameters
     ----------
-    scenario : Scenario
+    draws : Draws
+        The scenario, with the values of its random inputs.
     grid : Grid, optional
         Strips of an earlier part of the run, instead of the scenario's choice.
-    draws : Draws, optional
-        Values of the scenario's random inputs, if already drawn.
     model : ContactModel, optional
         A model from `prepared_model`; requires `grid`.
 
     Raises
     ------
     ScenarioError
-        If the scenario lacks values that a run requires.
+        If a setting has no meaning for the run, or the contact does not fit on the strips.
     CapabilityError
         If the contact model does not support the scenario.
     """
-    require_run(scenario)
-    draws = draws if draws is not None else draw(scenario)
     scenario = draws.scenario
-    load, chosen = scenario.load.build(), model or scenario.contact.build()
+    chosen = model or scenario.contact.build()
     check_model(scenario, chosen)
     first, multiplicity = merged_rollers(draws)
     name = chosen_stepper(scenario, chosen, 2 if draws.passes else len(first))
@@ -205,10 +174,22 @@ def assemble_problem(
     grid = grid if grid is not None else strips_of_run(draws)
     if model is None:
         chosen.prepare(grid, (scenario.cylinder.material, scenario.roller.material))
-    problem = problem_at_means(
-        scenario, chosen, load, grid, first, multiplicity, scenario.cylinder.profile
+    place = {number: k for k, number in enumerate(first)}
+    problem = replace(
+        build_problem(
+            scenario,
+            chosen,
+            grid,
+            {name: values[first][:, None] for name, values in draws.rollers.items()},
+            rollers=first,
+            multiplicity=multiplicity,
+        ),
+        law=scenario.wear.build() if scenario.wear is not None else NoWear(),
+        varying=tuple(
+            replace(item, rollers=tuple(place[r] for r in item.rollers if r in place))
+            for item in draws.varying
+        ),
     )
-    problem = with_draws(problem, draws, first)
     if draws.passes and stepper.pass_by_pass:
         nodes = with_nodes(problem, scenario, draws.passes, minimum_nodes(draws.passes))
         problem = replace(problem, redraw=redrawing(scenario, draws.passes), expectation=nodes)
@@ -238,17 +219,6 @@ def strips_of_run(draws: Draws) -> Grid:
     return run_grid(scenario, greatest, maxima)
 
 
-def with_draws(problem: WearProblem, draws: Draws, rollers: list[int]) -> WearProblem:
-    """Return the problem with the random inputs of its rollers, and with the paths of processes."""
-    values = {name: array[rollers][:, None] for name, array in draws.rollers.items()}
-    place = {number: k for k, number in enumerate(rollers)}
-    varying = tuple(
-        replace(item, rollers=tuple(place[r] for r in item.rollers if r in place))
-        for item in draws.varying
-    )
-    return replace(problem, inputs=problem.inputs.with_values(values), varying=varying)
-
-
 def with_converged_nodes(problem: WearProblem, draws: Draws) -> WearProblem:
     """Return the problem with quadrature nodes for the inputs that are drawn at every pass.
 
@@ -271,67 +241,61 @@ def with_converged_nodes(problem: WearProblem, draws: Draws) -> WearProblem:
         count *= 2
 
 
-def problem_at_means(
+def build_problem(
     scenario: Scenario,
     model: ContactModel,
-    load: Load,
     grid: Grid,
-    rollers: list[int],
-    multiplicity: FloatArray,
-    profile: Profile | None,
+    drawn: Mapping[str, FloatArray],
+    *,
+    rollers: Sequence[int] = (0,),
+    multiplicity: FloatArray | None = None,
+    realisations: int = 1,
 ) -> WearProblem:
-    """Return the problem of some rollers, every random input at its mean.
+    """Return the problem of some rollers without wear, for any number of realisations.
 
     Parameters
     ----------
     scenario : Scenario
     model : ContactModel
         Prepared for the grid.
-    load : Load
     grid : Grid
-    rollers : list of int
-        Numbers of the rollers.
-    multiplicity : ndarray, shape (rollers,)
-        Number of physical rollers that each represents.
-    profile : Profile, optional
-        The cylinder's profile at the start.
+    drawn : mapping of str to ndarray
+        Drawn inputs by the names of `contact_values`; they broadcast to (rollers, realisations).
+        Inputs that are not drawn have the value of the scenario.
+    rollers : sequence of int, optional
+        Numbers of the rollers, by default the first one.
+    multiplicity : ndarray, shape (rollers,), optional
+        Number of physical rollers that each represents, by default one.
+    realisations : int
+        Number of realisations.
     """
-    creepage, roller, count = scenario.creepage, scenario.roller, len(rollers)
-    offsets = scenario.per_roller(roller.offset)
-    s = np.array([grid.y - offsets[number] for number in rollers])
-    height = start_height(profile, grid)
-    inputs = ContactInputs.uniform(
-        count,
-        friction=scenario.friction.coefficient,
-        longitudinal=creepage.longitudinal or 0.0,
-        bearing_torque=creepage.bearing_torque or 0.0,
-    )
-    angles = {
-        name: np.array(scenario.per_roller(value))[rollers][:, None]
-        for name, value in (("yaw", creepage.yaw), ("tilt", creepage.tilt))
-    }
+    creepage, roller, cylinder = scenario.creepage, scenario.roller, scenario.cylinder
+    count, values = len(rollers), contact_inputs(scenario, rollers, drawn)
+    s, height = grid.y - values.pop("offset")[..., None], start_height(scenario, grid)
+    gap = s * s / (2.0 * roller.crown_radius) - height
+    slip = s * s / (2.0 * roller.crown_radius * roller.radius) + height / cylinder.radius
     tolerance = np.clip(ITERATION_FRACTION * scenario.evolution.tolerance, *ITERATION_RANGE)
     return WearProblem(
         grid=grid,
         model=model,
-        law=scenario.wear.build() if scenario.wear is not None else NoWear(),
-        load=load,
+        law=NoWear(),
+        load=scenario.load.build(),
         terms={term.name: term.build() for term in scenario.load.terms},
         kinematics=Kinematics(
-            cylinder_radius=scenario.cylinder.radius,
+            cylinder_radius=cylinder.radius,
             roller_radius=roller.radius,
             crown_radius=roller.crown_radius,
             rolling_speed=scenario.rolling_speed,
-            multiplicity=multiplicity,
+            multiplicity=np.ones(count) if multiplicity is None else multiplicity,
         ),
-        flat_gap=flat_gap(scenario, s, height)[None, :, None, :],
+        flat_gap=np.broadcast_to(gap, (count, realisations, grid.strips))[None],
         from_apex=s,
-        inputs=inputs.with_values(angles),
+        inputs=ContactInputs.uniform(count, realisations).with_values(values),
         roller=np.arange(count, dtype=np.int64),
         weight=np.ones(count),
         half=np.zeros(count, dtype=np.int64),
         tilt_shifts=creepage.tilt_shifts_contact,
         free=creepage.drive == "free",
-        slip_profile=slip_profile(scenario, s, height) if creepage.differential_slip else None,
+        slip_profile=slip if creepage.differential_slip else None,
         iteration_tolerance=float(tolerance),
     )

@@ -1,4 +1,4 @@
-"""Random inputs of one run: values of the test and its rollers, and processes in time."""
+"""Random inputs of tests and contacts: values by realisation, and processes in time."""
 
 from __future__ import annotations
 
@@ -12,15 +12,17 @@ from wearsim.errors import CapabilityError, Mistake, ScenarioError
 from wearsim.evolution.contact_inputs import Varying
 from wearsim.mechanics.numerics.piecewise_linear import PiecewiseLinear
 from wearsim.plugins import JointDistribution, Process
-from wearsim.scenario import RandomInput, Scenario, realise
+from wearsim.scenario import RandomInput, Scenario, realise, require_run
 from wearsim.scenario.random.model import CONTACT_FIELDS
+from wearsim.studies.run.inputs import OFFSET, TILT, YAW, contact_values, origin
 from wearsim.types import FloatArray
 from wearsim.uq.sampling.philox import Stream
 from wearsim.uq.sampling.plans import REPLICATES, PlanName
 from wearsim.uq.sampling.sampler import Sampler
 
-LISTED = {"roller.offset", "creepage.yaw", "creepage.tilt"}  # a scenario may give one per roller
+LISTED = {OFFSET, YAW, TILT}  # a scenario may give one per roller
 LONGEST_PATH = 5_000_000  # samples of a process
+BLOCK = 4096  # realisations that are drawn at once
 _MIDPOINTS = np.linspace(0.5, 63.5, 64) / 64.0  # probabilities to average over a distribution
 RARE = 1e-7  # fraction of the passes that may exceed the range of the strips
 
@@ -117,11 +119,6 @@ def _ranges(item: RandomInput) -> list[list[float]]:
     return [[float(low) - mean, float(high) - mean]]
 
 
-def origin(key: str, mean: float) -> float:
-    """Return the origin of the values of a key: the mean for a load, which is an offset."""
-    return mean if key == "load.normal_force" else 0.0
-
-
 def draw(scenario: Scenario) -> Draws:
     """Draw the random inputs of the realisation that is selected in a scenario.
 
@@ -136,10 +133,12 @@ def draw(scenario: Scenario) -> Draws:
     Raises
     ------
     ScenarioError
-        If the plan does not define single realisations, or the path of a process would be too long.
+        If the scenario lacks values that a run requires, if the plan does not define single
+        realisations, or if the path of a process would be too long.
     CapabilityError
         If there is a friction field, which requires the study of one contact.
     """
+    require_run(scenario)
     if scenario.sampling.plan == "latin-hypercube" and scenario.random:
         mistake = Mistake(
             "sampling",
@@ -162,6 +161,8 @@ class Drawer:
         Name of a plan of `wearsim.uq.sampling.plans`.
     total : int, optional
         Realisations of the whole plan, where it depends on their number.
+    replicates : int
+        Number of independent, alternating sequences of the plan "sobol".
 
     Raises
     ------
@@ -169,7 +170,13 @@ class Drawer:
         If there is a friction field, which requires the study of one contact.
     """
 
-    def __init__(self, scenario: Scenario, plan: PlanName, total: int | None = None) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        plan: PlanName,
+        total: int | None = None,
+        replicates: int = REPLICATES,
+    ) -> None:
         for item in scenario.random:
             if item.role == "field":
                 raise CapabilityError(
@@ -202,7 +209,7 @@ class Drawer:
             plan,
             total,
             correlations=correlations,
-            replicates=REPLICATES if plan == "sobol" else 1,
+            replicates=replicates,
         )
 
     @property
@@ -254,15 +261,11 @@ class Drawer:
             for key, array in values.items()
             if array.ndim == 0 or key in LISTED
         }
-        means = {item.name: item.mean[0] for item in self.items}
+        unlisted = {key: array for key, array in values.items() if key not in listed}
         paths = {item: _paths(scenario, item, numbers[item.name]) for item in self._processes}
         return Draws(
             scenario=realise(scenario, listed) if listed else scenario,
-            rollers={
-                CONTACT_FIELDS[key]: array - origin(key, means[key])
-                for key, array in values.items()
-                if key not in listed
-            },
+            rollers=contact_values(self.items, unlisted),
             varying=tuple(one for found in paths.values() for one in found),
             passes=tuple(item for item in scenario.random if item.persistence == "per-pass"),
             values=values,
@@ -282,14 +285,21 @@ class Drawer:
         dict of str to ndarray, shape (count,) or (count, rollers)
             By the scenario's key, in SI.
         """
-        uniforms = self._sampler.uniforms(first, count)
-        columns = {}
-        for item in self.items:
-            names = self._names[item.name]
-            found = np.stack([item.values(uniforms[name]) for name in names], axis=1)
-            for number, key in enumerate(item.keys):
-                single = item.persistence == "per-test"
-                columns[key] = found[:, 0, number] if single else found[:, :, number]
+        columns = {
+            key: np.empty(
+                count if item.persistence == "per-test" else (count, len(self._names[item.name]))
+            )
+            for item in self.items
+            for key in item.keys
+        }
+        for start in range(0, count, BLOCK):
+            stop = min(start + BLOCK, count)
+            uniforms = self._sampler.uniforms(first + start, stop - start)
+            for item in self.items:
+                for roller, name in enumerate(self._names[item.name]):
+                    found = item.values(uniforms[name])
+                    for number, key in enumerate(item.keys):
+                        columns[key].reshape(count, -1)[start:stop, roller] = found[:, number]
         return columns
 
 

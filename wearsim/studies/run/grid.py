@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +13,7 @@ from wearsim.mechanics.hertz.ellipse import HertzContact, hertz
 from wearsim.plugins import ContactModel, WearLaw
 from wearsim.scenario import Scenario
 from wearsim.scenario.tables.plain import DEFAULT_TOLERANCE
+from wearsim.studies.run.inputs import contact_inputs
 from wearsim.types import ContactSolution, FloatArray, Grid, Profile
 
 STRIPS_PER_HALF_WIDTH = 12  # of the initial patch; the discretisation error is then below 1e-3
@@ -42,20 +44,18 @@ class InputMaxima:
 NO_RANDOM_INPUTS = InputMaxima()
 
 
-def contact_centres(scenario: Scenario) -> tuple[float, ...]:
-    """Return the initial contact position of each roller [m]."""
-    offsets = np.array(scenario.per_roller(scenario.roller.offset))
-    tilts = np.array(scenario.per_roller(scenario.creepage.tilt))
-    return tuple(initial_contact_positions(scenario, offsets, tilts).tolist())
+def contact_positions(scenario: Scenario, inputs: Mapping[str, FloatArray]) -> FloatArray:
+    """Return the contact positions on an unworn cylinder [m].
 
-
-def initial_contact_positions(
-    scenario: Scenario, offset: FloatArray, tilt: FloatArray
-) -> FloatArray:
-    """Return the contact positions on an unworn cylinder [m] for offsets [m] and tilts [rad]."""
+    Parameters
+    ----------
+    scenario : Scenario
+    inputs : mapping of str to ndarray
+        Among them offset [m] and tilt [rad], see `contact_inputs`.
+    """
     if not scenario.creepage.tilt_shifts_contact:
-        return offset
-    return np.asarray(offset - scenario.roller.crown_radius * tilt)
+        return inputs["offset"]
+    return np.asarray(inputs["offset"] - scenario.roller.crown_radius * inputs["tilt"])
 
 
 def suggested_grid(scenario: Scenario, model: ContactModel, load: float) -> Grid | None:
@@ -198,10 +198,13 @@ def run_grid(scenario: Scenario, load: float, maxima: InputMaxima = NO_RANDOM_IN
     ScenarioError
         If the contact does not fit on the strips that the scenario defines.
     """
-    patch, centres = fresh_patch(scenario, load), contact_centres(scenario)
-    choice = scenario.contact
-    centre = choice.centre if choice.centre is not None else 0.5 * (min(centres) + max(centres))
-    shift = max(abs(y - centre) for y in centres)
+    patch, choice = fresh_patch(scenario, load), scenario.contact
+    centres = contact_positions(
+        scenario, contact_inputs(scenario, range(scenario.operation.rollers))
+    )
+    middle = 0.5 * float(centres.min() + centres.max())
+    centre = choice.centre if choice.centre is not None else middle
+    shift = float(np.abs(centres - centre).max())
     if scenario.creepage.tilt_shifts_contact:
         shift += scenario.roller.crown_radius * maxima.tilt
     half = shift + 1.1 * predicted_half_width(scenario, load, maxima) + 1.3 * patch.b

@@ -11,7 +11,7 @@ from wearsim.evolution.contact_inputs import ContactInputs, Redraw
 from wearsim.evolution.problem import WearProblem
 from wearsim.scenario import RandomInput, Scenario
 from wearsim.scenario.random.model import CONTACT_FIELDS
-from wearsim.studies.run.draws import origin
+from wearsim.studies.run.inputs import origin
 from wearsim.types import FloatArray
 from wearsim.uq.sampling.gaussian_copula import GaussianCopula
 from wearsim.uq.sampling.philox import Stream

@@ -18,7 +18,7 @@ from wearsim.results import Result, RunData, check_output, kind_of, read_results
 from wearsim.results.run.schema import VARIABLES
 from wearsim.scenario import Scenario, parse_scenario
 from wearsim.studies.run.assemble import assemble_problem, start_height, strips_of_run
-from wearsim.studies.run.draws import draw, drawn_values
+from wearsim.studies.run.draws import Draws, draw, drawn_values
 from wearsim.studies.run.events import Checkpointed, Event, Finished, Started, Stepped, Warned
 from wearsim.studies.run.provenance import changed_origins, check_plugins, origin_of
 from wearsim.studies.run.recorder import Recorder, RecordSchedule
@@ -65,7 +65,7 @@ def run(
     path = Path(output) if output is not None else None
     if path is not None:
         check_output(path, force, scenario.paths)
-    return _RunInProgress(scenario, path, on_event, stop_requested).finish()
+    return _RunInProgress(scenario, draw(scenario), path, on_event, stop_requested).finish()
 
 
 def resume(
@@ -121,21 +121,22 @@ def resume(
         )
     if data.finished and scenario.total_passes == state.passes:
         return Result(data, path)
-    data, state = _widened(scenario, data, state)
-    return _RunInProgress(scenario, path, on_event, stop_requested, data, state).finish()
+    draws = draw(scenario)
+    data, state = _widened(draws, data, state)
+    return _RunInProgress(scenario, draws, path, on_event, stop_requested, data, state).finish()
 
 
-def _widened(scenario: Scenario, data: RunData, state: WearState) -> tuple[RunData, WearState]:
+def _widened(draws: Draws, data: RunData, state: WearState) -> tuple[RunData, WearState]:
     """Return data and state with additional strips if an extended test needs them.
 
     The present strips are unchanged, so that nothing is interpolated.
     """
     y, spacing = data.static["y"], float(data.checkpoint["spacing"])
-    needed = strips_of_run(draw(scenario))
+    needed = strips_of_run(draws)
     lacking = 0.5 * (needed.spacing * needed.strips - spacing * len(y))
     # a surplus strip costs less than a contact that reaches the edge
     strips = int(np.ceil(lacking / spacing)) if lacking > 1e-6 * spacing else 0
-    if strips == 0 or scenario.total_passes == data.total_passes:
+    if strips == 0 or draws.scenario.total_passes == data.total_passes:
         return data, state
     margin = spacing * np.arange(1, strips + 1)
     wider = np.concatenate([y[0] - margin[::-1], y, y[-1] + margin])
@@ -162,6 +163,7 @@ class _RunInProgress:
     def __init__(
         self,
         scenario: Scenario,
+        draws: Draws,
         path: Path | None,
         on_event: Watcher | None,
         stop_requested: Callable[[], bool] | None,
@@ -170,12 +172,12 @@ class _RunInProgress:
     ) -> None:
         grid = None if data is None else Grid(data.static["y"], float(data.checkpoint["spacing"]))
         self.scenario, self.path = scenario, path
-        self.problem, self.stepper, self.stepper_name = assemble_problem(scenario, grid)
+        self.problem, self.stepper, self.stepper_name = assemble_problem(draws, grid)
         self.on_event: Watcher = on_event or (lambda event: None)
         self.stop_requested = stop_requested or (lambda: False)
         self.stop = float(scenario.total_passes)
         self.origin = origin_of(scenario)
-        self.drawn = drawn_values(scenario, draw(scenario))
+        self.drawn = drawn_values(scenario, draws)
         self.warnings: list[str] = [] if data is None else list(data.warnings)
         now = datetime.now(UTC).isoformat(timespec="seconds")
         self.created = now if data is None else data.created
@@ -330,7 +332,7 @@ class _RunInProgress:
             static={
                 "y": problem.grid.y,
                 "nominal_gap": problem.per_roller(problem.at_time(0.0, 0.0).nominal_gap),
-                "start_height": start_height(scenario.cylinder.profile, problem.grid),
+                "start_height": start_height(scenario, problem.grid),
                 "multiplicity": kinematics.multiplicity,
             },
             history=self.recorder.history,

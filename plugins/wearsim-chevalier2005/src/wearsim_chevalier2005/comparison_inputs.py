@@ -8,8 +8,8 @@ import numpy as np
 
 from wearsim.models.random.distributions import AnalyticDistribution
 from wearsim.scenario import Scenario
-from wearsim.studies.contact.draws import LOAD, LONGITUDINAL, TILT, YAW
 from wearsim.studies.run.grid import fresh_patch
+from wearsim.studies.run.inputs import LOAD, LONGITUDINAL, TILT, YAW
 from wearsim.uq.distributions.base import MaxentDistribution
 from wearsim.uq.estimation.moments import summarise
 from wearsim_chevalier2005 import paper

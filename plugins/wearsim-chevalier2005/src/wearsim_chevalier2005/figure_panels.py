@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 
 from wearsim.report.parts.style import BLUE, GREEN, ORANGE, RED, name_axes
 from wearsim.report.text.units import PER_SI
-from wearsim.studies.contact.draws import LOAD, TILT, YAW
+from wearsim.studies.run.inputs import LOAD, TILT, YAW
 from wearsim.types import FloatArray
 from wearsim_chevalier2005 import paper
 from wearsim_chevalier2005.comparison_inputs import maxent_of

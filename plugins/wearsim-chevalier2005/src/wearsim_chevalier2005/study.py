@@ -12,11 +12,11 @@ from wearsim.contact_batch import OperatingPoints
 from wearsim.results import DissipationResult
 from wearsim.scenario import Scenario
 from wearsim.scenario.examples import shipped_scenario
-from wearsim.studies.contact.draws import FRICTION, LONGITUDINAL, TILT, YAW
 from wearsim.studies.contact.friction_field import LocalFriction
 from wearsim.studies.contact.monte_carlo import dissipation
 from wearsim.studies.contact.single import ContactStudy, study_contact
 from wearsim.studies.run.grid import fresh_patch
+from wearsim.studies.run.inputs import FRICTION, LONGITUDINAL, TILT, YAW
 from wearsim.types import FloatArray
 from wearsim_chevalier2005 import paper
 

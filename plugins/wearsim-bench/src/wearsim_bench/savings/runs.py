@@ -10,7 +10,8 @@ import numpy as np
 from wearsim.scenario import Scenario
 from wearsim.scenario.examples import shipped_scenario
 from wearsim.scenario.tables.plain import DEFAULT_RECORDS
-from wearsim.studies.contact.draws import draw_contacts
+from wearsim.studies.contact.batch import acting_inputs
+from wearsim.studies.run.draws import Drawer
 from wearsim.studies.run.run import run
 from wearsim.types import FloatArray
 from wearsim.uq.sampling.sampler import Sampler
@@ -84,15 +85,16 @@ def idle_inputs(quick: bool) -> Iterator[Saving]:
 
 
 def _drawn(scenario: Scenario, count: int) -> FloatArray:
-    return np.concatenate(list(draw_contacts(scenario, count).values.values()))
+    drawer = Drawer(acting_inputs(scenario)[0], scenario.sampling.plan, count, replicates=1)
+    return np.concatenate(list(drawer.columns(0, count).values()))
 
 
 def _all_drawn(scenario: Scenario, count: int) -> FloatArray:
-    drawn = draw_contacts(scenario, count)
-    idle = [item for item in scenario.random if not set(item.keys) <= drawn.values.keys()]
+    acting = {item.name for item in acting_inputs(scenario)[0].random}
+    idle = [item for item in scenario.random if item.name not in acting]
     inputs = [(item.name, item.dimension) for item in idle]
     sampler = Sampler(scenario.seed, inputs, scenario.sampling.plan, total=count)
     uniforms = sampler.uniforms(0, count)
     for item in idle:
         item.values(uniforms[item.name])
-    return np.concatenate(list(drawn.values.values()))
+    return _drawn(scenario, count)

@@ -92,7 +92,7 @@ class PreparedTest:
     """
 
     def __init__(self, scenario: Scenario) -> None:
-        built: tuple[WearProblem, Stepper, str] = assemble_problem(scenario)
+        built: tuple[WearProblem, Stepper, str] = assemble_problem(draw(scenario))
         self.problem, self.stepper, self.name = built
         self.stop, self._max_steps = float(scenario.total_passes), scenario.evolution.max_steps
 
