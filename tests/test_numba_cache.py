@@ -45,7 +45,8 @@ import importlib, json, pkgutil
 import wearsim, wearsim.mechanics
 from pathlib import Path
 from wearsim.mechanics.numerics.kernel_dispatcher import Whole
-from wearsim.models.contact.hertz_fastsim import HertzFastsim
+from wearsim.contact_batch import ContactBatch
+from wearsim.models.contact.hertz_fastsim import HertzFastsim, HertzFastsimOptions
 from wearsim.types import Creepage, Grid, Material, OperatingPoint
 
 def scenario(name, **overrides):
@@ -78,9 +79,10 @@ wearsim.dissipation(scenario("mean-contact.toml", friction__coefficient=field), 
 march = spin | {{"contact__closed_form": "never"}}
 for more in ({{}}, march, march | {{"contact__dissipation": "element-sum"}}):
     wearsim.study_contact(scenario("mean-contact.toml", **more))
-model, grid = HertzFastsim(), Grid.spanning(-3e-3, 3e-3, 61)
-model.prepare(grid, (Material(200e9, 0.3), Material(200e9, 0.3)))
-model.friction_points(grid.y**2, 90.0, OperatingPoint(300.0, 2.6, Creepage(1e-3), 0.1))
+steel, grid = Material(200e9, 0.3), Grid.spanning(-3e-3, 3e-3, 61)
+model = HertzFastsim(HertzFastsimOptions(), grid, (steel, steel))
+point = OperatingPoint(300.0, 2.6, Creepage(1e-3), 0.1)
+model.friction_points(ContactBatch.of(grid.y[None] ** 2, 90.0, [point]))
 counts = {{}}
 prefix = "wearsim.mechanics."
 for module in pkgutil.walk_packages(wearsim.mechanics.__path__, prefix):

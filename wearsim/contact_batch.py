@@ -1,214 +1,240 @@
-"""Operating points and solutions of a batch of contacts, stored as columns."""
+"""Batches of contacts and of their solutions, stored as arrays over contacts."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import cached_property
-from typing import Any, overload
 
 import numpy as np
-import numpy.typing as npt
 
 from wearsim.types import ContactSolution, Creepage, FloatArray, IntArray, OperatingPoint
 
 
-@dataclass(frozen=True)
-class OperatingPoints(Sequence[OperatingPoint]):
-    """Operating points without bearing torque, as columns; a sequence of `OperatingPoint`.
+@dataclass(frozen=True, eq=False)
+class ContactBatch:
+    """Contacts to be solved in one call, on the same strips.
+
+    All arrays have the contacts as first axis. An array that is equal for all contacts may have
+    stride 0 along it.
 
     Parameters
     ----------
-    normal_force, longitudinal, lateral, spin : ndarray, shape (contacts,)
-        Load [N], longitudinal and lateral creepage, and spin [1/m].
+    gap : ndarray, shape (contacts, strips)
+        Gap of the undeformed bodies at x = 0 [m]; its zero is arbitrary.
+    longitudinal_curvature : ndarray, shape (contacts,)
+        Relative curvature along rolling, 1/R_1 + 1/R_2 [1/m].
+    normal_force, rolling_speed : ndarray, shape (contacts,)
+        Load N [N] and rolling velocity V [m/s].
+    longitudinal, lateral, spin : ndarray, shape (contacts,)
+        Longitudinal and lateral creepage, and spin [1/m], as in `Creepage`.
     friction : ndarray, shape (contacts,), (contacts, strips) or (contacts, points, strips)
         Friction coefficient, as in `OperatingPoint`.
-    rolling_speed : float
-        Rolling velocity V [m/s].
     variation : ndarray, shape (contacts, strips), optional
         Variation of the longitudinal creepage, as in `Creepage`.
+    bearing_torque : ndarray, shape (contacts,), optional
+        Torque of the roller's bearing [N m], as in `OperatingPoint`.
+    rolling_radius : ndarray, shape (contacts, strips), optional
+        Lever arm of the longitudinal traction [m]; required with a bearing torque.
     friction_carried : bool
         As in `OperatingPoint`.
+    shape : tuple of int, optional
+        Numbers of stations, contacts and realisations that the contacts run through, the last
+        fastest; error messages then name a contact by these indices.
     """
 
+    gap: FloatArray
+    longitudinal_curvature: FloatArray
     normal_force: FloatArray
+    rolling_speed: FloatArray
     longitudinal: FloatArray
     lateral: FloatArray
     spin: FloatArray
     friction: FloatArray
-    rolling_speed: float
     variation: FloatArray | None = None
+    bearing_torque: FloatArray | None = None
+    rolling_radius: FloatArray | None = None
     friction_carried: bool = False
+    shape: tuple[int, ...] | None = None
 
     def __post_init__(self) -> None:
-        count = len(self.normal_force)
-        for name in _POINT_COLUMNS:
-            column = getattr(self, name)
-            if column is not None and len(column) != count:
+        count = len(self.gap)
+        for name in _INPUTS:
+            array = getattr(self, name)
+            if array is not None and len(array) != count:
                 raise ValueError(
-                    f"{name} has {len(column)} values for {count} contacts; expected one each"
+                    f"{name} has {len(array)} values for {count} contacts; expected one each"
                 )
 
     @classmethod
-    def of(cls, points: Sequence[OperatingPoint]) -> OperatingPoints | None:
-        """Return `points` as columns, or None if they differ in `OperatingPoint.kind`."""
-        if isinstance(points, cls):
-            return points
-        if (
-            not points
-            or points[0].bearing_torque is not None
-            or (len(points) > 1 and len({point.kind for point in points}) > 1)
-        ):
-            return None
-        creepages = [point.creepage for point in points]
-        varies = creepages[0].variation is not None
+    def of(
+        cls, gap: FloatArray, longitudinal_curvature: float, points: Sequence[OperatingPoint]
+    ) -> ContactBatch:
+        """Return contacts that differ in gap and operating point as a batch.
+
+        Parameters
+        ----------
+        gap : ndarray, shape (contacts, strips)
+            Gap of each contact [m].
+        longitudinal_curvature : float
+            Relative curvature along rolling [1/m].
+        points : sequence of OperatingPoint
+            One per contact. All or none give a variation of the creepage, a bearing torque and
+            carried friction, and all give their friction in the same shape.
+
+        Raises
+        ------
+        ValueError
+            If the points are not of one kind, or their number is not that of the gaps.
+        """
+        kinds = {
+            (
+                np.shape(point.friction),
+                point.friction_carried,
+                point.creepage.variation is None,
+                point.bearing_torque is None,
+                point.rolling_radius is None,
+            )
+            for point in points
+        }
+        if len(kinds) != 1:
+            raise ValueError(
+                "the operating points of a batch differ in the shape of their friction, or in"
+                " whether they have a variation of the creepage, a bearing torque or carried"
+                " friction; solve them in a batch of each kind"
+            )
+        creepages, first = [point.creepage for point in points], points[0]
+        torques = [point.bearing_torque for point in points]
         return cls(
-            normal_force=np.array([point.normal_force for point in points], dtype=np.float64),
-            longitudinal=np.array([creepage.longitudinal for creepage in creepages]),
-            lateral=np.array([creepage.lateral for creepage in creepages]),
-            spin=np.array([creepage.spin for creepage in creepages]),
-            friction=np.array([point.friction for point in points]),
-            rolling_speed=points[0].rolling_speed,
-            variation=np.array([item.variation for item in creepages]) if varies else None,
-            friction_carried=points[0].friction_carried,
+            gap=gap,
+            longitudinal_curvature=np.full(len(points), float(longitudinal_curvature)),
+            normal_force=np.array([float(point.normal_force) for point in points]),
+            rolling_speed=np.array([float(point.rolling_speed) for point in points]),
+            longitudinal=np.array([float(creepage.longitudinal) for creepage in creepages]),
+            lateral=np.array([float(creepage.lateral) for creepage in creepages]),
+            spin=np.array([float(creepage.spin) for creepage in creepages]),
+            friction=np.array([point.friction for point in points], dtype=np.float64),
+            variation=_rows([creepage.variation for creepage in creepages]),
+            bearing_torque=_rows(torques),
+            rolling_radius=_rows([point.rolling_radius for point in points]),
+            friction_carried=first.friction_carried,
         )
 
     def __len__(self) -> int:
-        return len(self.normal_force)
+        return len(self.gap)
 
-    def at(self, numbers: IntArray | slice) -> OperatingPoints:
-        """Return some of the points, by number and in that order."""
-        columns = {name: getattr(self, name) for name in _POINT_COLUMNS}
-        return replace(self, **{n: c[numbers] for n, c in columns.items() if c is not None})
+    def at(self, numbers: IntArray) -> ContactBatch:
+        """Return some of the contacts, by number and in that order."""
+        arrays = {name: getattr(self, name) for name in _INPUTS}
+        some = {name: array[numbers] for name, array in arrays.items() if array is not None}
+        return replace(self, **some, shape=None)
 
-    @overload
-    def __getitem__(self, index: int) -> OperatingPoint: ...
-
-    @overload
-    def __getitem__(self, index: slice) -> OperatingPoints: ...
-
-    def __getitem__(self, index: int | slice) -> OperatingPoint | OperatingPoints:
-        if isinstance(index, slice):
-            return self.at(index)
-        friction = self.friction[index]
+    def point(self, number: int) -> OperatingPoint:
+        """Return the operating point of one contact."""
+        friction, torque = self.friction[number], self.bearing_torque
+        variation, radius = self.variation, self.rolling_radius
         return OperatingPoint(
-            normal_force=float(self.normal_force[index]),
-            rolling_speed=self.rolling_speed,
+            normal_force=float(self.normal_force[number]),
+            rolling_speed=float(self.rolling_speed[number]),
             creepage=Creepage(
-                float(self.longitudinal[index]),
-                float(self.lateral[index]),
-                float(self.spin[index]),
-                None if self.variation is None else self.variation[index],
+                float(self.longitudinal[number]),
+                float(self.lateral[number]),
+                float(self.spin[number]),
+                None if variation is None else variation[number],
             ),
             friction=float(friction) if self.friction.ndim == 1 else friction,
+            bearing_torque=None if torque is None else float(torque[number]),
+            rolling_radius=None if radius is None else radius[number],
             friction_carried=self.friction_carried,
         )
 
+    def place(self, number: int) -> tuple[list[int], str]:
+        """Return the indices of one contact along `shape`, and their description."""
+        shape = self.shape or (len(self),)
+        axes = ("station", "contact", "realisation") if self.shape else ("contact",)
+        indices = [int(i) for i in np.unravel_index(number, shape)]
+        each = zip(axes[-len(shape) :], indices, shape, strict=True)
+        return indices, ", ".join(f"{axis} {i}" for axis, i, length in each if length > 1)
 
-_POINT_COLUMNS = ("normal_force", "longitudinal", "lateral", "spin", "friction", "variation")
+
+def _rows(values: Sequence[float | FloatArray | None]) -> FloatArray | None:
+    """Return the values of all contacts as an array, or None if they have none."""
+    return None if values[0] is None else np.array(values, dtype=np.float64)
+
+
+_INPUTS = tuple(
+    item.name for item in fields(ContactBatch) if item.name not in {"friction_carried", "shape"}
+)
 
 
 @dataclass(frozen=True, eq=False)
-class BatchSolution(Sequence[ContactSolution]):
-    """Solutions of a batch of contacts, as columns; a sequence of `ContactSolution`.
-
-    The sequence runs through the leading axes with the last axis fastest.
+class ContactBatchSolution:
+    """Solutions of a batch of contacts: the fields of `ContactSolution` as arrays over contacts.
 
     Parameters
     ----------
-    shape : tuple of int
-        Leading axes: (station, roller, realisation).
     y : ndarray, shape (strips,)
         Axial position of the strips [m], the same for all contacts.
-    columns : mapping of str to ndarray
-        The other fields of `ContactSolution`, leading axes first.
+    half_length, line_load, dissipation : ndarray, shape (contacts, strips)
+        As in `ContactSolution`.
+    force_x, force_y, spin_moment, approach, peak_pressure : ndarray, shape (contacts,)
+        As in `ContactSolution`.
+    adhesion_fraction, power, longitudinal_creepage : ndarray, shape (contacts,)
+        As in `ContactSolution`.
+    iterations : ndarray of int, shape (contacts,)
+        As in `ContactSolution`.
     """
 
-    shape: tuple[int, ...]
     y: FloatArray
-    columns: Mapping[str, npt.NDArray[Any]]
+    half_length: FloatArray
+    line_load: FloatArray
+    dissipation: FloatArray
+    force_x: FloatArray
+    force_y: FloatArray
+    spin_moment: FloatArray
+    approach: FloatArray
+    peak_pressure: FloatArray
+    adhesion_fraction: FloatArray
+    power: FloatArray
+    longitudinal_creepage: FloatArray
+    iterations: IntArray
 
     @classmethod
-    def of(cls, shape: tuple[int, ...], solutions: Sequence[ContactSolution]) -> BatchSolution:
-        """Return a sequence of solutions as a batch, last axis fastest."""
-        rows = {name: rows_of(solutions, name) for name in _COLUMNS}
-        columns = {name: values.reshape(shape + values.shape[1:]) for name, values in rows.items()}
-        return cls(shape, solutions[0].y, columns)
-
-    def stack(self, name: str) -> npt.NDArray[Any]:
-        """Return the field `name` of every contact as one array with the leading axes first."""
-        if name == "y":
-            return np.broadcast_to(self.y, self.shape + self.y.shape)
-        return self.columns[name]
-
-    @cached_property
-    def solutions(self) -> tuple[ContactSolution, ...]:
-        """The solutions of the contacts, last axis fastest."""
-        # numbers of contacts as lists, to give plain Python numbers
-        flat = [
-            column.ravel().tolist()
-            if column.ndim == len(self.shape)
-            else column.reshape(-1, len(self.y))
-            for column in (self.columns[name] for name in _COLUMNS)
-        ]
-        return tuple(
-            ContactSolution(self.y, **dict(zip(_COLUMNS, values, strict=True)))
-            for values in zip(*flat, strict=True)
-        )
+    def of(cls, solutions: Sequence[ContactSolution]) -> ContactBatchSolution:
+        """Return single solutions on the same strips as a batch."""
+        columns = {n: np.array([getattr(one, n) for one in solutions]) for n in _OUTPUTS}
+        return cls(y=solutions[0].y, **columns)
 
     def __len__(self) -> int:
-        return math.prod(self.shape)
+        return len(self.power)
 
-    @overload
-    def __getitem__(self, index: int) -> ContactSolution: ...
+    def __getitem__(self, number: int) -> ContactSolution:
+        """Return the solution of one contact."""
+        values = (getattr(self, name)[number] for name in _OUTPUTS)
+        return ContactSolution(self.y, *(v if v.ndim else v.item() for v in values))
 
-    @overload
-    def __getitem__(self, index: slice) -> tuple[ContactSolution, ...]: ...
+    def __iter__(self) -> Iterator[ContactSolution]:
+        return (self[number] for number in range(len(self)))
 
-    def __getitem__(self, index: int | slice) -> ContactSolution | tuple[ContactSolution, ...]:
-        return self.solutions[index]
+    def at(self, numbers: IntArray) -> ContactBatchSolution:
+        """Return some of the solutions, by number and in that order."""
+        return ContactBatchSolution(self.y, *(getattr(self, name)[numbers] for name in _OUTPUTS))
 
-    def at(self, numbers: IntArray) -> BatchSolution:
-        """Return the contacts at some indices of the last leading axis, in that order."""
-        last = len(self.shape) - 1
-        columns = {name: c.take(numbers, axis=last) for name, c in self.columns.items()}
-        return BatchSolution((*self.shape[:-1], len(numbers)), self.y, columns)
+    def with_others(self, numbers: IntArray, others: ContactBatchSolution) -> ContactBatchSolution:
+        """Return these solutions with others at some numbers."""
+        columns = [getattr(self, name).copy() for name in _OUTPUTS]
+        for column, name in zip(columns, _OUTPUTS, strict=True):
+            column[numbers] = getattr(others, name)
+        return ContactBatchSolution(self.y, *columns)
 
-    def with_axis_moved(self, source: int, target: int) -> BatchSolution:
-        """Return the contacts with a leading axis moved to another position."""
-        axes = len(self.shape)
-        order = list(range(axes))
-        order.insert(target, order.pop(source))
-        columns = {
-            name: np.ascontiguousarray(c.transpose(*order, *range(axes, c.ndim)))
-            for name, c in self.columns.items()
-        }
-        return BatchSolution(tuple(self.shape[axis] for axis in order), self.y, columns)
-
-    def joined_with(self, *others: BatchSolution) -> BatchSolution:
-        """Return these contacts followed by others along the last leading axis."""
-        last, parts = len(self.shape) - 1, (self, *others)
-        columns = {
-            name: np.concatenate([part.columns[name] for part in parts], axis=last)
-            for name in self.columns
-        }
-        count = sum(part.shape[-1] for part in parts)
-        return BatchSolution((*self.shape[:-1], count), self.y, columns)
-
-    def with_others(self, numbers: IntArray, others: BatchSolution) -> BatchSolution:
-        """Return these contacts with others at some indices of the last leading axis."""
-        order = np.arange(self.shape[-1])
-        order[numbers] = len(order) + np.arange(len(numbers))
-        return self.joined_with(others).at(order)
+    def joined_with(self, *others: ContactBatchSolution, rows: int) -> ContactBatchSolution:
+        """Return these solutions joined with others row by row, all divided into equal `rows`."""
+        joined = []
+        for name in _OUTPUTS:
+            columns = [getattr(part, name) for part in (self, *others)]
+            parts = [column.reshape(rows, -1, *column.shape[1:]) for column in columns]
+            whole = np.concatenate(parts, axis=1)
+            joined.append(whole.reshape(-1, *whole.shape[2:]))
+        return ContactBatchSolution(self.y, *joined)
 
 
-_COLUMNS = tuple(item.name for item in fields(ContactSolution) if item.name != "y")
-
-
-def rows_of(contacts: Sequence[ContactSolution], name: str) -> npt.NDArray[Any]:
-    """Return the field `name` of all contacts, first axis contact."""
-    if isinstance(contacts, BatchSolution):
-        values = contacts.stack(name)
-        return values.reshape(-1, *values.shape[len(contacts.shape) :])
-    return np.array([getattr(contact, name) for contact in contacts])
+_OUTPUTS = tuple(item.name for item in fields(ContactBatchSolution) if item.name != "y")

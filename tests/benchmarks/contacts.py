@@ -162,7 +162,7 @@ def strip_problem(case: Case, strips: int, contacts: int) -> tuple[tuple[Any, ..
         grid.y,
         grid.spacing,
         strip_elasticity(elastic.contact_modulus, elastic.shear_modulus),
-        point.rolling_speed,
+        per_contact(point.rolling_speed),
         per_contact(creepage.longitudinal),
         per_contact(creepage.lateral),
         per_contact(creepage.spin),

@@ -188,8 +188,8 @@ def test_expectation_over_passes_matches_drawn_passes():
 class FailingFarAway(BlackBox):
     """Model that fails if the contact differs too much from the initial guess."""
 
-    def solve(self, gap, longitudinal_curvature, point, wear_compliance=None, warm=None):
-        found = super().solve(gap, longitudinal_curvature, point, wear_compliance, warm)
+    def solve_contact(self, gap, longitudinal_curvature, point, wear_compliance=None, warm=None):
+        found = super().solve_contact(gap, longitudinal_curvature, point, wear_compliance, warm)
         if warm is not None and abs(found.approach - warm.approach) > 0.1e-6:
             raise ContactError("the contact has moved too far", {"gap": gap})
         return found
@@ -207,10 +207,10 @@ def test_step_is_shortened_until_every_stage_is_solved():
 
 def test_error_of_a_model_that_always_fails_is_raised():
     class Failing(BlackBox):
-        def solve(self, gap, *others):
+        def solve_contact(self, gap, *others):
             if gap.min() > 1e-6:
                 raise ContactError("no solution beyond a micrometre", {"gap": gap})
-            return super().solve(gap, *others)
+            return super().solve_contact(gap, *others)
 
     problem, stepper, stop = boxed(foundation=True, box=Failing)
     with pytest.raises(ContactError, match="no solution beyond a micrometre") as caught:

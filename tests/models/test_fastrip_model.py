@@ -9,7 +9,7 @@ import pytest
 from tests.materials import STEEL
 from wearsim.errors import ContactError
 from wearsim.mechanics.hertz.elasticity import combine
-from wearsim.models.contact.hertz import HertzModel
+from wearsim.models.contact.hertz import HertzModel, HertzOptions, strips_over_patch
 from wearsim.models.tangential.base import spread_work
 from wearsim.models.tangential.fastrip import FastripTheory
 from wearsim.types import Creepage, Grid, OperatingPoint
@@ -21,13 +21,13 @@ RIG = (90.0, 2.0)  # relative curvatures along and across
 
 def contact(case, curvatures=RIG, strips=60, mx=50):
     """Solve a case of the reference with exact Hertz."""
-    model = HertzModel(FastripTheory(mx), strips)
-    grid = model.suggest_grid(curvatures[1], curvatures[0], case["N_N"], MATERIALS)
-    model.prepare(grid, MATERIALS)
+    chosen = HertzOptions(my=strips)
+    grid = strips_over_patch(chosen, curvatures[1], curvatures[0], case["N_N"], MATERIALS)
+    model = HertzModel(FastripTheory(mx), grid, MATERIALS)
     creepage = Creepage(case["xi"], case["eta"], case["phi_per_m"])
     point = OperatingPoint(case["N_N"], 1.0, creepage, case["mu"])
     gap = 0.5 * curvatures[1] * grid.y**2
-    return model, gap, point, model.solve(gap, curvatures[0], point)
+    return model, gap, point, model.solve_one(gap, curvatures[0], point)
 
 
 def errors(cases, solve):
@@ -56,16 +56,16 @@ def test_power_is_the_work_of_the_rigid_slip(creepage):
 
 @pytest.mark.parametrize("curvatures", [RIG, (20.0, 20.0), (2.0, 60.0)])
 def test_no_strip_has_negative_dissipation(curvatures):
-    rng, model = np.random.default_rng(11), HertzModel(FastripTheory(), 41)
-    grid = model.suggest_grid(curvatures[1], curvatures[0], 300.0, MATERIALS)
-    model.prepare(grid, MATERIALS)
+    rng, chosen = np.random.default_rng(11), HertzOptions(my=41)
+    grid = strips_over_patch(chosen, curvatures[1], curvatures[0], 300.0, MATERIALS)
+    model = HertzModel(FastripTheory(), grid, MATERIALS)
     gap = 0.5 * curvatures[1] * grid.y**2
     resting = 0
     for _ in range(250):
         xi, eta = rng.normal(size=2) * 10.0 ** rng.uniform(-5.0, -2.5, 2)
         phi = rng.normal() * 10.0 ** rng.uniform(-2.0, 1.0)
         point = OperatingPoint(300.0, 1.0, Creepage(xi, eta, phi), 0.1)
-        found = model.solve(gap, curvatures[0], point)
+        found = model.solve_one(gap, curvatures[0], point)
         work = -(xi * found.force_x + eta * found.force_y + phi * found.spin_moment)
         assert found.dissipation.min() >= 0.0
         assert found.power == pytest.approx(work, rel=1e-9)
@@ -88,7 +88,7 @@ def test_varying_creepage_approximates_longitudinal_spin():
     case = {"N_N": 300.0, "mu": 0.1, "xi": 4e-4, "eta": 0.0, "phi_per_m": 0.2}
     model, gap, point, turning = contact(case)
     varied = replace(point, creepage=Creepage(4e-4, variation=-0.2 * turning.y))
-    found = model.solve(gap, RIG[0], varied)
+    found = model.solve_one(gap, RIG[0], varied)
     assert found.dissipation == pytest.approx(
         turning.dissipation, abs=0.02 * turning.dissipation.max()
     )
@@ -98,10 +98,10 @@ def test_bearing_torque_is_balanced_or_the_roller_skids():
     case = {"N_N": 300.0, "mu": 0.1, "xi": 0.0, "eta": 2e-4, "phi_per_m": 0.1}
     model, gap, point, _ = contact(case)
     torque = replace(point, bearing_torque=0.1, rolling_radius=np.full(60, 20e-3))
-    found = model.solve(gap, RIG[0], torque)
+    found = model.solve_one(gap, RIG[0], torque)
     assert -found.force_x * 20e-3 == pytest.approx(0.1, rel=1e-9)
     with pytest.raises(ContactError, match="skids"):
-        model.solve(gap, RIG[0], replace(torque, bearing_torque=1.0))
+        model.solve_one(gap, RIG[0], replace(torque, bearing_torque=1.0))
 
 
 @pytest.mark.parametrize("creepage", [(6e-4, 3e-4, 0.05), (2e-4, 0.0, 0.5), (1e-3, 5e-4, 8.0)])
@@ -137,9 +137,8 @@ def test_transition_to_fastsim_at_large_spin_is_small():
 def test_solution_is_independent_of_the_grid_width():
     case = {"N_N": 300.0, "mu": 0.1, "xi": 4e-4, "eta": 3e-4, "phi_per_m": 0.1}
     exact = contact(case, strips=1000)[-1].power
-    model = HertzModel(FastripTheory(), 60)
     for half in np.linspace(1.6e-3, 1.8e-3, 7):
         grid = Grid.spanning(-half, half, 61)
-        model.prepare(grid, MATERIALS)
+        model = HertzModel(FastripTheory(), grid, MATERIALS)
         point = OperatingPoint(300.0, 1.0, Creepage(4e-4, 3e-4, 0.1), 0.1)
-        assert model.solve(grid.y**2, RIG[0], point).power == pytest.approx(exact, rel=1e-3)
+        assert model.solve_one(grid.y**2, RIG[0], point).power == pytest.approx(exact, rel=1e-3)

@@ -140,7 +140,7 @@ def test_worn_profile_has_a_wider_patch_with_the_same_load(depth):
 def test_solution_is_independent_of_the_initial_guess():
     grid = Grid.spanning(-9e-3, 9e-3, 181)
     model, gap, point, cold = contact(grid, shape=groove(17e-6))
-    warm = model.solve(gap, RIG[0], point, None, cold)
+    warm = model.solve_one(gap, RIG[0], point, None, cold)
     assert np.array_equal(warm.dissipation, cold.dissipation)
 
 
@@ -173,7 +173,7 @@ def test_lost_contact_is_an_error():
 def test_wear_compliance_is_refused():
     model, gap, point, _ = contact()
     with pytest.raises(CapabilityError, match="stepper = 'stabilised'"):
-        model.solve(gap, RIG[0], point, np.zeros_like(gap))
+        model.solve_one(gap, RIG[0], point, np.zeros_like(gap))
 
 
 def test_prescribed_patch_determines_pressure_and_power():
@@ -199,11 +199,11 @@ def test_bearing_torque_determines_the_creepage():
     point = OperatingPoint(
         300.0, SPEED, Creepage(0.0), 0.1, bearing_torque=0.1, rolling_radius=np.full(50, 20e-3)
     )
-    solution = model.solve(gap, RIG[0], point)
+    solution = model.solve_one(gap, RIG[0], point)
     assert -solution.force_x * 20e-3 == pytest.approx(0.1, rel=1e-9)
     assert solution.longitudinal_creepage > 0.0
     with pytest.raises(ContactError, match="skids"):
-        model.solve(
+        model.solve_one(
             gap,
             RIG[0],
             OperatingPoint(
@@ -215,18 +215,18 @@ def test_bearing_torque_determines_the_creepage():
 
 def test_creepage_may_vary_from_strip_to_strip():
     model, gap, _, _ = contact()
-    y = model.suggest_grid(RIG[1], RIG[0], 300.0, MATERIALS).y
-    creepage = Creepage(1e-3, variation=200.0 * y**2)
+    grid = SPEC.suggest_grid(HertzFastsimOptions(), RIG[1], RIG[0], 300.0, MATERIALS)
+    creepage = Creepage(1e-3, variation=200.0 * grid.y**2)
     point = OperatingPoint(300.0, SPEED, creepage, 0.1)
     for closed_form in ("exact", "never"):
-        chosen = HertzFastsim(HertzFastsimOptions(closed_form=closed_form, mx=400))
-        chosen.prepare(model.suggest_grid(RIG[1], RIG[0], 300.0, MATERIALS), MATERIALS)
-        solution = chosen.solve(gap, RIG[0], point)
+        options = HertzFastsimOptions(closed_form=closed_form, mx=400)
+        chosen = HertzFastsim(options, grid, MATERIALS)
+        solution = chosen.solve_one(gap, RIG[0], point)
         mean = np.dot(creepage.variation, solution.line_load) / solution.line_load.sum()
         local = 1e-3 + creepage.variation - mean
         assert np.all(solution.dissipation[np.abs(local) > 1e-6] > 0.0)
         powers = solution.power
-    assert powers == pytest.approx(model.solve(gap, RIG[0], point).power, rel=1e-4)
+    assert powers == pytest.approx(model.solve_one(gap, RIG[0], point).power, rel=1e-4)
 
 
 @pytest.mark.parametrize("bound", ["parabolic", "elliptic"])
@@ -298,7 +298,7 @@ def test_options_are_validated_and_described():
 
 
 def test_spec_builds_its_model():
-    model = SPEC.factory(SPEC.options())
+    model = SPEC.factory(SPEC.options(), Grid.spanning(-3e-3, 3e-3, 50), MATERIALS)
     assert isinstance(model, HertzFastsim)
     assert SPEC.name == "hertz-fastsim"
     assert not model.capabilities.wear_compliance

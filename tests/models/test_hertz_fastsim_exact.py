@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hertz_fastsim_examples import MATERIALS, PAIR, SPEED, contact
 
+from wearsim.models.contact.hertz import strips_over_patch
 from wearsim.models.contact.hertz_fastsim import HertzFastsim, HertzFastsimOptions
 from wearsim.models.tangential.base import Strips, complete
 from wearsim.models.tangential.fastsim import FastsimTheory
@@ -43,11 +44,11 @@ def test_errors_of_hard_cases_are_those_of_kalkers_fastsim(bound, rms):
     for case in rows("hard_cases"):
         creepage = Creepage(case["xi"], case["eta"], case["phi_per_m"])
         curvatures = 2.0 * case["A_per_m"], 2.0 * case["B_per_m"]
-        model = HertzFastsim(HertzFastsimOptions(mx=200, my=100, bound=bound))
-        grid = model.suggest_grid(curvatures[1], curvatures[0], case["N_N"], MATERIALS)
-        model.prepare(grid, MATERIALS)
+        options = HertzFastsimOptions(mx=200, my=100, bound=bound)
+        grid = strips_over_patch(options, curvatures[1], curvatures[0], case["N_N"], MATERIALS)
+        model = HertzFastsim(options, grid, MATERIALS)
         point = OperatingPoint(case["N_N"], 1.0, creepage, case["mu"])
-        power = model.solve(0.5 * curvatures[1] * grid.y**2, curvatures[0], point).power
+        power = model.solve_one(0.5 * curvatures[1] * grid.y**2, curvatures[0], point).power
         errors.append(power / case["P_over_V_N"] - 1.0)
     assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(rms, rel=0.03)
 
@@ -60,16 +61,14 @@ def test_march_converges_to_the_reference_quadrature(bound, rate, flexibility):
     given = {"c11": c11, "c22": 2.5, "c23": 0.5}
     for case in whole["rows"][:2]:
         for mx in (10, 25, 50, 100, 200):
-            model = HertzFastsim(
-                HertzFastsimOptions(
-                    mx=mx, my=1200, bound=bound, flexibility=flexibility, closed_form="never",
-                    kalker_coefficients=given,
-                )
+            options = HertzFastsimOptions(
+                mx=mx, my=1200, bound=bound, flexibility=flexibility, closed_form="never",
+                kalker_coefficients=given,
             )  # fmt: skip
-            grid = model.suggest_grid(1.0, 45.0, 300.0, MATERIALS)
-            model.prepare(grid, MATERIALS)
+            grid = strips_over_patch(options, 1.0, 45.0, 300.0, MATERIALS)
+            model = HertzFastsim(options, grid, MATERIALS)
             point = OperatingPoint(300.0, 1.0, Creepage(case["xi"]), 0.1)
-            power = model.solve(0.5 * grid.y**2, 45.0, point).power
+            power = model.solve_one(0.5 * grid.y**2, 45.0, point).power
             error = power / case[f"fastsim_{bound[:3]}_exact_P_over_V_N"] - 1.0
             assert abs(error) < rate / mx**2
 

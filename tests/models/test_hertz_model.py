@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 
 from tests.materials import STEEL
+from wearsim.contact_batch import ContactBatch
 from wearsim.errors import CapabilityError, ContactError
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.mechanics.hertz.ellipse import hertz
 from wearsim.models.contact.equivalent_ellipse import EllipseStrips
-from wearsim.models.contact.hertz import SPEC, HertzModel, Patch
+from wearsim.models.contact.hertz import SPEC, HertzModel, Patch, strips_over_patch
 from wearsim.models.contact.hertz_fastsim import HertzFastsim, HertzFastsimOptions
+from wearsim.models.tangential.options import tangential_theory
 from wearsim.types import Creepage, Grid, OperatingPoint
 
 MATERIALS = (STEEL, STEEL)
@@ -20,13 +22,13 @@ THEORIES = ("strip", "fastrip", "fastsim")
 
 def contact(grid=None, creepage=(1e-3, 0.0, 0.0), load=300.0, mu=0.1, shape=None, **options):
     """Solve the rig's contact; `options` as in a scenario."""
-    model = SPEC.factory(SPEC.options(**options))
+    chosen = SPEC.options(**options)
     if grid is None:
-        grid = model.suggest_grid(RIG[1], RIG[0], load, MATERIALS)
-    model.prepare(grid, MATERIALS)
+        grid = SPEC.suggest_grid(chosen, RIG[1], RIG[0], load, MATERIALS)
+    model = SPEC.factory(chosen, grid, MATERIALS)
     gap = grid.y**2 if shape is None else shape(grid.y)
     point = OperatingPoint(load, 2.618, Creepage(*creepage), mu)
-    return model, gap, point, model.solve(gap, RIG[0], point)
+    return model, gap, point, model.solve_one(gap, RIG[0], point)
 
 
 def test_patch_is_that_of_hertz():
@@ -42,11 +44,11 @@ def test_patch_is_that_of_hertz():
 @pytest.mark.parametrize("bound", ["parabolic", "elliptic"])
 def test_with_fastsim_it_equals_hertz_fastsim(bound, creepage):
     *_, found = contact(creepage=creepage, tangential="fastsim", bound=bound)
-    model = HertzFastsim(HertzFastsimOptions(bound=bound))
-    grid = model.suggest_grid(RIG[1], RIG[0], 300.0, MATERIALS)
-    model.prepare(grid, MATERIALS)
+    options = HertzFastsimOptions(bound=bound)
+    grid = strips_over_patch(options, RIG[1], RIG[0], 300.0, MATERIALS)
+    model = HertzFastsim(options, grid, MATERIALS)
     point = OperatingPoint(300.0, 2.618, Creepage(*creepage), 0.1)
-    expected = model.solve(grid.y**2, RIG[0], point)
+    expected = model.solve_one(grid.y**2, RIG[0], point)
     assert np.array_equal(found.dissipation, expected.dissipation)
 
 
@@ -64,12 +66,12 @@ def test_power_is_smooth_with_partly_covered_strips(tangential):
 def test_strips_may_end_anywhere_near_the_patch_edge(tangential):
     rng, b = np.random.default_rng(5), 1.5e-3
     patch = Patch(a="0.14 mm", b="1.5 mm")
-    model = HertzModel(SPEC.factory(SPEC.options(tangential=tangential)).theory, 50, patch)
+    theory = tangential_theory(SPEC.options(tangential=tangential))
     point = OperatingPoint(300.0, 2.618, Creepage(6e-4, 3e-4, 0.05), 0.1)
 
     def power(grid):
-        model.prepare(grid, MATERIALS)
-        return model.solve(grid.y**2, RIG[0], point).power
+        model = HertzModel(theory, grid, MATERIALS, patch)
+        return model.solve_one(grid.y**2, RIG[0], point).power
 
     exact = power(Grid.spanning(-b, b, 2000))
     for _ in range(150):
@@ -140,15 +142,15 @@ def test_worn_profile_is_fitted_again(tangential):
 def test_friction_torque_and_creepage_may_be_local(tangential):
     model, gap, _, whole = contact(tangential=tangential)
     friction = np.where(np.arange(50) < 25, 0.1, 0.05)
-    half = model.solve(gap, RIG[0], OperatingPoint(300.0, 2.618, Creepage(1e-3), friction))
+    half = model.solve_one(gap, RIG[0], OperatingPoint(300.0, 2.618, Creepage(1e-3), friction))
     assert half.dissipation[:20] == pytest.approx(whole.dissipation[:20], rel=2e-2)
     assert np.all(half.dissipation[25:] < whole.dissipation[25:])
     torque = OperatingPoint(
         300.0, 2.618, Creepage(0.0), 0.1, bearing_torque=0.1, rolling_radius=np.full(50, 20e-3)
     )
-    assert -model.solve(gap, RIG[0], torque).force_x * 20e-3 == pytest.approx(0.1, rel=1e-9)
+    assert -model.solve_one(gap, RIG[0], torque).force_x * 20e-3 == pytest.approx(0.1, rel=1e-9)
     varied = Creepage(1e-4, variation=300.0 * whole.y**2)
-    assert np.isfinite(model.solve(gap, RIG[0], OperatingPoint(300.0, 1.0, varied, 0.1)).power)
+    assert np.isfinite(model.solve_one(gap, RIG[0], OperatingPoint(300.0, 1.0, varied, 0.1)).power)
 
 
 @pytest.mark.parametrize("tangential", THEORIES)
@@ -169,17 +171,17 @@ def test_fields_integrate_to_load_and_traction(tangential):
 
 def test_batch_equals_single_solutions():
     model, gap, point, single = contact(creepage=(4e-4, 3e-4, 0.1), tangential="fastrip")
-    found = model.solve_batch(np.array([gap, gap]), RIG[0], [point, point])
-    assert found.stack("dissipation")[1] == pytest.approx(single.dissipation, rel=1e-14)
+    found = model.solve(ContactBatch.of(np.array([gap, gap]), RIG[0], [point, point]))
+    assert found.dissipation[1] == pytest.approx(single.dissipation, rel=1e-14)
 
 
 def test_missing_capabilities_are_refused():
     model, gap, point, _ = contact()
-    with pytest.raises(CapabilityError, match="hertz takes no wear compliance"):
-        model.solve(gap, RIG[0], point, np.zeros_like(gap))
+    with pytest.raises(CapabilityError, match="HertzModel does not support wear compliance"):
+        model.solve_one(gap, RIG[0], point, np.zeros_like(gap))
     field = OperatingPoint(300.0, 2.618, Creepage(1e-3), np.full((50, 50), 0.1))
-    with pytest.raises(CapabilityError, match="not one per point"):
-        model.solve(gap, RIG[0], field)
+    with pytest.raises(CapabilityError, match="from point to point"):
+        model.solve_one(gap, RIG[0], field)
     with pytest.raises(ContactError, match="contact is lost"):
         contact(Grid.spanning(-3e-3, 3e-3, 61), load=0.0)
     for tangential in THEORIES:
@@ -190,5 +192,6 @@ def test_missing_capabilities_are_refused():
 
 def test_spec_builds_its_model():
     assert SPEC.name == "hertz"
-    assert isinstance(SPEC.factory(SPEC.options()), HertzModel)
+    grid = Grid.spanning(-3e-3, 3e-3, 50)
+    assert isinstance(SPEC.factory(SPEC.options(), grid, MATERIALS), HertzModel)
     assert SPEC.capabilities == HertzModel.capabilities

@@ -22,16 +22,16 @@ LINE_LOAD = {
 
 
 def contact(variant="analyn", grid=None, gap=None, creepage=None, curvature=RIG, **options):
-    model = SPEC.factory(SemiHertzianOptions(variant=variant, **options))
+    chosen = SemiHertzianOptions(variant=variant, **options)
     if grid is None:
-        grid = model.suggest_grid(2.0, curvature, 300.0, MATERIALS)
-    model.prepare(grid, MATERIALS)
+        grid = SPEC.suggest_grid(chosen, 2.0, curvature, 300.0, MATERIALS)
+    model = SPEC.factory(chosen, grid, MATERIALS)
     gap = grid.y**2 if gap is None else gap(grid.y)
     creepage = dict(creepage or {"longitudinal": 1e-3})
     torque = creepage.pop("bearing_torque", None)
     radius = np.full(grid.strips, 0.02) if torque is not None else None
     point = OperatingPoint(300.0, 2.6, Creepage(**creepage), 0.1, torque, radius)
-    return model, gap, point, model.solve(gap, curvature, point)
+    return model, gap, point, model.solve_one(gap, curvature, point)
 
 
 def carried_on(exact, y):
@@ -92,7 +92,7 @@ def test_variants_have_their_capabilities():
     assert SPEC.capabilities == model.capabilities
     assert model.capabilities.wear_compliance
     assert not model.capabilities.coupled
-    soft = model.solve(gap, RIG, point, np.full(len(gap), 2e-12))
+    soft = model.solve_one(gap, RIG, point, np.full(len(gap), 2e-12))
     assert soft.peak_pressure < hard.peak_pressure
     assert soft.line_load.sum() == pytest.approx(hard.line_load.sum(), rel=1e-12)
 
@@ -101,7 +101,7 @@ def test_variants_have_their_capabilities():
 def test_solution_is_independent_of_the_initial_guess(variant):
     model, gap, point, solution = contact(variant)
     _, _, _, other = contact(variant, gap=lambda y: 0.7 * y**2)
-    again = model.solve(gap, RIG, point, None, other)
+    again = model.solve_one(gap, RIG, point, None, other)
     np.testing.assert_array_equal(again.line_load, solution.line_load)
 
 

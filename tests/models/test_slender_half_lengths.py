@@ -8,6 +8,7 @@ import pytest
 
 from tests.materials import STEEL
 from tests.reference import half_space
+from wearsim.contact_batch import ContactBatch
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.mechanics.hertz.ellipse import hertz
 from wearsim.models.contact.slender import SPEC, SlenderOptions
@@ -23,9 +24,9 @@ FAR = 1e-3  # a gap that does not close: beyond the end of the roller
 
 def solved(gap, wide, strips, curvature=RIG, **options):
     """Return the solution of a gap profile on strips that span -wide to wide."""
-    model, grid = SPEC.factory(SlenderOptions(**options)), Grid.spanning(-wide, wide, strips)
-    model.prepare(grid, MATERIALS)
-    return model.solve(gap(grid.y), curvature, POINT)
+    grid = Grid.spanning(-wide, wide, strips)
+    model = SPEC.factory(SlenderOptions(**options), grid, MATERIALS)
+    return model.solve_one(gap(grid.y), curvature, POINT)
 
 
 @cache
@@ -155,13 +156,13 @@ def test_strips_wider_than_long_are_independent():
 
 
 def test_all_solve_methods_give_equal_half_lengths():
-    model, grid = SPEC.factory(SlenderOptions()), Grid.spanning(-1e-3, 1e-3, 61)
-    model.prepare(grid, MATERIALS)
+    grid = Grid.spanning(-1e-3, 1e-3, 61)
+    model = SPEC.factory(SlenderOptions(), grid, MATERIALS)
     gap = 8.5 * grid.y**2
-    single = model.solve(gap, RIG, POINT)
-    batch = model.solve_batch(np.stack([gap, gap]), RIG, [POINT, POINT]).solutions
+    single = model.solve_one(gap, RIG, POINT)
+    batch = model.solve(ContactBatch.of(np.stack([gap, gap]), RIG, [POINT, POINT]))
     driven = replace(POINT, bearing_torque=0.1, rolling_radius=np.full(61, 0.02))
-    for other in (*batch, model.solve(gap, RIG, driven)):
+    for other in (*batch, model.solve_one(gap, RIG, driven)):
         np.testing.assert_array_equal(other.half_length, single.half_length)
         assert other.peak_pressure == pytest.approx(single.peak_pressure, rel=1e-14)
     fields = model.fields(single, gap, RIG, POINT)

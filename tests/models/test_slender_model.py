@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 from tests.materials import STEEL
+from wearsim.contact_batch import ContactBatch, ContactBatchSolution
 from wearsim.errors import ContactError
 from wearsim.models.contact.slender import SPEC, Slender, SlenderOptions
 from wearsim.models.tangential.strip_theory import StripTheory
+from wearsim.plugins import SharedWear
 from wearsim.types import ContactSolution, Creepage, Grid, OperatingPoint
 
 MATERIALS = (STEEL, STEEL)
@@ -18,16 +20,16 @@ RIG = 90.0
 
 
 def contact(grid=None, gap=None, creepage=None, load=300.0, curvature=RIG, mu=0.1, **options):
-    model = SPEC.factory(SlenderOptions(**options))
+    chosen = SlenderOptions(**options)
     if grid is None:
-        grid = model.suggest_grid(2.0, curvature, load, MATERIALS)
-    model.prepare(grid, MATERIALS)
+        grid = SPEC.suggest_grid(chosen, 2.0, curvature, load, MATERIALS)
+    model = SPEC.factory(chosen, grid, MATERIALS)
     gap = grid.y**2 if gap is None else gap(grid.y)
     torque = creepage.pop("bearing_torque", None) if isinstance(creepage, dict) else None
     creep = Creepage(**(creepage or {"longitudinal": 1e-3}))
     radius = np.full(grid.strips, 0.02) if torque is not None else None
     point = OperatingPoint(load, SPEED, creep, mu, torque, radius)
-    return model, gap, point, model.solve(gap, curvature, point)
+    return model, gap, point, model.solve_one(gap, curvature, point)
 
 
 def test_rig_power_is_within_1_percent_of_exact_theory():
@@ -164,14 +166,12 @@ def test_single_solution_equals_batch_bit_for_bit(creepage, warm):
     model, gap, point, start = contact(creepage=dict(creepage), mu=mu)
     near = start if warm else None
     point, compliance = replace(point, normal_force=310.0), np.full_like(gap, 1e-13)
-    single = model.solve(gap, RIG, point, compliance, near)
+    single = model.solve_one(gap, RIG, point, compliance, near)
     others = [point, replace(point, normal_force=280.0)]
-    batch = model.solve_batch(
-        np.stack([gap, gap]),
-        RIG,
-        others,
+    batch = model.solve(
+        ContactBatch.of(np.stack([gap, gap]), RIG, others),
         np.stack([compliance, compliance]),
-        [near, near] if warm else None,
+        warm=ContactBatchSolution.of([near, near]) if warm else None,
     )
     for item in fields(ContactSolution):
         assert np.array_equal(getattr(single, item.name), getattr(batch[0], item.name))
@@ -181,19 +181,44 @@ def test_infinite_power_is_an_error_naming_the_contact():
     model, gap, point, _ = contact()
     bad = replace(point, creepage=Creepage(np.nan))
     with pytest.raises(ContactError, match=r"^the dissipated power is not finite"):
-        model.solve(gap, RIG, bad)
-    with pytest.raises(ContactError, match=r"^realisation 1: the dissipated power is not finite"):
-        model.solve_batch(np.stack([gap, gap]), RIG, [point, bad])
+        model.solve_one(gap, RIG, bad)
+    with pytest.raises(ContactError, match=r"^contact 1: the dissipated power is not finite"):
+        model.solve(ContactBatch.of(np.stack([gap, gap]), RIG, [point, bad]))
+
+
+@pytest.mark.parametrize("coupled", [False, True])
+@pytest.mark.parametrize("tangential", ["strip", "fastsim"])
+def test_curvature_and_speed_may_differ_from_contact_to_contact(tangential, coupled):
+    model, gap, point, _ = contact(Grid.spanning(-2.5e-3, 2.5e-3, 81), tangential=tangential)
+    curvatures, speeds = np.array([60.0, 90.0, 130.0]), np.array([1.0, 2.6, 4.0])
+    points = [replace(point, rolling_speed=speed) for speed in speeds]
+    batch = replace(
+        ContactBatch.of(np.array([gap, 1.1 * gap, 0.9 * gap]), RIG, points),
+        longitudinal_curvature=curvatures,
+    )
+    wear = SharedWear(np.zeros((3, 2), dtype=np.int64), np.full((3, 2, 81), 1e-13))
+    found = model.solve(batch, coupling=wear if coupled else None)
+    opened = wear.opening(found.line_load) if coupled else np.zeros_like(batch.gap)
+    for k, curvature in enumerate(curvatures):
+        single = model.solve_one(batch.gap[k] + opened[k], curvature, points[k])
+        for item in fields(ContactSolution):
+            value, expected = getattr(found[k], item.name), getattr(single, item.name)
+            if not coupled:
+                assert np.array_equal(value, expected), item.name
+            elif item.name in {"line_load", "half_length", "power"}:
+                assert value == pytest.approx(expected, rel=1e-4, abs=1e-6 * np.max(expected))
 
 
 def test_wear_compliance_reduces_pressure_and_keeps_load():
     model, gap, point, hard = contact(grid=Grid.spanning(-4e-3, 4e-3, 81))
-    soft = model.solve(gap, RIG, point, np.full(81, 5e-11), hard)
+    soft = model.solve_one(gap, RIG, point, np.full(81, 5e-11), hard)
     assert soft.line_load.sum() == pytest.approx(hard.line_load.sum(), rel=1e-12)
     assert soft.peak_pressure < hard.peak_pressure
     assert (soft.line_load > 0).sum() > (hard.line_load > 0).sum()
 
 
 def test_only_strip_theory_has_the_compiled_loop():
-    assert Slender(StripTheory()).capabilities.pass_loop
-    assert not SPEC.factory(SlenderOptions(tangential="fastsim")).capabilities.pass_loop
+    arguments = Grid.spanning(-1e-3, 1e-3, 11), MATERIALS
+    assert Slender(StripTheory(), *arguments).capabilities.pass_loop
+    marched = SPEC.factory(SlenderOptions(tangential="fastsim"), *arguments)
+    assert not marched.capabilities.pass_loop

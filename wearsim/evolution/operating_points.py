@@ -1,59 +1,49 @@
-"""Operating points of the contacts of a wear problem, from loads and worn depths."""
+"""Contacts of a wear problem, from gaps, loads and worn depths."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
-
 import numpy as np
 
-from wearsim.contact_batch import OperatingPoints
+from wearsim.contact_batch import ContactBatch
 from wearsim.evolution.problem import WearProblem
-from wearsim.types import FloatArray, OperatingPoint
+from wearsim.types import FloatArray
 
 
-def operating_points(
+def contact_batch(
     problem: WearProblem,
+    gap: FloatArray,
     loads: FloatArray,
     cylinder_depth: FloatArray,
     roller_depth: FloatArray,
-) -> Sequence[OperatingPoint]:
-    """Return the operating point of every contact, in the order of `WearProblem.contacts`.
+) -> ContactBatch:
+    """Return all contacts as a batch, in the order of `WearProblem.contacts`.
 
     Parameters
     ----------
     problem : WearProblem
+    gap : ndarray, shape (stations, contacts, realisations, strips)
+        Gap of each contact [m].
     loads : ndarray, shape (stations, contacts, realisations)
         Normal force of each contact [N].
     cylinder_depth, roller_depth : ndarray
         Worn depths, shapes as in `WearState` [m].
     """
     worn = problem.at_contacts(roller_depth)
-    points = OperatingPoints(
+    return ContactBatch(
+        gap=gap.reshape(-1, problem.grid.strips),
         normal_force=loads.ravel(),
         **problem.input_columns,
-        rolling_speed=problem.kinematics.rolling_speed,
         variation=_creepage_variation(problem, cylinder_depth, worn),
+        rolling_radius=_rolling_radius(problem, worn) if problem.free else None,
+        shape=problem.shape,
     )
-    if not problem.free:
-        return points
-    torques = np.broadcast_to(problem.inputs.bearing_torque, problem.shape).ravel().tolist()
-    radii = _rolling_radius(problem, worn)
-    return [
-        replace(point, bearing_torque=torque, rolling_radius=radius)
-        for point, torque, radius in zip(points, torques, radii, strict=True)
-    ]
 
 
-def unworn_contacts(problem: WearProblem) -> tuple[FloatArray, float, Sequence[OperatingPoint]]:
-    """Return gap [m], curvature along rolling [1/m] and operating points of the unworn bodies.
-
-    The loads are those at the start of the test.
-    """
+def unworn_contacts(problem: WearProblem) -> ContactBatch:
+    """Return the contacts of the unworn bodies under the loads at the start of the test."""
     loads = np.broadcast_to(problem.force(0.0) + problem.inputs.normal_force_offset, problem.shape)
     cylinder, roller = np.zeros((1, 1, 1, 1)), np.zeros((1, problem.rollers, 1, 1))
-    points = operating_points(problem, loads, cylinder, roller)
-    return problem.nominal_gap, problem.kinematics.longitudinal_curvature, points
+    return contact_batch(problem, problem.nominal_gap, loads, cylinder, roller)
 
 
 def _rolling_radius(problem: WearProblem, roller_depth: FloatArray) -> FloatArray:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, overload
 
 import numpy as np
 
-from wearsim.contact_batch import BatchSolution, rows_of
+from wearsim.contact_batch import ContactBatchSolution
 from wearsim.evolution.batch.per_realisation import (
     mean_along,
     per_strip,
@@ -20,7 +20,7 @@ from wearsim.evolution.batch.per_realisation import (
 from wearsim.evolution.contact_inputs import ContactInputs, Redraw, Varying
 from wearsim.evolution.kinematics import Kinematics
 from wearsim.plugins import BODIES, Body, ContactModel, Load, LoadTerm, WearLaw
-from wearsim.types import ContactSolution, FloatArray, Grid, IntArray, Number
+from wearsim.types import FloatArray, Grid, IntArray, Number
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class WearProblem:
     grid : Grid
         Strips across the track.
     model : ContactModel
-        Contact model, prepared for the grid.
+        Contact model, built for the grid.
     law : WearLaw
         Wear law of both bodies.
     load : Load
@@ -171,13 +171,17 @@ class WearProblem:
 
     @cached_property
     def input_columns(self) -> dict[str, Any]:
-        """Creepages, spin and friction by their name in `OperatingPoints`, shape (contacts,)."""
-        columns = {
+        """Inputs by their name in `ContactBatch`, those that no step changes, shape (contacts,)."""
+        columns: dict[str, Number] = {
+            "longitudinal_curvature": self.kinematics.longitudinal_curvature,
+            "rolling_speed": self.kinematics.rolling_speed,
             "longitudinal": self.inputs.longitudinal,
             "lateral": self.inputs.yaw,
             "spin": self.spin,
             "friction": self.inputs.friction,
         }
+        if self.free:
+            columns["bearing_torque"] = self.inputs.bearing_torque
         return {n: np.broadcast_to(column, self.shape).ravel() for n, column in columns.items()}
 
     @cached_property
@@ -281,14 +285,12 @@ class WearProblem:
         """
         return np.asarray(gap.min(axis=-1) - self.nominal_gap.min(axis=-1))
 
-    def values_of(self, contacts: Sequence[ContactSolution], name: str) -> FloatArray:
+    def values_of(self, contacts: ContactBatchSolution, name: str) -> FloatArray:
         """Return the field `name` of all contacts, with the axes of `shape` first."""
-        if isinstance(contacts, BatchSolution) and contacts.shape == self.shape:
-            return contacts.stack(name)
-        values = rows_of(contacts, name)
+        values: FloatArray = getattr(contacts, name)
         return values.reshape(self.shape + values.shape[1:])
 
-    def wear_per_pass(self, contacts: Sequence[ContactSolution]) -> tuple[FloatArray, FloatArray]:
+    def wear_per_pass(self, contacts: ContactBatchSolution) -> tuple[FloatArray, FloatArray]:
         """Return the depth worn off either body by one pass of each contact, where it touches.
 
         Returns
@@ -299,7 +301,7 @@ class WearProblem:
         return self._depths(contacts, dict.fromkeys(BODIES, 1.0))
 
     def wear_parts(
-        self, contacts: Sequence[ContactSolution], passes: Number
+        self, contacts: ContactBatchSolution, passes: Number
     ) -> tuple[FloatArray, FloatArray]:
         """Return the contribution of each contact to the wear of the bodies over some passes [m].
 
@@ -311,7 +313,7 @@ class WearProblem:
         return self._depths(contacts, {body: share * per_strip(passes) for body, share in shares})
 
     def _depths(
-        self, contacts: Sequence[ContactSolution], passes: Mapping[Body, Number]
+        self, contacts: ContactBatchSolution, passes: Mapping[Body, Number]
     ) -> tuple[FloatArray, FloatArray]:
         """Return the depth that `passes` passes of each contact wear off either body [m]."""
         dissipation, speed = self.values_of(contacts, "dissipation"), self.kinematics.rolling_speed

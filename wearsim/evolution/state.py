@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from wearsim.contact_batch import BatchSolution, rows_of
+from wearsim.contact_batch import ContactBatchSolution
 from wearsim.evolution.operating_points import unworn_contacts
 from wearsim.evolution.problem import WearProblem
-from wearsim.types import ContactSolution, FloatArray, IntArray, Number
+from wearsim.types import FloatArray, IntArray, Number
 
 SIGMAS = 2.0  # standard deviations of the sampling scatter that are counted as error
-Contacts: TypeAlias = Sequence[ContactSolution]
 Depths: TypeAlias = tuple[FloatArray, FloatArray]
 """Depths of cylinder and rollers, shapes as in `WearState` [m]."""
 _CONTACT = "contact_"
@@ -56,7 +55,7 @@ class WearState:
         Worn depth of each roller [m].
     terms : ndarray, shape (terms, rollers, realisations)
         State of each load term.
-    contacts : sequence of ContactSolution
+    contacts : ContactBatchSolution
         Last solution of every contact, in the order of `WearProblem.contacts`.
     energy : ndarray, shape (realisations,)
         Dissipated energy of all rollers [J].
@@ -97,7 +96,7 @@ class WearState:
     cylinder_depth: FloatArray
     roller_depth: FloatArray
     terms: FloatArray
-    contacts: Contacts
+    contacts: ContactBatchSolution
     energy: FloatArray
     depth_error: FloatArray
     volume_error: FloatArray
@@ -119,13 +118,6 @@ class WearState:
     def passes_done(self) -> Number:
         """Roller passes done: one number, or one per realisation with individual steps."""
         return self.passes if self.individual is None else self.individual.passes
-
-    @property
-    def batch(self) -> BatchSolution:
-        """The contacts as columns with leading axes (station, contact, realisation)."""
-        stations, _, realisations = self.cylinder_depth.shape[:3]
-        contacts = len(self.contacts) // (stations * realisations)
-        return as_batch(self.contacts, (stations, contacts, realisations))
 
     @property
     def depths(self) -> Depths:
@@ -184,8 +176,9 @@ class WearState:
             if item.name not in {"contacts", "individual", *_AUXILIARY}
             and getattr(self, item.name) is not None
         }
-        for item in fields(ContactSolution):
-            arrays[_CONTACT + item.name] = np.array(rows_of(self.contacts, item.name))
+        for name, column in vars(self.contacts).items():
+            arrays[_CONTACT + name] = np.array(column)
+        arrays[_CONTACT + "y"] = np.tile(self.contacts.y, (len(self.contacts), 1))
         for name, state in self.auxiliary.items():
             arrays.update({f"{name}_{key}": a for key, a in state.to_arrays().items()})
         return arrays
@@ -206,27 +199,13 @@ class WearState:
             if part:
                 values[name] = cls.from_arrays(part)
         columns = _with_prefix(arrays, _CONTACT)
-        y = columns.pop("y")
-        values["contacts"] = BatchSolution((len(y),), y[0], columns).solutions
+        values["contacts"] = ContactBatchSolution(**columns | {"y": columns["y"][0]})
         return cls(**values)
 
 
 def _with_prefix(arrays: Mapping[str, npt.NDArray[Any]], prefix: str) -> dict[str, Any]:
     """Return the arrays whose names begin with a prefix, by the rest of their names."""
     return {n.removeprefix(prefix): a for n, a in arrays.items() if n.startswith(prefix)}
-
-
-def as_batch(contacts: Contacts, shape: tuple[int, ...]) -> BatchSolution:
-    """Return contacts as columns with given leading axes."""
-    if not isinstance(contacts, BatchSolution):
-        return BatchSolution.of(shape, contacts)
-    if contacts.shape == shape:
-        return contacts
-    columns = {
-        name: column.reshape(shape + column.shape[len(contacts.shape) :])
-        for name, column in contacts.columns.items()
-    }
-    return BatchSolution(shape, contacts.y, columns)
 
 
 def widened(array: FloatArray, strips: int) -> FloatArray:
@@ -245,21 +224,17 @@ def widened_state(state: WearState, y: FloatArray, strips: int) -> WearState:
     strips : int
         Number of strips added on each side.
     """
-    contacts = tuple(
-        replace(
-            contact,
-            y=y,
-            half_length=widened(contact.half_length, strips),
-            line_load=widened(contact.line_load, strips),
-            dissipation=widened(contact.dissipation, strips),
-        )
-        for contact in state.contacts
-    )
-    loop = state.loop_strips
+    contacts, loop = state.contacts, state.loop_strips
     return state.replaced(
         cylinder_depth=widened(state.cylinder_depth, strips),
         roller_depth=widened(state.roller_depth, strips),
-        contacts=contacts,
+        contacts=replace(
+            contacts,
+            y=y,
+            half_length=widened(contacts.half_length, strips),
+            line_load=widened(contacts.line_load, strips),
+            dissipation=widened(contacts.dissipation, strips),
+        ),
         loop_strips=None if loop is None else widened(loop, strips),
         **{name: widened_state(part, y, strips) for name, part in state.auxiliary.items()},
     )
@@ -270,7 +245,7 @@ def fresh_state(problem: WearProblem) -> WearState:
     problem = problem.at_time(0.0, 0.0)
     stations, _, realisations = problem.shape
     n = problem.grid.strips
-    contacts = problem.model.solve_batch(*unworn_contacts(problem))
+    contacts = problem.model.solve(unworn_contacts(problem))
     return WearState(
         passes=0.0,
         cylinder_depth=np.zeros((stations, 1, realisations, n)),

@@ -139,6 +139,7 @@ SPECS = (
         factory=ConstantLoad,
         options=ConstantOptions,
         summary="a constant load",
+        protocol=2,
     ),
     LoadSpec(
         name="spring",
@@ -146,12 +147,14 @@ SPECS = (
         options=SpringOptions,
         summary="a preload that decreases with worn depth by the stiffness of the mounting spring",
         references=_PAPER,
+        protocol=2,
     ),
     LoadSpec(
         name="recorded",
         factory=RecordedLoad,
         options=RecordedOptions,
         summary="a logged load from a CSV file, linear between samples",
+        protocol=2,
     ),
     LoadSpec(
         name="thermal",
@@ -160,5 +163,6 @@ SPECS = (
         role="term",
         summary="a first-order lag of the dissipated power",
         references=_PAPER,
+        protocol=2,
     ),
 )

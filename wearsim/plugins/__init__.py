@@ -2,10 +2,10 @@
 
 from pydantic import Field
 
-from wearsim.contact_batch import BatchSolution, OperatingPoints
+from wearsim.contact_batch import ContactBatch, ContactBatchSolution
 from wearsim.errors import CapabilityError, ContactError
 from wearsim.plugins.capabilities import Capabilities, PassLoop
-from wearsim.plugins.contact_model import ContactModel, refuse_unclaimed
+from wearsim.plugins.contact_model import ContactModel, SingleContactModel, refuse_unclaimed
 from wearsim.plugins.hookspecs import hookimpl
 from wearsim.plugins.manager import registry
 from wearsim.plugins.protocols import BODIES, Body, Load, LoadTerm, WearLaw
@@ -44,10 +44,11 @@ from wearsim.units import Kind, QuantityError
 
 __all__ = [
     "BODIES",
-    "BatchSolution",
     "Body",
     "Capabilities",
     "CapabilityError",
+    "ContactBatch",
+    "ContactBatchSolution",
     "ContactError",
     "ContactModel",
     "ContactModelSpec",
@@ -64,7 +65,6 @@ __all__ = [
     "LoadTerm",
     "NonNegativeStiffness",
     "NonNegativeWearFactor",
-    "OperatingPoints",
     "Options",
     "PassLoop",
     "PositiveDuration",
@@ -78,6 +78,7 @@ __all__ = [
     "QuantityError",
     "RandomInputSpec",
     "SharedWear",
+    "SingleContactModel",
     "Spec",
     "Uniforms",
     "Value",

@@ -16,7 +16,7 @@ class Capabilities:
     wear_compliance : bool
         `solve` accepts `wear_compliance`, which implicit steps require.
     coupled : bool
-        `solve_coupled` accepts several contacts that wear the same bodies.
+        `solve` accepts `coupling`: contacts that wear the same bodies.
     creepage_variation : bool
         The creepage may vary from strip to strip (`Creepage.variation`).
     bearing_torque : bool
@@ -71,7 +71,7 @@ class PassLoop:
         Load lost per displacement of a roller towards the cylinder [N/m].
     nominal_gap, from_apex : ndarray, shape (contacts, strips)
         Gap before wear and axial distance from the roller's apex [m].
-    longitudinal_curvature, rolling_speed : float
+    longitudinal_curvature, rolling_speed : ndarray, shape (contacts,)
         Relative curvature along rolling [1/m], rolling velocity V [m/s].
     slip_base, spin_arm : ndarray, shape (contacts, strips)
         Variation of the longitudinal creepage on unworn bodies; its decrease per spin [m].
@@ -108,8 +108,8 @@ class PassLoop:
     stiffness: float
     nominal_gap: FloatArray
     from_apex: FloatArray
-    longitudinal_curvature: float
-    rolling_speed: float
+    longitudinal_curvature: FloatArray
+    rolling_speed: FloatArray
     slip_base: FloatArray
     spin_arm: FloatArray
     slip_rates: FloatArray

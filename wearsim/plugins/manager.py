@@ -13,9 +13,18 @@ import pluggy
 
 from wearsim.errors import PluginError
 from wearsim.plugins.hookspecs import PROJECT, HookSpecs
-from wearsim.plugins.specs import ContactModelSpec, LoadSpec, RandomInputSpec, Spec, WearLawSpec
+from wearsim.plugins.specs import (
+    PROTOCOL,
+    ContactModelSpec,
+    LoadSpec,
+    RandomInputSpec,
+    Spec,
+    WearLawSpec,
+)
 
 S = TypeVar("S", bound=Spec)
+
+MIGRATION = "docs/plugins.md, section 'Migration to protocol 2'"
 
 _HOOKS: dict[type[Spec], str] = {
     ContactModelSpec: "wearsim_contact_models",
@@ -32,6 +41,20 @@ class Registered:
     spec: Spec
     distribution: str
     version: str
+
+    @property
+    def refusal(self) -> str | None:
+        """Why a scenario cannot select the spec, if it is of another protocol."""
+        spec = self.spec
+        if spec.protocol == PROTOCOL:
+            return None
+        older = spec.protocol < PROTOCOL
+        remedy = "a newer version of the plugin" if older else "a newer wearsim"
+        return (
+            f"{spec.kind} '{spec.name}' of {self.distribution} {self.version} is written for plugin"
+            f" protocol {spec.protocol}, and this wearsim has {PROTOCOL}; install {remedy},"
+            f" or change the plugin as described at {MIGRATION}"
+        )
 
 
 @dataclass(frozen=True)
@@ -109,8 +132,9 @@ class Registry:
         return [item for items in self._specs.values() for _, item in sorted(items.items())]
 
     def names(self, kind: type[Spec]) -> list[str]:
-        """Return the sorted names registered for `kind`."""
-        return sorted(self._specs[kind])
+        """Return the sorted names of the specs of `kind` that a scenario can select."""
+        specs = self._specs[kind]
+        return sorted(name for name, item in specs.items() if item.refusal is None)
 
     def get(self, kind: type[S], name: str) -> S:
         """Return the spec of `kind` called `name`.
@@ -118,10 +142,13 @@ class Registry:
         Raises
         ------
         PluginError
-            If there is none; the message includes broken plugins and their causes.
+            If there is none; the message includes broken plugins and their causes. If it is of
+            another protocol; the message has both protocols.
         """
         item = self._specs[kind].get(name)
         if item is not None and isinstance(item.spec, kind):
+            if item.refusal is not None:
+                raise PluginError(item.refusal)
             return item.spec
         known = self.names(kind)
         text = f"no {kind.kind} is named '{name}'; known: {', '.join(known) or 'none'}"

@@ -30,7 +30,8 @@ class SharedWear:
         numbered independently.
     compliance : ndarray, shape (contacts, 2, strips)
         Depth that a contact wears off each of its bodies per unit of line load [m/(N/m)]. A
-        leading axis may count independent sets of such contacts.
+        leading axis may count independent sets of such contacts, which follow one another in a
+        `ContactBatch`.
     """
 
     bodies: IntArray

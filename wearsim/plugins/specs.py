@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, TypeAlias
 
 from pydantic import BaseModel, ConfigDict
 
@@ -12,6 +12,13 @@ from wearsim.plugins.capabilities import Capabilities
 from wearsim.plugins.contact_model import ContactModel
 from wearsim.plugins.protocols import Load, LoadTerm, WearLaw
 from wearsim.plugins.random_inputs import Distribution, FrictionField, JointDistribution, Process
+from wearsim.types import Grid, Material
+
+Materials: TypeAlias = tuple[Material, Material]
+SuggestGrid: TypeAlias = Callable[[Any, float, float, float, Materials], Grid | None]
+
+
+PROTOCOL = 2  # version of the plugin interface; docs/plugins.md describes the changes
 
 
 class Options(BaseModel):
@@ -36,6 +43,9 @@ class Spec:
         One line for lists.
     references : tuple of str
         Sources: paper, equation, DOI.
+    protocol : int
+        Version of the interface that the plugin is written for; `PROTOCOL` is the only one that a
+        scenario can select. A spec that gives none is of version 1.
     """
 
     kind: ClassVar[str] = ""
@@ -44,6 +54,7 @@ class Spec:
     options: type[Options]
     summary: str
     references: tuple[str, ...] = ()
+    protocol: int = field(kw_only=True, default=1)
 
     def describe(self) -> list[str]:
         """Return the capabilities or the role as words."""
@@ -52,12 +63,26 @@ class Spec:
 
 @dataclass(frozen=True)
 class ContactModelSpec(Spec):
-    """Spec of a contact model, built by `factory(options)`."""
+    """Spec of a contact model.
+
+    Parameters
+    ----------
+    factory : callable
+        `factory(options, grid, materials)` returns a ContactModel for the strips `grid` and the
+        materials of cylinder and roller.
+    capabilities : Capabilities
+        All capabilities that its models have with some options.
+    suggest_grid : callable, optional
+        ``suggest_grid(options, gap_curvature, longitudinal_curvature, normal_force, materials)``
+        returns a Grid for one contact of unworn bodies centred on y = 0, or None. `gap_curvature`
+        is the relative curvature across the track [1/m].
+    """
 
     kind: ClassVar[str] = "contact model"
 
-    factory: Callable[[Any], ContactModel] = field(kw_only=True)
+    factory: Callable[[Any, Grid, Materials], ContactModel] = field(kw_only=True)
     capabilities: Capabilities = field(kw_only=True, default=Capabilities())
+    suggest_grid: SuggestGrid | None = field(kw_only=True, default=None)
 
     def describe(self) -> list[str]:
         """Return the names of the capabilities."""

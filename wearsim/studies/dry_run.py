@@ -5,7 +5,7 @@ from __future__ import annotations
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.scenario import Scenario, described_model
 from wearsim.studies.contact.single import study_contact
-from wearsim.studies.run.assemble import assemble_problem, check_model, load_range
+from wearsim.studies.run.assemble import assemble_problem, load_range
 from wearsim.studies.run.draws import draw
 from wearsim.studies.run.grid import fresh_patch
 
@@ -110,6 +110,5 @@ def plan(scenario: Scenario) -> TableRows:
     ]
     if is_run:
         return rows + _test(scenario)
-    check_model(scenario, scenario.contact.build())
     strips = study_contact(scenario).grid.strips
     return [*rows, ("runs as", f"one contact, {strips} strips (no duration or no wear law)")]

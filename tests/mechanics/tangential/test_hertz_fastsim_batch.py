@@ -49,8 +49,8 @@ GAPS = np.array([Y**2, 2e-6 + 1.3 * (Y - 4e-4) ** 2, GROOVE])
 ROW = RANDOM.integers(0, 3, CONTACTS)
 
 
-def bodies(a=0.0, b=0.0, curvature_x=45.0):
-    return Bodies(Y, GRID.spacing, curvature_x, MODULUS, a, b, 1e-10, 200)
+def bodies(contacts, a=0.0, b=0.0, curvature_x=45.0):
+    return Bodies(Y, GRID.spacing, np.full(contacts, curvature_x), MODULUS, a, b, 1e-10, 200)
 
 
 def patches_of(contacts):
@@ -59,7 +59,7 @@ def patches_of(contacts):
 
 def find(gaps=GAPS, row=ROW, loads=LOADS, **given):
     patches = patches_of(len(row))
-    find_patches(bodies(**given), gaps, row, loads, patches)
+    find_patches(bodies(len(row), **given), gaps, row, loads, patches)
     return patches
 
 
@@ -119,7 +119,7 @@ def test_failed_contact_has_a_status_and_does_not_affect_others(gap, load, statu
     patches = find(gaps, row, np.array([300.0, load, 300.0]))
     assert patches.status.tolist() == [CONVERGED, status, CONVERGED]
     assert patches.b[0] == patches.b[2] > 0.0
-    halves = half_lengths(bodies(), patches, np.array([300.0, load, 300.0]))
+    halves = half_lengths(bodies(3), patches, np.array([300.0, load, 300.0]))
     assert not halves[1].any()
     assert np.array_equal(halves[0], halves[2])
 
@@ -136,13 +136,14 @@ def operating_points(chosen=slice(None)):
     numbers = random.normal(size=(3, CONTACTS)) * [[4e-4], [5e-4], [0.1]]
     friction = random.uniform(0.05, 0.15, (CONTACTS, 1, 1))
     columns = [LOADS, 1e-3 + numbers[0], numbers[1], numbers[2], friction]
-    return ContactInputs(*(column[chosen] for column in columns), False, np.zeros((0, len(Y))), 2.6)
+    speed, none = np.full(CONTACTS, 2.6)[chosen], np.zeros((0, len(Y)))
+    return ContactInputs(*(column[chosen] for column in columns), False, none, speed)
 
 
 def solve(options, inputs, row=ROW, gaps=GAPS, **given):
     found = ContactResults(*np.zeros((3, len(row), len(Y))), *np.zeros((5, len(row))))
     patches = patches_of(len(row))
-    failed = solve_contacts(bodies(**given), options, gaps, row, inputs, patches, found)
+    failed = solve_contacts(bodies(len(row), **given), options, gaps, row, inputs, patches, found)
     return failed, found, patches
 
 

@@ -166,7 +166,7 @@ def test_contact_totals_are_the_sums_over_strips():
         y,
         spacing,
         ELASTICITY,
-        speed,
+        twice(speed),
         twice(longitudinal),
         twice(lateral),
         twice(spin),

@@ -76,6 +76,12 @@ def problem_of(problem: WearProblem, numbers: IntArray) -> WearProblem:
     )
 
 
+def contacts_of(state: WearState, numbers: IntArray) -> IntArray:
+    """Return the numbers of the contacts of some realisations, in the state's order."""
+    realisations = state.cylinder_depth.shape[2]
+    return np.arange(len(state.contacts)).reshape(-1, realisations)[:, numbers].ravel()
+
+
 def state_of(state: WearState, numbers: IntArray) -> WearState:
     """Return the state of some realisations, by number and in that order."""
     arrays: dict[str, Any] = {
@@ -87,7 +93,7 @@ def state_of(state: WearState, numbers: IntArray) -> WearState:
     return replace(
         state,
         **arrays,
-        contacts=state.batch.at(numbers),
+        contacts=state.contacts.at(contacts_of(state, numbers)),
         coarse_step_solution=None if coarse is None else state_of(coarse, numbers),
         individual=counts,
     )
@@ -99,7 +105,8 @@ def stacked_states(states: Sequence[WearState]) -> WearState:
         name: np.concatenate([getattr(state, name) for state in states], axis=axis)
         for name, axis in _AXES.items()
     }
-    first, *others = (state.batch for state in states)
+    first, *others = (state.contacts for state in states)
+    rows = len(first) // states[0].cylinder_depth.shape[2]
     counts = [state.individual for state in states if state.individual is not None]
     coarse = [
         state.coarse_step_solution for state in states if state.coarse_step_solution is not None
@@ -107,7 +114,7 @@ def stacked_states(states: Sequence[WearState]) -> WearState:
     return replace(
         states[0],
         **arrays,
-        contacts=first.joined_with(*others),
+        contacts=first.joined_with(*others, rows=rows),
         coarse_step_solution=stacked_states(coarse) if len(coarse) == len(states) else None,
         individual=IndividualCounts(
             np.concatenate([item.passes for item in counts]),

@@ -175,14 +175,10 @@ def _shifted_wear(
 
 def half_quadrature_start(problem: WearProblem, state: WearState) -> WearState:
     """Return the initial half-quadrature solution: `state` with half the nodes per roller."""
-    chosen = set(np.flatnonzero(problem.half == 0))
+    numbers = np.arange(len(state.contacts)).reshape(problem.shape)[:, problem.half == 0]
     return replace(
         state,
-        contacts=tuple(
-            contact
-            for (_, c, _), contact in zip(problem.contacts, state.contacts, strict=True)
-            if c in chosen
-        ),
+        contacts=state.contacts.at(numbers.ravel()),
         coarse_step_solution=None,
         half_quadrature_solution=None,
     )

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from wearsim.contact_batch import OperatingPoints
+from wearsim.contact_batch import ContactBatch, ContactBatchSolution
 from wearsim.errors import StepError
 from wearsim.evolution.batch.per_realisation import first_of
 from wearsim.evolution.error_control.error_estimates import Step
 from wearsim.evolution.error_control.step_doubling import StepDoublingStepper
-from wearsim.evolution.operating_points import operating_points
+from wearsim.evolution.operating_points import contact_batch
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import Contacts, WearState, as_batch
+from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.single_step import REALISATION, end_depths, end_loads, worn_state
 from wearsim.evolution.steppers.wear_increment import WearIncrement
 from wearsim.plugins import SharedWear
-from wearsim.types import BoolArray, FloatArray, IntArray, Number, OperatingPoint
+from wearsim.types import BoolArray, FloatArray, Number
 
 MAX_FIXED_POINT = 60
 RELAXATION_INTERVAL = 20  # iterations between relaxations of the tolerance by a factor of ten
@@ -68,10 +66,8 @@ def implicit_step(problem: WearProblem, state: WearState, passes: Number) -> Wea
     active = np.ones(problem.shape[REALISATION], dtype=np.bool_)
     iterations = np.zeros(len(active), dtype=np.int64)
     for iteration in range(1, MAX_FIXED_POINT + 1):
-        points = operating_points(problem, loads, *ends)
-        solved = solve_compliant(
-            problem, gap + wear.offset, points, wear.compliance, contacts, active
-        )
+        batch = contact_batch(problem, gap + wear.offset, loads, *ends)
+        solved = solve_compliant(problem, batch, wear.compliance, contacts, active)
         iterations += active
         new = WearIncrement(problem, solved, passes)
         ends = end_depths(state, new)
@@ -100,72 +96,42 @@ def implicit_step(problem: WearProblem, state: WearState, passes: Number) -> Wea
 
 def solve_compliant(
     problem: WearProblem,
-    gap: FloatArray,
-    points: Sequence[OperatingPoint],
+    batch: ContactBatch,
     wear: SharedWear,
-    warm: Contacts,
+    warm: ContactBatchSolution,
     active: BoolArray,
-) -> Contacts:
+) -> ContactBatchSolution:
     """Solve the contacts of the active realisations; the others keep their solutions.
 
     Parameters
     ----------
     problem : WearProblem
-    gap : ndarray, shape (stations, contacts, realisations, strips)
-        Gap of each contact [m].
-    points : sequence of OperatingPoint
-        One per contact, in the problem's order.
+    batch : ContactBatch
+        The contacts, in the problem's order.
     wear : SharedWear
         Wear compliance with a first axis of realisations.
-    warm : sequence of ContactSolution
+    warm : ContactBatchSolution
         Solutions to start from, in the problem's order.
     active : ndarray of bool, shape (realisations,)
 
     Returns
     -------
-    sequence of ContactSolution
+    ContactBatchSolution
         In the problem's order; those of inactive realisations are taken from `warm`.
     """
-    if np.count_nonzero(active) == len(active):
-        return _solve(problem, gap, points, wear, warm)
+    model, realisations = problem.model, problem.shape[REALISATION]
+    coupled = len(batch) // realisations
+    everywhere = np.count_nonzero(active) == realisations
+    if everywhere and coupled == 1:
+        return model.solve(batch, wear.total.reshape(batch.gap.shape), None, warm)
+    if everywhere and realisations == 1:
+        return model.solve(batch, None, wear, warm)
+    # the contacts of one realisation next to each other, which the problem has `realisations` apart
     numbers = np.flatnonzero(active)
-    places = np.arange(len(points)).reshape(-1, len(active))[:, numbers].ravel()
-    warm = as_batch(warm, problem.shape)
-    solved = _solve(
-        problem,
-        np.take(gap, numbers, axis=REALISATION),
-        _points_at(points, places),
-        wear.at(numbers),
-        warm.at(numbers),
-    )
-    return warm.with_others(numbers, as_batch(solved, (*problem.shape[:2], len(numbers))))
-
-
-def _points_at(points: Sequence[OperatingPoint], places: IntArray) -> Sequence[OperatingPoint]:
-    if isinstance(points, OperatingPoints):
-        return points.at(places)
-    return [points[place] for place in places]
-
-
-def _solve(
-    problem: WearProblem,
-    gap: FloatArray,
-    points: Sequence[OperatingPoint],
-    wear: SharedWear,
-    warm: Contacts,
-) -> Contacts:
-    """Solve the contacts of some realisations, in the order station, contact, realisation."""
-    model, curvature = problem.model, problem.kinematics.longitudinal_curvature
-    stations, contacts, realisations, strips = gap.shape
-    coupled = stations * contacts
+    order = np.arange(len(batch)).reshape(coupled, realisations)[:, numbers].T.ravel()
+    some, near, part = batch.at(order), warm.at(order), wear.at(numbers)
     if coupled == 1:
-        return model.solve_batch(gap, curvature, points, wear.total.reshape(gap.shape), warm)
-    sets = gap.reshape(coupled, realisations, strips).transpose(1, 0, 2)
-    if realisations == 1:
-        return model.solve_coupled_batch(sets, curvature, points, wear, warm)
-    # the model expects the contacts of one realisation next to each other
-    order = np.arange(len(points)).reshape(coupled, realisations).T.ravel()
-    near = as_batch(warm, gap.shape[:-1]).with_axis_moved(REALISATION, 0)
-    solved = model.solve_coupled_batch(sets, curvature, _points_at(points, order), wear, near)
-    by_set = as_batch(solved, (realisations, stations, contacts))
-    return by_set.with_axis_moved(0, REALISATION)
+        solved = model.solve(some, part.total.reshape(some.gap.shape), None, near)
+    else:
+        solved = model.solve(some, None, part, near)
+    return warm.with_others(order, solved)

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from wearsim.evolution.operating_points import operating_points
+from wearsim.contact_batch import ContactBatchSolution
+from wearsim.evolution.operating_points import contact_batch
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.base import Advance, Stepper
@@ -136,8 +137,8 @@ def _run_compiled(problem: WearProblem, state: WearState, count: int) -> WearSta
             stiffness=problem.load.stiffness,
             nominal_gap=_of_realisation(problem, problem.flat_gap[0], v),
             from_apex=from_apex,
-            longitudinal_curvature=kinematics.longitudinal_curvature,
-            rolling_speed=speed,
+            longitudinal_curvature=np.full(problem.rollers, kinematics.longitudinal_curvature),
+            rolling_speed=np.full(problem.rollers, speed),
             slip_base=slip_base,
             spin_arm=spin_arm,
             slip_rates=slip_rates,
@@ -193,9 +194,10 @@ def _run_in_python(problem: WearProblem, state: WearState, count: int) -> WearSt
             gap = unworn + cylinder[s, 0, v] + roller[0, r, v]
             load = float(force[number, v]) + float(terms[:, r, v].sum())
             load -= problem.load.stiffness * float(gap.min() - unworn.min())
-            points = operating_points(one, np.full(one.shape, load), cylinder, roller)
-            point = points[s * problem.shape[2] + v]
-            contacts[s, r, v] = contact = problem.model.solve(
+            loads = np.full(one.shape, load)
+            batch = contact_batch(one, one.nominal_gap, loads, cylinder, roller)
+            point = batch.point(s * problem.shape[2] + v)
+            contacts[s, r, v] = contact = problem.model.solve_one(
                 gap, kinematics.longitudinal_curvature, point, None, contacts[s, r, v]
             )
             cylinder[s, 0, v] += problem.law.depth_per_pass("cylinder", contact, speed)
@@ -212,7 +214,7 @@ def _run_in_python(problem: WearProblem, state: WearState, count: int) -> WearSt
         roller_depth=roller,
         terms=terms,
         energy=energy,
-        contacts=tuple(contacts[index] for index in problem.contacts),
+        contacts=ContactBatchSolution.of([contacts[index] for index in problem.contacts]),
         full_solves=state.full_solves + solves,
         solves=state.solves + solves,
     )

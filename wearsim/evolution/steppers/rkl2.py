@@ -10,10 +10,11 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from wearsim.contact_batch import ContactBatchSolution
 from wearsim.evolution.error_control.error_estimates import Step
 from wearsim.evolution.error_control.step_doubling import StepDoublingStepper
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import Contacts, WearState
+from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.single_step import (
     contacts_at,
     mean_loads,
@@ -154,8 +155,8 @@ def _rate(
     state: WearState,
     passes: float,
     change: Change,
-    solve: Callable[[WearProblem, WearState, FloatArray], Contacts] = solve_present,
-) -> tuple[Contacts, Change]:
+    solve: Callable[[WearProblem, WearState, FloatArray], ContactBatchSolution] = solve_present,
+) -> tuple[ContactBatchSolution, Change]:
     """Return the contacts on the profiles of a stage, and the change in a whole step with them.
 
     The load is the mean over the step, with the spring force at the descent of the stage.

@@ -7,13 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from wearsim.contact_batch import ContactBatchSolution
 from wearsim.errors import StepError
 from wearsim.evolution.batch.per_realisation import first_of
-from wearsim.evolution.batch.stack import problem_of, state_of
+from wearsim.evolution.batch.stack import contacts_of, problem_of, state_of
 from wearsim.evolution.observables import depth, worn_volume
-from wearsim.evolution.operating_points import operating_points
+from wearsim.evolution.operating_points import contact_batch
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import Contacts, Depths, WearState, as_batch
+from wearsim.evolution.state import Depths, WearState
 from wearsim.evolution.steppers.wear_increment import WearIncrement
 from wearsim.types import FloatArray, Number
 
@@ -72,7 +73,11 @@ def end_depths(state: WearState, wear: WearIncrement) -> Depths:
 
 
 def end_loads(
-    problem: WearProblem, state: WearState, passes: Number, ends: Depths, contacts: Contacts
+    problem: WearProblem,
+    state: WearState,
+    passes: Number,
+    ends: Depths,
+    contacts: ContactBatchSolution,
 ) -> FloatArray:
     """Return the mean loads of a step with worn depths `ends` at its end."""
     power = problem.values_of(contacts, "power")
@@ -110,7 +115,7 @@ def present_loads(problem: WearProblem, state: WearState) -> FloatArray:
     return checked_loads(loads, state.passes_done)
 
 
-def contacts_at(problem: WearProblem, state: WearState, loads: FloatArray) -> Contacts:
+def contacts_at(problem: WearProblem, state: WearState, loads: FloatArray) -> ContactBatchSolution:
     """Return the contacts on the present profiles under `loads`, shape (S, C, N) [N].
 
     A step over many passes leaves them solved on the profile at its end; contacts that carry
@@ -127,24 +132,24 @@ def contacts_at(problem: WearProblem, state: WearState, loads: FloatArray) -> Co
         return solve_present(problem, state, loads)
     chosen, part = problem_of(problem, others), state_of(state, others)
     solved = solve_present(chosen, part, np.take(loads, others, axis=REALISATION))
-    return state.batch.with_others(others, as_batch(solved, chosen.shape))
+    return state.contacts.with_others(contacts_of(state, others), solved)
 
 
-def carried_loads(problem: WearProblem, contacts: Contacts) -> FloatArray:
+def carried_loads(problem: WearProblem, contacts: ContactBatchSolution) -> FloatArray:
     """Return the integral of the line load of each contact, shape (S, C, N) [N]."""
     return np.asarray(problem.values_of(contacts, "line_load").sum(axis=-1) * problem.grid.spacing)
 
 
-def solve_present(problem: WearProblem, state: WearState, loads: FloatArray) -> Contacts:
-    """Solve every contact on the present profiles under `loads`, shape (S, C, N) [N]."""
+def solve_present(
+    problem: WearProblem, state: WearState, loads: FloatArray, cold: bool = False
+) -> ContactBatchSolution:
+    """Solve every contact on the present profiles under `loads`, shape (S, C, N) [N].
+
+    The solver starts from the contacts of the state unless `cold`.
+    """
     problem = present_problem(problem, state)
-    return problem.model.solve_batch(
-        problem.gap(*state.depths),
-        problem.kinematics.longitudinal_curvature,
-        operating_points(problem, loads, *state.depths),
-        None,
-        state.contacts or None,
-    )
+    batch = contact_batch(problem, problem.gap(*state.depths), loads, *state.depths)
+    return problem.model.solve(batch, warm=None if cold else state.contacts)
 
 
 def worn_state(

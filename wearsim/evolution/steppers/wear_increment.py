@@ -6,9 +6,8 @@ from functools import cached_property
 
 import numpy as np
 
-from wearsim.contact_batch import rows_of
+from wearsim.contact_batch import ContactBatchSolution
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import Contacts
 from wearsim.mechanics.numerics.wear_exponent import estimate_exponents, ratio_to_load
 from wearsim.plugins import SharedWear
 from wearsim.types import FloatArray, Number
@@ -27,7 +26,7 @@ class WearIncrement:
     Parameters
     ----------
     problem : WearProblem
-    contacts : sequence of ContactSolution
+    contacts : ContactBatchSolution
     passes : float or ndarray, shape (realisations,)
         Length of the step.
 
@@ -42,7 +41,9 @@ class WearIncrement:
         absent it is 1, which is exact in full sliding.
     """
 
-    def __init__(self, problem: WearProblem, contacts: Contacts, passes: Number) -> None:
+    def __init__(
+        self, problem: WearProblem, contacts: ContactBatchSolution, passes: Number
+    ) -> None:
         self._parts = problem.wear_parts(contacts, passes)
         self.depths = problem.sum_of_parts(*self._parts)
         self.cylinder, self.roller = self.depths
@@ -58,7 +59,7 @@ class WearIncrement:
         stations, contacts, realisations = self.problem.shape
         shape = realisations, stations * contacts, self.problem.grid.strips
         compliance = np.zeros((*shape[:2], 2, shape[2]))
-        line_load = rows_of(self.contacts, "line_load")
+        line_load = self.contacts.line_load
         for side, part in enumerate(parts):
             if np.count_nonzero(part):
                 wear = np.ascontiguousarray(part).reshape(line_load.shape)
@@ -103,7 +104,7 @@ class WearIncrement:
             self.exponents = np.ones((*problem.shape, problem.grid.strips))
         else:
             self.exponents = old.exponents.copy()
-        load, new_load = rows_of(old.contacts, "line_load"), rows_of(self.contacts, "line_load")
+        load, new_load = old.contacts.line_load, self.contacts.line_load
         linear = problem.wear_factors["cylinder"] is not None
         estimate_exponents(
             load,

@@ -30,13 +30,13 @@ _INSIDE = 1.0 - 1e-9  # of the half-width: the patch may end exactly at the edge
 class Bodies(NamedTuple):
     """Constants of a batch of contacts.
 
-    Positions of the strips (strips,) and their width [m], A [1/m], E* [Pa], semi-axes of a
-    prescribed patch [m], 0 for the Hertz ellipse, tolerance and iteration limit of the fit.
+    Positions of the strips (strips,) and their width [m], A (contacts,) [1/m], E* [Pa], semi-axes
+    of a prescribed patch [m], 0 for the Hertz ellipse, tolerance and iteration limit of the fit.
     """
 
     y: FloatArray
     spacing: float
-    curvature_x: float
+    curvature_x: FloatArray
     contact_modulus: float
     given_a: float
     given_b: float
@@ -96,7 +96,7 @@ def find_patches(
     """Find the patch of every contact as `hertz_on_profile` and `hertz` do.
 
     Successive contacts with the same gap share its fit if the gap is a parabola, and those with the
-    same fitted curvature share the shape of their ellipse and differ in its size only.
+    same curvatures share the shape of their ellipse and differ in its size only.
 
     Parameters
     ----------
@@ -111,16 +111,16 @@ def find_patches(
     patches : Patches
         Overwritten.
     """
-    y, curvature_x, modulus = bodies.y, bodies.curvature_x, bodies.contact_modulus
+    y, modulus = bodies.y, bodies.contact_modulus
     middle = 0.5 * (y[0] + y[-1])
     width = 0.5 * (y[-1] - y[0]) * len(y) / max(len(y) - 1, 1)
     given = bodies.given_a > 0.0
     first_edge, last_edge = y[0] - 0.5 * bodies.spacing, y[-1] + 0.5 * bodies.spacing
     fitted, exact, fit_status = -1, False, CONVERGED
     fit_curvature, vertex, bottom = math.nan, math.nan, math.nan
-    shaped, shape = math.nan, (math.nan, math.nan, math.nan)
+    shaped, shaped_x, shape = math.nan, math.nan, (math.nan, math.nan, math.nan)
     for k in range(len(row)):
-        gap, force = gaps[row[k]], normal_force[k]
+        gap, force, curvature_x = gaps[row[k]], normal_force[k], bodies.curvature_x[k]
         if row[k] != fitted:
             fitted = row[k]
             if not np.isfinite(gap).all():
@@ -147,17 +147,19 @@ def find_patches(
             solved, curvature, iterations = False, fit_curvature, 1
             a = b = peak = approach = math.nan
             if exact:
-                if curvature != shaped:
-                    shape, shaped = ellipse_shape(curvature_x, curvature), curvature
+                if curvature != shaped or curvature_x != shaped_x:
+                    shape = ellipse_shape(curvature_x, curvature)
+                    shaped, shaped_x = curvature, curvature_x
                 a, b, peak, approach = ellipse_under(curvature_x, curvature, shape, force, modulus)
                 solved = b <= width and strips_within(y, centre, b) >= 3
             if not solved:
                 curvature, b, centre, height, iterations, status = hertz_on_profile(
                     y, gap, curvature_x, force, modulus, bodies.tolerance, bodies.limit
                 )
-                if status == CONVERGED and curvature != shaped:
-                    shape, shaped = ellipse_shape(curvature_x, curvature), curvature
                 if status == CONVERGED:
+                    if curvature != shaped or curvature_x != shaped_x:
+                        shape = ellipse_shape(curvature_x, curvature)
+                        shaped, shaped_x = curvature, curvature_x
                     a, b, peak, approach = ellipse_under(
                         curvature_x, curvature, shape, force, modulus
                     )

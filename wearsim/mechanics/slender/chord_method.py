@@ -38,7 +38,7 @@ from wearsim.mechanics.slender.newton import (
     CONVERGED,
     GAP_TOLERANCE,
     SINGULAR,
-    log_scale_of,
+    log_scales_of,
     solve_slender,
 )
 from wearsim.mechanics.tangential.strip_interaction import StripElasticity, strip_elasticity
@@ -54,12 +54,12 @@ MAX_CHORD = 4
 
 
 class ContactConstants(NamedTuple):
-    """Strip width [m], 1/(pi E*) [1/Pa], E* [Pa], kappa [1/m], influence tables and elasticity."""
+    """Strip width [m], 1/(pi E*) [1/Pa], E* [Pa], kappa (contacts,) [1/m], tables, elasticity."""
 
     spacing: float
     unit: float
     contact_modulus: float
-    longitudinal_curvature: float
+    longitudinal_curvature: FloatArray
     table: FloatArray
     curvature_influence: FloatArray
     elasticity: StripElasticity
@@ -110,7 +110,7 @@ def contact_constants(
     spacing: float,
     contact_modulus: float,
     shear_modulus: float,
-    longitudinal_curvature: float,
+    longitudinal_curvature: FloatArray,
     table: FloatArray,
     curvature_influence: FloatArray,
 ) -> ContactConstants:
@@ -128,8 +128,8 @@ def contact_constants(
 
 def new_chord_state(constants: ContactConstants, contacts: int, n: int) -> ChordState:
     """Return the `ChordState` of contacts without an anchor."""
-    log_scale = float(
-        log_scale_of(constants.contact_modulus, constants.longitudinal_curvature, constants.spacing)
+    log_scale = log_scales_of(
+        constants.contact_modulus, constants.longitudinal_curvature, constants.spacing
     )
     return ChordState(
         np.zeros((contacts, n), np.int64),
@@ -141,7 +141,7 @@ def new_chord_state(constants: ContactConstants, contacts: int, n: int) -> Chord
         np.empty((contacts, n, n)),
         np.empty((contacts, n)),
         np.zeros((contacts, n)),
-        new_half_lengths(contacts, constants.curvature_influence, log_scale, REACH),
+        new_half_lengths(constants.curvature_influence, log_scale, REACH),
         np.empty(n),
         np.empty(n),
         np.empty((6, max(n, BAND))),
@@ -371,9 +371,9 @@ def solve_fully(
         gap,
         np.zeros((1, n)),
         force,
+        np.full(1, constants.longitudinal_curvature[g]),
         constants.spacing,
         constants.contact_modulus,
-        constants.longitudinal_curvature,
         constants.table,
         constants.curvature_influence,
         line_load,

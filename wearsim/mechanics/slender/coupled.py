@@ -33,7 +33,7 @@ from wearsim.mechanics.slender.newton import (
     TOO_FINE,
     check_convergence,
     least_gap,
-    log_scale_of,
+    log_scales_of,
     start_contact,
     update_loads,
 )
@@ -72,9 +72,9 @@ def solve_coupled(
     bodies: IntArray,
     shared: FloatArray,
     loads: FloatArray,
+    longitudinal_curvature: FloatArray,
     spacing: float,
     contact_modulus: float,
-    longitudinal_curvature: float,
     table: FloatArray,
     curvature_influence: FloatArray,
     line_load: FloatArray,
@@ -89,7 +89,7 @@ def solve_coupled(
         Bodies that each contact shares with others, numbered from 0; -1 for none.
     shared : ndarray, shape (contacts, 2, strips)
         Depth that a contact wears off those bodies per unit of line load [m/(N/m)].
-    gap, compliance, loads, spacing, contact_modulus, longitudinal_curvature
+    gap, compliance, loads, longitudinal_curvature, spacing, contact_modulus
         As in `newton.solve_slender`.
     table, curvature_influence, line_load, approach, half_length
         Likewise.
@@ -104,8 +104,8 @@ def solve_coupled(
     surface, work = np.empty((contacts, n)), np.empty((2, n))
     response, approach_slope = np.empty((contacts, n, n)), np.empty((contacts, n))
     state, system = new_newton_state(contacts, n), new_depth_system(bodies, n)
-    log_scale = log_scale_of(contact_modulus, longitudinal_curvature, spacing)
-    lengths = new_half_lengths(contacts, curvature_influence, log_scale, NEWTON_REACH)
+    log_scale = log_scales_of(contact_modulus, longitudinal_curvature, spacing)
+    lengths = new_half_lengths(curvature_influence, log_scale, NEWTON_REACH)
     lowest = np.empty(contacts)
     for k in range(contacts):
         for i in range(n):
@@ -161,9 +161,9 @@ def solve_each_coupled(
     bodies: IntArray,
     shared: FloatArray,
     loads: FloatArray,
+    longitudinal_curvature: FloatArray,
     spacing: float,
     contact_modulus: float,
-    longitudinal_curvature: float,
     table: FloatArray,
     curvature_influence: FloatArray,
     line_load: FloatArray,
@@ -176,9 +176,10 @@ def solve_each_coupled(
 
     Parameters
     ----------
-    gap, compliance, bodies, shared, loads, line_load, approach, half_length : ndarray
+    gap, compliance, bodies, shared, loads, longitudinal_curvature : ndarray
+    line_load, approach, half_length : ndarray
         As in `solve_coupled`, with the axis of the sets first, except for `bodies`.
-    spacing, contact_modulus, longitudinal_curvature, table, curvature_influence
+    spacing, contact_modulus, table, curvature_influence
         As in `solve_coupled`.
     status, iterations : ndarray of int, shape (sets,)
         Filled with the values that `solve_coupled` returns.
@@ -193,9 +194,9 @@ def solve_each_coupled(
                 bodies,
                 shared[number],
                 loads[number],
+                longitudinal_curvature[number],
                 spacing,
                 contact_modulus,
-                longitudinal_curvature,
                 table,
                 curvature_influence,
                 line_load[number],

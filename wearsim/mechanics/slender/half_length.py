@@ -39,13 +39,13 @@ class HalfLengths(NamedTuple):
     """Half-lengths of several contacts and their work space.
 
     `table` is from `curvature_table`, or from `no_table` for strips without interaction, and
-    `log_scale` is ln(a/dy) of such a strip at 1 N/m. `factor` is s and `log_ratio` is ln(a/dy),
-    (contacts, strips); `slope` is the derivative of ln s_j by ln q of strip j + c - reach,
-    (contacts, strips, c). `slope_part`, `gathered` and `work` are work space.
+    `log_scale` is ln(a/dy) of such a strip at 1 N/m, (contacts,). `factor` is s and `log_ratio` is
+    ln(a/dy), (contacts, strips); `slope` is the derivative of ln s_j by ln q of strip
+    j + c - reach, (contacts, strips, c). `slope_part`, `gathered` and `work` are work space.
     """
 
     table: FloatArray
-    log_scale: float
+    log_scale: FloatArray
     factor: FloatArray
     log_ratio: FloatArray
     slope: FloatArray
@@ -55,9 +55,9 @@ class HalfLengths(NamedTuple):
 
 
 @kernel
-def new_half_lengths(contacts: int, table: FloatArray, log_scale: float, reach: int) -> HalfLengths:
+def new_half_lengths(table: FloatArray, log_scale: FloatArray, reach: int) -> HalfLengths:
     """Return the `HalfLengths` of contacts with s = 1; `reach` is `REACH` or `NEWTON_REACH`."""
-    n = table.shape[2]
+    contacts, n = log_scale.shape[0], table.shape[2]
     return HalfLengths(
         table,
         log_scale,
@@ -73,7 +73,7 @@ def new_half_lengths(contacts: int, table: FloatArray, log_scale: float, reach: 
 @kernel
 def log_half_length(k: int, j: int, line_load: FloatArray, lengths: HalfLengths) -> float:
     """Return ln(a/dy) of the loaded strip `j` of contact `k`."""
-    return float(lengths.log_scale + 0.5 * np.log(line_load[k, j] * lengths.factor[k, j]))
+    return float(lengths.log_scale[k] + 0.5 * np.log(line_load[k, j] * lengths.factor[k, j]))
 
 
 @kernel

@@ -226,10 +226,15 @@ def least_gap(k: int, gap: FloatArray) -> float:
 
 
 @kernel
-def log_scale_of(contact_modulus: float, longitudinal_curvature: float, spacing: float) -> float:
-    """Return ln(a/dy) of a strip under 1 N/m without interaction (s = 1)."""
-    scale = 4.0 / (np.pi * contact_modulus * longitudinal_curvature)
-    return float(0.5 * np.log(scale) - np.log(spacing))
+def log_scales_of(
+    contact_modulus: float, longitudinal_curvature: FloatArray, spacing: float
+) -> FloatArray:
+    """Return ln(a/dy) of a strip of each contact under 1 N/m without interaction (s = 1)."""
+    log_scale = np.empty(longitudinal_curvature.shape[0])
+    for k in range(longitudinal_curvature.shape[0]):
+        scale = 4.0 / (np.pi * contact_modulus * longitudinal_curvature[k])
+        log_scale[k] = 0.5 * np.log(scale) - np.log(spacing)
+    return log_scale
 
 
 @kernel
@@ -237,9 +242,9 @@ def solve_slender(
     gap: FloatArray,
     compliance: FloatArray,
     loads: FloatArray,
+    longitudinal_curvature: FloatArray,
     spacing: float,
     contact_modulus: float,
-    longitudinal_curvature: float,
     table: FloatArray,
     curvature_influence: FloatArray,
     line_load: FloatArray,
@@ -254,10 +259,10 @@ def solve_slender(
         Gap [m].
     compliance : ndarray, shape (contacts, strips)
         Wear compliance of the separate contacts: increase of gap per line load [m/(N/m)].
-    loads : ndarray, shape (contacts,)
-        Loads N [N].
-    spacing, contact_modulus, longitudinal_curvature : float
-        Strip width [m], E* [Pa], kappa [1/m].
+    loads, longitudinal_curvature : ndarray, shape (contacts,)
+        Loads N [N], kappa [1/m].
+    spacing, contact_modulus : float
+        Strip width [m], E* [Pa].
     table, curvature_influence : ndarray
         From `influence_table`, and from `curvature_table` or, for half-lengths without interaction
         of the strips, `no_table`.
@@ -277,9 +282,9 @@ def solve_slender(
     unit, before = 1.0 / (np.pi * contact_modulus), 0.0
     surface, work = np.empty((contacts, n)), np.empty((2, n))
     state = new_newton_state(contacts, n)
-    log_scale = log_scale_of(contact_modulus, longitudinal_curvature, spacing)
+    log_scale = log_scales_of(contact_modulus, longitudinal_curvature, spacing)
     lengths, lowest = (
-        new_half_lengths(contacts, curvature_influence, log_scale, NEWTON_REACH),
+        new_half_lengths(curvature_influence, log_scale, NEWTON_REACH),
         np.empty(contacts),
     )
     for k in range(contacts):
@@ -318,9 +323,9 @@ def solve_each(
     gap: FloatArray,
     compliance: FloatArray,
     loads: FloatArray,
+    longitudinal_curvature: FloatArray,
     spacing: float,
     contact_modulus: float,
-    longitudinal_curvature: float,
     table: FloatArray,
     curvature_influence: FloatArray,
     line_load: FloatArray,
@@ -346,9 +351,9 @@ def solve_each(
                 gap[number],
                 compliance[number],
                 loads[number],
+                longitudinal_curvature[number],
                 spacing,
                 contact_modulus,
-                longitudinal_curvature,
                 table,
                 curvature_influence,
                 line_load[number],

@@ -118,7 +118,7 @@ def run_passes(
     term_rates: FloatArray,
     nominal_gap: FloatArray,
     from_apex: FloatArray,
-    rolling_speed: float,
+    rolling_speed: FloatArray,
     similar: bool,
     constants: ContactConstants,
     wear: Wear,
@@ -145,7 +145,7 @@ def run_passes(
         Gain [N/W], and per contact the fraction of the distance to equilibrium in one pass.
     nominal_gap, from_apex : ndarray, shape (contacts, strips)
         Gap before wear without tilt, and its increase per unit of tilt [m].
-    rolling_speed : float
+    rolling_speed : ndarray, shape (contacts,)
         V [m/s].
     similar : bool
         Use the chord method where possible, instead of a full solve of every pass.
@@ -190,7 +190,7 @@ def run_passes(
             status = solve_fully(g, load, similar, loads, constants, state)
             if status != CONVERGED:
                 return status, p, full_solves
-        power = (rolling_speed * constants.spacing) * _wear_strips(
+        power = (rolling_speed[g] * constants.spacing) * _wear_strips(
             g, p, loads.line_load, passes, constants, state, wear
         )
         energy[g] += power

@@ -49,9 +49,10 @@ class Theory(NamedTuple):
 class ContactInputs(NamedTuple):
     """Operating points of the contacts.
 
-    Loads [N], creepages and spins [1/m], all (contacts,); friction (contacts, points, strips), with
-    one point if constant along a strip, and one strip if equal for all; whether friction moves with
-    the material; variation of the creepage (contacts, strips), or (0, strips) for none; V [m/s].
+    Loads [N], creepages, spins [1/m] and V [m/s], all (contacts,); friction (contacts, points,
+    strips), with one point if constant along a strip, and one strip if equal for all; whether
+    friction moves with the material; variation of the creepage (contacts, strips), or (0, strips)
+    for none.
     """
 
     normal_force: FloatArray
@@ -61,7 +62,7 @@ class ContactInputs(NamedTuple):
     friction: FloatArray
     carried: bool
     variation: FloatArray
-    rolling_speed: float
+    rolling_speed: FloatArray
 
 
 class ContactResults(NamedTuple):
@@ -336,7 +337,7 @@ def _fill_results(
     total: Sums,
 ) -> None:
     """Fill the solution of contact `k` from the integrals along its strips."""
-    eta, phi, speed = inputs.lateral[k], inputs.spin[k], inputs.rolling_speed
+    eta, phi, speed = inputs.lateral[k], inputs.spin[k], inputs.rolling_speed[k]
     centre = _load_weighted_mean(bodies.y, results.line_load[k])
     force_x, force_y, moment, power, sticking, length = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(len(bodies.y)):

@@ -222,7 +222,7 @@ def strip_contacts(
     y: FloatArray,
     spacing: float,
     elasticity: StripElasticity,
-    rolling_speed: float,
+    rolling_speed: FloatArray,
     longitudinal: FloatArray,
     lateral: FloatArray,
     spin: FloatArray,
@@ -242,10 +242,8 @@ def strip_contacts(
     spacing : float
         Strip width [m].
     elasticity : StripElasticity
-    rolling_speed : float
-        V [m/s].
-    longitudinal, lateral, spin : ndarray, shape (contacts,)
-        Mean longitudinal creepage, lateral creepage, and spin phi [1/m].
+    rolling_speed, longitudinal, lateral, spin : ndarray, shape (contacts,)
+        V [m/s], mean longitudinal creepage, lateral creepage, and spin phi [1/m].
     variation, friction : ndarray, shape (contacts, strips)
         Variation of the longitudinal creepage, whose load-weighted mean is subtracted here;
         friction coefficient.
@@ -281,7 +279,7 @@ def strip_contacts(
         )
         peak = length = adhering = sum_x = sum_y = moment = power = 0.0
         for i in range(n):
-            dissipation[k, i] = rolling_speed * tractions.work[i]
+            dissipation[k, i] = rolling_speed[k] * tractions.work[i]
             if line_load[k, i] > 0.0:
                 peak = max(peak, 2.0 * line_load[k, i] / (np.pi * half_length[k, i]))
             length += half_length[k, i]

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from pydantic import Field
 
-from wearsim.errors import CapabilityError, ContactError
+from wearsim.errors import ContactError
 from wearsim.mechanics.hertz import parabola_fit
 from wearsim.mechanics.hertz.elasticity import ElasticPair, combine
 from wearsim.mechanics.hertz.ellipse import HertzContact, given_ellipse, hertz
@@ -24,7 +24,7 @@ from wearsim.models.tangential.base import (
     power_not_finite,
 )
 from wearsim.models.tangential.options import TangentialOptions, tangential_theory
-from wearsim.plugins import Capabilities, ContactModel, ContactModelSpec, Options
+from wearsim.plugins import Capabilities, ContactModelSpec, Options, SingleContactModel
 from wearsim.quantities import PositiveLength
 from wearsim.types import (
     ContactFields,
@@ -52,7 +52,7 @@ class HertzOptions(TangentialOptions):
     my: int = Field(50, ge=3, description="strips across the patch of a single contact")
 
 
-class HertzModel(ContactModel):
+class HertzModel(SingleContactModel):
     """Exact Hertzian contact on the strips of a grid, with any tangential theory.
 
     On a worn profile the lateral curvature and the centre are those of a parabola fitted to the
@@ -64,43 +64,31 @@ class HertzModel(ContactModel):
     ----------
     theory : TangentialTheory
         Theory of the tangential contact.
-    my : int
-        Strips across the patch of a single contact.
+    grid : Grid
+        The strips.
+    materials : tuple of Material
+        Materials of cylinder and roller.
     patch : Patch, optional
         Contact ellipse that replaces the Hertzian one.
     """
 
-    name: ClassVar[str] = "hertz"
     capabilities = Capabilities(
         creepage_variation=True, bearing_torque=True, local_friction=True, fields=True
     )
 
-    def __init__(self, theory: TangentialTheory, my: int, patch: Patch | None = None) -> None:
+    def __init__(
+        self,
+        theory: TangentialTheory,
+        grid: Grid,
+        materials: tuple[Material, Material],
+        patch: Patch | None = None,
+    ) -> None:
         self.theory = theory
-        self.my = my
-        self.patch = patch
-
-    def prepare(self, grid: Grid, materials: tuple[Material, Material]) -> None:
-        """Set the strips and the materials of both bodies."""
         self._grid = grid
         self._pair: ElasticPair = combine(*materials)
+        self.patch = patch
 
-    def suggest_grid(
-        self,
-        gap_curvature: float,
-        longitudinal_curvature: float,
-        normal_force: float,
-        materials: tuple[Material, Material],
-    ) -> Grid | None:
-        """Return `my` strips over the width of the patch."""
-        if self.patch is not None:
-            b = self.patch.b
-        else:
-            modulus = combine(*materials).contact_modulus
-            b = hertz(0.5 * longitudinal_curvature, 0.5 * gap_curvature, normal_force, modulus).b
-        return Grid.spanning(-b, b, self.my)
-
-    def solve(
+    def solve_contact(
         self,
         gap: FloatArray,
         longitudinal_curvature: float,
@@ -116,10 +104,7 @@ class HertzModel(ContactModel):
             If the curvature of the gap over the patch is not positive, the patch extends beyond
             the strips or covers too few of them, the fit does not converge, or a value is not
             finite.
-        CapabilityError
-            If a wear compliance is given, or friction that the model does not support.
         """
-        self._refuse(wear_compliance)
         if not np.isfinite(point.friction).all():  # a closed form would return zero traction
             raise power_not_finite(point, gap=gap)
         strips = self._theory_strips(gap, longitudinal_curvature, point)
@@ -148,13 +133,6 @@ class HertzModel(ContactModel):
     def _friction(self, strips: Strips, point: OperatingPoint) -> FloatArray:
         """Return the friction coefficients of the fields."""
         return friction_per_strip(strips, point)
-
-    def _refuse(self, wear_compliance: FloatArray | None) -> None:
-        if wear_compliance is not None:
-            raise CapabilityError(
-                f"{self.name} takes no wear compliance; use evolution.stepper = 'stabilised' or"
-                " 'per-pass', or contact.model = 'slender'"
-            )
 
     def _theory_strips(
         self, gap: FloatArray, longitudinal_curvature: float, point: OperatingPoint
@@ -290,9 +268,41 @@ def _failure(status: int, state: Mapping[str, Any], spacing: float) -> ContactEr
     return ContactError(text, dict(state))
 
 
+def strips_over_patch(
+    options: Any,
+    gap_curvature: float,
+    longitudinal_curvature: float,
+    normal_force: float,
+    materials: tuple[Material, Material],
+) -> Grid:
+    """Return `options.my` strips over the width of the patch.
+
+    Parameters
+    ----------
+    options : HertzOptions or HertzFastsimOptions
+    gap_curvature, longitudinal_curvature : float
+        Relative curvatures across and along rolling [1/m].
+    normal_force : float
+        Load [N].
+    materials : tuple of Material
+        Materials of the two bodies.
+    """
+    patch: Patch | None = getattr(options, "patch", None)
+    if patch is not None:
+        b = patch.b
+    else:
+        modulus = combine(*materials).contact_modulus
+        b = hertz(0.5 * longitudinal_curvature, 0.5 * gap_curvature, normal_force, modulus).b
+    return Grid.spanning(-b, b, options.my)
+
+
 SPEC = ContactModelSpec(
     name="hertz",
-    factory=lambda options: HertzModel(tangential_theory(options), options.my),
+    factory=lambda options, grid, materials: HertzModel(
+        tangential_theory(options), grid, materials
+    ),
+    suggest_grid=strips_over_patch,
+    protocol=2,
     options=HertzOptions,
     capabilities=HertzModel.capabilities,
     summary="exact Hertz, fitted to the worn profile, with any tangential theory",

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
 
-from wearsim.contact_batch import BatchSolution, OperatingPoints
+from wearsim.contact_batch import ContactBatch, ContactBatchSolution
 from wearsim.errors import CapabilityError, ContactError
 from wearsim.mechanics.hertz.parabola_fit import CONVERGED
 from wearsim.mechanics.hertz.patches import Bodies, Patches, find_patches, half_lengths
@@ -19,7 +17,7 @@ from wearsim.mechanics.tangential.hertz_fastsim_batch import (
     solve_contacts,
 )
 from wearsim.mechanics.tangential.kalker_coefficients import CreepageCoefficients
-from wearsim.models.contact.hertz import LIMIT, TOLERANCE, HertzModel, Patch
+from wearsim.models.contact.hertz import LIMIT, TOLERANCE, HertzModel, Patch, strips_over_patch
 from wearsim.models.tangential.base import Strips, power_not_finite
 from wearsim.models.tangential.fastsim import (
     Bound,
@@ -29,7 +27,13 @@ from wearsim.models.tangential.fastsim import (
     Flexibility,
     Kalker,
 )
-from wearsim.plugins import Capabilities, ContactModelSpec, Options
+from wearsim.plugins import (
+    Capabilities,
+    ContactModelSpec,
+    Options,
+    SharedWear,
+    refuse_unclaimed,
+)
 from wearsim.plugins.contact_model import naming_contact
 from wearsim.types import ContactSolution, FloatArray, Grid, IntArray, Material, OperatingPoint
 
@@ -79,11 +83,13 @@ class HertzFastsim(HertzModel):
 
     Parameters
     ----------
-    options : HertzFastsimOptions, optional
-        The options; by default their defaults.
+    options : HertzFastsimOptions
+    grid : Grid
+        The strips.
+    materials : tuple of Material
+        Materials of cylinder and roller.
     """
 
-    name: ClassVar[str] = "hertz-fastsim"
     capabilities = Capabilities(
         creepage_variation=True,
         bearing_torque=True,
@@ -93,28 +99,25 @@ class HertzFastsim(HertzModel):
     )
     theory: FastsimTheory
 
-    def __init__(self, options: HertzFastsimOptions | None = None) -> None:
-        self.options = options if options is not None else HertzFastsimOptions()
-        given = self.options.kalker_coefficients
+    def __init__(
+        self, options: HertzFastsimOptions, grid: Grid, materials: tuple[Material, Material]
+    ) -> None:
+        given = options.kalker_coefficients
         theory = FastsimTheory(
-            bound=self.options.bound,
-            mx=self.options.mx,
-            dissipation=self.options.dissipation,
-            kalker=self.options.kalker,
+            bound=options.bound,
+            mx=options.mx,
+            dissipation=options.dissipation,
+            kalker=options.kalker,
             coefficients=None
             if given is None
             else CreepageCoefficients(given.c11, given.c22, given.c23, math.nan),
-            closed_form=self.options.closed_form,
-            flexibility=self.options.flexibility,
+            closed_form=options.closed_form,
+            flexibility=options.flexibility,
         )
-        super().__init__(theory, self.options.my, self.options.patch)
+        super().__init__(theory, grid, materials, options.patch)
+        self._compiled = theory.compiled(self._pair)
 
-    def prepare(self, grid: Grid, materials: tuple[Material, Material]) -> None:
-        """Set the strips and the materials of both bodies."""
-        super().prepare(grid, materials)
-        self._compiled = self.theory.compiled(self._pair)
-
-    def solve(
+    def solve_one(
         self,
         gap: FloatArray,
         longitudinal_curvature: float,
@@ -122,116 +125,84 @@ class HertzFastsim(HertzModel):
         wear_compliance: FloatArray | None = None,
         warm: ContactSolution | None = None,
     ) -> ContactSolution:
-        """Solve one contact; friction may vary from point to point.
+        """Solve one contact; equal to a batch of one up to round-off.
+
+        As with a bearing torque, friction that does not vary along rolling is left to
+        `HertzModel.solve_contact`.
+        """
+        if np.ndim(point.friction) > 1 or wear_compliance is not None:
+            return super().solve_one(gap, longitudinal_curvature, point, wear_compliance, warm)
+        return self.solve_contact(gap, longitudinal_curvature, point)
+
+    def solve(
+        self,
+        batch: ContactBatch,
+        wear_compliance: FloatArray | None = None,
+        coupling: SharedWear | None = None,
+        warm: ContactBatchSolution | None = None,
+    ) -> ContactBatchSolution:
+        """Solve the contacts in one call of compiled code, those with a bearing torque in Python.
 
         Raises
         ------
         ContactError
-            As `HertzModel.solve`.
+            As `HertzModel.solve_contact`, with the place of the first contact that fails.
         CapabilityError
             If a wear compliance is given, or a bearing torque with friction that varies from point
             to point.
         """
-        if np.ndim(point.friction) > 1 and point.bearing_torque is None:
-            self._refuse(wear_compliance)
-            if not np.isfinite(point.friction).all():
-                raise power_not_finite(point, gap=gap)
-            return self.solve_batch(gap[None, :], longitudinal_curvature, [point]).solutions[0]
-        return super().solve(gap, longitudinal_curvature, point, wear_compliance, warm)
-
-    def solve_batch(
-        self,
-        gap: FloatArray,
-        longitudinal_curvature: float,
-        points: Sequence[OperatingPoint],
-        wear_compliance: FloatArray | None = None,
-        warm: Sequence[ContactSolution] | None = None,
-    ) -> BatchSolution:
-        """Solve many contacts in one call of compiled code; equal to `solve` up to round-off.
-
-        Points with a bearing torque, or of different kinds, are solved one after another.
-
-        Raises
-        ------
-        ContactError, CapabilityError
-            As `solve`, with the position of the first contact that fails.
-        """
-        self._refuse(wear_compliance)
-        columns = OperatingPoints.of(points)
-        if columns is None:
-            return super().solve_batch(gap, longitudinal_curvature, points)
-        shape, strips = gap.shape[:-1], self._grid.strips
-        gaps, row = _distinct_gaps(gap)
-        forces = _usable_loads(columns.normal_force, longitudinal_curvature)
-        self._check_shapes(len(row), columns)
+        refuse_unclaimed(self, batch, wear_compliance, coupling)
+        if batch.bearing_torque is not None:
+            return super().solve(batch)
+        self._check_shapes(batch)
+        strips = self._grid.strips
+        gaps, row = _distinct_gaps(batch.gap)
         patches = _new_patches(len(row))
         results = ContactResults(*np.zeros((3, len(row), strips)), *np.zeros((5, len(row))))
         inputs = ContactInputs(
-            forces,
-            _column(columns.longitudinal),
-            _column(columns.lateral),
-            _column(columns.spin),
-            self._friction_array(columns.friction),
-            columns.friction_carried,
-            np.zeros((0, strips)) if columns.variation is None else _column(columns.variation),
-            float(columns.rolling_speed),
+            _usable_loads(batch),
+            _column(batch.longitudinal),
+            _column(batch.lateral),
+            _column(batch.spin),
+            self._friction_array(batch.friction),
+            batch.friction_carried,
+            np.zeros((0, strips)) if batch.variation is None else _column(batch.variation),
+            _column(batch.rolling_speed),
         )
-        bodies = self._bodies(longitudinal_curvature)
+        bodies = self._bodies(batch)
         first_failed = solve_contacts(bodies, self._compiled, gaps, row, inputs, patches, results)
         if first_failed < len(row):
-            raise self._error_of(first_failed, gap, longitudinal_curvature, points)
-        fields = results._asdict() | {
-            "approach": patches.approach,
-            "peak_pressure": patches.peak_pressure,
-            "longitudinal_creepage": np.array(columns.longitudinal, dtype=np.float64),
-            "iterations": patches.iterations,
-        }
-        shaped = {name: value.reshape(shape + value.shape[1:]) for name, value in fields.items()}
-        return BatchSolution(shape, bodies.y, shaped)
-
-    def friction_points(
-        self, gap: FloatArray, longitudinal_curvature: float, point: OperatingPoint
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return the points of the friction coefficients: the ends of the `mx` steps."""
-        x, y = self.friction_points_batch(gap[None, :], longitudinal_curvature, [point])
-        return x[0], y
-
-    def friction_points_batch(
-        self, gap: FloatArray, longitudinal_curvature: float, points: Sequence[OperatingPoint]
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return `friction_points` of all contacts, x of shape (contacts, mx, strips)."""
-        forces = (
-            points.normal_force
-            if isinstance(points, OperatingPoints)
-            else np.array([point.normal_force for point in points])
+            raise self._error_of(first_failed, batch)
+        return ContactBatchSolution(
+            y=bodies.y,
+            **results._asdict(),
+            approach=patches.approach,
+            peak_pressure=patches.peak_pressure,
+            longitudinal_creepage=np.array(batch.longitudinal, dtype=np.float64),
+            iterations=patches.iterations,
         )
-        gaps, row = _distinct_gaps(gap)
-        bodies, patches = self._bodies(longitudinal_curvature), _new_patches(len(row))
-        loads = _usable_loads(forces, longitudinal_curvature)
+
+    def friction_points(self, batch: ContactBatch) -> tuple[FloatArray, FloatArray]:
+        """Return the points of the friction coefficients: the ends of the `mx` steps."""
+        gaps, row = _distinct_gaps(batch.gap)
+        bodies, patches = self._bodies(batch), _new_patches(len(row))
+        loads = _usable_loads(batch)
         find_patches(bodies, gaps, row, loads, patches)
         if (patches.status != CONVERGED).any():
-            failed = int(np.argmax(patches.status != CONVERGED))
-            raise self._error_of(failed, gap, longitudinal_curvature, points)
-        places = np.linspace(1.0, -1.0, self.options.mx + 1)[1:, None]
+            raise self._error_of(int(np.argmax(patches.status != CONVERGED)), batch)
+        places = np.linspace(1.0, -1.0, self.theory.mx + 1)[1:, None]
         return places * half_lengths(bodies, patches, loads)[:, None, :], self._grid.y
 
-    def _error_of(
-        self,
-        number: int,
-        gap: FloatArray,
-        longitudinal_curvature: float,
-        points: Sequence[OperatingPoint],
-    ) -> ContactError:
+    def _error_of(self, number: int, batch: ContactBatch) -> ContactError:
         """Return the error of a contact of a batch that failed."""
-        shape = gap.shape[:-1]
-        own, point = gap[np.unravel_index(number, shape)], points[number]
+        gap, point = batch.gap[number], batch.point(number)
         try:
-            strips = self._strips(own, longitudinal_curvature, point)
+            strips = self._strips(gap, float(batch.longitudinal_curvature[number]), point)
             self.theory.flexibilities(strips, self._pair)
-            error = power_not_finite(point, gap=own)
+            error = power_not_finite(point, gap=gap)
         except ContactError as caught:
             error = caught
-        return naming_contact(error, number, shape)
+        return naming_contact(error, number, batch)
 
     def _friction(self, strips: Strips, point: OperatingPoint) -> FloatArray:
         """Return the friction coefficients of the fields, per strip or per point."""
@@ -244,11 +215,11 @@ class HertzFastsim(HertzModel):
             )
         return np.asarray(point.friction)
 
-    def _bodies(self, longitudinal_curvature: float) -> Bodies:
+    def _bodies(self, batch: ContactBatch) -> Bodies:
         return Bodies(
             _column(self._grid.y),
             float(self._grid.spacing),
-            0.5 * float(longitudinal_curvature),
+            _column(0.5 * batch.longitudinal_curvature),
             self._pair.contact_modulus,
             *((0.0, 0.0) if self.patch is None else (self.patch.a, self.patch.b)),
             TOLERANCE,
@@ -261,26 +232,25 @@ class HertzFastsim(HertzModel):
         shape = {1: (contacts, 1, 1), 2: (contacts, 1, self._grid.strips)}
         return _column(friction).reshape(shape.get(friction.ndim, friction.shape))
 
-    def _check_shapes(self, contacts: int, points: OperatingPoints) -> None:
-        if len(points) != contacts:
-            raise ValueError(f"{len(points)} operating points for a batch of {contacts} contacts")
-        strips, given = self._grid.strips, points.friction.shape[1:]
+    def _check_shapes(self, batch: ContactBatch) -> None:
+        strips, given = self._grid.strips, batch.friction.shape[1:]
         if given not in {(), (strips,), (self.theory.mx, strips)}:
             raise ValueError(
                 f"friction has the shape {given} per contact, expected (), (strips,) = "
                 f"({strips},) or (mx, strips) = ({self.theory.mx}, {strips}); take it at"
                 " `friction_points`"
             )
-        if points.variation is not None and points.variation.shape[1:] != (strips,):
+        if batch.variation is not None and batch.variation.shape[1:] != (strips,):
             raise ValueError(
-                f"the creepage varies over {points.variation.shape[1:]} strips, expected {strips}"
+                f"the creepage varies over {batch.variation.shape[1:]} strips, expected {strips}"
             )
 
 
-def _usable_loads(forces: FloatArray, curvature: float) -> FloatArray:
-    """Return the loads, or NaN if the curvature along rolling is not positive and finite."""
-    usable = curvature > 0.0 and math.isfinite(curvature)
-    return _column(forces if usable else np.full(len(forces), math.nan))
+def _usable_loads(batch: ContactBatch) -> FloatArray:
+    """Return the loads, NaN where the curvature along rolling is not positive and finite."""
+    curvature = batch.longitudinal_curvature
+    usable = (curvature > 0.0) & np.isfinite(curvature)
+    return np.where(usable, batch.normal_force, math.nan)
 
 
 def _column(values: FloatArray) -> FloatArray:
@@ -293,19 +263,17 @@ def _new_patches(contacts: int) -> Patches:
 
 
 def _distinct_gaps(gap: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Return the distinct gaps, (rows, strips), and the row of each contact.
-
-    An axis of stride 0 repeats one gap, which is not copied.
-    """
-    shape = gap.shape[:-1]
-    own = gap[tuple(slice(0, 1) if step == 0 else slice(None) for step in gap.strides[:-1])]
-    rows = np.arange(math.prod(own.shape[:-1])).reshape(own.shape[:-1])
-    return _column(own).reshape(-1, gap.shape[-1]), np.broadcast_to(rows, shape).flatten()
+    """Return the distinct gaps, (rows, strips), and the row of each contact."""
+    if gap.strides[0] == 0:  # all are the same
+        return _column(gap[:1]), np.zeros(len(gap), dtype=np.int64)
+    return _column(gap), np.arange(len(gap))
 
 
 SPEC = ContactModelSpec(
     name="hertz-fastsim",
     factory=HertzFastsim,
+    suggest_grid=strips_over_patch,
+    protocol=2,
     options=HertzFastsimOptions,
     capabilities=HertzFastsim.capabilities,
     summary="exact Hertz and Kalker's FASTSIM, fitted to the worn profile: the paper's model",

@@ -17,10 +17,10 @@ from wearsim.mechanics.semi_hertzian.penetration import (
     TOO_FINE,
 )
 from wearsim.mechanics.slender.influence import HIGHEST
-from wearsim.models.contact.strip_model import StripModel, check_edges
+from wearsim.models.contact.strip_model import StripModel, check_edges, grid_about_hertz
 from wearsim.models.tangential.base import TangentialTheory
 from wearsim.models.tangential.options import TangentialOptions, tangential_theory
-from wearsim.plugins import Capabilities, ContactModelSpec
+from wearsim.plugins import Capabilities, ContactModelSpec, SingleContactModel
 from wearsim.types import ContactSolution, FloatArray, Grid, Material, OperatingPoint
 
 Variant = Literal["kik-piotrowski", "ayasse-chollet", "analyn"]
@@ -48,7 +48,7 @@ class SemiHertzianOptions(TangentialOptions):
     )
 
 
-class SemiHertzian(StripModel):
+class SemiHertzian(StripModel, SingleContactModel):
     """Strips as springs with Hertzian stiffness, or that of a virtual penetration.
 
     The variants depend on the lateral curvature of the profile, which is that of a least-squares
@@ -61,8 +61,8 @@ class SemiHertzian(StripModel):
     ----------
     variant : {"kik-piotrowski", "ayasse-chollet", "analyn"}
         Variant of the method.
-    theory : TangentialTheory
-        Theory of the tangential contact.
+    theory, grid, materials
+        As in `StripModel`.
     """
 
     capabilities = Capabilities(
@@ -73,16 +73,18 @@ class SemiHertzian(StripModel):
         fields=True,
     )
 
-    def __init__(self, variant: Variant, theory: TangentialTheory) -> None:
-        super().__init__(theory)
+    def __init__(
+        self,
+        variant: Variant,
+        theory: TangentialTheory,
+        grid: Grid,
+        materials: tuple[Material, Material],
+    ) -> None:
+        super().__init__(theory, grid, materials)
         self._variant = _VARIANTS[variant]
-
-    def prepare(self, grid: Grid, materials: tuple[Material, Material]) -> None:
-        """Set strips and materials; tabulate the influence of the strips and Hertzian ellipses."""
-        super().prepare(grid, materials)
         self._local_hertz = kernels.local_hertz_table()
 
-    def solve(
+    def solve_contact(
         self,
         gap: FloatArray,
         longitudinal_curvature: float,
@@ -122,7 +124,11 @@ class SemiHertzian(StripModel):
 
 SPEC = ContactModelSpec(
     name="semi-hertzian",
-    factory=lambda options: SemiHertzian(options.variant, tangential_theory(options)),
+    factory=lambda options, grid, materials: SemiHertzian(
+        options.variant, tangential_theory(options), grid, materials
+    ),
+    suggest_grid=grid_about_hertz,
+    protocol=2,
     options=SemiHertzianOptions,
     capabilities=SemiHertzian.capabilities,
     summary="strips as springs: Kik-Piotrowski, STRIPES or ANALYN, chosen by the option variant",

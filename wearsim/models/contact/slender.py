@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 from pydantic import Field
 
-from wearsim.contact_batch import BatchSolution, OperatingPoints
+from wearsim.contact_batch import ContactBatch, ContactBatchSolution
 from wearsim.errors import ContactError
 from wearsim.mechanics.slender import newton as kernels
 from wearsim.mechanics.slender.influence import HIGHEST, curvature_table, no_table
@@ -17,18 +16,22 @@ from wearsim.mechanics.tangential.strip_theory import SUMS
 from wearsim.models.contact.slender_problems import (
     Constants,
     NormalContacts,
-    TangentialInputs,
     first_not_finite,
-    start_of,
     strip_tractions,
 )
-from wearsim.models.contact.strip_model import StripModel, check_edges
+from wearsim.models.contact.strip_model import StripModel, check_edges, grid_about_hertz
 from wearsim.models.tangential.base import TangentialTheory, power_not_finite
 from wearsim.models.tangential.options import TangentialOptions, tangential_theory
 from wearsim.models.tangential.strip_theory import StripTheory
-from wearsim.plugins import Capabilities, ContactModelSpec, PassLoop, SharedWear
-from wearsim.plugins.contact_model import naming_contact
-from wearsim.types import ContactSolution, FloatArray, Grid, Material, Number, OperatingPoint
+from wearsim.plugins import (
+    Capabilities,
+    ContactModelSpec,
+    PassLoop,
+    SharedWear,
+    refuse_unclaimed,
+)
+from wearsim.plugins.contact_model import naming_contact, solved_one_by_one
+from wearsim.types import FloatArray, Grid, Material
 
 _REMEDY = {
     kernels.SINGULAR: "its equations are singular: check the gap, the load and the materials",
@@ -38,7 +41,6 @@ _REMEDY = {
     kernels.NO_CONVERGENCE: "Newton's method did not converge on the strips in contact",
     kernels.NOT_FINITE: "a value is not finite",
 }
-_SINGLE = (1, 1, 1)  # leading axes of a single contact
 
 
 class SlenderOptions(TangentialOptions):
@@ -57,8 +59,8 @@ class Slender(StripModel):
 
     Parameters
     ----------
-    theory : TangentialTheory
-        Theory of the tangential contact.
+    theory, grid, materials
+        As in `StripModel`.
     coupled_lengths : bool
         Whether half-lengths depend on the line loads of all strips.
     """
@@ -73,181 +75,83 @@ class Slender(StripModel):
         fields=True,
     )
 
-    def __init__(self, theory: TangentialTheory, coupled_lengths: bool = True) -> None:
-        super().__init__(theory)
-        self._coupled_lengths = coupled_lengths
+    def __init__(
+        self,
+        theory: TangentialTheory,
+        grid: Grid,
+        materials: tuple[Material, Material],
+        coupled_lengths: bool = True,
+    ) -> None:
+        super().__init__(theory, grid, materials)
+        self._bend = (curvature_table if coupled_lengths else no_table)(grid.strips)
         if not isinstance(theory, StripTheory):
             self.capabilities = replace(self.capabilities, pass_loop=False)
 
-    def prepare(self, grid: Grid, materials: tuple[Material, Material]) -> None:
-        """Set strips and materials, and tabulate the influence of one strip on another."""
-        super().prepare(grid, materials)
-        self._bend = (curvature_table if self._coupled_lengths else no_table)(grid.strips)
-
     def solve(
         self,
-        gap: FloatArray,
-        longitudinal_curvature: float,
-        point: OperatingPoint,
+        batch: ContactBatch,
         wear_compliance: FloatArray | None = None,
-        warm: ContactSolution | None = None,
-    ) -> ContactSolution:
-        """Solve one contact."""
-        shape = (1, 1, len(gap))
-        own = np.zeros(shape) if wear_compliance is None else wear_compliance.reshape(shape)
-        start = None if warm is None else (warm.line_load, warm.approach)
-        normal = self._solve_normal(
-            gap.reshape(shape), longitudinal_curvature, point.normal_force, own, start, _SINGLE
-        )
-        if not self._has_closed_form(point):
-            return self._completed(normal, (0, 0), longitudinal_curvature, point)
-        inputs = TangentialInputs.of_one(point, self._grid)
-        dissipation, sums = strip_tractions(normal, inputs, self._grid, self._pair)
-        if first_not_finite(sums) is not None:
-            raise power_not_finite(point, line_load=normal.line_load[0, 0])
-        return ContactSolution(
-            y=self._grid.y,
-            half_length=normal.half_length[0, 0],
-            line_load=normal.line_load[0, 0],
-            dissipation=dissipation[0],
-            approach=normal.approach.item(),
-            longitudinal_creepage=point.creepage.longitudinal,
-            iterations=normal.iterations.item(),
-            **dict(zip(SUMS, sums[:, 0].tolist(), strict=True)),
-        )
+        coupling: SharedWear | None = None,
+        warm: ContactBatchSolution | None = None,
+    ) -> ContactBatchSolution:
+        """Solve the contacts in one call if strip theory supports them.
 
-    def solve_coupled(
-        self,
-        gap: FloatArray,
-        longitudinal_curvature: float,
-        points: Sequence[OperatingPoint],
-        wear: SharedWear,
-        warm: Sequence[ContactSolution] | None = None,
-    ) -> Sequence[ContactSolution]:
-        """Solve several contacts that wear common bodies, in one system of equations."""
-        return self.solve_coupled_batch(
-            gap[None],
-            longitudinal_curvature,
-            points,
-            SharedWear(wear.bodies, wear.compliance[None]),
-            warm,
-        )
-
-    def solve_coupled_batch(
-        self,
-        gap: FloatArray,
-        longitudinal_curvature: float,
-        points: Sequence[OperatingPoint],
-        wear: SharedWear,
-        warm: Sequence[ContactSolution] | None = None,
-    ) -> Sequence[ContactSolution]:
-        """Solve many sets of contacts that wear common bodies, in one call."""
-        leading, columns = (*gap.shape[:2], 1), self._columns(points)
-        if columns is not None:
-            return self._solve_columns(gap, longitudinal_curvature, columns, wear, warm, leading)
-        loads = np.array([point.normal_force for point in points])
-        start = start_of(warm)
-        normal = self._solve_normal(gap, longitudinal_curvature, loads, wear, start, leading)
-        return [
-            self._completed(normal, place, longitudinal_curvature, point)
-            for place, point in zip(np.ndindex(gap.shape[:2]), points, strict=True)
-        ]
-
-    def _completed(
-        self,
-        normal: NormalContacts,
-        place: tuple[int, ...],
-        longitudinal_curvature: float,
-        point: OperatingPoint,
-    ) -> ContactSolution:
-        """Return the solution at `place`, set and contact, by any tangential theory."""
-        return self._complete(
-            normal.line_load[place],
-            normal.half_length[place],
-            longitudinal_curvature,
-            float(normal.approach[place]),
-            int(normal.iterations[place[0]]),
-            point,
-        )
-
-    def solve_batch(
-        self,
-        gap: FloatArray,
-        longitudinal_curvature: float,
-        points: Sequence[OperatingPoint],
-        wear_compliance: FloatArray | None = None,
-        warm: Sequence[ContactSolution] | None = None,
-    ) -> BatchSolution:
-        """Solve many independent contacts, in one call if strip theory supports the points."""
-        columns = self._columns(points)
-        if columns is None:
-            return super().solve_batch(gap, longitudinal_curvature, points, wear_compliance, warm)
-        single = gap.reshape(-1, 1, gap.shape[-1])
-        shape = single.shape
-        own = np.zeros(shape) if wear_compliance is None else wear_compliance.reshape(shape)
-        leading = gap.shape[:-1]
-        return self._solve_columns(single, longitudinal_curvature, columns, own, warm, leading)
-
-    def _solve_columns(
-        self,
-        gap: FloatArray,
-        longitudinal_curvature: float,
-        points: OperatingPoints,
-        wear: SharedWear | FloatArray,
-        warm: Sequence[ContactSolution] | None,
-        leading: tuple[int, ...],
-    ) -> BatchSolution:
-        """Solve sets of contacts, (sets, contacts, strips), by strip theory.
-
-        `wear` is shared, or the wear compliance of each contact. `leading` is the shape of the
-        result.
+        Contacts with a bearing torque, or with another theory, have their normal problems solved in
+        one call and their tangential problems one after another.
         """
-        loads, start = points.normal_force, start_of(warm)
-        normal = self._solve_normal(gap, longitudinal_curvature, loads, wear, start, leading)
-        inputs = TangentialInputs.of(points, self._grid)
-        dissipation, sums = strip_tractions(normal, inputs, self._grid, self._pair)
+        refuse_unclaimed(self, batch, wear_compliance, coupling)
+        normal = self._solve_normal(batch, wear_compliance, coupling, warm)
+        line_load = normal.line_load.reshape(batch.gap.shape)
+        half_length = normal.half_length.reshape(batch.gap.shape)
+        approach = normal.approach.reshape(len(batch))
+        iterations = normal.iterations.repeat(normal.gap.shape[1])
+        if not isinstance(self.theory, StripTheory) or batch.bearing_torque is not None:
+            return solved_one_by_one(
+                batch,
+                lambda k: self._complete(
+                    line_load[k],
+                    half_length[k],
+                    float(batch.longitudinal_curvature[k]),
+                    float(approach[k]),
+                    int(iterations[k]),
+                    batch.point(k),
+                ),
+            )
+        dissipation, sums = strip_tractions(line_load, half_length, batch, self._grid, self._pair)
         number = first_not_finite(sums)
         if number is not None:
-            line_load = normal.line_load.reshape(dissipation.shape)
-            error = power_not_finite(points[number], line_load=line_load[number])
-            raise naming_contact(error, number, leading)
-        strips = (*leading, self._grid.strips)
-        columns = {
-            "half_length": normal.half_length.reshape(strips),
-            "line_load": normal.line_load.reshape(strips),
-            "dissipation": dissipation.reshape(strips),
-            "approach": normal.approach.reshape(leading),
-            "longitudinal_creepage": points.longitudinal.reshape(leading),
-            "iterations": normal.iterations.repeat(normal.gap.shape[1]).reshape(leading),
-            **dict(zip(SUMS, sums.reshape(-1, *leading), strict=True)),
-        }
-        return BatchSolution(leading, self._grid.y, columns)
+            error = power_not_finite(batch.point(number), line_load=line_load[number])
+            raise naming_contact(error, number, batch)
+        return ContactBatchSolution(
+            y=self._grid.y,
+            half_length=half_length,
+            line_load=line_load,
+            dissipation=dissipation,
+            approach=approach,
+            longitudinal_creepage=batch.longitudinal,
+            iterations=iterations,
+            **dict(zip(SUMS, sums, strict=True)),
+        )
 
     def _solve_normal(
         self,
-        gap: FloatArray,
-        longitudinal_curvature: float,
-        loads: Number,
-        wear: SharedWear | FloatArray,
-        start: tuple[FloatArray, Number] | None,
-        leading: tuple[int, ...],
+        batch: ContactBatch,
+        wear_compliance: FloatArray | None,
+        coupling: SharedWear | None,
+        warm: ContactBatchSolution | None,
     ) -> NormalContacts:
-        """Solve the normal problem of sets of contacts.
-
-        `start` is the initial guess of line loads and approaches.
-        """
+        """Solve the normal problems; arguments as in `solve`."""
         constants = Constants(
-            self._grid.spacing,
-            self._pair.contact_modulus,
-            longitudinal_curvature,
-            self._table,
-            self._bend,
+            self._grid.spacing, self._pair.contact_modulus, self._table, self._bend
         )
-        normal = NormalContacts.starting(gap, loads, start)
-        if isinstance(wear, SharedWear):
-            normal.solve(wear, constants)
+        size = 1 if coupling is None else len(coupling.bodies)
+        normal = NormalContacts.starting(batch, size, warm)
+        if coupling is not None:
+            normal.solve(coupling, constants)
+        elif wear_compliance is not None:
+            normal.solve_independent(wear_compliance, constants)
         else:
-            normal.solve_independent(wear, constants)
+            normal.solve_independent(np.zeros(normal.gap.shape), constants)
         for number in normal.failed.tolist():
             try:
                 self._check(
@@ -258,28 +162,10 @@ class Slender(StripModel):
                     normal.approach[number],
                 )
             except ContactError as error:
-                if gap.shape[1] > 1:
+                if size > 1:
                     raise
-                raise naming_contact(error, number, leading) from error
+                raise naming_contact(error, number, batch) from error
         return normal
-
-    def _has_closed_form(self, point: OperatingPoint) -> bool:
-        """Return whether strip theory solves an operating point in closed form."""
-        return (
-            isinstance(self.theory, StripTheory)
-            and (isinstance(point.friction, float) or np.ndim(point.friction) < 2)
-            and point.bearing_torque is None
-            and not point.friction_carried
-        )
-
-    def _columns(self, points: Sequence[OperatingPoint]) -> OperatingPoints | None:
-        """Return the points as columns if strip theory solves them in closed form, or None."""
-        if not isinstance(self.theory, StripTheory):
-            return None
-        columns = OperatingPoints.of(points)
-        if columns is None or columns.friction.ndim > 2 or columns.friction_carried:
-            return None
-        return columns
 
     def _check(
         self,
@@ -347,7 +233,11 @@ class Slender(StripModel):
 
 SPEC = ContactModelSpec(
     name="slender",
-    factory=lambda options: Slender(tangential_theory(options), options.half_length == "coupled"),
+    factory=lambda options, grid, materials: Slender(
+        tangential_theory(options), grid, materials, options.half_length == "coupled"
+    ),
+    suggest_grid=grid_about_hertz,
+    protocol=2,
     options=SlenderOptions,
     capabilities=Slender.capabilities,
     summary="line-contact strips on any profile; the default",

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from wearsim.contact_batch import BatchSolution, OperatingPoints, rows_of
+from wearsim.contact_batch import ContactBatch, ContactBatchSolution
 from wearsim.mechanics.hertz.elasticity import ElasticPair
 from wearsim.mechanics.numerics.jit import own_array
 from wearsim.mechanics.slender.newton import CONVERGED, NOT_FINITE, solve_each
@@ -15,16 +14,9 @@ from wearsim.mechanics.tangential.strip_interaction import strip_elasticity
 from wearsim.mechanics.tangential.strip_theory import SUMS, strip_contacts
 from wearsim.plugins import SharedWear
 from wearsim.plugins.shared_wear import NO_BODY
-from wearsim.types import ContactSolution, FloatArray, Grid, IntArray, Number, OperatingPoint
+from wearsim.types import FloatArray, Grid, IntArray
 
 _NONE = np.zeros(0, dtype=np.int64)
-
-
-def start_of(warm: Sequence[ContactSolution] | None) -> tuple[FloatArray, FloatArray] | None:
-    """Return line loads and approaches of an initial guess, if there is one."""
-    if isinstance(warm, BatchSolution):
-        return warm.stack("line_load"), warm.stack("approach")
-    return None if warm is None else (rows_of(warm, "line_load"), rows_of(warm, "approach"))
 
 
 class Constants(NamedTuple):
@@ -32,7 +24,6 @@ class Constants(NamedTuple):
 
     spacing: float
     contact_modulus: float
-    longitudinal_curvature: float
     table: FloatArray
     bend: FloatArray
 
@@ -44,8 +35,8 @@ class NormalContacts(NamedTuple):
     ----------
     gap : ndarray, shape (sets, contacts, strips)
         Gap [m].
-    loads : ndarray, shape (sets, contacts)
-        Loads [N].
+    longitudinal_curvature, loads : ndarray, shape (sets, contacts)
+        Relative curvature along rolling [1/m] and loads [N].
     line_load, half_length : ndarray, shape (sets, contacts, strips)
         Output: q [N/m], whose values on entry are the initial guess, and a [m].
     approach : ndarray, shape (sets, contacts)
@@ -55,6 +46,7 @@ class NormalContacts(NamedTuple):
     """
 
     gap: FloatArray
+    longitudinal_curvature: FloatArray
     loads: FloatArray
     line_load: FloatArray
     approach: FloatArray
@@ -64,18 +56,27 @@ class NormalContacts(NamedTuple):
 
     @classmethod
     def starting(
-        cls, gap: FloatArray, loads: Number, start: tuple[FloatArray, Number] | None
+        cls, batch: ContactBatch, size: int, start: ContactBatchSolution | None
     ) -> NormalContacts:
-        """Return contacts with an initial guess of line loads and approaches, by default zero."""
-        shape = gap.shape[:-1]
+        """Return the normal problems of sets of `size` contacts, with an initial guess if any."""
+        shape = len(batch) // size, size
+        wide = *shape, batch.gap.shape[1]
         if start is None:
-            line_load, approach = np.zeros(gap.shape), np.zeros(shape)
+            line_load, approach = np.zeros(wide), np.zeros(shape)
         else:
-            line_load = own_array(start[0]).reshape(gap.shape)
-            approach = np.array(start[1], dtype=np.float64).reshape(shape)
-        own = own_array(gap), np.array(loads, dtype=np.float64).reshape(shape)
-        status, iterations = np.zeros((2, len(gap)), np.int64)
-        return cls(*own, line_load, approach, np.zeros(gap.shape), status, iterations)
+            line_load = own_array(start.line_load).reshape(wide)
+            approach = own_array(start.approach).reshape(shape)
+        status, iterations = np.zeros((2, shape[0]), np.int64)
+        return cls(
+            own_array(batch.gap).reshape(wide),
+            own_array(batch.longitudinal_curvature).reshape(shape),
+            own_array(batch.normal_force).reshape(shape),
+            line_load,
+            approach,
+            np.zeros(wide),
+            status,
+            iterations,
+        )
 
     @property
     def failed(self) -> IntArray:
@@ -92,11 +93,23 @@ class NormalContacts(NamedTuple):
 
         Parameters
         ----------
-        own : ndarray, shape (sets, contacts, strips)
+        own : ndarray, shape (sets, contacts, strips) or (contacts, strips)
             Increase of each contact's gap by its wear per unit of line load [m/(N/m)].
         constants : Constants
         """
-        solve_each(self.gap, own_array(own), self.loads, *constants, *self._outputs)
+        wear = own_array(own).reshape(self.gap.shape)
+        solve_each(
+            self.gap,
+            wear,
+            self.loads,
+            self.longitudinal_curvature,
+            *constants,
+            self.line_load,
+            self.approach,
+            self.half_length,
+            self.status,
+            self.iterations,
+        )
         self._refuse_infinite_gaps()
 
     def solve(self, wear: SharedWear, constants: Constants) -> None:
@@ -118,13 +131,21 @@ class NormalContacts(NamedTuple):
     ) -> None:
         from wearsim.mechanics.slender.coupled import solve_each_coupled  # noqa: PLC0415  (rarely needed)
 
-        arrays = (self.gap, own, members, shared, self.loads)
-        solve_each_coupled(*arrays, *constants, *self._outputs)
+        solve_each_coupled(
+            self.gap,
+            own,
+            members,
+            shared,
+            self.loads,
+            self.longitudinal_curvature,
+            *constants,
+            self.line_load,
+            self.approach,
+            self.half_length,
+            self.status,
+            self.iterations,
+        )
         self._refuse_infinite_gaps()
-
-    @property
-    def _outputs(self) -> tuple[FloatArray, FloatArray, FloatArray, IntArray, IntArray]:
-        return self.line_load, self.approach, self.half_length, self.status, self.iterations
 
     def _refuse_infinite_gaps(self) -> None:
         """Mark sets with a gap that is not finite, since the kernels skip such strips."""
@@ -133,79 +154,39 @@ class NormalContacts(NamedTuple):
             self.status[~finite.all(axis=(1, 2))] = NOT_FINITE
 
 
-class TangentialInputs(NamedTuple):
-    """Creepages and friction of contacts, in the order of the arguments of `strip_contacts`.
-
-    Parameters
-    ----------
-    rolling_speed : float
-        V [m/s].
-    longitudinal, lateral, spin : ndarray, shape (contacts,)
-        Mean longitudinal creepage, lateral creepage and spin [1/m].
-    variation, friction : ndarray, shape (contacts, strips)
-        Variation of the longitudinal creepage; friction coefficient.
-    """
-
-    rolling_speed: float
-    longitudinal: FloatArray
-    lateral: FloatArray
-    spin: FloatArray
-    variation: FloatArray
-    friction: FloatArray
-
-    @classmethod
-    def of(cls, points: OperatingPoints, grid: Grid) -> TangentialInputs:
-        """Return the inputs of operating points with at most one friction value per strip."""
-        friction, variation = points.friction, points.variation
-        per_strip = np.empty((len(friction), grid.strips))
-        per_strip[:] = friction if friction.ndim > 1 else friction[:, None]
-        return cls(
-            points.rolling_speed,
-            own_array(points.longitudinal),
-            own_array(points.lateral),
-            own_array(points.spin),
-            -points.spin[:, None] * grid.y if variation is None else own_array(variation),
-            per_strip,
-        )
-
-    @classmethod
-    def of_one(cls, point: OperatingPoint, grid: Grid) -> TangentialInputs:
-        """Return the inputs of one operating point; faster than `of`."""
-        creepage, variation = point.creepage, point.creepage.variation
-        friction = np.empty((1, grid.strips))
-        friction[:] = point.friction
-        return cls(
-            point.rolling_speed,
-            np.array([creepage.longitudinal], dtype=np.float64),
-            np.array([creepage.lateral], dtype=np.float64),
-            np.array([creepage.spin], dtype=np.float64),
-            (-creepage.spin * grid.y if variation is None else own_array(variation))[None],
-            friction,
-        )
-
-
 def strip_tractions(
-    normal: NormalContacts, inputs: TangentialInputs, grid: Grid, pair: ElasticPair
+    line_load: FloatArray,
+    half_length: FloatArray,
+    batch: ContactBatch,
+    grid: Grid,
+    pair: ElasticPair,
 ) -> tuple[FloatArray, FloatArray]:
     """Return dissipation, (contacts, strips) [W/m], and `SUMS`, (6, contacts), by strip theory.
 
     Parameters
     ----------
-    normal : NormalContacts
-        Solved normal problems, of as many contacts as the inputs.
-    inputs : TangentialInputs
+    line_load, half_length : ndarray, shape (contacts, strips)
+        Solution of the normal problems [N/m], [m].
+    batch : ContactBatch
+        The contacts, with at most one friction value per strip.
     grid : Grid
     pair : ElasticPair
     """
-    shape = inputs.friction.shape
-    dissipation, sums = np.empty(shape), np.empty((len(SUMS), shape[0]))
+    friction, variation = np.empty(line_load.shape), batch.variation
+    friction[:] = batch.friction if batch.friction.ndim > 1 else batch.friction[:, None]
+    dissipation, sums = np.empty(line_load.shape), np.empty((len(SUMS), len(line_load)))
     strip_contacts(
-        normal.line_load.reshape(shape),
-        normal.half_length.reshape(shape),
+        line_load,
+        half_length,
         grid.y,
         grid.spacing,
         strip_elasticity(pair.contact_modulus, pair.shear_modulus),
-        *inputs,
+        own_array(batch.rolling_speed),
+        own_array(batch.longitudinal),
+        own_array(batch.lateral),
+        own_array(batch.spin),
+        -batch.spin[:, None] * grid.y if variation is None else own_array(variation),
+        friction,
         dissipation,
         sums,
     )

@@ -33,26 +33,19 @@ class StripModel(ContactModel):
     ----------
     theory : TangentialTheory
         Theory of the tangential contact.
+    grid : Grid
+        The strips.
+    materials : tuple of Material
+        Materials of cylinder and roller.
     """
 
-    def __init__(self, theory: TangentialTheory) -> None:
+    def __init__(
+        self, theory: TangentialTheory, grid: Grid, materials: tuple[Material, Material]
+    ) -> None:
         self.theory = theory
-
-    def prepare(self, grid: Grid, materials: tuple[Material, Material]) -> None:
-        """Set strips and materials, and tabulate the influence of one strip on another."""
         self._grid = grid
         self._pair: ElasticPair = combine(*materials)
         self._table = influence_table(grid.strips)
-
-    def suggest_grid(
-        self,
-        gap_curvature: float,
-        longitudinal_curvature: float,
-        normal_force: float,
-        materials: tuple[Material, Material],
-    ) -> Grid | None:
-        """Return 121 strips over 1.2 times the width of the Hertzian patch."""
-        return grid_about_hertz(gap_curvature, longitudinal_curvature, normal_force, materials)
 
     def fields(
         self,
@@ -109,6 +102,7 @@ class StripModel(ContactModel):
 
 
 def grid_about_hertz(
+    options: object,
     gap_curvature: float,
     longitudinal_curvature: float,
     normal_force: float,
@@ -118,6 +112,8 @@ def grid_about_hertz(
 
     Parameters
     ----------
+    options : Options
+        Not used.
     gap_curvature, longitudinal_curvature : float
         Relative curvatures across and along rolling [1/m].
     normal_force : float

@@ -265,6 +265,7 @@ SPECS = (
         options=MaxentOptions,
         summary="maximum entropy for given support, mean and standard deviation",
         references=_ENTROPY,
+        protocol=2,
     ),
     RandomInputSpec(
         name="normal",
@@ -273,18 +274,21 @@ SPECS = (
         ),
         options=NormalOptions,
         summary="normal with given mean and standard deviation",
+        protocol=2,
     ),
     RandomInputSpec(
         name="lognormal",
         factory=Lognormal,
         options=LognormalOptions,
         summary="positive value whose logarithm is normal",
+        protocol=2,
     ),
     RandomInputSpec(
         name="uniform",
         factory=lambda options: AnalyticDistribution(Uniform(options.low, options.high)),
         options=UniformOptions,
         summary="uniform between two limits",
+        protocol=2,
     ),
     RandomInputSpec(
         name="truncated-normal",
@@ -293,18 +297,21 @@ SPECS = (
         ),
         options=TruncatedNormalOptions,
         summary="normal truncated at limits; mean and std are those before (else maxent)",
+        protocol=2,
     ),
     RandomInputSpec(
         name="constant",
         factory=Constant,
         options=ConstantOptions,
         summary="a constant value",
+        protocol=2,
     ),
     RandomInputSpec(
         name="table",
         factory=TableDistribution,
         options=TableOptions,
         summary="measured samples, or a table of quantiles, from a CSV file",
+        protocol=2,
     ),
     RandomInputSpec(
         name="disc",
@@ -313,5 +320,6 @@ SPECS = (
         role="joint",
         summary="yaw and tilt, uniform on a disc",
         references=_ENTROPY[1:],
+        protocol=2,
     ),
 )

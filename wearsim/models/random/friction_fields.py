@@ -150,6 +150,7 @@ SPECS = (
         role="field",
         summary="independent friction at each point of the grid: depends on the grid",
         references=("Chevalier, Cloupet, Soize, Wear 258 (2005), DOI 10.1016/j.wear.2004.11.012",),
+        protocol=2,
     ),
     RandomInputSpec(
         name="gaussian-field",
@@ -158,5 +159,6 @@ SPECS = (
         role="field",
         summary="friction with a correlation length, independent of the grid",
         references=("Higdon, process convolutions (2002), DOI 10.1007/978-1-4471-0657-9_2",),
+        protocol=2,
     ),
 )

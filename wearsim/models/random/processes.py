@@ -86,5 +86,6 @@ SPECS = (
         role="process",
         summary="stationary process with an exponential correlation in time",
         references=("Gillespie, Phys. Rev. E 54 (1996), DOI 10.1103/PhysRevE.54.2084",),
+        protocol=2,
     ),
 )

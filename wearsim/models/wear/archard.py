@@ -53,4 +53,5 @@ SPEC = WearLawSpec(
         "Archard, J. Appl. Phys. 24 (1953), DOI 10.1063/1.1721448",
         "Chevalier, Cloupet, Soize, Wear 258 (2005), DOI 10.1016/j.wear.2004.11.012",
     ),
+    protocol=2,
 )

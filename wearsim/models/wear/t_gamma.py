@@ -116,4 +116,5 @@ SPEC = WearLawSpec(
         "Lewis, Dwyer-Joyce, Proc. IMechE J 218 (2004), DOI 10.1243/1350650042794815",
         "Braghin, Lewis, Dwyer-Joyce, Bruni, Wear 261 (2006), DOI 10.1016/j.wear.2006.03.025",
     ),
+    protocol=2,
 )

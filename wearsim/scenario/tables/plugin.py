@@ -25,6 +25,7 @@ from wearsim.quantities import Length, PositiveLength
 from wearsim.scenario.parse.mistakes import Mistakes, Table, installed
 from wearsim.scenario.parse.validate import key_of_file, split_keys
 from wearsim.scenario.random.read import validate
+from wearsim.types import Grid, Material
 from wearsim.units import shown
 
 
@@ -85,9 +86,9 @@ class ContactChoice:
         """Registered specification of the contact model."""
         return registry().get(ContactModelSpec, self.model)
 
-    def build(self) -> ContactModel:
-        """Return a new contact model, not yet prepared."""
-        return self.spec.factory(self.options)
+    def build(self, grid: Grid, materials: tuple[Material, Material]) -> ContactModel:
+        """Return a new contact model for strips, and for the materials of cylinder and roller."""
+        return self.spec.factory(self.options, grid, materials)
 
 
 @dataclass(frozen=True)

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from wearsim.contact_batch import BatchSolution, OperatingPoints
+from wearsim.contact_batch import ContactBatch, ContactBatchSolution
 from wearsim.errors import ContactError, Mistake, ScenarioError, SolverError
 from wearsim.evolution.operating_points import unworn_contacts
-from wearsim.plugins import ContactModel
 from wearsim.scenario import RandomInput, Scenario, realise
 from wearsim.studies.contact.friction_field import LocalFriction
-from wearsim.studies.run.assemble import build_problem, check_model, load_range
+from wearsim.studies.run.assemble import build_problem, check_model, load_range, prepared_model
 from wearsim.studies.run.draws import Drawer, units_of
 from wearsim.studies.run.grid import (
     MOST_STRIPS,
@@ -24,7 +22,7 @@ from wearsim.studies.run.grid import (
     suggested_grid,
 )
 from wearsim.studies.run.inputs import FIELDS, OFFSET, TILT, contact_inputs, contact_values
-from wearsim.types import FloatArray, Grid, OperatingPoint
+from wearsim.types import FloatArray, Grid
 
 _MARGIN = 1e-9  # of a patch, against rounding at the outer edges
 _ROUNDING = 1e-12
@@ -54,22 +52,21 @@ class Realisations:
 
     def __init__(self, scenario: Scenario, count: int) -> None:
         self.scenario, self.count = scenario, count
-        self.model = scenario.contact.build()
-        check_model(scenario, self.model)
         mean_load = load_range(scenario, scenario.load.build(), 0.0)[0]
         self._once, field, self.notes = acting_inputs(scenario)
         drawer = Drawer(self._once, scenario.sampling.plan, count, replicates=1)
         self.values, self.units = drawer.columns(0, count), units_of(self._once)
-        self._field = LocalFriction(scenario, self.model, field) if field is not None else None
         drawn = self._drawn(slice(None))
         self.loads = np.full(count, mean_load) + drawn.get("normal_force_offset", 0.0)
         centres = contact_positions(scenario, contact_inputs(scenario, [0], drawn))
-        self.grid = realisation_grid(scenario, self.model, mean_load, self.loads, centres)
-        self.model.prepare(self.grid, (scenario.cylinder.material, scenario.roller.material))
+        self.grid = realisation_grid(scenario, mean_load, self.loads, centres)
+        self.model = prepared_model(scenario, self.grid)
+        check_model(scenario, self.model)
+        self._field = LocalFriction(scenario, self.model, field) if field is not None else None
         self.friction_points = 0 if self._field is None else self._checked_points(self._field)
 
-    def solve(self, first: int, count: int) -> BatchSolution:
-        """Solve consecutive realisations; leading axes (1, 1, count).
+    def solve(self, first: int, count: int) -> ContactBatchSolution:
+        """Solve consecutive realisations.
 
         Parameters
         ----------
@@ -91,35 +88,34 @@ class Realisations:
                     raise self._failure(number, error) from error
             raise  # no single realisation fails
 
-    def solve_mean_problem(self) -> BatchSolution:
-        """Solve the contact with every input at its mean; leading axes (1, 1, 1)."""
+    def solve_mean_problem(self) -> ContactBatchSolution:
+        """Solve the contact with every input at its mean."""
         problem = build_problem(self.scenario, self.model, self.grid, {})
-        return self.model.solve_batch(*unworn_contacts(problem))
+        return self.model.solve(unworn_contacts(problem))
 
     def _drawn(self, part: slice) -> dict[str, FloatArray]:
         """Return the drawn inputs of some realisations by the names of `contact_values`."""
         values = {key: column[part] for key, column in self.values.items()}
         return contact_values(self._once.random, values)
 
-    def _contacts(self, part: slice) -> tuple[FloatArray, float, Sequence[OperatingPoint]]:
-        """Return gaps, curvature along rolling and operating points of some realisations."""
+    def _contacts(self, part: slice) -> ContactBatch:
+        """Return the contacts of some realisations."""
         drawn = {name: values[None] for name, values in self._drawn(part).items()}
         count = part.stop - part.start
         problem = build_problem(self.scenario, self.model, self.grid, drawn, realisations=count)
         return unworn_contacts(problem)
 
-    def _solve(self, part: slice) -> BatchSolution:
-        gap, curvature, points = self._contacts(part)
-        if self._field is not None and isinstance(points, OperatingPoints):
-            x, y = self.model.friction_points_batch(gap, curvature, points)
-            points = self._field.put(points, x, y, part.start)
-        return self.model.solve_batch(gap, curvature, points)
+    def _solve(self, part: slice) -> ContactBatchSolution:
+        batch = self._contacts(part)
+        if self._field is not None and batch.bearing_torque is None:
+            batch = self._field.put(batch, *self.model.friction_points(batch), part.start)
+        return self.model.solve(batch)
 
     def _checked_points(self, field: LocalFriction) -> int:
         """Check that the points of a strip resolve the friction field; return their number."""
         heaviest = int(np.argmax(self.loads))
         try:
-            x, _ = self.model.friction_points_batch(*self._contacts(slice(heaviest, heaviest + 1)))
+            x, _ = self.model.friction_points(self._contacts(slice(heaviest, heaviest + 1)))
         except SolverError as error:
             raise self._failure(heaviest, error) from error
         field.check(x[0], self.grid.spacing)
@@ -198,7 +194,7 @@ def _acts(scenario: Scenario, item: RandomInput) -> bool:
 
 
 def realisation_grid(
-    scenario: Scenario, model: ContactModel, load: float, loads: FloatArray, centres: FloatArray
+    scenario: Scenario, load: float, loads: FloatArray, centres: FloatArray
 ) -> Grid:
     """Return strips that cover the contacts of all realisations.
 
@@ -208,7 +204,6 @@ def realisation_grid(
     Parameters
     ----------
     scenario : Scenario
-    model : ContactModel
     load : float
         Load with every input at its mean [N].
     loads : ndarray, shape (realisations,)
@@ -243,7 +238,7 @@ def realisation_grid(
             raise ScenarioError(scenario.file, [mistake])
         half = 0.5 * choice.width
         return Grid.spanning(centre - half, centre + half, choice.strips or 121)
-    grid = suggested_grid(scenario, model, load)
+    grid = suggested_grid(scenario, load)
     if grid is None:
         grid = Grid.spanning(-1.2 * mean_b, 1.2 * mean_b, 121)
     margin = 0.5 * grid.spacing * grid.strips / mean_b  # 1 where the strips end with the patch

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from wearsim.contact_batch import OperatingPoints
+from wearsim.contact_batch import ContactBatch
 from wearsim.errors import CapabilityError, Mistake, ScenarioError
 from wearsim.plugins import ContactModel, ContactModelSpec, FrictionField, registry
 from wearsim.scenario import RandomInput, Scenario
@@ -82,14 +82,12 @@ class LocalFriction:
                 self._scenario.file, [Mistake(table, key, mistake, self._item.describe(), remedy)]
             )
 
-    def put(
-        self, points: OperatingPoints, x: FloatArray, y: FloatArray, first: int
-    ) -> OperatingPoints:
-        """Return the operating points of consecutive realisations with their local friction.
+    def put(self, batch: ContactBatch, x: FloatArray, y: FloatArray, first: int) -> ContactBatch:
+        """Return the contacts of consecutive realisations with their local friction.
 
         Parameters
         ----------
-        points : OperatingPoints
+        batch : ContactBatch
         x : ndarray, shape (contacts, points, strips)
             Positions along rolling, from the leading edge [m].
         y : ndarray, shape (strips,)
@@ -102,7 +100,7 @@ class LocalFriction:
             uniforms = partial(self._stream.uniforms, realisation=first + row)
             friction[row] = self._field.values(x[row], y, uniforms)
         carried = self._field.frame != "contact"
-        return replace(points, friction=friction, friction_carried=carried)
+        return replace(batch, friction=friction, friction_carried=carried)
 
 
 def finer_grid(

@@ -119,9 +119,9 @@ class _Study:
         first, count = self.done, min(self._batch, self.contacts.count - self.done)
         start = time.monotonic()
         batch = self.contacts.solve(first, count)
-        rows = batch.columns["dissipation"].reshape(-1, self.contacts.grid.strips)
+        rows = batch.dissipation
         for name, values in self._scalars.items():
-            values[first : first + count] = batch.columns[name].ravel()
+            values[first : first + count] = getattr(batch, name)
         kept = self._kept[first : first + count]
         kept[:] = rows[: len(kept)]
         self._moments.add(rows.astype(np.float64, copy=False))
@@ -152,7 +152,7 @@ class _Study:
             "dissipation_std": std,
             "dissipation_low": low,
             "dissipation_high": high,
-            "mean_problem_dissipation": self._mean_problem.columns["dissipation"].ravel(),
+            "mean_problem_dissipation": self._mean_problem.dissipation[0],
             **{key: values[:done] for key, values in contacts.values.items()},
         }
         friction_grid = (
@@ -167,7 +167,7 @@ class _Study:
             finished=done == contacts.count,
             strip_width=contacts.grid.spacing,
             friction_grid=friction_grid if points else "",
-            mean_problem_power=float(self._mean_problem.columns["power"].item()),
+            mean_problem_power=float(self._mean_problem.power[0]),
             notes=[*scenario.notes, *contacts.notes],
             warnings=self._warnings(len(kept)),
             variables=variables,

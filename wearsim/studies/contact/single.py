@@ -62,7 +62,7 @@ class ContactStudy:
     notes: tuple[str, ...]
 
 
-def _grid(scenario: Scenario, model: ContactModel, load: float) -> Grid:
+def _grid(scenario: Scenario, load: float) -> Grid:
     """Return the strips of the scenario, of the profile's whole width, or of the model's choice."""
     choice, profile = scenario.contact, scenario.cylinder.profile
     centre = choice.centre
@@ -72,7 +72,7 @@ def _grid(scenario: Scenario, model: ContactModel, load: float) -> Grid:
     if choice.width is None and profile is not None:
         return profile_grid(profile, half_width, choice.strips)
     if choice.width is None and choice.strips is None:
-        grid = suggested_grid(scenario, model, load)
+        grid = suggested_grid(scenario, load)
         if grid is not None:
             return Grid(grid.y + centre, grid.spacing)
     width = choice.width if choice.width is not None else 2.4 * half_width
@@ -111,18 +111,16 @@ def study_contact(
     """
     if profile is not None:
         scenario = replace(scenario, cylinder=replace(scenario.cylinder, profile=profile))
-    model = scenario.contact.build()
-    check_model(scenario, model)
     force = load_range(scenario, scenario.load.build(), 0.0)[0]
-    grid = _grid(scenario, model, force)
+    grid = _grid(scenario, force)
     model, gap, curvature, point = _contact(scenario, grid)
-    solution = model.solve(gap, curvature, point)
+    solution = model.solve_one(gap, curvature, point)
     fields = model.fields(solution, gap, curvature, point) if with_fields else None
     error, seconds = None, None
     if with_error:
         error = _grid_error(scenario, grid, solution.power)
         start = perf_counter()
-        model.solve(gap, curvature, point)
+        model.solve_one(gap, curvature, point)
         seconds = perf_counter() - start
     return ContactStudy(
         solution,
@@ -141,11 +139,12 @@ def study_contact(
 def _contact(
     scenario: Scenario, grid: Grid
 ) -> tuple[ContactModel, FloatArray, float, OperatingPoint]:
-    """Return a model prepared for strips, gap [m], curvature along rolling [1/m] and the point."""
+    """Return the model for strips, gap [m], curvature along rolling [1/m] and the point."""
     model = prepared_model(scenario, grid)
+    check_model(scenario, model)
     problem = build_problem(scenario, model, grid, {})
-    gap, curvature, points = unworn_contacts(problem)
-    return model, gap[0, 0, 0], curvature, points[0]
+    batch = unworn_contacts(problem)
+    return model, batch.gap[0], float(batch.longitudinal_curvature[0]), batch.point(0)
 
 
 def _grid_error(scenario: Scenario, grid: Grid, power: float) -> float | None:
@@ -156,7 +155,7 @@ def _grid_error(scenario: Scenario, grid: Grid, power: float) -> float | None:
     try:
         coarse = Grid.spanning(*ends, (grid.strips + 1) // 2)
         model, gap, curvature, point = _contact(scenario, coarse)
-        solution = model.solve(gap, curvature, point)
+        solution = model.solve_one(gap, curvature, point)
     except WearsimError:
         return None
     return abs(solution.power / power - 1.0)

@@ -163,7 +163,8 @@ def assemble_problem(
         If the contact model does not support the scenario.
     """
     scenario = draws.scenario
-    chosen = model or scenario.contact.build()
+    grid = grid if grid is not None else strips_of_run(draws)
+    chosen = model or prepared_model(scenario, grid)
     check_model(scenario, chosen)
     first, multiplicity = merged_rollers(draws)
     name = chosen_stepper(scenario, chosen, 2 if draws.passes else len(first))
@@ -171,9 +172,6 @@ def assemble_problem(
     if scenario.evolution.nodes is not None and (stepper.pass_by_pass or not draws.passes):
         what = "has no meaning without an expectation over passes"
         raise ScenarioError(scenario.file, [Mistake("evolution", "nodes", what)])
-    grid = grid if grid is not None else strips_of_run(draws)
-    if model is None:
-        chosen.prepare(grid, (scenario.cylinder.material, scenario.roller.material))
     place = {number: k for k, number in enumerate(first)}
     problem = replace(
         build_problem(
@@ -199,10 +197,8 @@ def assemble_problem(
 
 
 def prepared_model(scenario: Scenario, grid: Grid) -> ContactModel:
-    """Return the scenario's contact model, prepared for the strips."""
-    model = scenario.contact.build()
-    model.prepare(grid, (scenario.cylinder.material, scenario.roller.material))
-    return model
+    """Return the scenario's contact model for the strips."""
+    return scenario.contact.build(grid, (scenario.cylinder.material, scenario.roller.material))
 
 
 def strips_of_run(draws: Draws) -> Grid:
@@ -257,7 +253,7 @@ def build_problem(
     ----------
     scenario : Scenario
     model : ContactModel
-        Prepared for the grid.
+        Built for the grid.
     grid : Grid
     drawn : mapping of str to ndarray
         Drawn inputs by the names of `contact_values`; they broadcast to (rollers, realisations).

@@ -10,7 +10,7 @@ import numpy as np
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.mechanics.hertz.ellipse import HertzContact, hertz
-from wearsim.plugins import ContactModel, WearLaw
+from wearsim.plugins import WearLaw
 from wearsim.scenario import Scenario
 from wearsim.scenario.tables.plain import DEFAULT_TOLERANCE
 from wearsim.studies.run.inputs import contact_inputs
@@ -58,11 +58,15 @@ def contact_positions(scenario: Scenario, inputs: Mapping[str, FloatArray]) -> F
     return np.asarray(inputs["offset"] - scenario.roller.crown_radius * inputs["tilt"])
 
 
-def suggested_grid(scenario: Scenario, model: ContactModel, load: float) -> Grid | None:
-    """Return the strips that a contact model suggests for the contact under `load` [N], if any."""
+def suggested_grid(scenario: Scenario, load: float) -> Grid | None:
+    """Return the strips that the contact model suggests under `load` [N], if any."""
+    choice = scenario.contact
+    if choice.spec.suggest_grid is None:
+        return None
     curvature = 1.0 / scenario.cylinder.radius + 1.0 / scenario.roller.radius
     materials = scenario.cylinder.material, scenario.roller.material
-    return model.suggest_grid(1.0 / scenario.roller.crown_radius, curvature, load, materials)
+    across = 1.0 / scenario.roller.crown_radius
+    return choice.spec.suggest_grid(choice.options, across, curvature, load, materials)
 
 
 def profile_grid(profile: Profile, half_width: float, strips: int | None) -> Grid:

@@ -205,8 +205,11 @@ def present_contacts(
     If inputs are drawn at every pass, the contacts are those of the quadrature over passes, so that
     a record does not depend on the stepper.
     """
-    if problem.expectation is not None:
-        problem, state = problem.expectation, state.replaced(contacts=())
+    expected = problem.expectation
+    if expected is not None:
+        loads = present_loads(expected, state)
+        contacts = solve_present(expected, state, loads, cold=True)
+        return expected, state.replaced(contacts=contacts), loads
     loads = present_loads(problem, state)
     solve = solve_present if pass_by_pass else contacts_at
     return problem, state.replaced(contacts=solve(problem, state, loads)), loads

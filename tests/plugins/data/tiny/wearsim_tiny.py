@@ -4,11 +4,11 @@ import numpy as np
 from scipy.optimize import brentq
 
 from wearsim.plugins import (
-    ContactModel,
     ContactModelSpec,
     LoadSpec,
     LoadTerm,
     Options,
+    SingleContactModel,
     WearLaw,
     WearLawSpec,
     hookimpl,
@@ -16,21 +16,18 @@ from wearsim.plugins import (
 from wearsim.types import ContactSolution
 
 
-class Foundation(ContactModel):
+class Foundation(SingleContactModel):
     """Independent springs in gross sliding, without optional capabilities."""
 
-    def __init__(self, foundation_modulus):
-        self.modulus = foundation_modulus
-
-    def prepare(self, grid, materials):
-        self.grid = grid
+    def __init__(self, options, grid, materials):
+        self.modulus, self.grid = options.foundation_modulus, grid
 
     def _line_load(self, gap, curvature, approach):
         depth = np.maximum(approach - gap, 0.0)
         half_length = np.sqrt(2.0 * depth / curvature)
         return 4.0 / 3.0 * self.modulus * depth * half_length, half_length
 
-    def solve(self, gap, longitudinal_curvature, point, wear_compliance=None, warm=None):
+    def solve_contact(self, gap, longitudinal_curvature, point, wear_compliance=None, warm=None):
         if wear_compliance is not None:
             raise ValueError("wear compliance without the capability")
         spacing, force = self.grid.spacing, point.normal_force
@@ -100,9 +97,10 @@ class DriftOptions(Options):
 def wearsim_contact_models():
     yield ContactModelSpec(
         name="foundation",
-        factory=lambda options: Foundation(options.foundation_modulus),
+        factory=Foundation,
         options=FoundationOptions,
         summary="elastic foundation",
+        protocol=2,
     )
 
 
@@ -113,6 +111,7 @@ def wearsim_wear_laws():
         factory=Abrasion,
         options=AbrasionOptions,
         summary="wear proportional to line load",
+        protocol=2,
     )
 
 
@@ -124,4 +123,5 @@ def wearsim_loads():
         options=DriftOptions,
         role="term",
         summary="load by dissipated energy",
+        protocol=2,
     )
