@@ -1,12 +1,12 @@
-"""Batches of solved contacts, as columns and as sequences."""
+"""Batches of contacts and of their solutions."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 
-from wearsim.contact_batch import BatchSolution, OperatingPoints, rows_of
-from wearsim.types import ContactSolution
+from wearsim.contact_batch import ContactBatch, ContactBatchSolution
+from wearsim.types import ContactSolution, Creepage, OperatingPoint
 
 Y = np.linspace(-1.0, 1.0, 5)
 
@@ -27,67 +27,52 @@ def numbers(contacts):
     return [contact.iterations for contact in contacts]
 
 
-def batch(shape=(1, 2, 3), first=0):
+def batch(count=6, first=0):
     """Return a batch of contacts numbered from `first`."""
-    return BatchSolution.of(shape, [solution(first + k) for k in range(int(np.prod(shape)))])
+    return ContactBatchSolution.of([solution(first + k) for k in range(count)])
 
 
-def test_batch_is_a_sequence_of_contacts():
+def test_batch_of_solutions_gives_single_contacts():
     found = batch()
     assert len(found) == 6
     assert numbers(found) == [0, 1, 2, 3, 4, 5]
-    assert numbers(found[2:4]) == [2, 3]
     assert found[-1].power == 5.5
     assert isinstance(found[0].power, float)
+    assert isinstance(found[0].iterations, int)
+    assert (found[3].line_load == 6.0).all()
+    assert found[0].y is found.y
 
 
-@pytest.mark.parametrize("name", ["line_load", "power", "y"])
-def test_rows_of_a_batch_equal_those_of_its_contacts(name):
+def test_solutions_are_selected_joined_and_replaced_by_number():
     found = batch()
-    assert (rows_of(found, name) == rows_of(list(found), name)).all()
-
-
-def test_selection_and_joining_act_on_the_last_axis():
-    found = batch()
-    taken = found.at(np.array([2, 0]))
-    assert taken.shape == (1, 2, 2)
-    assert numbers(taken) == [2, 0, 5, 3]
-    joined = found.joined_with(batch(first=10))
-    assert joined.shape == (1, 2, 6)
+    assert numbers(found.at(np.array([2, 0, 5]))) == [2, 0, 5]
+    joined = found.joined_with(batch(first=10), rows=2)
     assert numbers(joined) == [0, 1, 2, 10, 11, 12, 3, 4, 5, 13, 14, 15]
-    replaced = found.with_others(np.array([1]), batch((1, 2, 1), first=20))
+    replaced = found.with_others(np.array([1, 4]), batch(2, first=20))
     assert numbers(replaced) == [0, 20, 2, 3, 21, 5]
-    assert all(column.flags.c_contiguous for column in replaced.columns.values())
+    assert numbers(found) == [0, 1, 2, 3, 4, 5]
 
 
-def test_moving_an_axis_and_back_keeps_the_order():
-    found = batch()
-    moved = found.with_axis_moved(2, 0)
-    assert moved.shape == (3, 1, 2)
-    assert numbers(moved) == [0, 3, 1, 4, 2, 5]
-    assert moved.columns["line_load"].flags.c_contiguous
-    assert numbers(moved.with_axis_moved(0, 2)) == numbers(found)
-
-
-def test_operating_points_are_selected_by_number():
+def test_contacts_are_selected_by_number():
     column = np.arange(4.0)
-    points = OperatingPoints(
-        column, column, -column, column, column, 1.0, np.tile(column[:, None], (1, 5))
+    wide = np.tile(column[:, None], (1, 5))
+    contacts = ContactBatch(
+        wide, column, column, 2.0 * column, column, -column, column, column, wide, shape=(2, 1, 2)
     )
-    chosen = points.at(np.array([3, 1]))
-    assert [point.normal_force for point in chosen] == [3.0, 1.0]
-    assert chosen[0].creepage.lateral == -3.0
-    assert (chosen[1].creepage.variation == 1.0).all()
-    assert replace_variation(points).at(np.array([2]))[0].creepage.variation is None
+    chosen = contacts.at(np.array([3, 1]))
+    assert chosen.normal_force.tolist() == [3.0, 1.0]
+    point = chosen.point(0)
+    assert (point.rolling_speed, point.creepage.lateral) == (6.0, -3.0)
+    assert (chosen.point(1).creepage.variation == 1.0).all()
+    assert replace(contacts, variation=None).at(np.array([2])).point(0).creepage.variation is None
+    assert contacts.place(3) == ([1, 0, 1], "station 1, realisation 1")
+    assert chosen.place(1) == ([1], "contact 1")
 
 
-def replace_variation(points):
-    """Return the points without a variation of the creepage."""
-    return OperatingPoints(
-        points.normal_force,
-        points.longitudinal,
-        points.lateral,
-        points.spin,
-        points.friction,
-        points.rolling_speed,
-    )
+def test_points_of_different_kinds_are_no_batch():
+    gap, point = np.zeros((2, 5)), OperatingPoint(300.0, 1.0, Creepage(1e-3), 0.1)
+    for change in ({"bearing_torque": 0.1}, {"friction": np.ones(5)}, {"friction_carried": True}):
+        with pytest.raises(ValueError, match="in a batch of each kind"):
+            ContactBatch.of(gap, 90.0, [point, replace(point, **change)])
+    with pytest.raises(ValueError, match="longitudinal_curvature has 1 values for 2 contacts"):
+        ContactBatch.of(gap, 90.0, [point])

@@ -144,17 +144,6 @@ class OperatingPoint:
     rolling_radius: FloatArray | None = None
     friction_carried: bool = False
 
-    @property
-    def kind(self) -> tuple[object, ...]:
-        """Values that operating points must share to be columns of one `OperatingPoints`."""
-        return (
-            self.rolling_speed,
-            self.bearing_torque,
-            np.shape(self.friction),
-            self.friction_carried,
-            self.creepage.variation is None,
-        )
-
 
 @dataclass(frozen=True)
 class ContactSolution:

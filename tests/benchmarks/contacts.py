@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tests.benchmarks.table import Effort, Row, part
-from wearsim.contact_batch import OperatingPoints
+from wearsim.contact_batch import ContactBatch
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.mechanics.hertz.ellipse import HertzContact, hertz
 from wearsim.mechanics.tangential.strip_interaction import strip_elasticity
@@ -32,18 +32,18 @@ class Mean:
 
     def __init__(self, name: str, strips: int | None = None, **options: Any) -> None:
         spec = registry().get(ContactModelSpec, name)
-        self.model = spec.factory(spec.options(**options))
-        grid = self.model.suggest_grid(1 / CROWN, ALONG, LOAD, (STEEL, STEEL))
+        chosen = spec.options(**options)
+        grid = spec.suggest_grid(chosen, 1 / CROWN, ALONG, LOAD, (STEEL, STEEL))
         if strips is not None:
             half = 0.5 * grid.strips * grid.spacing
             grid = Grid.spanning(-half, half, strips)
-        self.model.prepare(grid, (STEEL, STEEL))
+        self.model = spec.factory(chosen, grid, (STEEL, STEEL))
         self.gap = grid.y**2 / (2 * CROWN)
 
     def solve(self, warm: ContactSolution | None = None, load: float = LOAD) -> ContactSolution:
         """Solve it, with or without a warm start."""
         point = POINT if load == LOAD else replace(POINT, normal_force=load)
-        return self.model.solve(self.gap, ALONG, point, None, warm)
+        return self.model.solve_one(self.gap, ALONG, point, None, warm)
 
 
 def rig_hertz() -> HertzContact:
@@ -80,32 +80,34 @@ def mean_rows(effort: Effort) -> list[Row]:
     return rows
 
 
-def draws(contacts: int) -> OperatingPoints:
-    """Draw load, creepage, yaw, tilt and friction similarly to the paper."""
+def draws(gap: np.ndarray) -> ContactBatch:
+    """Draw load, creepage, yaw, tilt and friction of contacts similarly to the paper."""
+    contacts = len(gap)
     random = np.random.default_rng(0)
     angle, size = 2 * np.pi * random.random(contacts), 2e-3 * np.sqrt(random.random(contacts))
-    return OperatingPoints(
+    return ContactBatch(
+        gap=gap,
+        longitudinal_curvature=np.full(contacts, ALONG),
         normal_force=random.normal(307.0, 32.0, contacts),
         longitudinal=np.abs(random.normal(1e-3, 4e-4, contacts)),
         lateral=size * np.cos(angle),
         spin=size * np.sin(angle) / 0.020,
         friction=np.abs(random.normal(0.1, 0.02, contacts)),
-        rolling_speed=POINT.rolling_speed,
+        rolling_speed=np.full(contacts, POINT.rolling_speed),
     )
 
 
 def batch_rows(effort: Effort) -> list[Row]:
     """Time a batch of 1000 contacts with spin; errors are against the limit of FASTSIM."""
-    points = draws(1000)
     steps = 400 if not effort.quick else 100
 
     def case(elements: int, strips: int, form: str) -> tuple[float, np.ndarray]:
-        model = HertzFastsim(HertzFastsimOptions(mx=elements, closed_form=form))
         grid = Grid.spanning(-1.8e-3, 1.8e-3, strips)
-        model.prepare(grid, (STEEL, STEEL))
-        gap = np.broadcast_to(grid.y**2 / (2 * CROWN), (1, 1, len(points), strips))
-        power = model.solve_batch(gap, ALONG, points).stack("power").ravel()
-        return best(lambda: model.solve_batch(gap, ALONG, points), effort.repetitions), power
+        options = HertzFastsimOptions(mx=elements, closed_form=form)
+        model = HertzFastsim(options, grid, (STEEL, STEEL))
+        contacts = draws(np.broadcast_to(grid.y**2 / (2 * CROWN), (1000, strips)))
+        power = model.solve(contacts).power
+        return best(lambda: model.solve(contacts), effort.repetitions), power
 
     reference = case(steps, steps, "never")[1]
     rows = []

@@ -25,7 +25,7 @@ from wearsim.report.text.units import brief
 from wearsim_bench.contact.accuracy import (
     PowerErrors,
     WornErrors,
-    build_model,
+    choose_model,
     hard_case_errors,
     random_case_errors,
     solved,
@@ -64,7 +64,7 @@ def drawn_table(repetitions: int) -> str:
     """Return the errors of the tangential theories on random and on hard cases."""
     lines = []
     for label, (name, options) in TANGENTIAL.items():
-        model = build_model(name, **options)
+        model = choose_model(name, **options)
         case = elliptic_cases("partial")[0]
         seconds = best_short(lambda model=model, case=case: solved(model, case), repetitions)
         cells = [label]
@@ -97,7 +97,7 @@ def worn_table() -> str:
     for profile in WORN:
         for label, (name, options) in normal_models().items():
             try:
-                cells = _worn_cells(worn_errors(build_model(name, **options), profile))
+                cells = _worn_cells(worn_errors(choose_model(name, **options), profile))
             except WearsimError as error:
                 cells = [FAILED + str(error).split(";", maxsplit=1)[0], *[""] * 6]
             lines.append([profile.replace("_", " "), label, *cells])

@@ -60,7 +60,7 @@ def module(**hooks: Callable[..., object]) -> Callable[[], ModuleType]:
 
 def load_named(name: str) -> Callable[[], list[LoadSpec]]:
     """Return a hook that yields a load of this name."""
-    return lambda: [LoadSpec(name, Options, "a load", factory=lambda options: None)]
+    return lambda: [LoadSpec(name, Options, "a load", factory=lambda options: None, protocol=2)]
 
 
 def rig(

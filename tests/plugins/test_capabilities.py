@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wearsim.contact_batch import OperatingPoints
+from wearsim.contact_batch import ContactBatch
 from wearsim.errors import CapabilityError, ContactError
 from wearsim.plugins import ContactModelSpec, SharedWear, registry
 from wearsim.types import Creepage, Grid, Material, OperatingPoint
@@ -24,19 +24,19 @@ MODELS = {
 
 
 class Case:
-    """Prepared contact model with a contact to solve."""
+    """Contact model with a contact to solve."""
 
     def __init__(self, name: str) -> None:
         model = "slender" if name.startswith("slender") else "hertz-fastsim"
         self.spec = registry().get(ContactModelSpec, model)
-        self.model = self.spec.factory(self.spec.options(**MODELS[name]))
         self.grid = Grid.spanning(-2.5e-3, 2.5e-3, 61)
-        self.model.prepare(self.grid, (STEEL, STEEL))
+        options = self.spec.options(**MODELS[name])
+        self.model = self.spec.factory(options, self.grid, (STEEL, STEEL))
         self.gap = self.grid.y**2 / (2 * 0.5)
         self.solution = self.solve(POINT)
 
     def solve(self, point: OperatingPoint, compliance=None):
-        return self.model.solve(self.gap, CURVATURE, point, compliance)
+        return self.model.solve_one(self.gap, CURVATURE, point, compliance)
 
 
 @pytest.fixture(params=MODELS)
@@ -55,19 +55,19 @@ def test_wear_compliance(case):
             case.solve(POINT, compliance)
         return
     softer = case.solve(POINT, compliance)
-    opened = case.model.solve(case.gap + compliance * softer.line_load, CURVATURE, POINT)
+    opened = case.model.solve_one(case.gap + compliance * softer.line_load, CURVATURE, POINT)
     assert softer.line_load.max() < 0.99 * case.solution.line_load.max()
     assert opened.line_load == pytest.approx(softer.line_load, rel=1e-5, abs=1.0)
 
 
 def test_coupled(case):
-    gap, points = np.array([case.gap, case.gap]), [POINT, POINT]
+    batch = ContactBatch.of(np.array([case.gap, case.gap]), CURVATURE, [POINT, POINT])
     wear = SharedWear(np.zeros((2, 2), dtype=np.int64), np.full((2, 2, case.grid.strips), 5e-13))
     if not case.model.capabilities.coupled:
-        with pytest.raises(CapabilityError, match="one contact at a time"):
-            case.model.solve_coupled(gap, CURVATURE, points, wear)
+        with pytest.raises(CapabilityError, match="contacts that wear common bodies"):
+            case.model.solve(batch, coupling=wear)
         return
-    one, other = case.model.solve_coupled(gap, CURVATURE, points, wear)
+    one, other = case.model.solve(batch, coupling=wear)
     single = case.solve(POINT, 2 * wear.total[0])
     assert one.line_load == pytest.approx(other.line_load, rel=1e-9)
     assert one.line_load == pytest.approx(single.line_load, rel=1e-6, abs=1e-3)
@@ -80,14 +80,14 @@ def test_coupled_sets_equal_single_solutions(case):
     bodies = np.zeros((2, 2), dtype=np.int64)
     wear = SharedWear(bodies, softness * np.ones((3, 2, 2, case.grid.strips)))
     lighter = replace(POINT, normal_force=0.8 * POINT.normal_force)
-    gap, points = np.array([[case.gap, case.gap]] * 3), [POINT, lighter] * 3
-    found = list(case.model.solve_coupled_batch(gap, CURVATURE, points, wear))
-    again = list(case.model.solve_coupled_batch(gap, CURVATURE, points, wear, found))
+    batch = ContactBatch.of(np.array([case.gap] * 6), CURVATURE, [POINT, lighter] * 3)
+    found = case.model.solve(batch, coupling=wear)
+    again = case.model.solve(batch, coupling=wear, warm=found)
     for k in range(3):
-        own = slice(2 * k, 2 * k + 2)
-        single = case.model.solve_coupled(gap[k], CURVATURE, points[own], wear.at(k))
-        warm = case.model.solve_coupled(gap[k], CURVATURE, points[own], wear.at(k), found[own])
-        for one, other in zip([*found[own], *again[own]], [*single, *warm], strict=True):
+        own = np.array([2 * k, 2 * k + 1])
+        single = case.model.solve(batch.at(own), coupling=wear.at(k))
+        warm = case.model.solve(batch.at(own), coupling=wear.at(k), warm=found.at(own))
+        for one, other in zip([*found.at(own), *again.at(own)], [*single, *warm], strict=True):
             assert (one.line_load == other.line_load).all()
             assert one.power == other.power
 
@@ -118,13 +118,14 @@ def test_local_friction(case):
 
 
 def test_friction_field(case):
+    batch = ContactBatch.of(case.gap[None], CURVATURE, [POINT])
     if not case.model.capabilities.friction_field:
-        with pytest.raises(CapabilityError, match="one friction coefficient per strip"):
+        with pytest.raises(CapabilityError, match="from point to point"):
             case.solve(replace(POINT, friction=np.full((50, case.grid.strips), 0.1)))
         with pytest.raises(CapabilityError, match="from point to point"):
-            case.model.friction_points(case.gap, CURVATURE, POINT)
+            case.model.friction_points(batch)
         return
-    x, y = case.model.friction_points(case.gap, CURVATURE, POINT)
+    (x,), y = case.model.friction_points(batch)
     friction = np.where(x > 0.0, 0.05, 0.15) + np.zeros_like(y)
     changed = case.solve(replace(POINT, friction=friction))
     assert changed.power == pytest.approx(case.solution.power, rel=0.2)
@@ -135,21 +136,22 @@ def test_friction_field(case):
 
 def test_batch_equals_single_solutions(case):
     loads = np.array([250.0, 300.0, 320.0])
-    points = OperatingPoints(loads, np.full(3, 1e-3), 3e-4 + 0 * loads, 0.02 + 0 * loads,
-                             np.full(3, 0.1), 2.618)  # fmt: skip
-    gaps = np.broadcast_to(case.gap, (1, 1, 3, case.grid.strips))
-    batch = case.model.solve_batch(gaps, CURVATURE, points)
-    assert batch.stack("y").shape == batch.stack("line_load").shape == gaps.shape
-    for k, found in enumerate(batch.solutions):
+    points = [replace(POINT, normal_force=n, creepage=Creepage(1e-3, 3e-4, 0.02)) for n in loads]
+    contacts = ContactBatch.of(np.array([case.gap] * 3), CURVATURE, points)
+    batch = case.model.solve(contacts)
+    assert batch.line_load.shape == contacts.gap.shape
+    for k, found in enumerate(batch):
         single = case.solve(points[k])
         assert found.dissipation == pytest.approx(single.dissipation, rel=1e-12, abs=1e-12)
-        assert batch.stack("power")[0, 0, k] == found.power == pytest.approx(single.power)
+        assert batch.power[k] == found.power == pytest.approx(single.power)
         assert [type(value) for value in vars(found).values()] == [
             type(value) for value in vars(single).values()
         ]
-    bad = replace(points, normal_force=np.array([300.0, 300.0, 1e7]))
+    bad = replace(contacts, normal_force=np.array([300.0, 300.0, 1e7]))
+    with pytest.raises(ContactError, match=r"^contact 2: "):
+        case.model.solve(bad)
     with pytest.raises(ContactError, match=r"^realisation 2: "):
-        case.model.solve_batch(gaps, CURVATURE, bad)
+        case.model.solve(replace(bad, shape=(1, 1, 3)))
 
 
 def test_pass_loop(case):

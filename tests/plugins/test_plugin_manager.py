@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import sys
 
 import pytest
 from plugin_examples import HOOKS, TABLES, Point, load_named, module, rig
+from typer.testing import CliRunner
 
+from wearsim.cli.app import app
 from wearsim.errors import PluginError, ScenarioError
 from wearsim.plugins import (
     ContactModelSpec,
@@ -36,7 +39,9 @@ def test_built_in_plugins_use_the_same_hooks(install):
 
 def test_every_kind_of_spec_is_registered():
     def of(kind, **more):
-        return lambda: [kind("new", Options, "new", factory=lambda options: None, **more)]
+        return lambda: [
+            kind("new", Options, "new", factory=lambda options: None, protocol=2, **more)
+        ]
 
     kinds = dict(
         zip(HOOKS, (ContactModelSpec, WearLawSpec, LoadSpec, RandomInputSpec), strict=True)
@@ -65,7 +70,7 @@ def test_plugin_with_a_built_in_name_is_an_error(install):
 
 
 def test_different_kinds_may_have_the_same_name():
-    law = [WearLawSpec("ramp", Options, "a law", factory=lambda options: None)]
+    law = [WearLawSpec("ramp", Options, "a law", factory=lambda options: None, protocol=2)]
     loader = module(wearsim_loads=load_named("ramp"), wearsim_wear_laws=lambda: law)
     assert len(Registry([Point(loader)]).all()) == 2
 
@@ -129,3 +134,51 @@ def test_failed_plugin_does_not_affect_other_scenarios(install):
 def test_nearest_name_is_suggested():
     with pytest.raises(PluginError, match="did you mean 'slender'"):
         registry().get(ContactModelSpec, "slendre")
+
+
+@pytest.mark.parametrize(
+    ("given", "protocol", "remedy"),
+    [({}, 1, "a newer version of the plugin"), ({"protocol": 3}, 3, "a newer wearsim")],
+)
+def test_spec_of_another_protocol_is_listed_and_refused_when_selected(
+    install, given, protocol, remedy
+):
+    def old():
+        return [ContactModelSpec("old", Options, "old", factory=lambda options: None, **given)]
+
+    install(Point(module(wearsim_contact_models=old), "old", "old-dist", "9"))
+    assert "old" not in registry().names(ContactModelSpec)
+    (item,) = [item for item in registry().all() if item.spec.name == "old"]
+    assert item.refusal
+    assert rig(**TABLES).contact.model == "slender"
+    with pytest.raises(ScenarioError, match=r"\[contact\] model: contact model 'old'") as caught:
+        rig(contact='model = "old"')
+    for part in ("old-dist 9", f"protocol {protocol}", "has 2", remedy, "docs/plugins.md"):
+        assert part in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("hook", "spec"),
+    [
+        ("wearsim_wear_laws", WearLawSpec),
+        ("wearsim_loads", LoadSpec),
+        ("wearsim_random_inputs", RandomInputSpec),
+    ],
+)
+def test_every_kind_of_spec_has_a_protocol(hook, spec):
+    made = [spec("old", Options, "old", factory=lambda options: None)]
+    plugins = Registry([Point(module(**{hook: lambda: made}))])
+    with pytest.raises(PluginError, match=r"plugin protocol 1, and this wearsim has 2"):
+        plugins.get(spec, "old")
+
+
+def test_refused_plugins_are_listed_by_the_command(install):
+    old = [LoadSpec("old", Options, "a load", factory=lambda options: None)]
+    install(Point(module(wearsim_loads=lambda: old), "old", "old-dist", "9"))
+    shown = CliRunner().invoke(app, ["plugins"])
+    assert shown.exit_code == 0
+    assert "refused: load 'old' of old-dist 9" in shown.stderr
+    entries = json.loads(CliRunner().invoke(app, ["plugins", "--json"]).stdout)["plugins"]
+    refused = [entry["name"] for entry in entries if entry["refused"]]
+    assert refused == ["old"]
+    assert {entry["protocol"] for entry in entries if not entry["refused"]} == {2}

@@ -6,7 +6,7 @@ import pytest
 
 from wearsim.errors import ContactError
 from wearsim_bench.contact.accuracy import (
-    build_model,
+    choose_model,
     hard_case_errors,
     random_case_errors,
     worn_errors,
@@ -27,12 +27,12 @@ DRAWN = {
 
 @cache
 def on_profile(name, profile, **options):
-    return worn_errors(build_model(name, **options), profile)
+    return worn_errors(choose_model(name, **options), profile)
 
 
 @pytest.mark.parametrize(("model", "tangential", "kind"), DRAWN)
 def test_power_of_random_contacts_matches_exact_theory(model, tangential, kind):
-    found = random_case_errors(build_model(model, tangential=tangential), kind)
+    found = random_case_errors(choose_model(model, tangential=tangential), kind)
     rms, worst, strips = DRAWN[model, tangential, kind]
     assert found.rms < rms
     assert found.worst < worst
@@ -41,7 +41,7 @@ def test_power_of_random_contacts_matches_exact_theory(model, tangential, kind):
 
 @pytest.mark.parametrize(("tangential", "rms"), [("strip", 5e-3), ("fastrip", 5e-3)])
 def test_power_of_long_hard_cases_matches_exact_theory(tangential, rms):
-    assert hard_case_errors(build_model("hertz", tangential=tangential), 3.0).rms < rms
+    assert hard_case_errors(choose_model("hertz", tangential=tangential), 3.0).rms < rms
 
 
 @pytest.mark.parametrize("profile", WORN)

@@ -150,13 +150,21 @@ def _plugins() -> ModuleType:
 
     @hookimpl
     def wearsim_random_inputs():
-        yield RandomInputSpec("flat", FlatOptions, "even", factory=Flat)
-        yield RandomInputSpec("bell", BellOptions, "normal", factory=Bell)
-        yield RandomInputSpec("logged", LogOptions, "samples", factory=Logged)
-        yield RandomInputSpec("square", SquareOptions, "both", factory=Square, role="joint")
-        yield RandomInputSpec("pair", SquareOptions, "others", factory=Pair, role="joint")
-        yield RandomInputSpec("patches", PatchesOptions, "field", factory=Patches, role="field")
-        yield RandomInputSpec("wander", WanderOptions, "process", factory=Wander, role="process")
+        yield RandomInputSpec("flat", FlatOptions, "even", factory=Flat, protocol=2)
+        yield RandomInputSpec("bell", BellOptions, "normal", factory=Bell, protocol=2)
+        yield RandomInputSpec("logged", LogOptions, "samples", factory=Logged, protocol=2)
+        yield RandomInputSpec(
+            "square", SquareOptions, "both", factory=Square, role="joint", protocol=2
+        )
+        yield RandomInputSpec(
+            "pair", SquareOptions, "others", factory=Pair, role="joint", protocol=2
+        )
+        yield RandomInputSpec(
+            "patches", PatchesOptions, "field", factory=Patches, role="field", protocol=2
+        )
+        yield RandomInputSpec(
+            "wander", WanderOptions, "process", factory=Wander, role="process", protocol=2
+        )
 
     module.wearsim_random_inputs = wearsim_random_inputs
     return module

@@ -123,7 +123,7 @@ class ArchardOptions(Options):
     roller: Factor = Field(description="The roller.")
 
 
-def _build(options: Options) -> tuple[str, Options]:
+def _build(options: Options, *others: object) -> tuple[str, Options]:
     return ("built", options)
 
 
@@ -132,19 +132,25 @@ def _plugins() -> ModuleType:
 
     @hookimpl
     def wearsim_contact_models():
-        yield ContactModelSpec("slender", SlenderOptions, "strips", factory=_build)
-        yield ContactModelSpec("hertz-fastsim", FastsimOptions, "ellipse", factory=_build)
+        yield ContactModelSpec("slender", SlenderOptions, "strips", factory=_build, protocol=2)
+        yield ContactModelSpec(
+            "hertz-fastsim", FastsimOptions, "ellipse", factory=_build, protocol=2
+        )
 
     @hookimpl
     def wearsim_wear_laws():
-        yield WearLawSpec("archard-dissipation", ArchardOptions, "Archard", factory=_build)
+        yield WearLawSpec(
+            "archard-dissipation", ArchardOptions, "Archard", factory=_build, protocol=2
+        )
 
     @hookimpl
     def wearsim_loads():
-        yield LoadSpec("constant", ConstantOptions, "constant", factory=_build)
-        yield LoadSpec("spring", SpringOptions, "spring", factory=_build)
-        yield LoadSpec("recorded", RecordedOptions, "log", factory=_build)
-        yield LoadSpec("thermal", ThermalOptions, "thermal", factory=_build, role="term")
+        yield LoadSpec("constant", ConstantOptions, "constant", factory=_build, protocol=2)
+        yield LoadSpec("spring", SpringOptions, "spring", factory=_build, protocol=2)
+        yield LoadSpec("recorded", RecordedOptions, "log", factory=_build, protocol=2)
+        yield LoadSpec(
+            "thermal", ThermalOptions, "thermal", factory=_build, role="term", protocol=2
+        )
 
     module.wearsim_contact_models = wearsim_contact_models
     module.wearsim_wear_laws = wearsim_wear_laws

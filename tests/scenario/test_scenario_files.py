@@ -10,6 +10,7 @@ import pytest
 
 from wearsim.csv_tables import read_columns
 from wearsim.scenario import Scenario, load_scenario, require_run
+from wearsim.types import Grid
 
 FOLDER = Path(__file__).parents[2] / "scenarios"
 
@@ -22,7 +23,8 @@ def _load(name: str) -> Scenario:
 def test_shipped_scenario_loads_and_builds_its_plugins(path: Path) -> None:
     scenario = load_scenario(path)
     assert tomllib.loads(scenario.text)["title"] == scenario.title
-    scenario.contact.build()
+    materials = scenario.cylinder.material, scenario.roller.material
+    scenario.contact.build(Grid.spanning(-1e-3, 1e-3, 11), materials)
     scenario.load.build()
     for term in scenario.load.terms:
         term.build()

@@ -103,7 +103,7 @@ def test_terms_are_added_to_a_load(parse: Parse) -> None:
 
 def test_plugins_are_built_with_their_options(parse: Parse) -> None:
     scenario = parse(('model = "slender"', 'model = "hertz-fastsim"\nmx = 7\nstrips = 41'))
-    assert scenario.contact.build() == ("built", scenario.contact.options)
+    assert scenario.contact.build(None, ()) == ("built", scenario.contact.options)
     assert scenario.wear.build() == ("built", scenario.wear.options)
     assert (scenario.contact.options.mx, scenario.contact.strips) == (7, 41)
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
 
 from wearsim.errors import ContactError
-from wearsim.models.contact.hertz_fastsim import HertzFastsim
+from wearsim.models.contact.hertz_fastsim import HertzFastsim, HertzFastsimOptions
 from wearsim.models.contact.slender import Slender
+from wearsim.models.contact.strip_model import grid_about_hertz
 from wearsim.models.tangential.strip_theory import StripTheory
 from wearsim.plugins import ContactModelSpec, Options
 from wearsim.types import Creepage, Grid, OperatingPoint
@@ -19,16 +21,23 @@ CREEPAGE = Creepage(1e-3)
 class Unmodified(Slender):
     """Base class of all mutants but two."""
 
-    def __init__(self):
-        super().__init__(StripTheory())
+    def __init__(self, grid, materials):
+        super().__init__(StripTheory(), grid, materials)
+
+
+class UnmodifiedFastsim(HertzFastsim):
+    """Base class of the mutants with a friction field."""
+
+    def __init__(self, grid, materials):
+        super().__init__(HertzFastsimOptions(), grid, materials)
 
 
 def after(change):
     """Return a model whose solutions are changed by `change(solution, gap)`, a dict of fields."""
 
     class ChangedSolution(Unmodified):
-        def solve(self, gap, curvature, point, wear_compliance=None, warm=None):
-            solution = super().solve(gap, curvature, point, wear_compliance, warm)
+        def solve_one(self, gap, curvature, point, wear_compliance=None, warm=None):
+            solution = super().solve_one(gap, curvature, point, wear_compliance, warm)
             return replace(solution, **change(solution, gap))
 
     return ChangedSolution
@@ -38,9 +47,9 @@ def before(change):
     """Return a model that solves other inputs: `change(gap, point, compliance)`."""
 
     class ChangedInput(Unmodified):
-        def solve(self, gap, curvature, point, wear_compliance=None, warm=None):
+        def solve_one(self, gap, curvature, point, wear_compliance=None, warm=None):
             gap, point, wear_compliance = change(gap, point, wear_compliance)
-            return super().solve(gap, curvature, point, wear_compliance, warm)
+            return super().solve_one(gap, curvature, point, wear_compliance, warm)
 
     return ChangedInput
 
@@ -51,6 +60,11 @@ def without(capability, model=Unmodified):
     class Unclaimed(model):
         capabilities = replace(model.capabilities, **{capability: False})
 
+        def solve(self, *args, **kwargs):
+            able = copy(self)
+            able.capabilities = model.capabilities
+            return model.solve(able, *args, **kwargs)
+
     return Unclaimed
 
 
@@ -59,21 +73,21 @@ class Drifting(Unmodified):
 
     calls = 0
 
-    def solve(self, *args, **kwargs):
+    def solve_one(self, *args, **kwargs):
         self.calls += 1
-        solution = super().solve(*args, **kwargs)
+        solution = super().solve_one(*args, **kwargs)
         return replace(solution, approach=solution.approach * (1.0 + 1e-14 * self.calls))
 
 
 class Buffered(Unmodified):
     """Returns arrays that later calls overwrite."""
 
-    def prepare(self, grid, materials):
-        super().prepare(grid, materials)
+    def __init__(self, grid, materials):
+        super().__init__(grid, materials)
         self.load = np.zeros(grid.strips)
 
-    def solve(self, *args, **kwargs):
-        solution = super().solve(*args, **kwargs)
+    def solve_one(self, *args, **kwargs):
+        solution = super().solve_one(*args, **kwargs)
         self.load[:] = solution.line_load
         return replace(solution, line_load=self.load)
 
@@ -81,16 +95,16 @@ class Buffered(Unmodified):
 class ChangesInput(Unmodified):
     """Changes the gap in place."""
 
-    def solve(self, gap, *args, **kwargs):
+    def solve_one(self, gap, *args, **kwargs):
         gap += 1e-9
-        return super().solve(gap, *args, **kwargs)
+        return super().solve_one(gap, *args, **kwargs)
 
 
 class DependsOnWarmStart(Unmodified):
     """Mixes the warm start into the solution."""
 
-    def solve(self, gap, curvature, point, wear_compliance=None, warm=None):
-        solution = super().solve(gap, curvature, point, wear_compliance, warm)
+    def solve_one(self, gap, curvature, point, wear_compliance=None, warm=None):
+        solution = super().solve_one(gap, curvature, point, wear_compliance, warm)
         if warm is None:
             return solution
         return replace(solution, line_load=0.99 * solution.line_load + 0.01 * warm.line_load)
@@ -99,19 +113,21 @@ class DependsOnWarmStart(Unmodified):
 class HidesErrors(Unmodified):
     """Returns the solution of another contact instead of an error."""
 
-    def solve(self, gap, curvature, point, *args, **kwargs):
+    def solve_one(self, gap, curvature, point, *args, **kwargs):
         try:
-            return super().solve(gap, curvature, point, *args, **kwargs)
+            return super().solve_one(gap, curvature, point, *args, **kwargs)
         except ContactError:
-            return super().solve(self._grid.y**2, 90.0, OperatingPoint(300.0, 1.0, CREEPAGE, 0.1))
+            return super().solve_one(
+                self._grid.y**2, 90.0, OperatingPoint(300.0, 1.0, CREEPAGE, 0.1)
+            )
 
 
 class WrongError(Unmodified):
     """Raises ZeroDivisionError for a zero load."""
 
-    def solve(self, gap, curvature, point, *args, **kwargs):
+    def solve_one(self, gap, curvature, point, *args, **kwargs):
         1.0 / point.normal_force
-        return super().solve(gap, curvature, point, *args, **kwargs)
+        return super().solve_one(gap, curvature, point, *args, **kwargs)
 
 
 class Truncating(Unmodified):
@@ -124,20 +140,27 @@ class Truncating(Unmodified):
 
 
 class WrongBatch(Unmodified):
-    """Returns a slightly different power in batches."""
+    """Returns a slightly different power in batches of several contacts."""
 
-    def solve_batch(self, *args, **kwargs):
-        solution = super().solve_batch(*args, **kwargs)
-        columns = dict(solution.columns) | {"power": 1.001 * solution.columns["power"]}
-        return replace(solution, columns=columns)
+    def solve(self, batch, *args, **kwargs):
+        solution = super().solve(batch, *args, **kwargs)
+        return replace(solution, power=1.001 * solution.power) if len(batch) > 1 else solution
+
+
+class IgnoresCurvatures(Unmodified):
+    """Solves all contacts of a batch with the curvature of the first."""
+
+    def solve(self, batch, *args, **kwargs):
+        same = np.full(len(batch), batch.longitudinal_curvature[0])
+        return super().solve(replace(batch, longitudinal_curvature=same), *args, **kwargs)
 
 
 class UnnamedBatchError(Unmodified):
     """Does not name the failed contact of a batch."""
 
-    def solve_batch(self, *args, **kwargs):
+    def solve(self, *args, **kwargs):
         try:
-            return super().solve_batch(*args, **kwargs)
+            return super().solve(*args, **kwargs)
         except ContactError as error:
             raise ContactError("a contact failed") from error
 
@@ -145,17 +168,16 @@ class UnnamedBatchError(Unmodified):
 class NarrowGrid(Unmodified):
     """Suggests strips narrower than the contact."""
 
-    def suggest_grid(self, *args):
+    @staticmethod
+    def suggest_grid(*args):
         return Grid.spanning(-1e-4, 1e-4, 31)
 
 
 class Uncoupled(Unmodified):
     """Claims coupled contacts and solves them separately."""
 
-    def solve_coupled(self, gap, curvature, points, wear, warm=None):
-        if len(points) == 1:
-            return super().solve_coupled(gap, curvature, points, wear, warm)
-        return [self.solve(gap[k], curvature, point) for k, point in enumerate(points)]
+    def solve(self, batch, wear_compliance=None, coupling=None, warm=None):
+        return super().solve(batch, wear_compliance, None, warm)
 
 
 class LosesEnergy(Unmodified):
@@ -190,12 +212,12 @@ class ReversedTraction(Unmodified):
         return replace(solution, traction_y=-solution.traction_y)
 
 
-class AveragesFriction(HertzFastsim):
+class AveragesFriction(UnmodifiedFastsim):
     """Claims a friction field and uses its mean."""
 
-    def solve(self, gap, curvature, point, wear_compliance=None, warm=None):
+    def solve_one(self, gap, curvature, point, wear_compliance=None, warm=None):
         point = replace(point, friction=float(np.mean(point.friction)))
-        return super().solve(gap, curvature, point, wear_compliance, warm)
+        return super().solve_one(gap, curvature, point, wear_compliance, warm)
 
 
 def _without_variation(gap, point, compliance):
@@ -274,7 +296,7 @@ MUTANTS = {
     "result-independent-of-warm-start": [DependsOnWarmStart],
     "invalid-input-raises-contact-error": [HidesErrors, WrongError],
     "contact-wider-than-strips-raises": [Truncating],
-    "batch-equals-single-solves": [WrongBatch],
+    "batch-equals-single-solves": [WrongBatch, IgnoresCurvatures],
     "batch-error-names-contact": [UnnamedBatchError],
     "suggested-grid-holds-contact": [NarrowGrid],
     "wear-compliance": [
@@ -288,7 +310,7 @@ MUTANTS = {
         before(lambda gap, point, c: (gap, replace(point, bearing_torque=None), c)),
     ],
     "local-friction": [without("local_friction"), before(_mean_friction)],
-    "friction-field": [without("friction_field", HertzFastsim), AveragesFriction],
+    "friction-field": [without("friction_field", UnmodifiedFastsim), AveragesFriction],
     "fields": [
         without("fields"),
         WeakTraction,
@@ -301,12 +323,13 @@ MUTANTS = {
 
 def spec_of(model, **changes):
     """Return the spec of a mutant, with the capabilities of the model."""
-    capabilities = model().capabilities
     fields = {
         "name": "mutant",
         "options": Options,
         "summary": "a model that violates a requirement",
+        "factory": lambda options, grid, materials: model(grid, materials),
+        "capabilities": model.capabilities,
+        "suggest_grid": getattr(model, "suggest_grid", grid_about_hertz),
+        "protocol": 2,
     }
-    return ContactModelSpec(
-        **(fields | {"factory": lambda options: model(), "capabilities": capabilities} | changes)
-    )
+    return ContactModelSpec(**(fields | changes))

@@ -41,6 +41,7 @@ def test_violations_are_reported(name, model):
         ("spec-is-complete", {"name": "My Model"}),
         ("spec-is-complete", {"summary": " "}),
         ("spec-is-complete", {"references": "a paper"}),
+        ("spec-is-complete", {"protocol": 1}),
         ("options-reject-unknown-keys", {"options": type("Loose", (Options,), {
             "model_config": {"extra": "ignore"}, "__module__": __name__})}),
         ("spec-and-model-capabilities-agree", {"capabilities": Capabilities()}),

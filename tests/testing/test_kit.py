@@ -26,7 +26,7 @@ class Heavy(Load):
         return 301.0
 
 
-SPEC = LoadSpec("heavy", Options, "a load with a wrong mean", factory=lambda o: Heavy())
+SPEC = LoadSpec("heavy", Options, "a load with a wrong mean", factory=lambda o: Heavy(), protocol=2)
 test_heavy = load_tests(SPEC, without={"extremes-bound-force": "sampled only"})
 """
 

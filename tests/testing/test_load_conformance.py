@@ -123,7 +123,12 @@ CASES = [
 
 def fixture(load_class, role):
     spec = LoadSpec(
-        "mutant", Options, "violates a requirement", factory=lambda o: load_class(), role=role
+        "mutant",
+        Options,
+        "violates a requirement",
+        factory=lambda o: load_class(),
+        role=role,
+        protocol=2,
     )
     return LoadFixture(ConfiguredSpec(spec))
 

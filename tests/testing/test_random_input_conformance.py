@@ -78,7 +78,7 @@ def uniform():
 
 def fixture(input_class, role="scalar", **changes):
     spec = {"name": "mutant", "options": Options, "summary": "violates a requirement"} | changes
-    spec = RandomInputSpec(factory=lambda options: input_class(), role=role, **spec)
+    spec = RandomInputSpec(factory=lambda options: input_class(), role=role, protocol=2, **spec)
     return RandomInputFixture(ConfiguredSpec(spec))
 
 

@@ -87,7 +87,7 @@ CASES = [
 
 def fixture(law_class):
     spec = WearLawSpec(
-        "mutant", Options, "violates a requirement", factory=lambda options: law_class()
+        "mutant", Options, "violates a requirement", factory=lambda options: law_class(), protocol=2
     )
     return WearLawFixture(ConfiguredSpec(spec))
 

@@ -24,7 +24,7 @@ class HookSpecs:
     def wearsim_contact_models(self) -> Iterable[ContactModelSpec]:  # type: ignore[empty-body]
         """Yield contact models, selected in a scenario by ``contact.model``.
 
-        The requirements are documented in `ContactModel` and tested by
+        The requirements are documented in `ContactModel` and `SingleContactModel` and tested by
         `wearsim.testing.contact_model_tests`; ``wearsim new plugin NAME`` writes a complete one.
 
         Returns
@@ -47,9 +47,10 @@ class HookSpecs:
             def wearsim_contact_models():
                 yield ContactModelSpec(
                     name="foundation",
-                    factory=lambda options: Foundation(options.foundation_modulus),
+                    factory=Foundation,  # called with options, grid and materials
                     options=FoundationOptions,
                     summary="elastic foundation",
+                    protocol=2,
                 )
         """
 
@@ -90,6 +91,7 @@ class HookSpecs:
                     factory=Constant,
                     options=PerPass,
                     summary="the same depth in every pass",
+                    protocol=2,
                 )
         """
 
@@ -134,7 +136,11 @@ class HookSpecs:
             @hookimpl
             def wearsim_loads():
                 yield LoadSpec(
-                    name="ramp", factory=Ramp, options=RampOptions, summary="a rising load"
+                    name="ramp",
+                    factory=Ramp,
+                    options=RampOptions,
+                    summary="a rising load",
+                    protocol=2,
                 )
         """
 
@@ -178,5 +184,6 @@ class HookSpecs:
                     factory=Flat,
                     options=Bounds,
                     summary="uniform between two bounds",
+                    protocol=2,
                 )
         """

@@ -7,7 +7,7 @@ from dataclasses import asdict, replace
 
 import numpy as np
 
-from wearsim.contact_batch import BatchSolution, OperatingPoints
+from wearsim.contact_batch import ContactBatch, ContactBatchSolution
 from wearsim.errors import ContactError
 from wearsim.testing.checks import Checks, ConformanceError, agree, require
 from wearsim.testing.contact_fixtures import NUMBERS, STRIPS, ContactFixture
@@ -15,7 +15,6 @@ from wearsim.types import ContactSolution, Creepage, FloatArray, Grid
 
 BEHAVIOUR: Checks[ContactFixture] = Checks()
 _SOLVE = "wearsim.plugins.ContactModel.solve"
-_BATCH = "wearsim.plugins.ContactModel.solve_batch"
 
 
 def _require_identical(one: ContactSolution, other: ContactSolution, message: str) -> None:
@@ -30,14 +29,14 @@ def repeated_solves_identical(fixture: ContactFixture) -> None:
     """The same contact has the same solution bit for bit, by the same model or a new one."""
     point, curvature = fixture.point(Creepage(3e-4, 4e-4, 0.3)), fixture.case.curvature
     model = fixture.fresh()
-    first = model.solve(fixture.gap, curvature, point)
+    first = model.solve_one(fixture.gap, curvature, point)
     copy = ContactSolution(**asdict(first))
     for gap in fixture.gaps.values():  # other solves in between
-        model.solve(gap, curvature, fixture.point())
+        model.solve_one(gap, curvature, fixture.point())
     _require_identical(first, copy, "later calls change these fields of an earlier solution:")
-    repeated = model.solve(fixture.gap, curvature, point)
+    repeated = model.solve_one(fixture.gap, curvature, point)
     _require_identical(first, repeated, "a second solve by the same model differs in")
-    repeated = fixture.fresh().solve(fixture.gap, curvature, point)
+    repeated = fixture.fresh().solve_one(fixture.gap, curvature, point)
     _require_identical(first, repeated, "the solution of a new model differs in")
 
 
@@ -130,72 +129,75 @@ def contact_wider_than_strips_raises(fixture: ContactFixture) -> None:
     model, case = fixture.fresh(grid), fixture.case
     _require_contact_error(
         f"strips over {1e3 * half:.3g} mm of a contact twice as wide",
-        lambda: model.solve(case.gap(grid), case.curvature, fixture.point()),
+        lambda: model.solve_one(case.gap(grid), case.curvature, fixture.point()),
     )
 
 
-def _operating_points(fixture: ContactFixture) -> OperatingPoints:
-    ones = np.ones(4)
-    return OperatingPoints(
-        normal_force=fixture.case.normal_force * np.array([0.8, 0.9, 1.0, 1.1]),
-        longitudinal=5e-4 * ones,
-        lateral=np.array([0.0, 1e-4, 2e-4, 3e-4]),
-        spin=0.05 * ones,
-        friction=fixture.case.friction * ones,
-        rolling_speed=fixture.case.rolling_speed,
+def _contacts(fixture: ContactFixture, loads: FloatArray) -> ContactBatch:
+    """Return contacts of these loads that differ in gap, curvature, velocity and creepage."""
+    points = [
+        fixture.point(Creepage(5e-4, 1e-4 * k, 0.05), normal_force=float(load))
+        for k, load in enumerate(loads)
+    ]
+    gaps = fixture.gaps["fresh"], fixture.gaps["worn"]
+    factor: FloatArray = np.linspace(1.0, 1.3, len(loads))
+    return replace(
+        fixture.batch(points, [gaps[k % 2] for k in range(len(loads))]),
+        longitudinal_curvature=fixture.case.curvature * factor,
+        rolling_speed=fixture.case.rolling_speed / factor,
     )
 
 
-@BEHAVIOUR.specified_in(_BATCH)
+@BEHAVIOUR.specified_in(_SOLVE)
 def batch_equals_single_solves(fixture: ContactFixture) -> None:
-    """A batch equals single solves, for operating points in columns or in a list."""
-    case, strips, columns = fixture.case, fixture.grid.strips, _operating_points(fixture)
-    gaps = np.array([fixture.gaps["fresh"], fixture.gaps["worn"]]).reshape(1, 2, 1, strips)
-    gaps = np.broadcast_to(gaps, (1, 2, 2, strips))  # the second axis from last has stride 0
-    singles = [fixture.solve(columns[k], gaps[0, k // 2, k % 2].copy()) for k in range(4)]
+    """A batch of contacts of different curvature and velocity equals single solves."""
+    case = fixture.case
+    batch = _contacts(fixture, case.normal_force * np.array([0.8, 0.9, 1.0, 1.1]))
+    solutions = fixture.model.solve(batch)
+    require(
+        isinstance(solutions, ContactBatchSolution), f"solve returns {type(solutions).__name__}"
+    )
+    require(len(solutions) == len(batch), f"solve returns {len(solutions)} of 4 solutions")
     size = case.friction * case.normal_force * case.width
-    for form, points in (("columns", columns), ("a list", list(columns))):
-        batch = fixture.model.solve_batch(gaps, case.curvature, points)
-        require(isinstance(batch, BatchSolution), f"solve_batch returns {type(batch).__name__}")
-        require(batch.shape == (1, 2, 2), f"the batch has the shape {batch.shape}, not (1, 2, 2)")
-        for k, (solution, single) in enumerate(zip(batch.solutions, singles, strict=True)):
-            for name in (*STRIPS, *NUMBERS):
-                agree(
-                    f"{name} of contact {k} in a batch given as {form}",
-                    getattr(solution, name),
-                    getattr(single, name),
-                    1e-9,
-                    1e-6 * size if name in {"spin_moment", "force_y"} else 0.0,
-                )
+    for k, solution in enumerate(solutions):
+        single = fixture.model.solve_one(
+            batch.gap[k], float(batch.longitudinal_curvature[k]), batch.point(k)
+        )
+        for name in (*STRIPS, *NUMBERS):
+            agree(
+                f"{name} of contact {k} in a batch",
+                getattr(solution, name),
+                getattr(single, name),
+                1e-9,
+                1e-6 * size if name in {"spin_moment", "force_y"} else 0.0,
+            )
 
 
-@BEHAVIOUR.specified_in(_BATCH)
+@BEHAVIOUR.specified_in(_SOLVE)
 def batch_error_names_contact(fixture: ContactFixture) -> None:
     """The error of a batch names the failed contact, in its message and in its state."""
-    points = _operating_points(fixture)
-    points = replace(points, normal_force=np.where(np.arange(4) == 2, -1.0, points.normal_force))
-    gaps = np.broadcast_to(fixture.gap, (1, 1, 4, fixture.grid.strips))
+    batch = _contacts(fixture, fixture.case.normal_force * np.array([1.0, 1.0, -1.0]))
     error = _require_contact_error(
-        "a batch whose third load is -1 N",
-        lambda: fixture.model.solve_batch(gaps, fixture.case.curvature, points).solutions[0],
+        "a batch whose third load is negative", lambda: fixture.model.solve(batch)[0]
     )
     require(
-        error.state.get("contact") == [0, 0, 2] and "realisation 2" in str(error),
+        error.state.get("contact") == [2] and "contact 2" in str(error),
         f"the error of a batch names no contact: {error}",
     )
 
 
-@BEHAVIOUR.specified_in("wearsim.plugins.ContactModel.suggest_grid")
+@BEHAVIOUR.specified_in("wearsim.plugins.ContactModelSpec")
 def suggested_grid_holds_contact(fixture: ContactFixture) -> None:
     """The suggested strips are equally wide and contain the contact."""
-    case = fixture.case
-    grid = fixture.model.suggest_grid(
-        1.0 / case.crown_radius, case.curvature, case.normal_force, case.materials
-    )
+    case, suggest = fixture.case, fixture.configured.spec.suggest_grid
+    if suggest is None:
+        return
+    problem = 1.0 / case.crown_radius, case.curvature, case.normal_force, case.materials
+    grid = suggest(fixture.configured.options, *problem)
     if grid is None:
         return
     equal = np.full(grid.strips - 1, grid.spacing)
     agree("the spacing of the suggested strips", np.diff(grid.y), equal, 1e-9)
-    solution = fixture.fresh(grid).solve(case.gap(grid), case.curvature, fixture.point())
+    solution = fixture.fresh(grid).solve_one(case.gap(grid), case.curvature, fixture.point())
     carried = float(solution.line_load.sum()) * grid.spacing
     agree("load of the suggested strips", carried, case.normal_force, case.tolerance)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -87,19 +87,15 @@ def wear_compliance(fixture: ContactFixture) -> None:
 @CAPABILITIES.specified_in(_CAPABILITIES)
 def coupled(fixture: ContactFixture) -> None:
     """Contacts coupled by the wear of a shared body each solve the gap that all of them open."""
-    gap = np.array([fixture.gaps["fresh"], fixture.gaps["off centre"]])
     load = fixture.case.normal_force
     points = [fixture.point(), fixture.point(Creepage(5e-4, 2e-4), normal_force=0.8 * load)]
     own = 0.25 * _uneven_compliance(fixture)
     wear = SharedWear(np.array([[0, 0], [0, 1]]), np.array([[own, own], [own, 0.0 * own]]))
-
-    def solve() -> Sequence[ContactSolution]:
-        return fixture.model.solve_coupled(gap, fixture.case.curvature, points, wear)
-
-    if _is_refused(fixture, "coupled", solve):
+    batch = fixture.batch(points, [fixture.gaps["fresh"], fixture.gaps["off centre"]])
+    if _is_refused(fixture, "coupled", lambda: fixture.model.solve(batch, coupling=wear)):
         return
-    solutions = solve()
-    opened = gap + wear.opening(np.array([item.line_load for item in solutions]))
+    solutions = fixture.model.solve(batch, coupling=wear)
+    opened = batch.gap + wear.opening(solutions.line_load)
     for k, (point, solution) in enumerate(zip(points, solutions, strict=True)):
         single = fixture.solve(point, opened[k])
         how = f"of contact {k}, solved separately on the worn gap, compared with the coupled one,"
@@ -195,22 +191,25 @@ def local_friction(fixture: ContactFixture) -> None:
 @CAPABILITIES.specified_in("wearsim.plugins.ContactModel.friction_points")
 def friction_field(fixture: ContactFixture) -> None:
     """Friction points are inside the contact; sliding points dissipate by their local friction."""
-    mu, curvature, model = fixture.case.friction, fixture.case.curvature, fixture.model
+    mu = fixture.case.friction
     uniform = np.full((7, fixture.grid.strips), mu)
 
     def points() -> tuple[FloatArray, FloatArray]:
-        return model.friction_points(fixture.gap, curvature, fixture.point())
+        gaps = [fixture.gap, fixture.gaps["worn"]]
+        return fixture.model.friction_points(fixture.batch([fixture.point()] * 2, gaps))
 
     if _is_refused(
         fixture, "friction_field", lambda: fixture.solve(fixture.point(friction=uniform))
     ):
         _is_refused(fixture, "friction_field", points)
         return
-    x, y = points()
-    agree("y of the friction points", y, fixture.grid.y, 0.0)
+    found, y = points()
     require(
-        x.ndim == 2 and x.shape[1] == len(y), f"x has the shape {x.shape}, not (points, strips)"
+        found.ndim == 3 and found.shape[::2] == (2, len(y)),
+        f"x has the shape {found.shape}, not (contacts, points, strips)",
     )
+    x = found[0]
+    agree("y of the friction points", y, fixture.grid.y, 0.0)
     require((np.diff(x, axis=0) <= 0.0).all(), "x does not decrease from the leading edge")
     require(not x[:, fixture.solution.half_length == 0.0].any(), "x is not 0 outside the contact")
     even = np.full(x.shape, mu)
@@ -228,8 +227,6 @@ def friction_field(fixture: ContactFixture) -> None:
         fixture.solve(fixture.point(Creepage(2e-2))).dissipation * friction[0] / mu,
         0.03,
     )
-    batch, _ = model.friction_points_batch(fixture.gap[None], curvature, [fixture.point()])
-    agree("friction_points_batch of one contact", batch, x[None], 1e-12)
 
 
 @CAPABILITIES.specified_in("wearsim.plugins.ContactModel.fields")
@@ -284,8 +281,8 @@ def _pass_loop(fixture: ContactFixture) -> PassLoop:
         stiffness=0.1 * case.normal_force / overlap,
         nominal_gap=np.array([fixture.gaps["fresh"], fixture.gaps["off centre"]]),
         from_apex=np.array([y, y - 0.05 * case.width]),
-        longitudinal_curvature=case.curvature,
-        rolling_speed=case.rolling_speed,
+        longitudinal_curvature=case.curvature * np.array([1.0, 1.1]),
+        rolling_speed=case.rolling_speed * np.array([1.0, 0.9]),
         slip_base=np.zeros(shape),
         spin_arm=np.array([y, y]),
         slip_rates=np.zeros(2),
@@ -318,8 +315,9 @@ def _run_single_solves(fixture: ContactFixture, loop: PassLoop) -> None:
             normal_force=load,
             friction=float(loop.friction[p]),
         )
-        solution = fixture.solve(point, gap)
-        energy_per_area = solution.dissipation / loop.rolling_speed
+        point = replace(point, rolling_speed=float(loop.rolling_speed[g]))
+        solution = fixture.model.solve_one(gap, float(loop.longitudinal_curvature[g]), point)
+        energy_per_area = solution.dissipation / point.rolling_speed
         loop.cylinder_depth += loop.wear[0] * energy_per_area
         loop.roller_depth[g] += loop.wear[1 + g] * energy_per_area
         gain, rate = loop.term_rates[:, 0], loop.term_rates[:, 1 + g]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from wearsim.contact_batch import ContactBatch
 from wearsim.plugins import Capabilities, ContactModel, ContactModelSpec
 from wearsim.testing.specs import Fixture
 from wearsim.types import (
@@ -115,10 +116,10 @@ class ContactFixture(Fixture[ContactModelSpec]):
     case: ContactCase = field(default_factory=ContactCase)
 
     def fresh(self, grid: Grid | None = None) -> ContactModel:
-        """Return a new model, prepared for `grid`, by default the grid of the case."""
-        model: ContactModel = super().fresh()
-        model.prepare(self.grid if grid is None else grid, self.case.materials)
-        return model
+        """Return a new model for `grid`, by default the grid of the case."""
+        return self.configured.spec.factory(
+            self.configured.options, grid or self.grid, self.case.materials
+        )
 
     @cached_property
     def grid(self) -> Grid:
@@ -165,13 +166,17 @@ class ContactFixture(Fixture[ContactModelSpec]):
         warm: ContactSolution | None = None,
     ) -> ContactSolution:
         """Solve one contact with the shared model, by default the base contact."""
-        return self.model.solve(
+        return self.model.solve_one(
             self.gap if gap is None else gap,
             self.case.curvature,
             point or self.point(),
             wear_compliance,
             warm,
         )
+
+    def batch(self, points: Sequence[OperatingPoint], gaps: Sequence[FloatArray]) -> ContactBatch:
+        """Return contacts of the case with other operating points and gaps."""
+        return ContactBatch.of(np.array(gaps), self.case.curvature, points)
 
     @cached_property
     def solution(self) -> ContactSolution:

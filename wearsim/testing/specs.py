@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
@@ -17,6 +17,7 @@ from wearsim.plugins import (
     WearLawSpec,
     registry,
 )
+from wearsim.plugins.specs import PROTOCOL
 from wearsim.testing.checks import Checks, require
 
 if TYPE_CHECKING:
@@ -76,7 +77,8 @@ class Fixture(Generic[S]):
 
     def fresh(self) -> Any:
         """Return a new instance."""
-        return self.configured.spec.factory(self.configured.options)
+        factory: Callable[..., Any] = self.configured.spec.factory
+        return factory(self.configured.options)
 
     @cached_property
     def instance(self) -> Any:
@@ -95,8 +97,12 @@ def spec_checks() -> Checks[Any]:
 
     @checks.specified_in("wearsim.plugins.Spec")
     def spec_is_complete(fixture: Any) -> None:
-        """A spec has a name of lower-case words and a summary of one line."""
+        """A spec has the current protocol, a name of lower-case words and a summary of one line."""
         spec = fixture.configured.spec
+        require(
+            spec.protocol == PROTOCOL,
+            f"the spec has protocol {spec.protocol}, and wearsim has protocol {PROTOCOL}",
+        )
         require(
             re.fullmatch(r"[a-z][a-z0-9]*(-[a-z0-9]+)*", spec.name),
             f"the name {spec.name!r} does not consist of lower-case words joined by hyphens",

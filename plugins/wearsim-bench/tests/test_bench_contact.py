@@ -19,7 +19,7 @@ from wearsim.models.contact import slender
 from wearsim.models.tangential.options import TangentialOptions
 from wearsim.plugins import ContactModelSpec, manager, registry
 from wearsim.studies.run.grid import fresh_patch, run_grid
-from wearsim_bench.contact.accuracy import build_model, errors_of, random_case_errors, solved
+from wearsim_bench.contact.accuracy import choose_model, errors_of, random_case_errors, solved
 from wearsim_bench.contact.cases import elliptic_cases, worn_cases
 from wearsim_bench.contact.methods import COMPARISON_MODEL, Method, methods, normal_methods
 from wearsim_bench.contact.topic import HARD, contact
@@ -46,23 +46,20 @@ class ChoosyOptions(ws.Options):
         return value
 
 
-class Faulty(ws.ContactModel):
-    """Contact model with a `solve` that raises a TypeError."""
+class Faulty(ws.SingleContactModel):
+    """Contact model with a `solve_contact` that raises a TypeError."""
 
-    def __init__(self, options):
+    def __init__(self, options, grid, materials):
         self.options = options
 
-    def prepare(self, grid, materials):
-        """Do nothing."""
-
-    def solve(self, gap, longitudinal_curvature, point, wear_compliance=None, warm=None):
+    def solve_contact(self, gap, longitudinal_curvature, point, wear_compliance=None, warm=None):
         """Raise a TypeError."""
         return len(None)
 
 
 def faulty_plugin():
     module = ModuleType("faulty_plugin")
-    spec = ContactModelSpec("choosy", ChoosyOptions, "a faulty model", factory=Faulty)
+    spec = ContactModelSpec("choosy", ChoosyOptions, "a faulty model", factory=Faulty, protocol=2)
     module.wearsim_contact_models = ws.hookimpl(lambda: [spec], specname="wearsim_contact_models")
     return module
 
@@ -173,10 +170,10 @@ def test_warm_starts_are_timed_for_models_that_use_them(topic):
 def test_warm_start_with_another_result_is_a_failure(monkeypatch):
     solve = slender.Slender.solve
 
-    def depends_on_start(self, gap, longitudinal_curvature, point, wear_compliance=None, warm=None):
+    def depends_on_start(self, batch, wear_compliance=None, coupling=None, warm=None):
         if warm is not None:
-            point = replace(point, friction=1.01 * point.friction)
-        return solve(self, gap, longitudinal_curvature, point, wear_compliance, warm)
+            batch = replace(batch, friction=1.01 * batch.friction)
+        return solve(self, batch, wear_compliance, coupling, warm)
 
     monkeypatch.setattr(slender.Slender, "solve", depends_on_start)
     found = measure("draws", elliptic_cases("paper")[:1], Method("slender"), 41, 1)
@@ -195,8 +192,8 @@ def test_defaults_are_the_strips_of_a_run_and_a_contact(topic):
             [int(item.setting.split()[0]) for item in default],
         )
         usual, fewer = (
-            case.grid(build_model("slender")),
-            case.grid(build_model("slender"), strips[0]),
+            case.grid(choose_model("slender")),
+            case.grid(choose_model("slender"), strips[0]),
         )
         assert [fewer.strips, usual.strips] == strips
         assert case.patch.b / fewer.spacing == pytest.approx(of_run, rel=0.05)
@@ -205,11 +202,11 @@ def test_defaults_are_the_strips_of_a_run_and_a_contact(topic):
 def test_errors_of_a_group_are_those_of_its_contacts():
     cases = elliptic_cases("paper")
     found = measure("draws", cases, Method("hertz"), 50, 1).errors
-    whole = random_case_errors(build_model("hertz", my=50), "paper")
+    whole = random_case_errors(choose_model("hertz", my=50), "paper")
     assert found["power"] == whole.rms
     assert found["worst_power"] == whole.worst
     assert found["dissipation"] == whole.strips
-    powers = [solved(build_model("hertz"), case)[0].power for case in cases]
+    powers = [solved(choose_model("hertz"), case)[0].power for case in cases]
     exact = [row["P_over_V_N"] for row in rows("rig_random", kind="paper")]
     assert found["worst_power"] == np.abs(np.array(powers) / exact - 1.0).max()
 
@@ -224,7 +221,7 @@ def test_hertz_model_has_exact_pressure_and_width():
 def test_steps_along_rolling_equal_the_strips():
     fastsim = Method("hertz", {"tangential": "fastsim"})
     assert fastsim.setting(41) == "41 x 41"
-    assert fastsim.build(41).theory.mx == 41
+    assert fastsim.choice(41).options.mx == 41
     assert Method("hertz").setting(41) == "41 strips"
 
 
@@ -239,7 +236,7 @@ def test_errors_decrease_with_the_number_of_strips():
 
 def test_nonfinite_value_raises_contact_error():
     case = elliptic_cases("paper")[0]
-    solution, grid = solved(build_model("hertz"), case)
+    solution, grid = solved(choose_model("hertz"), case)
     solution.dissipation[3] = np.nan
     with pytest.raises(ContactError, match="dissipation: not finite"):
         errors_of(solution, grid, case)

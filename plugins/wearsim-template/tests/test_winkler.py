@@ -13,10 +13,10 @@ test_softer_winkler = contact_model_tests(SPEC, {"foundation_modulus": "500 GPa/
 
 def test_strip_of_the_half_length_has_its_hertzian_load():
     a, curvature = 0.1e-3, 90.0
-    model = SPEC.factory(SPEC.options(half_length="0.1 mm"))
-    model.prepare(Grid.spanning(-3e-3, 3e-3, 3), (STEEL, STEEL))
+    options, grid = SPEC.options(half_length="0.1 mm"), Grid.spanning(-3e-3, 3e-3, 3)
+    model = SPEC.factory(options, grid, (STEEL, STEEL))
     hertz = np.pi / 4.0 * STEEL.youngs_modulus / (2.0 * (1.0 - 0.3**2)) * curvature * a**2
     point = OperatingPoint(hertz * 2e-3, 1.0, Creepage(1e-3), 0.1)  # a single strip of 2 mm
-    solution = model.solve(np.array([1.0, 0.0, 1.0]), curvature, point)
+    solution = model.solve_one(np.array([1.0, 0.0, 1.0]), curvature, point)
     assert solution.half_length[1] == pytest.approx(a, rel=1e-9)
     assert solution.line_load[1] == pytest.approx(hertz, rel=1e-9)

@@ -23,8 +23,8 @@ def test_friction_field_is_independent_of_batches(frame, kind):
         friction__coefficient=field(kind, frame=frame, **options), contact__my=50, contact__mx=20
     )
     contacts = Realisations(scenario, 6)
-    whole = contacts.solve(0, 6).columns["power"].ravel()
-    single = [contacts.solve(k, 1).columns["power"].item() for k in (5, 2, 0)]
+    whole = contacts.solve(0, 6).power
+    single = [contacts.solve(k, 1).power.item() for k in (5, 2, 0)]
     assert single == [whole[5], whole[2], whole[0]]
     assert len(set(whole.tolist())) == 6
 

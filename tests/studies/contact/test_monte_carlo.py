@@ -84,8 +84,9 @@ def test_solutions_are_bitwise_independent_of_batches():
     for first in (40, 0, 20, 59):
         count = min(20, 60 - first)
         part = parts.solve(first, count)
-        for name, column in part.columns.items():
-            expected = whole.columns[name][:, :, first : first + count]
+        expected_part = vars(whole.at(np.arange(first, first + count)))
+        for name, column in vars(part).items():
+            expected = expected_part[name]
             assert column.tobytes() == expected.tobytes(), name
 
 
@@ -160,11 +161,11 @@ def test_realisation_is_the_contact_with_its_values(case):
         single = study_contact(realise(scenario, values)).solution
         np.testing.assert_allclose(found.y, single.y, atol=1e-18)
         for name in ("power", "force_x", "force_y", "spin_moment", "longitudinal_creepage"):
-            assert found.columns[name][0, 0, k] == pytest.approx(
+            assert getattr(found, name)[k] == pytest.approx(
                 getattr(single, name), rel=1e-9, abs=1e-12
             ), name
         np.testing.assert_allclose(
-            found.columns["dissipation"][0, 0, k], single.dissipation, rtol=1e-7, atol=1e-9
+            found.dissipation[k], single.dissipation, rtol=1e-7, atol=1e-9
         )
 
 
@@ -221,12 +222,12 @@ def test_strips_cover_the_contacts_of_all_realisations():
     grid, mean = contacts.grid, study_contact(scenario)
     assert grid.spacing == pytest.approx(mean.grid.spacing, rel=1e-12)
     # the strips of the mean contact end at its edges: 50 strips, none partly in contact
-    load = contacts.solve_mean_problem().columns["line_load"].ravel()
+    load = contacts.solve_mean_problem().line_load[0]
     assert (load > 1e-9 * load.max()).sum() == 50
-    solved = contacts.solve(0, 500).columns
+    solved = contacts.solve(0, 500)
     shift = 0.5 * np.abs(contacts.values["creepage.tilt"]).max()
     assert 2 * shift + 3.0e-3 < grid.spacing * grid.strips < 2 * shift + 4.0e-3
-    loads = solved["line_load"].sum(axis=-1).ravel() * grid.spacing
+    loads = solved.line_load.sum(axis=-1) * grid.spacing
     np.testing.assert_allclose(loads, contacts.values["load.normal_force"], rtol=1e-12)
 
 

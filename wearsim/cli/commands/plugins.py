@@ -10,7 +10,7 @@ from wearsim.cli.output import note, write_json, write_list
 if TYPE_CHECKING:
     from wearsim.plugins.manager import Registered
 
-_HEADS = ("name", "kind", "distribution", "version", "capabilities", "summary")
+_HEADS = ("name", "kind", "distribution", "version", "protocol", "capabilities", "summary")
 
 
 def plugins(json: Json = False) -> None:
@@ -26,7 +26,9 @@ def plugins(json: Json = False) -> None:
         return
     for entry in entries:
         entry["capabilities"] = ", ".join(word.replace("_", " ") for word in entry["capabilities"])
-    write_list(_HEADS, [[entry[head] for head in _HEADS] for entry in entries])
+    write_list(_HEADS, [[str(entry[head]) for head in _HEADS] for entry in entries])
+    for refusal in filter(None, (entry["refused"] for entry in entries)):
+        note(f"refused: {refusal}")
     for item in found.broken:
         note(
             f"broken: plugin '{item.entry_point}' of {item.distribution} {item.version}"
@@ -40,6 +42,8 @@ def _entry(item: Registered) -> dict[str, Any]:
         "kind": item.spec.kind,
         "distribution": item.distribution,
         "version": item.version,
+        "protocol": item.spec.protocol,
+        "refused": item.refusal,
         "capabilities": item.spec.describe(),
         "summary": item.spec.summary,
         "references": list(item.spec.references),

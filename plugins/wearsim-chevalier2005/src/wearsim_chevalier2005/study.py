@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from wearsim.contact_batch import OperatingPoints
+from wearsim.contact_batch import ContactBatch
 from wearsim.results import DissipationResult
 from wearsim.scenario import Scenario
 from wearsim.scenario.examples import shipped_scenario
@@ -171,15 +171,14 @@ def white_friction(scenario: Scenario) -> dict[str, object]:
 def _with_white_friction(scenario: Scenario) -> ContactStudy:
     """Return the mean problem with one realisation of white friction."""
     study = study_contact(scenario)
-    model = scenario.contact.build()
-    model.prepare(study.grid, (scenario.cylinder.material, scenario.roller.material))
+    materials = scenario.cylinder.material, scenario.roller.material
+    model = scenario.contact.build(study.grid, materials)
     curvature = 1.0 / scenario.cylinder.radius + 1.0 / scenario.roller.radius
-    points = OperatingPoints.of([study.point])
-    assert points is not None
-    x, y = model.friction_points_batch(study.gap[None, None, None], curvature, points)
+    batch = ContactBatch.of(study.gap[None], curvature, [study.point])
     item = next(item for item in scenario.random if item.name == FRICTION)
-    point = LocalFriction(scenario, model, item).put(points, x, y, 0)[0]
-    solution = model.solve(study.gap, curvature, point)
+    local = LocalFriction(scenario, model, item)
+    batch = local.put(batch, *model.friction_points(batch), 0)
+    solution, point = model.solve(batch)[0], batch.point(0)
     fields = model.fields(solution, study.gap, curvature, point)
     return replace(study, solution=solution, fields=fields, point=point)
 

@@ -17,23 +17,19 @@ class WinklerOptions(ws.Options):
     foundation_modulus: Modulus | None = ws.Field(None, description="instead: pressure per depth")
 
 
-class Winkler(ws.ContactModel):
+class Winkler(ws.SingleContactModel):
     """Independent springs: the pressure is the modulus times the depth, friction mu times it."""
 
     capabilities = ws.Capabilities(creepage_variation=True, local_friction=True)
 
-    def __init__(self, options):
-        self.options = options
-
-    def prepare(self, grid, materials):
-        """Set strips and modulus; by default K = 3 pi E*/(8 a), see README.md."""
+    def __init__(self, options, grid, materials):
+        # by default K = 3 pi E*/(8 a), see README.md
         compliance = sum((1.0 - m.poisson_ratio**2) / m.youngs_modulus for m in materials)  # 1/E*
-        by_hertz = 3.0 * np.pi / (8.0 * compliance * self.options.half_length)
-        self.grid, self.modulus = grid, self.options.foundation_modulus or by_hertz
+        by_hertz = 3.0 * np.pi / (8.0 * compliance * options.half_length)
+        self.grid, self.modulus = grid, options.foundation_modulus or by_hertz
 
-    def solve(self, gap, longitudinal_curvature, point, wear_compliance=None, warm=None):
+    def solve_contact(self, gap, longitudinal_curvature, point, wear_compliance=None, warm=None):
         """Solve one contact; `warm` is not used."""
-        ws.refuse_unclaimed(self, point, wear_compliance)
         force, spacing = point.normal_force, self.grid.spacing
         if not (0.0 < force < np.inf and np.isfinite(gap).all()):
             raise ws.ContactError(f"no contact: load {force:.4g} N or a gap that is not finite")
@@ -83,6 +79,7 @@ SPEC = ws.ContactModelSpec(
     *("winkler", WinklerOptions, "elastic foundation in gross sliding"),
     factory=Winkler,
     capabilities=Winkler.capabilities,
+    protocol=2,
 )
 
 

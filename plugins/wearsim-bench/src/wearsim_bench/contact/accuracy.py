@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from wearsim.errors import ContactError
-from wearsim.plugins import ContactModel, ContactModelSpec, registry
+from wearsim.plugins import ContactModelSpec, registry
+from wearsim.scenario.tables.plugin import ContactChoice
 from wearsim.types import ContactSolution, FloatArray, Grid
 from wearsim_bench.contact.cases import MATERIALS, Case, contact_width, elliptic_cases, worn_cases
 from wearsim_bench.exact_solutions import worn_profile
@@ -55,19 +56,18 @@ class WornErrors:
     power: dict[str, float]
 
 
-def build_model(name: str, **options: Any) -> ContactModel:
-    """Return a contact model by its registered name, not prepared."""
-    spec = registry().get(ContactModelSpec, name)
-    return spec.factory(spec.options(**options))
+def choose_model(name: str, **options: Any) -> ContactChoice:
+    """Return a contact model by its registered name, with options."""
+    return ContactChoice(name, registry().get(ContactModelSpec, name).options(**options))
 
 
 def solved(
-    model: ContactModel, case: Case, strips: int | None = None
+    choice: ContactChoice, case: Case, strips: int | None = None
 ) -> tuple[ContactSolution, Grid]:
-    """Prepare a model and solve a case, by default on the strips suggested by the model."""
-    grid = case.grid(model, strips)
-    model.prepare(grid, MATERIALS)
-    return model.solve(case.gap_at(grid.y), case.longitudinal_curvature, case.point), grid
+    """Build a model and solve a case, by default on the strips suggested by the model."""
+    grid = case.grid(choice, strips)
+    model = choice.build(grid, MATERIALS)
+    return model.solve_one(case.gap_at(grid.y), case.longitudinal_curvature, case.point), grid
 
 
 def errors_of(solution: ContactSolution, grid: Grid, case: Case) -> CaseErrors:
@@ -104,19 +104,19 @@ def rms(errors: Iterable[float]) -> float:
     return float(np.sqrt(np.mean(np.square(list(errors)))))
 
 
-def random_case_errors(model: ContactModel, kind: str) -> PowerErrors:
+def random_case_errors(choice: ContactChoice, kind: str) -> PowerErrors:
     """Return the errors over the 40 draws of `rig_random` of a kind, "paper" or "partial"."""
-    return _errors_over(model, elliptic_cases(kind))
+    return _errors_over(choice, elliptic_cases(kind))
 
 
-def hard_case_errors(model: ContactModel, least_ratio: float) -> PowerErrors:
+def hard_case_errors(choice: ContactChoice, least_ratio: float) -> PowerErrors:
     """Return the errors over the hard cases with b/a of at least `least_ratio`."""
     cases = elliptic_cases("hard")
-    return _errors_over(model, [c for c in cases if c.patch.b >= least_ratio * c.patch.a])
+    return _errors_over(choice, [c for c in cases if c.patch.b >= least_ratio * c.patch.a])
 
 
-def _errors_over(model: ContactModel, cases: Iterable[Case]) -> PowerErrors:
-    return summed([errors_of(*solved(model, case), case) for case in cases])
+def _errors_over(choice: ContactChoice, cases: Iterable[Case]) -> PowerErrors:
+    return summed([errors_of(*solved(choice, case), case) for case in cases])
 
 
 def summed(cases: Sequence[CaseErrors]) -> PowerErrors:
@@ -126,7 +126,7 @@ def summed(cases: Sequence[CaseErrors]) -> PowerErrors:
     return PowerErrors(rms(powers), float(np.abs(powers).max()), strips)
 
 
-def worn_errors(model: ContactModel, name: str) -> WornErrors:
+def worn_errors(choice: ContactChoice, name: str) -> WornErrors:
     """Return the errors on a worn profile of the reference data.
 
     Raises
@@ -135,7 +135,7 @@ def worn_errors(model: ContactModel, name: str) -> WornErrors:
         If the model has no solution.
     """
     exact, cases = worn_profile(name), worn_cases(name)
-    solutions = {slip: solved(model, case, WORN_STRIPS) for slip, case in cases.items()}
+    solutions = {slip: solved(choice, case, WORN_STRIPS) for slip, case in cases.items()}
     errors = {slip: errors_of(*solutions[slip], case) for slip, case in cases.items()}
     solution, grid = solutions["mean"]
 

@@ -13,7 +13,7 @@ import numpy as np
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.mechanics.hertz.ellipse import HertzContact, hertz
 from wearsim.models.contact.strip_model import grid_about_hertz
-from wearsim.plugins import ContactModel
+from wearsim.scenario.tables.plugin import ContactChoice
 from wearsim.studies.run.grid import profile_grid
 from wearsim.types import Creepage, FloatArray, Grid, OperatingPoint, Profile
 from wearsim_bench.exact_solutions import CREEPAGES, STEEL, WORN, rows, strips_of, worn_profile
@@ -83,14 +83,15 @@ class Case:
         modulus = combine(*MATERIALS).contact_modulus
         return hertz(along, across, self.point.normal_force, modulus)
 
-    def grid(self, model: ContactModel, strips: int | None = None) -> Grid:
+    def grid(self, choice: ContactChoice, strips: int | None = None) -> Grid:
         """Return the default strips of a single contact, or another number over the same width."""
         if self.span is not None:
             ends = np.array([-0.5, 0.5]) * self.span
             usual = profile_grid(Profile(ends, np.zeros(2)), self.patch.b, None)
         else:
-            problem = self.gap_curvature, self.longitudinal_curvature, self.point.normal_force
-            usual = model.suggest_grid(*problem, MATERIALS) or grid_about_hertz(*problem, MATERIALS)
+            suggest, load = choice.spec.suggest_grid or grid_about_hertz, self.point.normal_force
+            problem = self.gap_curvature, self.longitudinal_curvature, load, MATERIALS
+            usual = suggest(choice.options, *problem) or grid_about_hertz(None, *problem)
         if strips in (None, usual.strips):
             return usual
         half = 0.5 * usual.strips * usual.spacing

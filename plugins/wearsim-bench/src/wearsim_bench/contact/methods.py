@@ -10,8 +10,8 @@ from typing import Any, Literal, Union, get_args, get_origin
 import numpy as np
 
 from wearsim.models.tangential.options import TangentialOptions
-from wearsim.plugins import ContactModel, ContactModelSpec, Options, registry
-from wearsim.scenario.tables.plugin import ContactTable
+from wearsim.plugins import ContactModelSpec, Options, registry
+from wearsim.scenario.tables.plugin import ContactChoice, ContactTable
 from wearsim.types import ContactSolution
 from wearsim_bench.contact.accuracy import solved
 from wearsim_bench.contact.cases import worn_cases
@@ -62,9 +62,9 @@ class Method:
         """Whether this is the default of a scenario."""
         return self.model == DEFAULT_MODEL and not self.options
 
-    def build(self, strips: int | None = None) -> ContactModel:
-        """Return the model, not prepared; `mx` and `my` are set to the number of strips."""
-        return self.spec.factory(self.spec.options(**self._resolved(strips)))
+    def choice(self, strips: int | None = None) -> ContactChoice:
+        """Return the model with its options; `mx` and `my` are set to the number of strips."""
+        return ContactChoice(self.model, self.spec.options(**self._resolved(strips)))
 
     def setting(self, strips: int) -> str:
         """Return the resolution: "81 strips", or "81 x 81" with steps along rolling."""
@@ -177,7 +177,7 @@ def _word(value: object) -> str:
 def _flat(method: Method) -> ContactSolution | None:
     """Return the contact on the flat worn profile, or None if the model has no solution."""
     try:
-        return solved(method.build(_STRIPS), worn_cases("flat")["mean"], _STRIPS)[0]
+        return solved(method.choice(_STRIPS), worn_cases("flat")["mean"], _STRIPS)[0]
     except Exception:  # reported when the method is measured
         return None
 

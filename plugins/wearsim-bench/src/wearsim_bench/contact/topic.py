@@ -144,6 +144,6 @@ def _measured(group: _Group, method: Method, effort: Effort) -> Iterator[Measure
 
 def _usual_strips(method: Method, case: Case) -> tuple[int, int]:
     """Return the default numbers of strips of a run and of a single contact."""
-    grid = case.grid(method.build())
+    grid = case.grid(method.choice())
     of_run = strips_over(grid.strips * grid.spacing, case.patch.b, DEFAULT_TOLERANCE)
     return of_run, grid.strips

@@ -88,17 +88,18 @@ def failure_reason(error: Exception) -> str:
 
 
 def _solve(case: Case, method: Method, strips: int) -> _Solved:
-    model = method.build(strips)
-    grid = case.grid(model, strips)
-    preparing = timed(lambda: model.prepare(grid, MATERIALS))
+    choice, built = method.choice(strips), []
+    grid = case.grid(choice, strips)
+    preparing = timed(lambda: built.append(choice.build(grid, MATERIALS)))
+    (model,) = built
     gap, curvature, point = case.gap_at(grid.y), case.longitudinal_curvature, case.point
 
     def solve(warm: ContactSolution | None = None) -> ContactSolution:
-        return model.solve(gap, curvature, point, None, warm)
+        return model.solve_one(gap, curvature, point, None, warm)
 
     solution = solve()
     errors = errors_of(solution, grid, case)
-    nearby = model.solve(
+    nearby = model.solve_one(
         gap, curvature, replace(point, normal_force=_WARM_LOAD * point.normal_force)
     )
     started = solve(nearby)

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from wearsim.contact_batch import OperatingPoints, rows_of
+from wearsim.contact_batch import ContactBatch
 from wearsim.models.contact.strip_model import grid_about_hertz
 from wearsim.plugins import ContactModelSpec, registry
 from wearsim.scenario.examples import shipped_scenario
@@ -41,26 +41,25 @@ class MeanContact:
         materials = scenario.cylinder.material, scenario.roller.material
         self.curvature = 1.0 / scenario.cylinder.radius + 1.0 / scenario.roller.radius
         across, self.point = 1.0 / scenario.roller.crown_radius, study_contact(scenario).point
-        usual = grid_about_hertz(across, self.curvature, self.point.normal_force, materials)
+        usual = grid_about_hertz(None, across, self.curvature, self.point.normal_force, materials)
         half = 0.5 * wide * usual.strips * usual.spacing
         self.grid = Grid.spanning(-half, half, wide * fine * usual.strips)
         self.gap: FloatArray = 0.5 * across * self.grid.y**2
-        self.model = method.build()
-        self.model.prepare(self.grid, materials)
+        self.model = method.choice().build(self.grid, materials)
 
     def batch(self, name: str, point: OperatingPoint) -> Callable[[], FloatArray]:
         """Return a function that solves a batch of contacts and returns one solution field."""
-        points = OperatingPoints.of([point] * CONTACTS) or [point] * CONTACTS
         gaps = np.repeat(self.gap[None], CONTACTS, axis=0)
-        return lambda: rows_of(self.model.solve_batch(gaps, self.curvature, points), name)
+        contacts = ContactBatch.of(gaps, self.curvature, [point] * CONTACTS)
+        return lambda: np.asarray(getattr(self.model.solve(contacts), name))
 
     def dissipation(self, point: OperatingPoint) -> FloatArray:
         """Return P_l(y) at an operating point, shape (strips,) [W/m]."""
-        return self.model.solve(self.gap, self.curvature, point).dissipation
+        return self.model.solve_one(self.gap, self.curvature, point).dissipation
 
     def with_fields(self, point: OperatingPoint) -> FloatArray:
         """Return P_l(y) like `dissipation`, after computing tractions and slip too."""
-        solution = self.model.solve(self.gap, self.curvature, point)
+        solution = self.model.solve_one(self.gap, self.curvature, point)
         self.model.fields(solution, self.gap, self.curvature, point)
         return solution.dissipation
 
@@ -168,7 +167,8 @@ def _one_friction(method: Method) -> Alternatives:
 def _friction_shape(method: Method, rig: MeanContact) -> tuple[int, ...]:
     if not method.spec.capabilities.friction_field:
         return (rig.grid.strips,)
-    return rig.model.friction_points(rig.gap, rig.curvature, rig.point)[0].shape
+    contact = ContactBatch.of(rig.gap[None], rig.curvature, [rig.point])
+    return rig.model.friction_points(contact)[0].shape[1:]
 
 
 def strips_outside() -> Iterator[Saving]:
