@@ -45,7 +45,7 @@ class ContactModel(ABC):
             gap ``gap + wear_compliance * q``.
         coupling : SharedWear, optional
             The same for sets of contacts that wear common bodies, with the contacts of a set next
-            to each other in the batch; in the place of a wear compliance.
+            to each other in the batch; instead of a wear compliance.
         warm : ContactBatchSolution, optional
             Solutions of similar contacts, as the initial guess.
 
