@@ -164,9 +164,7 @@ def test_realisation_is_the_contact_with_its_values(case):
             assert getattr(found, name)[k] == pytest.approx(
                 getattr(single, name), rel=1e-9, abs=1e-12
             ), name
-        np.testing.assert_allclose(
-            found.dissipation[k], single.dissipation, rtol=1e-7, atol=1e-9
-        )
+        np.testing.assert_allclose(found.dissipation[k], single.dissipation, rtol=1e-7, atol=1e-9)
 
 
 def test_mean_problem_has_all_inputs_at_their_mean():
