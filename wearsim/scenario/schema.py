@@ -9,7 +9,7 @@ from pydantic.json_schema import GenerateJsonSchema
 from pydantic_core import core_schema
 
 from wearsim.plugins import Options, RandomInputSpec
-from wearsim.scenario.parse.field_wording import model_at
+from wearsim.scenario.parse.fields import model_at, target_of
 from wearsim.scenario.parse.key_index import REQUIRED, TABLES
 from wearsim.scenario.parse.mistakes import installed
 from wearsim.scenario.random.model import (
@@ -18,7 +18,6 @@ from wearsim.scenario.random.model import (
     RandomInputTable,
     can_be_random,
 )
-from wearsim.scenario.random.targets import JointTarget, target_of
 from wearsim.scenario.tables.plain import TopTable
 from wearsim.scenario.tables.plugin import PLUGIN_TABLES
 
@@ -131,7 +130,7 @@ def _fields(
         name, inner, target = f"{table}.{key}", model_at(model, (key,)), target_of(field)
         kind: Any = field.annotation
         described: Any = field
-        if isinstance(target, JointTarget):
+        if target and target.components:
             kind, described = joint, Field(None, description=field.description)
         elif target and number and can_be_random(name):
             kind = Union[field.rebuild_annotation(), friction if name == FRICTION else number]  # noqa: UP007

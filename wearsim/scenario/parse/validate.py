@@ -11,7 +11,7 @@ from pydantic_core import ErrorDetails
 
 from wearsim.errors import ScenarioError
 from wearsim.quantities import Quantity
-from wearsim.scenario.parse.field_wording import choices, field_at, form, model_at
+from wearsim.scenario.parse.fields import choices, field_at, form, model_at
 from wearsim.scenario.parse.mistakes import Mistakes, nearest
 from wearsim.units import QuantityError, shown
 
@@ -69,7 +69,7 @@ def validate_options(
         for details in error.errors(include_url=False):
             # a refused random input is still in the table, and fails again at or below its location
             if not any(details["loc"][: len(place)] == place for place in refused):
-                _translate(mistakes, details, model, raw, table, other_keys, quantity)
+                _translate(mistakes, details, model, table, other_keys, quantity)
     except ScenarioError as error:
         mistakes.add_file(error, table, key_of_file(raw, error.file))
     return None
@@ -93,68 +93,59 @@ def replace_numbers(
     table : str
         The table's name.
     """
-    raw = _with_numbers(model, values)
     try:
-        return type(model).model_validate(raw, context={"numbers": float})
+        return type(model).model_validate(_with_numbers(model, values), context={"numbers": float})
     except ValidationError as error:
         for details in error.errors(include_url=False):
-            _translate(mistakes, details, type(model), raw, table)
+            _translate(mistakes, details, type(model), table)
     return None
 
 
 def _with_numbers(model: BaseModel, values: Mapping[str, object]) -> dict[str, object]:
-    fields = {key: getattr(model, key) for key in model.model_fields_set}
-    for key, value in values.items():
-        if isinstance(value, dict):
-            fields[key] = _with_numbers(getattr(model, key), value)
-        else:
-            fields[key] = value
-    return fields
+    inner = {key: value for key, value in values.items() if isinstance(value, dict)}
+    return {
+        **{key: getattr(model, key) for key in model.model_fields_set},
+        **values,
+        **{key: _with_numbers(getattr(model, key), value) for key, value in inner.items()},
+    }
 
 
 def _translate(
     mistakes: Mistakes,
     details: ErrorDetails,
     model: type[BaseModel],
-    raw: object,
     table: str,
     other_keys: type[BaseModel] | None = None,
     quantity: Quantity | None = None,
 ) -> None:
     """Add the mistake that an error of pydantic reports."""
-    place, key = _where(details["loc"], raw, table)
-    field = field_at(model, details["loc"])
-    kind, value = details["type"], details["input"]
+    kind, value, loc = details["type"], details["input"], details["loc"]
+    *inner, key = [part for part in loc if isinstance(part, str)] or [""]
+    place = ".".join([table, *inner])
+    key += "".join(f" (entry {part + 1})" for part in loc if isinstance(part, int))
+    field = field_at(model, loc)
     expected = form(field, quantity) if field else None
-    if kind == "value_error":
-        _add_value_error(mistakes, place, key, details["ctx"]["error"], value)
+    error = details.get("ctx", {}).get("error")
+    if isinstance(error, QuantityError):
+        mistakes.add(place, key, error.what, error.got, error.expected)
+    elif error and isinstance(error.__cause__, ScenarioError):
+        mistakes.add_file(error.__cause__, place, key)
+    elif error:
+        mistakes.add(place, key, str(error), None if isinstance(value, dict) else shown(value))
     elif kind == "extra_forbidden":
-        known = model_at(model, details["loc"][:-1])
-        here = list(known.model_fields) if known else []
-        if other_keys and len(details["loc"]) == 1:
-            here += other_keys.model_fields
+        known = model_at(model, loc[:-1])
+        here = [*(known.model_fields if known else ())]
+        here += other_keys.model_fields if other_keys and len(loc) == 1 else []
         mistakes.add(place, key, f"unknown key{mistakes.hint(key, here)}")
     elif kind == "missing":
         mistakes.add(place, key, "is missing", None, expected)
-    elif kind == "literal_error" and isinstance(value, str):
-        what = f"unknown choice{nearest(value, choices(field))}"
-        mistakes.add(place, key, what, shown(value), expected)
     else:
         what = _WHAT.get(kind, "is out of range" if kind in _BOUNDS else "cannot be used")
+        if kind == "literal_error" and isinstance(value, str):
+            what += nearest(value, choices(field))
         message = details["msg"].removeprefix("Input should be ")
         expected = expected or message[:1].lower() + message[1:]
         mistakes.add(place, key, what, shown(value), expected)
-
-
-def _add_value_error(
-    mistakes: Mistakes, table: str, key: str, error: Exception, value: object
-) -> None:
-    if isinstance(error, QuantityError):
-        mistakes.add(table, key, error.what, error.got, error.expected)
-    elif isinstance(error.__cause__, ScenarioError):
-        mistakes.add_file(error.__cause__, table, key)
-    else:
-        mistakes.add(table, key, str(error), None if isinstance(value, dict) else shown(value))
 
 
 def key_of_file(raw: Mapping[str, object], file: str) -> str:
@@ -168,17 +159,3 @@ def split_keys(
     """Split a table into the keys of `model` and all others."""
     own = {key: value for key, value in raw.items() if key in model.model_fields}
     return own, {key: value for key, value in raw.items() if key not in own}
-
-
-def _where(loc: Sequence[str | int], raw: object, table: str) -> tuple[str, str]:
-    """Return the table and the key of a location within a table's model."""
-    key = ""
-    for part in loc:
-        if isinstance(part, int):
-            key += f" (entry {part + 1})"
-        elif key and isinstance(raw, dict):
-            table, key = f"{table}.{key}", part
-        else:
-            key = part
-        raw = raw.get(part) if isinstance(raw, dict) else None
-    return table, key

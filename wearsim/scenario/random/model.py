@@ -74,6 +74,8 @@ class RandomInput:
         Dotted key of the value that it replaces, "load.normal_force".
     kind : str
         Name of the distribution, "maxent".
+    role : {"scalar", "joint", "field", "process"}
+        One value, several values drawn together, or values that vary in space or in time.
     persistence : {"per-test", "per-roller", "per-pass"}
         Persistence of one draw.
     distribution : Distribution, JointDistribution, FrictionField or Process
@@ -88,20 +90,12 @@ class RandomInput:
 
     name: str
     kind: str
+    role: Role
     persistence: Persistence
     distribution: Distribution | JointDistribution | FrictionField | Process
     quantity: Quantity | None
     options: Mapping[str, object] = field(default_factory=dict)
     marginal: str = ""
-
-    @property
-    def role(self) -> Role:
-        """Role: a scalar, several scalars drawn together, a field or a process."""
-        if isinstance(self.distribution, Distribution):
-            return "scalar"
-        if isinstance(self.distribution, JointDistribution):
-            return "joint"
-        return "field" if isinstance(self.distribution, FrictionField) else "process"
 
     @property
     def keys(self) -> tuple[str, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any, TypeAlias
 
 from pydantic import BaseModel
@@ -13,7 +13,7 @@ from pydantic.fields import FieldInfo
 from wearsim.errors import ScenarioError
 from wearsim.plugins import Distribution, JointDistribution, RandomInputSpec
 from wearsim.quantities import Quantity
-from wearsim.scenario.parse.field_wording import form, model_at
+from wearsim.scenario.parse.fields import RandomTarget, form, model_at, target_of
 from wearsim.scenario.parse.mistakes import Mistakes, installed
 from wearsim.scenario.parse.validate import M, key_of_file, split_keys, validate_options
 from wearsim.scenario.random.model import (
@@ -30,7 +30,6 @@ from wearsim.scenario.random.model import (
     amount,
     can_be_random,
 )
-from wearsim.scenario.random.targets import JointTarget, RandomTarget, target_of
 from wearsim.units import QuantityError, shown
 
 Loc: TypeAlias = tuple[str | int, ...]
@@ -95,25 +94,22 @@ def _means(
     mistakes: Mistakes, field: FieldInfo, raw: Mapping[str, Any], table: str, key: str
 ) -> dict[str, object]:
     """Add a random input, and return the means of the keys that it sets; none after mistakes."""
-    name, target = f"{table}.{key}" if table else key, target_of(field)
-    if "distribution" not in raw[key]:
-        _refuse_table(mistakes, field, raw[key], table, key)
+    name, target, value = f"{table}.{key}" if table else key, target_of(field), raw[key]
+    if "distribution" not in value:
+        _refuse_table(mistakes, field, value, table, key)
         return {}
     mistakes.random[name] = None
     if target is None or not can_be_random(name):
         mistakes.add(table, key, "cannot be random", "a table with a distribution", _NOT_RANDOM)
         return {}
-    item = read_random_input(mistakes, raw[key], name, target)
+    item = read_random_input(mistakes, value, name, target)
     rivals = [other for other in target.components if other in raw]
     for other in rivals:
-        what = f"is set by {key} already"
-        mistakes.add(table, other, what, shown(raw[other]), "one of the two")
-    if item is None or rivals:
-        return {}
-    if isinstance(target, RandomTarget) and not _fits(mistakes, item, target, table, key):
+        mistakes.add(table, other, f"is set by {key} already", shown(raw[other]), "one of the two")
+    if item is None or rivals or not _fits(mistakes, item, target, table, key):
         return {}
     mistakes.random[name] = item
-    means = item.mean if item.quantity is None else [{"si": mean} for mean in item.mean]
+    means = [{"si": mean} if item.quantity else mean for mean in item.mean]
     return dict(zip(target.components or (key,), means, strict=True))
 
 
@@ -121,33 +117,35 @@ def _refuse_table(
     mistakes: Mistakes, field: FieldInfo, raw: Mapping[str, object], table: str, key: str
 ) -> None:
     """Add the mistake of a table without distribution instead of a number."""
-    name, near = f"{table}.{key}", difflib.get_close_matches("distribution", raw, n=1)
+    name = f"{table}.{key}"
+    near = difflib.get_close_matches("distribution", raw, n=1)
     if not can_be_random(name):
         mistakes.add(table, key, "is not a number", "a table", form(field))
     elif near:
         mistakes.add(name, near[0], "unknown key (did you mean 'distribution'?)")
     else:
-        expected = "the name of a random input"
-        mistakes.add(name, "distribution", "is missing", None, expected)
+        mistakes.add(name, "distribution", "is missing", None, "the name of a random input")
 
 
 def _fits(
     mistakes: Mistakes, item: RandomInput, target: RandomTarget, table: str, key: str
 ) -> bool:
     """Check the support and the mean of a random input against what its field allows."""
-    (low, high), (least, most) = item.scalar.support, item.extremes
-    reach = None
-    if low < target.low or (target.above and least <= target.low):
-        reach = f"down to {amount(low, target.quantity)}"
-    elif high > target.high or (target.below and most >= target.high):
-        reach = f"up to {amount(high, target.quantity)}"
-    if reach and low == high:
-        what, got = f"must be {target.allowed}", amount(low, target.quantity)
-        mistakes.add(table, key, what, got, f"a value {target.allowed}")
-    elif reach:
-        what = f"takes values {reach}, and must be {target.allowed}"
-        remedy = f"maxent with support {target.support} or truncated-normal"
-        mistakes.add(table, key, what, item.describe(), remedy)
+    if target.components:
+        return True
+    (low, high), (least, most), limits = item.scalar.support, item.extremes, target.limits
+    what = None
+    if low < target.range[0] or least <= limits.get("gt", -math.inf):
+        what = f"takes values down to {amount(low, target.quantity)}"
+    elif high > target.range[1] or most >= limits.get("lt", math.inf):
+        what = f"takes values up to {amount(high, target.quantity)}"
+    if what and low == high:
+        got, expected = amount(low, target.quantity), f"a value {target.allowed}"
+        mistakes.add(table, key, f"must be {target.allowed}", got, expected)
+    elif what:
+        expected = f"maxent with support {target.support} or truncated-normal"
+        what = f"{what}, and must be {target.allowed}"
+        mistakes.add(table, key, what, item.describe(), expected)
     elif not math.isfinite(item.mean[0]):
         mistakes.add(table, key, "has no finite mean", item.describe())
     else:
@@ -156,7 +154,7 @@ def _fits(
 
 
 def read_random_input(
-    mistakes: Mistakes, raw: Mapping[str, Any], name: str, target: RandomTarget | JointTarget
+    mistakes: Mistakes, raw: Mapping[str, Any], name: str, target: RandomTarget
 ) -> RandomInput | None:
     """Return the random input that a table holds, or None after adding its mistakes.
 
@@ -168,13 +166,13 @@ def read_random_input(
         The table.
     name : str
         Dotted key of the value that it replaces.
-    target : RandomTarget or JointTarget
+    target : RandomTarget
         The number, or the numbers, that it sets.
     """
-    before, quantity = len(mistakes.entries), target.quantity
+    before, kind = len(mistakes.entries), raw["distribution"]
     own, options = split_keys(raw, RandomInputTable)
     table = validate_options(mistakes, RandomInputTable, own, name)
-    kind, spec = raw["distribution"], None
+    spec = None
     if isinstance(kind, str):
         spec = mistakes.find_plugin(RandomInputSpec, kind, name, "distribution")
     if spec is None or not _check_role(mistakes, spec, name, target):
@@ -183,26 +181,25 @@ def read_random_input(
         _check_persistence(mistakes, spec, table.persistence, name)
     marginal = None
     if spec.role in WITH_MARGINAL:
-        marginal = _read_marginal(mistakes, raw, name, quantity)
+        marginal = _read_marginal(mistakes, raw.get("marginal"), name, target.quantity)
     elif "marginal" in raw:
         what = f"is only for a field or a process; '{spec.name}' is neither"
         mistakes.add(name, "marginal", what)
-    distribution = _build(mistakes, spec, options, name, quantity, marginal)
+    distribution = _build(mistakes, spec, options, name, target.quantity, marginal)
     if isinstance(distribution, JointDistribution):
-        sets, components = distribution.components, target.components
-        if sorted(sets) != sorted(components):
-            expected = f"a distribution of {' and '.join(components)}"
-            what = f"sets {' and '.join(sets)}"
-            mistakes.add(name, "distribution", what, shown(spec.name), expected)
-    if len(mistakes.entries) > before or distribution is None or table is None:
+        sets, components = " and ".join(distribution.components), " and ".join(target.components)
+        if sorted(distribution.components) != sorted(target.components):
+            expected = f"a distribution of {components}"
+            mistakes.add(name, "distribution", f"sets {sets}", shown(kind), expected)
+    if len(mistakes.entries) > before or table is None:
         return None
     inner = str(table.marginal["distribution"]) if table.marginal else ""
-    return RandomInput(name, spec.name, table.persistence, distribution, quantity, options, inner)
+    return RandomInput(
+        name, kind, spec.role, table.persistence, distribution, target.quantity, options, inner
+    )
 
 
-def _check_role(
-    mistakes: Mistakes, spec: RandomInputSpec, name: str, target: RandomTarget | JointTarget
-) -> bool:
+def _check_role(mistakes: Mistakes, spec: RandomInputSpec, name: str, target: RandomTarget) -> bool:
     """Check that the role of the distribution is possible for this value."""
     roles = {"joint" if target.components else "scalar"}
     roles |= {"process"} if name in CONTACT_FIELDS else set()
@@ -220,7 +217,7 @@ def _check_role(
     return False
 
 
-def _one_of(roles: set[str]) -> str:
+def _one_of(roles: Collection[str]) -> str:
     """Return the names of the distributions with these roles, for messages."""
     names = [shown(spec.name) for spec in installed(RandomInputSpec) if spec.role in roles]
     return f"one of {', '.join(names)}"
@@ -229,43 +226,42 @@ def _one_of(roles: set[str]) -> str:
 def _check_persistence(
     mistakes: Mistakes, spec: RandomInputSpec, persistence: Persistence, name: str
 ) -> None:
+    places = {"per-pass": OF_A_CONTACT, "per-roller": OF_A_ROLLER}.get(persistence)
+    what = f"is only for {', '.join(places)}" if places and name not in places else None
     if persistence == "per-pass" and spec.role == "process":
         what = "is not for a process, which runs through the whole test"
-    elif persistence == "per-pass" and name not in OF_A_CONTACT:
-        what = f"is only for {', '.join(OF_A_CONTACT)}"
-    elif persistence == "per-roller" and name not in OF_A_ROLLER:
-        what = f"is only for {', '.join(OF_A_ROLLER)}"
-    else:
-        return
-    allowed = '"per-test" or "per-roller"' if name in OF_A_ROLLER else '"per-test"'
-    mistakes.add(name, "persistence", what, shown(persistence), allowed)
+    if what:
+        allowed = '"per-test" or "per-roller"' if name in OF_A_ROLLER else '"per-test"'
+        mistakes.add(name, "persistence", what, shown(persistence), allowed)
 
 
 def _read_marginal(
-    mistakes: Mistakes, table: Mapping[str, object], name: str, quantity: Quantity | None
+    mistakes: Mistakes, raw: object, name: str, quantity: Quantity | None
 ) -> Distribution | None:
     """Return the marginal distribution of a field or a process."""
-    raw, place = table.get("marginal"), f"{name}.marginal"
+    place, expected = f"{name}.marginal", _one_of({"scalar"})
     if raw is None:
-        expected = "a table with a distribution and its options"
-        mistakes.add(name, "marginal", "is missing", None, expected)
+        what = "a table with a distribution and its options"
+        mistakes.add(name, "marginal", "is missing", None, what)
     if not isinstance(raw, dict):
         return None
-    keys, options = split_keys(raw, RandomInputTable)
-    kind = keys.pop("distribution", None)
-    for key in sorted(keys):
-        mistakes.add(place, key, f"belongs in [{name}], not in its marginal", shown(keys[key]))
-    if not isinstance(kind, str):
-        what = "is missing" if kind is None else "is not text"
-        got = None if kind is None else shown(kind)
-        mistakes.add(place, "distribution", what, got, _one_of({"scalar"}))
-        return None
-    spec = mistakes.find_plugin(RandomInputSpec, kind, place, "distribution")
-    if spec and spec.role != "scalar":
+    own, options = split_keys(raw, RandomInputTable)
+    kind = own.pop("distribution", None)
+    for key in sorted(own):
+        mistakes.add(place, key, f"belongs in [{name}], not in its marginal", shown(own[key]))
+    spec = None
+    if kind is None:
+        mistakes.add(place, "distribution", "is missing", None, expected)
+    elif not isinstance(kind, str):
+        mistakes.add(place, "distribution", "is not text", shown(kind), expected)
+    else:
+        spec = mistakes.find_plugin(RandomInputSpec, kind, place, "distribution")
+    if spec and spec.role == "scalar":
+        return _build(mistakes, spec, options, place, quantity)
+    if spec:
         what = f"is a {spec.role}, but a marginal is the distribution of one number"
-        mistakes.add(place, "distribution", what, shown(spec.name), _one_of({"scalar"}))
-        return None
-    return _build(mistakes, spec, options, place, quantity, None) if spec else None
+        mistakes.add(place, "distribution", what, shown(kind), expected)
+    return None
 
 
 def _build(
@@ -274,7 +270,7 @@ def _build(
     raw: Mapping[str, object],
     place: str,
     quantity: Quantity | None,
-    marginal: Distribution | None,
+    marginal: Distribution | None = None,
 ) -> Any:
     """Build a distribution, or add the mistakes of its options and return None."""
     options = validate_options(mistakes, spec.options, raw, place, RandomInputTable, quantity)

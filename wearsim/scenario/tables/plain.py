@@ -17,9 +17,9 @@ from wearsim.quantities import (
     PositiveRotationSpeed,
     Quantity,
 )
+from wearsim.scenario.parse.fields import JointTarget
 from wearsim.scenario.parse.mistakes import Mistakes, Table
 from wearsim.scenario.random.read import validate
-from wearsim.scenario.random.targets import JointTarget
 from wearsim.units import ANGLE
 
 DEFAULT_TOLERANCE = 1e-3
