@@ -13,7 +13,7 @@ from cli_examples import Command
 from wearsim.plugins import template
 from wearsim.scenario import parse_scenario
 from wearsim.scenario.examples import starter_scenario
-from wearsim.scenario.parse.key_index import TABLES
+from wearsim.scenario.parse.toml import TABLES
 
 ROOT = Path(__file__).parents[2]
 FILES = {

@@ -1,6 +1,5 @@
 """Scenarios: TOML with units, validated as a whole, immutable and in SI once read."""
 
-from wearsim.scenario.model_label import described_model
 from wearsim.scenario.parse.overrides import parse_override
 from wearsim.scenario.parse.toml import load_scenario, parse_scenario
 from wearsim.scenario.random.model import Persistence, RandomInput
@@ -14,9 +13,15 @@ from wearsim.scenario.tables.plain import (
     FrictionTable,
     OperationTable,
     OutputsTable,
+    SamplingTable,
 )
-from wearsim.scenario.tables.plugin import ContactChoice, LoadChoice, TermChoice, WearChoice
-from wearsim.scenario.tables.sampling import SamplingTable
+from wearsim.scenario.tables.plugin import (
+    ContactChoice,
+    LoadChoice,
+    TermChoice,
+    WearChoice,
+    described_model,
+)
 
 __all__ = [
     "ContactChoice",

@@ -18,9 +18,9 @@ from wearsim.scenario.tables.plain import (
     FrictionTable,
     OperationTable,
     OutputsTable,
+    SamplingTable,
 )
 from wearsim.scenario.tables.plugin import ContactChoice, LoadChoice, WearChoice
-from wearsim.scenario.tables.sampling import SamplingTable
 
 Drawn: TypeAlias = float | tuple[float, ...]
 

@@ -10,8 +10,8 @@ from pydantic_core import core_schema
 
 from wearsim.plugins import Options, RandomInputSpec
 from wearsim.scenario.parse.fields import model_at, target_of
-from wearsim.scenario.parse.key_index import REQUIRED, TABLES
 from wearsim.scenario.parse.mistakes import installed
+from wearsim.scenario.parse.toml import REQUIRED, TABLES
 from wearsim.scenario.random.model import (
     FRICTION,
     WITH_MARGINAL,

@@ -1,4 +1,4 @@
-"""Fields of options models: their alternatives, their form in words, and targets of random inputs."""
+"""Fields of options models: alternatives, form in words, and what a random input may set."""
 
 from __future__ import annotations
 
@@ -99,8 +99,8 @@ def _form(part: Any, quantity: Quantity | None = None) -> str | None:
 
 def _limits(marks: Iterable[Any]) -> dict[str, Any]:
     """Return the bounds of a number, by their names in pydantic."""
-    bounds = {(name, getattr(mark, name, None)): None for mark in marks for name in _LIMITS}
-    return {name: bound for name, bound in bounds if bound is not None}
+    found = [(name, getattr(mark, name, None)) for mark in marks for name in _LIMITS]
+    return {name: bound for name, bound in found if bound is not None}
 
 
 def _in_words(limits: Mapping[str, Any]) -> str:

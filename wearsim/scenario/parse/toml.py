@@ -10,26 +10,63 @@ from typing import Any
 
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.mechanics.hertz.elasticity import combine
-from wearsim.scenario.parse.key_index import REQUIRED, TABLES, keys_by_place
-from wearsim.scenario.parse.mistakes import Mistakes, nearest
+from wearsim.plugins import LoadSpec, RandomInputSpec
+from wearsim.scenario.parse.mistakes import Mistakes, Table, installed, nearest
 from wearsim.scenario.parse.overrides import apply_overrides
-from wearsim.scenario.random.model import RandomInput
+from wearsim.scenario.random.model import RandomInput, RandomInputTable
 from wearsim.scenario.random.read import validate
 from wearsim.scenario.scenario import Scenario
-from wearsim.scenario.tables.bodies import Cylinder, Roller, read_cylinder, read_roller
+from wearsim.scenario.tables.bodies import (
+    Cylinder,
+    CylinderTable,
+    Roller,
+    RollerTable,
+    read_cylinder,
+    read_roller,
+)
 from wearsim.scenario.tables.plain import (
+    CreepageTable,
+    EvolutionTable,
+    FrictionTable,
+    OperationTable,
+    OutputsTable,
+    SamplingTable,
     TopTable,
+    check_correlation,
     check_lists,
     read_creepage,
     read_operation,
     read_outputs,
 )
-from wearsim.scenario.tables.plugin import read_contact, read_load, read_wear
-from wearsim.scenario.tables.sampling import check_correlation
+from wearsim.scenario.tables.plugin import (
+    PLUGIN_TABLES,
+    ContactTable,
+    LoadTable,
+    WearTable,
+    read_contact,
+    read_load,
+    read_wear,
+)
 from wearsim.units import shown
 
 DUNDURS_LIMIT = 0.1
 
+TABLES: dict[str, type[Table]] = {
+    "roller": RollerTable,
+    "cylinder": CylinderTable,
+    "operation": OperationTable,
+    "load": LoadTable,
+    "friction": FrictionTable,
+    "creepage": CreepageTable,
+    "contact": ContactTable,
+    "wear": WearTable,
+    "evolution": EvolutionTable,
+    "outputs": OutputsTable,
+    "sampling": SamplingTable,
+}
+REQUIRED = ("roller", "cylinder", "operation", "load", "friction", "creepage")
+
+#: functions that read the tables with more checks than those of their models
 READERS: dict[str, Callable[[Mapping[str, object], Mistakes], Any]] = {
     "roller": read_roller,
     "cylinder": read_cylinder,
@@ -40,7 +77,6 @@ READERS: dict[str, Callable[[Mapping[str, object], Mistakes], Any]] = {
     "wear": read_wear,
     "outputs": read_outputs,
 }
-"""Functions that read the tables of which the model is not all."""
 
 
 def load_scenario(path: str | Path, overrides: Mapping[str, object] | None = None) -> Scenario:
@@ -209,3 +245,19 @@ def _dundurs_note(roller: Roller, cylinder: Cylinder) -> list[str]:
         " pressure and traction, which is neglected, is no longer small"
     )
     return [note] if abs(dundurs) > DUNDURS_LIMIT else []
+
+
+def keys_by_place() -> dict[str, set[str]]:
+    """Return the keys of every table and of every plugin, by their place in words."""
+    keys = {"the top of the file": set(TopTable.model_fields)}
+    keys |= {f"[{table}]": set(model.model_fields) for table, model in TABLES.items()}
+    for table, (_, key, kind) in PLUGIN_TABLES.items():
+        for spec in installed(kind):
+            term = isinstance(spec, LoadSpec) and spec.role == "term"
+            place = f"[load.{spec.name}]" if term else f'[{table}] with {key} = "{spec.name}"'
+            keys[place] = set(spec.options.model_fields)
+    keys["a random input"] = set(RandomInputTable.model_fields)
+    for spec in installed(RandomInputSpec):
+        place = f'a random input with distribution = "{spec.name}"'
+        keys[place] = set(spec.options.model_fields)
+    return keys

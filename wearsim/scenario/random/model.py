@@ -21,6 +21,7 @@ Role: TypeAlias = Literal["scalar", "joint", "field", "process"]
 LEAST = 1.0 - BELOW_ONE  # least uniform number of a draw
 MISALIGNMENT = "creepage.misalignment"
 FRICTION = "friction.coefficient"
+#: random values of one contact: field name in the contact solution, by scenario key
 CONTACT_FIELDS = {
     "load.normal_force": "normal_force_offset",
     FRICTION: "friction",
@@ -29,13 +30,12 @@ CONTACT_FIELDS = {
     "creepage.yaw": "yaw",
     "creepage.tilt": "tilt",
 }
-"""Random values of one contact: field name in the contact solution, by scenario key."""
+#: keys of the values that may vary from pass to pass
 OF_A_CONTACT = (*CONTACT_FIELDS, MISALIGNMENT)
-"""Keys of the values that may vary from pass to pass."""
+#: keys of the values that may differ from roller to roller
 OF_A_ROLLER = (*OF_A_CONTACT, "roller.offset")
-"""Keys of the values that may differ from roller to roller."""
+#: roles of the distributions that need a marginal distribution
 WITH_MARGINAL = ("field", "process")
-"""Roles of the distributions that need a marginal distribution."""
 RANDOM_PLACES = "the values of [load], [friction], [creepage] and [wear], and roller.offset"
 
 
@@ -122,9 +122,9 @@ class RandomInput:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Notes for the user on the validity of the distribution."""
-        if isinstance(self.distribution, JointDistribution):
-            return ()
-        return self.distribution.warnings
+        return (
+            () if isinstance(self.distribution, JointDistribution) else self.distribution.warnings
+        )
 
     @property
     def scalar(self) -> Distribution:

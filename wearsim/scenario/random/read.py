@@ -14,8 +14,14 @@ from wearsim.errors import ScenarioError
 from wearsim.plugins import Distribution, JointDistribution, RandomInputSpec
 from wearsim.quantities import Quantity
 from wearsim.scenario.parse.fields import RandomTarget, form, model_at, target_of
-from wearsim.scenario.parse.mistakes import Mistakes, installed
-from wearsim.scenario.parse.validate import M, key_of_file, split_keys, validate_options
+from wearsim.scenario.parse.mistakes import (
+    M,
+    Mistakes,
+    installed,
+    key_of_file,
+    split_keys,
+    validate_options,
+)
 from wearsim.scenario.random.model import (
     CONTACT_FIELDS,
     FRICTION,
@@ -256,12 +262,11 @@ def _read_marginal(
         mistakes.add(place, "distribution", "is not text", shown(kind), expected)
     else:
         spec = mistakes.find_plugin(RandomInputSpec, kind, place, "distribution")
-    if spec and spec.role == "scalar":
-        return _build(mistakes, spec, options, place, quantity)
-    if spec:
+    if spec and spec.role != "scalar":
         what = f"is a {spec.role}, but a marginal is the distribution of one number"
         mistakes.add(place, "distribution", what, shown(kind), expected)
-    return None
+        return None
+    return _build(mistakes, spec, options, place, quantity) if spec else None
 
 
 def _build(

@@ -8,9 +8,8 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from wearsim.scenario.parse.key_index import TABLES, keys_by_place
-from wearsim.scenario.parse.mistakes import Mistakes
-from wearsim.scenario.parse.validate import replace_numbers
+from wearsim.scenario.parse.mistakes import Mistakes, replace_numbers
+from wearsim.scenario.parse.toml import TABLES, keys_by_place
 from wearsim.scenario.scenario import Drawn, Scenario
 from wearsim.scenario.tables.plain import check_angles, check_lists
 from wearsim.scenario.tables.plugin import LoadChoice, check_load

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, cast
@@ -22,8 +23,7 @@ from wearsim.plugins import (
     registry,
 )
 from wearsim.quantities import Length, PositiveLength
-from wearsim.scenario.parse.mistakes import Mistakes, Table, installed
-from wearsim.scenario.parse.validate import key_of_file, split_keys
+from wearsim.scenario.parse.mistakes import Mistakes, Table, installed, key_of_file, split_keys
 from wearsim.scenario.random.read import validate
 from wearsim.types import Grid, Material
 from wearsim.units import shown
@@ -143,12 +143,12 @@ class WearChoice:
         return self.spec.factory(self.options)
 
 
+#: model of the table's own keys, key with the name of the plugin, kind of plugin
 PLUGIN_TABLES: dict[str, tuple[type[Table], str, type[Spec]]] = {
     "contact": (ContactTable, "model", ContactModelSpec),
     "load": (LoadTable, "kind", LoadSpec),
     "wear": (WearTable, "law", WearLawSpec),
 }
-"""Tables that choose a plugin: model of their own keys, key with its name, kind of plugin."""
 
 
 def _choose(
@@ -247,3 +247,26 @@ def _read_term(name: str, raw: dict[str, object], mistakes: Mistakes) -> TermCho
         return None
     options = validate(mistakes, spec.options, raw, table) if spec else None
     return TermChoice(name, options) if options is not None else None
+
+
+def described_model(model: str, scenario_text: str) -> str:
+    """Return the label of a contact model, ``slender (tangential = "fastsim")``.
+
+    Parameters
+    ----------
+    model : str
+        Name of the model.
+    scenario_text : str
+        TOML of the scenario; the model's plugin need not be installed.
+
+    Returns
+    -------
+    str
+        Only the name if the scenario gives no option.
+    """
+    given = [
+        f"{key} = {shown(value)}"
+        for key, value in tomllib.loads(scenario_text).get("contact", {}).items()
+        if key not in ContactTable.model_fields
+    ]
+    return f"{model} ({', '.join(given)})" if given else model

@@ -10,7 +10,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from wearsim.scenario.tables.sampling import SamplingTable
+from wearsim.scenario.tables.plain import SamplingTable
 from wearsim.studies.ensemble.control_variate import DRAWS
 from wearsim.studies.ensemble.designs import BASE_PLANS, EnsemblePlan
 from wearsim.types import FloatArray
