@@ -3,8 +3,7 @@
 from wearsim.scenario.parse.overrides import parse_override
 from wearsim.scenario.parse.toml import load_scenario, parse_scenario
 from wearsim.scenario.random.model import Persistence, RandomInput
-from wearsim.scenario.random.realise import realise
-from wearsim.scenario.scenario import Drawn, Scenario, require_run
+from wearsim.scenario.scenario import Drawn, Scenario, realise, require_run
 from wearsim.scenario.schema import scenario_schema
 from wearsim.scenario.tables.bodies import Cylinder, Roller, read_profile
 from wearsim.scenario.tables.plain import (

@@ -9,12 +9,11 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from annotated_types import MultipleOf
-from pydantic import BaseModel, GetCoreSchemaHandler, GetJsonSchemaHandler, PlainValidator
+from pydantic import BaseModel, PlainValidator
 from pydantic.fields import FieldInfo
-from pydantic_core import CoreSchema, core_schema
 
 from wearsim.quantities import HostQuantity, Quantity
-from wearsim.units import QuantityError, shown
+from wearsim.units import shown
 
 _LIMITS = {"gt": "above", "ge": "at least", "lt": "below", "le": "at most"}
 
@@ -112,6 +111,8 @@ def _in_words(limits: Mapping[str, Any]) -> str:
 class RandomTarget:
     """The number, or the numbers, that a random input sets.
 
+    A key that takes a joint random input has it in its annotation.
+
     Parameters
     ----------
     quantity : Quantity, optional
@@ -149,46 +150,11 @@ class RandomTarget:
         return shown(ends)
 
 
-@dataclass(frozen=True)
-class JointTarget:
-    """Annotation of a key for a joint random input: ``Annotated[None, JointTarget(...)]``.
-
-    Parameters
-    ----------
-    components : tuple of str
-        The keys of the same table that the input sets together.
-    quantity : Quantity
-        Quantity of the components.
-    example : str
-        A random input as it is written in a scenario.
-    """
-
-    components: tuple[str, ...]
-    quantity: Quantity
-    example: str
-
-    def parse(self, value: object) -> None:
-        """Reject `value`: a random input is read before the validation."""
-        raise QuantityError(
-            "is not a random input", shown(value), f"a table such as {self.example}"
-        )
-
-    def __get_pydantic_core_schema__(
-        self, source: Any, handler: GetCoreSchemaHandler
-    ) -> CoreSchema:
-        return core_schema.no_info_plain_validator_function(self.parse)
-
-    def __get_pydantic_json_schema__(
-        self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
-        return {"type": "object"}
-
-
 def target_of(field: FieldInfo) -> RandomTarget | None:
     """Return what a random input in a field sets, or None for a field without numbers."""
     for mark in field.metadata:
-        if isinstance(mark, JointTarget):
-            return RandomTarget(mark.quantity, components=mark.components)
+        if isinstance(mark, RandomTarget):
+            return mark
     for part in alternatives(field):
         kind, *marks = get_args(part) if get_origin(part) is Annotated else (part,)
         if kind is float:

@@ -69,7 +69,7 @@ class Mistakes:
         self,
         file: str,
         read: Callable[[str], str],
-        find_keys: Callable[[], Mapping[str, Collection[str]]],
+        find_keys: Callable[[], Mapping[str, Collection[str]]] = dict,
     ) -> None:
         self.file = file
         self.read = read
@@ -108,13 +108,6 @@ class Mistakes:
         """Raise a ScenarioError if there is any mistake."""
         if self.entries:
             raise ScenarioError(self.file, self.entries)
-
-    def require_one(self, raw: Mapping[str, object], table: str, keys: tuple[str, ...]) -> None:
-        """Add a mistake unless exactly one of `keys` is given."""
-        given = [key for key in keys if key in raw]
-        if len(given) != 1:
-            got = " and ".join(given) or "none"
-            self.add(table, " or ".join(keys), "exactly one is needed", got)
 
     def find_plugin(self, kind: type[S], name: str, table: str, key: str) -> S | None:
         """Return the plugin that a table's `key` names, or None after adding a mistake."""

@@ -7,17 +7,11 @@ from collections.abc import Mapping, MutableMapping
 from typing import Any
 
 from wearsim.errors import Mistake, ScenarioError
-from wearsim.scenario.tables.plain import CADENCES
+from wearsim.scenario.tables.plain import ALTERNATIVES
 from wearsim.units import shown
 
 #: Keys that exclude each other: an override of one removes the others.
-_ALTERNATIVES = {
-    "roller": (("radius", "diameter"), ("crown_radius", "crown_diameter")),
-    "cylinder": (("radius", "diameter"),),
-    "operation": (("duration", "passes"),),
-    "creepage": (("misalignment", "yaw"), ("misalignment", "tilt")),
-    "outputs": (CADENCES,),
-}
+_ALTERNATIVES = {**ALTERNATIVES, "creepage": (("misalignment", "yaw"), ("misalignment", "tilt"))}
 
 
 def parse_override(text: str) -> tuple[str, object]:

@@ -32,10 +32,10 @@ from wearsim.scenario.tables.plain import (
     OutputsTable,
     SamplingTable,
     TopTable,
+    check_alternatives,
     check_correlation,
     check_lists,
     read_creepage,
-    read_operation,
     read_outputs,
 )
 from wearsim.scenario.tables.plugin import (
@@ -70,7 +70,6 @@ REQUIRED = ("roller", "cylinder", "operation", "load", "friction", "creepage")
 READERS: dict[str, Callable[[Mapping[str, object], Mistakes], Any]] = {
     "roller": read_roller,
     "cylinder": read_cylinder,
-    "operation": read_operation,
     "load": read_load,
     "creepage": read_creepage,
     "contact": read_contact,
@@ -160,7 +159,7 @@ def parse_scenario(
     top = _read_top(data, mistakes)
     sections = {table: _read_table(table, data, mistakes) for table in TABLES}
     check_lists(mistakes, data)
-    check_correlation(sections["sampling"], mistakes)
+    check_correlation(mistakes, sections["sampling"])
     mistakes.raise_any()
     random = tuple(mistakes.random_inputs)
     return Scenario(
@@ -223,6 +222,7 @@ def _read_table(table: str, data: Mapping[str, object], mistakes: Mistakes) -> A
         expected = f"a line [{table}] and its keys below"
         mistakes.add("", table, "is not a table", shown(raw), expected)
         return None
+    check_alternatives(mistakes, raw, table)
     if table in READERS:
         return READERS[table](raw, mistakes)
     return validate(mistakes, TABLES[table], raw, table)

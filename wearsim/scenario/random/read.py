@@ -40,6 +40,7 @@ from wearsim.units import QuantityError, shown
 
 Loc: TypeAlias = tuple[str | int, ...]
 
+_ONE_RANDOM = 'one random input for all rollers, with persistence = "per-roller" to differ'
 _NOT_RANDOM = f"a value; only {RANDOM_PLACES} can be random"
 
 
@@ -79,7 +80,9 @@ def _with_means(
         elif isinstance(value, list):
             for entry, item in enumerate(value):
                 if isinstance(item, dict) and _is_random(item, inner):
-                    _refuse_entry(mistakes, table, key, entry)
+                    expected = _ONE_RANDOM if f"{table}.{key}" in OF_A_ROLLER else _NOT_RANDOM
+                    place = f"{key} (entry {entry + 1})"
+                    mistakes.add(table, place, "cannot be random", "a table", expected)
                     refused.append((*here, entry))
     return values, refused
 
@@ -87,13 +90,6 @@ def _with_means(
 def _is_random(table: Mapping[str, object], model: type[BaseModel] | None) -> bool:
     """Return whether a table is a random input, and not a table of its field's model."""
     return "distribution" in table and not (model and "distribution" in model.model_fields)
-
-
-def _refuse_entry(mistakes: Mistakes, table: str, key: str, entry: int) -> None:
-    expected = _NOT_RANDOM
-    if f"{table}.{key}" in OF_A_ROLLER:
-        expected = 'one random input for all rollers, with persistence = "per-roller" to differ'
-    mistakes.add(table, f"{key} (entry {entry + 1})", "cannot be random", "a table", expected)
 
 
 def _means(

@@ -126,8 +126,6 @@ def _radius(radius: float | None, diameter: float | None) -> float | None:
 
 def read_roller(raw: Mapping[str, object], mistakes: Mistakes) -> Roller | None:
     """Return the rollers, or None after adding the mistakes of the table [roller]."""
-    mistakes.require_one(raw, "roller", ("radius", "diameter"))
-    mistakes.require_one(raw, "roller", ("crown_radius", "crown_diameter"))
     table = validate(mistakes, RollerTable, raw, "roller")
     if table is None:
         return None
@@ -142,7 +140,6 @@ def read_roller(raw: Mapping[str, object], mistakes: Mistakes) -> Roller | None:
 
 def read_cylinder(raw: Mapping[str, object], mistakes: Mistakes) -> Cylinder | None:
     """Return the cylinder, or None after adding the mistakes of the table [cylinder]."""
-    mistakes.require_one(raw, "cylinder", ("radius", "diameter"))
     table = validate(mistakes, CylinderTable, raw, "cylinder")
     if table is None:
         return None

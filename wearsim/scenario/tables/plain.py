@@ -1,4 +1,4 @@
-"""Tables without plugins: [operation], [friction], [creepage], [evolution], [outputs], [sampling]."""
+"""Tables without plugins, from [operation] to [sampling]."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, PlainValidator
 
 from wearsim.quantities import (
     Angle,
@@ -17,11 +17,10 @@ from wearsim.quantities import (
     PositiveRotationSpeed,
     Quantity,
 )
-from wearsim.scenario.parse.fields import JointTarget
+from wearsim.scenario.parse.fields import RandomTarget
 from wearsim.scenario.parse.mistakes import Mistakes, Table, nearest
-from wearsim.scenario.random.model import RandomInput
 from wearsim.scenario.random.read import validate
-from wearsim.units import ANGLE, shown
+from wearsim.units import ANGLE, QuantityError, shown
 from wearsim.uq.sampling.gaussian_copula import GaussianCopula
 
 DEFAULT_TOLERANCE = 1e-3
@@ -55,7 +54,13 @@ class FrictionTable(Table):
     coefficient: float = Field(gt=0.0, description="Coefficient of friction.")
 
 
-SLACK = JointTarget(("yaw", "tilt"), Quantity(ANGLE), '{distribution = "disc", radius = "2 mrad"}')
+def _refuse(value: object) -> None:
+    """Reject a value: a random input is read before the validation."""
+    expected = 'a table such as {distribution = "disc", radius = "2 mrad"}'
+    raise QuantityError("is not a random input", shown(value), expected)
+
+
+SLACK = RandomTarget(Quantity(ANGLE), components=("yaw", "tilt"))
 
 
 class CreepageTable(Table):
@@ -78,7 +83,7 @@ class CreepageTable(Table):
     tilt: PerRoller[Angle] = Field(
         default=0.0, description="Angle about the rolling direction; causes spin."
     )
-    misalignment: Annotated[None, SLACK] = Field(
+    misalignment: Annotated[None, PlainValidator(_refuse), SLACK] = Field(
         default=None, description="A joint random input that sets yaw and tilt together."
     )
     differential_slip: bool = Field(
@@ -167,12 +172,22 @@ DEFAULT_RECORDS = 20
 LARGEST_ANGLE = 0.1  # rad; slip and shift are linear in the angles
 CADENCES = ("records", "every_passes", "every")
 
+#: keys of which at most one may be given; exactly one of a radius and a diameter
+ALTERNATIVES = {
+    "roller": (("radius", "diameter"), ("crown_radius", "crown_diameter")),
+    "cylinder": (("radius", "diameter"),),
+    "operation": (("duration", "passes"),),
+    "outputs": (CADENCES,),
+}
 
-def read_operation(raw: Mapping[str, object], mistakes: Mistakes) -> OperationTable | None:
-    """Return the table [operation], or None after adding its mistakes."""
-    if "duration" in raw and "passes" in raw:
-        mistakes.require_one(raw, "operation", ("duration", "passes"))
-    return validate(mistakes, OperationTable, raw, "operation")
+
+def check_alternatives(mistakes: Mistakes, raw: Mapping[str, object], table: str) -> None:
+    """Add a mistake for each group of alternative keys of which not exactly one is given."""
+    for keys in ALTERNATIVES.get(table, ()):
+        given = [key for key in keys if key in raw]
+        if len(given) > 1 or (not given and table in {"roller", "cylinder"}):
+            got = " and ".join(given) or "none"
+            mistakes.add(table, " or ".join(keys), "exactly one is needed", got)
 
 
 def read_creepage(raw: Mapping[str, object], mistakes: Mistakes) -> CreepageTable | None:
@@ -209,9 +224,7 @@ def read_outputs(raw: Mapping[str, object], mistakes: Mistakes) -> OutputsTable 
     given = [key for key in CADENCES if key in raw]
     if not given:
         raw = {**raw, "records": DEFAULT_RECORDS}
-    elif len(given) > 1:
-        mistakes.require_one(raw, "outputs", CADENCES)
-    elif "spacing" in raw and given != ["records"]:
+    elif "spacing" in raw and "records" not in given:
         mistakes.add("outputs", "spacing", f"goes with records, not with {given[0]}")
     return validate(mistakes, OutputsTable, raw, "outputs")
 
@@ -230,38 +243,34 @@ def check_lists(mistakes: Mistakes, data: Mapping[str, Any]) -> None:
             mistakes.add(table, key, "a list has one value per roller", got, expected)
 
 
-def check_correlation(table: SamplingTable | None, mistakes: Mistakes) -> None:
+def check_correlation(mistakes: Mistakes, table: SamplingTable | None) -> None:
     """Add the mistakes of the correlations; all random inputs must have been read."""
     known = {item.name: item for item in mistakes.random_inputs}
     rows = table.correlation if table else ()
-    valid = [
-        _is_valid((first, second), f"correlation (entry {count})", known, mistakes)
-        for count, (first, second, _) in enumerate(rows, start=1)
-    ]
-    if rows and all(valid):
+    before = len(mistakes.entries)
+    for count, row in enumerate(rows, start=1):
+        key, names = f"correlation (entry {count})", row[:2]
+        for name in names:
+            if name not in mistakes.random:
+                hint = nearest(name, known) or f" (known: {', '.join(sorted(known)) or 'none'})"
+                mistakes.add("sampling", key, f"'{name}' is not a random input{hint}")
+        pair = [known[name] for name in names if name in known]
+        if len(pair) < len(names):
+            continue  # an input that has mistakes itself adds none here
+        for item in pair:
+            if item.role != "scalar":
+                what = f"'{item.name}' is a {item.role}, and only single numbers can be correlated"
+                mistakes.add("sampling", key, what, shown(item.kind))
+        first, second = (item.persistence for item in pair)
+        if first != second:
+            what = "needs two random inputs of the same persistence"
+            mistakes.add("sampling", key, what, f"{first} and {second}")
+    if (
+        rows
+        and len(mistakes.entries) == before
+        and known.keys() >= {n for r in rows for n in r[:2]}
+    ):
         try:
-            GaussianCopula(rows, {item.name: item.dimension for item in mistakes.random_inputs})
+            GaussianCopula(rows, {item.name: item.dimension for item in known.values()})
         except ValueError as error:
             mistakes.add("sampling", "correlation", str(error))
-
-
-def _is_valid(
-    pair: tuple[str, str], key: str, known: Mapping[str, RandomInput], mistakes: Mistakes
-) -> bool:
-    """Check one pair of random inputs; an input that has mistakes itself adds none here."""
-    for name in pair:
-        if name not in mistakes.random:
-            hint = nearest(name, known) or f" (known: {', '.join(sorted(known)) or 'none'})"
-            mistakes.add("sampling", key, f"'{name}' is not a random input{hint}")
-    if not known.keys() >= set(pair):
-        return False
-    first, second = known[pair[0]], known[pair[1]]
-    unfit = [item for item in (first, second) if item.role != "scalar"]
-    for item in unfit:
-        what = f"'{item.name}' is a {item.role}, and only single numbers can be correlated"
-        mistakes.add("sampling", key, what, shown(item.kind))
-    same = first.persistence == second.persistence
-    if not same:
-        what = "needs two random inputs of the same persistence"
-        mistakes.add("sampling", key, what, f"{first.persistence} and {second.persistence}")
-    return same and not unfit
