@@ -29,6 +29,21 @@ from wearsim.scenario.tables.plugin import ContactChoice, LoadChoice, WearChoice
 
 Drawn: TypeAlias = float | tuple[float, ...]
 
+_NO_LENGTH = Mistake(
+    "operation",
+    "duration or passes",
+    "is needed for a run",
+    "none",
+    'one of them, such as duration = "450 min"',
+)
+_NO_WEAR = Mistake(
+    "wear",
+    "",
+    "the table is needed for a run",
+    None,
+    'law = "archard-dissipation" and its options',
+)
+
 
 @dataclass(frozen=True, eq=False)
 class Scenario:
@@ -115,7 +130,7 @@ class Scenario:
         if self.operation.passes is not None:
             return self.operation.passes
         if self.operation.duration is None:
-            raise ScenarioError(self.file, [_no_length()])
+            raise ScenarioError(self.file, [_NO_LENGTH])
         return max(1, round(self.pass_rate * self.operation.duration))
 
     @property
@@ -134,11 +149,6 @@ class Scenario:
         return value if isinstance(value, tuple) else (value,) * self.operation.rollers
 
 
-def _no_length() -> Mistake:
-    expected = 'one of them, such as duration = "450 min"'
-    return Mistake("operation", "duration or passes", "is needed for a run", "none", expected)
-
-
 def require_run(scenario: Scenario) -> None:
     """Check that a scenario has all that a run needs.
 
@@ -152,12 +162,9 @@ def require_run(scenario: Scenario) -> None:
     ScenarioError
         If it has no duration or no wear law; both are reported together.
     """
-    mistakes = []
-    if scenario.operation.duration is None and scenario.operation.passes is None:
-        mistakes.append(_no_length())
-    if scenario.wear is None:
-        expected = 'law = "archard-dissipation" and its options'
-        mistakes.append(Mistake("wear", "", "the table is needed for a run", None, expected))
+    operation = scenario.operation
+    mistakes = [] if operation.duration or operation.passes else [_NO_LENGTH]
+    mistakes += [_NO_WEAR] if scenario.wear is None else []
     if mistakes:
         raise ScenarioError(scenario.file, mistakes)
 

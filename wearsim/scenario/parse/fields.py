@@ -75,7 +75,7 @@ def form(field: FieldInfo, quantity: Quantity | None = None) -> str | None:
     known = [f"a multiple of {step}" for step in steps] or list(
         dict.fromkeys(text for part in parts if (text := _form(part, quantity)))
     )
-    limits = _in_words(_limits(field.metadata))
+    limits = in_words(_limits(field.metadata))
     of = " of " if limits.startswith("at least") else " "
     return f"{' or '.join(known)}{of}{limits}".rstrip() if known else None
 
@@ -102,7 +102,8 @@ def _limits(marks: Iterable[Any]) -> dict[str, Any]:
     return {name: bound for name, bound in found if bound is not None}
 
 
-def _in_words(limits: Mapping[str, Any]) -> str:
+def in_words(limits: Mapping[str, Any]) -> str:
+    """Return the range of a number, such as "above 0 and at most 1"."""
     words = {name: f"{end:g}" if isinstance(end, float) else end for name, end in limits.items()}
     return " and ".join(f"{_LIMITS[name]} {end}" for name, end in words.items())
 
@@ -126,11 +127,6 @@ class RandomTarget:
     quantity: Quantity | None
     limits: Mapping[str, float] = field(default_factory=dict)
     components: tuple[str, ...] = ()
-
-    @property
-    def allowed(self) -> str:
-        """Range of the values, in words."""
-        return _in_words(self.limits)
 
     @property
     def range(self) -> tuple[float, float]:

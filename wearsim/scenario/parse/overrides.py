@@ -72,9 +72,11 @@ def apply_overrides(text: str, file: str, overrides: Mapping[str, object]) -> st
         *names, key = dotted.split(".")
         try:
             table = _descend(document, names, key)
-            table[key] = _item(value)
+            table[key] = value
         except ValueError as error:
-            mistakes.append(Mistake("", dotted, str(error), shown(value)))
+            unfit = isinstance(error, tomlkit.exceptions.ConvertError)
+            what = "has a value that TOML cannot hold" if unfit else str(error)
+            mistakes.append(Mistake("", dotted, what, shown(value)))
             continue
         prefix = ".".join(names)
         for group in _ALTERNATIVES.get(prefix, ()):
@@ -86,25 +88,14 @@ def apply_overrides(text: str, file: str, overrides: Mapping[str, object]) -> st
     return tomlkit.dumps(document)
 
 
-def _item(value: object) -> Any:
-    import tomlkit  # noqa: PLC0415
-
-    try:
-        return tomlkit.item(value)
-    except ValueError as error:
-        raise ValueError("has a value that TOML cannot hold") from error
-
-
 def _descend(document: Any, tables: list[str], key: str) -> MutableMapping[str, Any]:
     """Return the table that holds `key`; missing tables are created."""
-    import tomlkit  # noqa: PLC0415
-
     if not all([*tables, key]):
         raise ValueError("is not a key to override")
     table = document
     for name in tables:
         if name not in table:
-            table[name] = tomlkit.table()
+            table[name] = {}
         table = table[name]
         if not isinstance(table, MutableMapping):
             raise ValueError(f"cannot be set, since '{name}' is not a table")

@@ -109,8 +109,8 @@ def load_scenario(path: str | Path, overrides: Mapping[str, object] | None = Non
     except UnicodeDecodeError as error:
         raise ScenarioError(str(path), [Mistake("", "", "is not text in UTF-8")]) from error
     except OSError as error:
-        mistake = Mistake("", "", f"the file cannot be read ({error.strerror})")
-        raise ScenarioError(str(path), [mistake]) from error
+        what = f"the file cannot be read ({error.strerror})"
+        raise ScenarioError(str(path), [Mistake("", "", what)]) from error
     return parse_scenario(text, str(path), read, overrides)
 
 
@@ -257,7 +257,7 @@ def keys_by_place() -> dict[str, set[str]]:
             place = f"[load.{spec.name}]" if term else f'[{table}] with {key} = "{spec.name}"'
             keys[place] = set(spec.options.model_fields)
     keys["a random input"] = set(RandomInputTable.model_fields)
-    for spec in installed(RandomInputSpec):
-        place = f'a random input with distribution = "{spec.name}"'
-        keys[place] = set(spec.options.model_fields)
-    return keys
+    return keys | {
+        f'a random input with distribution = "{spec.name}"': set(spec.options.model_fields)
+        for spec in installed(RandomInputSpec)
+    }

@@ -13,7 +13,7 @@ from pydantic.fields import FieldInfo
 from wearsim.errors import ScenarioError
 from wearsim.plugins import Distribution, JointDistribution, RandomInputSpec
 from wearsim.quantities import Quantity
-from wearsim.scenario.parse.fields import RandomTarget, form, model_at, target_of
+from wearsim.scenario.parse.fields import RandomTarget, form, in_words, model_at, target_of
 from wearsim.scenario.parse.mistakes import (
     M,
     Mistakes,
@@ -136,23 +136,21 @@ def _fits(
     if target.components:
         return True
     (low, high), (least, most), limits = item.scalar.support, item.extremes, target.limits
-    what = None
+    allowed, what = in_words(limits), None
     if low < target.range[0] or least <= limits.get("gt", -math.inf):
-        what = f"takes values down to {amount(low, target.quantity)}"
+        what = f"takes values down to {amount(low, target.quantity)}, and must be {allowed}"
     elif high > target.range[1] or most >= limits.get("lt", math.inf):
-        what = f"takes values up to {amount(high, target.quantity)}"
-    if what and low == high:
-        got, expected = amount(low, target.quantity), f"a value {target.allowed}"
-        mistakes.add(table, key, f"must be {target.allowed}", got, expected)
-    elif what:
-        expected = f"maxent with support {target.support} or truncated-normal"
-        what = f"{what}, and must be {target.allowed}"
-        mistakes.add(table, key, what, item.describe(), expected)
+        what = f"takes values up to {amount(high, target.quantity)}, and must be {allowed}"
     elif not math.isfinite(item.mean[0]):
         mistakes.add(table, key, "has no finite mean", item.describe())
-    else:
-        return True
-    return False
+        return False
+    if what and low == high:
+        got = amount(low, target.quantity)
+        mistakes.add(table, key, f"must be {allowed}", got, f"a value {allowed}")
+    elif what:
+        expected = f"maxent with support {target.support} or truncated-normal"
+        mistakes.add(table, key, what, item.describe(), expected)
+    return what is None
 
 
 def read_random_input(

@@ -120,8 +120,9 @@ class Cylinder:
     profile: Profile | None = None
 
 
-def _radius(radius: float | None, diameter: float | None) -> float | None:
-    return radius if diameter is None else 0.5 * diameter
+def _radius(radius: float | None, diameter: float | None) -> float:
+    """Return the radius that one of the two gives; without both, a mistake has been added."""
+    return radius or 0.5 * (diameter or 0.0)
 
 
 def read_roller(raw: Mapping[str, object], mistakes: Mistakes) -> Roller | None:
@@ -129,12 +130,11 @@ def read_roller(raw: Mapping[str, object], mistakes: Mistakes) -> Roller | None:
     table = validate(mistakes, RollerTable, raw, "roller")
     if table is None:
         return None
-    radius = _radius(table.radius, table.diameter)
-    crown = _radius(table.crown_radius, table.crown_diameter)
-    if radius is None or crown is None:
-        return None
     return Roller.model_construct(
-        radius=radius, crown_radius=crown, offset=table.offset, material=table.material
+        radius=_radius(table.radius, table.diameter),
+        crown_radius=_radius(table.crown_radius, table.crown_diameter),
+        offset=table.offset,
+        material=table.material,
     )
 
 
@@ -143,13 +143,12 @@ def read_cylinder(raw: Mapping[str, object], mistakes: Mistakes) -> Cylinder | N
     table = validate(mistakes, CylinderTable, raw, "cylinder")
     if table is None:
         return None
-    radius = _radius(table.radius, table.diameter)
     try:
         profile = read_profile(table.profile) if table.profile else None
     except ScenarioError as error:
         mistakes.add_file(error, "cylinder", "profile")
         return None
-    return None if radius is None else Cylinder(radius, table.material, profile)
+    return Cylinder(_radius(table.radius, table.diameter), table.material, profile)
 
 
 def read_profile(file: InputFile) -> Profile:

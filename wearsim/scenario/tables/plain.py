@@ -257,10 +257,9 @@ def check_correlation(mistakes: Mistakes, table: SamplingTable | None) -> None:
         pair = [known[name] for name in names if name in known]
         if len(pair) < len(names):
             continue  # an input that has mistakes itself adds none here
-        for item in pair:
-            if item.role != "scalar":
-                what = f"'{item.name}' is a {item.role}, and only single numbers can be correlated"
-                mistakes.add("sampling", key, what, shown(item.kind))
+        for item in [item for item in pair if item.role != "scalar"]:
+            what = f"'{item.name}' is a {item.role}, and only single numbers can be correlated"
+            mistakes.add("sampling", key, what, shown(item.kind))
         first, second = (item.persistence for item in pair)
         if first != second:
             what = "needs two random inputs of the same persistence"
