@@ -26,8 +26,6 @@ LATER = (
     "wearsim/results/ensemble/state_slots.py",
     "wearsim/results/ensemble/stored_arrays.py",
     "wearsim/results/ensemble/row_encoding.py",
-    "wearsim/scenario/random/placeholders.py",
-    "wearsim/scenario/random/substitute.py",
 )
 SOURCES = [
     path
