@@ -14,7 +14,6 @@ from wearsim.scenario.parse.mistakes import installed
 from wearsim.scenario.parse.toml import REQUIRED, TABLES
 from wearsim.scenario.random.model import (
     FRICTION,
-    WITH_MARGINAL,
     RandomInputTable,
     can_be_random,
 )
@@ -76,26 +75,30 @@ def _one_of(name: str, models: list[Model]) -> Model | None:
 def _random_inputs() -> RandomInputs:
     """Return the models of what may replace a number, the friction and several numbers."""
     own, specs = RandomInputTable.model_fields, installed(RandomInputSpec)
-    scalars = [_random_input(spec, "{} as marginal", {}) for spec in specs if spec.role == "scalar"]
-    marginal = _one_of("MarginalDistribution", scalars)
+
+    def models(role: str, keys: dict[str, Any], name: str = "{}") -> list[Model]:
+        return [
+            _model(
+                name.format(spec.name),
+                spec.summary,
+                {
+                    "distribution": (Literal[spec.name], own["distribution"]),
+                    **keys,
+                    **_fields(spec.options),
+                },
+            )
+            for spec in specs
+            if spec.role == role
+        ]
+
+    marginal = _one_of("MarginalDistribution", models("scalar", {}, "{} as marginal"))
     drawn = {"persistence": (own["persistence"].annotation, own["persistence"])}
-    of_marginal = {"marginal": (marginal, Field(description=own["marginal"].description))}
-    inputs: dict[str, list[Model]] = {"scalar": [], "process": [], "field": [], "joint": []}
-    for spec in specs:
-        if spec.role not in WITH_MARGINAL:
-            inputs[spec.role].append(_random_input(spec, "{}", drawn))
-        elif marginal:
-            inputs[spec.role].append(_random_input(spec, "{}", {**drawn, **of_marginal}))
-    number = _one_of("RandomInput", inputs["scalar"] + inputs["process"])
-    friction = _one_of("RandomFriction", [number, *inputs["field"]] if number else [])
-    return number, friction, _one_of("JointRandomInput", inputs["joint"])
-
-
-def _random_input(spec: RandomInputSpec, name: str, keys: dict[str, Any]) -> Model:
-    """Return the model of one random input, with `keys` besides its name and its options."""
-    named = Literal[spec.name], RandomInputTable.model_fields["distribution"]
-    fields = {"distribution": named, **keys, **_fields(spec.options)}
-    return _model(name.format(spec.name), spec.summary, fields)
+    of_marginal = Field(description=own["marginal"].description)
+    full = {**drawn, "marginal": (marginal, of_marginal)}
+    processes = models("process", full) if marginal else []
+    number = _one_of("RandomInput", models("scalar", drawn) + processes)
+    friction = _one_of("RandomFriction", [number, *models("field", full)] if number else [])
+    return number, friction, _one_of("JointRandomInput", models("joint", drawn))
 
 
 def _choices(table: str, random: RandomInputs) -> list[Model]:

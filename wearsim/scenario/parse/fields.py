@@ -50,10 +50,10 @@ def field_at(model: type[BaseModel], loc: Sequence[str | int]) -> FieldInfo | No
     return owner.model_fields.get(names[-1]) if owner else None
 
 
-def choices(field: FieldInfo | None) -> list[str]:
+def choices(field: FieldInfo) -> list[str]:
     """Return the names between which a field chooses."""
-    parts = alternatives(field) if field else []
-    return [str(item) for part in parts if get_origin(part) is Literal for item in get_args(part)]
+    literals = [part for part in alternatives(field) if get_origin(part) is Literal]
+    return [str(item) for part in literals for item in get_args(part)]
 
 
 def form(field: FieldInfo, quantity: Quantity | None = None) -> str | None:

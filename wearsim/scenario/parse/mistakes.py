@@ -8,11 +8,11 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cached_property
 from typing import TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from wearsim.errors import Mistake, PluginError, ScenarioError
-from wearsim.plugins import Options, Spec, registry
+from wearsim.plugins import Spec, registry
 from wearsim.quantities import Quantity
 from wearsim.scenario.parse.fields import choices, field_at, form, model_at
 from wearsim.scenario.random.model import RandomInput
@@ -34,12 +34,6 @@ _WHAT = {
     **dict.fromkeys(("int_type", "int_parsing", "int_from_float"), "is not a whole number"),
     **dict.fromkeys(("string_type", "string_sub_type"), "is not text"),
 }
-
-
-class Table(Options):
-    """Base class of the scenario's own tables."""
-
-    model_config = ConfigDict(allow_inf_nan=False)
 
 
 class Mistakes:
@@ -101,8 +95,8 @@ class Mistakes:
     def add_file(self, error: ScenarioError, table: str, key: str) -> None:
         """Add the mistakes of a file that the table's `key` names."""
         for mistake in error.mistakes:
-            what = f"{error.file} {mistake}" if mistake.key else f"{error.file}: {mistake}"
-            self.add(table, key, what)
+            colon = "" if mistake.key else ":"
+            self.add(table, key, f"{error.file}{colon} {mistake}")
 
     def raise_any(self) -> None:
         """Raise a ScenarioError if there is any mistake."""
@@ -253,7 +247,7 @@ def _translate(
         mistakes.add(place, key, "is missing", None, expected)
     else:
         what = _WHAT.get(kind, "is out of range" if kind in _BOUNDS else "cannot be used")
-        if kind == "literal_error" and isinstance(value, str):
+        if kind == "literal_error" and isinstance(value, str) and field:
             what += nearest(value, choices(field))
         message = details["msg"].removeprefix("Input should be ")
         expected = expected or message[:1].lower() + message[1:]

@@ -10,8 +10,8 @@ from typing import Any
 
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.mechanics.hertz.elasticity import combine
-from wearsim.plugins import LoadSpec, RandomInputSpec
-from wearsim.scenario.parse.mistakes import Mistakes, Table, installed, nearest
+from wearsim.plugins import LoadSpec, Options, RandomInputSpec
+from wearsim.scenario.parse.mistakes import Mistakes, installed, nearest
 from wearsim.scenario.parse.overrides import apply_overrides
 from wearsim.scenario.random.model import RandomInput, RandomInputTable
 from wearsim.scenario.random.read import validate
@@ -51,7 +51,7 @@ from wearsim.units import shown
 
 DUNDURS_LIMIT = 0.1
 
-TABLES: dict[str, type[Table]] = {
+TABLES: dict[str, type[Options]] = {
     "roller": RollerTable,
     "cylinder": CylinderTable,
     "operation": OperationTable,
@@ -202,10 +202,8 @@ def _syntax_mistake(text: str, message: str) -> Mistake:
 def _read_top(data: Mapping[str, object], mistakes: Mistakes) -> TopTable:
     """Return the keys above the tables; add a mistake for each unknown key and table."""
     own = {key: data[key] for key in TopTable.model_fields if key in data}
-    for key, value in data.items():
-        if key in TABLES or key in own:
-            continue
-        if isinstance(value, dict):
+    for key in [key for key in data if key not in TABLES and key not in own]:
+        if isinstance(data[key], dict):
             mistakes.add(key, "", f"unknown table{nearest(key, TABLES)}")
         else:
             mistakes.add("", key, f"unknown key{mistakes.hint(key, TopTable.model_fields)}")
@@ -230,11 +228,9 @@ def _read_table(table: str, data: Mapping[str, object], mistakes: Mistakes) -> A
 
 def _unused_sampling_note(data: Mapping[str, Any], random: tuple[RandomInput, ...]) -> list[str]:
     """Return a note if the table [sampling] has keys but no input is random."""
-    given = data.get("sampling")
-    if random or not given:
-        return []
-    keys = ", ".join(f"sampling.{key}" for key in given)
-    return [f"{keys} {'has' if len(given) == 1 else 'have'} no effect: no input is random"]
+    keys = [f"sampling.{key}" for key in data.get("sampling", ()) if not random]
+    have = "has" if len(keys) == 1 else "have"
+    return [f"{', '.join(keys)} {have} no effect: no input is random"] if keys else []
 
 
 def _dundurs_note(roller: Roller, cylinder: Cylinder) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
@@ -185,8 +186,7 @@ class RandomInput:
                 words.append(f"frame {self.distribution.frame}")
             words.append(f"of {self.marginal}")
         low, high = self.scalar.support
-        left = "(" if low == -float("inf") else "["
-        right = ")" if high == float("inf") else "]"
+        left, right = "(" if low == -math.inf else "[", ")" if high == math.inf else "]"
         words += [
             f"mean {amount(self.scalar.mean, self.quantity)}",
             f"std {amount(self.scalar.std, self.quantity)}",

@@ -81,8 +81,9 @@ def _with_means(
             for entry, item in enumerate(value):
                 if isinstance(item, dict) and _is_random(item, inner):
                     expected = _ONE_RANDOM if f"{table}.{key}" in OF_A_ROLLER else _NOT_RANDOM
-                    place = f"{key} (entry {entry + 1})"
-                    mistakes.add(table, place, "cannot be random", "a table", expected)
+                    mistakes.add(
+                        table, f"{key} (entry {entry + 1})", "cannot be random", "a table", expected
+                    )
                     refused.append((*here, entry))
     return values, refused
 
@@ -183,14 +184,14 @@ def read_random_input(
     if spec.role in WITH_MARGINAL:
         marginal = _read_marginal(mistakes, raw.get("marginal"), name, target.quantity)
     elif "marginal" in raw:
-        what = f"is only for a field or a process; '{spec.name}' is neither"
-        mistakes.add(name, "marginal", what)
+        mistakes.add(
+            name, "marginal", f"is only for a field or a process; '{spec.name}' is neither"
+        )
     distribution = _build(mistakes, spec, options, name, target.quantity, marginal)
-    if isinstance(distribution, JointDistribution):
-        sets, components = " and ".join(distribution.components), " and ".join(target.components)
-        if sorted(distribution.components) != sorted(target.components):
-            expected = f"a distribution of {components}"
-            mistakes.add(name, "distribution", f"sets {sets}", shown(kind), expected)
+    sets = distribution.components if isinstance(distribution, JointDistribution) else ()
+    if sets and sorted(sets) != sorted(target.components):
+        expected = f"a distribution of {' and '.join(target.components)}"
+        mistakes.add(name, "distribution", f"sets {' and '.join(sets)}", shown(kind), expected)
     if len(mistakes.entries) > before or table is None:
         return None
     inner = str(table.marginal["distribution"]) if table.marginal else ""
@@ -241,8 +242,9 @@ def _read_marginal(
     """Return the marginal distribution of a field or a process."""
     place, expected = f"{name}.marginal", _one_of({"scalar"})
     if raw is None:
-        what = "a table with a distribution and its options"
-        mistakes.add(name, "marginal", "is missing", None, what)
+        mistakes.add(
+            name, "marginal", "is missing", None, "a table with a distribution and its options"
+        )
     if not isinstance(raw, dict):
         return None
     own, options = split_keys(raw, RandomInputTable)

@@ -13,7 +13,7 @@ from wearsim.csv_tables import read_columns
 from wearsim.errors import ScenarioError
 from wearsim.plugins import Options
 from wearsim.quantities import InputFile, Length, PerRoller, PositiveLength, PositivePressure
-from wearsim.scenario.parse.mistakes import Mistakes, Table
+from wearsim.scenario.parse.mistakes import Mistakes
 from wearsim.scenario.random.read import validate
 from wearsim.types import Material, Profile
 from wearsim.units import QuantityError, shown
@@ -28,7 +28,7 @@ MATERIALS = {
 MaterialName: TypeAlias = Literal["steel", "aluminium", "bronze", "ductile-iron"]
 
 
-class MaterialTable(Table):
+class MaterialTable(Options):
     """Elastic constants of a material."""
 
     youngs_modulus: PositivePressure = Field(description="Young's modulus.")
@@ -40,12 +40,11 @@ class MaterialTable(Table):
 
 def _read_material(value: object) -> Material:
     expected = f"one of {', '.join(shown(name) for name in MATERIALS)} or a table of its constants"
-    if isinstance(value, str):
-        if value not in MATERIALS:
-            raise QuantityError("unknown material", shown(value), expected)
+    if isinstance(value, str) and value in MATERIALS:
         return MATERIALS[value]
     if not isinstance(value, dict):
-        raise QuantityError("is not a material", shown(value), expected)
+        what = "unknown material" if isinstance(value, str) else "is not a material"
+        raise QuantityError(what, shown(value), expected)
     table = MaterialTable.model_validate_json(json.dumps(value, default=str), strict=True)
     return Material(table.youngs_modulus, table.poisson_ratio, table.hardness)
 
@@ -56,7 +55,7 @@ MaterialField: TypeAlias = Annotated[
 ]
 
 
-class RollerTable(Table):
+class RollerTable(Options):
     """Rollers: crowned, all of the same shape."""
 
     radius: PositiveLength | None = Field(
@@ -75,7 +74,7 @@ class RollerTable(Table):
     material: MaterialField = Field(description="Name of a material, or a table of its constants.")
 
 
-class CylinderTable(Table):
+class CylinderTable(Options):
     """Cylinder on which the rollers run."""
 
     radius: PositiveLength | None = Field(

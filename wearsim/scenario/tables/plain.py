@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, PlainValidator
 
+from wearsim.plugins import Options
 from wearsim.quantities import (
     Angle,
     NonNegativeTorque,
@@ -18,7 +19,7 @@ from wearsim.quantities import (
     Quantity,
 )
 from wearsim.scenario.parse.fields import RandomTarget
-from wearsim.scenario.parse.mistakes import Mistakes, Table, nearest
+from wearsim.scenario.parse.mistakes import Mistakes, nearest
 from wearsim.scenario.random.read import validate
 from wearsim.units import ANGLE, QuantityError, shown
 from wearsim.uq.sampling.gaussian_copula import GaussianCopula
@@ -26,14 +27,14 @@ from wearsim.uq.sampling.gaussian_copula import GaussianCopula
 DEFAULT_TOLERANCE = 1e-3
 
 
-class TopTable(Table):
+class TopTable(Options):
     """Keys above the first table."""
 
     title: str | None = Field(default=None, description="One line of description.")
     seed: int = Field(default=1, ge=0, le=2**63 - 1, description="Seed of all random draws.")
 
 
-class OperationTable(Table):
+class OperationTable(Options):
     """Speed, duration and number of rollers of the test."""
 
     speed: PositiveRotationSpeed = Field(description="Rotation speed of the cylinder.")
@@ -48,7 +49,7 @@ class OperationTable(Table):
     rollers: int = Field(default=1, ge=1, description="Number of rollers on the cylinder.")
 
 
-class FrictionTable(Table):
+class FrictionTable(Options):
     """Friction between roller and cylinder."""
 
     coefficient: float = Field(gt=0.0, description="Coefficient of friction.")
@@ -60,10 +61,7 @@ def _refuse(value: object) -> None:
     raise QuantityError("is not a random input", shown(value), expected)
 
 
-SLACK = RandomTarget(Quantity(ANGLE), components=("yaw", "tilt"))
-
-
-class CreepageTable(Table):
+class CreepageTable(Options):
     """Creepage between rollers and cylinder."""
 
     drive: Literal["creepage", "free"] = Field(
@@ -83,9 +81,11 @@ class CreepageTable(Table):
     tilt: PerRoller[Angle] = Field(
         default=0.0, description="Angle about the rolling direction; causes spin."
     )
-    misalignment: Annotated[None, PlainValidator(_refuse), SLACK] = Field(
-        default=None, description="A joint random input that sets yaw and tilt together."
-    )
+    misalignment: Annotated[
+        None,
+        PlainValidator(_refuse),
+        RandomTarget(Quantity(ANGLE), components=("yaw", "tilt")),
+    ] = Field(default=None, description="A joint random input that sets yaw and tilt together.")
     differential_slip: bool = Field(
         default=False,
         description="Vary the longitudinal creepage with the rolling radii across the track.",
@@ -96,7 +96,7 @@ class CreepageTable(Table):
     )
 
 
-class EvolutionTable(Table):
+class EvolutionTable(Options):
     """Time integration of the wear."""
 
     stepper: Literal["auto", "implicit", "stabilised", "explicit", "per-pass"] = Field(
@@ -125,7 +125,7 @@ class EvolutionTable(Table):
     max_steps: int = Field(default=1_000_000, gt=0, description="Maximum number of steps.")
 
 
-class OutputsTable(Table):
+class OutputsTable(Options):
     """Records and their schedule."""
 
     records: int | None = Field(
@@ -153,7 +153,7 @@ class OutputsTable(Table):
 Correlation = Annotated[float, Field(ge=-1.0, le=1.0)]
 
 
-class SamplingTable(Table):
+class SamplingTable(Options):
     """Sampling design of the random inputs."""
 
     plan: Literal["monte-carlo", "latin-hypercube", "sobol"] = Field(
@@ -234,10 +234,9 @@ def check_lists(mistakes: Mistakes, data: Mapping[str, Any]) -> None:
     tables = {table: keys for table, keys in data.items() if isinstance(keys, dict)}
     rollers = tables.get("operation", {}).get("rollers", 1)
     for table, key in (("roller", "offset"), ("creepage", "yaw"), ("creepage", "tilt")):
-        value = tables.get(table, {}).get(key)
-        if not isinstance(value, list | tuple) or not isinstance(rollers, int):
-            continue
-        if len(value) != rollers:
+        value: Any = tables.get(table, {}).get(key)
+        listed = isinstance(value, list | tuple) and isinstance(rollers, int)
+        if listed and len(value) != rollers:
             got = f"{len(value)} values" if len(value) != 1 else "1 value"
             expected = f"{rollers}, the value of operation.rollers"
             mistakes.add(table, key, "a list has one value per roller", got, expected)

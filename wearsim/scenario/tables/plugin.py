@@ -23,13 +23,13 @@ from wearsim.plugins import (
     registry,
 )
 from wearsim.quantities import Length, PositiveLength
-from wearsim.scenario.parse.mistakes import Mistakes, Table, installed, key_of_file, split_keys
+from wearsim.scenario.parse.mistakes import Mistakes, installed, key_of_file, split_keys
 from wearsim.scenario.random.read import validate
 from wearsim.types import Grid, Material
 from wearsim.units import shown
 
 
-class ContactTable(Table):
+class ContactTable(Options):
     """Contact model; the keys of the chosen model are its options."""
 
     model: str = Field(default="slender", description="Name of the contact model.")
@@ -47,13 +47,13 @@ class ContactTable(Table):
     )
 
 
-class LoadTable(Table):
+class LoadTable(Options):
     """Load on a roller; other keys are options of the chosen load, sub-tables are added terms."""
 
     kind: str = Field(default="constant", description="Name of the load.")
 
 
-class WearTable(Table):
+class WearTable(Options):
     """Wear law; the other keys are its options."""
 
     law: str = Field(default="archard-dissipation", description="Name of the wear law.")
@@ -133,18 +133,13 @@ class WearChoice:
     law: str
     options: Options
 
-    @property
-    def spec(self) -> WearLawSpec:
-        """Registered specification of the wear law."""
-        return registry().get(WearLawSpec, self.law)
-
     def build(self) -> WearLaw:
         """Return a new wear law."""
-        return self.spec.factory(self.options)
+        return registry().get(WearLawSpec, self.law).factory(self.options)
 
 
 #: model of the table's own keys, key with the name of the plugin, kind of plugin
-PLUGIN_TABLES: dict[str, tuple[type[Table], str, type[Spec]]] = {
+PLUGIN_TABLES: dict[str, tuple[type[Options], str, type[Spec]]] = {
     "contact": (ContactTable, "model", ContactModelSpec),
     "load": (LoadTable, "kind", LoadSpec),
     "wear": (WearTable, "law", WearLawSpec),
@@ -171,15 +166,15 @@ def _choose(
 def _default_model(mistakes: Mistakes) -> str:
     """Return the model of a scenario that names none: one for a friction field if there is any."""
     default = str(ContactTable.model_fields["model"].default)
-    field = next((item for item in mistakes.random_inputs if item.role == "field"), None)
-    able = [s.name for s in installed(ContactModelSpec) if s.capabilities.friction_field]
-    if field is None or not able:
-        return default
-    mistakes.notes.append(
-        f"contact.model is '{able[0]}': {field.name} is a field, {field.kind}, which '{default}'"
-        " does not support"
-    )
-    return able[0]
+    fields = [item for item in mistakes.random_inputs if item.role == "field"]
+    for spec in installed(ContactModelSpec) if fields else []:
+        if spec.capabilities.friction_field:
+            mistakes.notes.append(
+                f"contact.model is '{spec.name}': {fields[0].name} is a field, {fields[0].kind},"
+                f" which '{default}' does not support"
+            )
+            return spec.name
+    return default
 
 
 def read_contact(raw: Mapping[str, object], mistakes: Mistakes) -> ContactChoice | None:
@@ -214,14 +209,15 @@ def read_load(raw: Mapping[str, object], mistakes: Mistakes) -> LoadChoice | Non
     if own is None or spec is None:
         return None
     if spec.role == "term":
-        what = f"'{spec.name}' is a term, added by a table [load.{spec.name}]"
-        mistakes.add("load", "kind", what)
+        mistakes.add(
+            "load", "kind", f"'{spec.name}' is a term, added by a table [load.{spec.name}]"
+        )
         return None
     rest = {key: value for key, value in rest.items() if key not in tables}
     for name in [key for key in rest if key not in spec.options.model_fields]:
         if kinds.get(name) == "term":
-            got, expected = shown(rest.pop(name)), f"a table [load.{name}]"
-            mistakes.add("load", name, "is a term of the load", got, expected)
+            got = shown(rest.pop(name))
+            mistakes.add("load", name, "is a term of the load", got, f"a table [load.{name}]")
     options = validate(mistakes, spec.options, rest, "load", LoadTable)
     if options is None:
         return None
