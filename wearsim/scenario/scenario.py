@@ -162,9 +162,8 @@ def require_run(scenario: Scenario) -> None:
     ScenarioError
         If it has no duration or no wear law; both are reported together.
     """
-    operation = scenario.operation
-    mistakes = [] if operation.duration or operation.passes else [_NO_LENGTH]
-    mistakes += [_NO_WEAR] if scenario.wear is None else []
+    has_length = scenario.operation.duration or scenario.operation.passes
+    mistakes = [*([] if has_length else [_NO_LENGTH]), *([] if scenario.wear else [_NO_WEAR])]
     if mistakes:
         raise ScenarioError(scenario.file, mistakes)
 

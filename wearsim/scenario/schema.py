@@ -56,10 +56,15 @@ def scenario_schema() -> dict[str, Any]:
         kind = _one_of(table, _choices(table, random) if table in PLUGIN_TABLES else [])
         kind = kind or _model(table, model.__doc__, _fields(model, table, random))
         tables[table] = kind, Field(... if table in REQUIRED else None, description=model.__doc__)
-    described = "Scenario of a wear simulation of a rolling contact, for wearsim."
-    scenario = _model("wearsim scenario", described, {**_fields(TopTable), **tables})
-    schema = scenario.model_json_schema(schema_generator=_ScenarioSchema)
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+    scenario = _model(
+        "wearsim scenario",
+        "Scenario of a wear simulation of a rolling contact, for wearsim.",
+        {**_fields(TopTable), **tables},
+    )
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **scenario.model_json_schema(schema_generator=_ScenarioSchema),
+    }
 
 
 def _model(name: str, description: str | None, fields: dict[str, Any]) -> Model:
@@ -93,8 +98,7 @@ def _random_inputs() -> RandomInputs:
 
     marginal = _one_of("MarginalDistribution", models("scalar", {}, "{} as marginal"))
     drawn = {"persistence": (own["persistence"].annotation, own["persistence"])}
-    of_marginal = Field(description=own["marginal"].description)
-    full = {**drawn, "marginal": (marginal, of_marginal)}
+    full = {**drawn, "marginal": (marginal, Field(description=own["marginal"].description))}
     processes = models("process", full) if marginal else []
     number = _one_of("RandomInput", models("scalar", drawn) + processes)
     friction = _one_of("RandomFriction", [number, *models("field", full)] if number else [])
@@ -114,8 +118,8 @@ def _choices(table: str, random: RandomInputs) -> list[Model]:
             terms[spec.name] = model, Field(None, description=spec.summary)
         else:
             default = spec.name if spec.name == named.default else ...
-            name = Literal[spec.name], Field(default, description=named.description)
-            options[spec.name] = {**fields, **_fields(base), key: name}
+            described = Field(default, description=named.description)
+            options[spec.name] = {**fields, **_fields(base), key: (Literal[spec.name], described)}
     return [
         _model(f"{table} {spec.name}", spec.summary, {**terms, **options[spec.name]})
         for spec in specs

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import json
 from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TypeVar
 
@@ -36,6 +37,7 @@ _WHAT = {
 }
 
 
+@dataclass
 class Mistakes:
     """Collector of the mistakes, notes and random inputs of one scenario.
 
@@ -59,18 +61,12 @@ class Mistakes:
         The random inputs by dotted key; None for one with mistakes.
     """
 
-    def __init__(
-        self,
-        file: str,
-        read: Callable[[str], str],
-        find_keys: Callable[[], Mapping[str, Collection[str]]] = dict,
-    ) -> None:
-        self.file = file
-        self.read = read
-        self._find_keys = find_keys
-        self.entries: list[Mistake] = []
-        self.notes: list[str] = []
-        self.random: dict[str, RandomInput | None] = {}
+    file: str
+    read: Callable[[str], str]
+    find_keys: Callable[[], Mapping[str, Collection[str]]] = dict
+    entries: list[Mistake] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    random: dict[str, RandomInput | None] = field(default_factory=dict)
 
     @property
     def random_inputs(self) -> list[RandomInput]:
@@ -79,7 +75,7 @@ class Mistakes:
 
     @cached_property
     def _keys(self) -> Mapping[str, Collection[str]]:
-        return self._find_keys()
+        return self.find_keys()
 
     def add(
         self,

@@ -109,8 +109,9 @@ def load_scenario(path: str | Path, overrides: Mapping[str, object] | None = Non
     except UnicodeDecodeError as error:
         raise ScenarioError(str(path), [Mistake("", "", "is not text in UTF-8")]) from error
     except OSError as error:
-        what = f"the file cannot be read ({error.strerror})"
-        raise ScenarioError(str(path), [Mistake("", "", what)]) from error
+        raise ScenarioError(
+            str(path), [Mistake("", "", f"the file cannot be read ({error.strerror})")]
+        ) from error
     return parse_scenario(text, str(path), read, overrides)
 
 
@@ -217,8 +218,9 @@ def _read_table(table: str, data: Mapping[str, object], mistakes: Mistakes) -> A
         return None
     raw = data.get(table, {})
     if not isinstance(raw, dict):
-        expected = f"a line [{table}] and its keys below"
-        mistakes.add("", table, "is not a table", shown(raw), expected)
+        mistakes.add(
+            "", table, "is not a table", shown(raw), f"a line [{table}] and its keys below"
+        )
         return None
     check_alternatives(mistakes, raw, table)
     if table in READERS:
@@ -236,11 +238,14 @@ def _unused_sampling_note(data: Mapping[str, Any], random: tuple[RandomInput, ..
 def _dundurs_note(roller: Roller, cylinder: Cylinder) -> list[str]:
     """Return a note if the coupling of pressure and traction is not negligible."""
     dundurs = combine(cylinder.material, roller.material).dundurs
-    note = (
-        f"the materials' Dundurs constant is {dundurs:.3g}: beyond {DUNDURS_LIMIT} the coupling of"
-        " pressure and traction, which is neglected, is no longer small"
-    )
-    return [note] if abs(dundurs) > DUNDURS_LIMIT else []
+    if abs(dundurs) <= DUNDURS_LIMIT:
+        return []
+    return [
+        (
+            f"the materials' Dundurs constant is {dundurs:.3g}: beyond {DUNDURS_LIMIT} the coupling"
+            " of pressure and traction, which is neglected, is no longer small"
+        )
+    ]
 
 
 def keys_by_place() -> dict[str, set[str]]:

@@ -259,8 +259,13 @@ def _read_marginal(
     else:
         spec = mistakes.find_plugin(RandomInputSpec, kind, place, "distribution")
     if spec and spec.role != "scalar":
-        what = f"is a {spec.role}, but a marginal is the distribution of one number"
-        mistakes.add(place, "distribution", what, shown(kind), expected)
+        mistakes.add(
+            place,
+            "distribution",
+            f"is a {spec.role}, but a marginal is the distribution of one number",
+            shown(kind),
+            expected,
+        )
         return None
     return _build(mistakes, spec, options, place, quantity) if spec else None
 

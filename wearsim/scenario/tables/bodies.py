@@ -43,8 +43,11 @@ def _read_material(value: object) -> Material:
     if isinstance(value, str) and value in MATERIALS:
         return MATERIALS[value]
     if not isinstance(value, dict):
-        what = "unknown material" if isinstance(value, str) else "is not a material"
-        raise QuantityError(what, shown(value), expected)
+        raise QuantityError(
+            "unknown material" if isinstance(value, str) else "is not a material",
+            shown(value),
+            expected,
+        )
     table = MaterialTable.model_validate_json(json.dumps(value, default=str), strict=True)
     return Material(table.youngs_modulus, table.poisson_ratio, table.hardness)
 

@@ -57,8 +57,11 @@ class FrictionTable(Options):
 
 def _refuse(value: object) -> None:
     """Reject a value: a random input is read before the validation."""
-    expected = 'a table such as {distribution = "disc", radius = "2 mrad"}'
-    raise QuantityError("is not a random input", shown(value), expected)
+    raise QuantityError(
+        "is not a random input",
+        shown(value),
+        'a table such as {distribution = "disc", radius = "2 mrad"}',
+    )
 
 
 class CreepageTable(Options):
@@ -150,9 +153,6 @@ class OutputsTable(Options):
     )
 
 
-Correlation = Annotated[float, Field(ge=-1.0, le=1.0)]
-
-
 class SamplingTable(Options):
     """Sampling design of the random inputs."""
 
@@ -162,7 +162,7 @@ class SamplingTable(Options):
     realisation: int = Field(
         default=0, ge=0, description="Number of the realisation that a single run uses."
     )
-    correlation: tuple[tuple[str, str, Correlation], ...] = Field(
+    correlation: tuple[tuple[str, str, Annotated[float, Field(ge=-1.0, le=1.0)]], ...] = Field(
         default=(),
         description="Rank correlations, each with the names of two random inputs and a number.",
     )
@@ -186,8 +186,9 @@ def check_alternatives(mistakes: Mistakes, raw: Mapping[str, object], table: str
     for keys in ALTERNATIVES.get(table, ()):
         given = [key for key in keys if key in raw]
         if len(given) > 1 or (not given and table in {"roller", "cylinder"}):
-            got = " and ".join(given) or "none"
-            mistakes.add(table, " or ".join(keys), "exactly one is needed", got)
+            mistakes.add(
+                table, " or ".join(keys), "exactly one is needed", " and ".join(given) or "none"
+            )
 
 
 def read_creepage(raw: Mapping[str, object], mistakes: Mistakes) -> CreepageTable | None:
@@ -215,8 +216,13 @@ def check_angles(mistakes: Mistakes, table: CreepageTable) -> None:
             greatest[item.name.removeprefix("creepage.")] = item.greatest
     for key, angle in greatest.items():
         if angle > LARGEST_ANGLE:
-            expected = f"at most {LARGEST_ANGLE:g} rad (5.7 deg), since small angles are assumed"
-            mistakes.add("creepage", key, "is too large an angle", f"{angle:.4g} rad", expected)
+            mistakes.add(
+                "creepage",
+                key,
+                "is too large an angle",
+                f"{angle:.4g} rad",
+                f"at most {LARGEST_ANGLE:g} rad (5.7 deg), since small angles are assumed",
+            )
 
 
 def read_outputs(raw: Mapping[str, object], mistakes: Mistakes) -> OutputsTable | None:
@@ -261,8 +267,12 @@ def check_correlation(mistakes: Mistakes, table: SamplingTable | None) -> None:
             mistakes.add("sampling", key, what, shown(item.kind))
         first, second = (item.persistence for item in pair)
         if first != second:
-            what = "needs two random inputs of the same persistence"
-            mistakes.add("sampling", key, what, f"{first} and {second}")
+            mistakes.add(
+                "sampling",
+                key,
+                "needs two random inputs of the same persistence",
+                f"{first} and {second}",
+            )
     if (
         rows
         and len(mistakes.entries) == before
