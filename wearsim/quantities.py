@@ -112,15 +112,17 @@ class Quantity:
         if dimensions != si_dimensions:
             got = f"{shown(value)} ({kind_of(unit).name})"
             raise QuantityError("wrong dimension", got, self.expected)
-        return self._checked(_si(number, size / si_size), shown(value))
+        return self._checked(_si(number, size / si_size), value)
 
-    def _checked(self, number: float, got: str) -> float:
+    def _checked(self, number: float, text: object = None) -> float:
+        """Return a number in SI if it is allowed; `text` is what the file has instead of it."""
         if number - number != 0.0:  # infinite or not a number
-            raise QuantityError("must be finite", got, self.expected)
-        if _is_below(self.bound, number):
+            what = "must be finite"
+        elif _is_below(self.bound, number):
             what = "must be above zero" if self.bound == "positive" else "must not be negative"
-            raise QuantityError(what, got, self.expected)
-        return number
+        else:
+            return number
+        raise QuantityError(what, shown(text or self.write(number)), self.expected)
 
     def _read(self, value: Any, info: ValidationInfo) -> float:
         """Return a value in SI.
@@ -132,7 +134,7 @@ class Quantity:
         if numbers is not None and isinstance(value, numbers):
             number = value.get("si") if isinstance(value, dict) else value
             if isinstance(number, float):
-                return self._checked(number, shown(self.write(number)))
+                return self._checked(number)
         return self.parse(value)
 
     def write(self, value: float | None) -> str | None:

@@ -5,12 +5,14 @@
 from __future__ import annotations
 
 import math
+import pickle
 
 import numpy as np
 import pytest
 from scenario_examples import FORCE_LINE, FRICTION, LOAD, MU, RIG, SLACK, WEAR, XI, Parse
 
 from wearsim.errors import ScenarioError
+from wearsim.quantities import Quantity
 from wearsim.scenario import Scenario, load_scenario, parse_override, parse_scenario, realise
 from wearsim.units import ANGLE, FORCE
 
@@ -134,7 +136,7 @@ def test_realisation_has_the_values_bit_for_bit(rig: Scenario) -> None:
 
 
 @pytest.mark.parametrize("force", [5e-324, 0.1 + 0.2, math.nextafter(300.0, 301.0), 1e22, 1.7e308])
-def test_any_float_survives_conversion_to_text(rig: Scenario, force: float) -> None:
+def test_realisation_has_any_float_bit_for_bit(rig: Scenario, force: float) -> None:
     drawn = realise(rig, {"load.normal_force": np.float64(force), "friction.coefficient": force})
     assert drawn.load.options.normal_force == force
     assert drawn.friction.coefficient == force
@@ -173,6 +175,50 @@ def test_realisation_values_are_checked(rig: Scenario) -> None:
         realise(rig, {"load.stiffness": 1.0})
     with pytest.raises(ValueError, match=r"sets creepage\.tilt too"):
         realise(rig, {"creepage.yaw": 1e-3})
+    with pytest.raises(ScenarioError) as caught:
+        realise(rig, {"wear.cylinder.k_over_h": -2e-11, "load.normal_force": math.inf})
+    assert str(caught.value) == (
+        'rig.toml: [load] normal_force: must be finite, got "inf N", expected a force above zero such as "300 N"\n'
+        'rig.toml: [wear.cylinder] k_over_h: must not be negative, got "-2e-11 1/Pa", expected a wear factor of zero or more such as "1.1e-11 1/Pa"'
+    )
+    with pytest.raises(
+        ScenarioError, match=r"\[creepage\] yaw: is too large an angle, got 0\.2 rad"
+    ):
+        realise(rig, {"creepage.yaw": 0.2, "creepage.tilt": 0.0})
+    with pytest.raises(ScenarioError, match=r"yaw \(entry 2\): must be finite"):
+        realise(rig, {"creepage.yaw": (0.0, math.nan, 0.0), "creepage.tilt": 0.0})
+
+
+def test_realisation_reads_and_writes_no_units(
+    rig: Scenario, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("wearsim.quantities.measure", None)
+    monkeypatch.setattr(Quantity, "write", None)
+    drawn = realise(rig, {"load.normal_force": 250.0, "wear.cylinder.k_over_h": 1e-11})
+    assert drawn.load.options.normal_force == 250.0
+    assert drawn.wear.options.roller == rig.wear.options.roller
+
+
+def test_realised_scenario_can_be_pickled(rig: Scenario) -> None:
+    drawn = pickle.loads(pickle.dumps(realise(rig, {"load.normal_force": 250.0})))
+    assert drawn.load.options.normal_force == 250.0
+    assert (drawn.text, dict(drawn.drawn)) == (rig.text, {"load.normal_force": 250.0})
+
+
+def test_realisation_runs_the_validators_of_a_plugin() -> None:
+    low, high = ({"distribution": "uniform", "low": f"{k} ug/J", "high": "6 ug/J"} for k in (1, 5))
+    law = {"wear.law": "t-gamma", "wear.cylinder.mild": high, "wear.roller.mild": low}
+    text = RIG.read_text().split("[wear]")[0] + "[wear]\n"
+    scenario = parse_scenario(text, "rig.toml", {}.__getitem__, law)
+    drawn = realise(scenario, {"wear.cylinder.mild": 5.5e-9})
+    assert drawn.wear.options.cylinder.mild == 5.5e-9
+    assert drawn.wear.options.cylinder.severe == scenario.wear.options.cylinder.severe
+    assert [item.name for item in drawn.random] == ["wear.roller.mild"]
+    with pytest.raises(ScenarioError) as caught:
+        realise(scenario, {"wear.roller.mild": 0.5e-9})
+    [mistake] = caught.value.mistakes
+    assert (mistake.table, mistake.key) == ("wear", "roller")
+    assert mistake.what == "catastrophic wear would begin before severe wear does"
 
 
 def test_stored_scenario_has_the_same_random_inputs(rig: Scenario) -> None:

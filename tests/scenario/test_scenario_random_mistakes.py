@@ -74,6 +74,11 @@ rig.toml: [load.normal_force] persistance: unknown key (did you mean 'persistenc
         'cylinder = { distribution = "flat" }',
         f"rig.toml: [wear] cylinder: cannot be random, got a table with a distribution, expected {PLACES}",
     ),
+    "a table of a number": (
+        'radius = "25 mm"',
+        "radius = {si = 0.025}",
+        'rig.toml: [cylinder] radius: is not a quantity, got a table, expected a length above zero such as "20 mm"',
+    ),
     "an entry of a list": (
         XI,
         f'{XI}\nyaw = ["1 mrad", {{distribution = "flat"}}, "2 mrad"]',

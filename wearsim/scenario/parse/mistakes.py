@@ -163,10 +163,9 @@ def validate_options(
         Locations whose mistakes have been added already.
     """
     # as JSON: its strict mode rejects "3" for 3 but accepts a list for a tuple
-    text = json.dumps(raw, default=str)
     context = {"read": mistakes.read, "quantity": quantity, "numbers": dict}
     try:
-        return model.model_validate_json(text, strict=True, context=context)
+        return model.model_validate_json(json.dumps(raw, default=str), strict=True, context=context)
     except ValidationError as error:
         for details in error.errors(include_url=False):
             # a refused random input is still in the table, and fails again at or below its location

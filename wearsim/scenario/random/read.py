@@ -74,8 +74,8 @@ def _with_means(
             refused += within
         elif isinstance(value, dict) and ("distribution" in value or target_of(field)):
             means = _means(mistakes, field, raw, table, key)
-            values = {name: item for name, item in values.items() if name != key or not means}
-            values |= means
+            kept = {name: item for name, item in values.items() if name != key or not means}
+            values = {**kept, **means}
             refused += [] if means else [here]
         elif isinstance(value, list):
             for entry, item in enumerate(value):
@@ -120,10 +120,11 @@ def _refuse_table(
     mistakes: Mistakes, field: FieldInfo, raw: Mapping[str, object], table: str, key: str
 ) -> None:
     """Add the mistake of a table without distribution instead of a number."""
-    name = f"{table}.{key}"
+    name, target = f"{table}.{key}", target_of(field)
     near = difflib.get_close_matches("distribution", raw, n=1)
     if not can_be_random(name):
-        mistakes.add(table, key, "is not a number", "a table", form(field))
+        kind = "quantity" if target and target.quantity else "number"
+        mistakes.add(table, key, f"is not a {kind}", "a table", form(field))
     elif near:
         mistakes.add(name, near[0], "unknown key (did you mean 'distribution'?)")
     else:
@@ -170,10 +171,9 @@ def read_random_input(
     target : RandomTarget
         The number, or the numbers, that it sets.
     """
-    before, kind = len(mistakes.entries), raw["distribution"]
+    before, kind, spec = len(mistakes.entries), raw["distribution"], None
     own, options = split_keys(raw, RandomInputTable)
     table = validate_options(mistakes, RandomInputTable, own, name)
-    spec = None
     if isinstance(kind, str):
         spec = mistakes.find_plugin(RandomInputSpec, kind, name, "distribution")
     if spec is None or not _check_role(mistakes, spec, name, target):
@@ -194,9 +194,15 @@ def read_random_input(
         mistakes.add(name, "distribution", f"sets {' and '.join(sets)}", shown(kind), expected)
     if len(mistakes.entries) > before or table is None:
         return None
-    inner = str(table.marginal["distribution"]) if table.marginal else ""
     return RandomInput(
-        name, kind, spec.role, table.persistence, distribution, target.quantity, options, inner
+        name=name,
+        kind=kind,
+        role=spec.role,
+        persistence=table.persistence,
+        distribution=distribution,
+        quantity=target.quantity,
+        options=options,
+        marginal=str(table.marginal["distribution"]) if table.marginal else "",
     )
 
 

@@ -133,9 +133,14 @@ class WearChoice:
     law: str
     options: Options
 
+    @property
+    def spec(self) -> WearLawSpec:
+        """Registered specification of the wear law."""
+        return registry().get(WearLawSpec, self.law)
+
     def build(self) -> WearLaw:
         """Return a new wear law."""
-        return registry().get(WearLawSpec, self.law).factory(self.options)
+        return self.spec.factory(self.options)
 
 
 #: model of the table's own keys, key with the name of the plugin, kind of plugin
