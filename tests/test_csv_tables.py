@@ -33,13 +33,6 @@ def test_columns_are_in_si_for_every_separator(mark: str) -> None:
     assert columns["load"].tolist() == [300.0, -100.0]
 
 
-def test_column_can_have_an_alias() -> None:
-    text = "y [mm],z [um]\n0,1\n1,-2\n"
-    columns = {"y": "m", "height": "m"}
-    found = read_columns(text, "p.csv", columns, aliases={"height": ["z"]})
-    np.testing.assert_allclose(found["height"], [1e-6, -2e-6], rtol=1e-15)
-
-
 def test_plain_numbers_need_no_unit() -> None:
     columns = read_columns("n,mu [-]\n1,0.1\n2,0.2\n", "mu.csv", {"n": "1", "mu": "1"})
     assert columns["mu"].tolist() == [0.1, 0.2]

@@ -6,33 +6,35 @@ import csv
 import difflib
 import re
 from operator import methodcaller
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.quantities import DECIMAL_COMMA, NOT_FINITE, NUMBER
 from wearsim.units import QuantityError, conversion
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
     from wearsim.types import FloatArray
 
 MAX_MISTAKES = 20  # reported of one file
 _HEADER = re.compile(r"(?P<name>[^\[\]]*?)\s*(?:\[(?P<unit>[^\[\]]*)\])?")
+_Columns: TypeAlias = "dict[str, tuple[int, float]]"
 _PLAIN_NUMBER = {"", "-", "1"}  # spellings of the unit of a plain number
 
 
-class _Row(NamedTuple):
+class _Header(NamedTuple):
+    """The header: number of its line, counted from 1, separator, and cells."""
+
     line: int
+    separator: str
     cells: list[str]
 
 
-class _Column(NamedTuple):
-    """A required column: position in the file and factor to SI."""
-
-    name: str
-    place: int
-    factor: float
+def column_names(text: str) -> list[str]:
+    """Return the names of the columns of a CSV file, without units; see `read_columns`."""
+    header = _header(text.removeprefix("\ufeff").splitlines())
+    return [_name_and_unit(cell)[0] for cell in header.cells] if header else []
 
 
 def read_columns(
@@ -40,7 +42,6 @@ def read_columns(
     file: str,
     columns: Mapping[str, str],
     *,
-    aliases: Mapping[str, Sequence[str]] | None = None,
     rising: str | None = None,
 ) -> dict[str, FloatArray]:
     """Read columns of numbers from a CSV file with units in its headers.
@@ -56,8 +57,6 @@ def read_columns(
         Name of the file, for messages.
     columns : mapping of str to str
         Unit to return for each column by name; "1" for plain numbers.
-    aliases : mapping of str to sequence of str, optional
-        Other accepted names of a column.
     rising : str, optional
         A column whose values must increase from row to row.
 
@@ -73,36 +72,26 @@ def read_columns(
     """
     import numpy as np  # noqa: PLC0415  (every command of the shell imports this module)
 
-    mistakes: list[Mistake] = []
     lines = text.removeprefix("\ufeff").splitlines()
-    start = next((k for k, line in enumerate(lines) if _has_cells(line)), None)
-    if start is None:
+    header = _header(lines)
+    if header is None:
         heads = ", ".join(_head(name, unit) for name, unit in columns.items())
         expected = f"a header line such as {heads}"
         raise ScenarioError(file, [Mistake("", "", "the file is empty", None, expected)])
-    separator = next((mark for mark in "\t;," if mark in lines[start]), ",")
-    header = _cells(lines[start], start, separator)
-    found = _find_columns(header, columns, aliases or {}, mistakes)
-    body = lines[start + 1 :]
+    mistakes: list[Mistake] = []
+    found = _find_columns(header, columns, mistakes)
+    body = lines[header.line :]
     values: Mapping[str, FloatArray | list[float]] | None = None
     if not mistakes:
-        values = _regular_numbers(body, header, found, separator, rising)
+        values = _regular_numbers(body, header, found, rising)
     if values is None:
-        rows = [
-            _cells(line, start + 1 + k, separator)
-            for k, line in enumerate(body)
-            if _has_cells(line)
-        ]
-        values = _numbers(rows, header, found, separator, rising, mistakes)
-        if len(rows) < 2:
-            got = str(len(rows))
-            mistakes.append(Mistake("", "", "too few rows of numbers", got, "at least 2"))
+        values = _numbers(body, header, found, rising, mistakes)
     if len(mistakes) > MAX_MISTAKES:
         rest = Mistake("", "", f"and {len(mistakes) - MAX_MISTAKES} more")
         mistakes = [*mistakes[:MAX_MISTAKES], rest]
     if mistakes:
         raise ScenarioError(file, mistakes)
-    return {column.name: np.asarray(values[column.name]) * column.factor for column in found}
+    return {name: np.asarray(values[name]) * factor for name, (_, factor) in found.items()}
 
 
 def _mistake(line: int, what: str, got: str | None = None, expected: str | None = None) -> Mistake:
@@ -118,13 +107,28 @@ def _has_cells(line: str) -> bool:
     return bool(line.strip()) and not line.lstrip().startswith("#")
 
 
-def _cells(line: str, place: int, separator: str) -> _Row:
+def _header(lines: list[str]) -> _Header | None:
+    """Return the header of a file, or None if the file is empty."""
+    for number, line in enumerate(lines, 1):
+        if _has_cells(line):
+            separator = next((mark for mark in "\t;," if mark in line), ",")
+            return _Header(number, separator, _cells(line, separator))
+    return None
+
+
+def _cells(line: str, separator: str) -> list[str]:
     cells = next(csv.reader([line], delimiter=separator, skipinitialspace=True))
-    return _Row(place + 1, [cell.strip() for cell in cells])
+    return [cell.strip() for cell in cells]
+
+
+def _name_and_unit(cell: str) -> tuple[str, str]:
+    """Split a cell of the header, such as "time [min]"; the unit may be empty."""
+    head = _HEADER.fullmatch(cell)
+    return (head["name"], (head["unit"] or "").strip()) if head else (cell, "")
 
 
 def _regular_numbers(
-    body: list[str], header: _Row, found: list[_Column], separator: str, rising: str | None
+    body: list[str], header: _Header, found: _Columns, rising: str | None
 ) -> dict[str, FloatArray] | None:
     """Read the columns by numpy's parser, or return None if anything in the file is irregular.
 
@@ -133,39 +137,29 @@ def _regular_numbers(
     import numpy as np  # noqa: PLC0415
 
     joined = "\n".join(body)
-    marks = set(map(methodcaller("count", separator), body))
+    marks = set(map(methodcaller("count", header.separator), body))
     if marks != {len(header.cells) - 1} or "#" in joined or '"' in joined:
         return None
-    places = [column.place for column in found]
+    places = [place for place, _ in found.values()]
     try:
-        table = np.loadtxt(body, delimiter=separator, usecols=places, ndmin=2, unpack=True)
+        table = np.loadtxt(body, delimiter=header.separator, usecols=places, ndmin=2, unpack=True)
     except ValueError:
         return None
-    values = {column.name: row for column, row in zip(found, table, strict=True)}
+    values = dict(zip(found, table, strict=True))
     order = values.get(rising or "", np.arange(2.0))
     regular = len(body) > 1 and np.isfinite(table).all() and (order[1:] > order[:-1]).all()
     return values if regular else None
 
 
-def _find_columns(
-    header: _Row,
-    columns: Mapping[str, str],
-    aliases: Mapping[str, Sequence[str]],
-    mistakes: list[Mistake],
-) -> list[_Column]:
-    """Find the required columns in the header."""
-    heads = [_HEADER.fullmatch(cell) for cell in header.cells]
-    names = [
-        (head["name"] if head else cell) for head, cell in zip(heads, header.cells, strict=True)
-    ]
-    found = []
+def _find_columns(header: _Header, columns: Mapping[str, str], mistakes: list[Mistake]) -> _Columns:
+    """Return the positions of the required columns, and their factors to SI."""
+    heads = [_name_and_unit(cell) for cell in header.cells]
+    found = {}
     for name, unit in columns.items():
-        accepted = {name, *aliases.get(name, ())}
-        places = [place for place, other in enumerate(names) if other in accepted]
+        places = [place for place, (other, _) in enumerate(heads) if other == name]
         if len(places) == 1:
-            head = heads[places[0]]
-            factor = _factor(header.line, name, head["unit"] if head else None, unit, mistakes)
-            found.append(_Column(name, places[0], factor))
+            factor = _factor(header.line, name, heads[places[0]][1], unit, mistakes)
+            found[name] = places[0], factor
         elif places:
             what = f"column '{name}' appears {len(places)} times"
             mistakes.append(_mistake(header.line, what))
@@ -179,9 +173,8 @@ def _find_columns(
     return found
 
 
-def _factor(line: int, name: str, written: str | None, unit: str, mistakes: list[Mistake]) -> float:
+def _factor(line: int, name: str, written: str, unit: str, mistakes: list[Mistake]) -> float:
     """Return the factor from the unit `written` in the header to `unit`; 1 after a mistake."""
-    written = (written or "").strip()
     if unit == "1":
         if written not in _PLAIN_NUMBER:
             what = f"column '{name}': a plain number has no unit"
@@ -198,35 +191,39 @@ def _factor(line: int, name: str, written: str | None, unit: str, mistakes: list
 
 
 def _numbers(
-    rows: list[_Row],
-    header: _Row,
-    found: list[_Column],
-    separator: str,
+    body: list[str],
+    header: _Header,
+    found: _Columns,
     rising: str | None,
     mistakes: list[Mistake],
 ) -> dict[str, list[float]]:
     """Read every cell of the columns found."""
-    width = len(header.cells)
-    values: dict[str, list[float]] = {column.name: [] for column in found}
-    for row in rows:
-        if len(row.cells) > width:
-            comma = " (is a comma meant as decimal point?)" if separator == "," else ""
-            got, expected = f"{len(row.cells)} cells", f"{width}, as in the header"
-            mistakes.append(_mistake(row.line, f"too many cells{comma}", got, expected))
+    width, rows = len(header.cells), 0
+    values: dict[str, list[float]] = {name: [] for name in found}
+    for line, text in enumerate(body, header.line + 1):
+        if not _has_cells(text):
             continue
-        for column in found:
-            cell = row.cells[column.place] if column.place < len(row.cells) else ""
-            number, above = _number(cell, row.line, column, mistakes), values[column.name]
+        cells, rows = _cells(text, header.separator), rows + 1
+        if len(cells) > width:
+            comma = " (is a comma meant as decimal point?)" if header.separator == "," else ""
+            got, expected = f"{len(cells)} cells", f"{width}, as in the header"
+            mistakes.append(_mistake(line, f"too many cells{comma}", got, expected))
+            continue
+        for name, (place, _) in found.items():
+            cell = cells[place] if place < len(cells) else ""
+            number, above = _number(cell, line, name, mistakes), values[name]
             if number is None:
                 continue
-            if column.name == rising and above and number <= above[-1]:
-                what, expected = f"column '{column.name}' must increase", f"more than {above[-1]:g}"
-                mistakes.append(_mistake(row.line, what, cell, expected))
+            if name == rising and above and number <= above[-1]:
+                what, expected = f"column '{name}' must increase", f"more than {above[-1]:g}"
+                mistakes.append(_mistake(line, what, cell, expected))
             above.append(number)
+    if rows < 2:
+        mistakes.append(Mistake("", "", "too few rows of numbers", str(rows), "at least 2"))
     return values
 
 
-def _number(cell: str, line: int, column: _Column, mistakes: list[Mistake]) -> float | None:
+def _number(cell: str, line: int, column: str, mistakes: list[Mistake]) -> float | None:
     """Return the number in a cell, or None after a mistake."""
     number = float(cell) if NUMBER.fullmatch(cell) else None
     if number is not None and abs(number) != float("inf"):
@@ -238,5 +235,5 @@ def _number(cell: str, line: int, column: _Column, mistakes: list[Mistake]) -> f
         what, got = "must be finite", cell
     elif DECIMAL_COMMA.fullmatch(cell):
         what = "needs a decimal point"
-    mistakes.append(_mistake(line, f"column '{column.name}': {what}", got, "a number"))
+    mistakes.append(_mistake(line, f"column '{column}': {what}", got, "a number"))
     return None

@@ -128,7 +128,7 @@ def test_total_indices_are_drawn_for_saltelli():
     result = made_up(5 * 80, "saltelli")
     axes = panel(ensemble_figure(result), "Sobol indices")
     drawn = [line for line in axes.get_lines() if line.get_marker() == "D"]
-    marks = [line.get_xdata()[0] for line in drawn if len(line.get_xdata())]
+    marks = [value for line in drawn for value in line.get_xdata()]
     totals = [100.0 * item.total.value for item in result.sensitivity("depth")]
     assert marks == pytest.approx(totals)
 

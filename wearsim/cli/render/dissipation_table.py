@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from wearsim.cli.output import write_list, write_table
 from wearsim.cli.render.summary import CONSTANT, Rows, input_data, input_rows, still_random
 from wearsim.report.text.labels import Named
-from wearsim.report.text.units import NOTHING, count, lapse, shown
+from wearsim.report.text.units import NOTHING, count, in_unit, lapse, shown
 from wearsim.uq.estimation.moments import is_constant
 
 if TYPE_CHECKING:
@@ -65,19 +65,15 @@ def _power_ranges(power: Summary) -> Rows:
     rows = []
     for low, high in ((0.025, 0.975), (0.05, 0.95)):
         ends = [power.quantile(low), power.quantile(high)]
-        values = " to ".join(_watts(end.value) for end in ends)
+        values = " to ".join(in_unit(end.value, "W") for end in ends)
         # with the digits of the quantile, so that rounding does not put it outside its interval
-        pairs = [(_watts(end.low), _watts(end.high)) for end in ends]
+        pairs = [(in_unit(end.low, "W"), in_unit(end.high, "W")) for end in ends]
         intervals = [_TOO_FEW if NOTHING in pair else "..".join(pair) for pair in pairs]
         confidence = " and ".join(dict.fromkeys(intervals))
         name = f"dissipated power, {100.0 * (high - low):g} %"
         rows.append((name, f"{values} W (95 % confidence: {confidence})"))
-    extremes = f"{_watts(power.least)} to {shown(power.greatest, 'W')}"
+    extremes = f"{in_unit(power.least, 'W')} to {shown(power.greatest, 'W')}"
     return [*rows, ("dissipated power, all", extremes)]
-
-
-def _watts(value: float) -> str:
-    return shown(value, "W").removesuffix(" W")
 
 
 def _cells(name: str, result: DissipationResult) -> tuple[str, ...]:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from functools import cached_property
 from typing import Self
 
 import numpy as np
 from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
 
-from wearsim.csv_tables import read_columns
+from wearsim.csv_tables import column_names, read_columns
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.plugins import Distribution, Options
 from wearsim.quantities import InputFile, Quantity
@@ -39,9 +38,7 @@ class TableOptions(Options):
 
 def _read_quantiles(file: InputFile, unit: str) -> tuple[FloatArray, FloatArray]:
     """Return the probabilities and quantiles of a file; raise a ScenarioError for mistakes."""
-    lines = (line.strip() for line in file.text.lstrip("\ufeff").splitlines())
-    header = next((line for line in lines if line and not line.startswith("#")), "")
-    if "probability" not in (cell.split("[")[0].strip(' "') for cell in re.split("[,;\t]", header)):
+    if "probability" not in column_names(file.text):
         samples = np.sort(read_columns(file.text, file.path, {"value": unit})["value"])
         # Sample i of n has the probability (i - 1/2)/n, with constant ends beyond the first and
         # the last, so that the mean is that of the samples. With equal steps from 0 to 1 the two

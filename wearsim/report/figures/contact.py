@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from wearsim.report.parts.patch_size import patch_edges, patches
-from wearsim.report.parts.style import BLUE, ORANGE, PRESSURE, figure_style, name_axes
+from wearsim.report.parts.style import BLUE, ORANGE, PRESSURE, name_axes, titled_figure
 from wearsim.report.text.units import PER_SI, shown
 from wearsim.studies.contact.single import ContactStudy
 from wearsim.types import ContactFields, ContactSolution, FloatArray, IntArray
@@ -39,21 +39,17 @@ def contact_figure(study: ContactStudy, title: str) -> Figure:
     -------
     Figure
     """
-    with figure_style():
-        if study.fields is None:
-            figure = Figure(figsize=(10.0, 3.4), layout="constrained")
-            panels = figure.subplot_mosaic([STRIPS])
-        else:
-            figure = Figure(figsize=(10.0, 8.2), layout="constrained")
-            panels = figure.subplot_mosaic([*MAPS, STRIPS], sharex=True)
+    caption = (
+        f"{title}\n{study.described_model}\nnormal force {shown(study.point.normal_force, 'N')},"
+        f" peak pressure {shown(study.solution.peak_pressure, 'MPa')},"
+        f" dissipated power {shown(study.solution.power, 'W')}"
+    )
+    maps = [] if study.fields is None else MAPS
+    with titled_figure(10.0, 8.2 if maps else 3.4, caption) as figure:
+        panels = figure.subplot_mosaic([*maps, STRIPS], sharex=bool(maps))
+        if study.fields is not None:
             _draw_fields(panels, study.fields, study.solution)
         _draw_strips(panels, study.solution)
-        caption = (
-            f"{study.described_model}\nnormal force {shown(study.point.normal_force, 'N')},"
-            f" peak pressure {shown(study.solution.peak_pressure, 'MPa')},"
-            f" dissipated power {shown(study.solution.power, 'W')}"
-        )
-        figure.suptitle(f"{title}\n{caption}", fontsize=10.5)
     return figure
 
 
@@ -62,10 +58,13 @@ def _draw_fields(panels: dict[str, Axes], fields: ContactFields, solution: Conta
     inside = slice(int(touching[0]), int(touching[-1]) + 1)
     y = np.broadcast_to(fields.y[inside], fields.x[:, inside].shape) * MM
     x = fields.x[:, inside] * MM
-    traction = np.hypot(fields.traction_x, fields.traction_y)
     for name, value, title in (
         ("pressure", _pressure(fields, solution) * MPA, "Pressure [MPa]"),
-        ("traction", traction * MPA, "Traction on the cylinder [MPa]"),
+        (
+            "traction",
+            np.hypot(fields.traction_x, fields.traction_y) * MPA,
+            "Traction on the cylinder [MPa]",
+        ),
         ("power", fields.power_density * W_MM2, r"Dissipated power density [W/mm$^2$]"),
     ):
         axes = panels[name]
@@ -154,10 +153,13 @@ def _draw_strips(panels: dict[str, Axes], solution: ContactSolution) -> None:
     touching = np.flatnonzero(solution.half_length > 0.0)
     inside = slice(max(int(touching[0]) - 1, 0), int(touching[-1]) + 2)
     y = solution.y[inside] * MM
-    load, power = panels["line load"], panels["dissipation"]
-    load.plot(y, solution.line_load[inside] * N_MM, color=BLUE)
-    name_axes(load, "Line load [N/mm]", Y_LABEL, "q(y)")
-    power.plot(y, solution.dissipation[inside] * W_MM, color=ORANGE)
-    name_axes(power, "Dissipated power per length [W/mm]", Y_LABEL, r"$P_l$(y)")
-    for axes in (load, power):
-        axes.set_ylim(bottom=0.0)
+    for name, value, colour, title, label in (
+        ("line load", solution.line_load * N_MM, BLUE, "Line load [N/mm]", "q(y)"),
+        (
+            "dissipation", solution.dissipation * W_MM, ORANGE,
+            "Dissipated power per length [W/mm]", r"$P_l$(y)",
+        ),
+    ):  # fmt: skip
+        panels[name].plot(y, value[inside], color=colour)
+        name_axes(panels[name], title, Y_LABEL, label)
+        panels[name].set_ylim(bottom=0.0)

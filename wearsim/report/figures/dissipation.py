@@ -15,11 +15,11 @@ from wearsim.report.parts.style import (
     GREEN,
     GREY,
     ORANGE,
-    figure_style,
     name_axes,
+    titled_figure,
     write_message,
 )
-from wearsim.report.text.units import PER_SI, number_of_realisations, shown
+from wearsim.report.text.units import PER_SI, in_unit, number_of_realisations, shown
 from wearsim.results import DissipationResult
 
 MM, W_MM = PER_SI["mm"], PER_SI["W/mm"]
@@ -43,8 +43,7 @@ def dissipation_figure(result: DissipationResult) -> Figure:
         Five panels: mean and standard deviation against the number of realisations, density of the
         dissipated power, and dissipated power per length: realisations, and mean with 95 % range.
     """
-    with figure_style():
-        figure = Figure(figsize=(13.0, 6.8), layout="constrained")
+    with titled_figure(13.0, 6.8, f"{result.title}\n{_caption(result)}") as figure:
         panels = figure.subplot_mosaic(PANELS, width_ratios=[1.0, 1.15, 1.1])
         found, constant = result.convergence(), result.summaries["power"].is_constant
         # a constant power has rounding errors only
@@ -52,28 +51,33 @@ def dissipation_figure(result: DissipationResult) -> Figure:
         mean_error, std, std_error = (np.zeros_like(e) if constant else e for e in spreads)
         for name, value, error in (("mean", found.mean, mean_error), ("std", std, std_error)):
             draw_convergence(panels[name], found.count, value, value - error, value + error)
-        title = "Mean dissipated power, with standard error"
-        name_axes(panels["mean"], title, "", "mean of $P_d$ [W]")
-        title = "Standard deviation, with standard error"
-        name_axes(panels["std"], title, "realisations", "std of $P_d$ [W]")
+        name_axes(
+            panels["mean"], "Mean dissipated power, with standard error", "", "mean of $P_d$ [W]"
+        )
+        name_axes(
+            panels["std"],
+            "Standard deviation, with standard error",
+            "realisations",
+            "std of $P_d$ [W]",
+        )
         _draw_density(panels["density"], result)
         _draw_realisations(panels["realisations"], result)
         _draw_band(panels["band"], result)
-        figure.suptitle(f"{result.title}\n{_caption(result)}", fontsize=10.5)
     return figure
 
 
 def _caption(result: DissipationResult) -> str:
     power, raw = result.summaries["power"], result.raw
-    text = f"{number_of_realisations(result.count)} ({raw.plan}, {result.described_model}"
-    text += f"{'' if result.finished else ', unfinished'})\n"
-    text += f"mean dissipated power {shown(power.mean, 'W')}"
+    text = (
+        f"{number_of_realisations(result.count)} ({raw.plan}, {result.described_model}"
+        f"{'' if result.finished else ', unfinished'})\n"
+        f"mean dissipated power {shown(power.mean, 'W')}"
+    )
     if result.count == 1:
         return text
     if power.is_constant:
         return f"{text}, equal in all realisations"
-    ends = [power.quantile(0.025).value, power.quantile(0.975).value]
-    band = " to ".join(shown(value, "W", 3).removesuffix(" W") for value in ends)
+    band = " to ".join(in_unit(power.quantile(p).value, "W", 3) for p in (0.025, 0.975))
     return f"{text}, std {shown(power.std, 'W')}, 95 % range {band} W"
 
 
@@ -91,12 +95,11 @@ def _draw_density(axes: Axes, result: DissipationResult) -> None:
     normal = np.exp(-0.5 * score**2) / (summary.std * math.sqrt(math.tau))
     axes.plot(across, normal, color=ORANGE, label="normal distribution, same mean and std")
     axes.set_xlim(max(low, 0.0), high)
-    ends = [summary.quantile(probability).value for probability in (0.025, 0.975)]
     for place, colour, style, label in (
         (summary.mean, "black", "-", f"mean: {shown(summary.mean, 'W')}"),
         (result.mean_problem_power, GREEN, "--", at_means),
-        (ends[0], GREY, ":", "2.5 % and 97.5 % quantile"),
-        (ends[1], GREY, ":", None),
+        (summary.quantile(0.025).value, GREY, ":", "2.5 % and 97.5 % quantile"),
+        (summary.quantile(0.975).value, GREY, ":", None),
     ):
         axes.axvline(place, 0.0, 1.0 / _HEADROOM, color=colour, ls=style, lw=1.0, label=label)
     name_axes(axes, title, "$P_d$ [W]", "probability density [1/W]")
@@ -119,11 +122,10 @@ def _draw_realisations(axes: Axes, result: DissipationResult) -> None:
 
 def _draw_band(axes: Axes, result: DissipationResult) -> None:
     y = result.y * MM
-    names = ("dissipation_low", "dissipation_high", "dissipation_mean")
-    low, high, mean = (result.values(name) * W_MM for name in names)
+    names = ("dissipation_low", "dissipation_high", "dissipation_mean", "mean_problem_dissipation")
+    low, high, mean, at_means = (result.values(name) * W_MM for name in names)
     axes.fill_between(y, low, high, color=BLUE, alpha=0.25, lw=0, label="2.5 to 97.5 %")
     axes.plot(y, mean, color="black", label="mean")
-    at_means = result.values("mean_problem_dissipation") * W_MM
     axes.plot(y, at_means, color=GREEN, ls="--", label="inputs at their means")
     name_axes(axes, "Mean and 95 % range", "y [mm]", r"$P_l$ [W/mm]")
     axes.set_ylim(0.0, 1.3 * axes.get_ylim()[1])

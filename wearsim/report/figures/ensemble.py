@@ -14,9 +14,9 @@ from wearsim.report.parts.style import (
     GREEN,
     GREY,
     ORANGE,
-    figure_style,
     name_axes,
     set_depth_axes,
+    titled_figure,
     write_message,
 )
 from wearsim.report.text.estimates import (
@@ -26,12 +26,12 @@ from wearsim.report.text.estimates import (
     too_few,
 )
 from wearsim.report.text.labels import OBSERVABLES, statistic_in_words
-from wearsim.report.text.units import PER_SI, count, number_of_realisations, shown
+from wearsim.report.text.units import PER_SI, count, in_unit, number_of_realisations, shown
 from wearsim.results import EnsembleResult
 from wearsim.results.ensemble.result import Effect
 from wearsim.results.ensemble.schema import PENDING
-from wearsim.types import IntArray
-from wearsim.uq.estimation.intervals import Interval
+from wearsim.types import FloatArray, IntArray
+from wearsim.uq.estimation.intervals import UNKNOWN, Interval
 from wearsim.uq.estimation.stopping_rule import Target
 
 UM, MM = PER_SI["um"], PER_SI["mm"]
@@ -59,9 +59,7 @@ def ensemble_figure(result: EnsembleResult) -> Figure:
         the estimate, mean worn profile, and Sobol indices of the depth; a message if no realisation
         is completed.
     """
-    with figure_style():
-        figure = Figure(figsize=(13.0, 7.5), layout="constrained")
-        figure.suptitle(f"{result.title}\n{_caption(result)}", fontsize=10.5)
+    with titled_figure(13.0, 7.5, f"{result.title}\n{_caption(result)}") as figure:
         if result.count == 0:
             write_message(figure.subplots(), "", ["no realisation is completed: nothing to draw"])
             return figure
@@ -78,27 +76,28 @@ def ensemble_figure(result: EnsembleResult) -> Figure:
 
 
 def _caption(result: EnsembleResult) -> str:
-    raw = result.raw
-    text = number_of_realisations(result.count)
-    text += "" if result.finished else f" of {count(result.asked)}"
-    text += f" ({count(result.failed)} failed)" if result.failed else ""
-    text += f", {raw.plan}, of {count(raw.total_passes)} roller passes"
-    text += f" ({result.described_model}, {raw.stepper}{'' if result.finished else ', unfinished'})"
+    requested, unfinished = f" of {count(result.asked)}", ", unfinished"
+    if result.finished:
+        requested = unfinished = ""
+    text = (
+        f"{number_of_realisations(result.count)}{requested}"
+        f"{f' ({count(result.failed)} failed)' if result.failed else ''}, {result.raw.plan},"
+        f" of {count(result.raw.total_passes)} roller passes"
+        f" ({result.described_model}, {result.raw.stepper}{unfinished})"
+    )
     if result.count == 0:
         return text
     depth = result.estimate("depth", -1, NINETY_PERCENT)
-    name = "depth" if result.count == 1 else "mean depth"
-    text += f"\n{name} {shown(depth.mean.value, 'um')}"
     if result.count == 1:
-        return text
+        return f"{text}\ndepth {shown(depth.mean.value, 'um')}"
+    text += f"\nmean depth {shown(depth.mean.value, 'um')}"
     if result.is_constant("depth"):
         return f"{text}, equal in all realisations"
     text += f", std {shown(depth.std.value, 'um', 3)}"
-    ends = [depth.quantile(p) for p in NINETY_PERCENT]
+    ends = [end for _, end in depth.quantiles]
     if not all(np.isfinite(end.half_width) for end in ends):
         return text
-    low, high = (shown(end.value, "um", 3) for end in ends)
-    return f"{text}, 90 % range {low.removesuffix(' um')} to {high}"
+    return f"{text}, 90 % range {' to '.join(in_unit(end.value, 'um', 3) for end in ends)} um"
 
 
 def _draw_course(axes: Axes, result: EnsembleResult) -> None:
@@ -108,12 +107,9 @@ def _draw_course(axes: Axes, result: EnsembleResult) -> None:
     passes = course.passes[drawn] / unit
     numbers = result.numbers[:LINES]
     first = int(numbers[0])
-    rows = np.asarray(result.raw.rows("depth", first, int(numbers[-1]) + 1)[numbers - first])
-    rows = rows[:, drawn] * UM
-    axes.plot(
-        passes, rows[0], color=GREY, lw=0.6, alpha=0.6, label=number_of_realisations(len(rows))
-    )
-    axes.plot(passes, rows[1:].T, color=GREY, lw=0.6, alpha=0.6)
+    rows = result.raw.rows("depth", first, int(numbers[-1]) + 1)[numbers - first][:, drawn] * UM
+    lines = axes.plot(passes, rows.T, color=GREY, lw=0.6, alpha=0.6)
+    lines[0].set_label(number_of_realisations(len(rows)))
     if result.count > 1:
         low, median, high = (course.quantiles[p][drawn] * UM for p in (0.05, 0.5, 0.95))
         if sufficient_for(result.count, NINETY_PERCENT[0]):
@@ -128,8 +124,8 @@ def _draw_density(axes: Axes, result: EnsembleResult) -> None:
     title, depth = "Depth at the end", result.at_end("depth")
     if result.count == 1 or result.is_constant("depth"):
         where = "the only realisation" if result.count == 1 else f"all {count(result.count)}"
-        value = shown(float(depth.mean()), "um")
-        write_message(axes, title, [f"{value} in {where}: no density to draw"])
+        text = f"{shown(float(depth.mean()), 'um')} in {where}: no density to draw"
+        write_message(axes, title, [text])
         return
     # Rice's rule
     classes = int(np.clip(np.ceil(2.0 * len(depth) ** (1.0 / 3.0)), 5, _MOST_CLASSES))
@@ -143,8 +139,7 @@ def _draw_density(axes: Axes, result: EnsembleResult) -> None:
     if sufficient_for(result.count, NINETY_PERCENT[0]):
         marks += [(low, GREY, ":", "5 % and 95 %"), (high, GREY, ":", None)]
     for place, colour, style, label in marks:
-        top = 1.0 / _HEADROOM
-        axes.axvline(place * UM, 0.0, top, color=colour, ls=style, lw=1.1, label=label)
+        axes.axvline(place * UM, 0.0, 1 / _HEADROOM, color=colour, ls=style, lw=1.1, label=label)
     name_axes(axes, title, "depth [um]", "probability density [1/um]")
     axes.set_ylim(top=_HEADROOM * axes.get_ylim()[1])
     axes.legend(loc="upper right", ncols=2)
@@ -234,22 +229,24 @@ def _draw_effects(axes: Axes, result: EnsembleResult) -> None:
         write_message(axes, title, ["none, the depth is equal in all realisations"])
         return
     effects = effects[:_MOST_EFFECTS]
-    places = np.arange(len(effects))
+    places = np.arange(float(len(effects)))
     colours = [GREY if item.without_effect else BLUE for item in effects]
-    widths = [100.0 * np.nan_to_num(item.first.value) for item in effects]
+    first, total = [item.first for item in effects], [item.total or UNKNOWN for item in effects]
+    widths = [100.0 * np.nan_to_num(index.value) for index in first]
     axes.barh(places, widths, 0.6, color=colours, alpha=0.55)
-    for place, item in enumerate(effects):
-        _draw_interval(axes, place, item.first, "black", "")
-        if item.total is not None:
-            _draw_interval(axes, place + 0.38, item.total, ORANGE, "D")
+    _draw_intervals(axes, places, first, "black")
+    if any(item.total for item in effects):
+        below = np.asarray(places + 0.38, dtype=np.float64)
+        _draw_intervals(axes, below, total, ORANGE)
+        values = [100.0 * index.value for index in total]
+        label = "total, with interactions"
+        axes.plot(values, below, "D", color=ORANGE, ms=4.0, label=label)
+        axes.legend(loc="lower right")
     axes.set_yticks(places, [_label(item) for item in effects])
-    for label, item in zip(axes.get_yticklabels(), effects, strict=True):
-        label.set_color("black" if label.get_text() == item.name else GREY)
+    for tick, item in zip(axes.get_yticklabels(), effects, strict=True):
+        tick.set_color("black" if tick.get_text() == item.name else GREY)
     axes.invert_yaxis()
     axes.set_xlim(0.0, 100.0)
-    if any(item.total is not None for item in effects):
-        axes.plot([], [], "D", color=ORANGE, ms=4.0, label="total, with interactions")
-        axes.legend(loc="lower right")
     name_axes(axes, title, "first-order index: part of the variance [%]", "")
 
 
@@ -259,10 +256,7 @@ def _label(item: Effect) -> str:
     return f"{item.name} (not significant)" if item.without_effect else item.name
 
 
-def _draw_interval(axes: Axes, place: float, found: Interval, colour: str, mark: str) -> None:
-    if not np.isfinite(found.value):
-        return
-    low, high = (float(np.clip(end, 0.0, 1.0)) for end in (found.low, found.high))
-    axes.plot([100.0 * low, 100.0 * high], [place, place], color=colour, lw=1.0)
-    if mark:
-        axes.plot([100.0 * found.value], [place], mark, color=colour, ms=4.0)
+def _draw_intervals(axes: Axes, places: FloatArray, found: list[Interval], colour: str) -> None:
+    known = [np.isfinite(index.value) for index in found]
+    ends = np.clip([[index.low for index in found], [index.high for index in found]], 0.0, 1.0)
+    axes.plot(np.where(known, 100.0 * ends, np.nan), [places, places], color=colour, lw=1.0)

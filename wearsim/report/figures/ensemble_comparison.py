@@ -10,7 +10,16 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
-from wearsim.report.parts.style import BLUE, GREEN, ORANGE, RECORDS, RED, figure_style, name_axes
+from wearsim.report.parts.style import (
+    BLUE,
+    GREEN,
+    ORANGE,
+    RECORDS,
+    RED,
+    evenly,
+    name_axes,
+    titled_figure,
+)
 from wearsim.report.text.comparison_words import against, realisations
 from wearsim.report.text.estimates import sufficient_for
 from wearsim.report.text.labels import OBSERVABLES, Named
@@ -42,9 +51,7 @@ def comparison_figure(comparison: Comparison, title: str = "") -> Figure:
     colours = list(COLOURS[: len(rows)])
     if len(rows) > len(COLOURS):
         colours = [to_hex(c) for c in colormaps[RECORDS](np.linspace(0.0, 0.9, len(rows)))]
-    with figure_style():
-        height = max(4.6, 1.8 + _ROW_HEIGHT * len(rows))
-        figure = Figure(figsize=(13.0, height), layout="constrained")
+    with titled_figure(13.0, max(4.6, 1.8 + _ROW_HEIGHT * len(rows)), title) as figure:
         left, right = figure.subplots(1, 2)
         for row, colour in zip(rows, colours, strict=True):
             _draw_distribution(left, row, colour, named)
@@ -54,7 +61,6 @@ def comparison_figure(comparison: Comparison, title: str = "") -> Figure:
         left.legend(loc="best")
         _draw_ranges(right, comparison, colours, named)
         right.set_xlabel(label)
-        figure.suptitle(title, fontsize=10.5)
     return figure
 
 
@@ -66,9 +72,7 @@ def _draw_distribution(axes: Axes, row: Compared, colour: str, named: Named) -> 
         axes.axvline(row.value.value * named.per_si, color=colour, label=f"{row.label} (run)")
         return
     values = row.values * named.per_si
-    picks = np.arange(len(values))
-    if len(values) > MOST_POINTS:
-        picks = np.unique(np.linspace(0, len(values) - 1, MOST_POINTS).round().astype(np.int64))
+    picks = evenly(len(values), MOST_POINTS)
     parts = 100.0 * (picks + 1.0) / len(values)
     # from zero, since the function rises at the first value too
     across = np.concatenate([values[:1], values[picks]])
@@ -81,19 +85,15 @@ def _draw_ranges(axes: Axes, comparison: Comparison, colours: list[str], named: 
     rows = comparison.rows
     places = np.arange(len(rows))
     for place, row, colour in zip(places, rows, colours, strict=True):
-        level = [place, place]
+        quantiles = [quantile.value * named.per_si for _, quantile in row.quantiles]
         if _has_range(row):
-            ends = [row.quantiles[0][1].value, row.quantiles[-1][1].value]
-            axes.plot(np.array(ends) * named.per_si, level, color=colour, lw=_THIN)
+            axes.plot([quantiles[0], quantiles[-1]], [place] * 2, color=colour, lw=_THIN)
         if row.quantiles:
             middle = dict(row.quantiles)[0.5].value * named.per_si
             axes.plot([middle], [place], "|", color=colour, ms=13.0, mew=_THIN)
-        if np.isfinite([row.value.low, row.value.high]).all():
-            ends = [row.value.low, row.value.high]
-            axes.plot(
-                np.array(ends) * named.per_si, level, color=colour, lw=_THICK, alpha=0.45,
-                solid_capstyle="butt",
-            )  # fmt: skip
+        ends = np.array([row.value.low, row.value.high]) * named.per_si
+        if np.isfinite(ends).all():
+            axes.plot(ends, [place] * 2, color=colour, lw=_THICK, alpha=0.45, solid_capstyle="butt")
         axes.plot([row.value.value * named.per_si], [place], "o", color=colour, ms=4.5)
     axes.set_yticks(places, [_label(comparison, row) for row in rows])
     axes.set_ylim(len(rows) - 0.5, -0.5)

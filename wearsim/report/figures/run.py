@@ -20,9 +20,10 @@ from wearsim.report.parts.style import (
     ORANGE,
     RECORDS,
     RED,
-    figure_style,
+    evenly,
     name_axes,
     set_depth_axes,
+    titled_figure,
 )
 from wearsim.report.text.units import PER_SI, count, pass_unit, shown
 from wearsim.results import Result
@@ -50,8 +51,7 @@ def run_figure(result: Result, measured: Sequence[Measured] = ()) -> Figure:
         Four panels: profiles and dissipated power per length at records, depth against roller
         passes, normal force against time.
     """
-    with figure_style():
-        figure = Figure(figsize=(11.0, 7.6), layout="constrained")
+    with titled_figure(11.0, 7.6, f"{result.title}\n{_caption(result)}") as figure:
         panels = figure.subplot_mosaic(
             [["profiles", "depth"], ["dissipation", "load"]], width_ratios=[1.15, 1.0]
         )
@@ -64,7 +64,6 @@ def run_figure(result: Result, measured: Sequence[Measured] = ()) -> Figure:
         colours.draw_bar(figure, [panels["profiles"], panels["dissipation"]])
         _draw_depth(panels["depth"], result)
         _draw_normal_force(panels["load"], result)
-        figure.suptitle(f"{result.title}\n{_caption(result)}", fontsize=10.5)
     return figure
 
 
@@ -86,8 +85,7 @@ class _Colours:
     """Drawn records and their colours, by roller passes; the start of the run is black."""
 
     def __init__(self, passes: FloatArray) -> None:
-        picks = np.linspace(0, len(passes) - 1, min(len(passes), MOST_RECORDS))
-        self.records: IntArray = np.unique(picks.round().astype(np.int64))
+        self.records = evenly(len(passes), MOST_RECORDS)
         worn = passes[passes > 0.0]
         last = float(worn[-1]) if len(worn) else 1.0
         crowded = len(worn) > 2 and float(np.median(worn)) < 0.15 * last
@@ -98,8 +96,7 @@ class _Colours:
 
     def selection(self, number: int) -> IntArray:
         """Return at most `number` records, the first and the last included."""
-        picks = np.linspace(0, len(self.records) - 1, min(len(self.records), number))
-        return self.records[np.unique(picks.round().astype(np.int64))]
+        return self.records[evenly(len(self.records), number)]
 
     def of(self, record: int) -> tuple[float, float, float, float] | str:
         passes = float(self._passes[record])
@@ -116,8 +113,7 @@ def _draw_profiles(
     y = result.y * MM
     worn = np.asarray(result.profiles)
     for record in colours.records:
-        height = (result.start_height - worn[record]) * UM
-        axes.plot(y, height, color=colours.of(record), lw=1.1)
+        axes.plot(y, (result.start_height - worn[record]) * UM, color=colours.of(record), lw=1.1)
     rollers = np.atleast_2d(np.asarray(result.roller_profiles)[-1])
     for number, roller in enumerate(rollers):
         if roller.max() > 0.0:
@@ -131,8 +127,12 @@ def _draw_profiles(
             profile.y * MM, profile.height * UM, MARKS[number % len(MARKS)], ms=3.2, mew=0.7,
             mfc="white", mec=RED, label=f"measured: {profile.label}", zorder=5,
         )  # fmt: skip
-    title = "Worn profile of the cylinder (black: start of the run)"
-    name_axes(axes, title, "y [mm]", "height above nominal [um]")
+    name_axes(
+        axes,
+        "Worn profile of the cylinder (black: start of the run)",
+        "y [mm]",
+        "height above nominal [um]",
+    )
     if axes.get_legend_handles_labels()[0]:
         axes.legend(loc="lower right")
 
@@ -148,10 +148,10 @@ def _extent(result: Result, others: Sequence[FloatArray]) -> tuple[float, float]
 
 
 def _draw_depth(axes: Axes, result: Result) -> None:
-    passes, depth = np.asarray(result.passes), np.asarray(result.depth)
-    error = np.asarray(result.depth_error)
-    drawn, unit, name = set_depth_axes(axes, passes, depth)
-    passes, depth, error = passes[drawn], depth[drawn], error[drawn]
+    drawn, unit, name = set_depth_axes(axes, result.passes, result.depth)
+    passes, depth, error = (
+        values[drawn] for values in (result.passes, result.depth, result.depth_error)
+    )
     visible = bool((error > 0.05 * depth).any())
     estimate = f"estimated error {shown(float(error[-1]), 'um', 2)} at the end"
     if visible:
@@ -180,8 +180,12 @@ def _draw_dissipation(axes: Axes, result: Result, colours: _Colours) -> None:
         for number, style in enumerate(styles, 1):
             axes.plot([], [], style, color="black", label=f"roller {number}")
         axes.legend(loc="upper right")
-    title = "Dissipated power per length (black: start of the run)"
-    name_axes(axes, title, "y [mm]", r"$P_l$ [W/mm]")
+    name_axes(
+        axes,
+        "Dissipated power per length (black: start of the run)",
+        "y [mm]",
+        r"$P_l$ [W/mm]",
+    )
     axes.set_ylim(bottom=0.0)
 
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from pathlib import PurePath
 
-from wearsim.csv_tables import read_columns
+from wearsim.csv_tables import column_names, read_columns
 from wearsim.types import FloatArray
 
 
@@ -48,9 +47,7 @@ def read_measured(text: str, file: str) -> Measured:
     ScenarioError
         With all mistakes in the file.
     """
-    lines = (line.strip() for line in text.lstrip("\ufeff").splitlines())
-    header = next((line for line in lines if line and not line.startswith("#")), "")
-    names = {cell.split("[")[0].strip() for cell in re.split("[\t;,]", header)}
+    names = column_names(text)
     name = "depth" if "depth" in names and "height" not in names else "height"
     columns = read_columns(text, file, {"y": "m", name: "m"})
     height = -columns[name] if name == "depth" else columns[name]

@@ -7,11 +7,13 @@ from contextlib import contextmanager
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
 from wearsim.report.text.units import pass_unit
-from wearsim.types import BoolArray, FloatArray
+from wearsim.types import BoolArray, FloatArray, IntArray
 
 RECORDS = "viridis"
 PRESSURE = "magma"
@@ -47,11 +49,24 @@ def figure_style() -> Iterator[None]:
         yield
 
 
+@contextmanager
+def titled_figure(width: float, height: float, title: str | None = None) -> Iterator[Figure]:
+    """Return a figure of a width and height in inches, drawn with the settings of wearsim."""
+    with figure_style():
+        figure = Figure(figsize=(width, height), layout="constrained")
+        if title is not None:
+            figure.suptitle(title, fontsize=10.5)
+        yield figure
+
+
 def name_axes(axes: Axes, title: str, x: str, y: str) -> None:
     """Set the title of a panel and the labels of its axes."""
-    axes.set_title(title)
-    axes.set_xlabel(x)
-    axes.set_ylabel(y)
+    axes.set(title=title, xlabel=x, ylabel=y)
+
+
+def evenly(count: int, most: int) -> IntArray:
+    """Return at most `most` evenly spaced indices of `count` items, with the first and the last."""
+    return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.int64))
 
 
 def write_message(axes: Axes, title: str, lines: Sequence[str]) -> None:
@@ -83,8 +98,7 @@ def set_depth_axes(
     """
     worn = (passes > 0.0) & (depth > 0.0)
     if worn.sum() > 3 and passes[worn][-1] > 100.0 * passes[worn][0]:
-        axes.set_xscale("log")
-        axes.set_yscale("log")
+        axes.set(xscale="log", yscale="log")
         axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         return worn, 1.0, "roller passes"
     return passes >= 0.0, *pass_unit(float(passes[-1]))

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from wearsim.report.text.units import NOTHING, PER_SI, count, shown
+from wearsim.report.text.units import NOTHING, PER_SI, count, in_unit
 from wearsim.results import EnsembleResult
 from wearsim.uq.estimation.intervals import Interval
 from wearsim.uq.sensitivity.sobol_indices import FEWEST_BASES, fewest_realisations
@@ -50,16 +50,14 @@ def _numbers(found: Interval, unit: str) -> tuple[str, str, str]:
     """Return an estimate and the ends of its interval, or a remark instead of the ends."""
     if not math.isfinite(found.value):
         return NOTHING, TOO_FEW, ""
-    ends = (found.value, found.low, found.high)
-    value, low, high = (end * PER_SI[unit] for end in ends)
-    bare = [shown(end, unit).removesuffix(f" {unit}") for end in ends]
-    if low == high:
-        return bare[0], "", ""
-    if not (math.isfinite(low) and math.isfinite(high)):
-        return bare[0], TOO_FEW, ""
+    if found.low == found.high:
+        return in_unit(found.value, unit), "", ""
+    if not math.isfinite(found.half_width):
+        return in_unit(found.value, unit), TOO_FEW, ""
+    value, low, high = (end * PER_SI[unit] for end in (found.value, found.low, found.high))
     sizes = [abs(end) for end in (value, low, high) if end]
     if min(sizes) < _WITHOUT_EXPONENT[0] or max(sizes) >= _WITHOUT_EXPONENT[1]:
-        return bare[0], bare[1], bare[2]
+        return in_unit(found.value, unit), in_unit(found.low, unit), in_unit(found.high, unit)
     place = math.floor(math.log10(abs(value))) if value else 0
     decimals = _HALF_WIDTH_DIGITS - 1 - math.floor(math.log10(0.5 * (high - low)))
     decimals = max(min(max(decimals, _MIN_DIGITS - 1 - place), _MAX_DIGITS - 1 - place), 0)
@@ -70,12 +68,10 @@ def part_with_interval(found: Interval) -> str:
     """Return a fraction in per cent, "57.1 % [54.0, 60.2]"."""
     if not math.isfinite(found.value):
         return NOTHING
-    value, low, high = (100.0 * end for end in (found.value, found.low, found.high))
-    if low == high:
-        return f"{value:.1f} %"
-    if not (math.isfinite(low) and math.isfinite(high)):
-        return f"{value:.1f} % {TOO_FEW}"
-    return f"{value:.1f} % [{low:.1f}, {high:.1f}]"
+    value, low, high = (f"{100.0 * end:.1f}" for end in (found.value, found.low, found.high))
+    if found.low == found.high:
+        return f"{value} %"
+    return f"{value} % " + (f"[{low}, {high}]" if math.isfinite(found.half_width) else TOO_FEW)
 
 
 def sufficient_for(realisations: int, probability: float) -> bool:

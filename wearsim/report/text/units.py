@@ -27,7 +27,13 @@ NOTHING = "-"
 
 
 def shown(value: float | None, unit: str, digits: int = 4) -> str:
-    """Return an SI value in an engineering unit, with that unit.
+    """Return an SI value in an engineering unit, with that unit; parameters as of `in_unit`."""
+    text = in_unit(value, unit, digits)
+    return text if unit == "1" or text == NOTHING else f"{text} {unit}"
+
+
+def in_unit(value: float | None, unit: str, digits: int = 4) -> str:
+    """Return an SI value as a number in an engineering unit; very small and large with exponent.
 
     Parameters
     ----------
@@ -44,18 +50,13 @@ def shown(value: float | None, unit: str, digits: int = 4) -> str:
     """
     if value is None or not math.isfinite(value):
         return NOTHING
-    text = _significant(value * PER_SI[unit], digits)
-    return text if unit == "1" else f"{text} {unit}"
-
-
-def _significant(value: float, digits: int) -> str:
-    """Format a number with significant digits, very small and large ones with an exponent."""
-    text = f"{value:.{digits - 1}e}"
-    if value != 0.0 and not 1e-4 <= abs(value) < 1e7:
-        return text
+    text = f"{value * PER_SI[unit]:.{digits - 1}e}"
     rounded = float(text)
-    exponent = math.floor(math.log10(abs(rounded))) if rounded else 0
-    return f"{rounded:.{max(digits - 1 - exponent, 0)}f}" if rounded else "0"
+    if rounded == 0.0:
+        return "0"
+    if not 1e-4 <= abs(value * PER_SI[unit]) < 1e7:
+        return text
+    return f"{rounded:.{max(digits - 1 - math.floor(math.log10(abs(rounded))), 0)}f}"
 
 
 def count(value: float) -> str:

@@ -130,9 +130,9 @@ def _computed(row: Row) -> str:
 
 def _shown(value: float, unit: str, digits: int) -> str:
     """Return a number converted to a unit, without the unit."""
-    from wearsim.report.text.units import PER_SI, shown
+    from wearsim.report.text.units import PER_SI, in_unit
 
-    return shown(value, unit if unit in PER_SI else "1", digits).removesuffix(f" {unit}")
+    return in_unit(value, unit if unit in PER_SI else "1", digits)
 
 
 def _data(results: Reproduction, rows: tuple[Row, ...], figure: Path | None) -> dict[str, Any]:
