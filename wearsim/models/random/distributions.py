@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
-from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
+from pydantic import Field, ValidationInfo, model_validator
 
 from wearsim.models.random.table import TableDistribution, TableOptions
 from wearsim.plugins import Distribution, JointDistribution, Options, RandomInputSpec
@@ -132,20 +132,18 @@ class MaxentOptions(Options):
         None,
         description="mean of the logarithm of the SI value, instead of std: a gamma distribution",
     )
-    _distribution: MaxentDistribution = PrivateAttr()
 
     @model_validator(mode="after")
-    def _solve(self, info: ValidationInfo) -> Self:
+    def _feasible(self, info: ValidationInfo) -> Self:
         try:
-            self._distribution = maximum_entropy(self.support, self.mean, self.std, self.mean_log)
+            self.distribution()
         except Infeasible as error:
             raise QuantityError(f"{error}{_in_unit(info)}") from error
         return self
 
-    @property
     def distribution(self) -> MaxentDistribution:
-        """Distribution of maximum entropy."""
-        return self._distribution
+        """Return the distribution of maximum entropy."""
+        return maximum_entropy(self.support, self.mean, self.std, self.mean_log)
 
 
 def check_rising(low: float, high: float, info: ValidationInfo) -> None:
@@ -159,37 +157,6 @@ def _in_unit(info: ValidationInfo) -> str:
     """Return a remark on the unit of the numbers in a message, if they have one."""
     replaced: Quantity | None = (info.context or {}).get("quantity")
     return "" if replaced is None else f" (numbers in {replaced.kind.unit})"
-
-
-class AnalyticDistribution(Distribution):
-    """Random input whose quantiles and moments are those of an analytic distribution."""
-
-    def __init__(self, analytic: MaxentDistribution) -> None:
-        self.analytic = analytic
-
-    def quantile(self, probability: FloatArray) -> FloatArray:
-        """Return the quantiles, shape as `probability`."""
-        return self.analytic.quantile(probability)
-
-    @cached_property
-    def support(self) -> tuple[float, float]:
-        """Minimum and maximum."""
-        return self.analytic.support
-
-    @cached_property
-    def mean(self) -> float:
-        """Exact mean."""
-        return self.analytic.mean
-
-    @cached_property
-    def std(self) -> float:
-        """Exact standard deviation."""
-        return self.analytic.std
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Warnings about the validity, for the user."""
-        return self.analytic.warnings
 
 
 class Lognormal(Distribution):
@@ -261,7 +228,7 @@ _ENTROPY = (
 SPECS = (
     RandomInputSpec(
         name="maxent",
-        factory=lambda options: AnalyticDistribution(options.distribution),
+        factory=MaxentOptions.distribution,
         options=MaxentOptions,
         summary="maximum entropy for given support, mean and standard deviation",
         references=_ENTROPY,
@@ -269,9 +236,7 @@ SPECS = (
     ),
     RandomInputSpec(
         name="normal",
-        factory=lambda options: AnalyticDistribution(
-            TruncatedNormal(-math.inf, math.inf, options.mean, options.std)
-        ),
+        factory=lambda options: TruncatedNormal(-math.inf, math.inf, options.mean, options.std),
         options=NormalOptions,
         summary="normal with given mean and standard deviation",
         protocol=2,
@@ -285,15 +250,15 @@ SPECS = (
     ),
     RandomInputSpec(
         name="uniform",
-        factory=lambda options: AnalyticDistribution(Uniform(options.low, options.high)),
+        factory=lambda options: Uniform(options.low, options.high),
         options=UniformOptions,
         summary="uniform between two limits",
         protocol=2,
     ),
     RandomInputSpec(
         name="truncated-normal",
-        factory=lambda options: AnalyticDistribution(
-            cut_normal(*(*options.support, options.parent_mean, options.parent_std))
+        factory=lambda options: cut_normal(
+            *(*options.support, options.parent_mean, options.parent_std)
         ),
         options=TruncatedNormalOptions,
         summary="normal truncated at limits; mean and std are those before (else maxent)",

@@ -1,9 +1,10 @@
-"""Base class of maximum-entropy distributions, and those with closed quantile functions."""
+"""Base classes of distributions, and maximum entropy with closed quantile functions."""
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from functools import cached_property
 
 import numpy as np
 
@@ -12,7 +13,58 @@ from wearsim.types import FloatArray
 _STEEP = 30.0  # fall of the log density from which the density at the upper end is below rounding
 
 
-class MaxentDistribution(ABC):
+class Distribution(ABC):
+    """Distribution of a random number, given by its quantile function; values in SI units."""
+
+    @abstractmethod
+    def quantile(self, probability: FloatArray) -> FloatArray:
+        """Return the quantiles.
+
+        Parameters
+        ----------
+        probability : ndarray
+            0 to 1; the quantiles at 0 and 1 are the ends of the support, which may be infinite.
+
+        Returns
+        -------
+        ndarray, shape as `probability`
+        """
+
+    @cached_property
+    def support(self) -> tuple[float, float]:
+        """Minimum and maximum."""
+        low, high = self.quantile(np.array([0.0, 1.0]))
+        return float(low), float(high)
+
+    @cached_property
+    def mean(self) -> float:
+        """Mean, by default integrated over the quantiles."""
+        return self._moments[0]
+
+    @cached_property
+    def std(self) -> float:
+        """Standard deviation, by default integrated over the quantiles."""
+        return self._moments[1]
+
+    @cached_property
+    def _moments(self) -> tuple[float, float]:
+        # in normal scores, as functions of which common quantile functions are smooth
+        from scipy.special import ndtr  # noqa: PLC0415  (slow to import, and rarely needed)
+
+        scores, weights = np.polynomial.hermite_e.hermegauss(120)
+        # the weights in the tails vanish, but an infinite end of the support would dominate
+        values = self.quantile(np.clip(ndtr(scores), 2.0**-53, 1.0 - 2.0**-53))
+        weights /= weights.sum()
+        mean = float(np.dot(weights, values))
+        return mean, float(np.sqrt(np.dot(weights, (values - mean) ** 2)))
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Warnings about the validity, for the user."""
+        return ()
+
+
+class MaxentDistribution(Distribution):
     """A distribution with density ``exp(-l0 - l1 x - l2 g(x))``, g being x^2 or log x.
 
     Attributes
@@ -32,9 +84,6 @@ class MaxentDistribution(ABC):
     """
 
     family: str
-    support: tuple[float, float]
-    mean: float
-    std: float
     multipliers: tuple[float, float, float]
     third: str = "x^2"
     antimode: tuple[float, float] | None = None

@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 
-from wearsim.models.random.distributions import AnalyticDistribution
 from wearsim.scenario import Scenario
 from wearsim.studies.run.grid import fresh_patch
 from wearsim.studies.run.inputs import LOAD, LONGITUDINAL, TILT, YAW
@@ -61,9 +60,9 @@ def _radii(scenario: Scenario) -> str:
 def maxent_of(scenario: Scenario, key: str) -> MaxentDistribution:
     """Return the maximum-entropy distribution of a random input."""
     (item,) = (item for item in scenario.random if item.name == key)
-    if not isinstance(item.distribution, AnalyticDistribution):
+    if not isinstance(item.distribution, MaxentDistribution):
         raise TypeError(f"{key} has no maximum-entropy distribution, but {item.kind}")
-    return item.distribution.analytic
+    return item.distribution
 
 
 def printed_area(printed: paper.PrintedMultipliers, distribution: MaxentDistribution) -> float:
