@@ -27,8 +27,8 @@ from wearsim.units import (
     Bound,
     Kind,
     QuantityError,
+    conversion,
     kind_of,
-    measure,
     shown,
 )
 
@@ -104,15 +104,8 @@ class Quantity:
             If it is not a quantity of this kind within the bound.
         """
         number, unit = _split(value, self.expected)
-        try:
-            size, dimensions = measure(unit)
-        except ValueError as error:
-            raise QuantityError(str(error), shown(value), self.expected) from error
-        si_size, si_dimensions = measure(self.kind.unit)
-        if dimensions != si_dimensions:
-            got = f"{shown(value)} ({kind_of(unit).name})"
-            raise QuantityError("wrong dimension", got, self.expected)
-        return self._checked(_si(number, size / si_size), value)
+        factor = conversion(unit, self.kind.unit, shown(value), self.expected)
+        return self._checked(_si(number, factor), value)
 
     def _checked(self, number: float, text: object = None) -> float:
         """Return a number in SI if it is allowed; `text` is what the file has instead of it."""

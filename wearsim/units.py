@@ -186,7 +186,9 @@ def kind_of(unit: str) -> Kind:
     return Kind(name, unit, f"1 {_normalised(unit)}")
 
 
-def conversion(unit: str, target: str) -> Fraction:
+def conversion(
+    unit: str, target: str, written: str | None = None, expected: str | None = None
+) -> Fraction:
     """Return the exact factor from `unit` to `target`.
 
     Parameters
@@ -195,6 +197,8 @@ def conversion(unit: str, target: str) -> Fraction:
         Unit in the spelling of a user, "mm".
     target : str
         Unit to convert to, "m".
+    written, expected : str, optional
+        Quantity with this unit and expected form, for messages; by default they are on the unit.
 
     Returns
     -------
@@ -205,14 +209,15 @@ def conversion(unit: str, target: str) -> Fraction:
     QuantityError
         If `unit` is unknown or has another dimension than `target`.
     """
-    wanted = kind_of(target)
-    expected = f"a unit of {wanted.name.split(maxsplit=1)[1]} such as {target}"
+    if expected is None:
+        expected = f"a unit of {kind_of(target).name.split(maxsplit=1)[1]} such as {target}"
     try:
         size, dimensions = measure(unit)
     except ValueError as error:
-        raise QuantityError(str(error), None, expected) from error
+        raise QuantityError(str(error), written, expected) from error
     if dimensions != measure(target)[1]:
-        raise QuantityError("wrong dimension", f"{unit} ({kind_of(unit).name})", expected)
+        got = f"{written or unit} ({kind_of(unit).name})"
+        raise QuantityError("wrong dimension", got, expected)
     return size / measure(target)[0]
 
 
