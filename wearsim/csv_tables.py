@@ -136,10 +136,10 @@ def _regular_numbers(
     """
     import numpy as np  # noqa: PLC0415
 
-    joined = "\n".join(body)
-    marks = set(map(methodcaller("count", header.separator), body))
-    if marks != {len(header.cells) - 1} or "#" in joined or '"' in joined:
-        return None
+    if not _is_regular(body, header):
+        body = [line for line in body if _has_cells(line)]
+        if not _is_regular(body, header):
+            return None
     places = [place for place, _ in found.values()]
     try:
         table = np.loadtxt(body, delimiter=header.separator, usecols=places, ndmin=2, unpack=True)
@@ -149,6 +149,13 @@ def _regular_numbers(
     order = values.get(rising or "", np.arange(2.0))
     regular = len(body) > 1 and np.isfinite(table).all() and (order[1:] > order[:-1]).all()
     return values if regular else None
+
+
+def _is_regular(rows: list[str], header: _Header) -> bool:
+    """Return whether rows have as many cells as the header, and no comments or quotes."""
+    joined = "\n".join(rows)
+    marks = set(map(methodcaller("count", header.separator), rows))
+    return marks == {len(header.cells) - 1} and "#" not in joined and '"' not in joined
 
 
 def _find_columns(header: _Header, columns: Mapping[str, str], mistakes: list[Mistake]) -> _Columns:
