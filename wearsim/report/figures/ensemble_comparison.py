@@ -16,7 +16,7 @@ from wearsim.report.parts.style import (
     ORANGE,
     RECORDS,
     RED,
-    evenly,
+    evenly_spaced,
     name_axes,
     titled_figure,
 )
@@ -72,7 +72,7 @@ def _draw_distribution(axes: Axes, row: Compared, colour: str, named: Named) -> 
         axes.axvline(row.value.value * named.per_si, color=colour, label=f"{row.label} (run)")
         return
     values = row.values * named.per_si
-    picks = evenly(len(values), MOST_POINTS)
+    picks = evenly_spaced(len(values), MOST_POINTS)
     parts = 100.0 * (picks + 1.0) / len(values)
     # from zero, since the function rises at the first value too
     across = np.concatenate([values[:1], values[picks]])

@@ -20,7 +20,7 @@ from wearsim.report.parts.style import (
     ORANGE,
     RECORDS,
     RED,
-    evenly,
+    evenly_spaced,
     name_axes,
     set_depth_axes,
     titled_figure,
@@ -85,7 +85,7 @@ class _Colours:
     """Drawn records and their colours, by roller passes; the start of the run is black."""
 
     def __init__(self, passes: FloatArray) -> None:
-        self.records = evenly(len(passes), MOST_RECORDS)
+        self.records = evenly_spaced(len(passes), MOST_RECORDS)
         worn = passes[passes > 0.0]
         last = float(worn[-1]) if len(worn) else 1.0
         crowded = len(worn) > 2 and float(np.median(worn)) < 0.15 * last
@@ -96,7 +96,7 @@ class _Colours:
 
     def selection(self, number: int) -> IntArray:
         """Return at most `number` records, the first and the last included."""
-        return self.records[evenly(len(self.records), number)]
+        return self.records[evenly_spaced(len(self.records), number)]
 
     def of(self, record: int) -> tuple[float, float, float, float] | str:
         passes = float(self._passes[record])

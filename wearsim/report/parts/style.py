@@ -64,7 +64,7 @@ def name_axes(axes: Axes, title: str, x: str, y: str) -> None:
     axes.set(title=title, xlabel=x, ylabel=y)
 
 
-def evenly(count: int, most: int) -> IntArray:
+def evenly_spaced(count: int, most: int) -> IntArray:
     """Return at most `most` evenly spaced indices of `count` items, with the first and the last."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.int64))
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from wearsim.types import FloatArray
 
-_STEEP = 30.0  # fall of the log density from which the density at the upper end is below rounding
+_STEEP = 40.0  # fall of the log density from which values near the upper end cannot be drawn
 
 
 class Distribution(ABC):

@@ -164,10 +164,8 @@ def _errors(
             raise ValueError("a control-variate plan needs the control of each realisation")
         if control.is_usable:
             return Controlled(control)
-        return Independent(
-            count, "independent realisations, too few or too similar for a control variate"
-        )
     words = {
+        "control-variate": "independent realisations, too few or too similar for a control variate",
         "monte-carlo": "independent realisations",
         "latin-hypercube": "as for independent realisations, and therefore too wide",
         "saltelli": "independent realisations of the blocks A and B",
