@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
+from threading import Timer
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,27 @@ class Deadly:
         return True
 
 
+class _KilledAsItIsPickled:
+    def __reduce__(self) -> tuple[object, ...]:
+        os.kill(os.getpid(), signal.SIGKILL)
+        return ()
+
+
+@dataclass(frozen=True)
+class KilledAsItWrites:
+    """Zero bytes; the process is killed once when a part of the results has been written."""
+
+    folder: Path
+    length: int
+
+    def __call__(self, numbers: Sequence[int]) -> list[object]:
+        results: list[object] = [bytes(self.length) for _ in numbers]
+        if 0 in numbers and not (self.folder / "killed").exists():
+            (self.folder / "killed").touch()
+            results.append(_KilledAsItIsPickled())
+        return results
+
+
 @dataclass(frozen=True)
 class KilledAsItSends:
     """Zero bytes; kills its process once while the results are being sent."""
@@ -86,6 +109,25 @@ def _write_and_die(handle: int, content: bytes) -> int:
     os.write(handle, bytes(content[:1000]))
     os.kill(os.getpid(), signal.SIGKILL)
     return 0
+
+
+@dataclass(frozen=True)
+class EndsAfterwards:
+    """Process ids; the process of number 0 ends a moment after it has returned its results."""
+
+    def __call__(self, numbers: Sequence[int]) -> list[int]:
+        if 0 in numbers:
+            Timer(0.2, os._exit, (3,)).start()
+        return [os.getpid() for _ in numbers]
+
+
+class Exiting:
+    """Squares; calls `sys.exit` at number 3."""
+
+    def __call__(self, numbers: Sequence[int]) -> list[int]:
+        if 3 in numbers:
+            sys.exit("finished")
+        return [number * number for number in numbers]
 
 
 class Raising:

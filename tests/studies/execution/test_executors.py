@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,8 +15,11 @@ from pathlib import Path
 import pytest
 from batch_works import (
     Deadly,
+    EndsAfterwards,
+    Exiting,
     Held,
     KilledAsItSends,
+    KilledAsItWrites,
     Raising,
     Squares,
     Unreadable,
@@ -129,9 +133,12 @@ def test_batches_of_a_killed_process_are_repeated(tmp_path: Path, size: int) -> 
     assert messages == [f"a worker process {cause}; {name} will be done again"] * 2
 
 
-def test_batch_of_process_killed_while_sending_is_repeated(tmp_path: Path) -> None:
+@pytest.mark.parametrize("way", [KilledAsItSends, KilledAsItWrites])
+def test_batch_of_process_killed_while_sending_is_repeated(
+    tmp_path: Path, way: type[KilledAsItSends | KilledAsItWrites]
+) -> None:
     with executor("processes", 2) as pool:
-        work = KilledAsItSends(tmp_path, 1_000_000)
+        work = way(tmp_path, 1_000_000)
         found = {numbers[0]: rows for numbers, rows in pool.results(work, batches_of(1, 6))}
     assert (tmp_path / "killed").exists()
     assert sorted(found) == list(range(6))
@@ -147,6 +154,38 @@ def test_batch_that_kills_every_process_raises(tmp_path: Path) -> None:
     assert caught.value.exit_code == 1
     assert len(list(tmp_path.glob("killed *"))) == 3
     assert list(tmp_path.glob("done *"))  # the other process continued
+
+
+def test_process_that_ends_between_batches_is_replaced() -> None:
+    messages: list[str] = []
+    with executor("processes", 2, on_notice=messages.append) as pool:
+        found = pool.results(EndsAfterwards(), iter([[0], [1], [2]]))
+        results = [next(found), next(found)]
+        time.sleep(1.0)
+        results += [*found, *pool.results(EndsAfterwards(), iter([[3], [4]]))]
+    assert sorted(numbers[0] for numbers, _ in results) == list(range(5))
+    assert len(messages) == 1
+    assert messages[0].startswith("a worker process ended with exit code 3; realisation ")
+
+
+def test_exit_of_the_work_fails_its_batch_only() -> None:
+    with executor("processes", 2) as pool:
+        with pytest.raises(WorkerError, match=r"realisations 2 to 3 called sys.exit\('finished'\)"):
+            list(pool.results(Exiting(), batches_of(2, 8)))
+        assert list(pool.results(Exiting(), iter([[2]]))) == [([2], [4])]
+
+
+def test_unwritable_temporary_folder_is_reported(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    with executor("processes", 2) as pool:
+        found = pool.results(Squares(0.1), batches_of(1, 100))
+        next(found)
+        (folder,) = tmp_path.iterdir()
+        folder.rename(tmp_path / "moved")
+        with pytest.raises(WorkerError, match="batches cannot be exchanged through .*wearsim-"):
+            list(found)
 
 
 @pytest.mark.parametrize(("scheduler", "workers"), EXECUTORS)
@@ -195,10 +234,11 @@ def alive(pid: int) -> bool:
         pytest.param("dask", signal.SIGINT, marks=pytest.mark.slow),
     ],
 )
-def test_workers_end_with_the_study(scheduler: str, number: signal.Signals) -> None:
+def test_workers_end_with_the_study(tmp_path: Path, scheduler: str, number: signal.Signals) -> None:
     with subprocess.Popen(
         interruptible(HERE / "executor_run.py", scheduler),
         cwd=HERE.parents[1],
+        env=os.environ | {"TMPDIR": str(tmp_path)},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -219,15 +259,24 @@ def test_workers_end_with_the_study(scheduler: str, number: signal.Signals) -> N
             break
         time.sleep(0.02)
     assert not any(map(alive, pids))
+    assert list(tmp_path.iterdir()) == []
 
 
 UNGUARDED = (
     "from wearsim.studies.execution.factory import executor\n"
     "def negatives(numbers):\n"
     "    return [-number for number in numbers]\n"
+    "\n"
     "with executor({!r}, 2) as pool:\n"
     "    print(sorted(pool.results(negatives, iter([[1], [2]]))))\n"
+    "\n"
 )
+INTERACTIVE = """
+import code, sys
+console = code.InteractiveConsole()
+for line in sys.stdin.read().splitlines():
+    console.push(line)
+"""
 
 
 def run_unguarded(folder: Path, scheduler: str, way: str) -> subprocess.CompletedProcess[str]:
@@ -237,9 +286,15 @@ def run_unguarded(folder: Path, scheduler: str, way: str) -> subprocess.Complete
     temporary.mkdir()
     script = folder / "script.py"
     script.write_text(text)
+    arguments = {
+        "file": [script],
+        "-c": ["-c", text],
+        "stdin": ["-"],
+        "console": ["-c", INTERACTIVE],
+    }
     done = subprocess.run(
-        [sys.executable, *{"file": [script], "-c": ["-c", text], "stdin": ["-"]}[way]],
-        input=text if way == "stdin" else None,
+        [sys.executable, *arguments[way]],
+        input=text,
         cwd=work,
         env=os.environ | {"PYTHONPATH": str(HERE.parents[1]), "TMPDIR": str(temporary)},
         capture_output=True,
@@ -250,7 +305,7 @@ def run_unguarded(folder: Path, scheduler: str, way: str) -> subprocess.Complete
     return done
 
 
-@pytest.mark.parametrize("way", ["file", "-c", "stdin"])
+@pytest.mark.parametrize("way", ["file", "-c", "stdin", "console"])
 def test_unguarded_script_runs_in_processes(tmp_path: Path, way: str) -> None:
     done = run_unguarded(tmp_path, "processes", way)
     assert done.stderr == ""
@@ -258,10 +313,10 @@ def test_unguarded_script_runs_in_processes(tmp_path: Path, way: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("way", ["file", "-c", "stdin"])
+@pytest.mark.parametrize("way", ["file", "-c", "stdin", "console"])
 def test_unguarded_script_with_dask_runs_or_is_reported(tmp_path: Path, way: str) -> None:
     done = run_unguarded(tmp_path, "dask", way)
-    if way == "-c":
+    if way in {"-c", "console"}:
         assert done.stdout == "[([1], [-1]), ([2], [-2])]\n", done.stderr
         return
     assert done.returncode == 1

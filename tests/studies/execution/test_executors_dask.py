@@ -222,6 +222,7 @@ def test_address_without_scheduler_is_reported(monkeypatch: pytest.MonkeyPatch) 
 
 def test_missing_dask_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
+    monkeypatch.delitem(sys.modules, "wearsim.studies.execution.dask")
     expected = r'pip install "wearsim\[cluster\]"'
     for chosen in ("dask", "tcp://127.0.0.1:8786"):
         with pytest.raises(WorkerError, match=expected), executor(chosen):

@@ -237,9 +237,8 @@ class EnsembleWork:
             try:
                 results = self.pool.results(self.runner, iter([[number]]))
                 outcomes = [outcome for _, some in results for outcome in some]
-            except WorkerError:
-                text = "the worker process ended in every attempt: out of memory, or killed"
-                outcomes = [Outcome(number=number, error=text)]
+            except WorkerError as failure:
+                outcomes = [Outcome(number=number, error=str(failure))]
             self._take(outcomes)
 
     def _pending(self) -> Iterator[int]:

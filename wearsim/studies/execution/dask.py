@@ -35,10 +35,6 @@ LOOKING = 2.0  # s between two checks of the number of workers
 POLLING = 0.05  # s between two checks for finished batches
 PATIENCE = 60.0  # s after which a cluster without workers is an error, if there are no notices
 CONNECTING = 10.0  # s, time limit for the connection to a scheduler
-GUARDED = (
-    'a script must run its study under `if __name__ == "__main__":` and cannot be read from'
-    " standard input"
-)
 
 
 class Cluster:
@@ -66,8 +62,8 @@ class Cluster:
     ) -> None:
         self._client, self._address = client, address
         self._on_notice, self._stop_requested = on_notice, stop_requested
-        self._threads, self._checked_at = 0, -LOOKING
-        self._without_workers_since: float | None = None
+        self._threads, self._checked_at = 1, -LOOKING
+        self._had_workers_at = time.monotonic()
 
     @property
     def workers(self) -> int:
@@ -94,14 +90,16 @@ class Cluster:
 
     def results(self, work: Work, batches: Iterator[Batch]) -> Results:
         """Yield every batch with its results, as `Executor.results`."""
-        pickled, ours = cloudpickle.dumps(work), version("wearsim")
+        # a task, not scattered data: it runs again if all workers that had its result are lost
+        sent = self._client.submit(cloudpickle.loads, cloudpickle.dumps(work), pure=False)
+        ours = version("wearsim")
         running: dict[Future[Answer], Batch] = {}
         completed = as_completed(loop=self._client.loop, with_results=True, raise_errors=False)
         try:
             while True:
                 free = AHEAD * max(self.workers, 1) - len(running)
                 for numbers in islice(batches, max(free, 0)):
-                    future = self._client.submit(_run_batch, pickled, numbers, ours, pure=False)
+                    future = self._client.submit(_run_batch, sent, numbers, ours, pure=False)
                     running[future] = numbers
                     completed.add(future)
                 if not running:
@@ -123,7 +121,7 @@ class Cluster:
         finally:
             if self._client.status == "running":
                 with suppress(OSError, TimeoutError, ClosedClientError):
-                    self._client.cancel(list(running))
+                    self._client.cancel([sent, *running])
 
     def _failure(self, numbers: Batch, cause: object) -> WorkerError:
         """Return the error of a batch that was cancelled or failed outside the work."""
@@ -154,6 +152,7 @@ class Cluster:
         WorkerError
             If there were none for too long without a receiver of notices, or the scheduler ended.
         """
+        before = self._threads
         try:
             self._threads = sum(self._client.nthreads().values())
         except Exception as error:
@@ -163,22 +162,20 @@ class Cluster:
             return
         self._checked_at = now = time.monotonic()
         if self._threads:
-            self._without_workers_since = None
-        elif self._without_workers_since is None:
-            self._without_workers_since = now
-            if self._on_notice is not None:
-                self._on_notice(f"waiting for workers: there are none at {self._address}")
-        elif self._on_notice is None and now - self._without_workers_since > PATIENCE:
+            self._had_workers_at = now
+        elif self._on_notice is not None and before:
+            self._on_notice(f"waiting for workers: there are none at {self._address}")
+        elif self._on_notice is None and now - self._had_workers_at > PATIENCE:
             raise WorkerError(
                 f"the scheduler at {self._address} has had no workers for {PATIENCE:g} s; start"
                 f" some with: dask worker {self._address}"
             )
 
 
-def _run_batch(pickled: bytes, numbers: Batch, ours: str) -> Answer:
+def _run_batch(work: Work, numbers: Batch, ours: str) -> Answer:
     """Run a batch on a worker, which may have joined after the check of the versions."""
     _check_version(version("wearsim"), "that runs it", ours)
-    return run_batch(pickled, numbers)
+    return run_batch(work, numbers)
 
 
 def _check_version(theirs: str, where: str, ours: str | None = None) -> None:
@@ -228,7 +225,6 @@ def cluster(
 
 
 def _local_cluster(count: int) -> LocalCluster:
-
     try:
         with sigint_blocked():
             return LocalCluster(
@@ -242,11 +238,13 @@ def _local_cluster(count: int) -> LocalCluster:
             )
     except RuntimeError as error:
         cause = str(error).splitlines()[0]
-        raise WorkerError(f"no Dask cluster could be started here ({cause}); {GUARDED}") from error
+        raise WorkerError(
+            f"no Dask cluster could be started here ({cause}); a script must run its study under"
+            ' `if __name__ == "__main__":` and cannot be read from standard input'
+        ) from error
 
 
 def _connected(address: str) -> Client:
-
     try:
         with ThreadPoolExecutor(1) as thread:  # a notebook runs an event loop in this one
             thread.submit(asyncio.run, _check_answer(address)).result()

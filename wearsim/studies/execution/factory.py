@@ -53,13 +53,11 @@ def executor(
     count = available_processors() if workers is None else operator.index(workers)
     if scheduler == "dask" or scheduler not in LOCAL:
         try:
-            import distributed  # noqa: F401, PLC0415  (slow to import, and only an extra)
+            from wearsim.studies.execution.dask import cluster  # noqa: PLC0415  (optional)
         except ImportError as error:
             raise WorkerError(
                 f'Dask is not installed ({error}); install it with: pip install "wearsim[cluster]"'
             ) from error
-        from wearsim.studies.execution.dask import cluster  # noqa: PLC0415  (imports distributed)
-
         address = None if scheduler == "dask" else scheduler
         with cluster(address, count, on_notice, stop_requested or (lambda: False)) as found:
             yield found

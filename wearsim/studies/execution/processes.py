@@ -1,25 +1,24 @@
-"""Execution of batches on this machine, and the interface of executors.
-
-Each worker process is a loky executor with a single process and a single batch in progress, so that
-the death of a process identifies its batch and fails no other batch.
-"""
+"""Execution of batches on this machine, and the interface of executors."""
 
 from __future__ import annotations
 
 import multiprocessing
 import os
 import pickle
+import shutil
 import signal
 import sys
 import traceback
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager, suppress
 from functools import lru_cache
-from itertools import islice
+from itertools import chain, islice
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
+from pathlib import Path
+from tempfile import NamedTemporaryFile, TemporaryDirectory
 from threading import Thread
 from typing import Any, Protocol, TypeAlias
 
@@ -125,76 +124,76 @@ class Threads:
 class Processes:
     """Execution by processes of this machine.
 
+    Every process is a loky executor with one process and one batch in progress, so that the end of
+    a process identifies its batch and fails no other batch. Messages between processes are short
+    enough to be written to a pipe in one piece, since loky waits for ever for the rest of a message
+    whose sender was killed. The work and its results are files in a temporary folder, which the
+    worker processes remove if this process is killed.
+
     Parameters
     ----------
     workers : int
     on_notice : callable, optional
-        Called with a message when a process died.
+        Called with a message when a process ended unexpectedly.
     """
 
     def __init__(self, workers: int, on_notice: Notify | None = None) -> None:
         self.workers = workers
         self.describe = f"{workers} processes"
         self._on_notice = on_notice or (lambda message: None)
+        self._folder = TemporaryDirectory(prefix="wearsim-", ignore_cleanup_errors=True)
         self._parent_end, self._kept_open = multiprocessing.Pipe(duplex=False)
         # started at once, while the study is prepared
-        self._idle = [_Worker(self._parent_end) for _ in range(workers)]
+        self._idle = [self._new_worker() for _ in range(workers)]
+
+    def _new_worker(self) -> _Worker:
+        return _Worker(self._parent_end, self._folder.name)
 
     def close(self) -> None:
-        """Kill the processes."""
-        self._kept_open.close()
-        self._parent_end.close()
+        """Kill the processes and remove the temporary folder."""
         for worker in self._idle:
             worker.end()
+        self._kept_open.close()
+        self._parent_end.close()
+        self._folder.cleanup()
 
     def results(self, work: Work, batches: Iterator[Batch]) -> Results:
         """Yield every batch with its results, as `Executor.results`."""
-        import cloudpickle  # noqa: PLC0415  (used with processes only)
-        from loky import BrokenProcessPool  # noqa: PLC0415  (used with processes only)
-
-        pickled = cloudpickle.dumps(work)
-        repeated: list[Batch] = []
-        deaths: Counter[tuple[int, ...]] = Counter()
-        running: dict[Future[Answer], _Worker] = {}
+        file = _store(work, self._folder.name)
+        deaths: Counter[Batch] = Counter()
+        running: dict[Future[str], _Worker] = {}
         finished: list[tuple[Batch, list[Any]]] = []
         try:
             while True:
-                while len(running) < self.workers:
-                    numbers = repeated.pop() if repeated else next(batches, None)
-                    if numbers is None:
-                        break
-                    worker = self._idle.pop() if self._idle else _Worker(self._parent_end)
-                    running[worker.submit(pickled, numbers)] = worker
+                for numbers in islice(batches, self.workers - len(running)):
+                    worker = self._idle.pop() if self._idle else self._new_worker()
+                    running[worker.submit(file, numbers)] = worker
                 yield from finished  # after the next batches, which run meanwhile
-                finished.clear()
                 if not running:
                     return
                 future = next(iter(wait(running, return_when=FIRST_COMPLETED).done))
                 worker = running.pop(future)
                 try:
-                    results, error = future.result()
-                except BrokenProcessPool:
+                    file_of_answer = future.result()
+                except BrokenExecutor:
                     worker.end()
-                    repeated.append(worker.numbers)
                     deaths[tuple(worker.numbers)] += 1
                     self._report_death(worker, deaths[tuple(worker.numbers)])
+                    batches, finished = chain([worker.numbers], batches), []
                     continue
+                results, error = _load(file_of_answer)
+                Path(file_of_answer).unlink()
                 self._idle.append(worker)
                 if error is not None:
                     raise error
-                finished.append((worker.numbers, results))
+                finished = [(worker.numbers, results)]
         finally:
             for worker in running.values():
                 worker.end()
 
     def _report_death(self, worker: _Worker, deaths: int) -> None:
         """Notify that a batch will be repeated, or raise if it failed too often."""
-        # the exit code in the message of loky is missing on a loaded machine
-        code = worker.process.exitcode
-        cause = f"ended with exit code {code}"
-        if code < 0:
-            cause = f"was killed by {signal.Signals(-code).name}"
-            cause += " (out of memory?)" if cause.endswith("SIGKILL") else ""
+        cause = worker.cause_of_death()
         if deaths < DEATHS:
             self._on_notice(f"a worker process {cause}; {named(worker.numbers)} will be done again")
         elif worker.started.exception() is not None:
@@ -214,52 +213,97 @@ class _Worker:
     ----------
     parent_end : Connection
         Pipe that closes when the parent process ends.
+    folder : str
+        Temporary folder of the study.
     """
 
     numbers: Batch
 
-    def __init__(self, parent_end: Connection) -> None:
+    def __init__(self, parent_end: Connection, folder: str) -> None:
         from loky import ProcessPoolExecutor  # noqa: PLC0415  (used with processes only)
 
         self._pool = ProcessPoolExecutor(
-            1, initializer=_initialise, initargs=(parent_end,), env=_ENVIRONMENT
+            1, initializer=_initialise, initargs=(parent_end, folder), env=_ENVIRONMENT
         )
+        others = multiprocessing.active_children()
         with sigint_blocked():
             self.started = self._pool.submit(os.getpid)
-        (self.process,) = self._pool._processes.values()
-        # otherwise loky waits for ever for the rest of a message whose sender was killed
-        self._pool._result_queue._writer.close()
+        self._processes = [p for p in multiprocessing.active_children() if p not in others]
 
-    def submit(self, pickled: bytes, numbers: Batch) -> Future[Answer]:
-        """Start a batch and return the future of its `Answer`."""
+    def submit(self, work: str, numbers: Batch) -> Future[str]:
+        """Start a batch and return the future of the file with its `Answer`."""
         self.numbers = numbers
-        future: Future[Answer] = self._pool.submit(run_batch, pickled, numbers)
+        future: Future[str] = Future()
+        try:
+            future = self._pool.submit(_run_stored, work, numbers)
+        except BrokenExecutor as error:  # the process ended after its last batch
+            future.set_exception(error)
         return future
+
+    def cause_of_death(self) -> str:
+        """Return how the process ended, as a predicate: "was killed by SIGKILL"."""
+        code = next((process.exitcode for process in self._processes), None)
+        if code is None or code >= 0:
+            return f"ended with exit code {code}"
+        name = signal.Signals(-code).name
+        return f"was killed by {name}" + (" (out of memory?)" if name == "SIGKILL" else "")
 
     def end(self) -> None:
         """Kill the process."""
         self._pool.shutdown(kill_workers=True)
 
 
-def _initialise(parent_end: Connection) -> None:
+def _initialise(parent_end: Connection, folder: str) -> None:
     """Prepare a worker process: ignore Ctrl-C, and end with the parent process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    Thread(target=_end_with_parent, args=(parent_end,), daemon=True).start()
+    Thread(target=_end_with_parent, args=(parent_end, folder), daemon=True).start()
 
 
-def _end_with_parent(parent_end: Connection) -> None:
+def _end_with_parent(parent_end: Connection, folder: str) -> None:
     with suppress(EOFError, OSError):
         parent_end.recv()
+    shutil.rmtree(folder, ignore_errors=True)
     os._exit(0)
 
 
-def run_batch(pickled: bytes, numbers: Batch) -> Answer:
-    """Run a batch in a worker process, which unpickles the work once.
+def _run_stored(file: str, numbers: Batch) -> str:
+    """Run a batch in a worker process, and return the file with its `Answer`."""
 
-    An error is returned in a form that the parent process can unpickle.
-    """
+    def work(numbers: Batch) -> list[Any]:
+        return _load_work(file)(numbers)
+
+    return _store(run_batch(work, numbers), str(Path(file).parent))
+
+
+def _store(content: object, folder: str) -> str:
+    """Write an object to a new file in a folder, and return its path."""
+    import cloudpickle  # noqa: PLC0415  (used with processes only)
+
     try:
-        return _unpickled(pickled)(numbers), None
+        with NamedTemporaryFile(dir=folder, delete=False) as stream:
+            cloudpickle.dump(content, stream)
+    except OSError as error:
+        raise WorkerError(f"batches cannot be exchanged through {folder}: {error}") from error
+    return stream.name
+
+
+def _load(file: str) -> Any:
+    with Path(file).open("rb") as stream:
+        return pickle.load(stream)
+
+
+@lru_cache(maxsize=1)
+def _load_work(file: str) -> Work:
+    work: Work = _load(file)
+    return work
+
+
+def run_batch(work: Work, numbers: Batch) -> Answer:
+    """Run a batch in a worker, and return an error in a form that can be unpickled."""
+    try:
+        return work(numbers), None
+    except SystemExit as error:  # otherwise it would end the study, or the worker
+        return [], WorkerError(f"{named(numbers)} called sys.exit({error.code!r})", numbers)
     except Exception as error:
         error.add_note(f"in a worker:\n{''.join(traceback.format_exception(error))}")
         try:
@@ -267,12 +311,6 @@ def run_batch(pickled: bytes, numbers: Batch) -> Answer:
         except Exception:
             return [], WorkerError(f"{type(error).__name__}: {error}")
         return [], error
-
-
-@lru_cache(maxsize=1)
-def _unpickled(pickled: bytes) -> Work:
-    work: Work = pickle.loads(pickled)
-    return work
 
 
 @contextmanager
