@@ -6,6 +6,7 @@ import json
 import re
 import signal
 import subprocess
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ import pytest
 from cli_examples import SCENARIOS, Command
 
 from tests.interruptible import interruptible
-from wearsim.cli.progress.realisations import CountedLines
+from wearsim.cli import progress
 from wearsim.results import open_dissipation
 from wearsim.studies.limits import MOST_BYTES
 
@@ -162,13 +163,19 @@ def test_signal_ends_a_study_that_keeps_its_results(tmp_path: Path) -> None:
     assert 0 < kept.count < 200_000
 
 
-def test_counted_lines_are_a_second_apart() -> None:
-    times = iter([0.0, 0.5, 1.1, 1.2, 2.2])
-    lines: list[str] = []
-    counted = CountedLines(lines.append, "realisations", lambda: next(times))
-    for done in (10, 20, 30, 40):
-        counted(done, 1040)
-    assert lines == ["20 of 1,040 realisations, 56 s left", "40 of 1,040 realisations, 55 s left"]
+def test_counted_lines_are_a_second_apart(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    now = [0.0]
+    monkeypatch.setattr(progress, "Display", partial(progress.Display, now=lambda: now[0]))
+    with progress.counting(quiet=False, items="realisations") as counted:
+        for time, done in ((0.5, 10), (1.1, 20), (1.2, 30), (2.2, 40)):
+            now[0] = time
+            counted(done, 1040)
+    assert capsys.readouterr().err.splitlines() == [
+        "20 of 1,040 realisations, 1 min 2 s left",
+        "40 of 1,040 realisations, 57 s left",
+    ]
 
 
 def _changed(name: str = "u.toml", **changes: str) -> Path:

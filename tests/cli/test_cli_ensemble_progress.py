@@ -7,13 +7,8 @@ import io
 import pytest
 from rich.console import Console
 
-from wearsim.cli.progress import realisations as progress
-from wearsim.cli.progress.realisations import (
-    EnsembleLines,
-    LiveEnsemble,
-    progress_text,
-    watching_ensemble,
-)
+from wearsim.cli import progress
+from wearsim.cli.progress import Display, EnsembleWatcher, progress_text, watching_ensemble
 from wearsim.studies.ensemble.driver import EnsembleProgress
 from wearsim.uq.estimation.intervals import UNKNOWN, Interval
 
@@ -31,8 +26,8 @@ PROGRESS = EnsembleProgress(
 
 def test_progress_has_rate_time_left_and_estimate() -> None:
     assert progress_text(PROGRESS) == (
-        "1,200 of 5,000 realisations, 3 failed, 12.3/s, 5 min 8 s left,"
-        " depth.mean 21.50 um [21.00, 22.00]"
+        "1,200 of 5,000 realisations, 3 failed, 5 min 8 s left,"
+        " depth.mean 21.50 um [21.00, 22.00], 12.3/s"
     )
 
 
@@ -41,27 +36,27 @@ def test_progress_omits_unknown_values() -> None:
     assert progress_text(none) == "0 of 5 realisations, 5 failed, 2/s"
 
 
-def test_progress_lines_are_a_second_apart() -> None:
-    times = iter([0.0, 0.5, 1.1, 1.2, 2.2])
-    lines: list[str] = []
-    watch = EnsembleLines(lines.append, lambda: next(times))
-    for _ in range(4):
+def test_progress_lines_are_a_second_apart(capsys: pytest.CaptureFixture[str]) -> None:
+    now = [0.0]
+    watch = EnsembleWatcher(Display(quiet=False, now=lambda: now[0]))
+    for time in (0.5, 1.1, 1.2, 2.2):
+        now[0] = time
         watch(PROGRESS)
-    assert lines == [progress_text(PROGRESS)] * 2
+    assert capsys.readouterr().err.splitlines() == [progress_text(PROGRESS)] * 2
     assert watch.workers == "2 processes"
 
 
 @pytest.mark.parametrize(
     ("columns", "line"),
     [
-        (53, "1,200 of 5,000, 3 failed, 12.3/s, 5 min 8 s left"),
+        (53, "1,200 of 5,000, 3 failed, 5 min 8 s left, 12.3/s"),
         (30, "1,200 of 5,000, 3 failed"),
         (5, "1,200 of 5,000"),
         (76, "1,200 of 5,000, 3 failed, 5 min 8 s left, depth.mean 21.50 um [21.00, 22.00]"),
     ],
 )
 def test_narrow_line_drops_whole_parts(columns: int, line: str) -> None:
-    assert progress_text(PROGRESS, "", columns) == line
+    assert progress_text(PROGRESS, columns) == line
 
 
 def test_line_of_60_columns_is_not_cut(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -70,7 +65,7 @@ def test_line_of_60_columns_is_not_cut(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(progress, "console", lambda **_: terminal)
     with watching_ensemble(quiet=False) as watch:
         watch(PROGRESS)
-    assert "12.3/s, 5 min 8 s left" in screen.getvalue()
+    assert "5 min 8 s left, 12.3/s" in screen.getvalue()
     assert "\u2026" not in screen.getvalue()
     assert "um" not in screen.getvalue()
 
@@ -80,10 +75,9 @@ def test_terminal_shows_a_live_line(monkeypatch: pytest.MonkeyPatch) -> None:
     terminal = Console(file=screen, force_terminal=True, width=140, markup=False, highlight=False)
     monkeypatch.setattr(progress, "console", lambda **_: terminal)
     with watching_ensemble(quiet=False) as watch:
-        assert isinstance(watch, LiveEnsemble)
         watch(PROGRESS)
     assert "24 %" in screen.getvalue()
-    assert progress_text(PROGRESS, items="") in screen.getvalue()
+    assert progress_text(PROGRESS, 111) in screen.getvalue()
 
 
 def test_quiet_shows_nothing(capsys: pytest.CaptureFixture[str]) -> None:

@@ -3,9 +3,9 @@ import io
 import pytest
 from rich.console import Console
 
+from wearsim.cli import progress
 from wearsim.cli.output import plain
-from wearsim.cli.progress import run as progress
-from wearsim.cli.progress.run import Clock, LiveLine, PlainLines
+from wearsim.cli.progress import Display, RunWatcher
 from wearsim.studies.run.events import Event, Finished, Started, Stepped, Warned
 
 STARTED = Started(1000.0, 60.0, 0.0, "implicit", "slender")
@@ -23,40 +23,54 @@ class Time:
         return self.now
 
 
-def shown_steps(steps: list[tuple[float, float]]) -> list[str]:
+def shown_steps(capsys: pytest.CaptureFixture[str], steps: list[tuple[float, float]]) -> list[str]:
     """Return the lines of steps given as time and passes."""
-    time, lines = Time(), []
-    watch = PlainLines(lines.append, Clock(time))
+    time = Time()
+    watch = RunWatcher(Display(quiet=False, now=time))
     watch(STARTED)
     for now, passes in steps:
         time.now = now
         watch(step(passes))
-    return lines[1:]
+    start, *others = capsys.readouterr().err.splitlines()
+    assert start == "running 1,000 passes, 1.000 min, with slender, implicit"
+    return others
 
 
-def test_first_and_last_step_are_always_shown() -> None:
-    lines = shown_steps([(0.0, 10.0), (0.1, 500.0), (0.2, 1000.0)])
-    assert [line.split(",")[0] for line in lines] == ["pass 10 (1 %)", "pass 1"]
-    assert lines[-1].startswith("pass 1,000 (100 %), 1.000 min, depth 1.000 um, step 10")
+def test_first_and_last_step_are_always_shown(capsys: pytest.CaptureFixture[str]) -> None:
+    found = shown_steps(capsys, [(0.0, 10.0), (0.1, 500.0), (0.2, 1000.0)])
+    assert [line.split(",")[0] for line in found] == ["pass 10 (1 %)", "pass 1"]
+    assert found[-1] == "pass 1,000 (100 %), 1.000 min, depth 1.000 um, step 10"
 
 
-def test_lines_are_a_second_apart() -> None:
-    lines = shown_steps([(0.01 * k, 1.0 + k) for k in range(350)])
-    assert len(lines) == 4
+def test_lines_are_a_second_apart(capsys: pytest.CaptureFixture[str]) -> None:
+    assert len(shown_steps(capsys, [(0.01 * k, 1.0 + k) for k in range(350)])) == 4
 
 
-def test_time_left_follows_from_the_rate_of_passes() -> None:
-    (_, line) = shown_steps([(0.0, 10.0), (10.0, 250.0)])
+def test_time_left_follows_from_the_rate_of_passes(capsys: pytest.CaptureFixture[str]) -> None:
+    (_, line) = shown_steps(capsys, [(0.0, 10.0), (10.0, 260.0)])
     assert line.endswith(", 30 s left")
 
 
-def test_warnings_and_the_end_are_shown() -> None:
-    lines: list[str] = []
-    watch = PlainLines(lines.append)
+def test_continued_run_starts_at_its_pass(capsys: pytest.CaptureFixture[str]) -> None:
+    time = Time()
+    watch = RunWatcher(Display(quiet=False, now=time))
+    watch(Started(1000.0, 60.0, 500.0, "implicit", "slender"))
+    time.now = 10.0
+    watch(step(600.0))
+    start, line = capsys.readouterr().err.splitlines()
+    assert start.startswith("continuing from pass 500 of 1,000 passes, 1.000 min, with")
+    assert line.endswith(", 40 s left")
+
+
+def test_warnings_and_the_end_are_shown(capsys: pytest.CaptureFixture[str]) -> None:
+    watch = RunWatcher(Display(quiet=False))
     events: list[Event] = [Warned("unstable [step]"), Finished(75.0)]
     for event in events:
         watch(event)
-    assert lines == ["warning: unstable [step]", "done in 1 min 15 s"]
+    assert capsys.readouterr().err.splitlines() == [
+        "warning: unstable [step]",
+        "done in 1 min 15 s",
+    ]
 
 
 def test_quiet_shows_warnings_only(capsys: pytest.CaptureFixture[str]) -> None:
@@ -72,14 +86,13 @@ def test_terminal_shows_a_live_line(monkeypatch: pytest.MonkeyPatch) -> None:
     terminal = Console(file=screen, force_terminal=True, width=140, markup=False, highlight=False)
     monkeypatch.setattr(progress, "console", lambda **_: terminal)
     with progress.watching(quiet=False) as watch:
-        assert isinstance(watch, LiveLine)
         events: list[Event] = [STARTED, step(500.0), Warned("look [here]"), step(1000.0)]
         for event in [*events, Finished(2.0)]:
             watch(event)
     text = screen.getvalue()
     assert "running 1,000 passes" in text
     assert "warning: look [here]" in text
-    assert "100 %  1,000 passes  done in 2.0 s" in text
+    assert "100 %  done in 2.0 s" in text
 
 
 def test_json_has_null_for_nan_and_infinity() -> None:

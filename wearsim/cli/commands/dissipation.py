@@ -58,7 +58,7 @@ def dissipation(
     loaded = read_scenario(scenario, [*(settings or []), *options])
     path = output if output is not None else Path(f"{scenario.stem}-dissipation.h5")
     refuse_same_file(figure, path, loaded.paths)
-    from wearsim.cli.progress.realisations import counting
+    from wearsim.cli.progress import counting
     from wearsim.cli.render.dissipation_table import as_json, write_spread
     from wearsim.cli.render.run_footer import dissipation_line
     from wearsim.cli.signals import stop_on_signals

@@ -83,7 +83,7 @@ def ensemble(
 ) -> None:
     """Run a wear test for each realisation of the random inputs."""
     check_figure(figure, force, "--figure")
-    from wearsim.cli.progress.realisations import watching_ensemble
+    from wearsim.cli.progress import watching_ensemble
     from wearsim.cli.signals import stop_on_signals
     from wearsim.studies.ensemble import api
     from wearsim.studies.ensemble.designs import parse_plan
@@ -118,7 +118,11 @@ def ensemble(
             note(f"{key} = {value}: {file}")
 
     with stop_on_signals(STOPPING) as stop, watching_ensemble(quiet) as watch:
-        options |= {"on_progress": watch, "stop_requested": stop.requested, "on_notice": note}
+        options |= {
+            "on_progress": watch,
+            "stop_requested": stop.requested,
+            "on_notice": watch.notice,
+        }
         if key:
             options["on_value"] = announce
             results = run_sweep(scenarios.__getitem__, list(files), realisations, path, **options)

@@ -71,7 +71,7 @@ def _resume_run(file: Path, until: str | None, json: bool, quiet: bool) -> None:
             if seconds <= 0.0:
                 raise ValueError(f"must be above zero, got '{until}'")
     from wearsim.cli.commands.run import report
-    from wearsim.cli.progress.run import watching
+    from wearsim.cli.progress import watching
     from wearsim.cli.signals import stop_on_signals
     from wearsim.studies.run import run as study
 
@@ -85,7 +85,7 @@ def _resume_ensemble(
 ) -> None:
     chosen = checked_scheduler(scheduler, workers)
     from wearsim.cli.commands.ensemble import STOPPING, report
-    from wearsim.cli.progress.realisations import watching_ensemble
+    from wearsim.cli.progress import watching_ensemble
     from wearsim.cli.signals import stop_on_signals
     from wearsim.results import open_ensemble
     from wearsim.studies.ensemble.api import resume_ensemble
@@ -101,7 +101,7 @@ def _resume_ensemble(
             scheduler=chosen,
             on_progress=watch,
             stop_requested=stop.requested,
-            on_notice=note,
+            on_notice=watch.notice,
         )
     report(result, json, None, watch.workers)
 

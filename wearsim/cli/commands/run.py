@@ -35,7 +35,7 @@ def run(
     """Run a wear test and write its results file."""
     loaded = read_scenario(scenario, settings)
     path = output if output is not None else Path(f"{scenario.stem}.h5")
-    from wearsim.cli.progress.run import watching
+    from wearsim.cli.progress import watching
     from wearsim.cli.signals import stop_on_signals
     from wearsim.studies.run import run as study
 

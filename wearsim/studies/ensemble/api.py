@@ -104,7 +104,13 @@ def ensemble(
     request = checked_request(scenario, realisations, plan, until)
     path = Path(output)
     check_output(path, force, scenario.paths)
-    with executor(scheduler, workers, on_notice=on_notice, stop_requested=stop_requested) as pool:
+    with executor(
+        scheduler,
+        workers,
+        on_notice=on_notice,
+        stop_requested=stop_requested,
+        preload=RealisationRunner.__module__,
+    ) as pool:
         grid = shared_grid(scenario)
         header = _header(scenario, request, grid)
         with EnsembleFile.create(path, header, _static(scenario, grid)) as file:
@@ -213,7 +219,13 @@ def resume_ensemble(
     grid = Grid(data.variables["y"], data.strip_width)
     runner = RealisationRunner(scenario, parse_plan(data.plan), data.asked, grid)
     with (
-        executor(scheduler, workers, on_notice=on_notice, stop_requested=stop_requested) as pool,
+        executor(
+            scheduler,
+            workers,
+            on_notice=on_notice,
+            stop_requested=stop_requested,
+            preload=RealisationRunner.__module__,
+        ) as pool,
         EnsembleFile.open(path) as opened,
     ):
         work = EnsembleWork(opened, runner, target, pool, on_progress, stop_requested)

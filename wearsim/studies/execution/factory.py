@@ -23,6 +23,7 @@ def executor(
     *,
     on_notice: Notify | None = None,
     stop_requested: Callable[[], bool] | None = None,
+    preload: str = "wearsim",
 ) -> Iterator[Executor]:
     """Provide the executor of a study; results do not depend on it, only their order does.
 
@@ -39,6 +40,8 @@ def executor(
         cluster without workers for a minute is an error.
     stop_requested : callable, optional
         Called while a cluster has no workers; True stops the study.
+    preload : str
+        Module that worker processes on this machine import as they start.
 
     Raises
     ------
@@ -66,7 +69,7 @@ def executor(
     elif scheduler == "threads":
         yield Threads(count)
     else:
-        with closing(Processes(count, on_notice)) as pool:
+        with closing(Processes(count, on_notice, preload)) as pool:
             yield pool
 
 

@@ -14,6 +14,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager, suppress
 from functools import lru_cache
+from importlib import import_module
 from itertools import chain, islice
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
@@ -135,10 +136,15 @@ class Processes:
     workers : int
     on_notice : callable, optional
         Called with a message when a process ended unexpectedly.
+    preload : str
+        Module that the processes import as they start.
     """
 
-    def __init__(self, workers: int, on_notice: Notify | None = None) -> None:
+    def __init__(
+        self, workers: int, on_notice: Notify | None = None, preload: str = "wearsim"
+    ) -> None:
         self.workers = workers
+        self._preload = preload
         self.describe = f"{workers} processes"
         self._on_notice = on_notice or (lambda message: None)
         self._folder = TemporaryDirectory(prefix="wearsim-", ignore_cleanup_errors=True)
@@ -147,7 +153,7 @@ class Processes:
         self._idle = [self._new_worker() for _ in range(workers)]
 
     def _new_worker(self) -> _Worker:
-        return _Worker(self._parent_end, self._folder.name)
+        return _Worker(self._parent_end, self._folder.name, self._preload)
 
     def close(self) -> None:
         """Kill the processes and remove the temporary folder."""
@@ -215,15 +221,17 @@ class _Worker:
         Pipe that closes when the parent process ends.
     folder : str
         Temporary folder of the study.
+    preload : str
+        Module that the process imports as it starts.
     """
 
     numbers: Batch
 
-    def __init__(self, parent_end: Connection, folder: str) -> None:
+    def __init__(self, parent_end: Connection, folder: str, preload: str) -> None:
         from loky import ProcessPoolExecutor  # noqa: PLC0415  (used with processes only)
 
         self._pool = ProcessPoolExecutor(
-            1, initializer=_initialise, initargs=(parent_end, folder), env=_ENVIRONMENT
+            1, initializer=_initialise, initargs=(parent_end, folder, preload), env=_ENVIRONMENT
         )
         others = multiprocessing.active_children()
         with sigint_blocked():
@@ -253,10 +261,11 @@ class _Worker:
         self._pool.shutdown(kill_workers=True)
 
 
-def _initialise(parent_end: Connection, folder: str) -> None:
-    """Prepare a worker process: ignore Ctrl-C, and end with the parent process."""
+def _initialise(parent_end: Connection, folder: str, preload: str) -> None:
+    """Prepare a worker process: ignore Ctrl-C, end with the parent process, and import a module."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     Thread(target=_end_with_parent, args=(parent_end, folder), daemon=True).start()
+    import_module(preload)
 
 
 def _end_with_parent(parent_end: Connection, folder: str) -> None:

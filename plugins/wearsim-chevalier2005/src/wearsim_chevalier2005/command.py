@@ -49,7 +49,7 @@ def reproduce(
 ) -> None:
     """Compute the numbers of the paper; -o draws its figures too."""
     check_figure(figure, force)
-    from wearsim.cli.progress.realisations import counting
+    from wearsim.cli.progress import counting
     from wearsim_chevalier2005.comparison import compare
     from wearsim_chevalier2005.study import reproduce as study
 

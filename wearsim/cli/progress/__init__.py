@@ -1,1 +1,0 @@
-"""Progress of runs and ensembles on stderr."""
