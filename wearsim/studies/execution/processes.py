@@ -160,7 +160,6 @@ class Processes:
         for worker in self._idle:
             worker.end()
         self._kept_open.close()
-        self._parent_end.close()
         self._folder.cleanup()
 
     def results(self, work: Work, batches: Iterator[Batch]) -> Results:
@@ -279,7 +278,8 @@ def _run_stored(file: str, numbers: Batch) -> str:
     """Run a batch in a worker process, and return the file with its `Answer`."""
 
     def work(numbers: Batch) -> list[Any]:
-        return _load_work(file)(numbers)
+        loaded: Work = _load_work(file)
+        return loaded(numbers)
 
     return _store(run_batch(work, numbers), str(Path(file).parent))
 
@@ -301,10 +301,7 @@ def _load(file: str) -> Any:
         return pickle.load(stream)
 
 
-@lru_cache(maxsize=1)
-def _load_work(file: str) -> Work:
-    work: Work = _load(file)
-    return work
+_load_work = lru_cache(maxsize=1)(_load)
 
 
 def run_batch(work: Work, numbers: Batch) -> Answer:
