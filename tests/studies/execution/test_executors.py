@@ -184,7 +184,7 @@ def test_unwritable_temporary_folder_is_reported(
         next(found)
         (folder,) = tmp_path.iterdir()
         folder.rename(tmp_path / "moved")
-        with pytest.raises(WorkerError, match="batches cannot be exchanged through .*wearsim-"):
+        with pytest.raises(WorkerError, match=r"batches cannot be exchanged through .*wearsim-"):
             list(found)
 
 
