@@ -38,3 +38,8 @@ def worn(name="rig-450min", **changes):
     """Run a scenario and return its problem and end state."""
     problem, stepper, stop = built(name, **changes)
     return problem, stepped(problem, stepper, stop)[0]
+
+
+def next_state(problem, stepper, state):
+    """Return the state after one more step of a test without end."""
+    return next(evolve(problem, state, stepper, 1e12, never, 10**6)).end

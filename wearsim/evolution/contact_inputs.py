@@ -49,6 +49,11 @@ class ContactInputs:
         """Return the inputs of some contacts, by number."""
         return ContactInputs(*(getattr(self, item.name)[contacts] for item in fields(self)))
 
+    def of_realisations(self, numbers: IntArray) -> ContactInputs:
+        """Return the inputs of some realisations, by number."""
+        columns = (getattr(self, item.name) for item in fields(self))
+        return ContactInputs(*(np.take(column, numbers, axis=1) for column in columns))
+
     def with_values(self, values: Mapping[str, FloatArray]) -> ContactInputs:
         """Return these inputs with some of them replaced; arrays broadcast to the shape."""
         shape = self.friction.shape
@@ -87,10 +92,10 @@ class Varying:
         Field of `ContactInputs`.
     rollers : tuple of int
         Rollers of the problem that it acts on.
-    path : PiecewiseLinear
-        Its value over time [s].
+    paths : tuple of PiecewiseLinear
+        Its value over time [s], one path per realisation.
     """
 
     name: str
     rollers: tuple[int, ...]
-    path: PiecewiseLinear
+    paths: tuple[PiecewiseLinear, ...]

@@ -1,16 +1,219 @@
-"""Integration of a wear test: one step after another until the test ends."""
+"""Integration of wear tests: one step after another until each test ends."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from typing import Any
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
-from wearsim.errors import StepError
+from wearsim.errors import ContactError, SolverError, StepError
+from wearsim.evolution.batch.bisect_failures import bisect_failures
+from wearsim.evolution.error_control.step_size import Trial
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import WearState
-from wearsim.evolution.steppers.base import Advance, Stepper
+from wearsim.evolution.state import WearState, joined_states
+from wearsim.evolution.steppers.base import Attempt, Step, Stepper
+from wearsim.types import FloatArray, IntArray
+
+
+@dataclass(frozen=True)
+class Advance:
+    """One accepted step of some tests.
+
+    Parameters
+    ----------
+    numbers : ndarray of int, shape (realisations,)
+        Numbers of the tests.
+    problem : WearProblem
+        Their problem.
+    path : tuple of WearState
+        States at the start of the step, at intermediate points if any, and at its end.
+    warning : str, optional
+        Message to the user about this step.
+    """
+
+    numbers: IntArray
+    problem: WearProblem
+    path: tuple[WearState, ...]
+    warning: str | None = None
+
+    @property
+    def end(self) -> WearState:
+        """The state after the step."""
+        return self.path[-1]
+
+    def at(self, places: IntArray) -> Advance:
+        """Return the step of some of the tests, by place and in that order."""
+        if len(places) == len(self.numbers):
+            return self
+        path = tuple(state.at(places) for state in self.path)
+        return Advance(self.numbers[places], self.problem.at(places), path, self.warning)
+
+
+class Evolution:
+    """Wear tests stepped to their ends together, each with its own step lengths.
+
+    Iteration yields accepted steps. The results of a test are the same to the bit for any tests
+    that it is stepped with. A single test is one realisation.
+
+    Parameters
+    ----------
+    problem : WearProblem
+    state : WearState
+        State of every test at the start.
+    stepper : Stepper
+    stop : float
+        Passes at the end of the tests.
+    max_steps : int
+        Greatest number of steps of a test; passes solved one by one do not count.
+    next_record : callable
+        Returns the passes of the first record after given passes; a pass-by-pass stepper stops
+        there.
+
+    Attributes
+    ----------
+    numbers : ndarray of int
+        Realisations of the given problem that are in progress.
+    problem, state
+        Those of the tests in progress.
+    failures : dict of int to Exception
+        Errors of the tests that failed, by number.
+    """
+
+    def __init__(
+        self,
+        problem: WearProblem,
+        state: WearState,
+        stepper: Stepper,
+        stop: float,
+        max_steps: int,
+        next_record: Callable[[float], float],
+    ) -> None:
+        self.problem, self.state, self.stepper = problem, state, stepper
+        self.stop, self.max_steps, self._next_record = stop, max_steps, next_record
+        self.numbers = np.arange(problem.shape[2])
+        self.failures: dict[int, Exception] = {}
+        self._trials: dict[int, Trial] = {}
+        self._scheme: Step
+        self._end_finished()
+
+    def __iter__(self) -> Iterator[Advance]:
+        while len(self.numbers):
+            advance = self._try_steps()
+            if advance is not None:
+                yield advance
+
+    def fail(self, failures: dict[int, Exception]) -> None:
+        """End tests, by number, with the errors given."""
+        self.failures.update(failures)
+        self._end_finished()
+
+    def _end_finished(self) -> None:
+        """Leave only the tests that have not failed and have not reached their end."""
+        tests = enumerate(zip(self.numbers.tolist(), self.state.passes.tolist(), strict=True))
+        going = [k for k, (n, passes) in tests if passes < self.stop and n not in self.failures]
+        kept = np.array(going, dtype=np.int64)
+        self.numbers = self.numbers[kept]
+        if going:
+            self.problem, self.state = self.problem.at(kept), self.state.at(kept)
+
+    def _try_steps(self) -> Advance | None:
+        """Try one step of every test in progress; return the accepted ones, if any."""
+        lengths = self._lengths()
+        if not len(self.numbers):
+            return None
+        problem, state, scheme = self.problem, self.state, self._scheme
+
+        def attempt(places: IntArray) -> Attempt:
+            some = problem.at(places), state.at(places), lengths[places]
+            return self.stepper.attempt(*some, self.stop, scheme)
+
+        done, failed = bisect_failures(attempt, np.arange(len(lengths)))
+        failures = self._rejected(failed, lengths)
+        accepted: list[tuple[IntArray, Attempt]] = []
+        for places, tried in done:
+            columns = self.numbers[places], tried.excess, lengths[places]
+            each = zip(*(column.tolist() for column in columns), strict=True)
+            chosen = np.flatnonzero([self._trials[n].accepts(over, step) for n, over, step in each])
+            if chosen.size:
+                accepted.append((places[chosen], tried.at(chosen)))
+        advance = self._continued(accepted) if accepted else None
+        if advance is not None:
+            advance, infinite = _finite(advance)
+            failures |= infinite
+        self.fail(failures)
+        return advance
+
+    def _lengths(self) -> FloatArray:
+        """Return the length of each test's next trial step [passes]; end tests without one."""
+        numbers, lengths = self.numbers.tolist(), []
+        if not self._trials.keys() >= set(numbers):
+            self._scheme = self.stepper.scheme(self.problem, self.state)
+            proposed = self.stepper.proposed(self.problem, self.state).tolist()
+            for number, length in zip(numbers, proposed, strict=True):
+                self._trials.setdefault(number, self.stepper.trial(length))
+        failures: dict[int, Exception] = {}
+        done = self.state.passes.tolist(), self.state.steps.tolist()
+        for place, (number, passes, steps) in enumerate(zip(numbers, *done, strict=True)):
+            try:
+                lengths.append(self._length(self._trials[number], passes, steps))
+            except SolverError as error:
+                error.state = error.state or self.state.at(np.array([place])).to_arrays()
+                failures[number] = error
+        if failures:
+            self.fail(failures)
+        return np.array(lengths)
+
+    def _length(self, trial: Trial, passes: float, steps: int) -> float:
+        """Return the length of the next trial step of a test [passes]."""
+        if self.stepper.pass_by_pass:
+            return trial.step(passes, min(self.stop, self._next_record(passes)))
+        if steps >= self.max_steps:
+            raise StepError(
+                f"{steps} steps have reached pass {passes:.0f} of {self.stop:.0f};"
+                " raise evolution.max_steps or evolution.tolerance"
+            )
+        return trial.step(passes, self.stop)
+
+    def _rejected(self, failed: dict[int, Exception], lengths: FloatArray) -> dict[int, Exception]:
+        """Shorten the steps that failed, by place; return errors of tests that cannot continue."""
+        failures: dict[int, Exception] = {}
+        for place, error in failed.items():
+            number = int(self.numbers[place])
+            if isinstance(error, (StepError, ContactError)) and self.stepper.forced_step is None:
+                self._trials[number].reject(error, float(lengths[place]))
+            else:
+                failures[number] = error
+        return failures
+
+    def _continued(self, accepted: list[tuple[IntArray, Attempt]]) -> Advance:
+        """Continue from accepted steps, given with the increasing places of their tests."""
+        places = np.concatenate([part for part, _ in accepted])
+        paths = zip(*(tried.path for _, tried in accepted), strict=True)
+        *middle, end = (joined_states(states) for states in paths)
+        numbers, start = self.numbers[places], self.state.at(places)
+        trials = [self._trials.pop(number) for number in numbers.tolist()]
+        end = end.replaced(
+            step=np.array([trial.proposed for trial in trials]),
+            rejected=end.rejected + np.array([trial.rejected for trial in trials]),
+        )
+        self.state = self.state.with_others(places, end)
+        path = (start, *middle, end)
+        return Advance(numbers, self.problem.at(places), path, accepted[0][1].warning)
+
+
+def _finite(advance: Advance) -> tuple[Advance | None, dict[int, Exception]]:
+    """Return the steps that led to finite values, and errors of the other tests by number."""
+    end = advance.end
+    finite = np.isfinite(end.cylinder_depth).all(axis=(0, 1, 3)) & np.isfinite(end.energy)
+    failures: dict[int, Exception] = {}
+    for place in np.flatnonzero(~finite).tolist():
+        message = f"a value is not finite after pass {end.passes[place]:.0f}"
+        failures[int(advance.numbers[place])] = StepError(
+            message, end.at(np.array([place])).to_arrays()
+        )
+    kept = np.flatnonzero(finite)
+    return advance.at(kept) if kept.size else None, failures
 
 
 def evolve(
@@ -21,47 +224,14 @@ def evolve(
     next_record: Callable[[float], float],
     max_steps: int,
 ) -> Iterator[Advance]:
-    """Yield the steps from `state` to `stop` passes.
-
-    Parameters
-    ----------
-    problem : WearProblem
-    state : WearState
-        State at the start.
-    stepper : Stepper
-    stop : float
-        Passes at the end of the test.
-    next_record : callable
-        Returns the passes of the first record after given passes; a pass-by-pass stepper stops
-        there.
-    max_steps : int
-        Greatest number of steps; passes solved one by one do not count.
+    """Yield the steps of a single test, with the parameters of `Evolution`.
 
     Raises
     ------
-    StepError
-        If a value is not finite or `max_steps` is reached.
+    SolverError
+        If the test fails.
     """
-    while state.passes < stop:
-        if state.steps >= max_steps and not stepper.pass_by_pass:
-            raise too_many_steps(max_steps, state.passes, stop, state.to_arrays())
-        end = min(stop, next_record(state.passes)) if stepper.pass_by_pass else stop
-        advance = stepper.advance(problem, state, end)
-        state = advance.end
-        if not (np.isfinite(state.cylinder_depth).all() and np.isfinite(state.energy).all()):
-            raise not_finite(state.passes, state.to_arrays())
-        yield advance
-
-
-def too_many_steps(steps: int, passes: float, stop: float, state: Mapping[str, Any]) -> StepError:
-    """Return the error of a test that has reached the greatest number of steps."""
-    return StepError(
-        f"{steps} steps have reached pass {passes:.0f} of {stop:.0f};"
-        " raise evolution.max_steps or evolution.tolerance",
-        dict(state),
-    )
-
-
-def not_finite(passes: float, state: Mapping[str, Any]) -> StepError:
-    """Return the error of a test with a value that is not finite."""
-    return StepError(f"a value is not finite after pass {passes:.0f}", dict(state))
+    test = Evolution(problem, state, stepper, stop, max_steps, next_record)
+    yield from test
+    for error in test.failures.values():
+        raise error

@@ -41,7 +41,8 @@ def contact_batch(
 
 def unworn_contacts(problem: WearProblem) -> ContactBatch:
     """Return the contacts of the unworn bodies under the loads at the start of the test."""
-    loads = np.broadcast_to(problem.force(0.0) + problem.inputs.normal_force_offset, problem.shape)
+    force = problem.force(np.zeros(len(problem.loads)))
+    loads = np.broadcast_to(force + problem.inputs.normal_force_offset, problem.shape)
     cylinder, roller = np.zeros((1, 1, 1, 1)), np.zeros((1, problem.rollers, 1, 1))
     return contact_batch(problem, problem.nominal_gap, loads, cylinder, roller)
 

@@ -5,31 +5,33 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, overload
+from itertools import cycle
+from typing import Any
 
 import numpy as np
 
 from wearsim.contact_batch import ContactBatchSolution
 from wearsim.evolution.batch.per_realisation import (
+    is_every,
     mean_along,
-    per_strip,
     sum_along,
     sum_in_order,
     values_between,
 )
-from wearsim.evolution.contact_inputs import ContactInputs, Redraw, Varying
+from wearsim.evolution.contact_inputs import ContactInputs, Varying
 from wearsim.evolution.kinematics import Kinematics
 from wearsim.plugins import BODIES, Body, ContactModel, Load, LoadTerm, WearLaw
-from wearsim.types import FloatArray, Grid, IntArray, Number
+from wearsim.types import FloatArray, Grid, IntArray
 
 
 @dataclass(frozen=True)
 class WearProblem:
-    """A wear test without its state: bodies, contact model, loads, wear law and contact inputs.
+    """Wear tests without their state: bodies, contact model, loads, wear laws and contact inputs.
 
-    Contacts are numbered (station, contact, realisation). A roller has one contact. Where inputs
-    are drawn at every pass it has several, the nodes of a quadrature over its passes, each with a
-    weight.
+    The realisations are tests that share grid, model and kinematics; a single test is one
+    realisation. Contacts are numbered (station, contact, realisation). A roller has one contact.
+    Where inputs are drawn at every pass it has several, the nodes of a quadrature over its passes,
+    each with a weight.
 
     Parameters
     ----------
@@ -37,10 +39,10 @@ class WearProblem:
         Strips across the track.
     model : ContactModel
         Contact model, built for the grid.
-    law : WearLaw
-        Wear law of both bodies.
-    load : Load
-        Normal load of every roller over time.
+    laws : tuple of WearLaw
+        Wear law of both bodies, one per realisation; one for all where none is worn.
+    loads : tuple of Load
+        Normal load of every roller over time, as `laws`.
     terms : mapping of str to LoadTerm
         Terms added to the load, in a fixed order.
     kinematics : Kinematics
@@ -55,9 +57,6 @@ class WearProblem:
         Roller of each contact.
     weight : ndarray, shape (contacts,)
         Fraction of its roller's passes that each contact represents.
-    half : ndarray of int, shape (contacts,)
-        0 or 1: the half of its roller's contacts that a contact belongs to. Each half is a
-        quadrature too.
     tilt_shifts : bool
         A tilt moves the contact over the crown.
     free : bool
@@ -67,22 +66,14 @@ class WearProblem:
         creepage varies with spin alone.
     varying : sequence of Varying
         Inputs that are random processes in time.
-    redraw : callable, optional
-        Draws the inputs of single passes, see `Redraw`.
-    expectation : WearProblem, optional
-        The same problem with quadrature nodes instead of passes drawn one by one, for records.
     iteration_tolerance : float
         Relative change of wear and loads below which an implicit step has converged.
-    stacked : tuple of WearProblem
-        The problem of each realisation where several tests are stepped together: each has its own
-        loads, wear factors and paths in time. Empty if all realisations share those of this
-        problem.
     """
 
     grid: Grid
     model: ContactModel
-    law: WearLaw
-    load: Load
+    laws: tuple[WearLaw, ...]
+    loads: tuple[Load, ...]
     terms: Mapping[str, LoadTerm]
     kinematics: Kinematics
     flat_gap: FloatArray
@@ -90,15 +81,11 @@ class WearProblem:
     inputs: ContactInputs
     roller: IntArray
     weight: FloatArray
-    half: IntArray
     tilt_shifts: bool = True
     free: bool = False
     slip_profile: FloatArray | None = None
     varying: tuple[Varying, ...] = ()
-    redraw: Redraw | None = None
-    expectation: WearProblem | None = None
     iteration_tolerance: float = 1e-8
-    stacked: tuple[WearProblem, ...] = ()
 
     @cached_property
     def shape(self) -> tuple[int, int, int]:
@@ -110,6 +97,11 @@ class WearProblem:
     def rollers(self) -> int:
         """Number of rollers of the problem; identical physical rollers are merged."""
         return len(self.kinematics.multiplicity)
+
+    @cached_property
+    def contacts_each(self) -> int:
+        """Number of contacts of a realisation."""
+        return self.shape[0] * self.shape[1]
 
     @property
     def has_nodes(self) -> bool:
@@ -124,12 +116,6 @@ class WearProblem:
         """Return the value of each contact's roller: (S, R, ...) to (S, C, ...)."""
         return values if self._one_contact_per_roller else values[:, self.roller]
 
-    @cached_property
-    def halved(self) -> WearProblem:
-        """The problem with the first half of the contacts of every roller."""
-        first = self.with_contacts(np.flatnonzero(self.half == 0))
-        return replace(first, weight=2.0 * first.weight)
-
     def with_contacts(self, chosen: IntArray) -> WearProblem:
         """Return the problem with some of its contacts, by number."""
         return replace(
@@ -137,7 +123,30 @@ class WearProblem:
             inputs=self.inputs.at(chosen),
             roller=self.roller[chosen],
             weight=self.weight[chosen],
-            half=self.half[chosen],
+        )
+
+    def at(self, realisations: IntArray) -> WearProblem:
+        """Return the problem of some realisations, by number and in that order."""
+        if is_every(realisations, self.shape[2]):
+            return self
+        numbers = realisations.tolist()
+
+        def part(values: FloatArray, axis: int) -> FloatArray:
+            shared = values.shape[axis] == 1  # by all realisations
+            return values if shared else values.take(realisations, axis=axis)
+
+        return replace(
+            self,
+            laws=tuple(self.laws[number] for number in numbers),
+            loads=tuple(self.loads[number] for number in numbers),
+            flat_gap=np.take(self.flat_gap, realisations, axis=2),
+            from_apex=part(self.from_apex, 1),
+            inputs=self.inputs.of_realisations(realisations),
+            slip_profile=None if self.slip_profile is None else part(self.slip_profile, 1),
+            varying=tuple(
+                replace(item, paths=tuple(item.paths[number] for number in numbers))
+                for item in self.varying
+            ),
         )
 
     @cached_property
@@ -172,7 +181,7 @@ class WearProblem:
     @cached_property
     def input_columns(self) -> dict[str, Any]:
         """Inputs by their name in `ContactBatch`, those that no step changes, shape (contacts,)."""
-        columns: dict[str, Number] = {
+        columns: dict[str, FloatArray | float] = {
             "longitudinal_curvature": self.kinematics.longitudinal_curvature,
             "rolling_speed": self.kinematics.rolling_speed,
             "longitudinal": self.inputs.longitudinal,
@@ -191,85 +200,52 @@ class WearProblem:
         return np.asarray(passes / self.kinematics.physical_rollers)
 
     @cached_property
-    def stiffness(self) -> Number:
-        """Loss of load per descent of the roller [N/m]."""
-        each = [problem.load.stiffness for problem in self.stacked]
-        return np.array(each) if each else self.load.stiffness
+    def stiffness(self) -> FloatArray:
+        """Loss of load per descent of the roller, shape (realisations,) [N/m]."""
+        return np.array([load.stiffness for load in self.loads])
 
     @cached_property
     def has_spring(self) -> bool:
         """Whether a load falls as its roller descends."""
-        return bool(np.any(self.stiffness))
+        return bool(self.stiffness.any())
 
-    def force(self, time: Number) -> FloatArray:
-        """Return the load at a time [s] before feedback, one or one per realisation [N]."""
-        loads = [problem.load for problem in self.stacked or (self,)]
-        times = np.broadcast_to(time, len(loads))[:, None]
-        return np.array([load.force(own)[0] for load, own in zip(loads, times, strict=True)])
+    def force(self, time: FloatArray) -> FloatArray:
+        """Return the load before feedback at a time [s] of each realisation, shape (N,) [N]."""
+        each = zip(self.loads, time[:, None], strict=True)
+        return np.array([load.force(own)[0] for load, own in each])
 
-    def mean_load(self, start: Number, stop: Number) -> FloatArray:
-        """Return the exact mean of the load between two times [s], as `force` [N]."""
-        return values_between([p.load.mean for p in self.stacked or (self,)], start, stop)
+    def mean_load(self, start: FloatArray, stop: FloatArray) -> FloatArray:
+        """Return the exact mean of the load between two times [s], shape (realisations,) [N]."""
+        return values_between([load.mean for load in self.loads], start, stop)
 
-    def deviations(self, start: Number, stop: Number) -> list[tuple[str, tuple[int, ...], Number]]:
+    def deviations(
+        self, start: FloatArray, stop: FloatArray
+    ) -> list[tuple[str, tuple[int, ...], FloatArray]]:
         """Return field, rollers and standard deviation of all that varies between two times [s]."""
-        problems = self.stacked or (self,)
-        load = values_between([problem.load.deviation for problem in problems], start, stop)
+        load = values_between([load.deviation for load in self.loads], start, stop)
         return [
             ("normal_force_offset", tuple(range(self.rollers)), load),
             *(
                 (
                     item.name,
                     item.rollers,
-                    values_between([p.varying[k].path.deviation for p in problems], start, stop),
+                    values_between([path.deviation for path in item.paths], start, stop),
                 )
-                for k, item in enumerate(self.varying)
+                for item in self.varying
             ),
         ]
 
-    def at_time(self, start: Number, stop: Number) -> WearProblem:
+    def at_time(self, start: FloatArray, stop: FloatArray) -> WearProblem:
         """Return the problem with every process at its mean between two times [s]."""
         if not self.varying:
             return self
-        inputs, problems = self.inputs, self.stacked or (self,)
-        for k, item in enumerate(self.varying):
-            mean = values_between([p.varying[k].path.mean for p in problems], start, stop)
+        inputs = self.inputs
+        for item in self.varying:
+            mean = values_between([path.mean for path in item.paths], start, stop)
             inputs = inputs.with_value_of(item, self.roller, mean)
         return replace(self, inputs=inputs, varying=())
 
-    def single_passes(self, rollers: IntArray, first: int, times: FloatArray) -> WearProblem:
-        """Return a problem whose contacts are single passes.
-
-        Parameters
-        ----------
-        rollers : ndarray of int, shape (passes,)
-            Roller that makes each pass.
-        first : int
-            Number of the first pass.
-        times : ndarray, shape (passes,)
-            Time of each pass [s].
-        """
-        inputs = self.inputs.at(rollers)
-        for item in self.varying:
-            inputs = inputs.with_value_of(item, rollers, item.path.at(times)[:, None])
-        if self.redraw is not None:
-            inputs = self.redraw(inputs, first)
-        return replace(
-            self,
-            inputs=inputs,
-            roller=rollers,
-            weight=np.ones(len(rollers)),
-            half=np.zeros(len(rollers), dtype=np.int64),
-            varying=(),
-        )
-
-    @overload
-    def time(self, passes: float) -> float: ...
-
-    @overload
-    def time(self, passes: Number) -> Number: ...
-
-    def time(self, passes: Number) -> Number:
+    def time(self, passes: FloatArray) -> FloatArray:
         """Return the time at which `passes` roller passes are done [s]."""
         return passes / self.kinematics.pass_rate
 
@@ -301,7 +277,7 @@ class WearProblem:
         return self._depths(contacts, dict.fromkeys(BODIES, 1.0))
 
     def wear_parts(
-        self, contacts: ContactBatchSolution, passes: Number
+        self, contacts: ContactBatchSolution, passes: FloatArray | float
     ) -> tuple[FloatArray, FloatArray]:
         """Return the contribution of each contact to the wear of the bodies over some passes [m].
 
@@ -309,11 +285,12 @@ class WearProblem:
         -------
         cylinder, roller : ndarray, shape (stations, contacts, realisations, strips)
         """
+        each = np.asarray(passes)[..., None]
         shares = self.wear_shares.items()
-        return self._depths(contacts, {body: share * per_strip(passes) for body, share in shares})
+        return self._depths(contacts, {body: share * each for body, share in shares})
 
     def _depths(
-        self, contacts: ContactBatchSolution, passes: Mapping[Body, Number]
+        self, contacts: ContactBatchSolution, passes: Mapping[Body, FloatArray | float]
     ) -> tuple[FloatArray, FloatArray]:
         """Return the depth that `passes` passes of each contact wear off either body [m]."""
         dissipation, speed = self.values_of(contacts, "dissipation"), self.kinematics.rolling_speed
@@ -321,23 +298,24 @@ class WearProblem:
         for body in BODIES:
             factor = self.wear_factors[body]
             if factor is None:
-                depths = np.array([self.law.depth_per_pass(body, c, speed) for c in contacts])
+                each = zip(contacts, cycle(self.laws), strict=False)
+                depths = np.array([law.depth_per_pass(body, c, speed) for c, law in each])
                 found.append(passes[body] * depths.reshape(dissipation.shape))
-            elif isinstance(factor, float) and factor == 0.0:
-                found.append(np.zeros(dissipation.shape))
             else:
-                found.append((passes[body] * per_strip(factor)) * dissipation)
+                found.append((passes[body] * factor[:, None]) * dissipation)
         return found[0], found[1]
 
     @cached_property
-    def wear_factors(self) -> dict[Body, Number | None]:
-        """Depth per pass and dissipation of either body [m/(W/m)]; None if wear is not linear."""
-        laws, speed = [p.law for p in self.stacked or (self,)], self.kinematics.rolling_speed
-        factors = {body: [w.depth_per_dissipation(body, speed) for w in laws] for body in BODIES}
-        return {
-            body: None if None in each else np.array(each) if self.stacked else each[0]
-            for body, each in factors.items()
+    def wear_factors(self) -> dict[Body, FloatArray | None]:
+        """Depth per pass and dissipation of either body, shape (realisations,) [m/(W/m)].
+
+        None if wear is not linear in the dissipation.
+        """
+        speed = self.kinematics.rolling_speed
+        factors = {
+            body: [law.depth_per_dissipation(body, speed) for law in self.laws] for body in BODIES
         }
+        return {b: None if None in each else np.array(each) for b, each in factors.items()}
 
     def shared_wear(
         self, cylinder: FloatArray, roller: FloatArray

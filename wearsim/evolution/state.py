@@ -2,52 +2,48 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from wearsim.contact_batch import ContactBatchSolution
+from wearsim.evolution.batch.per_realisation import is_every
 from wearsim.evolution.operating_points import unworn_contacts
 from wearsim.evolution.problem import WearProblem
-from wearsim.types import FloatArray, IntArray, Number
+from wearsim.types import FloatArray, IntArray
 
 SIGMAS = 2.0  # standard deviations of the sampling scatter that are counted as error
 Depths: TypeAlias = tuple[FloatArray, FloatArray]
 """Depths of cylinder and rollers, shapes as in `WearState` [m]."""
 _CONTACT = "contact_"
 _AUXILIARY = ("coarse_step_solution", "half_quadrature_solution")
-_SCALARS = ("passes", "step", "steps", "rejected", "solves", "full_solves")
-
-
-@dataclass(frozen=True)
-class IndividualCounts:
-    """Progress of tests that are stepped together with individual steps.
-
-    Parameters
-    ----------
-    passes : ndarray, shape (realisations,)
-        Roller passes done.
-    solves : ndarray of int, shape (realisations,)
-        Contact solves of the steps taken.
-    """
-
-    passes: FloatArray
-    solves: IntArray
+#: axis of the realisations in the arrays of a `WearState`
+_AXES = {
+    "cylinder_depth": 2,
+    "roller_depth": 2,
+    "terms": 2,
+    "quadrature": 1,
+    "scatter": 1,
+    "loop_strips": 3,
+    "loop_contacts": 3,
+    **dict.fromkeys(("passes", "energy", "depth_error", "volume_error", "decay"), 0),
+    **dict.fromkeys(("step", "steps", "rejected", "solves", "full_solves"), 0),
+}
 
 
 @dataclass(frozen=True)
 class WearState:
-    """A wear test after some roller passes.
+    """Wear tests after some roller passes, each with its own number of passes.
 
     Leading axes are (station, roller, realisation). The axis of rollers has length one for the
     cylinder, that of stations has length one for the rollers.
 
     Parameters
     ----------
-    passes : float
+    passes : ndarray, shape (realisations,)
         Roller passes done, all rollers together.
     cylinder_depth : ndarray, shape (stations, 1, realisations, strips)
         Worn depth of the cylinder [m].
@@ -68,13 +64,13 @@ class WearState:
         and volume [m^3].
     scatter : ndarray, shape (2, realisations)
         Variance between tests due to these draws: of depth [m^2] and volume [m^6].
-    step : float
+    step : ndarray, shape (realisations,)
         Length of the next step proposed by the step-size control [passes]; 0 before the first.
-    steps, rejected : int
+    steps, rejected : ndarray of int, shape (realisations,)
         Steps taken and rejected.
-    solves : int
+    solves : ndarray of int, shape (realisations,)
         Contact solves of the steps taken.
-    full_solves : int
+    full_solves : ndarray of int, shape (realisations,)
         Passes solved in full, not by the chord method, in a per-pass run.
     loop_strips : ndarray, shape (3, stations, rollers, realisations, strips), optional
         Memory of the compiled per-pass loop: line load [N/m], and line load [N/m] and gap [m] of
@@ -88,11 +84,9 @@ class WearState:
         The coarse-step solution with half the quadrature nodes per roller.
     decay : ndarray, shape (realisations,), optional
         Greatest decay rate of a profile by wear, last measurement [1/pass].
-    individual : IndividualCounts, optional
-        Replaces `passes` and `solves` if the realisations are tests with individual steps.
     """
 
-    passes: float
+    passes: FloatArray
     cylinder_depth: FloatArray
     roller_depth: FloatArray
     terms: FloatArray
@@ -102,22 +96,16 @@ class WearState:
     volume_error: FloatArray
     quadrature: FloatArray
     scatter: FloatArray
-    step: float = 0.0
-    steps: int = 0
-    rejected: int = 0
-    solves: int = 0
-    full_solves: int = 0
+    step: FloatArray
+    steps: IntArray
+    rejected: IntArray
+    solves: IntArray
+    full_solves: IntArray
     loop_strips: FloatArray | None = None
     loop_contacts: FloatArray | None = None
     coarse_step_solution: WearState | None = None
     half_quadrature_solution: WearState | None = None
     decay: FloatArray | None = None
-    individual: IndividualCounts | None = None
-
-    @property
-    def passes_done(self) -> Number:
-        """Roller passes done: one number, or one per realisation with individual steps."""
-        return self.passes if self.individual is None else self.individual.passes
 
     @property
     def depths(self) -> Depths:
@@ -136,32 +124,29 @@ class WearState:
         state.__dict__.update(self.__dict__, **others)
         return state
 
-    def advanced_to(
-        self, passes: Number, solves: IntArray | None = None, **others: Any
-    ) -> WearState:
-        """Return the state with other passes done, and other fields replaced.
+    def contacts_of(self, realisations: IntArray) -> IntArray:
+        """Return the numbers of the contacts of some realisations, in the state's order."""
+        every = np.arange(len(self.contacts)).reshape(-1, len(self.passes))
+        return every[:, realisations].ravel()
 
-        Parameters
-        ----------
-        passes : float or ndarray, shape (realisations,)
-            Passes done.
-        solves : ndarray of int, shape (realisations,), optional
-            Contact solves to add.
-        **others
-            Other fields.
-        """
-        if self.individual is None:
-            count = self.solves if solves is None else self.solves + int(solves.sum())
-            return self.replaced(passes=float(passes), solves=count, **others)
-        counts = self.individual.solves if solves is None else self.individual.solves + solves
-        individual = IndividualCounts(np.asarray(passes), counts)
-        return self.replaced(individual=individual, **others)
+    def at(self, realisations: IntArray) -> WearState:
+        """Return the state of some realisations, by number and in that order."""
+        if is_every(realisations, len(self.passes)):
+            return self
+        arrays = ((name, getattr(self, name)) for name in _AXES)
+        return self.replaced(
+            contacts=self.contacts.at(self.contacts_of(realisations)),
+            **{n: a.take(realisations, axis=_AXES[n]) for n, a in arrays if a is not None},
+            **{name: state.at(realisations) for name, state in self.auxiliary.items()},
+        )
 
-    def solves_since(self, before: WearState) -> IntArray:
-        """Return the contact solves since an earlier state, per realisation or in total."""
-        if self.individual is None or before.individual is None:
-            return np.array(self.solves - before.solves)
-        return self.individual.solves - before.individual.solves
+    def with_others(self, places: IntArray, others: WearState) -> WearState:
+        """Return the state with that of some realisations, by increasing place, replaced."""
+        order = np.arange(len(self.passes))
+        if len(places) == len(order):
+            return others
+        order[places] = len(order) + np.arange(len(places))
+        return joined_states([self, others]).at(order)
 
     @property
     def irreducible(self) -> FloatArray:
@@ -171,10 +156,7 @@ class WearState:
     def to_arrays(self) -> dict[str, npt.NDArray[np.generic]]:
         """Return the whole state as named arrays, for a checkpoint."""
         arrays: dict[str, npt.NDArray[np.generic]] = {
-            item.name: np.asarray(getattr(self, item.name))
-            for item in fields(self)
-            if item.name not in {"contacts", "individual", *_AUXILIARY}
-            and getattr(self, item.name) is not None
+            name: getattr(self, name) for name in _AXES if getattr(self, name) is not None
         }
         for name, column in vars(self.contacts).items():
             arrays[_CONTACT + name] = np.array(column)
@@ -186,14 +168,7 @@ class WearState:
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, npt.NDArray[np.generic]]) -> WearState:
         """Return the state stored in the result of `to_arrays`."""
-        known = {item.name for item in fields(cls)}  # early files have further names
-        values: dict[str, Any] = {
-            name: array.item() if name in _SCALARS else np.array(array)
-            for name, array in arrays.items()
-            if name in known
-        }
-        for name in ("quadrature", "scatter"):  # absent from early files of layout 1
-            values.setdefault(name, np.zeros((2, len(arrays["depth_error"]))))
+        values: dict[str, Any] = {n: np.array(a) for n, a in arrays.items() if n in _AXES}
         for name in _AUXILIARY:
             part = _with_prefix(arrays, f"{name}_")
             if part:
@@ -206,6 +181,24 @@ class WearState:
 def _with_prefix(arrays: Mapping[str, npt.NDArray[Any]], prefix: str) -> dict[str, Any]:
     """Return the arrays whose names begin with a prefix, by the rest of their names."""
     return {n.removeprefix(prefix): a for n, a in arrays.items() if n.startswith(prefix)}
+
+
+def joined_states(states: Sequence[WearState]) -> WearState:
+    """Return the states of tests without inputs drawn at every pass as those of one problem."""
+    first = states[0]
+    if len(states) == 1:
+        return first
+    arrays = ((name, [getattr(state, name) for state in states]) for name in _AXES)
+    contacts = [state.contacts for state in states]
+    rows = len(first.contacts) // len(first.passes)
+    # the coarse-step solution of a test begins as the test itself
+    coarse = [state.coarse_step_solution or state for state in states]
+    has_coarse = any(state.coarse_step_solution is not None for state in states)
+    return first.replaced(
+        contacts=contacts[0].joined_with(*contacts[1:], rows=rows),
+        coarse_step_solution=joined_states(coarse) if has_coarse else None,
+        **{n: np.concatenate(a, axis=_AXES[n]) for n, a in arrays if a[0] is not None},
+    )
 
 
 def widened(array: FloatArray, strips: int) -> FloatArray:
@@ -242,28 +235,25 @@ def widened_state(state: WearState, y: FloatArray, strips: int) -> WearState:
 
 def fresh_state(problem: WearProblem) -> WearState:
     """Return the state before the first pass, with the contacts of the unworn bodies solved."""
-    problem = problem.at_time(0.0, 0.0)
-    stations, _, realisations = problem.shape
+    stations, contacts, realisations = problem.shape
+    zeros, counts = np.zeros(realisations), np.zeros(realisations, dtype=np.int64)
+    problem = problem.at_time(zeros, zeros)
     n = problem.grid.strips
-    contacts = problem.model.solve(unworn_contacts(problem))
+    solved = problem.model.solve(unworn_contacts(problem))
     return WearState(
-        passes=0.0,
+        passes=zeros,
         cylinder_depth=np.zeros((stations, 1, realisations, n)),
         roller_depth=np.zeros((1, problem.rollers, realisations, n)),
         terms=np.zeros((len(problem.terms), problem.rollers, realisations)),
-        contacts=contacts,
-        energy=np.zeros(realisations),
-        depth_error=np.zeros(realisations),
-        volume_error=np.zeros(realisations),
+        contacts=solved,
+        energy=zeros,
+        depth_error=zeros,
+        volume_error=zeros,
         quadrature=np.zeros((2, realisations)),
         scatter=np.zeros((2, realisations)),
-        solves=len(contacts),
+        step=zeros,
+        steps=counts,
+        rejected=counts,
+        solves=counts + stations * contacts,
+        full_solves=counts,
     )
-
-
-def fresh_stacked_state(problem: WearProblem) -> WearState:
-    """Return the fresh state of stacked tests with individual steps."""
-    state, count = fresh_state(problem), problem.shape[2]
-    individual = IndividualCounts(np.zeros(count), np.full(count, state.solves // count))
-    state = replace(state, solves=0, individual=individual)
-    return replace(state, coarse_step_solution=state)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import wearsim
+from tests.evolution import never
 from tests.studies.random_examples import (
     CREEPAGE,
     FRICTION,
@@ -16,6 +17,7 @@ from tests.studies.random_examples import (
 from wearsim.errors import CapabilityError, Interrupted, ScenarioError, StepError
 from wearsim.evolution.error_control import error_estimates as errors_of_steps
 from wearsim.evolution.error_control.error_estimates import total_worn_volume
+from wearsim.evolution.integrate import evolve
 from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.forward_euler import stability_limit
 from wearsim.results import open_results
@@ -94,7 +96,7 @@ def test_expectation_over_passes_agrees_with_per_pass_draws(drawn):
     inputs = {name: ALL_PER_PASS[name] for name in drawn}
     _, reference = end_of(scenario_of(evolution__stepper="per-pass", contact__strips=91, **inputs))
     fresh, _, _ = assemble_problem(draw(scenario_of(contact__strips=91, **inputs)))
-    step = round(10.0 * stability_limit(fresh, fresh_state(fresh)))
+    step = round(10.0 * stability_limit(fresh, fresh_state(fresh))[0])
     problem, state = end_of(scenario_of(evolution__step=step, contact__strips=91, **inputs))
     assert state.steps < 20
     assert abs(depth_of(state) - depth_of(reference)) <= state.depth_error[0]
@@ -281,7 +283,7 @@ def test_step_is_shortened_where_coarse_solution_fails(monkeypatch):
         draw(scenario_of(passes=600, friction__coefficient=friction))
     )
     fresh = fresh_state(problem)
-    plain = stepper.advance(problem, fresh, 600.0).end
+    plain = next(evolve(problem, fresh, stepper, 600.0, never, 10**6)).end
     original, failures = (
         errors_of_steps.half_quadrature_start,
         [StepError("the coarse solution did not converge", {})],
@@ -293,7 +295,7 @@ def test_step_is_shortened_where_coarse_solution_fails(monkeypatch):
         return original(*arguments)
 
     monkeypatch.setattr(errors_of_steps, "half_quadrature_start", fails_once)
-    end = stepper.advance(problem, fresh, 600.0).end
+    end = next(evolve(problem, fresh, stepper, 600.0, never, 10**6)).end
     assert not failures
     assert end.rejected >= 1
     assert 0.0 < end.passes < plain.passes

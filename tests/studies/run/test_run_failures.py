@@ -184,15 +184,15 @@ def test_failure_after_resume_keeps_the_steps(path: Path, monkeypatch: pytest.Mo
     with pytest.raises(Interrupted):
         studies.run(short(), path, stop_requested=lambda: True)
     steps = iter(range(100))
-    wear = implicit.ImplicitStepper.advance
+    proposed = implicit.ImplicitStepper.proposed
 
     def fail(self: object, *args: object) -> object:
         if next(steps) == 4:
             raise StepError("no step")
-        return wear(self, *args)
+        return proposed(self, *args)
 
     with monkeypatch.context() as patch:
-        patch.setattr(implicit.ImplicitStepper, "advance", fail)
+        patch.setattr(implicit.ImplicitStepper, "proposed", fail)
         with pytest.raises(StepError, match="no step"):
             studies.resume(path)
     assert open_results(path).steps == 5

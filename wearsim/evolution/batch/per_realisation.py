@@ -6,27 +6,20 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from wearsim.types import FloatArray, Number
+from wearsim.types import FloatArray, IntArray
 
 
-def first_of(numbers: Number) -> float:
-    """Return a number shared by all realisations, or that of the first realisation."""
-    return numbers if isinstance(numbers, float) else float(np.ravel(numbers)[0])
+def is_every(places: IntArray, count: int) -> bool:
+    """Return whether places are those of all `count` realisations in their order."""
+    return len(places) == count and (count == 1 or bool((places == np.arange(count)).all()))
 
 
 def values_between(
-    values: Sequence[Callable[[float, float], float]], start: Number, stop: Number
+    values: Sequence[Callable[[float, float], float]], start: FloatArray, stop: FloatArray
 ) -> FloatArray:
-    """Return ``values[v](start, stop)`` for each realisation v, with its own times [s] if given."""
-    if len(values) == 1:  # broadcasting costs more than the value
-        return np.array([values[0](first_of(start), first_of(stop))])
-    first, last = (np.broadcast_to(time, len(values)).tolist() for time in (start, stop))
-    return np.array([value(a, b) for value, a, b in zip(values, first, last, strict=True)])
-
-
-def per_strip(number: Number) -> Number:
-    """Return a number, or one per realisation, that broadcasts over a last axis of strips."""
-    return number[..., None] if isinstance(number, np.ndarray) else number
+    """Return ``values[v](start[v], stop[v])`` for each realisation v."""
+    each = zip(values, start.tolist(), stop.tolist(), strict=True)
+    return np.array([value(first, last) for value, first, last in each])
 
 
 def sum_along(values: FloatArray, axis: int) -> FloatArray:

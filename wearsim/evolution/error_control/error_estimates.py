@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
-from typing import TypeAlias
 
 import numpy as np
 
@@ -13,14 +11,13 @@ from wearsim.evolution.error_control.step_size import StepControl
 from wearsim.evolution.observables import worn_volume
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import Depths, WearState
+from wearsim.evolution.steppers.base import Step
 from wearsim.evolution.steppers.single_step import carried_loads, solve_present
 from wearsim.evolution.steppers.wear_increment import WearIncrement
-from wearsim.types import FloatArray, Number
+from wearsim.types import FloatArray, IntArray
 
 # lower bounds: the depth grows with a power of 2/3 to 1 of the passes, the volume with about 1
 DEPTH_EXPONENT, VOLUME_EXPONENT = 0.5, 0.75
-Step: TypeAlias = Callable[[WearProblem, WearState, Number], WearState]
-"""Function from a problem, a state and a number of passes to the state after them."""
 COVER = 1.5  # safety factor on an error estimate
 FIRST_ORDER_COVER = 2.0  # for schemes of first order, with less conservative estimates
 DEEP = 0.5  # depths are compared where the groove is deeper than this part of its greatest depth
@@ -71,7 +68,7 @@ def state_difference(problem: WearProblem, one: WearState, other: WearState) -> 
 
 
 def variation_bias(
-    problem: WearProblem, end: WearState, first: Number, passes: Number
+    problem: WearProblem, end: WearState, first: FloatArray, passes: FloatArray
 ) -> Depths | None:
     """Return the wear that a step misses where load and processes vary within it.
 
@@ -84,7 +81,7 @@ def variation_bias(
     problem : WearProblem
     end : WearState
         State at the step's end.
-    first, passes : float or ndarray, shape (realisations,)
+    first, passes : ndarray, shape (realisations,)
         Start and length of the step [passes].
 
     Returns
@@ -160,7 +157,7 @@ def _shifted_wear(
     end: WearState,
     loads: FloatArray,
     shifts: dict[str, FloatArray],
-    passes: Number,
+    passes: FloatArray,
 ) -> WearIncrement:
     """Return the wear of some passes on the profiles of `end` with loads and inputs shifted."""
     values = {
@@ -173,11 +170,25 @@ def _shifted_wear(
     return WearIncrement(shifted, contacts, passes)
 
 
+def first_half(problem: WearProblem) -> IntArray:
+    """Return the first half of the quadrature nodes of every roller, as numbers of contacts.
+
+    Each half of the nodes is a quadrature too.
+    """
+    nodes = np.arange(len(problem.roller)).reshape(problem.rollers, -1)
+    return nodes[:, : nodes.shape[1] // 2].ravel()
+
+
+def with_half_the_nodes(problem: WearProblem) -> WearProblem:
+    """Return the problem with the first half of the quadrature nodes of every roller."""
+    half = problem.with_contacts(first_half(problem))
+    return replace(half, weight=2.0 * half.weight)
+
+
 def half_quadrature_start(problem: WearProblem, state: WearState) -> WearState:
     """Return the initial half-quadrature solution: `state` with half the nodes per roller."""
-    numbers = np.arange(len(state.contacts)).reshape(problem.shape)[:, problem.half == 0]
-    return replace(
-        state,
+    numbers = np.arange(len(state.contacts)).reshape(problem.shape)[:, first_half(problem)]
+    return state.replaced(
         contacts=state.contacts.at(numbers.ravel()),
         coarse_step_solution=None,
         half_quadrature_solution=None,
@@ -190,7 +201,7 @@ def with_pass_errors(
     end: WearState,
     coarse: WearState,
     step: Step,
-    passes: Number,
+    passes: FloatArray,
 ) -> WearState:
     """Return `end` with the error estimates due to inputs drawn at every pass.
 
@@ -207,25 +218,24 @@ def with_pass_errors(
         Solution after the step, by the same steps as the half-quadrature solution.
     step : callable
         Scheme of the half-quadrature solution, see `Step`.
-    passes : float
+    passes : ndarray, shape (realisations,)
         Length of the step.
     """
     if not problem.has_nodes:
         return end
     half_start = start.half_quadrature_solution or half_quadrature_start(problem, start)
-    half = step(problem.halved, half_start, passes)
+    half = step(with_half_the_nodes(problem), half_start, passes)
     volume = total_worn_volume(problem, end)
     variance = start.scatter[1] + _volume_variance(problem, end, passes)
     depth = np.square(greatest_depth(end) / np.where(volume > 0.0, volume, 1.0)) * variance
-    return replace(
-        end,
+    return end.replaced(
         quadrature=state_difference(problem, coarse, half),
         scatter=np.array([depth, variance]),
         half_quadrature_solution=half,
     )
 
 
-def _volume_variance(problem: WearProblem, end: WearState, passes: Number) -> FloatArray:
+def _volume_variance(problem: WearProblem, end: WearState, passes: FloatArray) -> FloatArray:
     """Return the variance of the volume worn in some passes, shape (realisations,) [m^6]."""
     kinematics, spacing = problem.kinematics, problem.grid.spacing
     cylinder, roller = problem.wear_per_pass(end.contacts)
@@ -266,7 +276,7 @@ def excess(
         Error of depth [m] and volume [m^3] after the step, at most `added` and the error before.
     """
     worst = np.zeros(problem.shape[2])
-    parts = np.broadcast_to(end.passes_done / stop, worst.shape).tolist()
+    parts = (end.passes / stop).tolist()
     sizes = greatest_depth(end), total_worn_volume(problem, end)
     # errors that a shorter step would not reduce must not shorten it
     reducible = np.array([start.depth_error, start.volume_error]) - start.irreducible

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 from wearsim.errors import ContactError, StepError
-from wearsim.evolution.steppers.base import fitted
 
 MIN_BUDGET = 0.02  # part of the error budget that a step may always add, so that a run never stalls
 
@@ -65,6 +62,13 @@ class StepControl:
         return step * min(self.grow, max(self.shrink, aim))
 
 
+def fitted(step: float, left: float) -> float:
+    """Return a step length that leaves no very short step before the stop, `left` passes ahead."""
+    if step >= left:
+        return left
+    return 0.5 * left if step > 0.5 * left else step
+
+
 SMALLEST_STEP = 1e-6  # passes; with a great wear factor ten passes wear a whole groove
 _SMALLEST_PART = 1e-8  # of the passes done; with shorter steps a test would not end
 
@@ -81,8 +85,6 @@ class Trial:
         Order of the scheme.
     forced : bool
         Whether every step has the proposed length, for any error.
-    state : callable
-        Returns the state at the start of the step as named arrays, for an error.
 
     Attributes
     ----------
@@ -92,16 +94,9 @@ class Trial:
         Trial steps rejected.
     """
 
-    def __init__(
-        self,
-        proposed: float,
-        control: StepControl,
-        order: int,
-        forced: bool,
-        state: Callable[[], dict[str, Any]],
-    ) -> None:
+    def __init__(self, proposed: float, control: StepControl, order: int, forced: bool) -> None:
         self.proposed, self.rejected = proposed, 0
-        self._control, self._order, self._forced, self._state = control, order, forced, state
+        self._control, self._order, self._forced = control, order, forced
         self._cause: StepError | ContactError | None = None
 
     def step(self, passes: float, stop: float) -> float:
@@ -118,16 +113,13 @@ class Trial:
                 raise self._cause
             raise StepError(
                 f"no step is short enough at pass {passes:.0f} (tried down to {shortest:.2g}"
-                f" passes); {self._cause or 'the error does not fall with the step'}",
-                self._state(),
+                f" passes); {self._cause or 'the error does not fall with the step'}"
             )
         left = stop - passes
         return min(self.proposed, left) if self._forced else fitted(self.proposed, left)
 
     def reject(self, failure: StepError | ContactError, step: float) -> None:
-        """Propose a shorter step after one that failed; raise the failure of a forced step."""
-        if self._forced:
-            raise failure
+        """Propose a shorter step after one that failed."""
         self._cause, self.proposed = failure, 0.2 * step
         self.rejected += 1
 

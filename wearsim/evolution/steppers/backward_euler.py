@@ -6,16 +6,15 @@ import numpy as np
 
 from wearsim.contact_batch import ContactBatch, ContactBatchSolution
 from wearsim.errors import StepError
-from wearsim.evolution.batch.per_realisation import first_of
-from wearsim.evolution.error_control.error_estimates import Step
 from wearsim.evolution.error_control.step_doubling import StepDoublingStepper
 from wearsim.evolution.operating_points import contact_batch
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
+from wearsim.evolution.steppers.base import Step
 from wearsim.evolution.steppers.single_step import REALISATION, end_depths, end_loads, worn_state
 from wearsim.evolution.steppers.wear_increment import WearIncrement
 from wearsim.plugins import SharedWear
-from wearsim.types import BoolArray, FloatArray, Number
+from wearsim.types import BoolArray, FloatArray
 
 MAX_FIXED_POINT = 60
 RELAXATION_INTERVAL = 20  # iterations between relaxations of the tolerance by a factor of ten
@@ -27,8 +26,6 @@ class ImplicitStepper(StepDoublingStepper):
     It is stable for any step length. The error of the coarse-step solution is about twice that of
     the test, so that the difference of the two is about the error of the test.
     """
-
-    order = 1
 
     def scheme(self, problem: WearProblem, state: WearState) -> Step:
         """Return the implicit step."""
@@ -43,7 +40,7 @@ def _relative_change(new: FloatArray, old: FloatArray) -> FloatArray:
     return np.asarray(change / scale)
 
 
-def implicit_step(problem: WearProblem, state: WearState, passes: Number) -> WearState:
+def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) -> WearState:
     """Step over `passes` passes with the contacts solved on the profiles at the step's end.
 
     The wear of the step enters the contact problem as a compliance, so that the step is stable for
@@ -56,7 +53,7 @@ def implicit_step(problem: WearProblem, state: WearState, passes: Number) -> Wea
     StepError
         If the iteration does not converge.
     """
-    begin = state.passes_done
+    begin = state.passes
     problem = problem.at_time(problem.time(begin), problem.time(begin + passes))
     gap = problem.gap(state.cylinder_depth, state.roller_depth)
     contacts = state.contacts
@@ -82,13 +79,13 @@ def implicit_step(problem: WearProblem, state: WearState, passes: Number) -> Wea
         relaxation = 10.0 ** ((iteration - 1) // RELAXATION_INTERVAL)
         active &= ~(change < problem.iteration_tolerance * relaxation)
         if not np.count_nonzero(active):
-            solves = iterations * (len(solved) // len(active))
-            begun = state.advanced_to(begin, solves, contacts=solved)
+            solves = state.solves + iterations * problem.contacts_each
+            begun = state.replaced(solves=solves, contacts=solved)
             return worn_state(problem, begun, passes, ends, problem.values_of(solved, "power"))
         new.estimate_exponents(wear)
         contacts, wear, loads = solved, new, new_loads
     raise StepError(
-        f"an implicit step of {first_of(passes):.4g} passes from pass {first_of(begin):.0f} did not"
+        f"an implicit step of {passes[0]:.4g} passes from pass {begin[0]:.0f} did not"
         f" converge (last relative change {change.max():.1e})",
         state.to_arrays(),
     )

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from wearsim.errors import StepError
@@ -19,7 +17,7 @@ from wearsim.evolution.error_control.step_size import StepControl
 from wearsim.evolution.observables import oscillation
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
-from wearsim.evolution.steppers.base import Advance, Stepper, fitted
+from wearsim.evolution.steppers.base import Attempt, Step, Stepper
 from wearsim.evolution.steppers.single_step import (
     contacts_at,
     explicit_step,
@@ -42,10 +40,8 @@ class ExplicitStepper(Stepper):
 
     Parameters
     ----------
-    control : StepControl
-        Step-size control; the stability limit applies in addition.
-    forced_step : float, optional
-        Passes per step, instead of the step-size control.
+    control, forced_step
+        As for `Stepper`; the stability limit applies in addition.
     allow_unstable : bool
         Allow a forced step beyond the stability limit.
     """
@@ -56,58 +52,57 @@ class ExplicitStepper(Stepper):
         forced_step: float | None = None,
         allow_unstable: bool = False,
     ) -> None:
-        self.control, self.forced_step = control, forced_step
+        super().__init__(control, forced_step)
         self.allow_unstable = allow_unstable
 
-    def side_step(self, problem: WearProblem, state: WearState, passes: float) -> WearState:
-        """Return the state `passes` passes later, in one step."""
-        return explicit_step(problem, state, passes)
-
-    def advance(self, problem: WearProblem, state: WearState, stop: float) -> Advance:
-        """Take one step, below the stability limit and within the tolerance."""
+    def proposed(self, problem: WearProblem, state: WearState) -> FloatArray:
+        """Return the step of the step-size control, below the stability limit, or a forced step."""
         limit = stability_limit(problem, state)
-        proposed = self.forced_step or min(state.step or np.inf, SAFETY * limit)
-        if self.forced_step and self.forced_step > limit and not self.allow_unstable:
+        if self.forced_step is None:
+            return np.minimum(np.where(state.step > 0.0, state.step, np.inf), SAFETY * limit)
+        if self.forced_step > limit.min() and not self.allow_unstable:
             raise StepError(
                 f"a step of {self.forced_step:g} passes exceeds the stability limit of"
-                f" {limit:.4g} passes at pass {state.passes:.0f}; lower evolution.step, set"
-                " evolution.stepper = 'stabilised', or set evolution.allow_unstable = true",
+                f" {limit.min():.4g} passes at pass {state.passes[0]:.0f}; lower evolution.step,"
+                " set evolution.stepper = 'stabilised', or set evolution.allow_unstable = true",
                 state.to_arrays(),
             )
-        left, rejected = stop - state.passes, state.rejected
-        while True:
-            step = min(proposed, left) if self.forced_step else fitted(proposed, left)
-            end = explicit_step(problem, state, step)
-            added = _errors(problem, state, end, step)
-            over = float(excess(self.control, problem, state, end, added, stop).max())
-            chosen = self.control.next_step(step, over)
-            if self.forced_step or over <= 1.0:
-                break
-            rejected += 1
-            proposed = min(chosen, 0.7 * step)
-        end = with_pass_errors(problem, state, end, end, explicit_step, step)
+        return np.full(limit.shape, self.forced_step)
+
+    def scheme(self, problem: WearProblem, state: WearState) -> Step:
+        """Return the explicit step."""
+        return explicit_step
+
+    def attempt(
+        self, problem: WearProblem, state: WearState, step: FloatArray, stop: float, scheme: Step
+    ) -> Attempt:
+        """Take a step, and estimate its error by another one with the wear rate of its end."""
+        end = scheme(problem, state, step)
+        added = _errors(problem, state, end, step)
+        over = excess(self.control, problem, state, end, added, stop)
+        end = with_pass_errors(problem, state, end, end, scheme, step)
         added = added + end.irreducible - state.irreducible
-        passes, half = stop if step == left else end.passes, end.half_quadrature_solution
-        end = replace(
-            end,
+        passes = np.where(step == stop - state.passes, stop, end.passes)
+        end = end.replaced(
             passes=passes,
-            half_quadrature_solution=None if half is None else replace(half, passes=passes),
+            **{name: solution.replaced(passes=passes) for name, solution in end.auxiliary.items()},
             depth_error=state.depth_error + added[0],
             volume_error=state.volume_error + added[1],
-            step=self.forced_step or (max(chosen, proposed) if step < proposed else chosen),
             steps=state.steps + 1,
-            rejected=rejected,
         )
         worst = max(oscillation(contact.line_load) for contact in end.contacts)
-        warning = (
-            f"unstable: at pass {passes:.0f} the line load alternates from strip to strip by"
-            f" {worst:.0%} of its peak; the step of {step:.4g} passes is"
-            f" {step / limit:.2g} times the stability limit"
-        )
-        return Advance(path=(state, end), warning=None if worst < OSCILLATING else warning)
+        warning = None
+        if worst >= OSCILLATING:
+            ratio = float((step / stability_limit(problem, state)).max())
+            warning = (
+                f"unstable: at pass {passes[0]:.0f} the line load alternates from strip to strip by"
+                f" {worst:.0%} of its peak; the step of {step.max():.4g} passes is"
+                f" {ratio:.2g} times the stability limit"
+            )
+        return Attempt((end,), over, warning)
 
 
-def _errors(problem: WearProblem, start: WearState, end: WearState, step: float) -> FloatArray:
+def _errors(problem: WearProblem, start: WearState, end: WearState, step: FloatArray) -> FloatArray:
     """Return the error that a step adds, in depth [m] and volume [m^3], shape (2, realisations).
 
     It is half the difference to a step with the wear rate of its end, plus the effect of the
@@ -119,8 +114,7 @@ def _errors(problem: WearProblem, start: WearState, end: WearState, step: float)
     loads = mean_loads(here, start, step, depths, here.values_of(end.contacts, "power"))
     solve = solve_present if problem.varying else contacts_at
     wear = WearIncrement(here, solve(here, end, loads), step)
-    other = replace(
-        end,
+    other = end.replaced(
         cylinder_depth=start.cylinder_depth + wear.cylinder,
         roller_depth=start.roller_depth + wear.roller,
     )

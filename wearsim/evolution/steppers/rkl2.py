@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from functools import lru_cache, partial
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from wearsim.contact_batch import ContactBatchSolution
-from wearsim.evolution.error_control.error_estimates import Step
 from wearsim.evolution.error_control.step_doubling import StepDoublingStepper
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
+from wearsim.evolution.steppers.base import Step
 from wearsim.evolution.steppers.single_step import (
     contacts_at,
     mean_loads,
@@ -108,7 +107,7 @@ class StabilisedStepper(StepDoublingStepper):
 
 
 def stabilised_step(
-    problem: WearProblem, state: WearState, passes: float, decay: FloatArray
+    problem: WearProblem, state: WearState, passes: FloatArray, decay: FloatArray
 ) -> WearState:
     """Step over `passes` passes with the number of stages that the decay rate requires.
 
@@ -119,13 +118,13 @@ def stabilised_step(
     ----------
     problem : WearProblem
     state : WearState
-    passes : float
+    passes : ndarray, shape (realisations,)
         Length of the step.
     decay : ndarray, shape (realisations,)
         Greatest decay rate [1/pass].
     """
     here = problem.at_time(problem.time(state.passes), problem.time(state.passes + passes))
-    stages = legendre_stages(stages_for(SAFETY * float(decay.max()) * passes))
+    stages = legendre_stages(stages_for(float((SAFETY * decay * passes).max())))
     before = (
         np.zeros_like(state.cylinder_depth),
         np.zeros_like(state.roller_depth),
@@ -133,10 +132,10 @@ def stabilised_step(
     )
     solve = solve_present if problem.varying else contacts_at
     contacts, first = _rate(here, state, passes, before, solve)
-    solves = (len(stages) + (contacts is not state.contacts)) * len(contacts)
+    solves = (len(stages) + (contacts is not state.contacts)) * problem.contacts_each
     change = _sum((stages[0].start_rate, first))
     for stage in stages[1:]:
-        contacts, rate = _rate(here, replace(state, contacts=contacts), passes, change)
+        contacts, rate = _rate(here, state.replaced(contacts=contacts), passes, change)
         weighted = (
             (stage.last, change),
             (stage.before_last, before),
@@ -144,16 +143,16 @@ def stabilised_step(
             (stage.start_rate, first),
         )
         before, change = change, _sum(*weighted)
-    begun = replace(state, contacts=contacts, solves=state.solves + solves, decay=decay)
+    begun = state.replaced(contacts=contacts, solves=state.solves + solves, decay=decay)
     ends = state.cylinder_depth + change[0], state.roller_depth + change[1]
     worn = worn_state(here, begun, passes, ends, change[2])
-    return replace(worn, contacts=solve_present(problem, worn, present_loads(problem, worn)))
+    return worn.replaced(contacts=solve_present(problem, worn, present_loads(problem, worn)))
 
 
 def _rate(
     here: WearProblem,
     state: WearState,
-    passes: float,
+    passes: FloatArray,
     change: Change,
     solve: Callable[[WearProblem, WearState, FloatArray], ContactBatchSolution] = solve_present,
 ) -> tuple[ContactBatchSolution, Change]:
@@ -167,7 +166,7 @@ def _rate(
         Problem with every process at its mean over the step.
     state : WearState
         State at the step's start, with contacts for the solver to start from.
-    passes : float
+    passes : ndarray, shape (realisations,)
         Length of the step.
     change : Change
         Change from the start to the stage.
@@ -176,7 +175,7 @@ def _rate(
     """
     depths = state.cylinder_depth + change[0], state.roller_depth + change[1]
     loads = mean_loads(here, state, passes, (depths,), here.values_of(state.contacts, "power"))
-    stage = replace(state, cylinder_depth=depths[0], roller_depth=depths[1])
+    stage = state.replaced(cylinder_depth=depths[0], roller_depth=depths[1])
     contacts = solve(here, stage, loads)
     wear = WearIncrement(here, contacts, passes)
     return contacts, (*wear.depths, here.values_of(contacts, "power"))

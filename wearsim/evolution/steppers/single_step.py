@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from wearsim.contact_batch import ContactBatchSolution
 from wearsim.errors import StepError
-from wearsim.evolution.batch.per_realisation import first_of
-from wearsim.evolution.batch.stack import contacts_of, problem_of, state_of
 from wearsim.evolution.observables import depth, worn_volume
 from wearsim.evolution.operating_points import contact_batch
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import Depths, WearState
 from wearsim.evolution.steppers.wear_increment import WearIncrement
-from wearsim.types import FloatArray, Number
+from wearsim.types import FloatArray
 
 REALISATION = 2  # axis of the realisations
 SAME_LOAD = 1e-9  # relative change of a load below which a contact is not solved again
@@ -25,7 +22,7 @@ SAME_LOAD = 1e-9  # relative change of a load below which a contact is not solve
 def mean_loads(
     problem: WearProblem,
     state: WearState,
-    passes: Number,
+    passes: FloatArray,
     depths: Sequence[Depths],
     power: FloatArray,
 ) -> FloatArray:
@@ -35,7 +32,7 @@ def mean_loads(
     the worn depths `depths`, usually those at the ends of the step, and each load term its exact
     mean at constant `power`.
     """
-    start, stop = problem.time(state.passes_done), problem.time(state.passes_done + passes)
+    start, stop = problem.time(state.passes), problem.time(state.passes + passes)
     problem = problem.at_time(start, stop)
     loads = _loads(problem, problem.mean_load(start, stop))
     if problem.has_spring:
@@ -43,23 +40,23 @@ def mean_loads(
         loads -= problem.stiffness * np.mean(descents, axis=0)
     for number, term in enumerate(problem.terms.values()):
         mean_power = problem.per_roller(power).mean(axis=0)
-        duration = first_of(stop - start)
+        duration = float((stop - start)[0])
         loads += term.mean_force(state.terms[number], mean_power, duration)[problem.roller]
-    return checked_loads(loads, state.passes_done)
+    return checked_loads(loads, state.passes)
 
 
-def _loads(problem: WearProblem, force: Number) -> FloatArray:
+def _loads(problem: WearProblem, force: FloatArray) -> FloatArray:
     """Return the load of every contact before feedback for a load `force` of the problem [N]."""
     loads = np.empty(problem.shape)
     loads[:] = force + problem.inputs.normal_force_offset
     return loads
 
 
-def checked_loads(loads: FloatArray, passes: Number) -> FloatArray:
+def checked_loads(loads: FloatArray, passes: FloatArray) -> FloatArray:
     """Return `loads`; raise StepError unless all are positive."""
     if np.count_nonzero(loads > 0.0) < loads.size:
         raise StepError(
-            f"contact is lost at pass {first_of(passes):.0f}: the load has fallen to"
+            f"contact is lost at pass {passes[0]:.0f}: the load has fallen to"
             f" {loads.min():.4g} N; the spring has run out of travel, or the recorded load or a"
             " random input falls to zero",
             {"normal_force": loads, "passes": passes},
@@ -75,7 +72,7 @@ def end_depths(state: WearState, wear: WearIncrement) -> Depths:
 def end_loads(
     problem: WearProblem,
     state: WearState,
-    passes: Number,
+    passes: FloatArray,
     ends: Depths,
     contacts: ContactBatchSolution,
 ) -> FloatArray:
@@ -84,35 +81,35 @@ def end_loads(
     return mean_loads(problem, state, passes, (state.depths, ends), power)
 
 
-def explicit_step(problem: WearProblem, state: WearState, passes: Number) -> WearState:
+def explicit_step(problem: WearProblem, state: WearState, passes: FloatArray) -> WearState:
     """Step over `passes` passes on the profiles of the step's start, under its mean load."""
     here = problem.at_time(problem.time(state.passes), problem.time(state.passes + passes))
     predicted = WearIncrement(here, state.contacts, passes)
     mean = end_loads(here, state, passes, end_depths(state, predicted), state.contacts)
     solve = solve_present if problem.varying else contacts_at
     contacts = solve(here, state, mean)
-    solves = len(contacts) if contacts is state.contacts else 2 * len(contacts)
+    solves = problem.contacts_each * (1 if contacts is state.contacts else 2)
     ends = end_depths(state, WearIncrement(here, contacts, passes))
-    begun = replace(state, contacts=contacts, solves=state.solves + solves)
+    begun = state.replaced(contacts=contacts, solves=state.solves + solves)
     worn = worn_state(here, begun, passes, ends, here.values_of(contacts, "power"))
-    return replace(worn, contacts=solve_present(problem, worn, present_loads(problem, worn)))
+    return worn.replaced(contacts=solve_present(problem, worn, present_loads(problem, worn)))
 
 
 def present_problem(problem: WearProblem, state: WearState) -> WearProblem:
     """Return the problem with every process at its value at the time of the state."""
-    now = problem.time(state.passes_done)
+    now = problem.time(state.passes)
     return problem.at_time(now, now)
 
 
 def present_loads(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the load of each contact at the time of the state, shape (S, C, N) [N]."""
     problem = present_problem(problem, state)
-    loads = _loads(problem, problem.force(problem.time(state.passes_done)))
+    loads = _loads(problem, problem.force(problem.time(state.passes)))
     if problem.has_spring:
         loads -= problem.stiffness * problem.descent(problem.gap(*state.depths))
     for number in range(len(problem.terms)):
         loads += problem.at_contacts(state.terms[number][None])[0]
-    return checked_loads(loads, state.passes_done)
+    return checked_loads(loads, state.passes)
 
 
 def contacts_at(problem: WearProblem, state: WearState, loads: FloatArray) -> ContactBatchSolution:
@@ -130,9 +127,9 @@ def contacts_at(problem: WearProblem, state: WearState, loads: FloatArray) -> Co
         return state.contacts
     if others.size == loads.shape[REALISATION]:
         return solve_present(problem, state, loads)
-    chosen, part = problem_of(problem, others), state_of(state, others)
+    chosen, part = problem.at(others), state.at(others)
     solved = solve_present(chosen, part, np.take(loads, others, axis=REALISATION))
-    return state.contacts.with_others(contacts_of(state, others), solved)
+    return state.contacts.with_others(state.contacts_of(others), solved)
 
 
 def carried_loads(problem: WearProblem, contacts: ContactBatchSolution) -> FloatArray:
@@ -155,7 +152,7 @@ def solve_present(
 def worn_state(
     problem: WearProblem,
     state: WearState,
-    passes: Number,
+    passes: FloatArray,
     ends: Depths,
     power: FloatArray,
 ) -> WearState:
@@ -166,21 +163,21 @@ def worn_state(
     problem : WearProblem
     state : WearState
         State at the step's start, with the contacts that the state returned keeps.
-    passes : float or ndarray, shape (realisations,)
+    passes : ndarray, shape (realisations,)
         Length of the step.
     ends : tuple of ndarray
         Worn depths of cylinder and rollers at the step's end, shapes as in `WearState` [m].
     power : ndarray, shape (stations, contacts, realisations)
         Mean dissipated power of the step [W], of the same dissipation as the wear.
     """
-    terms, begin = state.terms, state.passes_done
+    terms, begin = state.terms, state.passes
     if problem.terms:
-        duration = first_of(problem.time(begin + passes) - problem.time(begin))
+        duration = float((problem.time(begin + passes) - problem.time(begin))[0])
         mean = problem.per_roller(power).mean(axis=0)
         each = zip(problem.terms.values(), terms, strict=True)
         terms = np.array([term.advance(value, mean, duration) for term, value in each])
-    return state.advanced_to(
-        begin + passes,
+    return state.replaced(
+        passes=begin + passes,
         cylinder_depth=ends[0],
         roller_depth=ends[1],
         terms=terms,

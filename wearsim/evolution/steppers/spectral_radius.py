@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from wearsim.errors import ContactError
@@ -18,16 +16,17 @@ RATE_TOLERANCE = 0.1  # relative change between iterates, or from the last measu
 PERTURBATION = 1e-4  # change of a profile for the finite difference, relative to the approach
 
 
-def stability_limit(problem: WearProblem, state: WearState) -> float:
-    """Return the longest stable step of Euler's method [passes].
+def stability_limit(problem: WearProblem, state: WearState) -> FloatArray:
+    """Return the longest stable step of Euler's method, shape (realisations,) [passes].
 
     Returns
     -------
-    float
+    ndarray
         2 over the greatest decay rate, infinite without wear.
     """
-    rate = float(decay_rates(problem, state).max())
-    return 2.0 / rate if rate > 0.0 else np.inf
+    rates = decay_rates(problem, state)
+    limits: FloatArray = 2.0 / np.where(rates > 0.0, rates, 1.0)
+    return np.where(rates > 0.0, limits, np.inf)
 
 
 def decay_rates(problem: WearProblem, state: WearState) -> FloatArray:
@@ -88,8 +87,7 @@ def _decrease(
     step = PERTURBATION * np.maximum(approach.min(axis=(0, 1)), 1e-12)
     size = _maximum_norm(profile)
     factor = (step / np.where(size > 0.0, size, 1.0))[:, None]
-    changed = replace(
-        state,
+    changed = state.replaced(
         cylinder_depth=state.cylinder_depth + factor * profile[0],
         roller_depth=state.roller_depth + factor * profile[1],
     )

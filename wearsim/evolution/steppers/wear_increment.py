@@ -10,7 +10,7 @@ from wearsim.contact_batch import ContactBatchSolution
 from wearsim.evolution.problem import WearProblem
 from wearsim.mechanics.numerics.wear_exponent import estimate_exponents, ratio_to_load
 from wearsim.plugins import SharedWear
-from wearsim.types import FloatArray, Number
+from wearsim.types import FloatArray
 
 MAX_LINEAR_EXPONENT = 1.0  # of dissipation as a power of line load; 1 in full sliding
 MAX_EXPONENT = 50.0  # T gamma's wear law goes as the power 44 where catastrophic wear begins
@@ -42,7 +42,7 @@ class WearIncrement:
     """
 
     def __init__(
-        self, problem: WearProblem, contacts: ContactBatchSolution, passes: Number
+        self, problem: WearProblem, contacts: ContactBatchSolution, passes: FloatArray | float
     ) -> None:
         self._parts = problem.wear_parts(contacts, passes)
         self.depths = problem.sum_of_parts(*self._parts)

@@ -196,7 +196,7 @@ class Result(StudyResult[RunData]):
     @property
     def steps(self) -> int:
         """Number of accepted steps; the history may have fewer rows."""
-        return int(self.raw.checkpoint.get("steps", len(self.passes) - 1))
+        return int(np.sum(self.raw.checkpoint.get("steps", len(self.passes) - 1)))
 
     @property
     def final(self) -> dict[str, Number]:

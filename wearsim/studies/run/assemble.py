@@ -9,7 +9,11 @@ import numpy as np
 
 from wearsim.errors import CapabilityError, Mistake, ScenarioError
 from wearsim.evolution.contact_inputs import ContactInputs
-from wearsim.evolution.error_control.error_estimates import half_quadrature_start, total_worn_volume
+from wearsim.evolution.error_control.error_estimates import (
+    half_quadrature_start,
+    total_worn_volume,
+    with_half_the_nodes,
+)
 from wearsim.evolution.error_control.step_size import StepControl
 from wearsim.evolution.kinematics import Kinematics, NoWear
 from wearsim.evolution.problem import WearProblem
@@ -182,7 +186,7 @@ def assemble_problem(
             rollers=first,
             multiplicity=multiplicity,
         ),
-        law=scenario.wear.build() if scenario.wear is not None else NoWear(),
+        laws=(scenario.wear.build() if scenario.wear is not None else NoWear(),),
         varying=tuple(
             replace(item, rollers=tuple(place[r] for r in item.rollers if r in place))
             for item in draws.varying
@@ -190,7 +194,7 @@ def assemble_problem(
     )
     if draws.passes and stepper.pass_by_pass:
         nodes = with_nodes(problem, scenario, draws.passes, minimum_nodes(draws.passes))
-        problem = replace(problem, redraw=redrawing(scenario, draws.passes), expectation=nodes)
+        stepper = PerPassStepper(redrawing(scenario, draws.passes), nodes)
     elif draws.passes:
         problem = with_converged_nodes(problem, draws)
     return problem, stepper, name
@@ -222,15 +226,16 @@ def with_converged_nodes(problem: WearProblem, draws: Draws) -> WearProblem:
     half the tolerance, or `MAX_NODES` are reached.
     """
     evolution = draws.scenario.evolution
-    count = evolution.nodes or minimum_nodes(draws.passes)
+    count, one = evolution.nodes or minimum_nodes(draws.passes), np.ones(1)
     while True:
         found = with_nodes(problem, draws.scenario, draws.passes, count)
         if evolution.nodes or 2 * count > MAX_NODES:
             return found
         fresh = fresh_state(found)
-        full = total_worn_volume(problem, explicit_step(found, fresh, 1.0))
+        full = total_worn_volume(problem, explicit_step(found, fresh, one))
         half = total_worn_volume(
-            problem, explicit_step(found.halved, half_quadrature_start(found, fresh), 1.0)
+            problem,
+            explicit_step(with_half_the_nodes(found), half_quadrature_start(found, fresh), one),
         )
         if (np.abs(full - half) <= 0.5 * evolution.tolerance * full).all():
             return found
@@ -274,8 +279,8 @@ def build_problem(
     return WearProblem(
         grid=grid,
         model=model,
-        law=NoWear(),
-        load=scenario.load.build(),
+        laws=(NoWear(),),
+        loads=(scenario.load.build(),),
         terms={term.name: term.build() for term in scenario.load.terms},
         kinematics=Kinematics(
             cylinder_radius=cylinder.radius,
@@ -289,7 +294,6 @@ def build_problem(
         inputs=ContactInputs.uniform(count, realisations).with_values(values),
         roller=np.arange(count, dtype=np.int64),
         weight=np.ones(count),
-        half=np.zeros(count, dtype=np.int64),
         tilt_shifts=creepage.tilt_shifts_contact,
         free=creepage.drive == "free",
         slip_profile=slip if creepage.differential_slip else None,

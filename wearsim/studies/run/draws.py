@@ -76,8 +76,9 @@ class Draws:
         time = self.scenario.total_time
         for item in self.varying:
             if item.name == name:
-                signed = _changes_sign(item.path.value)
-                found = np.abs(item.path.value).mean() if signed else item.path.mean(0.0, time)
+                (path,) = item.paths
+                signed = _changes_sign(path.value)
+                found = np.abs(path.value).mean() if signed else path.mean(0.0, time)
                 sizes.append(abs(float(found)))
         for random in self.passes:
             if len(random.keys) == 1 and CONTACT_FIELDS[random.keys[0]] == name:
@@ -98,7 +99,7 @@ class Draws:
         values = [mean, *self.rollers.get(name, ())]
         for item in self.varying:
             if item.name == name:
-                values += [float(item.path.value.min()), float(item.path.value.max())]
+                values += [float(item.paths[0].value.min()), float(item.paths[0].value.max())]
         for random in self.passes:
             for key, limits in zip(random.keys, _ranges(random), strict=True):
                 if CONTACT_FIELDS[key] == name:
@@ -357,12 +358,12 @@ def _paths(scenario: Scenario, item: RandomInput, realisation: int) -> list[Vary
     for block, group in enumerate(groups):
         uniforms = partial(stream.uniforms, realisation=realisation, block=block)
         value = process.path(points, uniforms) - origin(item.name, item.mean[0])
-        found.append(Varying(CONTACT_FIELDS[item.name], group, PiecewiseLinear(times, value)))
+        found.append(Varying(CONTACT_FIELDS[item.name], group, (PiecewiseLinear(times, value),)))
     return found
 
 
 def _means(scenario: Scenario, item: RandomInput, paths: list[Varying]) -> FloatArray:
     """Return the mean of a process over the test, one or one for each roller [SI]."""
     start = origin(item.name, item.mean[0])
-    found = np.array([one.path.mean(0.0, scenario.total_time) + start for one in paths])
+    found = np.array([one.paths[0].mean(0.0, scenario.total_time) + start for one in paths])
     return found if item.persistence == "per-roller" else found[0]

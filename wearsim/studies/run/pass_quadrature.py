@@ -93,7 +93,7 @@ def with_nodes(
         uniforms = copula.correlate(sampler.uniforms(0, points))
         return _with_values(problem.inputs.at(np.repeat(rollers, points)), items, uniforms)
 
-    force = float(problem.load.force(np.zeros(1))[0])
+    force = float(problem.loads[0].force(np.zeros(1))[0])
     inputs, reference = inputs_of(count), inputs_of(REFERENCE_POINTS)
     weights = []
     for number in range(problem.rollers):
@@ -104,13 +104,11 @@ def with_nodes(
         # both halves of the points are quadratures too
         halves = values[:, : count // 2], values[:, count // 2 :]
         weights += [0.5 * _calibrated(half, exact.mean(axis=1)) for half in halves]
-    second_half = np.arange(count, dtype=np.int64) >= count // 2
     return replace(
         problem,
         inputs=inputs,
         roller=np.repeat(rollers, count),
         weight=np.concatenate(weights),
-        half=np.tile(second_half, problem.rollers).astype(np.int64),
     )
 
 

@@ -5,18 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import groupby, pairwise
+from operator import itemgetter
 
 import numpy as np
 
 from wearsim.errors import ContactError, StepError
 from wearsim.evolution.batch.per_realisation import mean_along
-from wearsim.evolution.error_control.error_estimates import Step
 from wearsim.evolution.error_control.step_size import SMALLEST_STEP
+from wearsim.evolution.integrate import Advance
 from wearsim.evolution.observables import depth, width, worn_volume
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import WearState
-from wearsim.evolution.steppers.base import Advance, Stepper
+from wearsim.evolution.state import WearState, joined_states
+from wearsim.evolution.steppers.base import Step, Stepper
 from wearsim.evolution.steppers.single_step import (
     contacts_at,
     cylinder_depth_of,
@@ -24,13 +25,14 @@ from wearsim.evolution.steppers.single_step import (
     present_loads,
     solve_present,
 )
+from wearsim.results.run.schema import VARIABLES
 from wearsim.scenario import Scenario
 from wearsim.scenario.tables.plain import DEFAULT_RECORDS
-from wearsim.types import FloatArray, Number
+from wearsim.types import FloatArray, IntArray
 
 _ROUND_OFF = 1e-9
 
-Variables = dict[str, object]
+Variables = dict[str, FloatArray]
 
 
 @dataclass(frozen=True)
@@ -122,31 +124,43 @@ class RecordSchedule:
         return float(math.ceil(due)) if pass_by_pass else due
 
 
+def present_contacts(
+    stepper: Stepper, problem: WearProblem, state: WearState
+) -> tuple[WearProblem, WearState, FloatArray]:
+    """Return `state` with its contacts at the present loads, their problem, and the loads.
+
+    If inputs are drawn at every pass, the contacts are those of the quadrature over passes, so that
+    a record does not depend on the stepper.
+    """
+    recorded = stepper.recorded(problem)
+    loads = present_loads(recorded, state)
+    if stepper.pass_by_pass:
+        contacts = solve_present(recorded, state, loads, cold=recorded is not problem)
+    else:
+        contacts = contacts_at(recorded, state, loads)
+    return recorded, state.replaced(contacts=contacts), loads
+
+
 def history_row(
+    stepper: Stepper,
     problem: WearProblem,
     state: WearState,
     before: WearState | None,
     threshold: float,
-    pass_by_pass: bool,
 ) -> Variables:
-    """Return the observables of a state; `threshold` [m] bounds the groove's width."""
-    problem, state, loads = present_contacts(problem, state, pass_by_pass)
-    worn = state.cylinder_depth
+    """Return the observables of every realisation; `threshold` [m] bounds the groove's width."""
+    problem, state, loads = present_contacts(stepper, problem, state)
+    worn = state.cylinder_depth[:, 0].max(axis=0)
 
     def per_roller(name: str) -> FloatArray:
         return problem.per_roller(problem.values_of(state.contacts, name))
 
     return {
-        "passes": state.passes_done,
-        "time": problem.time(state.passes_done),
-        "step_passes": 0.0 if before is None else state.passes_done - before.passes_done,
+        "passes": state.passes,
+        "time": problem.time(state.passes),
+        "step_passes": state.passes - (state if before is None else before).passes,
         "depth": cylinder_depth_of(state),
-        "width": np.array(
-            [
-                width(problem.grid.y, worn[:, 0, v].max(axis=0), threshold)
-                for v in range(problem.shape[2])
-            ]
-        ),
+        "width": np.array([width(problem.grid.y, groove, threshold) for groove in worn]),
         "worn_volume": cylinder_volume_of(problem, state),
         "roller_depth": depth(state.roller_depth)[0],
         "roller_worn_volume": worn_volume(
@@ -168,56 +182,9 @@ def history_row(
     }
 
 
-def take_side_step(step: Step, problem: WearProblem, state: WearState, passes: Number) -> WearState:
-    """Return the state `passes` later by one side step, or by halves if that step fails.
-
-    A profile interpolated between two steps would not fit its contact, since line loads change
-    noticeably with a tenth of a micrometre. The run does not continue from a side step.
-
-    Parameters
-    ----------
-    step : callable
-        Takes a problem, a state and a number of passes to the state after them.
-    problem : WearProblem
-    state : WearState
-    passes : float or ndarray, shape (realisations,)
-        Halved only for a single test, whose result must not depend on others in its batch.
-
-    Raises
-    ------
-    StepError, ContactError
-        If halves would be too short.
-    """
-    try:
-        return step(problem, state, passes)
-    except (StepError, ContactError):
-        half = 0.5 * passes
-        if np.size(half) > 1 or np.max(half) < SMALLEST_STEP:
-            raise
-    return take_side_step(step, problem, take_side_step(step, problem, state, half), half)
-
-
-def present_contacts(
-    problem: WearProblem, state: WearState, pass_by_pass: bool
-) -> tuple[WearProblem, WearState, FloatArray]:
-    """Return `state` with its contacts at the present loads, their problem, and the loads.
-
-    If inputs are drawn at every pass, the contacts are those of the quadrature over passes, so that
-    a record does not depend on the stepper.
-    """
-    expected = problem.expectation
-    if expected is not None:
-        loads = present_loads(expected, state)
-        contacts = solve_present(expected, state, loads, cold=True)
-        return expected, state.replaced(contacts=contacts), loads
-    loads = present_loads(problem, state)
-    solve = solve_present if pass_by_pass else contacts_at
-    return problem, state.replaced(contacts=solve(problem, state, loads)), loads
-
-
-def record_row(problem: WearProblem, state: WearState, pass_by_pass: bool) -> Variables:
+def record_row(stepper: Stepper, problem: WearProblem, state: WearState) -> Variables:
     """Return the profiles of a state and the contacts at the present loads."""
-    problem, state, _ = present_contacts(problem, state, pass_by_pass)
+    problem, state, _ = present_contacts(stepper, problem, state)
     return {
         "record_passes": state.passes,
         "record_time": problem.time(state.passes),
@@ -230,35 +197,99 @@ def record_row(problem: WearProblem, state: WearState, pass_by_pass: bool) -> Va
     }
 
 
-def due_states(
-    problem: WearProblem, stepper: Stepper, schedule: RecordSchedule, advance: Advance, stop: float
-) -> list[WearState]:
-    """Return the states to be recorded within a step and at its end, in order.
+def take_side_step(
+    step: Step, problem: WearProblem, state: WearState, passes: FloatArray
+) -> WearState:
+    """Return the state `passes` later by one side step, or by halves if that step fails.
+
+    A profile interpolated between two steps would not fit its contact, since line loads change
+    noticeably with a tenth of a micrometre. The run does not continue from a side step.
 
     Parameters
     ----------
+    step : callable
+        Takes a problem, a state and a number of passes to the state after them.
     problem : WearProblem
-    stepper : Stepper
-        Takes the side steps to records within the step.
-    schedule : RecordSchedule
-    advance : Advance
-        The step.
-    stop : float
-        Passes at the end of the test, which is always recorded.
+    state : WearState
+    passes : ndarray, shape (realisations,)
+        Halved only for a single test, whose result must not depend on others in its batch.
+
+    Raises
+    ------
+    StepError, ContactError
+        If halves would be too short.
+    """
+    try:
+        return step(problem, state, passes)
+    except (StepError, ContactError):
+        half = 0.5 * passes
+        if len(half) > 1 or half[0] < SMALLEST_STEP:
+            raise
+    return take_side_step(step, problem, take_side_step(step, problem, state, half), half)
+
+
+@dataclass(frozen=True)
+class DueRecords:
+    """Records due within and at the end of a step of some tests.
+
+    Parameters
+    ----------
+    numbers : ndarray of int, shape (records,)
+        Number of the test of each record; the records of a test are in order.
+    problem : WearProblem
+        Its realisations are the tests of the records.
+    state : WearState
+        The last state of the step at or before each record.
+    passes : ndarray, shape (records,)
+        Passes of each record.
     """
 
-    def step(problem: WearProblem, state: WearState, passes: Number) -> WearState:
-        return stepper.side_step(problem, state, float(passes))
+    numbers: IntArray
+    problem: WearProblem
+    state: WearState
+    passes: FloatArray
 
-    return [
-        last
-        if at_end
-        else take_side_step(step, problem, first, due - first.passes).replaced(passes=due)
-        for first, last in pairwise(advance.path)
-        for due, at_end in schedule.due_between(
-            first.passes, last.passes, stop, stepper.pass_by_pass
-        )
-    ]
+    @classmethod
+    def of(
+        cls, advance: Advance, schedule: RecordSchedule, stop: float, pass_by_pass: bool
+    ) -> DueRecords | None:
+        """Return the records due in a step; `stop` is the end of the test [passes]."""
+        due = [
+            (source + at_end, place, passes)
+            for source, (start, end) in enumerate(pairwise(advance.path))
+            for place, (first, last) in enumerate(
+                zip(start.passes.tolist(), end.passes.tolist(), strict=True)
+            )
+            for passes, at_end in schedule.due_between(first, last, stop, pass_by_pass)
+        ]
+        if not due:
+            return None
+        due.sort()
+        places, states = [], []
+        for source, group in groupby(due, key=itemgetter(0)):
+            places.append(np.array([place for _, place, _ in group]))
+            state = advance.path[source].replaced(
+                coarse_step_solution=None, half_quadrature_solution=None
+            )
+            states.append(state.at(places[-1]))
+        chosen = np.concatenate(places)
+        problem, passes = advance.problem.at(chosen), np.array([one[2] for one in due])
+        return cls(advance.numbers[chosen], problem, joined_states(states), passes)
+
+    def at(self, places: IntArray) -> DueRecords:
+        """Return some of the records, by place and in that order."""
+        problem, state = self.problem.at(places), self.state.at(places)
+        return DueRecords(self.numbers[places], problem, state, self.passes[places])
+
+    def recorded_state(self, stepper: Stepper) -> WearState:
+        """Return the states at the records, by side steps where no step ends."""
+        later = np.flatnonzero(self.passes > self.state.passes)
+        if not later.size:
+            return self.state
+        start, ends = self.state.at(later), self.passes[later]
+        length = ends - start.passes
+        end = take_side_step(stepper.side_step, self.problem.at(later), start, length)
+        return self.state.with_others(later, end.replaced(passes=ends))
 
 
 class Recorder:
@@ -292,19 +323,23 @@ class Recorder:
         self.stepper = stepper
         self.schedule = schedule
         self.threshold = threshold
-        self._history = _rows(history or {}) or [
-            history_row(problem, state, None, threshold, stepper.pass_by_pass)
-        ]
-        self._records = _rows(records or {}) or [record_row(problem, state, stepper.pass_by_pass)]
+        self._history = _rows(history or {}) or [self._history_row(state, None)]
+        self._records = _rows(records or {}) or [_single(record_row(stepper, problem, state))]
         self._kept = len(self._history), len(self._records), state
+
+    def _history_row(self, state: WearState, before: WearState | None) -> Variables:
+        return _single(history_row(self.stepper, self.problem, state, before, self.threshold))
 
     def add(self, advance: Advance, stop: float) -> None:
         """Add a step to the history, and record the states due within it or at its end."""
-        start, end = advance.path[0], advance.end
-        due = due_states(self.problem, self.stepper, self.schedule, advance, stop)
-        pass_by_pass = self.stepper.pass_by_pass
-        self._records += [record_row(self.problem, state, pass_by_pass) for state in due]
-        self._history.append(history_row(self.problem, end, start, self.threshold, pass_by_pass))
+        stepper, end = self.stepper, advance.end
+        due = DueRecords.of(advance, self.schedule, stop, stepper.pass_by_pass)
+        if due is not None:
+            for place in range(len(due.passes)):
+                one = due.at(np.array([place]))
+                row = record_row(stepper, one.problem, one.recorded_state(stepper))
+                self._records.append(_single(row))
+        self._history.append(self._history_row(end, advance.path[0]))
         # a single assignment: an interrupt before it leaves the previous step current
         self._kept = len(self._history), len(self._records), end
 
@@ -326,6 +361,11 @@ class Recorder:
     def records(self) -> dict[str, FloatArray]:
         """The records as arrays, first axis record."""
         return _columns(self._records)
+
+
+def _single(row: Variables) -> Variables:
+    """Return the row of a single test in the form of the results file."""
+    return {n: v[0] if len(VARIABLES[n].dims) == 1 else v for n, v in row.items()}
 
 
 def _rows(columns: Mapping[str, FloatArray]) -> list[Variables]:

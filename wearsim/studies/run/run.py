@@ -113,13 +113,14 @@ def resume(
     state = WearState.from_arrays(
         {name: array for name, array in data.checkpoint.items() if name not in _EXTRA}
     )
-    if scenario.total_passes < state.passes:
+    done = float(state.passes[0])
+    if scenario.total_passes < done:
         raise ResultsFileError(
             f"{path}: the test has already reached"
-            f" {state.passes / scenario.pass_rate / 60.0:.6g} min, which is past"
+            f" {done / scenario.pass_rate / 60.0:.6g} min, which is past"
             f" {(until or 0.0) / 60.0:.6g} min; give a later --until"
         )
-    if data.finished and scenario.total_passes == state.passes:
+    if data.finished and scenario.total_passes == done:
         return Result(data, path)
     draws = draw(scenario)
     data, state = _widened(draws, data, state)
@@ -201,12 +202,11 @@ class _RunInProgress:
 
     def finish(self) -> Result:
         """Step to the end of the test and return the result."""
-        state = self.recorder.state
         self.on_event(
             Started(
                 self.stop,
-                self.problem.time(self.stop),
-                state.passes,
+                self.stop / self.problem.kinematics.pass_rate,
+                self._passes,
                 self.stepper_name,
                 self.scenario.contact.model,
             )
@@ -263,16 +263,16 @@ class _RunInProgress:
                 self._warn(advance.warning)
             self.on_event(
                 Stepped(
-                    passes=state.passes,
+                    passes=self._passes,
                     total_passes=self.stop,
-                    time=self.problem.time(state.passes),
+                    time=self._passes / self.problem.kinematics.pass_rate,
                     depth=float(state.cylinder_depth.max()),
-                    step_passes=state.passes - advance.path[0].passes,
+                    step_passes=self._passes - float(advance.path[0].passes[0]),
                     depth_error=float(state.depth_error.max()),
                     wall_seconds=self._wall(),
                 )
             )
-            if self.stop_requested() and self.recorder.state.passes < self.stop:
+            if self.stop_requested() and self._passes < self.stop:
                 self._interrupt()
             # with a slow disk, at most 2 % of the time is spent on writing
             every = max(self.scenario.outputs.checkpoint_every, 50.0 * self._last_write)
@@ -291,9 +291,14 @@ class _RunInProgress:
         """Write a checkpoint and raise Interrupted."""
         self.recorder.drop_unfinished()
         self._write()
-        passes = self.recorder.state.passes
         rest = f"continue with: wearsim resume {self.path}" if self.path else "nothing was written"
-        raise Interrupted(f"stopped at pass {passes:.0f} of {self.stop:.0f}; {rest}") from None
+        where = f"pass {self._passes:.0f} of {self.stop:.0f}"
+        raise Interrupted(f"stopped at {where}; {rest}") from None
+
+    @property
+    def _passes(self) -> float:
+        """Roller passes done."""
+        return float(self.recorder.state.passes[0])
 
     def _wall(self) -> float:
         return self.wall_before + time.monotonic() - self.started
@@ -304,7 +309,7 @@ class _RunInProgress:
         begin = time.monotonic()
         write_results(self.path, self._data(finished))
         self._last_write = time.monotonic() - begin
-        self.on_event(Checkpointed(str(self.path), self.recorder.state.passes))
+        self.on_event(Checkpointed(str(self.path), self._passes))
 
     def _data(self, finished: bool) -> RunData:
         scenario, problem = self.scenario, self.problem
@@ -331,7 +336,9 @@ class _RunInProgress:
             },
             static={
                 "y": problem.grid.y,
-                "nominal_gap": problem.per_roller(problem.at_time(0.0, 0.0).nominal_gap),
+                "nominal_gap": problem.per_roller(
+                    problem.at_time(np.zeros(1), np.zeros(1)).nominal_gap
+                ),
                 "start_height": start_height(scenario, problem.grid),
                 "multiplicity": kinematics.multiplicity,
             },

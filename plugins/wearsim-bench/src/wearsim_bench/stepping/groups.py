@@ -152,15 +152,15 @@ class StepperBenchmark:
         default: bool = False,
         known: Mapping[str, float] | None = None,
     ) -> Measurement:
-        state = end.state
-        counts = {"steps": state.steps} if state.steps else {}
+        steps, solves = int(end.state.steps[0]), int(end.state.solves[0])
+        counts = {"steps": steps} if steps else {}
         return Measurement(
             group=self.group,
             method=method,
             setting=setting,
             seconds=seconds,
             errors=errors or {},
-            counts={**counts, "solves": state.solves, **(known or {})},
+            counts={**counts, "solves": solves, **(known or {})},
             default=default,
         )
 

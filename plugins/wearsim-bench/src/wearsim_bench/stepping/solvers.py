@@ -36,7 +36,7 @@ class _Rates:
 
     def __init__(self, problem: WearProblem, most: int) -> None:
         self.problem, self.state, self.most = problem, fresh_state(problem), most
-        self.solves = self.state.solves
+        self.solves = int(self.state.solves[0])
         self.length = float(problem.values_of(self.state.contacts, "approach").max())
         rates = self._wear()
         self.bodies = [name for name in DEPTHS if rates[name].any()]
@@ -58,7 +58,7 @@ class _Rates:
             last = first + int(np.prod(shape))
             values[name] = self.length * depths[first:last].reshape(shape)
             first = last
-        return self.state.advanced_to(passes, **values)
+        return replace(self.state, passes=np.array([passes]), **values)
 
     def __call__(self, passes: float, depths: FloatArray) -> FloatArray:
         """Return the wear per pass at these depths and number of passes.
@@ -137,4 +137,4 @@ def solved_by(
     if not solution.success:
         raise StepError(f"{solver} failed: {solution.message}", {"passes": solution.t})
     end = rates.state_at(passes, solution.y[:, -1])
-    return replace(end, solves=rates.solves, steps=0)
+    return replace(end, solves=np.array([rates.solves]), steps=np.array([0]))
