@@ -106,7 +106,8 @@ class Evolution:
     def fail(self, failures: dict[int, Exception]) -> None:
         """End tests, by number, with the errors given."""
         self.failures.update(failures)
-        self._end_finished()
+        if len(self.numbers):
+            self._end_finished()
 
     def _end_finished(self) -> None:
         """Leave only the tests that have not failed and have not reached their end."""
