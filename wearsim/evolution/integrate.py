@@ -42,13 +42,6 @@ class Advance:
         """The state after the step."""
         return self.path[-1]
 
-    def at(self, places: IntArray) -> Advance:
-        """Return the step of some of the tests, by place and in that order."""
-        if len(places) == len(self.numbers):
-            return self
-        path = tuple(state.at(places) for state in self.path)
-        return Advance(self.numbers[places], self.problem.at(places), path, self.warning)
-
 
 class Evolution:
     """Wear tests stepped to their ends together, each with its own step lengths.
@@ -127,7 +120,7 @@ class Evolution:
 
         def attempt(places: IntArray) -> Attempt:
             some = problem.at(places), state.at(places), lengths[places]
-            return self.stepper.attempt(*some, self.stop, scheme)
+            return _finite(self.stepper.attempt(*some, self.stop, scheme))
 
         done, failed = bisect_failures(attempt, np.arange(len(lengths)))
         failures = self._rejected(failed, lengths)
@@ -139,9 +132,6 @@ class Evolution:
             if chosen.size:
                 accepted.append((places[chosen], tried.at(chosen)))
         advance = self._continued(accepted) if accepted else None
-        if advance is not None:
-            advance, infinite = _finite(advance)
-            failures |= infinite
         self.fail(failures)
         return advance
 
@@ -203,18 +193,13 @@ class Evolution:
         return Advance(numbers, self.problem.at(places), path, accepted[0][1].warning)
 
 
-def _finite(advance: Advance) -> tuple[Advance | None, dict[int, Exception]]:
-    """Return the steps that led to finite values, and errors of the other tests by number."""
-    end = advance.end
-    finite = np.isfinite(end.cylinder_depth).all(axis=(0, 1, 3)) & np.isfinite(end.energy)
-    failures: dict[int, Exception] = {}
-    for place in np.flatnonzero(~finite).tolist():
-        message = f"a value is not finite after pass {end.passes[place]:.0f}"
-        failures[int(advance.numbers[place])] = StepError(
-            message, end.at(np.array([place])).to_arrays()
-        )
-    kept = np.flatnonzero(finite)
-    return advance.at(kept) if kept.size else None, failures
+def _finite(tried: Attempt) -> Attempt:
+    """Return a step; raise StepError if it leads to a value that is not finite."""
+    end = tried.path[-1]
+    if not (np.isfinite(end.cylinder_depth).all() and np.isfinite(end.energy).all()):
+        message = f"a value is not finite after pass {end.passes[0]:.0f}"
+        raise StepError(message, end.to_arrays())
+    return tried
 
 
 def evolve(
