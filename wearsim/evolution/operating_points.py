@@ -16,7 +16,7 @@ def contact_batch(
     cylinder_depth: FloatArray,
     roller_depth: FloatArray,
 ) -> ContactBatch:
-    """Return all contacts as a batch, in the order of `WearProblem.contacts`.
+    """Return all contacts as a batch, numbered as in `WearProblem`, the realisation fastest.
 
     Parameters
     ----------

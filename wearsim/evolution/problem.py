@@ -150,11 +150,6 @@ class WearProblem:
         )
 
     @cached_property
-    def contacts(self) -> tuple[tuple[int, int, int], ...]:
-        """Station, contact and realisation of every contact, last axis fastest."""
-        return tuple(np.ndindex(self.shape))
-
-    @cached_property
     def bodies(self) -> IntArray:
         """Station and roller in each contact, shape (stations * contacts, 2)."""
         stations, contacts, _ = self.shape

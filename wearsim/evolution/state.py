@@ -52,7 +52,7 @@ class WearState:
     terms : ndarray, shape (terms, rollers, realisations)
         State of each load term.
     contacts : ContactBatchSolution
-        Last solution of every contact, in the order of `WearProblem.contacts`.
+        Last solution of every contact, numbered as in `WearProblem`, the realisation fastest.
     energy : ndarray, shape (realisations,)
         Dissipated energy of all rollers [J].
     depth_error : ndarray, shape (realisations,)

@@ -13,11 +13,11 @@ from wearsim.evolution.contact_inputs import Redraw
 from wearsim.evolution.error_control.step_size import StepControl
 from wearsim.evolution.operating_points import contact_batch
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import WearState
+from wearsim.evolution.state import WearState, joined_states
 from wearsim.evolution.steppers.base import Attempt, Step, Stepper
 from wearsim.evolution.steppers.single_step import present_loads, solve_present
 from wearsim.plugins import BODIES, PassLoop
-from wearsim.types import ContactSolution, FloatArray, IntArray
+from wearsim.types import FloatArray, IntArray
 
 CHUNK = 20_000  # passes between checks for records, progress and interruption
 SLOW_CHUNK = 200  # the same where the loop is not compiled
@@ -71,21 +71,22 @@ class PerPassStepper(Stepper):
 def run_passes(
     problem: WearProblem, state: WearState, passes: FloatArray, redraw: Redraw | None = None
 ) -> WearState:
-    """Run the next passes of all realisations, in compiled code if possible.
+    """Run the next passes of each realisation, in compiled code if possible.
 
     Parameters
     ----------
     problem : WearProblem
     state : WearState
-        With the same number of passes done in all realisations.
     passes : ndarray, shape (realisations,)
-        Number of passes, all equal; a part of a pass counts as one.
+        Number of passes; a part of a pass counts as one.
     redraw : callable, optional
         Draws the inputs of single passes, see `Redraw`.
     """
-    count, loop = math.ceil(passes.max()), run_compiled if is_compiled(problem) else run_in_python
-    end = loop(problem, state, count, redraw)
-    return end.replaced(passes=state.passes + count, steps=state.steps + count)
+    loop, ends = run_compiled if is_compiled(problem) else run_in_python, []
+    for place, count in enumerate(np.ceil(passes).astype(np.int64).tolist()):
+        one = np.array([place])
+        ends.append(loop(problem.at(one), state.at(one), count, redraw))
+    return joined_states(ends)
 
 
 def is_compiled(problem: WearProblem) -> bool:
@@ -114,11 +115,10 @@ def _passes(
     times = (state.passes[0] + np.arange(count, dtype=np.float64) + 0.5) / kinematics.pass_rate
     inputs = problem.inputs.at(rollers)
     for item in problem.varying:
-        values = np.stack([path.at(times) for path in item.paths], axis=1)
-        inputs = inputs.with_value_of(item, rollers, values)
+        inputs = inputs.with_value_of(item, rollers, item.paths[0].at(times)[:, None])
     if redraw is not None:
         inputs = redraw(inputs, first)
-    force = np.stack([load.force(times) for load in problem.loads], axis=1)
+    force = problem.loads[0].force(times)[:, None]
     passes = replace(problem, inputs=inputs, roller=rollers, weight=np.ones(count), varying=())
     return force + inputs.normal_force_offset, passes
 
@@ -135,134 +135,126 @@ def _term_rates(problem: WearProblem) -> FloatArray:
     return np.array(rates).reshape(len(lags), 1 + len(own_pass))
 
 
-def _slip_base(
-    problem: WearProblem, from_apex: FloatArray, realisation: int
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _slip_base(problem: WearProblem) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the fields `slip_base`, `spin_arm` and `slip_rates` of `PassLoop`."""
-    kinematics, zeros = problem.kinematics, np.zeros_like(from_apex)
+    kinematics, from_apex = problem.kinematics, np.array(problem.from_apex[:, 0])
+    zeros = np.zeros_like(from_apex)
     if problem.slip_profile is None:
         return zeros, np.repeat(problem.grid.y[None], len(zeros), axis=0), np.zeros(2)
     rates = np.array([1.0 / kinematics.roller_radius, 1.0 / kinematics.cylinder_radius])
-    arm = zeros if problem.tilt_shifts else from_apex
-    return _of_realisation(problem, problem.slip_profile, realisation), arm, rates
-
-
-def _of_realisation(problem: WearProblem, values: FloatArray, realisation: int) -> FloatArray:
-    """Return an array of the rollers, (rollers, strips), in one realisation."""
-    shape = (len(values), problem.shape[2], problem.grid.strips)
-    return np.array(np.broadcast_to(values, shape)[:, realisation])
+    return np.array(problem.slip_profile[:, 0]), zeros if problem.tilt_shifts else from_apex, rates
 
 
 def run_compiled(
     problem: WearProblem, state: WearState, count: int, redraw: Redraw | None = None
 ) -> WearState:
-    """Run `count` passes of every realisation in the model's compiled loop."""
-    strips, carried = state.loop_strips, state.loop_contacts
-    strips = np.zeros((3, *problem.shape, problem.grid.strips)) if strips is None else strips.copy()
-    carried = np.zeros((3, *problem.shape)) if carried is None else carried.copy()
-    cylinder, roller = state.cylinder_depth.copy(), state.roller_depth.copy()
-    terms, energy = state.terms.copy(), state.energy.copy()
-    full_solves = state.full_solves.copy()
+    """Run `count` passes of a single realisation in the model's compiled loop."""
+    rollers, strips = problem.rollers, problem.grid.strips
+    # the loop changes these arrays in place, by views without the axes of length one
+    loop_strips = _copied(state.loop_strips, (3, *problem.shape, strips))
+    loop_contacts = _copied(state.loop_contacts, (3, *problem.shape))
+    new = state.replaced(
+        cylinder_depth=state.cylinder_depth.copy(),
+        roller_depth=state.roller_depth.copy(),
+        terms=state.terms.copy(),
+        loop_strips=loop_strips,
+        loop_contacts=loop_contacts,
+    )
+    line_load, anchor, anchor_gap = loop_strips.reshape(3, rollers, strips)
+    approach, anchor_approach, energy = loop_contacts.reshape(3, rollers)
+    slip_base, spin_arm, slip_rates = _slip_base(problem)
     kinematics, speed = problem.kinematics, problem.kinematics.rolling_speed
+    (load,), (law,) = problem.loads, problem.laws
+    per_power = [law.depth_per_dissipation(body, speed) or 0.0 for body in BODIES]
     ratio = kinematics.cylinder_radius / kinematics.roller_radius
     force, passes = _passes(problem, state, count, redraw)
-    inputs, lever = passes.inputs, 1.0 if problem.tilt_shifts else 0.0
+    inputs = passes.inputs
+    loop = PassLoop(
+        order=turn_order(problem),
+        first_pass=int(state.passes[0]),
+        base_load=force.ravel(),
+        creepage=np.concatenate([inputs.longitudinal, inputs.yaw], axis=1),
+        friction=inputs.friction.ravel(),
+        tilt=inputs.tilt.ravel() * (1.0 if problem.tilt_shifts else 0.0),
+        spin=passes.spin.ravel(),
+        stiffness=load.stiffness,
+        nominal_gap=np.array(problem.flat_gap[0, :, 0]),
+        from_apex=np.array(problem.from_apex[:, 0]),
+        longitudinal_curvature=np.full(rollers, kinematics.longitudinal_curvature),
+        rolling_speed=np.full(rollers, speed),
+        slip_base=slip_base,
+        spin_arm=spin_arm,
+        slip_rates=slip_rates,
+        wear=speed * np.array([per_power[0], *(per_power[1] * ratio / kinematics.multiplicity)]),
+        term_rates=_term_rates(problem),
+        similar=redraw is None,
+        terms=new.terms.reshape(-1, rollers),
+        cylinder_depth=new.cylinder_depth.reshape(strips),
+        roller_depth=new.roller_depth.reshape(rollers, strips),
+        line_load=line_load,
+        anchor=anchor,
+        anchor_gap=anchor_gap,
+        approach=approach,
+        anchor_approach=anchor_approach,
+        energy=energy,
+    )
+    full_solves = problem.model.pass_loop(loop)
     # every physical roller dissipates all the time, one pass per turn of the cylinder
     turn = kinematics.physical_rollers / kinematics.pass_rate
-    for v, law in enumerate(problem.laws):
-        per_power = [law.depth_per_dissipation(body, speed) or 0.0 for body in BODIES]
-        wear = speed * np.array([per_power[0], *(per_power[1] * ratio / kinematics.multiplicity)])
-        from_apex = _of_realisation(problem, problem.from_apex, v)
-        slip_base, spin_arm, slip_rates = _slip_base(problem, from_apex, v)
-        loop = PassLoop(
-            order=turn_order(problem),
-            first_pass=int(state.passes[0]),
-            base_load=np.ascontiguousarray(force[:, v]),
-            creepage=np.stack([inputs.longitudinal[:, v], inputs.yaw[:, v]], axis=1),
-            friction=np.ascontiguousarray(inputs.friction[:, v]),
-            tilt=lever * inputs.tilt[:, v],
-            spin=np.ascontiguousarray(passes.spin[:, v]),
-            stiffness=problem.loads[v].stiffness,
-            nominal_gap=_of_realisation(problem, problem.flat_gap[0], v),
-            from_apex=from_apex,
-            longitudinal_curvature=np.full(problem.rollers, kinematics.longitudinal_curvature),
-            rolling_speed=np.full(problem.rollers, speed),
-            slip_base=slip_base,
-            spin_arm=spin_arm,
-            slip_rates=slip_rates,
-            wear=wear,
-            term_rates=_term_rates(problem),
-            similar=redraw is None,
-            terms=np.ascontiguousarray(terms[:, :, v]),
-            cylinder_depth=np.ascontiguousarray(cylinder[0, 0, v]),
-            roller_depth=np.ascontiguousarray(roller[0, :, v]),
-            line_load=np.ascontiguousarray(strips[0, 0, :, v]),
-            anchor=np.ascontiguousarray(strips[1, 0, :, v]),
-            anchor_gap=np.ascontiguousarray(strips[2, 0, :, v]),
-            approach=np.ascontiguousarray(carried[0, 0, :, v]),
-            anchor_approach=np.ascontiguousarray(carried[1, 0, :, v]),
-            energy=np.ascontiguousarray(carried[2, 0, :, v]),
-        )
-        full_solves[v] += problem.model.pass_loop(loop)
-        terms[:, :, v] = loop.terms
-        cylinder[0, 0, v], roller[0, :, v] = loop.cylinder_depth, loop.roller_depth
-        strips[:, 0, :, v] = loop.line_load, loop.anchor, loop.anchor_gap
-        carried[:, 0, :, v] = loop.approach, loop.anchor_approach, loop.energy
-        energy[v] = float(loop.energy.sum()) * turn
-    return state.replaced(
-        cylinder_depth=cylinder,
-        roller_depth=roller,
-        terms=terms,
-        energy=energy,
-        full_solves=full_solves,
+    return new.replaced(
+        passes=state.passes + count,
+        energy=np.array([float(energy.sum()) * turn]),
+        steps=state.steps + count,
+        full_solves=state.full_solves + full_solves,
         solves=state.solves + count,
-        loop_strips=strips,
-        loop_contacts=carried,
     )
+
+
+def _copied(array: FloatArray | None, shape: tuple[int, ...]) -> FloatArray:
+    return np.zeros(shape) if array is None else array.copy()
 
 
 def run_in_python(
     problem: WearProblem, state: WearState, count: int, redraw: Redraw | None = None
 ) -> WearState:
-    """Run `count` passes by solving every one in full: slow, but for any plugin."""
+    """Run `count` passes of a single realisation by full solves: slow, but for any plugin."""
     kinematics, speed = problem.kinematics, problem.kinematics.rolling_speed
     force, passes = _passes(problem, state, count, redraw)
     cylinder, roller = state.cylinder_depth.copy(), state.roller_depth.copy()
     terms, energy = state.terms.copy(), state.energy.copy()
-    contacts: dict[tuple[int, ...], ContactSolution] = dict(
-        zip(problem.contacts, state.contacts, strict=True)
-    )
+    contacts, stations = list(state.contacts), problem.shape[0]
+    (load,), (law,) = problem.loads, problem.laws
     turn = kinematics.physical_rollers / kinematics.pass_rate
     for number, r in enumerate(passes.roller):
         one = passes.with_contacts(np.array([number]))
         multiplicity = float(kinematics.multiplicity[r])
         ratio = kinematics.cylinder_radius / kinematics.roller_radius
-        ratio /= multiplicity * problem.shape[0]
-        for s, _, v in np.ndindex((problem.shape[0], 1, problem.shape[2])):
-            unworn = one.nominal_gap[s, 0, v]
-            gap = unworn + cylinder[s, 0, v] + roller[0, r, v]
-            load = float(force[number, v]) + float(terms[:, r, v].sum())
-            load -= problem.loads[v].stiffness * float(gap.min() - unworn.min())
-            loads = np.full(one.shape, load)
-            batch = contact_batch(one, one.nominal_gap, loads, cylinder, roller)
-            point = batch.point(s * problem.shape[2] + v)
-            contacts[s, r, v] = contact = problem.model.solve_one(
-                gap, kinematics.longitudinal_curvature, point, None, contacts[s, r, v]
+        ratio /= multiplicity * stations
+        for s in range(stations):
+            unworn = one.nominal_gap[s, 0, 0]
+            gap = unworn + cylinder[s, 0, 0] + roller[0, r, 0]
+            force_of_pass = float(force[number, 0]) + float(terms[:, r, 0].sum())
+            force_of_pass -= load.stiffness * float(gap.min() - unworn.min())
+            loads = np.full(one.shape, force_of_pass)
+            point = contact_batch(one, one.nominal_gap, loads, cylinder, roller).point(s)
+            place = s * problem.rollers + r
+            contacts[place] = contact = problem.model.solve_one(
+                gap, kinematics.longitudinal_curvature, point, None, contacts[place]
             )
-            cylinder[s, 0, v] += problem.laws[v].depth_per_pass("cylinder", contact, speed)
-            roller[0, r, v] += ratio * problem.laws[v].depth_per_pass("roller", contact, speed)
-            energy[v] += contact.power * turn / problem.shape[0]
+            cylinder[s, 0, 0] += law.depth_per_pass("cylinder", contact, speed)
+            roller[0, r, 0] += ratio * law.depth_per_pass("roller", contact, speed)
+            energy += contact.power * turn / stations
             power = np.array([contact.power])
             for t, term in enumerate(problem.terms.values()):
-                value = terms[t, r : r + 1, v]
-                terms[t, r, v] = term.advance(value, power, turn / multiplicity)[0]
-    solves = count * problem.shape[0]
+                terms[t, r] = term.advance(terms[t, r], power, turn / multiplicity)
     return state.replaced(
+        passes=state.passes + count,
         cylinder_depth=cylinder,
         roller_depth=roller,
         terms=terms,
         energy=energy,
-        contacts=ContactBatchSolution.of([contacts[index] for index in problem.contacts]),
-        full_solves=state.full_solves + solves,
-        solves=state.solves + solves,
+        contacts=ContactBatchSolution.of(contacts),
+        steps=state.steps + count,
+        full_solves=state.full_solves + count * stations,
+        solves=state.solves + count * stations,
     )

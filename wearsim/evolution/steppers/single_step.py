@@ -28,12 +28,11 @@ def mean_loads(
 ) -> FloatArray:
     """Return the mean load of each contact over a step, shape (S, C, N) [N].
 
-    The load before feedback is integrated exactly. The spring takes the mean of the descents at
-    the worn depths `depths`, usually those at the ends of the step, and each load term its exact
-    mean at constant `power`.
+    Processes are at their means over the step in `problem`. The load before feedback is integrated
+    exactly. The spring takes the mean of the descents at the worn depths `depths`, usually those at
+    the ends of the step, and each load term its exact mean at constant `power`.
     """
     start, stop = problem.time(state.passes), problem.time(state.passes + passes)
-    problem = problem.at_time(start, stop)
     loads = _loads(problem, problem.mean_load(start, stop))
     if problem.has_spring:
         descents = [problem.descent(problem.gap(*worn)) for worn in depths]
