@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -33,21 +35,24 @@ print(json.dumps({{
 STRIP = """
 import json
 import wearsim
-from wearsim.mechanics.tangential.carter import strip_force as kernel
-kernel(1e-4, 1e5, 0.1, 1e13, 1e-3, 0.0, 0.0, 1.15e11, 8e10)
+from wearsim.mechanics.tangential.carter import mean_direction as kernel
+kernel(1e-3, 0.0, 2.0)
 stats = kernel.stats
 print(json.dumps({"hits": sum(stats.cache_hits.values()), "path": stats.cache_path,
     "file": wearsim.__file__}))
 """
 
 EVERYTHING = f"""
-import importlib, json, pkgutil
-import wearsim, wearsim.mechanics
+import json
+import wearsim
 from pathlib import Path
-from wearsim.mechanics.numerics.kernel_dispatcher import Whole
+from numba.core import event
 from wearsim.contact_batch import ContactBatch
 from wearsim.models.contact.hertz_fastsim import HertzFastsim, HertzFastsimOptions
 from wearsim.types import Creepage, Grid, Material, OperatingPoint
+
+compiled = event.RecordingListener()
+event.register("numba:compile", compiled)
 
 def scenario(name, **overrides):
     overrides = {{key.replace("__", "."): value for key, value in overrides.items()}}
@@ -84,14 +89,12 @@ model = HertzFastsim(HertzFastsimOptions(), grid, (steel, steel))
 point = OperatingPoint(300.0, 2.6, Creepage(1e-3), 0.1)
 model.friction_points(ContactBatch.of(grid.y[None] ** 2, 90.0, [point]))
 counts = {{}}
-prefix = "wearsim.mechanics."
-for module in pkgutil.walk_packages(wearsim.mechanics.__path__, prefix):
-    held = importlib.import_module(module.name)
-    for name, value in vars(held).items():
-        if isinstance(value, Whole) and value.__module__ == held.__name__:
-            # for calls from Python and from other kernels
-            called = {{str(types) for form in (value, value.part) for types in form.signatures}}
-            counts[f"{{module.name.removeprefix(prefix)}}.{{name}}"] = sorted(called)
+for _, begun in compiled.buffer:
+    function = begun.data["dispatcher"].py_func
+    if begun.is_start and function.__module__.startswith("wearsim.mechanics."):
+        name = function.__module__.split(".")[-1] + "." + function.__name__
+        counts.setdefault(name, set()).add(str(begun.data["args"]))
+counts = {{name: sorted(found) for name, found in counts.items()}}
 print(json.dumps(counts))
 """
 
@@ -126,9 +129,8 @@ def site(tmp_path: Path) -> Path:
 
 
 def make_read_only(site: Path) -> None:
-    """Replace numba's cache folders next to the kernels by files, which also blocks root."""
-    for package in (site / "wearsim" / "mechanics").rglob("__init__.py"):
-        (package.parent / "__pycache__").write_text("not a folder")
+    """Replace the cache folder next to the kernels by a file, which also blocks root."""
+    (site / "wearsim" / "mechanics" / "__pycache__").write_text("not a folder")
 
 
 @pytest.mark.slow
@@ -143,11 +145,17 @@ def test_concurrent_processes_share_an_empty_cache(site: Path, tmp_path: Path):
     assert Path(later["path"]).is_relative_to(tmp_path / "cache")
 
 
+def kernels() -> set[str]:
+    """Return module and name of all kernels and subroutines that are compiled separately."""
+    head = re.compile(r"^@(?:kernel|subroutine|inlined_subroutine)\ndef (\w+)", re.MULTILINE)
+    files = (ROOT / "wearsim" / "mechanics").rglob("*.py")
+    return {f"{file.stem}.{name}" for file in files for name in head.findall(file.read_text())}
+
+
 @pytest.mark.slow
 def test_every_kernel_has_one_signature(tmp_path: Path):
     counts = run(EVERYTHING, NUMBA_CACHE_DIR=tmp_path)
-    assert "slender.newton.solve_slender" in counts
-    unused = [name for name, signatures in counts.items() if not signatures]
+    unused = kernels() - set(counts)
     assert not unused, f"not reached by this test's runs: {unused}"
     several = {name: signatures for name, signatures in counts.items() if len(signatures) > 1}
     assert not several, json.dumps(several, indent=1)
@@ -156,7 +164,8 @@ def test_every_kernel_has_one_signature(tmp_path: Path):
 def test_writable_install_has_its_cache_next_to_the_kernels(site: Path):
     first, second = (run(STRIP, PYTHONPATH=site) for _ in range(2))
     assert Path(first["file"]).is_relative_to(site)
-    assert Path(first["path"]) == site / "wearsim" / "mechanics" / "tangential" / "__pycache__"
+    cache = site / "wearsim" / "mechanics" / "__pycache__"
+    assert Path(first["path"]).is_relative_to(cache)
     assert (first["hits"], second["hits"]) == (0, 1)
 
 
@@ -184,15 +193,45 @@ def test_read_only_install_runs_without_any_cache(site: Path, tmp_path: Path):
 def test_cache_is_renewed_when_a_callee_elsewhere_changes(site: Path, tmp_path: Path):
     mechanics = site / "wearsim" / "mechanics"
     callers, callees = mechanics / "slender", mechanics / "hertz"
-    head = "from wearsim.mechanics.numerics.jit import kernel\n"
-    body = "\n\n@kernel\ndef {name}(x: float) -> float:\n    return {value}\n"
-    outer = body.format(name="outer", value="2.0 * inner(x)")
+    head = "from wearsim.mechanics.numerics.jit import kernel, subroutine\n"
+    body = "\n\n@{kind}\ndef {name}(x: float) -> float:\n    return {value}\n"
+    outer = body.format(kind="kernel", name="outer", value="2.0 * inner(x)")
     (callers / "outer.py").write_text(
         head + "from wearsim.mechanics.hertz.inner import inner\n" + outer
     )
     found = []
     for value in ("x + 1.0", "x + 3.0"):
-        (callees / "inner.py").write_text(head + body.format(name="inner", value=value))
+        (callees / "inner.py").write_text(
+            head + body.format(kind="subroutine", name="inner", value=value)
+        )
         code = "from wearsim.mechanics.slender.outer import outer; print(outer(1.0))"
         found.append(run(code, PYTHONPATH=site, NUMBA_CACHE_DIR=tmp_path / "cache"))
     assert found == [4.0, 8.0]
+
+
+def test_unwritable_folder_of_the_user_falls_back_to_the_next(site: Path, tmp_path: Path):
+    (tmp_path / "file").write_text("not a folder")
+    found = run(STRIP, PYTHONPATH=site, NUMBA_CACHE_DIR=tmp_path / "file")
+    cache = site / "wearsim" / "mechanics" / "__pycache__"
+    assert Path(found["path"]).is_relative_to(cache)
+
+
+def test_kernels_of_former_sources_are_removed_after_a_day(site: Path):
+    cache = site / "wearsim" / "mechanics" / "__pycache__"
+    source = site / "wearsim" / "mechanics" / "hertz" / "elasticity.py"
+    for days in (2, 0.5, 0):
+        run(STRIP, PYTHONPATH=site)
+        newest = max(cache.glob("wearsim-*"), key=lambda folder: folder.stat().st_mtime)
+        then = time.time() - 86400 * days
+        os.utime(newest, (then, then))
+        source.write_text(source.read_text() + "\n")
+    assert len(list(cache.glob("wearsim-*"))) == 2
+
+
+def test_kernels_of_other_installs_are_kept_in_a_shared_folder(site: Path, tmp_path: Path):
+    other = tmp_path / "cache" / "wearsim-0123abcd-0123456789ab"
+    other.mkdir(parents=True)
+    os.utime(other, (0.0, 0.0))
+    run(STRIP, PYTHONPATH=site, NUMBA_CACHE_DIR=tmp_path / "cache")
+    assert other.is_dir()
+    assert len(list(other.parent.iterdir())) == 2

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wearsim.mechanics.numerics.jit import kernel
+from wearsim.mechanics.numerics.jit import kernel, subroutine
 from wearsim.types import FloatArray
 
 
@@ -49,7 +49,7 @@ class HertzContact:
         return 0.25 * self.normal_force * (1.0 + t) ** 2 * (2.0 - t)
 
 
-@kernel
+@subroutine
 def elliptic_integrals(complement: float) -> tuple[float, float]:
     """Return K(e) and D(e) = (K(e) - E(e))/e^2 by the arithmetic-geometric mean.
 
@@ -84,7 +84,7 @@ def elliptic_integrals(complement: float) -> tuple[float, float]:
     return first, first * total
 
 
-@kernel
+@subroutine
 def axis_ratio(curvature_ratio: float) -> float:
     """Return the ratio of minor to major semi-axis of the patch.
 
@@ -139,7 +139,7 @@ def hertz_ellipse(
     return ellipse_under(curvature_x, curvature_y, shape, normal_force, contact_modulus)
 
 
-@kernel
+@subroutine
 def ellipse_shape(curvature_x: float, curvature_y: float) -> tuple[float, float, float]:
     """Return the shape of the ellipse, which depends on the curvatures only: k', K and D.
 
@@ -157,7 +157,7 @@ def ellipse_shape(curvature_x: float, curvature_y: float) -> tuple[float, float,
     return ratio, first, d_integral
 
 
-@kernel
+@subroutine
 def ellipse_under(
     curvature_x: float,
     curvature_y: float,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from wearsim.mechanics.hertz.ellipse import hertz_ellipse
-from wearsim.mechanics.numerics.jit import kernel
+from wearsim.mechanics.numerics.jit import subroutine
 from wearsim.types import FloatArray
 
 CONVERGED, NOT_CONVERGED, NO_CURVATURE, TOO_FEW_STRIPS, LEAVES_STRIPS = range(5)
@@ -15,7 +15,7 @@ ROUND_OFF = 4e-15  # of the greatest height of the gap: tolerance of `is_parabol
 HOLLOW = 1.0  # upper bound of ln(b'/b), and its value in the concave part of a groove
 
 
-@kernel
+@subroutine
 def fit_parabola(
     y: FloatArray, gap: FloatArray, centre: float, half_width: float
 ) -> tuple[float, float, float, int]:
@@ -71,7 +71,7 @@ def fit_parabola(
     return square / half_width**2, centre + vertex * half_width, height, used
 
 
-@kernel
+@subroutine
 def fit_centred(
     y: FloatArray, gap: FloatArray, centre: float, half_width: float, tolerance: float
 ) -> tuple[float, float, float, int]:
@@ -98,7 +98,7 @@ def fit_centred(
     return curvature, centre, height, NOT_CONVERGED
 
 
-@kernel
+@subroutine
 def is_parabola(
     y: FloatArray, gap: FloatArray, curvature: float, centre: float, height: float
 ) -> bool:
@@ -121,7 +121,7 @@ def is_parabola(
     return worst <= ROUND_OFF * most
 
 
-@kernel
+@subroutine
 def strips_within(y: FloatArray, centre: float, half_width: float) -> int:
     """Return the number of strips within `half_width` of `centre`.
 
@@ -138,7 +138,7 @@ def strips_within(y: FloatArray, centre: float, half_width: float) -> int:
     return count
 
 
-@kernel
+@subroutine
 def hertz_on_profile(
     y: FloatArray,
     gap: FloatArray,

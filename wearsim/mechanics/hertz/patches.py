@@ -19,7 +19,7 @@ from wearsim.mechanics.hertz.parabola_fit import (
     is_parabola,
     strips_within,
 )
-from wearsim.mechanics.numerics.jit import kernel
+from wearsim.mechanics.numerics.jit import kernel, subroutine
 from wearsim.types import FloatArray, IntArray
 
 NO_GAP, NO_LOAD = 20, 21  # statuses in addition to those of `parabola_fit`
@@ -174,7 +174,7 @@ def find_patches(
         patches.centre[k] = centre
 
 
-@kernel
+@subroutine
 def cut_into_strips(
     bodies: Bodies,
     a: float,

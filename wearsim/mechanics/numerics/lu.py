@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from wearsim.mechanics.numerics.jit import kernel
+from wearsim.mechanics.numerics.jit import subroutine
 from wearsim.types import FloatArray, IntArray
 
 PANEL = 4  # unknowns eliminated together; the loops over the rows of a panel are unrolled
 
 
-@kernel
+@subroutine
 def _pivot(matrix: FloatArray, size: int, k: int, order: IntArray) -> bool:
     """Exchange equations to bring the greatest coefficient of unknown `k` into the k-th one."""
     best = k
@@ -30,7 +30,7 @@ def _pivot(matrix: FloatArray, size: int, k: int, order: IntArray) -> bool:
     return bool(abs(matrix[k, k]) > 0.0)
 
 
-@kernel
+@subroutine
 def _eliminate_panel(matrix: FloatArray, size: int, start: int) -> None:
     """Eliminate the four unknowns of a full panel from all later columns."""
     s1, s2, s3 = start + 1, start + 2, start + 3
@@ -47,7 +47,7 @@ def _eliminate_panel(matrix: FloatArray, size: int, start: int) -> None:
             row[j] -= (f0 * r0[j] + f1 * r1[j]) + (f2 * r2[j] + f3 * r3[j])
 
 
-@kernel
+@subroutine
 def factor_in_place(matrix: FloatArray, size: int, order: IntArray) -> bool:
     """Factor a linear system by elimination with partial pivoting.
 
@@ -82,7 +82,7 @@ def factor_in_place(matrix: FloatArray, size: int, order: IntArray) -> bool:
     return True
 
 
-@kernel
+@subroutine
 def _subtract_rows(
     matrix: FloatArray, start: int, stop: int, first: int, last: int, solution: FloatArray
 ) -> None:
@@ -104,7 +104,7 @@ def _subtract_rows(
             solution[j] -= x0 * matrix[k, j]
 
 
-@kernel
+@subroutine
 def solve_factored(
     matrix: FloatArray, size: int, order: IntArray, right: FloatArray, solution: FloatArray
 ) -> None:
@@ -136,7 +136,7 @@ def solve_factored(
         _subtract_rows(matrix, start, stop, 0, start, solution)
 
 
-@kernel
+@subroutine
 def _combine_rows(
     matrix: FloatArray,
     size: int,
@@ -162,7 +162,7 @@ def _combine_rows(
         p += 1
 
 
-@kernel
+@subroutine
 def invert_factored(matrix: FloatArray, size: int, order: IntArray, inverse: FloatArray) -> None:
     """Fill the inverse of a factored system, stored by columns like the system.
 

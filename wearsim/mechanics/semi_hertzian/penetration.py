@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wearsim.mechanics.numerics.jit import kernel
+from wearsim.mechanics.numerics.jit import subroutine
 from wearsim.mechanics.slender.influence import HIGHEST, read_value
 from wearsim.types import FloatArray, IntArray
 
@@ -17,7 +17,7 @@ TOLERANCE = 1e-14  # of the load
 CONVERGED, TOO_FINE, NO_CONVERGENCE, NOT_FINITE = range(4)
 
 
-@kernel
+@subroutine
 def first_contacts(gap: FloatArray, places: IntArray) -> int:
     """Find the minima of a gap, which are the possible first contact points of the bodies.
 
@@ -44,7 +44,7 @@ def first_contacts(gap: FloatArray, places: IntArray) -> int:
     return count
 
 
-@kernel
+@subroutine
 def contact_levels(
     gap: FloatArray,
     places: IntArray,
@@ -97,7 +97,7 @@ def contact_levels(
                 i += step
 
 
-@kernel
+@subroutine
 def solve_foundation(
     gap: FloatArray,
     opened: FloatArray,
@@ -163,7 +163,7 @@ def solve_foundation(
     return np.nan
 
 
-@kernel
+@subroutine
 def even_depth(gap: FloatArray, amount: float) -> float:
     """Return the height above the lowest gap [m] of the level with a given sum of depths.
 
@@ -187,7 +187,7 @@ def even_depth(gap: FloatArray, amount: float) -> float:
     return depth
 
 
-@kernel
+@subroutine
 def contact_places(
     gap: FloatArray, places: IntArray, count: int, depth: float, points: FloatArray
 ) -> int:
@@ -236,7 +236,7 @@ def contact_places(
     return found
 
 
-@kernel
+@subroutine
 def displacement_at(
     place: float,
     depth: FloatArray,
@@ -271,7 +271,7 @@ def displacement_at(
     return pressed
 
 
-@kernel
+@subroutine
 def solve_virtual_penetration(
     gap: FloatArray,
     places: IntArray,

@@ -26,7 +26,7 @@ from math import pi
 import numpy as np
 
 from wearsim.mechanics.hertz.ellipse import hertz
-from wearsim.mechanics.numerics.jit import kernel
+from wearsim.mechanics.numerics.jit import kernel, subroutine
 from wearsim.mechanics.semi_hertzian.penetration import (
     CONVERGED,
     NO_CONVERGENCE,
@@ -68,7 +68,7 @@ def local_hertz_table() -> FloatArray:
     return table
 
 
-@kernel
+@subroutine
 def read_local_hertz(table: FloatArray, ratio: float) -> tuple[float, float, float]:
     """Return k/E*, l A and the fraction of the overlap for B/A = `ratio`, by cubic interpolation.
 
@@ -221,7 +221,7 @@ LEAST, GREATEST = 0.125, 100.0  # bounds of the curvature, over that of `patch_c
 SINGULAR = 1e-9  # of the first term of the determinant: too few strips for a parabola
 
 
-@kernel
+@subroutine
 def patch_curvature(depth: FloatArray, spacing: float) -> tuple[float, float]:
     """Return half-width and curvature of the parabola equivalent to the depth of a contact.
 
@@ -250,7 +250,7 @@ def patch_curvature(depth: FloatArray, spacing: float) -> tuple[float, float]:
     return half_width, deepest / half_width**2
 
 
-@kernel
+@subroutine
 def curvature_at(
     gap: FloatArray, i: int, bottom: float, limit: float, window: float, spacing: float
 ) -> float:
@@ -300,7 +300,7 @@ def curvature_at(
     return square / det / window**2
 
 
-@kernel
+@subroutine
 def smoothed_curvature(
     gap: FloatArray, depth: FloatArray, approach: float, spacing: float, curvature: FloatArray
 ) -> None:

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wearsim.mechanics.numerics.jit import kernel
+from wearsim.mechanics.numerics.jit import subroutine
 from wearsim.mechanics.numerics.lu import factor_in_place, solve_factored
 from wearsim.types import FloatArray, IntArray
 
@@ -37,7 +37,7 @@ class DepthSystem(NamedTuple):
     depth: FloatArray
 
 
-@kernel
+@subroutine
 def new_depth_system(bodies: IntArray, n: int) -> DepthSystem:
     """Return an empty `DepthSystem` for the shared `bodies`, (contacts, 2), with `n` strips."""
     count = bodies.max() + 1
@@ -51,7 +51,7 @@ def new_depth_system(bodies: IntArray, n: int) -> DepthSystem:
     )
 
 
-@kernel
+@subroutine
 def add_depths(
     bodies: IntArray, shared: FloatArray, line_load: FloatArray, surface: FloatArray
 ) -> None:
@@ -82,7 +82,7 @@ def add_depths(
                     surface[k, i] += depth[b, i]
 
 
-@kernel
+@subroutine
 def _number_unknowns(
     bodies: IntArray, shared: FloatArray, index: IntArray, number: IntArray
 ) -> int:
@@ -105,7 +105,7 @@ def _number_unknowns(
     return count
 
 
-@kernel
+@subroutine
 def factor_depths(
     bodies: IntArray, shared: FloatArray, index: IntArray, response: FloatArray, system: DepthSystem
 ) -> bool:
@@ -140,7 +140,7 @@ def factor_depths(
     return factor_in_place(matrix, count, system.order)
 
 
-@kernel
+@subroutine
 def solve_depths(
     bodies: IntArray,
     shared: FloatArray,
@@ -181,7 +181,7 @@ def solve_depths(
         _apply_body_wear(k, bodies, index, response, approach_slope, system, step, approach)
 
 
-@kernel
+@subroutine
 def _add_contact_terms(
     k: int,
     side: int,
@@ -207,7 +207,7 @@ def _add_contact_terms(
                 )
 
 
-@kernel
+@subroutine
 def _apply_body_wear(
     k: int,
     bodies: IntArray,

@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wearsim.mechanics.numerics.jit import kernel
+from wearsim.mechanics.numerics.jit import subroutine
 from wearsim.mechanics.numerics.lu import factor_in_place, invert_factored
 from wearsim.mechanics.slender.half_length import (
     REACH,
@@ -152,7 +152,7 @@ def new_chord_state(constants: ContactConstants, contacts: int, n: int) -> Chord
     )
 
 
-@kernel
+@subroutine
 def _number_strips(g: int, line_load: FloatArray, state: ChordState) -> int:
     """List the loaded strips of contact `g` and their unloaded neighbours; count the latter."""
     n = line_load.shape[1]
@@ -170,7 +170,7 @@ def _number_strips(g: int, line_load: FloatArray, state: ChordState) -> int:
     return guards
 
 
-@kernel
+@subroutine
 def set_anchor(
     g: int, line_load: FloatArray, constants: ContactConstants, state: ChordState
 ) -> bool:
@@ -233,7 +233,7 @@ def set_anchor(
     return True
 
 
-@kernel
+@subroutine
 def fill_remainder(g: int, loads: Loads, constants: ContactConstants, state: ChordState) -> None:
     """Fill N of contact `g`: displacement of every strip beyond the anchor's tangent [m]."""
     n = loads.line_load.shape[1]
@@ -259,7 +259,7 @@ def fill_remainder(g: int, loads: Loads, constants: ContactConstants, state: Cho
             remainder[j - k] += work[0, k]
 
 
-@kernel
+@subroutine
 def _fill_load_change(g: int, anchor_gap: FloatArray, state: ChordState) -> None:
     """Fill the change of the loads at a fixed approach; four columns at once halve the time."""
     count, change, inverse = state.loaded[g], state.change, state.inverse[g]
@@ -286,7 +286,7 @@ def _fill_load_change(g: int, anchor_gap: FloatArray, state: ChordState) -> None
             change[r] += inverse[c, r] * f0
 
 
-@kernel
+@subroutine
 def _solve_chord(
     g: int, load: float, loads: Loads, constants: ContactConstants, state: ChordState
 ) -> bool:
@@ -310,7 +310,7 @@ def _solve_chord(
     return True
 
 
-@kernel
+@subroutine
 def _has_penetrated_strip(g: int, approach: float, tolerance: float, state: ChordState) -> bool:
     """Return whether an unloaded strip next to the contact has closed its gap."""
     for r in range(state.guard.shape[1]):
@@ -325,7 +325,7 @@ def _has_penetrated_strip(g: int, approach: float, tolerance: float, state: Chor
     return False
 
 
-@kernel
+@subroutine
 def solve_from_anchor(
     g: int, load: float, lowest: float, loads: Loads, constants: ContactConstants, state: ChordState
 ) -> bool:
@@ -352,7 +352,7 @@ def solve_from_anchor(
     return False
 
 
-@kernel
+@subroutine
 def solve_fully(
     g: int,
     load: float,

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wearsim.mechanics.numerics.jit import kernel
+from wearsim.mechanics.numerics.jit import kernel, subroutine
 from wearsim.mechanics.numerics.lu import invert_factored
 from wearsim.mechanics.slender.body_elimination import (
     add_depths,
@@ -49,7 +49,7 @@ from wearsim.mechanics.slender.newton_step import (
 from wearsim.types import FloatArray, IntArray
 
 
-@kernel
+@subroutine
 def _fill_responses(
     k: int, state: NewtonState, response: FloatArray, approach_slope: FloatArray
 ) -> None:
@@ -65,7 +65,7 @@ def _fill_responses(
             response[k, column, row] -= unit_load[k, row] * approach_slope[k, column]
 
 
-@kernel
+@subroutine
 def solve_coupled(
     gap: FloatArray,
     compliance: FloatArray,

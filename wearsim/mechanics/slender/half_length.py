@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wearsim.mechanics.numerics.jit import kernel
+from wearsim.mechanics.numerics.jit import kernel, subroutine
 from wearsim.mechanics.slender.influence import HIGHEST, read_influence, read_values
 from wearsim.types import FloatArray, IntArray
 
@@ -70,13 +70,13 @@ def new_half_lengths(table: FloatArray, log_scale: FloatArray, reach: int) -> Ha
     )
 
 
-@kernel
+@subroutine
 def log_half_length(k: int, j: int, line_load: FloatArray, lengths: HalfLengths) -> float:
     """Return ln(a/dy) of the loaded strip `j` of contact `k`."""
     return float(lengths.log_scale[k] + 0.5 * np.log(line_load[k, j] * lengths.factor[k, j]))
 
 
-@kernel
+@subroutine
 def fill_half_lengths(
     spacing: float, line_load: FloatArray, lengths: HalfLengths, half_length: FloatArray
 ) -> None:
@@ -88,7 +88,7 @@ def fill_half_lengths(
                 half_length[k, j] = spacing * np.exp(log_half_length(k, j, line_load, lengths))
 
 
-@kernel
+@subroutine
 def add_around(
     j: int, first: int, last: int, weight: float, value: FloatArray, total: FloatArray
 ) -> None:
@@ -100,7 +100,7 @@ def add_around(
         total[here - d] += weight * value[d]
 
 
-@kernel
+@subroutine
 def _add_slope(
     j: int,
     weight: float,
@@ -124,7 +124,7 @@ def _add_slope(
                 slope_part[i, start + c] += by_factor * slope[j, c]
 
 
-@kernel
+@subroutine
 def _update_slope(
     k: int,
     first: int,
@@ -144,7 +144,7 @@ def _update_slope(
         slope_part[j] = 0.0
 
 
-@kernel
+@subroutine
 def _find_span(k: int, line_load: FloatArray) -> tuple[int, int]:
     """Return the first and the last loaded strip; last < first if no strip is loaded."""
     first, last = 0, line_load.shape[1] - 1
@@ -155,7 +155,7 @@ def _find_span(k: int, line_load: FloatArray) -> tuple[int, int]:
     return first, last
 
 
-@kernel
+@subroutine
 def _update_factors(
     k: int, first: int, last: int, line_load: FloatArray, total: FloatArray, lengths: HalfLengths
 ) -> float:
@@ -171,7 +171,7 @@ def _update_factors(
     return widest
 
 
-@kernel
+@subroutine
 def find_factors(k: int, line_load: FloatArray, sloped: bool, lengths: HalfLengths) -> float:
     """Fill s and ln(a/dy) of contact `k`, and the slope of s if `sloped`.
 
@@ -224,7 +224,7 @@ def find_factors(k: int, line_load: FloatArray, sloped: bool, lengths: HalfLengt
     return widest
 
 
-@kernel
+@subroutine
 def gather_length_slopes(
     k: int, j: int, push: float, value: FloatArray, tangent: FloatArray, lengths: HalfLengths
 ) -> None:
@@ -241,7 +241,7 @@ def gather_length_slopes(
             gathered[i, start + c] += moved * slope[j, c]
 
 
-@kernel
+@subroutine
 def add_length_slopes(
     k: int, line_load: FloatArray, index: IntArray, lengths: HalfLengths, matrix: FloatArray
 ) -> None:

@@ -25,7 +25,7 @@ from math import comb
 import numpy as np
 
 from wearsim.mechanics.hertz.ellipse import elliptic_integrals
-from wearsim.mechanics.numerics.jit import kernel
+from wearsim.mechanics.numerics.jit import kernel, subroutine
 from wearsim.types import FloatArray
 
 LOWEST = -10.0  # ln(a/dy) below which F_k does not depend on a, to 1e-9
@@ -157,7 +157,7 @@ def _tabulated(
     return table
 
 
-@kernel
+@subroutine
 def _weights(table: FloatArray, tau: float) -> tuple[int, float, tuple[float, float, float, float]]:
     """Return the node below `tau`, the distance to it in steps, and the weights of the cubic.
 
@@ -171,7 +171,7 @@ def _weights(table: FloatArray, tau: float) -> tuple[int, float, tuple[float, fl
     return node, s, (low, low_slope, high, high_slope)
 
 
-@kernel
+@subroutine
 def read_value(table: FloatArray, tau: float, distance: int) -> float:
     """Interpolate F_k or C_k of one strip at one distance.
 
@@ -193,7 +193,7 @@ def read_value(table: FloatArray, tau: float, distance: int) -> float:
     return float(low + high)
 
 
-@kernel
+@subroutine
 def read_values(table: FloatArray, tau: float, count: int, value: FloatArray) -> None:
     """Interpolate F_k or C_k of one strip; parameters as in `read_influence`."""
     node, _, (v0, v1, w0, w1) = _weights(table, tau)
@@ -203,7 +203,7 @@ def read_values(table: FloatArray, tau: float, count: int, value: FloatArray) ->
         value[k] = v0 * low[k] + v1 * low_slope[k] + w0 * high[k] + w1 * high_slope[k]
 
 
-@kernel
+@subroutine
 def read_influence(
     table: FloatArray, tau: float, count: int, value: FloatArray, tangent: FloatArray
 ) -> None:

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wearsim.mechanics.numerics.jit import kernel
+from wearsim.mechanics.numerics.jit import kernel, subroutine
 from wearsim.mechanics.slender.half_length import NEWTON_REACH, fill_half_lengths, new_half_lengths
 from wearsim.mechanics.slender.influence import HIGHEST
 from wearsim.mechanics.slender.newton_step import (
@@ -44,7 +44,7 @@ MAX_ITERATIONS = 100
 CAUTIOUS = 12  # iterations after which the active set is changed cautiously
 
 
-@kernel
+@subroutine
 def start_contact(
     k: int,
     gap: FloatArray,
@@ -95,7 +95,7 @@ def start_contact(
     approach[k] = level
 
 
-@kernel
+@subroutine
 def update_loads(line_load: FloatArray, state: NewtonState, cautious: bool) -> tuple[float, bool]:
     """Add the step to the line loads and remove strips in tension from the active set.
 
@@ -127,7 +127,7 @@ def update_loads(line_load: FloatArray, state: NewtonState, cautious: bool) -> t
     return change, left
 
 
-@kernel
+@subroutine
 def _add_penetrated_strips(
     surface: FloatArray,
     line_load: FloatArray,
@@ -163,7 +163,7 @@ def _add_penetrated_strips(
     return entered
 
 
-@kernel
+@subroutine
 def check_convergence(
     iteration: int,
     unit: float,
@@ -213,7 +213,7 @@ def check_convergence(
     return CONVERGED if change * shrinking < TOLERANCE else CONTINUE, change
 
 
-@kernel
+@subroutine
 def least_gap(k: int, gap: FloatArray) -> float:
     """Return the least gap of contact `k`, the reference of its displacements.
 
@@ -237,7 +237,7 @@ def log_scales_of(
     return log_scale
 
 
-@kernel
+@subroutine
 def solve_slender(
     gap: FloatArray,
     compliance: FloatArray,

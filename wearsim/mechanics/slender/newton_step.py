@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wearsim.mechanics.numerics.jit import kernel
+from wearsim.mechanics.numerics.jit import subroutine
 from wearsim.mechanics.numerics.lu import factor_in_place, solve_factored
 from wearsim.mechanics.slender.half_length import (
     HalfLengths,
@@ -57,7 +57,7 @@ class NewtonState(NamedTuple):
     change: FloatArray
 
 
-@kernel
+@subroutine
 def new_newton_state(contacts: int, n: int) -> NewtonState:
     """Return the `NewtonState` of contacts without a Jacobian."""
     return NewtonState(
@@ -78,7 +78,7 @@ def new_newton_state(contacts: int, n: int) -> NewtonState:
     )
 
 
-@kernel
+@subroutine
 def _number_strips(k: int, line_load: FloatArray, state: NewtonState) -> None:
     """Assign rows to the loaded strips of contact `k`."""
     count = 0
@@ -91,7 +91,7 @@ def _number_strips(k: int, line_load: FloatArray, state: NewtonState) -> None:
     state.size[k] = count
 
 
-@kernel
+@subroutine
 def _fill_displacement(
     k: int,
     line_load: FloatArray,
@@ -124,7 +124,7 @@ def _fill_displacement(
         add_around(j, 0, n - 1, push, value, pressed)
 
 
-@kernel
+@subroutine
 def displace(
     k: int,
     compliance: FloatArray,
@@ -159,7 +159,7 @@ def displace(
     return widest
 
 
-@kernel
+@subroutine
 def factor_jacobian(k: int, state: NewtonState) -> bool:
     """Factor contact `k`'s fresh Jacobian; False if it is singular or approach adds no load."""
     size = state.size[k]
@@ -174,7 +174,7 @@ def factor_jacobian(k: int, state: NewtonState) -> bool:
     return bool(abs(state.unit_load_sum[k]) > 0.0)
 
 
-@kernel
+@subroutine
 def take_step(
     k: int, load: float, line_load: FloatArray, state: NewtonState, approach: FloatArray
 ) -> None:
@@ -189,7 +189,7 @@ def take_step(
         step[row] += state.unit_load[k, row] * approach[k]
 
 
-@kernel
+@subroutine
 def correct_residual(
     k: int,
     table: FloatArray,
@@ -213,7 +213,7 @@ def correct_residual(
         state.missing[k, row] -= pressed - state.pressed[k, row] - state.diagonal[k, row] * step
 
 
-@kernel
+@subroutine
 def predict_surface(k: int, surface: FloatArray, state: NewtonState) -> None:
     """Add the first-order displacement by contact `k`'s change of load to `surface`."""
     for row in range(state.size[k]):

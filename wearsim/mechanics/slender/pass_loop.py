@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wearsim.mechanics.numerics.jit import kernel
+from wearsim.mechanics.numerics.jit import kernel, subroutine
 from wearsim.mechanics.slender.chord_method import (
     ChordState,
     ContactConstants,
@@ -48,7 +48,7 @@ class Wear(NamedTuple):
     roller_depth: FloatArray
 
 
-@kernel
+@subroutine
 def _local_slip(g: int, i: int, spin: float, wear: Wear) -> float:
     """Return the variation of the longitudinal creepage at strip `i`, including the worn depth."""
     return float(
@@ -61,7 +61,7 @@ def _local_slip(g: int, i: int, spin: float, wear: Wear) -> float:
     )
 
 
-@kernel
+@subroutine
 def _wear_strips(
     g: int,
     p: int,

@@ -31,7 +31,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from wearsim.mechanics.numerics.jit import kernel
+from wearsim.mechanics.numerics.jit import kernel, subroutine
 
 SPIN_LIMIT = 0.9  # psi above which full sliding in both directions is blended in
 TURNED = 0.2  # phi a over the slip above which the rotation of the slip along the strip is included
@@ -121,7 +121,7 @@ def mean_direction(slip_x: float, slip_y: float, turn: float) -> tuple[float, fl
     return mean_x, mean_y, moment
 
 
-@kernel
+@subroutine
 def strip_force(
     half_length: float,
     line_load: float,
@@ -180,7 +180,7 @@ def strip_force(
     return force_x, force_y, moment, adhering
 
 
-@kernel
+@subroutine
 def spin_turns(
     half_length: float,
     steepness: float,
@@ -202,7 +202,7 @@ def spin_turns(
     return (straight < turn * turn) | strong  # `or` would branch
 
 
-@kernel
+@subroutine
 def straight_force(
     half_length: float,
     bound: float,

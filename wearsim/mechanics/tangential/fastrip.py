@@ -17,7 +17,7 @@ import math
 
 import numpy as np
 
-from wearsim.mechanics.numerics.jit import kernel
+from wearsim.mechanics.numerics.jit import kernel, subroutine
 from wearsim.mechanics.tangential.fastsim import Sums, march_into, new_sums, slice_sums, stack_sums
 from wearsim.mechanics.tangential.strip_with_spin import (
     Moduli,
@@ -92,7 +92,7 @@ def fastrip(
     return stack_sums(sums)
 
 
-@kernel
+@subroutine
 def _integrate_adhesion(j: int, strip: Strip, sums: Sums) -> None:
     """Integrate the traction over the adhesion zone of strip `j`."""
     a, radius = strip.half_length, strip.half_length - strip.shift
@@ -113,7 +113,7 @@ def _integrate_adhesion(j: int, strip: Strip, sums: Sums) -> None:
     sums.adhesion[j] += 2.0 * radius
 
 
-@kernel
+@subroutine
 def _march_slip(j: int, strip: Strip, steps: int, sums: Sums) -> None:
     """Integrate the traction's direction through the slip zone of strip `j`."""
     if not strip.shift > 0.0:
@@ -141,7 +141,7 @@ def _march_slip(j: int, strip: Strip, steps: int, sums: Sums) -> None:
         cosine, sine, e_x, e_y = next_cos, next_sin, n_x, n_y
 
 
-@kernel
+@subroutine
 def turn_direction(
     strip: Strip, slip_x: float, slip_y: float, way: float, e_x: float, e_y: float
 ) -> tuple[float, float]:
@@ -204,7 +204,7 @@ def fastrip_fields(
     return out
 
 
-@kernel
+@subroutine
 def _fill_fields(j: int, strip: Strip, out: FloatArray) -> None:
     """Fill traction and slip of strip `j`, point by point from the leading edge."""
     a, d, rise = strip.half_length, strip.shift, strip.rise

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wearsim.mechanics.numerics.jit import inlined_kernel, kernel
+from wearsim.mechanics.numerics.jit import inlined_subroutine, kernel, subroutine
 from wearsim.types import FloatArray
 
 _ROOT_CORNER = 0.2078862249773546  # -zeta(-1/2)
@@ -87,7 +87,7 @@ def march(
     return stack_sums(sums)
 
 
-@kernel
+@subroutine
 def new_sums(strips: int) -> Sums:
     """Return `Sums` of zeros for a number of strips.
 
@@ -100,7 +100,7 @@ def new_sums(strips: int) -> Sums:
     return Sums(rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6])
 
 
-@kernel
+@subroutine
 def slice_sums(sums: Sums, first: int, stop: int) -> Sums:
     """Return a view of the sums of the strips from `first` to before `stop`.
 
@@ -122,7 +122,7 @@ def slice_sums(sums: Sums, first: int, stop: int) -> Sums:
     )
 
 
-@kernel
+@subroutine
 def stack_sums(sums: Sums) -> FloatArray:
     """Return forces, moment and adhesion length as one array, shape (4, strips)."""
     out = np.empty((4, len(sums.force_x)))
@@ -130,7 +130,7 @@ def stack_sums(sums: Sums) -> FloatArray:
     return out
 
 
-@kernel
+@subroutine
 def clear(strips: int, sums: Sums) -> None:
     """Set the sums and tractions of the first strips to zero, as at the leading edge.
 
@@ -147,7 +147,7 @@ def clear(strips: int, sums: Sums) -> None:
         sums.traction_x[j] = sums.traction_y[j] = 0.0
 
 
-@kernel
+@subroutine
 def _times_step(strips: int, sums: Sums, half_length: FloatArray, cell: float) -> None:
     """Multiply the sums over points of the first strips by the step, to obtain integrals."""
     for j in range(strips):
@@ -158,7 +158,7 @@ def _times_step(strips: int, sums: Sums, half_length: FloatArray, cell: float) -
         sums.adhesion[j] *= dx
 
 
-@kernel
+@subroutine
 def march_into(
     strips: int,
     half_length: FloatArray,
@@ -194,7 +194,7 @@ def march_into(
     _times_step(strips, sums, half_length, cell)
 
 
-@inlined_kernel
+@inlined_subroutine
 def _step(
     j: int,
     place: float,
@@ -236,7 +236,7 @@ def _step(
     return tx, ty, scale
 
 
-@kernel
+@subroutine
 def place_of(step: int, points: int) -> float:
     """Return x/a at the end of a step, from just behind the leading edge to -1.
 
@@ -248,7 +248,7 @@ def place_of(step: int, points: int) -> float:
     return 1.0 - 2.0 / points * step if step < points else -1.0
 
 
-@kernel
+@subroutine
 def end_weights(step: int, points: int, elliptic: bool) -> tuple[float, float]:
     """Return the weights of the traction at the end of a step in the sums, in adhesion and slip.
 
@@ -275,7 +275,7 @@ def end_weights(step: int, points: int, elliptic: bool) -> tuple[float, float]:
     return sticking, sliding
 
 
-@kernel
+@subroutine
 def bound_shape(place: float, elliptic: bool) -> float:
     """Return the traction bound at x/a = `place` over that at x = 0.
 
@@ -290,7 +290,7 @@ def bound_shape(place: float, elliptic: bool) -> float:
     return math.sqrt(shape) if elliptic else shape
 
 
-@inlined_kernel
+@inlined_subroutine
 def limit_traction(traction_x: float, traction_y: float, bound: float) -> tuple[bool, float]:
     """Return whether the traction is within the bound, and the factor that scales it to the bound.
 
@@ -304,7 +304,7 @@ def limit_traction(traction_x: float, traction_y: float, bound: float) -> tuple[
     return sticks, 1.0 if sticks else bound / math.sqrt(square)
 
 
-@kernel
+@subroutine
 def march_local(
     strips: int,
     half_length: FloatArray,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from wearsim.mechanics.numerics.jit import kernel
+from wearsim.mechanics.numerics.jit import kernel, subroutine
 from wearsim.mechanics.tangential.fastsim import Sums, clear, new_sums, stack_sums
 from wearsim.types import FloatArray
 
@@ -44,7 +44,7 @@ def closed_form(
     return stack_sums(sums)
 
 
-@kernel
+@subroutine
 def closed_form_into(
     strips: int,
     half_length: FloatArray,
@@ -82,7 +82,7 @@ def closed_form_into(
             sums.adhesion[j] = 2.0 * a
 
 
-@kernel
+@subroutine
 def _parabolic(a: float, steep: float, peak: float) -> tuple[float, float, float]:
     """Return adhesion length, force and moment of the slip zone for the parabolic bound."""
     kappa = min(steep * a**2 / peak, 2.0 * a)
@@ -92,7 +92,7 @@ def _parabolic(a: float, steep: float, peak: float) -> tuple[float, float, float
     return 2.0 * a - kappa, slip_force, -0.25 * peak * (a**2 - edge**2) ** 2 / a**2
 
 
-@kernel
+@subroutine
 def _elliptic(a: float, steep: float, peak: float) -> tuple[float, float, float]:
     """Return adhesion length, force and moment of the slip zone for the elliptic bound."""
     k = steep * a / peak

@@ -9,7 +9,7 @@ import numpy as np
 
 from wearsim.mechanics.hertz.parabola_fit import CONVERGED
 from wearsim.mechanics.hertz.patches import Bodies, Patches, cut_into_strips, find_patches
-from wearsim.mechanics.numerics.jit import kernel
+from wearsim.mechanics.numerics.jit import kernel, subroutine
 from wearsim.mechanics.tangential.fastsim import Sums, clear, march_into, march_local, new_sums
 from wearsim.mechanics.tangential.fastsim_closed_form import closed_form_into
 from wearsim.mechanics.tangential.kalker_coefficients import (
@@ -169,7 +169,7 @@ def solve_contacts(
     return len(row)
 
 
-@kernel
+@subroutine
 def _coefficients(theory: Theory, ratio: float) -> tuple[float, float, float]:
     """Return C11, C22 and C23 at a/b = `ratio`."""
     nu = theory.poisson_ratio
@@ -182,7 +182,7 @@ def _coefficients(theory: Theory, ratio: float) -> tuple[float, float, float]:
     return values
 
 
-@kernel
+@subroutine
 def _load_weighted_mean(values: FloatArray, line_load: FloatArray) -> float:
     product, load = 0.0, 0.0
     for j in range(len(values)):
@@ -191,7 +191,7 @@ def _load_weighted_mean(values: FloatArray, line_load: FloatArray) -> float:
     return product / load
 
 
-@kernel
+@subroutine
 def _fill_creepage(
     k: int, bodies: Bodies, inputs: ContactInputs, line_load: FloatArray, work: Workspace
 ) -> None:
@@ -212,7 +212,7 @@ def _fill_creepage(
             work.longitudinal[j] = mean + work.spin_part[j]
 
 
-@kernel
+@subroutine
 def _solve_tractions(
     k: int,
     first: int,
@@ -299,13 +299,13 @@ def _solve_tractions(
         _accumulate(count, sums, 1.0 / lanes, first, total)
 
 
-@kernel
+@subroutine
 def _whole_lanes(strips: int) -> int:
     """Return the number of strips rounded up to a multiple of `_LANES`."""
     return (strips + _LANES - 1) // _LANES * _LANES
 
 
-@kernel
+@subroutine
 def _mean_magnitude(line_load: FloatArray, work: Workspace) -> float:
     """Return the load-weighted mean magnitude of the longitudinal creepage without spin."""
     product, load = 0.0, 0.0
@@ -315,7 +315,7 @@ def _mean_magnitude(line_load: FloatArray, work: Workspace) -> float:
     return product / load
 
 
-@kernel
+@subroutine
 def _accumulate(count: int, part: Sums, weight: float, first: int, total: Sums) -> None:
     """Add the weighted sums of the strips from `first` on to the totals."""
     for j in range(count):
@@ -326,7 +326,7 @@ def _accumulate(count: int, part: Sums, weight: float, first: int, total: Sums) 
         total.work[first + j] += weight * part.work[j]
 
 
-@kernel
+@subroutine
 def _fill_results(
     k: int,
     bodies: Bodies,

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wearsim.mechanics.numerics.jit import kernel
+from wearsim.mechanics.numerics.jit import kernel, subroutine
 from wearsim.types import FloatArray
 
 # Table of Kalker (1990), Three-Dimensional Elastic Bodies in Rolling Contact: one row per ratio,
@@ -109,7 +109,7 @@ def short_limit(ratio: float, nu: float) -> tuple[float, float, float, float]:
     )
 
 
-@kernel
+@subroutine
 def long_limit(ratio: float, nu: float) -> tuple[float, float, float, float]:
     """Return C11, C22, C23 and C33 for b/a -> 0, a contact that is long in the rolling direction.
 
@@ -166,7 +166,7 @@ def spline(which: int) -> Spline:
     return Spline(knots, values, np.asarray(np.linalg.solve(matrix, right)))
 
 
-@kernel
+@subroutine
 def _at(knots: FloatArray, values: FloatArray, slopes: FloatArray, k: int, place: float) -> float:
     """Return C at ``ln(a/b) = place`` for the Poisson's ratio of column k."""
     i = 0

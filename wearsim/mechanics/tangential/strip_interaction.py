@@ -31,7 +31,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wearsim.mechanics.numerics.jit import kernel
+from wearsim.mechanics.numerics.jit import kernel, subroutine
 from wearsim.mechanics.tangential.kalker_coefficients import creepage_coefficients, short_limit
 from wearsim.types import FloatArray
 
@@ -115,7 +115,7 @@ def effective_moduli(ratio: float, elasticity: StripElasticity) -> tuple[float, 
     return elasticity.contact_modulus * factor_x, elasticity.shear_modulus * factor_y
 
 
-@kernel
+@subroutine
 def coupling_length(half_length: float, adhering: float) -> float:
     """Return the regularisation length of W [m].
 
@@ -129,7 +129,7 @@ def coupling_length(half_length: float, adhering: float) -> float:
     return 0.5 * half_length * math.exp(0.75 * (1.0 + adhering))
 
 
-@kernel
+@subroutine
 def induced_slip(
     force_x: FloatArray,
     force_y: FloatArray,
@@ -170,7 +170,7 @@ def induced_slip(
         decay = math.exp(-rate * spacing)
 
 
-@kernel
+@subroutine
 def _add_group(
     force_x: FloatArray,
     force_y: FloatArray,

@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wearsim.mechanics.numerics.jit import kernel
+from wearsim.mechanics.numerics.jit import kernel, subroutine
 from wearsim.mechanics.tangential.carter import spin_turns, straight_force, strip_force
 from wearsim.mechanics.tangential.strip_interaction import (
     StripElasticity,
@@ -82,7 +82,7 @@ def bound_steepness(half_length: FloatArray, line_load: FloatArray) -> float:
     return moment / load if load > 0.0 else 0.0
 
 
-@kernel
+@subroutine
 def _fill_forces(
     half_length: FloatArray,
     line_load: FloatArray,
@@ -129,7 +129,7 @@ def _fill_forces(
             )
 
 
-@kernel
+@subroutine
 def _fill_work(slip_x: FloatArray, slip_y: float, spin: float, out: StripTractions) -> None:
     """Fill the work on the effective slip, scaled so that the total is that of the rigid slip."""
     seen, rigid = 0.0, 0.0

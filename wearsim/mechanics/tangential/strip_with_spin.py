@@ -23,7 +23,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from wearsim.mechanics.numerics.jit import kernel
+from wearsim.mechanics.numerics.jit import kernel, subroutine
 from wearsim.mechanics.tangential.kalker_coefficients import CreepageCoefficients
 from wearsim.types import FloatArray
 
@@ -127,7 +127,7 @@ def beyond_strip_theory(
     return bool(abs(motion.spin) * moduli.spin_across * half_length[j] >= 2.0 * bound_peak[j])
 
 
-@kernel
+@subroutine
 def strip_of(
     j: int, half_length: FloatArray, bound_peak: FloatArray, motion: Motion, moduli: Moduli
 ) -> Strip:
@@ -175,7 +175,7 @@ def strip_of(
     )
 
 
-@kernel
+@subroutine
 def _direction_at_edge(
     slip_x: float, slip_y: float, twist: float, strain: float, moduli: Moduli
 ) -> tuple[float, float]:
@@ -198,7 +198,7 @@ def _direction_at_edge(
     return -e_x / size, -e_y / size
 
 
-@kernel
+@subroutine
 def slip_at(strip: Strip, x: float, e_x: float, e_y: float) -> tuple[float, float]:
     """Return the slip of strip theory in the slip zone, over the rolling velocity.
 

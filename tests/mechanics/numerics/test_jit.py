@@ -1,0 +1,83 @@
+"""Compilation of kernels together with the subroutines that they call."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+import pytest
+
+from wearsim.mechanics.numerics.jit import (
+    inlined_subroutine,
+    kernel,
+    merged_subroutine,
+    subroutine,
+)
+
+
+def _third_of_root(x: float) -> float:
+    return np.sqrt(x) / 3.0
+
+
+_root = subroutine(_third_of_root)
+
+
+@subroutine
+def _shifted(x: float) -> float:
+    return _root(x) + 0.1
+
+
+@inlined_subroutine
+def _inverse(x: float) -> float:
+    return 1.0 / x
+
+
+@merged_subroutine
+def _difference(x: float, count: int) -> float:
+    return x - count
+
+
+@kernel
+def _sum(x: float, count: int) -> float:
+    total = 0.0
+    for i in range(count):
+        total += _shifted(x + i)
+    return total
+
+
+@kernel
+def _combined(x: float, count: int) -> float:
+    return _inverse(x) + _difference(x, count) + _sum(x, 2)
+
+
+def test_subroutine_in_a_kernel_is_bitwise_equal_to_a_kernel():
+    third_of_root = kernel(_third_of_root)
+    separate = 0.0
+    for i in range(100):
+        separate += third_of_root(0.7 + i) + 0.1
+    assert _sum(0.7, 100) == separate
+
+
+def test_kernels_call_all_kinds_of_subroutines_and_kernels():
+    assert _combined(4.0, 1) == 1.0 / 4.0 + 3.0 + _sum(4.0, 2)
+
+
+def test_subroutines_run_in_python():
+    assert _shifted(9.0) == 1.1
+    assert _inverse(4.0) == 0.25
+    assert _difference(4.0, 1) == 3.0
+
+
+def test_other_compiled_functions_call_subroutines():
+    @numba.njit
+    def twice(x: float) -> float:
+        return 2.0 * _shifted(x)
+
+    assert twice(9.0) == 2.0 * (1.0 + 0.1)
+
+
+@pytest.mark.parametrize("place", ["", "somewhere"])
+def test_cache_folder_of_other_functions_is_unchanged(place: str, monkeypatch, tmp_path):
+    own = str(tmp_path / place) if place else ""
+    monkeypatch.setattr(numba.config, "CACHE_DIR", own)
+    kernel(_third_of_root)
+    assert own == numba.config.CACHE_DIR
