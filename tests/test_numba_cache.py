@@ -21,7 +21,7 @@ CONTACT = f"""
 import hashlib, json, sys
 import wearsim
 solution = wearsim.solve_contact(wearsim.load_scenario(r"{SCENARIOS / "rig-450min.toml"}"))
-from wearsim.mechanics.slender.newton import solve_each as kernel
+from wearsim.mechanics.slender.newton import solve_slender as kernel
 stats = getattr(kernel, "stats")
 print(json.dumps({{
     "bits": hashlib.sha256(solution.dissipation.tobytes()).hexdigest(),
@@ -157,6 +157,7 @@ def test_every_kernel_has_one_signature(tmp_path: Path):
     counts = run(EVERYTHING, NUMBA_CACHE_DIR=tmp_path)
     unused = kernels() - set(counts)
     assert not unused, f"not reached by this test's runs: {unused}"
+    assert len(counts.pop("newton.solve_slender")) == 2  # with and without shared bodies
     several = {name: signatures for name, signatures in counts.items() if len(signatures) > 1}
     assert not several, json.dumps(several, indent=1)
 

@@ -8,7 +8,6 @@ from scipy.special import ellipk
 
 from tests.mechanics.slender.test_influence import direct
 from wearsim.mechanics.hertz.ellipse import hertz
-from wearsim.mechanics.slender.coupled import solve_coupled
 from wearsim.mechanics.slender.half_length import HIGHEST_FACTOR, LOWEST_FACTOR, SWEEPS
 from wearsim.mechanics.slender.influence import (
     curvature_table,
@@ -38,22 +37,24 @@ def solve(grid, gaps, loads, wear=None, start=None, lengths="coupled", found=Non
     approach = np.zeros(count)
     half_length = np.zeros((count, n)) if found is None else found
     own, members, shared = wear.reduced
-    coupled = (members, shared) if shared.any() else ()
-    status, iterations = (solve_coupled if coupled else solve_slender)(
-        np.ascontiguousarray(gaps),
-        own,
-        *coupled,
-        np.atleast_1d(np.asarray(loads, dtype=float)),
-        np.full(count, CURVATURE),
+    status, iterations = np.zeros((2, 1), np.int64)
+    solve_slender(
+        np.ascontiguousarray(gaps)[None],
+        own[None],
+        *((members, shared[None]) if shared.any() else (None, None)),
+        np.atleast_2d(np.asarray(loads, dtype=float)),
+        np.full((1, count), CURVATURE),
         grid.spacing,
         MODULUS,
         influence_table(n),
         (curvature_table if lengths == "coupled" else no_table)(n),
-        line_load,
-        approach,
-        half_length,
+        line_load[None],
+        approach[None],
+        half_length[None],
+        status,
+        iterations,
     )
-    return status, line_load, approach, iterations
+    return status[0], line_load, approach, iterations[0]
 
 
 def no_wear(count, n):

@@ -6,7 +6,7 @@ import pytest
 from wearsim.mechanics.tangential.strip_interaction import (
     strip_elasticity,
 )
-from wearsim.mechanics.tangential.strip_theory import new_tractions, solve_strips
+from wearsim.mechanics.tangential.strip_theory import new_tractions, strips_of_contact
 from wearsim_bench.exact_solutions import rows
 
 
@@ -25,7 +25,7 @@ def test_small_creepage_meets_kalkers_coefficients(nu, ratio):
     def found(longitudinal, lateral, spin):
         out = new_tractions(n)
         slip_x = longitudinal - spin * y
-        solve_strips(
+        strips_of_contact(
             half_length, line_load, friction, slip_x, lateral, spin, spacing, elasticity, out
         )
         moment = (out.moment - y * out.force_x).sum()

@@ -11,8 +11,8 @@ from wearsim.mechanics.tangential.strip_interaction import strip_elasticity
 from wearsim.mechanics.tangential.strip_theory import (
     SUMS,
     new_tractions,
-    solve_strips,
     strip_contacts,
+    strips_of_contact,
 )
 
 PAIR = combine(STEEL, STEEL)
@@ -30,7 +30,9 @@ def ellipse(a, b, load, strips=200):
 def solve(half_length, line_load, friction, slip_x, slip_y, spin, spacing):
     out = new_tractions(len(slip_x))
     friction = np.full(len(slip_x), friction) if np.ndim(friction) == 0 else friction
-    solve_strips(half_length, line_load, friction, slip_x, slip_y, spin, spacing, ELASTICITY, out)
+    strips_of_contact(
+        half_length, line_load, friction, slip_x, slip_y, spin, spacing, ELASTICITY, out
+    )
     return out
 
 

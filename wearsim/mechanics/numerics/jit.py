@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import shutil
 import time
@@ -15,6 +16,7 @@ from typing import Any, ParamSpec, TypeVar
 
 import numba
 import numpy as np
+from numba.core import event
 from numba.extending import register_jitable
 
 from wearsim.types import FloatArray
@@ -25,6 +27,29 @@ R = TypeVar("R")
 # kernels are never passed to C code, for which numba would compile a second wrapper
 _OPTIONS = {"error_model": "numpy", "no_cfunc_wrapper": True}
 KEPT = 86400.0  # seconds for which the compiled kernels of other sources are kept
+
+
+class _WithoutCollection(event.Listener):  # type: ignore[misc]  # numba is not typed
+    """Listener that disables Python's garbage collector, a tenth of the time, in compilations."""
+
+    def __init__(self) -> None:
+        self.depth, self.collecting = 0, True
+
+    def on_start(self, event: Any) -> None:
+        """Disable the collector at the start of the outermost compilation."""
+        if self.depth == 0:
+            self.collecting = gc.isenabled()
+            gc.disable()
+        self.depth += 1
+
+    def on_end(self, event: Any) -> None:
+        """Enable the collector at the end of the outermost compilation."""
+        self.depth -= 1
+        if self.depth == 0 and self.collecting:
+            gc.enable()
+
+
+event.register("numba:compile", _WithoutCollection())
 
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
@@ -60,15 +85,6 @@ def inlined_subroutine(function: Callable[P, R]) -> Callable[P, R]:
     For small functions called in an inner loop: a loop that contains a call is not vectorised.
     """
     return register_jitable(forceinline=True, **_OPTIONS)(function)  # type: ignore[no-any-return]
-
-
-def merged_subroutine(function: Callable[P, R]) -> Callable[P, R]:
-    """Let kernels call `function`, inserted into the caller before types are inferred.
-
-    For large functions with few callers, whose machine code would be generated once for themselves
-    and once for every caller.
-    """
-    return register_jitable(inline="always", **_OPTIONS)(function)  # type: ignore[no-any-return]
 
 
 def own_array(array: FloatArray) -> FloatArray:

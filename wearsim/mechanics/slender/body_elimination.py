@@ -16,7 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from wearsim.mechanics.numerics.jit import subroutine
-from wearsim.mechanics.numerics.lu import factor_in_place, solve_factored
+from wearsim.mechanics.numerics.lu import factor_in_place, invert_factored, solve_factored
+from wearsim.mechanics.slender.newton_step import NewtonState
 from wearsim.types import FloatArray, IntArray
 
 SIDES = 2  # a contact touches a cylinder and a roller
@@ -27,7 +28,9 @@ class DepthSystem(NamedTuple):
 
     `number` is the unknown of each body's strip, -1 for none, (bodies, strips). `matrix` is stored
     by columns, `order` is the order of its equations, `right` its right-hand side and `depth` its
-    solution [m].
+    solution [m]. `response` is S of each contact by columns: decrease of the line load, by row, per
+    increase of the gap, by row, at constant load (contacts, strips, strips) [N/m^2], and
+    `approach_slope` the increase of the approach per increase of the gap (contacts, strips).
     """
 
     number: IntArray
@@ -35,6 +38,8 @@ class DepthSystem(NamedTuple):
     order: IntArray
     right: FloatArray
     depth: FloatArray
+    response: FloatArray
+    approach_slope: FloatArray
 
 
 @subroutine
@@ -48,7 +53,31 @@ def new_depth_system(bodies: IntArray, n: int) -> DepthSystem:
         np.empty(size, np.int64),
         np.empty(size),
         np.empty(size),
+        np.empty((len(bodies), n, n)),
+        np.empty((len(bodies), n)),
     )
+
+
+@subroutine
+def add_shared(shared: FloatArray, compliance: FloatArray) -> None:
+    """Add the wear of the shared bodies, (contacts, 2, strips), to the separate compliance."""
+    for k in range(compliance.shape[0]):
+        for i in range(compliance.shape[1]):
+            compliance[k, i] = compliance[k, i] + shared[k, 0, i] + shared[k, 1, i]
+
+
+@subroutine
+def fill_responses(k: int, state: NewtonState, system: DepthSystem) -> None:
+    """Fill the derivatives of contact `k`'s step and approach by its gap at constant load."""
+    size, response, approach_slope = state.size[k], system.response, system.approach_slope
+    invert_factored(state.matrix[k], size, state.order[k], response[k])
+    for column in range(size):
+        total = 0.0
+        for row in range(size):
+            total += response[k, column, row]
+        approach_slope[k, column] = total / state.unit_load_sum[k]
+        for row in range(size):
+            response[k, column, row] -= state.unit_load[k, row] * approach_slope[k, column]
 
 
 @subroutine
@@ -107,7 +136,7 @@ def _number_unknowns(
 
 @subroutine
 def factor_depths(
-    bodies: IntArray, shared: FloatArray, index: IntArray, response: FloatArray, system: DepthSystem
+    bodies: IntArray, shared: FloatArray, index: IntArray, system: DepthSystem
 ) -> bool:
     """Assemble and factor the system of the bodies' depths.
 
@@ -117,11 +146,8 @@ def factor_depths(
         As in `add_depths`.
     index : ndarray of int, shape (contacts, strips)
         Row of each strip in its contact, -1 outside the contact.
-    response : ndarray, shape (contacts, strips, strips)
-        S by columns: decrease of the line load, by row, per increase of the gap, by row, at
-        constant load [N/m^2].
     system : DepthSystem
-        Filled.
+        Filled, with the responses of the contacts from `fill_responses`.
 
     Returns
     -------
@@ -136,7 +162,7 @@ def factor_depths(
         for side in range(SIDES):
             for other in range(SIDES):
                 if bodies[k, side] >= 0 and bodies[k, other] >= 0:
-                    _add_contact_terms(k, side, other, bodies, shared, index, response, system)
+                    _add_contact_terms(k, side, other, bodies, shared, index, system)
     return factor_in_place(matrix, count, system.order)
 
 
@@ -145,8 +171,6 @@ def solve_depths(
     bodies: IntArray,
     shared: FloatArray,
     index: IntArray,
-    response: FloatArray,
-    approach_slope: FloatArray,
     system: DepthSystem,
     step: FloatArray,
     approach: FloatArray,
@@ -155,10 +179,8 @@ def solve_depths(
 
     Parameters
     ----------
-    bodies, shared, index, response
+    bodies, shared, index
         As in `factor_depths`.
-    approach_slope : ndarray, shape (contacts, strips)
-        Increase of the approach per increase of the gap, by row.
     system : DepthSystem
         From `factor_depths`.
     step : ndarray, shape (contacts, strips)
@@ -178,7 +200,7 @@ def solve_depths(
                     right[unknown] += shared[k, side, i] * step[k, index[k, i]]
     solve_factored(system.matrix, count, system.order, right, system.depth)
     for k in range(contacts):
-        _apply_body_wear(k, bodies, index, response, approach_slope, system, step, approach)
+        _apply_body_wear(k, bodies, index, system, step, approach)
 
 
 @subroutine
@@ -189,7 +211,6 @@ def _add_contact_terms(
     bodies: IntArray,
     shared: FloatArray,
     index: IntArray,
-    response: FloatArray,
     system: DepthSystem,
 ) -> None:
     """Add the wear of contact `k`'s body on `side` per worn depth of its body on side `other`."""
@@ -203,7 +224,7 @@ def _add_contact_terms(
             row = index[k, i]
             if row >= 0 and shared[k, side, i] > 0.0:
                 system.matrix[unknown, number[worn_body, i]] += (
-                    shared[k, side, i] * response[k, column, row]
+                    shared[k, side, i] * system.response[k, column, row]
                 )
 
 
@@ -212,8 +233,6 @@ def _apply_body_wear(
     k: int,
     bodies: IntArray,
     index: IntArray,
-    response: FloatArray,
-    approach_slope: FloatArray,
     system: DepthSystem,
     step: FloatArray,
     approach: FloatArray,
@@ -228,6 +247,6 @@ def _apply_body_wear(
             b = bodies[k, side]
             if b >= 0 and system.number[b, i] >= 0:
                 opening += system.depth[system.number[b, i]]
-        approach[k] += approach_slope[k, column] * opening
+        approach[k] += system.approach_slope[k, column] * opening
         for row in range(size):
-            step[k, row] -= response[k, column, row] * opening
+            step[k, row] -= system.response[k, column, row] * opening

@@ -363,34 +363,38 @@ def solve_fully(
 ) -> int:
     """Solve contact `g` by Newton's method and set its anchor if `anchored`; return the status."""
     n = state.gap.shape[0]
-    gap, line_load, half_length = np.empty((1, n)), np.empty((1, n)), np.empty((1, n))
-    approach, force = np.full(1, loads.approach[g]), np.full(1, load)
+    gap, line_load = np.empty((1, 1, n)), np.empty((1, 1, n))
+    approach, status = np.full((1, 1), loads.approach[g]), np.zeros((2, 1), np.int64)
     for i in range(n):
-        gap[0, i], line_load[0, i] = state.gap[i], loads.line_load[g, i]
-    status, _ = solve_slender(
+        gap[0, 0, i], line_load[0, 0, i] = state.gap[i], loads.line_load[g, i]
+    solve_slender(
         gap,
-        np.zeros((1, n)),
-        force,
-        np.full(1, constants.longitudinal_curvature[g]),
+        np.zeros((1, 1, n)),
+        None,
+        None,
+        np.full((1, 1), load),
+        np.full((1, 1), constants.longitudinal_curvature[g]),
         constants.spacing,
         constants.contact_modulus,
         constants.table,
         constants.curvature_influence,
         line_load,
         approach,
-        half_length,
+        np.empty((1, 1, n)),
+        status[0],
+        status[1],
     )
-    if status != CONVERGED:
-        return status
-    loads.approach[g] = approach[0]
+    if status[0, 0] != CONVERGED:
+        return int(status[0, 0])
+    loads.approach[g] = approach[0, 0]
     for i in range(n):
-        loads.line_load[g, i] = line_load[0, i]
+        loads.line_load[g, i] = line_load[0, 0, i]
     if not anchored:
         _number_strips(g, loads.line_load, state)
         find_factors(g, loads.line_load, True, state.lengths)
         return CONVERGED
     for i in range(n):
-        loads.anchor[g, i], loads.anchor_gap[g, i] = line_load[0, i], state.gap[i]
+        loads.anchor[g, i], loads.anchor_gap[g, i] = line_load[0, 0, i], state.gap[i]
         state.remainder[g, i] = 0.0
-    loads.anchor_approach[g] = approach[0]
+    loads.anchor_approach[g] = approach[0, 0]
     return CONVERGED if set_anchor(g, loads.anchor, constants, state) else SINGULAR

@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wearsim.mechanics.numerics.jit import kernel, subroutine
+from wearsim.mechanics.numerics.jit import subroutine
 from wearsim.mechanics.slender.influence import HIGHEST, read_influence, read_values
 from wearsim.types import FloatArray, IntArray
 
@@ -54,7 +54,7 @@ class HalfLengths(NamedTuple):
     work: FloatArray
 
 
-@kernel
+@subroutine
 def new_half_lengths(table: FloatArray, log_scale: FloatArray, reach: int) -> HalfLengths:
     """Return the `HalfLengths` of contacts with s = 1; `reach` is `REACH` or `NEWTON_REACH`."""
     contacts, n = log_scale.shape[0], table.shape[2]

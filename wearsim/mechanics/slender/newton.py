@@ -7,16 +7,30 @@ Strip i of contact k has the gap z_i and is displaced by the line load of every 
     a_j = sqrt(4 s_j q_j / (pi E* kappa)),   sum_i q_i dy = N_k,
 
 with the relative curvature along rolling kappa, the interaction factor s of the half-lengths (see
-`half_length`) and the wear compliance c of the separate contact. Contacts that wear shared bodies
-are solved in `coupled`. Newton's method with an active set of strips in contact and the unknown
-approach delta uses the steps of `newton_step`.
+`half_length`) and the wear compliance c of the separate contact. Newton's method with an active set
+of strips in contact and the unknown approach delta uses the steps of `newton_step`.
+
+Where contacts wear shared bodies, the gap of contact k opens by the wear that all contacts cause on
+its bodies: the left-hand side is increased by D_i, the sum over its bodies and all l of their
+contacts of c_l,i q_l,i. `body_elimination` turns the steps of the separate contacts into the
+coupled step.
 """
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from wearsim.mechanics.numerics.jit import kernel, subroutine
+from wearsim.mechanics.slender.body_elimination import (
+    add_depths,
+    add_shared,
+    factor_depths,
+    fill_responses,
+    new_depth_system,
+    solve_depths,
+)
 from wearsim.mechanics.slender.half_length import NEWTON_REACH, fill_half_lengths, new_half_lengths
 from wearsim.mechanics.slender.influence import HIGHEST
 from wearsim.mechanics.slender.newton_step import (
@@ -225,7 +239,7 @@ def least_gap(k: int, gap: FloatArray) -> float:
     return float(lowest)
 
 
-@kernel
+@subroutine
 def log_scales_of(
     contact_modulus: float, longitudinal_curvature: FloatArray, spacing: float
 ) -> FloatArray:
@@ -233,95 +247,16 @@ def log_scales_of(
     log_scale = np.empty(longitudinal_curvature.shape[0])
     for k in range(longitudinal_curvature.shape[0]):
         scale = 4.0 / (np.pi * contact_modulus * longitudinal_curvature[k])
-        log_scale[k] = 0.5 * np.log(scale) - np.log(spacing)
+        log_scale[k] = 0.5 * math.log(scale) - math.log(spacing)
     return log_scale
 
 
-@subroutine
+@kernel
 def solve_slender(
     gap: FloatArray,
     compliance: FloatArray,
-    loads: FloatArray,
-    longitudinal_curvature: FloatArray,
-    spacing: float,
-    contact_modulus: float,
-    table: FloatArray,
-    curvature_influence: FloatArray,
-    line_load: FloatArray,
-    approach: FloatArray,
-    half_length: FloatArray,
-) -> tuple[int, int]:
-    """Solve one or several independent slender contacts, from starting line loads.
-
-    Parameters
-    ----------
-    gap : ndarray, shape (contacts, strips)
-        Gap [m].
-    compliance : ndarray, shape (contacts, strips)
-        Wear compliance of the separate contacts: increase of gap per line load [m/(N/m)].
-    loads, longitudinal_curvature : ndarray, shape (contacts,)
-        Loads N [N], kappa [1/m].
-    spacing, contact_modulus : float
-        Strip width [m], E* [Pa].
-    table, curvature_influence : ndarray
-        From `influence_table`, and from `curvature_table` or, for half-lengths without interaction
-        of the strips, `no_table`.
-    line_load : ndarray, shape (contacts, strips)
-        Starting line loads, all zero in a contact without a start; overwritten with q [N/m].
-    approach : ndarray, shape (contacts,)
-        Starting approaches; overwritten with delta [m].
-    half_length : ndarray, shape (contacts, strips)
-        Filled: a [m].
-
-    Returns
-    -------
-    status, iterations : int
-        CONVERGED or the cause of failure; iterations of Newton's method.
-    """
-    contacts, n = gap.shape
-    unit, before = 1.0 / (np.pi * contact_modulus), 0.0
-    surface, work = np.empty((contacts, n)), np.empty((2, n))
-    state = new_newton_state(contacts, n)
-    log_scale = log_scales_of(contact_modulus, longitudinal_curvature, spacing)
-    lengths, lowest = (
-        new_half_lengths(curvature_influence, log_scale, NEWTON_REACH),
-        np.empty(contacts),
-    )
-    for k in range(contacts):
-        start_contact(k, gap, compliance, contact_modulus, loads[k], spacing, line_load, approach)
-        lowest[k] = least_gap(k, gap)
-        approach[k] -= lowest[k]
-    for iteration in range(1, MAX_ITERATIONS + 1):
-        for k in range(contacts):
-            for i in range(n):  # a loop, as numba takes seconds to compile an array assignment
-                surface[k, i] = gap[k, i] - lowest[k]
-            widest = displace(k, compliance, table, unit, lengths, line_load, work, surface, state)
-            if widest > HIGHEST:
-                return TOO_FINE, iteration
-            if state.fresh[k] and not factor_jacobian(k, state):
-                return SINGULAR, iteration
-            take_step(k, loads[k] / spacing, line_load, state, approach)
-            correct_residual(k, table, unit, line_load, lengths, state)
-            take_step(k, loads[k] / spacing, line_load, state, approach)
-        change, left = update_loads(line_load, state, iteration > CAUTIOUS)
-        for k in range(contacts):
-            predict_surface(k, surface, state)
-        status, before = check_convergence(
-            iteration, unit, before, change, left, surface, state, approach, line_load
-        )
-        if status == CONVERGED:
-            fill_half_lengths(spacing, line_load, lengths, half_length)
-            for k in range(contacts):
-                approach[k] += lowest[k]
-        if status != CONTINUE:
-            return status, iteration
-    return NO_CONVERGENCE, MAX_ITERATIONS
-
-
-@kernel
-def solve_each(
-    gap: FloatArray,
-    compliance: FloatArray,
+    bodies: IntArray | None,
+    shared: FloatArray | None,
     loads: FloatArray,
     longitudinal_curvature: FloatArray,
     spacing: float,
@@ -334,31 +269,112 @@ def solve_each(
     status: IntArray,
     iterations: IntArray,
 ) -> None:
-    """Solve independent sets of contacts; parameters as in `solve_slender`, with a leading axis.
+    """Solve sets of slender contacts, from starting line loads.
 
-    A set that fails from its starting line loads is solved again without them.
+    The contacts of a set are independent or wear shared bodies. A set that fails from its starting
+    line loads is solved again without them. The kernel is compiled separately for independent
+    contacts (`bodies` and `shared` None), without the parts for shared bodies.
 
     Parameters
     ----------
+    gap : ndarray, shape (sets, contacts, strips)
+        Gap [m].
+    compliance : ndarray, shape (sets, contacts, strips)
+        Wear compliance of the separate contacts: increase of gap per line load [m/(N/m)].
+    bodies : ndarray of int, shape (contacts, 2), or None
+        Bodies that each contact of a set shares with others, numbered from 0; -1 for none.
+    shared : ndarray, shape (sets, contacts, 2, strips), or None
+        Depth that a contact wears off those bodies per unit of line load [m/(N/m)].
+    loads, longitudinal_curvature : ndarray, shape (sets, contacts)
+        Loads N [N], kappa [1/m].
+    spacing, contact_modulus : float
+        Strip width [m], E* [Pa].
+    table, curvature_influence : ndarray
+        From `influence_table`, and from `curvature_table` or, for half-lengths without interaction
+        of the strips, `no_table`.
+    line_load : ndarray, shape (sets, contacts, strips)
+        Starting line loads, all zero in a contact without a start; overwritten with q [N/m].
+    approach : ndarray, shape (sets, contacts)
+        Starting approaches; overwritten with delta [m].
+    half_length : ndarray, shape (sets, contacts, strips)
+        Filled: a [m].
     status, iterations : ndarray of int, shape (sets,)
-        Filled with the values that `solve_slender` returns.
+        Filled: CONVERGED or the cause of failure; iterations of Newton's method.
     """
+    contacts, n = gap.shape[1], gap.shape[2]
+    unit = 1.0 / (np.pi * contact_modulus)
     for number in range(gap.shape[0]):
-        for attempt in range(2 if np.any(line_load[number]) else 1):
+        load, total, delta = loads[number], line_load[number], approach[number]
+        own = compliance[number]
+        for attempt in range(2 if np.any(total) else 1):
             if attempt > 0:
-                line_load[number] = 0.0
-            status[number], iterations[number] = solve_slender(
-                gap[number],
-                compliance[number],
-                loads[number],
-                longitudinal_curvature[number],
-                spacing,
-                contact_modulus,
-                table,
-                curvature_influence,
-                line_load[number],
-                approach[number],
-                half_length[number],
-            )
-            if status[number] == CONVERGED:
+                total[:] = 0.0
+            surface, work = np.empty((contacts, n)), np.empty((2, n))
+            state, lowest = new_newton_state(contacts, n), np.empty(contacts)
+            log_scale = log_scales_of(contact_modulus, longitudinal_curvature[number], spacing)
+            lengths = new_half_lengths(curvature_influence, log_scale, NEWTON_REACH)
+            for k in range(contacts):
+                for i in range(n):  # a loop, as numba takes seconds to compile an array assignment
+                    surface[k, i] = own[k, i]
+            if bodies is not None:
+                system = new_depth_system(bodies, n)
+                add_shared(shared[number], surface)
+            for k in range(contacts):
+                start_contact(
+                    k, gap[number], surface, contact_modulus, load[k], spacing, total, delta
+                )
+                lowest[k] = least_gap(k, gap[number])
+                delta[k] -= lowest[k]
+            outcome, before, iteration = CONTINUE, 0.0, 0
+            while outcome == CONTINUE:
+                iteration += 1
+                for k in range(contacts):
+                    for i in range(n):
+                        surface[k, i] = gap[number, k, i] - lowest[k]
+                if bodies is not None:
+                    add_depths(bodies, shared[number], total, surface)
+                renewed = False
+                for k in range(contacts):
+                    widest = displace(k, own, table, unit, lengths, total, work, surface, state)
+                    if widest > HIGHEST:
+                        outcome = TOO_FINE
+                        break
+                    if state.fresh[k]:
+                        if not factor_jacobian(k, state):
+                            outcome = SINGULAR
+                            break
+                        renewed = True
+                        if bodies is not None:
+                            fill_responses(k, state, system)
+                if outcome != CONTINUE:
+                    break
+                if (
+                    bodies is not None
+                    and renewed
+                    and not factor_depths(bodies, shared[number], state.rows, system)
+                ):
+                    outcome = SINGULAR
+                    break
+                for sweep in range(2):
+                    for k in range(contacts):
+                        if sweep:
+                            correct_residual(k, table, unit, total, lengths, state)
+                        take_step(k, load[k] / spacing, total, state, delta)
+                    if bodies is not None:
+                        solve_depths(bodies, shared[number], state.rows, system, state.step, delta)
+                change, left = update_loads(total, state, iteration > CAUTIOUS)
+                for k in range(contacts):
+                    predict_surface(k, surface, state)
+                if bodies is not None:
+                    add_depths(bodies, shared[number], state.change, surface)
+                outcome, before = check_convergence(
+                    iteration, unit, before, change, left, surface, state, delta, total
+                )
+                if outcome == CONTINUE and iteration == MAX_ITERATIONS:
+                    outcome = NO_CONVERGENCE
+            status[number], iterations[number] = outcome, iteration
+            if outcome == CONVERGED:
+                fill_half_lengths(spacing, total, lengths, half_length[number])
+                for k in range(contacts):
+                    delta[k] += lowest[k]
                 break

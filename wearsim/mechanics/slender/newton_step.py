@@ -92,39 +92,6 @@ def _number_strips(k: int, line_load: FloatArray, state: NewtonState) -> None:
 
 
 @subroutine
-def _fill_displacement(
-    k: int,
-    line_load: FloatArray,
-    table: FloatArray,
-    unit: float,
-    lengths: HalfLengths,
-    work: FloatArray,
-    surface: FloatArray,
-    state: NewtonState,
-) -> None:
-    """Add contact `k`'s elastic displacement to `surface` and fill a fresh Jacobian."""
-    n, size, fresh = line_load.shape[1], state.size[k], state.fresh[k]
-    value, tangent, pressed = work[0], work[1], surface[k]
-    for column in range(size):
-        j = state.place[k, column]
-        push, tau, reach = unit * line_load[k, j], lengths.log_ratio[k, j], max(j + 1, n - j)
-        if fresh:
-            read_influence(table, tau, reach, value, tangent)
-            state.diagonal[k, column] = unit * tangent[0]
-            outer = state.outer[k, column]
-            outer[:] = 0.0
-            add_around(j, 0, n - 1, unit, tangent, outer)
-            for row in range(size):
-                state.matrix[k, column, row] = outer[state.place[k, row]]
-            if lengths.table.shape[0] > 0:
-                gather_length_slopes(k, j, push, value, tangent, lengths)
-        else:
-            read_values(table, tau, reach, value)
-        state.pressed[k, column] = push * value[0]
-        add_around(j, 0, n - 1, push, value, pressed)
-
-
-@subroutine
 def displace(
     k: int,
     compliance: FloatArray,
@@ -147,7 +114,24 @@ def displace(
     widest = find_factors(k, line_load, fresh, lengths)
     if widest > HIGHEST:
         return widest
-    _fill_displacement(k, line_load, table, unit, lengths, work, surface, state)
+    n, value, tangent, pressed = line_load.shape[1], work[0], work[1], surface[k]
+    for column in range(state.size[k]):
+        j = state.place[k, column]
+        push, tau, reach = unit * line_load[k, j], lengths.log_ratio[k, j], max(j + 1, n - j)
+        if fresh:
+            read_influence(table, tau, reach, value, tangent)
+            state.diagonal[k, column] = unit * tangent[0]
+            outer = state.outer[k, column]
+            outer[:] = 0.0
+            add_around(j, 0, n - 1, unit, tangent, outer)
+            for row in range(state.size[k]):
+                state.matrix[k, column, row] = outer[state.place[k, row]]
+            if lengths.table.shape[0] > 0:
+                gather_length_slopes(k, j, push, value, tangent, lengths)
+        else:
+            read_values(table, tau, reach, value)
+        state.pressed[k, column] = push * value[0]
+        add_around(j, 0, n - 1, push, value, pressed)
     if fresh and lengths.table.shape[0] > 0:
         add_length_slopes(k, line_load, state.rows, lengths, state.matrix[k])
     for row in range(state.size[k]):

@@ -31,7 +31,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from wearsim.mechanics.numerics.jit import kernel, subroutine
+from wearsim.mechanics.numerics.jit import subroutine
 
 SPIN_LIMIT = 0.9  # psi above which full sliding in both directions is blended in
 TURNED = 0.2  # phi a over the slip above which the rotation of the slip along the strip is included
@@ -58,7 +58,7 @@ class StripState(NamedTuple):
     scrubbed: float
 
 
-@kernel
+@subroutine
 def strip_state(
     half_length: float,
     steepness: float,
@@ -94,7 +94,7 @@ def strip_state(
     )
 
 
-@kernel
+@subroutine
 def mean_direction(slip_x: float, slip_y: float, turn: float) -> tuple[float, float, float]:
     """Return the pressure-weighted mean of the direction of (X, Y + phi x), and its moment.
 

@@ -31,7 +31,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wearsim.mechanics.numerics.jit import kernel, subroutine
+from wearsim.mechanics.numerics.jit import subroutine
 from wearsim.mechanics.tangential.kalker_coefficients import creepage_coefficients, short_limit
 from wearsim.types import FloatArray
 
@@ -71,7 +71,7 @@ def strip_elasticity(contact_modulus: float, shear_modulus: float) -> StripElast
     return StripElasticity(float(contact_modulus), float(shear_modulus), widening)
 
 
-@kernel
+@subroutine
 def equivalent_ratio(half_length: FloatArray, line_load: FloatArray, spacing: float) -> float:
     """Return a/b of the ellipses equivalent to a contact.
 
@@ -96,7 +96,7 @@ def equivalent_ratio(half_length: FloatArray, line_load: FloatArray, spacing: fl
     return 0.5 * math.pi * widest * rises / (length * spacing) if length > 0.0 else 1.0
 
 
-@kernel
+@subroutine
 def effective_moduli(ratio: float, elasticity: StripElasticity) -> tuple[float, float]:
     """Return E_x and G_y [Pa] of the strips of a contact.
 

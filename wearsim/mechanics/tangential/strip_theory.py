@@ -53,14 +53,14 @@ class StripTractions(NamedTuple):
     induced_y: FloatArray
 
 
-@kernel
+@subroutine
 def new_tractions(strips: int) -> StripTractions:
     """Return `StripTractions` of zeros."""
     rows = np.zeros((7, strips))
     return StripTractions(rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6])
 
 
-@kernel
+@subroutine
 def bound_steepness(half_length: FloatArray, line_load: FloatArray) -> float:
     """Return the steepness of the pressure bound along rolling, 2 p0/a [Pa/m].
 
@@ -78,7 +78,8 @@ def bound_steepness(half_length: FloatArray, line_load: FloatArray) -> float:
     for i in range(line_load.shape[0]):
         if line_load[i] > 0.0:
             load += line_load[i]
-            moment += 4.0 / np.pi * (line_load[i] / half_length[i]) ** 2
+            stress = line_load[i] / half_length[i]
+            moment += 4.0 / np.pi * (stress * stress)
     return moment / load if load > 0.0 else 0.0
 
 
@@ -144,7 +145,7 @@ def _fill_work(slip_x: FloatArray, slip_y: float, spin: float, out: StripTractio
         out.work[i] *= scale
 
 
-@kernel
+@subroutine
 def solve_strips(
     half_length: FloatArray,
     line_load: FloatArray,
@@ -213,6 +214,9 @@ def solve_strips(
             out,
         )
     _fill_work(slip_x, slip_y, spin, out)
+
+
+strips_of_contact = kernel(solve_strips)  # for calls from Python
 
 
 @kernel

@@ -9,7 +9,7 @@ import numpy as np
 from wearsim.contact_batch import ContactBatch, ContactBatchSolution
 from wearsim.mechanics.hertz.elasticity import ElasticPair
 from wearsim.mechanics.numerics.jit import own_array
-from wearsim.mechanics.slender.newton import CONVERGED, NOT_FINITE, solve_each
+from wearsim.mechanics.slender.newton import CONVERGED, NOT_FINITE, solve_slender
 from wearsim.mechanics.tangential.strip_interaction import strip_elasticity
 from wearsim.mechanics.tangential.strip_theory import SUMS, strip_contacts
 from wearsim.plugins import SharedWear
@@ -97,20 +97,7 @@ class NormalContacts(NamedTuple):
             Increase of each contact's gap by its wear per unit of line load [m/(N/m)].
         constants : Constants
         """
-        wear = own_array(own).reshape(self.gap.shape)
-        solve_each(
-            self.gap,
-            wear,
-            self.loads,
-            self.longitudinal_curvature,
-            *constants,
-            self.line_load,
-            self.approach,
-            self.half_length,
-            self.status,
-            self.iterations,
-        )
-        self._refuse_infinite_gaps()
+        self._solve(own_array(own).reshape(self.gap.shape), None, None, constants)
 
     def solve(self, wear: SharedWear, constants: Constants) -> None:
         """Solve all sets in place; the sets are the leading axis of the wear compliance."""
@@ -121,17 +108,20 @@ class NormalContacts(NamedTuple):
             if (members == NO_BODY).all():
                 part.solve_independent(own, constants)
             else:
-                part._solve_coupled(own, members, shared, constants)
+                part._solve(own, members, shared, constants)
             if part is not self:
                 for array, solved in zip(self, part, strict=True):
                     array[numbers] = solved
 
-    def _solve_coupled(
-        self, own: FloatArray, members: IntArray, shared: FloatArray, constants: Constants
+    def _solve(
+        self,
+        own: FloatArray,
+        members: IntArray | None,
+        shared: FloatArray | None,
+        constants: Constants,
     ) -> None:
-        from wearsim.mechanics.slender.coupled import solve_each_coupled  # noqa: PLC0415  (rarely needed)
-
-        solve_each_coupled(
+        """Solve all sets in place, and mark those with an infinite gap."""
+        solve_slender(
             self.gap,
             own,
             members,
@@ -145,10 +135,7 @@ class NormalContacts(NamedTuple):
             self.status,
             self.iterations,
         )
-        self._refuse_infinite_gaps()
-
-    def _refuse_infinite_gaps(self) -> None:
-        """Mark sets with a gap that is not finite, since the kernels skip such strips."""
+        # the kernels skip strips whose gap is not finite
         finite = np.isfinite(self.gap)
         if np.count_nonzero(finite) < finite.size:
             self.status[~finite.all(axis=(1, 2))] = NOT_FINITE

@@ -15,7 +15,7 @@ from wearsim.mechanics.tangential.strip_theory import (
     StripTractions,
     bound_steepness,
     new_tractions,
-    solve_strips,
+    strips_of_contact,
 )
 from wearsim.models.tangential.base import LocalSlip, Strips, TangentialTheory, Tractions
 from wearsim.types import BoolArray, ContactFields, FloatArray
@@ -154,7 +154,7 @@ class StripTheory(TangentialTheory):
         strips: Strips, pair: ElasticPair, slip: LocalSlip, friction: FloatArray
     ) -> StripTractions:
         solved = new_tractions(len(strips.y))
-        solve_strips(
+        strips_of_contact(
             np.ascontiguousarray(strips.half_length),
             np.ascontiguousarray(strips.line_load),
             np.ascontiguousarray(friction),
