@@ -142,7 +142,7 @@ def test_failed_and_unfinished_ensembles_are_marked(here: Command) -> None:
     assert "may be biased" in result.stderr
     items = json.loads(here("compare", "a.h5", "f.h5", "u.h5", "--json").stdout)["compared"]
     assert [item["failed"] for item in items] == [0, failing.failed, 0]
-    assert [item["asked"] for item in items] == [30, 12, 12]
+    assert [item["requested"] for item in items] == [30, 12, 12]
     assert [item["finished"] for item in items] == [True, True, False]
     assert "biased" not in here("compare", "a.h5", "u.h5").stderr
 

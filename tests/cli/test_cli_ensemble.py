@@ -90,7 +90,7 @@ def test_plan_and_seed_reach_the_file(command: Command, tests: Path) -> None:
     kept = open_ensemble("tests-ensemble.h5")
     assert (kept.plan, kept.raw.seed, kept.scenario.seed) == ("saltelli", 7, 7)
     assert " total" not in result.stdout  # two rows are too few for an index
-    assert f"of {kept.asked}" in result.stdout
+    assert f"of {kept.requested}" in result.stdout
 
 
 @pytest.mark.parametrize(

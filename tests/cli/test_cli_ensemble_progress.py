@@ -15,7 +15,7 @@ from wearsim.uq.estimation.intervals import UNKNOWN, Interval
 PROGRESS = EnsembleProgress(
     done=1200,
     failed=3,
-    asked=5000,
+    requested=5000,
     rate=12.34,
     left=307.7,
     what="depth.mean",

@@ -81,7 +81,7 @@ def made_up(
             total_time=27000.0,
             strip_width=1e-4,
             plan=plan,
-            asked=count,
+            requested=count,
             until=until,
             inputs=[
                 {"key": key, "unit": unit, "input": key, "rollers": "each" if unit == "m" else ""}

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from run_examples import LOG, SCENARIO
 
-from wearsim.results import EnsembleData, EnsembleFile, Outcome
+from wearsim.results import EnsembleData, EnsembleFile, Outcome, read_ensemble
 from wearsim.results.content import Arrays
 from wearsim.results.ensemble.schema import OBSERVABLES, STATISTICS
 
@@ -19,7 +19,7 @@ INPUTS = [
 ]
 
 
-def some_header(asked: int = 20, **changes: object) -> EnsembleData:
+def some_header(requested: int = 20, **changes: object) -> EnsembleData:
     """Return the data known before the first realisation; `changes` replaces fields."""
     values: dict[str, object] = {
         "scenario_text": SCENARIO,
@@ -38,7 +38,7 @@ def some_header(asked: int = 20, **changes: object) -> EnsembleData:
         "total_time": 27000.1,
         "strip_width": 6e-5,
         "plan": "sobol",
-        "asked": asked,
+        "requested": requested,
         "until": "depth.mean 1%",
         "inputs": INPUTS,
         "groups": [{"name": "misalignment", "role": "joint", "persistence": "per-roller"}],
@@ -79,21 +79,28 @@ def some_outcome(number: int, strips: int = STRIPS, error: str = "") -> Outcome:
     )
 
 
-def some_statistics(path: Path) -> Arrays:
-    """Return arrays for all statistics of a file."""
-    with EnsembleFile.open(path) as file:
-        shapes = {name: file.data.variables[name].shape for name in STATISTICS}
+def some_statistics(data: EnsembleData) -> Arrays:
+    """Return arrays for all statistics of an ensemble."""
     random = np.random.default_rng(1)
-    return {name: random.random(shape) for name, shape in shapes.items()}
+    return {name: random.random(data.shapes[name]) for name in STATISTICS}
 
 
-def without_state(path: Path) -> bytes:
-    """Return the bytes of a file, with the two slots of its state set to zero."""
-    import h5py
+def finish(file: EnsembleFile, **fields: object) -> None:
+    """Merge the parts of an ensemble, with some statistics and changed fields."""
+    file.finish(lambda data: ({"finished": True, **fields}, some_statistics(data)))
 
-    content = bytearray(path.read_bytes())
-    with h5py.File(path, locking=False) as file:
-        for place in file["checkpoint"].values():
-            start, size = place.id.get_offset(), place.id.get_storage_size()
-            content[start : start + size] = bytes(size)
-    return bytes(content)
+
+def contents(path: Path) -> dict[str, bytes]:
+    """Return all that an ensemble holds, except what identifies it and its parts."""
+    data = read_ensemble(path)
+    arrays = {name: array.tobytes() for name, array in data.variables.items()}
+    fields = {name: repr(value).encode() for name, value in data.attributes.items()}
+    del fields["run_id"], fields["merged"], fields["wall_seconds"]
+    status = {"status": data.status.tobytes(), "errors": repr(data.errors).encode()}
+    return {**arrays, **fields, **status}
+
+
+def differences(one: Path, other: Path) -> list[str]:
+    """Return the names of what differs between two ensembles."""
+    first, second = contents(one), contents(other)
+    return [name for name in first.keys() | second.keys() if first.get(name) != second.get(name)]

@@ -9,16 +9,17 @@ import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from ensemble_examples import some_header, some_outcome, some_static
+from ensemble_examples import finish, some_header, some_outcome, some_static
 
-from wearsim.results import EnsembleFile, Outcome
+from tests.faulty_storage import WatchedStorage, some_of_each
+from wearsim.results import DISK, EnsembleFile, Outcome, Storage
+from wearsim.results.ensemble import writer
 from wearsim.results.ensemble.schema import DONE
-from wearsim.results.io import atomic_write
 
 COUNT, STRIPS = 5, 60
 BATCHES = ([3, 0, 1], [4, 2])
 FAILED = (1, 4)
-SMALL_CHUNK = 400  # two writes per profile, so that a kill can leave half of one
+SMALL_PART = 10_000  # bytes: a batch and no more
 
 
 def outcome(number: int, fails: bool) -> Outcome:
@@ -27,25 +28,34 @@ def outcome(number: int, fails: bool) -> Outcome:
     return some_outcome(number, STRIPS, error)
 
 
-def create(path: Path) -> None:
+def create(path: Path, storage: Storage = DISK) -> None:
     """Write an ensemble of pending realisations."""
-    EnsembleFile.create(path, some_header(COUNT), some_static(STRIPS)).close()
+    EnsembleFile.create(path, some_header(COUNT), some_static(STRIPS), storage).close()
 
 
-def continue_writing(path: Path, batches: Iterable[list[int]] = BATCHES) -> None:
+def continue_writing(
+    path: Path, batches: Iterable[list[int]] = BATCHES, storage: Storage = DISK
+) -> None:
     """Write missing realisations, with a state after each batch, then repeat the failed ones."""
-    with EnsembleFile.open(path) as file:
+    with EnsembleFile.open(path, storage) as file:
         for batch in batches:
             missing = [number for number in batch if not file.status[number]]
             file.put([outcome(number, number in FAILED) for number in missing])
-            file.put_state({"wall_seconds": file.data.wall_seconds + len(missing)})
+            file.put_state(wall_seconds=file.data.wall_seconds + len(missing))
         again = [number for batch in batches for number in batch if file.status[number] != DONE]
         file.clear(again)
         file.put([outcome(number, fails=False) for number in again])
 
 
-def kill_while(work: Callable[[], None], at: int) -> int:
-    """Fork, kill the child at call number `at` of the write hook, and return the signal."""
+def finish_writing(path: Path, storage: Storage = DISK) -> None:
+    """Write what is missing, and merge the parts."""
+    continue_writing(path, storage=storage)
+    with EnsembleFile.open(path, storage) as file:
+        finish(file)
+
+
+def kill_while(work: Callable[[Storage], None], at: int) -> int:
+    """Fork, kill the child at file operation number `at`, and return the signal."""
     child = os.fork()
     if child:
         return os.WTERMSIG(os.waitpid(child, 0)[1])
@@ -55,42 +65,50 @@ def kill_while(work: Callable[[], None], at: int) -> int:
         if next(calls) == at:
             os.kill(os.getpid(), signal.SIGKILL)
 
-    atomic_write.on_write_stage = kill
-    work()
+    work(WatchedStorage(kill))
     os._exit(0)
 
 
-def stages_of(work: Callable[[], None]) -> list[str]:
-    """Return all calls of the write hook, in order."""
-    seen: list[str] = []
-    atomic_write.on_write_stage = seen.append
-    work()
-    atomic_write.on_write_stage = lambda _: None
-    return seen
-
-
-def kill_at_stages(kind: str, start: Path | None, work: Callable[[Path], None]) -> None:
+def kill_at_stages(
+    kind: str, start: Path | None, work: Callable[[Path, Storage], None], every: bool
+) -> None:
     """Kill the work on a copy of `start`, or without a file; print file, signal and stage.
 
-    The kills are at every call of the write hook, or at the first, middle and last of each stage.
+    The kills are at every file operation, or at the first, middle and last of each kind.
     """
-    stages = stages_of(lambda: work(whole))
-    for at, name in enumerate(stages):
+    stages: list[str] = []
+    if start:
+        copy_of(start, folder / f"{kind}.h5")
+    work(folder / f"{kind}.h5", WatchedStorage(stages.append))
+    for at in some_of_each(stages):
+        name = stages[at]
         calls = [number for number, stage in enumerate(stages) if stage == name]
         chosen = every or at in {calls[0], calls[len(calls) // 2], calls[-1]}
         if chosen and name.startswith("before"):  # a "before" follows each "after" at once
             target = folder / f"{kind}-{at}.h5"
             if start:
-                shutil.copy(start, target)
-            killed_by = kill_while(lambda: work(target), at)  # noqa: B023
+                copy_of(start, target)
+            killed_by = kill_while(lambda storage: work(target, storage), at)  # noqa: B023
             sys.stdout.write(f"{target.name},{killed_by},{name}\n")
+
+
+def copy_of(path: Path, target: Path) -> None:
+    """Copy an ensemble with its parts."""
+    shutil.copy(path, target)
+    shutil.copytree(f"{path}.parts", f"{target}.parts")
 
 
 if __name__ == "__main__":
     folder, every = Path(sys.argv[1]), sys.argv[2] == "all"
-    fresh, whole = folder / "fresh.h5", folder / "whole.h5"
+    writer.PART_BYTES = SMALL_PART
+    fresh, written, whole = (folder / f"{name}.h5" for name in ("fresh", "written", "whole"))
     create(fresh)
-    kill_at_stages("create", None, create)
-    atomic_write._CHUNK = SMALL_CHUNK
-    kill_at_stages("rows", fresh, lambda path: continue_writing(path, BATCHES[:1]))
-    continue_writing(whole)
+    kill_at_stages("create", None, create, every)
+    kill_at_stages(
+        "rows", fresh, lambda path, storage: continue_writing(path, BATCHES[:1], storage), every
+    )
+    create(written)
+    continue_writing(written)
+    kill_at_stages("merge", written, finish_writing, every)
+    create(whole)
+    finish_writing(whole)

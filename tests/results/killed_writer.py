@@ -9,19 +9,19 @@ from pathlib import Path
 
 from run_examples import some_run
 
-from wearsim.results.io import atomic_write, writer
+from tests.faulty_storage import WatchedStorage, some_of_each
+from wearsim.results import write_results
 
 
 def stages_of_a_write(path: Path) -> list[str]:
-    """Return all calls of the write hook, in order; a stage may occur more than once."""
+    """Return all file operations, in order; one may occur more than once."""
     seen: list[str] = []
-    atomic_write.on_write_stage = seen.append
-    writer.write_results(path, some_run(seed=2, strips=400, records=20))
+    write_results(path, some_run(seed=2, strips=400, records=20), WatchedStorage(seen.append))
     return seen
 
 
 def kill_while_writing(path: Path, at: int) -> int:
-    """Fork, kill the child at call number `at` of the write hook, and return the signal."""
+    """Fork, kill the child at file operation number `at`, and return the signal."""
     child = os.fork()
     if child:
         return os.WTERMSIG(os.waitpid(child, 0)[1])
@@ -31,18 +31,16 @@ def kill_while_writing(path: Path, at: int) -> int:
         if next(calls) == at:
             os.kill(os.getpid(), signal.SIGKILL)
 
-    atomic_write.on_write_stage = kill
-    writer.write_results(path, some_run(seed=2, strips=400, records=20))
+    write_results(path, some_run(seed=2, strips=400, records=20), WatchedStorage(kill))
     os._exit(0)
 
 
 if __name__ == "__main__":
     folder = Path(sys.argv[1])
     stages = stages_of_a_write(folder / "whole.h5")
-    for number, name in enumerate(stages):
-        target = folder / f"{number}.h5"
-        atomic_write.on_write_stage = lambda stage: None
+    for number in some_of_each(stages):
+        name, target = stages[number], folder / f"{number}.h5"
         if number % 2 == 0:  # with and without an old file
-            writer.write_results(target, some_run(seed=1))
+            write_results(target, some_run(seed=1))
         killed_by = kill_while_writing(target, number)
         sys.stdout.write(f"{number},{killed_by},{name}\n")

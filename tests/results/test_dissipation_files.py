@@ -49,7 +49,7 @@ def some_study(count: int = 40, kept: int = 30, **changes: object) -> Dissipatio
         "model": "hertz-fastsim",
         "plan": "sobol",
         "inputs": INPUTS,
-        "asked": 50,
+        "requested": 50,
         "finished": False,
         "strip_width": 6e-5,
         "friction_grid": "",
@@ -106,7 +106,7 @@ def test_xarray_opens_study_with_dimensions_and_units(study_file):
 
 def test_statistics_are_stored_in_the_file(study_file):
     with h5py.File(study_file) as file:
-        about = json.loads(file["inputs/about"][()])
+        about = json.loads(file["inputs/about"][0])
         power = file["power"][()]
     assert about["statistics"]["power"]["mean"] == pytest.approx(power.mean(), rel=1e-14)
     quantiles = {item["probability"]: item for item in about["statistics"]["power"]["quantiles"]}
@@ -129,7 +129,7 @@ def test_wrong_kind_of_file_raises_one_line_error(study_file, tmp_path):
 
 
 def _newer(file: h5py.File) -> None:
-    file.attrs["format_version"] = 2
+    file.attrs["format_version"] = 3
 
 
 def _without_power(file: h5py.File) -> None:
@@ -148,7 +148,7 @@ def _with_wrong_shape(file: h5py.File) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (_newer, "was written by a newer wearsim (format 2, this one reads up to 1)"),
+        (_newer, "has layout 3 of wearsim-dissipation, and this wearsim reads layout 2; update"),
         (_without_power, "is damaged (lacks power)"),
         (_without_drawn_values, "is damaged (lacks load.normal_force)"),
         (_with_wrong_shape, "is damaged ("),
@@ -173,7 +173,7 @@ def test_study_properties_return_their_variables(study_file):
     for name in ("power", "y", "dissipation"):
         assert getattr(result, name).tobytes() == result.values(name).tobytes()
     assert list(result.inputs) == ["load.normal_force", "friction.coefficient"]
-    assert (result.count, result.finished, result.raw.asked) == (40, False, 50)
+    assert (result.count, result.finished, result.raw.requested) == (40, False, 50)
     assert set(VARIABLES) < set(result.raw.variables)
 
 
@@ -192,7 +192,7 @@ def test_repr_of_study():
         r"<DissipationResult 'a contact': 40 of 50 realisations, power [\d.]+ W, std [\d.]+ W>",
         repr(DissipationResult(some_study())),
     )
-    one = DissipationResult(some_study(count=1, kept=1, asked=1, finished=True))
+    one = DissipationResult(some_study(count=1, kept=1, requested=1, finished=True))
     assert repr(one) == (
         f"<DissipationResult 'a contact': 1 realisation, power {one.power[0]:.4g} W>"
     )

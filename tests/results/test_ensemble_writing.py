@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import signal
 import subprocess
@@ -18,18 +17,20 @@ import pytest
 import xarray
 from ensemble_examples import (
     SCALARS,
+    differences,
+    finish,
     some_header,
     some_outcome,
     some_static,
     some_statistics,
-    without_state,
 )
 from run_examples import some_run
 
+from tests.faulty_storage import full_disk
 from wearsim.errors import ResultsFileError
-from wearsim.results import EnsembleFile, check_output, read_ensemble, write_results
+from wearsim.results import DISK, EnsembleFile, check_output, read_ensemble, write_results
+from wearsim.results.ensemble import writer
 from wearsim.results.ensemble.schema import DONE, OBSERVABLES, PENDING
-from wearsim.results.io import atomic_write
 
 HERE = Path(__file__).parent
 COUNT = 12
@@ -40,45 +41,49 @@ def _outcomes(numbers, failed=FAILED):
     return [some_outcome(n, error=f"{n} failed" if n in failed else "") for n in numbers]
 
 
-def _new(path: Path, **changes: object) -> EnsembleFile:
-    return EnsembleFile.create(path, some_header(COUNT, **changes), some_static())
+def _new(path: Path, storage=DISK, **changes: object) -> EnsembleFile:
+    return EnsembleFile.create(path, some_header(COUNT, **changes), some_static(), storage)
 
 
-def test_file_does_not_depend_on_order_and_batches(tmp_path):
-    contents = set()
+@pytest.mark.parametrize("part_bytes", [1, 5000, 1 << 21])
+def test_content_does_not_depend_on_order_batches_and_parts(tmp_path, monkeypatch, part_bytes):
+    monkeypatch.setattr(writer, "PART_BYTES", part_bytes)
+    whole = tmp_path / "whole.h5"
+    with _new(whole) as file:
+        file.put(_outcomes(range(COUNT)))
+        finish(file)
     for seed, size in ((0, COUNT), (1, 1), (2, 3), (3, 5), (4, 2)):
         path = tmp_path / f"{seed}.h5"
         order = np.random.default_rng(seed).permutation(COUNT)
         with _new(path) as file:
             for start in range(0, COUNT, size):
                 file.put(_outcomes(order[start : start + size].tolist()))
-                file.put_state({"wall_seconds": float(start)})
+                file.put_state(wall_seconds=float(start))
         with EnsembleFile.open(path) as file:
-            file.put_statistics(_statistics_for(tmp_path))
-        contents.add(hashlib.sha256(without_state(path)).hexdigest())
-    assert len(contents) == 1
-
-
-def _statistics_for(folder: Path):
-    path = folder / "shapes.h5"
-    if not path.exists():
-        _new(path).close()
-    return some_statistics(path)
+            finish(file)
+        assert differences(path, whole) == []
+        assert not Path(f"{path}.parts").exists()
 
 
 def test_repeated_failed_realisation_gives_the_same_file(tmp_path):
-    once, twice = tmp_path / "once.h5", tmp_path / "twice.h5"
+    once, twice, merged = (tmp_path / f"{name}.h5" for name in ("once", "twice", "merged"))
     with _new(once) as file:
         file.put(_outcomes(range(COUNT), failed={9}))
-    with _new(twice) as file:
-        file.put(_outcomes(range(COUNT)))
-    with EnsembleFile.open(twice) as file:
-        file.clear([3, 2])
-        assert np.flatnonzero(file.status == PENDING).tolist() == [2, 3]
-        file.put(_outcomes([2, 3], failed=set()))
-    assert read_ensemble(twice).errors == {9: "9 failed"}
-    is_same = without_state(once) == without_state(twice)
-    assert is_same
+        finish(file)
+    for path in (twice, merged):
+        with _new(path) as file:
+            file.put(_outcomes(range(COUNT)))
+            if path == merged:
+                finish(file)
+        with EnsembleFile.open(path) as file:
+            file.clear([3, 2])
+            assert np.flatnonzero(file.status == PENDING).tolist() == [2, 3]
+            assert not read_ensemble(path).finished
+            file.put(_outcomes([2, 3], failed=set()))
+            assert read_ensemble(path).errors == {9: "9 failed"}
+            finish(file)
+        assert read_ensemble(path).errors == {9: "9 failed"}
+        assert differences(once, path) == []
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork and SIGKILL")
@@ -94,18 +99,23 @@ def test_killed_ensemble_is_continued_bit_for_bit(tmp_path, extent):
     )
     lines = [line.split(",") for line in done.stdout.splitlines()]
     assert {int(killed_by) for _, killed_by, _ in lines} == {signal.SIGKILL}
-    whole = without_state(tmp_path / "whole.h5")
+    assert "before remove" in {stage for _, _, stage in lines}
+    whole = tmp_path / "whole.h5"
     counts, exists = set(), False
     for name, _, stage in lines:
         path = tmp_path / name
-        exists = exists or stage == "before fsync folder" or name.startswith("rows")
+        exists = exists or stage == "before fsync folder" or not name.startswith("create")
         assert path.exists() == exists
         if not exists:
             killed.create(path)  # remains of the killed process do not matter
-        counts.add(_check_rows(path))
-        killed.continue_writing(path)
-        is_same = without_state(path) == whole  # pytest takes long to show how files differ
-        assert is_same, name
+        if name.startswith("merge"):
+            data = read_ensemble(path)
+            assert len(data.done) == killed.COUNT  # finished or not, with or without parts
+        else:
+            counts.add(_check_rows(path))
+        killed.finish_writing(path)
+        assert differences(path, whole) == [], name
+        assert not list(tmp_path.glob(f"{name}.*"))
     expected = {(0, 0), (1, 1), (2, 1), (2, 0), (3, 0)}  # done and failed, after each operation
     assert counts == expected if extent == "all" else {(0, 0)} < counts <= expected
 
@@ -121,26 +131,6 @@ def _check_rows(path: Path) -> tuple[int, int]:
     for number in data.failed.tolist():
         assert data.errors[number] == killed.outcome(number, fails=True).error
     return len(data.done), len(data.failed)
-
-
-def test_partly_written_state_leaves_the_previous_one(tmp_path):
-    path = tmp_path / "a.h5"
-    with _new(path) as file:
-        file.put_state({"wall_seconds": 1.0})
-    before = path.read_bytes()
-    with EnsembleFile.open(path) as file:
-        file.put_state({"wall_seconds": 2.0, "finished": True})
-    after = path.read_bytes()
-    changed = np.flatnonzero(np.frombuffer(before, "u1") != np.frombuffer(after, "u1"))
-    for at in (*changed[:20], *changed[20::9]):  # bytes before it are new, the others old
-        path.write_bytes(after[:at] + before[at:])
-        data = read_ensemble(path)
-        assert (data.wall_seconds, data.finished) == (1.0, False), at
-        assert data.notes == some_header().notes
-    path.write_bytes(after[: changed[5]] + before[changed[5] :])
-    with EnsembleFile.open(path) as file:  # overwrites the damaged one
-        file.put_state({"wall_seconds": 3.0})
-    assert read_ensemble(path).wall_seconds == 3.0
 
 
 def test_second_writer_is_refused(tmp_path):
@@ -165,66 +155,97 @@ def test_ensemble_replaces_a_file_of_another_kind(tmp_path):
     path = tmp_path / "a.h5"
     write_results(path, some_run())
     _new(path).close()
-    assert read_ensemble(path).asked == COUNT
+    assert read_ensemble(path).requested == COUNT
+
+
+@pytest.mark.parametrize("stage", ["open", "rename", "fsync folder"])
+def test_replaced_ensemble_is_whole_before_and_after(tmp_path, stage):
+    path = tmp_path / "a.h5"
+    with _new(path) as file:
+        file.put(_outcomes([1, 2]))
+    with pytest.raises(ResultsFileError, match="cannot be written"):
+        _new(path, storage=full_disk(stage), title="another")
+    data = read_ensemble(path)
+    replaced = stage == "fsync folder"
+    assert data.title == ("another" if replaced else some_header().title)
+    assert np.flatnonzero(data.status).tolist() == ([] if replaced else [1, 2])
+    with EnsembleFile.open(path) as file:
+        file.put(_outcomes([0]))
+    assert np.flatnonzero(read_ensemble(path).status).tolist() == ([0] if replaced else [0, 1, 2])
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere HDF5 waits for the lock")
-def test_file_is_readable_while_it_is_written(tmp_path):
+def test_ensemble_is_readable_while_it_is_written(tmp_path):
     path = tmp_path / "a.h5"
     with _new(path) as file:
         for number in range(4):
             file.put(_outcomes([number], failed=set()))
             data = read_ensemble(path)
             assert data.done.tolist() == list(range(number + 1))
-            with h5py.File(path) as plain:
+            with h5py.File(f"{path}.parts/000001.h5") as plain:
                 assert plain["status"][number] == DONE
-            with xarray.open_dataset(path, engine="h5netcdf") as dataset:
                 expected = some_outcome(number).observables["depth"]
-                np.testing.assert_array_equal(dataset["depth"].values[number], expected)
+                np.testing.assert_array_equal(plain["depth"][number], expected)
+            with xarray.open_dataset(path, engine="h5netcdf") as dataset:
+                assert np.isnan(dataset["depth"].values).all()
+        finish(file)
+        assert read_ensemble(path).done.tolist() == list(range(4))
 
 
 @pytest.mark.parametrize("full_at", ["write", "fsync", "open", "rename"])
-def test_full_disk_raises_one_line_error_and_loses_no_row(tmp_path, monkeypatch, full_at):
+def test_full_disk_raises_one_line_error_and_loses_no_row(tmp_path, full_at):
     path, other = tmp_path / "a.h5", tmp_path / "b.h5"
-
-    def fill(stage: str) -> None:
-        if stage == f"before {full_at}":
-            raise OSError(28, "No space left on device")
-
+    with pytest.raises(ResultsFileError) as caught:
+        _new(other, full_disk(full_at))
+    assert str(caught.value) == f"{other}: cannot be written (No space left on device)"
+    assert list(tmp_path.iterdir()) == []
     with _new(path) as file:
         file.put(_outcomes([1]))
-        monkeypatch.setattr(atomic_write, "on_write_stage", fill)
-        with pytest.raises(ResultsFileError) as caught:
-            _new(other)
-        assert str(caught.value) == f"{other}: cannot be written (No space left on device)"
-        assert list(tmp_path.iterdir()) == [path]
-        if full_at in {"write", "fsync"}:
-            for attempt in (
-                lambda: file.put(_outcomes([0, 2])),
-                lambda: file.clear([1] if full_at == "write" else []),
-                lambda: file.put_state({"finished": True}),
-            ):
-                with pytest.raises(ResultsFileError) as caught:
-                    attempt()
-                assert str(caught.value) == f"{path}: cannot be written (No space left on device)"
-        monkeypatch.undo()
+    with EnsembleFile.open(path, full_disk(full_at)) as file:
+        for attempt in (
+            lambda: file.put(_outcomes([0, 2])),
+            lambda: file.clear([1]),
+            lambda: file.put_state(wall_seconds=2.0),
+            lambda: finish(file),
+            lambda: file.grow(2 * COUNT),
+        ):
+            with pytest.raises(ResultsFileError) as caught:
+                attempt()
+            assert str(caught.value).startswith(f"{path}")
+            assert str(caught.value).endswith(": cannot be written (No space left on device)")
         assert np.flatnonzero(file.status).tolist() == [1]
+    assert np.flatnonzero(read_ensemble(path).status).tolist() == [1]
+    with EnsembleFile.open(path) as file:
         file.put(_outcomes([0, 2]))
-    data = read_ensemble(path)
-    assert np.flatnonzero(data.status).tolist() == [0, 1, 2]
-    assert not data.finished
+        data = read_ensemble(path)
+        assert np.flatnonzero(data.status).tolist() == [0, 1, 2]
+        assert not data.finished
+        finish(file)
+    assert np.flatnonzero(read_ensemble(path).status).tolist() == [0, 1, 2]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="there is no limit on the size of files")
-def test_limit_on_file_size_raises_one_line_error(tmp_path):
+@pytest.mark.parametrize(
+    ("limit", "work"),
+    [
+        (20_000, "EnsembleFile.create(path, some_header(), some_static())"),
+        (80_000, "file = EnsembleFile.open(path); finish(file)"),
+    ],
+)
+def test_limit_on_file_size_raises_one_line_error(tmp_path, limit, work):
     """A limit on the file size represents a full disk, which HDF5 itself must not meet."""
     code = (
         "import resource, sys; from pathlib import Path\n"
         "from ensemble_examples import *\n"
-        "resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))\n"
-        "EnsembleFile.create(Path(sys.argv[1]), some_header(), some_static())"
+        "path = Path(sys.argv[1])\n"
+        f"resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))\n{work}"
     )
     path = tmp_path / "a.h5"
+    if "open" in work:
+        with EnsembleFile.create(path, some_header(1000), some_static()) as file:
+            file.put(_outcomes(range(20)))
+            file.put(_outcomes([999]))
+    before = sorted(tmp_path.rglob("*"))
     done = subprocess.run(
         [sys.executable, "-c", code, str(path)],
         capture_output=True,
@@ -236,18 +257,17 @@ def test_limit_on_file_size_raises_one_line_error(tmp_path):
     message = f"wearsim.errors.ResultsFileError: {path}: cannot be written (File too large)"
     assert done.stderr.splitlines()[-1] == message
     assert "Exception ignored" not in done.stderr
-    assert list(tmp_path.iterdir()) == []
+    assert [item for item in sorted(tmp_path.rglob("*")) if item.name != "lock"] == before
 
 
-def test_read_only_file_is_refused(tmp_path, monkeypatch):
+def test_folder_that_cannot_be_written_is_refused(tmp_path, monkeypatch):
     path = tmp_path / "a.h5"
     _new(path).close()
 
     def refuse(self, *args, **kwargs):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("wearsim.results.ensemble.writer.Path.open", refuse)
-    monkeypatch.setattr("wearsim.results.ensemble.writer.kind_of", lambda path: "ensemble")
+    monkeypatch.setattr("wearsim.results.ensemble.writer.Path.mkdir", refuse)
     with pytest.raises(ResultsFileError, match=r"a\.h5: cannot be written \(Permission denied\)"):
         EnsembleFile.open(path)
 
@@ -276,10 +296,9 @@ def test_inconsistent_outcome_is_refused_and_not_written(tmp_path, change, messa
     path, outcome = tmp_path / "a.h5", some_outcome(4)
     change(outcome)
     with _new(path) as file:
-        before = path.read_bytes()
         with pytest.raises(ValueError, match=message):
             file.put([some_outcome(0), outcome])
-        assert path.read_bytes() == before
+        assert (read_ensemble(path).status == PENDING).all()
 
 
 def test_realisation_is_written_only_once(tmp_path):
@@ -312,28 +331,30 @@ def test_profiles_beyond_the_kept_ones_are_not_stored(tmp_path, monkeypatch):
     np.testing.assert_array_equal(data.variables["depth"][4], some_outcome(4).observables["depth"])
 
 
-def test_inconsistent_state_is_refused(tmp_path):
+def test_unknown_field_is_refused(tmp_path):
     with _new(tmp_path / "a.h5") as file:
-        with pytest.raises(ValueError, match="a state has the fields"):
-            file.put_state({"depth": 1.0})
-        with pytest.raises(ValueError, match="does not fit"):
-            file.put_state({"warnings": ["too long " * 20_000]})
-        file.put_state({"statistics": {"all": [np.float64(0.1)] * 1000, "count": np.int64(3)}})
+        with pytest.raises(ValueError, match="has no fields"):
+            file.put_state(depth=1.0)
+        file.put_state(statistics={"all": [np.float64(0.1)] * 1000, "count": np.int64(3)})
     assert read_ensemble(tmp_path / "a.h5").statistics["count"] == 3
 
 
 def test_inconsistent_statistics_and_static_are_refused(tmp_path):
     path = tmp_path / "a.h5"
     with _new(path) as file:
-        with pytest.raises(ValueError, match="depth is not a statistic"):
-            file.put_statistics({"depth": np.zeros(4)})
-        with pytest.raises(ValueError, match=r"depth_mean has the shape \(3,\), expected \(4,\)"):
-            file.put_statistics({"depth_mean": np.zeros(3)})
+        for wrong, message in (
+            ({"depth": np.zeros(4)}, "depth is not a statistic"),
+            ({"depth_mean": np.zeros(3)}, r"depth_mean has the shape \(3,\), expected \(4,\)"),
+        ):
+            with pytest.raises(ValueError, match=message):
+                file.finish(lambda data, wrong=wrong: ({}, wrong))
+        assert some_statistics(file.data).keys() > {"depth_mean"}
     static = some_static()
+    before = sorted(tmp_path.iterdir())
     for broken in (static | {"record_time": np.zeros(2)}, {"y": static["y"]}):
         with pytest.raises(ValueError, match=r"record_time|static arrays"):
             EnsembleFile.create(tmp_path / "b.h5", some_header(), broken)
-    assert list(tmp_path.iterdir()) == [path]
+    assert sorted(tmp_path.iterdir()) == before
 
 
 def test_examples_contain_all_variables(tmp_path):

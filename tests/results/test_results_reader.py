@@ -160,8 +160,12 @@ def test_hdf5_of_another_program_is_refused(tmp_path: Path) -> None:
 
 
 def _newer(file: h5py.File) -> None:
-    file.attrs["format_version"] = 2
+    file.attrs["format_version"] = 3
     del file["depth"]
+
+
+def _older(file: h5py.File) -> None:
+    file.attrs["format_version"] = 1
 
 
 def _incomplete(file: h5py.File) -> None:
@@ -176,7 +180,7 @@ def _with_wrong_shape(file: h5py.File) -> None:
 def _with_about(text: str) -> Callable[[h5py.File], None]:
     def change(file: h5py.File) -> None:
         del file["inputs/about"]
-        file["inputs"].create_dataset("about", data=np.bytes_(text + " "))
+        file["inputs"].create_dataset("about", data=[np.bytes_(text + " ")])
 
     return change
 
@@ -184,7 +188,20 @@ def _with_about(text: str) -> Callable[[h5py.File], None]:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (_newer, "was written by a newer wearsim (format 2, this one reads up to 1)"),
+        (
+            _newer,
+            (
+                "has layout 3 of wearsim-run, and this wearsim reads layout 2; update wearsim to"
+                " read it"
+            ),
+        ),
+        (
+            _older,
+            (
+                "has layout 1 of wearsim-run, and this wearsim reads layout 2; repeat the"
+                " computation, or read it with the version of wearsim that wrote it"
+            ),
+        ),
         (_incomplete, "is damaged (lacks depth, inputs/about, checkpoint)"),
         (_with_wrong_shape, "is damaged (depth has 2 along step, others have 5)"),
         (_with_about("{"), "is damaged (Expecting property name"),

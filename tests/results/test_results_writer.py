@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 from run_examples import some_run
 
+from tests.faulty_storage import STAGES, WatchedStorage, full_disk, some_of_each
 from wearsim.errors import ResultsFileError
 from wearsim.results import check_output, read_results, write_results
-from wearsim.results.io import atomic_write
 from wearsim.results.run.data import differences
 
 HERE = Path(__file__).parent
@@ -25,30 +25,24 @@ class Fault(Exception):  # noqa: N818
     pass
 
 
-def _all_calls(folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+def _all_calls(folder: Path) -> list[str]:
     calls: list[str] = []
-    monkeypatch.setattr(atomic_write, "on_write_stage", calls.append)
-    write_results(folder / "all.h5", NEW)
-    monkeypatch.undo()
+    write_results(folder / "all.h5", NEW, WatchedStorage(calls.append))
     return calls
 
 
-def test_write_hook_is_called_around_every_stage(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    calls = _all_calls(tmp_path, monkeypatch)
-    expected = [f"{when} {stage}" for stage in atomic_write.STAGES for when in ("before", "after")]
+def test_storage_is_used_for_every_stage(tmp_path: Path) -> None:
+    calls = _all_calls(tmp_path)
+    expected = [f"{when} {stage}" for stage in STAGES for when in ("before", "after")]
     assert list(dict.fromkeys(calls)) == expected
     assert calls.count("before write") > 1  # so that a failure can hit a half-written file
 
 
-def test_failure_at_any_stage_leaves_old_or_new_file(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_failure_at_any_stage_leaves_old_or_new_file(tmp_path: Path) -> None:
     path = tmp_path / "run.h5"
-    calls = _all_calls(tmp_path, monkeypatch)
+    calls = _all_calls(tmp_path)
     renamed = calls.index("after rename")
-    for at in range(len(calls)):
+    for at in some_of_each(calls):
         write_results(path, OLD)
         left = at
 
@@ -58,10 +52,8 @@ def test_failure_at_any_stage_leaves_old_or_new_file(
             if left < 0:
                 raise Fault(stage)
 
-        monkeypatch.setattr(atomic_write, "on_write_stage", fail)
         with pytest.raises(Fault):
-            write_results(path, NEW)
-        monkeypatch.undo()
+            write_results(path, NEW, WatchedStorage(fail))
         assert differences(read_results(path), OLD if at < renamed else NEW) == []
         assert sorted(tmp_path.iterdir()) == [tmp_path / "all.h5", path]
 
@@ -74,37 +66,32 @@ def test_kill_at_any_stage_leaves_old_or_new_file(tmp_path: Path) -> None:
         capture_output=True,
         text=True,
         check=True,
-        env=environment,
+        env=environment | {"PYTHONPATH": str(HERE.parents[1])},
         cwd=HERE.parents[1],
     )
     lines = [line.split(",") for line in done.stdout.splitlines()]
-    assert {name.split(maxsplit=1)[1] for _, _, name in lines} == set(atomic_write.STAGES)
+    assert {name.split(maxsplit=1)[1] for _, _, name in lines} == set(STAGES)
     renamed = [name for _, _, name in lines].index("after rename")
-    for number, (_, killed_by, _) in enumerate(lines):
+    for place, (number, killed_by, _) in enumerate(lines):
         path = tmp_path / f"{number}.h5"
         assert int(killed_by) == signal.SIGKILL
-        if number >= renamed:
+        if place >= renamed:
             assert differences(read_results(path), NEW) == []
-        elif number % 2 == 0:
+        elif int(number) % 2 == 0:
             assert differences(read_results(path), OLD) == []
         else:
             assert not path.exists()
         write_results(path, NEW)  # remains of the killed process do not matter
         assert differences(read_results(path), NEW) == []
-        assert not path.with_name(f"{number}.h5.part").exists()
+        assert not path.with_name(f"{number}.h5.tmp").exists()
 
 
-def test_full_disk_raises_one_line_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("at", ["open", "write", "fsync", "rename"])
+def test_full_disk_raises_one_line_error(tmp_path: Path, at: str) -> None:
     path = tmp_path / "run.h5"
     write_results(path, OLD)
-
-    def fill(stage: str) -> None:
-        if stage == "before fsync":
-            raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(atomic_write, "on_write_stage", fill)
     with pytest.raises(ResultsFileError) as caught:
-        write_results(path, NEW)
+        write_results(path, NEW, full_disk(at))
     assert str(caught.value) == f"{path}: cannot be written (No space left on device)"
     assert differences(read_results(path), OLD) == []
 

@@ -22,21 +22,20 @@ from killed_run import (
 )
 
 from tests.studies.ensemble_cases import differences, small
-from wearsim.results import open_ensemble
-from wearsim.results.io import atomic_write
+from wearsim.results import DISK, Storage, open_ensemble
 from wearsim.scenario import Scenario
 from wearsim.studies.ensemble import realisation
 from wearsim.studies.ensemble.api import ensemble, resume_ensemble
 from wearsim.studies.ensemble.driver import EnsembleWork
 
 
-def go(scenario: Scenario, count: int, path: Path, scheduler: str = "serial") -> int:
+def go(scenario: Scenario, count: int, path: Path, storage: Storage = DISK) -> int:
     """Run or resume an ensemble; return the number of completed realisations, -1 for no file."""
     if not path.exists():
-        ensemble(scenario, count, path, scheduler=scheduler)
+        ensemble(scenario, count, path, scheduler="serial", storage=storage)
         return -1
     done = int((open_ensemble(path).raw.status != 0).sum())
-    resume_ensemble(path, scheduler=scheduler)
+    resume_ensemble(path, scheduler="serial", storage=storage)
     return done
 
 
@@ -46,9 +45,9 @@ def kill_at_stages(scenario: Scenario, count: int, folder: Path, extent: str) ->
     The names of all stages are printed first. Every fifth is killed again when it is resumed.
     """
     whole = ensemble(scenario, count, folder / "one.h5", scheduler="serial")
-    stages = stages_of(lambda: go(scenario, count, folder / "whole.h5"))
+    stages = stages_of(lambda storage: go(scenario, count, folder / "whole.h5", storage))
     write_line(stages=stages)
-    created = stages.index("after fsync folder") + 1  # later writes are in place
+    created = stages.index("after fsync folder") + 1  # parts and their merging follow
     third = (len(stages) - created) // 3
     bounds = [0, created, created + third, created + 2 * third, len(stages)]
     numbers = []
@@ -63,8 +62,7 @@ def kill_at_stages(scenario: Scenario, count: int, folder: Path, extent: str) ->
         for at in (number, *again):
 
             def work(at: int = at, path: Path = path) -> None:
-                atomic_write.on_write_stage = killing(at)
-                go(scenario, count, path)
+                go(scenario, count, path, killing(at))
 
             killed.append(ended(forked(work)))
         done = go(scenario, count, path)

@@ -15,20 +15,19 @@ from pathlib import Path
 
 from study_examples import LOADS, ROLLERS, run_differences, short
 
-from wearsim.results import Result, open_results
-from wearsim.results.io import atomic_write
+from tests.faulty_storage import WatchedStorage
+from wearsim.results import DISK, Result, Storage, open_results
 from wearsim.scenario import Scenario
 from wearsim.studies.run import run as studies
 from wearsim.studies.run.events import Event, Started
 
 OFTEN = {"outputs.checkpoint_every": "1e-9 s"}
-SMALL_CHUNK = 1 << 15  # several writes to a file
 
 
-def go(scenario: Scenario, path: Path) -> float:
+def go(scenario: Scenario, path: Path, storage: Storage = DISK) -> float:
     """Run or resume a test; return the passes from which it was resumed, -1 for none."""
     if not path.exists():
-        studies.run(scenario, path)
+        studies.run(scenario, path, storage=storage)
         return -1.0
     starts = [float(scenario.total_passes)]  # there are no events of a finished run
 
@@ -36,7 +35,7 @@ def go(scenario: Scenario, path: Path) -> float:
         if isinstance(event, Started):
             starts.append(event.from_passes)
 
-    studies.resume(path, on_event=watch)
+    studies.resume(path, on_event=watch, storage=storage)
     return starts[-1]
 
 
@@ -87,12 +86,10 @@ def ended_after(seconds: float, work: Callable[[], object]) -> int:
     return ended(forked(limited))
 
 
-def stages_of(work: Callable[[], object]) -> list[str]:
-    """Return the write stages of `work`."""
+def stages_of(work: Callable[[Storage], object]) -> list[str]:
+    """Return the file operations of `work`."""
     seen: list[str] = []
-    atomic_write.on_write_stage = seen.append
-    work()
-    atomic_write.on_write_stage = lambda _: None
+    work(WatchedStorage(seen.append))
     return seen
 
 
@@ -101,15 +98,15 @@ def chosen_of(stages: list[str], extent: str) -> list[int]:
     return {"all": list(range(len(stages))), "each stage": one_of_each(stages)}[extent]
 
 
-def killing(at: int) -> Callable[[str], None]:
-    """Return a hook for fault injection that kills the process at one of its calls."""
+def killing(at: int) -> Storage:
+    """Return file operations that kill the process at one of their stages."""
     calls = iter(range(10**6))
 
     def kill(_: str) -> None:
         if next(calls) == at:
             os.kill(os.getpid(), signal.SIGKILL)
 
-    return kill
+    return WatchedStorage(kill)
 
 
 def one_of_each(stages: list[str]) -> list[int]:
@@ -127,8 +124,7 @@ def kill_at_stages(scenario: Scenario, folder: Path, extent: str) -> None:
     The names of all stages are printed first.
     """
     whole = studies.run(scenario)
-    atomic_write._CHUNK = SMALL_CHUNK
-    stages = stages_of(lambda: go(scenario, folder / "whole.h5"))
+    stages = stages_of(lambda storage: go(scenario, folder / "whole.h5", storage))
     write_line(stages=stages)
     for turn, number in enumerate(chosen_of(stages, extent)):
         path = folder / f"{number}.h5"
@@ -137,12 +133,11 @@ def kill_at_stages(scenario: Scenario, folder: Path, extent: str) -> None:
         for at in (number, *again):
 
             def work(at: int = at) -> None:
-                atomic_write.on_write_stage = killing(at)
-                go(scenario, path)  # noqa: B023  (done before the next turn)
+                go(scenario, path, killing(at))  # noqa: B023  (done before the next turn)
 
             killed.append(ended(forked(work)))
         write_line(number=number, killed=killed, **finished(scenario, path, whole))
-        assert not path.with_name(f"{path.name}.part").exists()
+        assert not path.with_name(f"{path.name}.tmp").exists()
 
 
 def kill_at_moments(scenario: Scenario, folder: Path, count: int) -> None:

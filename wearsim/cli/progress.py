@@ -200,7 +200,7 @@ class EnsembleWatcher:
     def __call__(self, progress: EnsembleProgress) -> None:
         """Store the workers and show the progress."""
         self.workers = progress.workers
-        self._display.advance(progress.done + progress.failed, progress.asked)
+        self._display.advance(progress.done + progress.failed, progress.requested)
         self._display.show(progress_text(progress, self._display.columns))
 
 
@@ -213,7 +213,7 @@ def progress_text(progress: EnsembleProgress, columns: float = math.inf) -> str:
     columns : float
         Greatest length; parts that would exceed it are left out.
     """
-    text = f"{count(progress.done)} of {count(progress.asked)}"
+    text = f"{count(progress.done)} of {count(progress.requested)}"
     if columns == math.inf:
         text += " realisations"
     parts = [

@@ -7,6 +7,7 @@ from wearsim.results.ensemble.data import EnsembleData, Outcome
 from wearsim.results.ensemble.reader import read_ensemble
 from wearsim.results.ensemble.result import EnsembleResult, open_ensemble
 from wearsim.results.ensemble.writer import EnsembleFile
+from wearsim.results.io.atomic_write import DISK, Storage
 from wearsim.results.io.overwrite_guard import check_output, refuse_inputs, same_file
 from wearsim.results.io.reader import kind_of, read_dissipation, read_results
 from wearsim.results.io.writer import write_results
@@ -14,6 +15,7 @@ from wearsim.results.run.data import RunData
 from wearsim.results.run.result import Result, open_results
 
 __all__ = [
+    "DISK",
     "DissipationData",
     "DissipationResult",
     "EnsembleData",
@@ -22,6 +24,7 @@ __all__ = [
     "Outcome",
     "Result",
     "RunData",
+    "Storage",
     "check_output",
     "export_csv",
     "kind_of",

@@ -12,6 +12,12 @@ from wearsim.results.schema import Schema
 
 Arrays = dict[str, npt.NDArray[Any]]
 
+CHECKPOINT, INPUTS = "checkpoint", "inputs"
+"""Groups of a results file."""
+ABOUT, SCENARIO, FILES = "about", "scenario", "files"
+"""Texts in the group of the inputs: the attributes, the scenario and its files."""
+ERRORS = "surrogatepass"  # so that every Python string can be stored
+
 
 @dataclass(frozen=True, eq=False)
 class Content:
@@ -32,7 +38,7 @@ class Content:
     checkpoint : dict of str to ndarray
         State for resuming; empty if nothing can be resumed.
     reserved : frozenset of str
-        Variables for which only space is allocated; their values are ignored.
+        Variables whose rows are written later; their values are ignored.
     """
 
     schema: Schema

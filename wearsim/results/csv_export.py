@@ -13,13 +13,14 @@ import numpy as np
 import numpy.typing as npt
 
 from wearsim.errors import ResultsFileError
+from wearsim.results.content import ERRORS
 from wearsim.results.dissipation.data import DissipationData
 from wearsim.results.dissipation.result import DissipationResult
 from wearsim.results.dissipation.schema import dissipation_schema
 from wearsim.results.ensemble.data import EnsembleData
 from wearsim.results.ensemble.result import EnsembleResult
 from wearsim.results.ensemble.schema import FAILED, OBSERVABLES, PENDING
-from wearsim.results.io.atomic_write import write_pieces
+from wearsim.results.io.atomic_write import replacement
 from wearsim.results.run.data import RunData
 from wearsim.results.run.result import Result
 from wearsim.results.run.schema import AXES, VARIABLES
@@ -120,17 +121,9 @@ def export_csv(
             parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise ResultsFileError(f"{parent}: cannot be made ({error.strerror})") from error
-        write_pieces(folder / name, _with_offsets(content))
+        with replacement(folder / name) as file:
+            file.writelines(piece.encode("utf-8", ERRORS) for piece in content)
     return [folder / name for name in contents]
-
-
-def _with_offsets(content: Iterable[str]) -> Iterator[tuple[int, bytes]]:
-    """Yield the pieces of a text as bytes, each with its offset in the file."""
-    offset = 0
-    for piece in content:
-        data = piece.encode("utf-8", "surrogatepass")
-        yield offset, data
-        offset += len(data)
 
 
 def _path_in_folder(path: str, used: Iterable[str]) -> str:
@@ -157,8 +150,8 @@ def _ensemble_tables(result: EnsembleResult) -> dict[str, Iterable[str]]:
 
 def _ensemble_realisations(raw: EnsembleData) -> Iterator[str]:
     """Yield drawn values and results of all realisations except pending ones, in blocks."""
-    for start in range(0, raw.asked, _BLOCK):
-        stop = min(start + _BLOCK, raw.asked)
+    for start in range(0, raw.requested, _BLOCK):
+        stop = min(start + _BLOCK, raw.requested)
         titles, values = zip(*_block(raw, start, stop), strict=True)
         if start == 0:
             yield _csv([titles])

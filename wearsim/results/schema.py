@@ -78,7 +78,7 @@ class Schema:
     format : str
         Name of the format.
     version : int
-        Version written, which is also the newest that can be read.
+        Number of the layout, the only one that is written and read.
     holds : str
         Content and the command that writes it, for messages.
     axes : mapping of str to Axis

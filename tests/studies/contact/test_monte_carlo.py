@@ -269,7 +269,7 @@ def test_realisation_without_solution_is_reported(tmp_path, monkeypatch):
     assert message.startswith(f"realisation {first} of seed 3 has no solution: ")
     assert f"its inputs: load.normal_force {loads[first]:.6g} N" in message
     kept = open_dissipation(tmp_path / "a.h5")
-    assert (kept.count, kept.finished, kept.raw.asked) == (first // 8 * 8, False, 4000)
+    assert (kept.count, kept.finished, kept.raw.requested) == (first // 8 * 8, False, 4000)
 
 
 def test_stopped_study_keeps_completed_realisations(tmp_path, monkeypatch):

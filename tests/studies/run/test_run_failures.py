@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from study_examples import LOADS, STEPPERS, run_differences, short
 
+from tests.faulty_storage import WatchedStorage, some_of_each
 from wearsim.errors import (
     CapabilityError,
     Interrupted,
@@ -20,7 +21,6 @@ from wearsim.errors import (
 )
 from wearsim.evolution.steppers import backward_euler as implicit
 from wearsim.results import Result, open_results, read_results, write_results
-from wearsim.results.io import atomic_write
 from wearsim.scenario import Scenario, parse_scenario
 from wearsim.studies.run import recorder
 from wearsim.studies.run import run as studies
@@ -88,47 +88,40 @@ def test_interrupt_in_a_step_keeps_the_previous_step(
     assert run_differences(studies.resume(path), unbroken) == []
 
 
-def _stages(scenario: Scenario, path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Return the write stages of a whole run to `path`."""
+def _stages(scenario: Scenario, path: Path) -> list[str]:
+    """Return the file operations of a whole run to `path`."""
     seen: list[str] = []
-    with monkeypatch.context() as patch:
-        patch.setattr(atomic_write, "on_write_stage", seen.append)
-        studies.run(scenario, path)
+    studies.run(scenario, path, storage=WatchedStorage(seen.append))
     return seen
 
 
-def test_interrupt_while_writing_leaves_resumable_file(
-    path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_interrupt_while_writing_leaves_resumable_file(path: Path) -> None:
     scenario = short(evolution__step=3000, **OFTEN)
     unbroken = studies.run(scenario)
-    stages = _stages(scenario, path, monkeypatch)
-    per_write = stages.index("before open", 1)
-    assert len(stages) == 4 * per_write  # initial state, two steps, finished
-    within_a_write = range(per_write + 1, 2 * per_write + 1)
+    stages = _stages(scenario, path)
+    starts = [number for number, stage in enumerate(stages) if stage == "before open"]
+    assert len(starts) == 4  # initial state, two steps, finished
+    write = stages[starts[1] : starts[2]]
+    within_a_write = [starts[1] + 1 + number for number in some_of_each(write)]
     at_the_end = range(len(stages) - 3, len(stages) + 1)  # around the rename and after it
     for at in (*within_a_write, *at_the_end):
-        with monkeypatch.context() as patch:
-            patch.setattr(atomic_write, "on_write_stage", InterruptAtCall(lambda _: None, at))
-            with pytest.raises(Interrupted, match="continue with"):
-                studies.run(scenario, path, force=True)
+        interrupting = WatchedStorage(InterruptAtCall(lambda _: None, at))
+        with pytest.raises(Interrupted, match="continue with"):
+            studies.run(scenario, path, force=True, storage=interrupting)
         assert list(path.parent.iterdir()) == [path]
         if at % 3 == 0:
             assert run_differences(studies.resume(path), unbroken) == []
 
 
-def test_interrupt_of_first_write_leaves_initial_file_or_none(
-    path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_interrupt_of_first_write_leaves_initial_file_or_none(path: Path) -> None:
     scenario = short(evolution__step=3000)
-    stages = _stages(scenario, path, monkeypatch)
+    stages = _stages(scenario, path)
     renamed = stages.index("after rename")
     for at in (1, renamed, renamed + 1):
         path.unlink(missing_ok=True)
-        with monkeypatch.context() as patch:
-            patch.setattr(atomic_write, "on_write_stage", InterruptAtCall(lambda _: None, at))
-            with pytest.raises(KeyboardInterrupt):
-                studies.run(scenario, path)
+        interrupting = WatchedStorage(InterruptAtCall(lambda _: None, at))
+        with pytest.raises(KeyboardInterrupt):
+            studies.run(scenario, path, storage=interrupting)
         assert path.exists() == (at > renamed)
     assert open_results(path).passes.tolist() == [0.0]
     assert run_differences(studies.resume(path), studies.run(scenario)) == []

@@ -13,9 +13,9 @@ from killed_scripts import ROOT, rows_of
 from study_examples import RIG, run_differences
 
 import wearsim
+from tests.faulty_storage import STAGES
 from tests.interruptible import interruptible
 from wearsim.results import open_results
-from wearsim.results.io import atomic_write
 from wearsim.scenario import Scenario
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork and SIGKILL")
@@ -26,7 +26,7 @@ def test_run_killed_while_writing_resumes_bit_for_bit(tmp_path: Path, extent: st
     head, *rows = rows_of("killed_run.py", "stages", tmp_path, extent)
     stages = head["stages"]
     # initial state, two steps, and the end: four writes through all stages
-    assert {stage.split(maxsplit=1)[1] for stage in stages} == set(atomic_write.STAGES)
+    assert {stage.split(maxsplit=1)[1] for stage in stages} == set(STAGES)
     assert stages.count("before rename") == stages.count("after rename") == 4
     assert stages.count("before write") > 4
     killed_at = [row["number"] for row in rows]

@@ -29,6 +29,16 @@ Until = Annotated[
         show_default=False,
     ),
 ]
+More = Annotated[
+    int | None,
+    typer.Option(
+        "--realisations",
+        "-n",
+        min=1,
+        help="New number of realisations of an ensemble; extends it.",
+        show_default=False,
+    ),
+]
 Failed = Annotated[
     bool, typer.Option("--failed", help="Repeat the failed realisations of an ensemble.")
 ]
@@ -38,6 +48,7 @@ def resume(
     file: ResultsFile,
     until: Until = None,
     failed: Failed = False,
+    realisations: More = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
     json: Json = False,
@@ -49,10 +60,13 @@ def resume(
     if kind_of(file) == "ensemble":
         if until is not None:
             raise typer.BadParameter("only wear tests can be extended", param_hint="--until")
-        _resume_ensemble(file, failed, workers, scheduler, json, quiet)
+        if failed and realisations is not None:
+            raise typer.BadParameter("extend the ensemble first", param_hint="--failed")
+        _resume_ensemble(file, failed, realisations, workers, scheduler, json, quiet)
         return
     for option, is_given in (
         ("--failed", failed),
+        ("--realisations", realisations is not None),
         ("--workers", workers is not None),
         ("--scheduler", scheduler is not None),
     ):
@@ -81,7 +95,13 @@ def _resume_run(file: Path, until: str | None, json: bool, quiet: bool) -> None:
 
 
 def _resume_ensemble(
-    file: Path, failed: bool, workers: int | None, scheduler: str | None, json: bool, quiet: bool
+    file: Path,
+    failed: bool,
+    realisations: int | None,
+    workers: int | None,
+    scheduler: str | None,
+    json: bool,
+    quiet: bool,
 ) -> None:
     chosen = checked_scheduler(scheduler, workers)
     from wearsim.cli.commands.ensemble import STOPPING, report
@@ -91,12 +111,13 @@ def _resume_ensemble(
     from wearsim.studies.ensemble.api import resume_ensemble
 
     nothing = _nothing_to_do(open_ensemble(file), failed)
-    if nothing:
+    if nothing and realisations is None:
         note(f"note: nothing to do: {nothing}")
     with stop_on_signals(STOPPING) as stop, watching_ensemble(quiet) as watch:
         result = resume_ensemble(
             file,
             failed=failed,
+            realisations=realisations,
             workers=workers,
             scheduler=chosen,
             on_progress=watch,

@@ -122,7 +122,7 @@ def as_json(found: Comparison, files: Sequence[str]) -> dict[str, Any]:
                 "realisations": row.count,
                 "done": row.done,
                 "failed": row.failed,
-                "asked": row.asked,
+                "requested": row.requested,
                 "finished": row.finished,
                 "passes": row.passes,
                 "time_s": row.time,

@@ -41,7 +41,7 @@ def write_spread(result: DissipationResult, more: Rows) -> None:
     standing = (
         [done, *words]
         if result.finished
-        else [f"{done} of {count(raw.asked)}", *words, "unfinished"]
+        else [f"{done} of {count(raw.requested)}", *words, "unfinished"]
     )
     rows = [
         ("realisations", ", ".join(standing)),
@@ -105,7 +105,7 @@ def as_json(result: DissipationResult) -> dict[str, Any]:
         "plan": raw.plan,
         "seed": raw.seed,
         "realisations": result.count,
-        "asked": raw.asked,
+        "requested": raw.requested,
         "finished": result.finished,
         "mean_problem_power_W": result.mean_problem_power,
         **{f"{name}_{_SI[named.unit]}": raw.statistics[name] for name, named in QUANTITIES.items()},

@@ -37,7 +37,9 @@ def write_ensemble(result: EnsembleResult, more: Rows, workers: str = "") -> Non
         Workers that were used, if known.
     """
     raw = result.raw
-    done = f"{count(result.count)} done, {count(result.failed)} failed, of {count(result.asked)}"
+    done = (
+        f"{count(result.count)} done, {count(result.failed)} failed, of {count(result.requested)}"
+    )
     rows = [
         ("realisations", done if result.finished else f"{done}, unfinished"),
         ("sampling design", f"{raw.plan}, seed {raw.seed}"),
@@ -160,7 +162,7 @@ def as_json(result: EnsembleResult) -> dict[str, Any]:
         "stepper": raw.stepper,
         "plan": raw.plan,
         "seed": raw.seed,
-        "asked": result.asked,
+        "requested": result.requested,
         "realisations": result.count,
         "failed": result.failed,
         "errors": dict(result.errors.items()),

@@ -76,7 +76,7 @@ def ensemble_figure(result: EnsembleResult) -> Figure:
 
 
 def _caption(result: EnsembleResult) -> str:
-    requested, unfinished = f" of {count(result.asked)}", ", unfinished"
+    requested, unfinished = f" of {count(result.requested)}", ", unfinished"
     if result.finished:
         requested = unfinished = ""
     text = (
@@ -171,7 +171,7 @@ def convergence_of(
     # kept in memory, since a file's arrays are read again at every access
     held = {name: raw.column(name, -1)[:, None]}
     held |= {"control": raw.variables["control"]} if raw.control else {}
-    numbers, found = np.arange(raw.asked), []
+    numbers, found = np.arange(raw.requested), []
     for last in result.numbers[counts - 1]:
         status = np.where(numbers <= last, raw.status, PENDING)
         part = replace(result, raw=replace(raw, variables=held, status=status))

@@ -17,10 +17,10 @@ EQUAL = "equal in all tests"
 def realisations(row: Compared) -> str:
     """Return the number of realisations of an ensemble: "7 of 10, 3 failed"."""
     text = count(row.done)
-    if row.done < row.asked:
-        text += f" of {count(row.asked)}"
+    if row.done < row.requested:
+        text += f" of {count(row.requested)}"
         # an ensemble that reached its target, without failures
-        text += " at most" if row.finished and row.done + row.failed < row.asked else ""
+        text += " at most" if row.finished and row.done + row.failed < row.requested else ""
     text += f", {count(row.failed)} failed" if row.failed else ""
     text += f", {count(row.count)} of them independent" if row.count < row.done else ""
     return text if row.finished else f"{text}, unfinished"

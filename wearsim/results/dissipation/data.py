@@ -19,7 +19,7 @@ class DissipationData(StudyData):
         Name of the sampling design.
     inputs : list of dict
         Dotted key and SI unit of each drawn value.
-    asked : int
+    requested : int
         Requested number of realisations.
     strip_width : float
         Width of a strip [m].
@@ -39,7 +39,7 @@ class DissipationData(StudyData):
 
     plan: str
     inputs: list[dict[str, str]]
-    asked: int
+    requested: int
     strip_width: float
     friction_grid: str
     mean_problem_power: float

@@ -30,7 +30,7 @@ class DissipationResult(StudyResult[DissipationData]):
     """Realisations of one contact, finished or not."""
 
     def __repr__(self) -> str:
-        done = f"{self.count}" if self.finished else f"{self.count} of {self.raw.asked}"
+        done = f"{self.count}" if self.finished else f"{self.count} of {self.raw.requested}"
         noun = "realisation" if done == "1" else "realisations"
         power = self.summaries["power"]
         std = f", std {power.std:.4g} W" if power.count > 1 else ""

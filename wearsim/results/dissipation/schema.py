@@ -47,7 +47,7 @@ VARIABLES: Mapping[str, Variable] = by_name(
 
 DISSIPATION = Schema(
     "wearsim-dissipation",
-    1,
+    2,
     "realisations of one contact, from `wearsim dissipation`",
     by_name(
         (

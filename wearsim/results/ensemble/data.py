@@ -4,24 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from wearsim.results.content import Arrays, Content, StudyData
-from wearsim.results.ensemble import state_slots
 from wearsim.results.ensemble.schema import (
     DONE,
     FAILED,
     QUANTILES,
     STATIC,
     ensemble_schema,
-    is_row,
     kept_profiles,
     type_of,
 )
-from wearsim.results.ensemble.stored_arrays import StoredArrays
+from wearsim.results.ensemble.stored_rows import StoredRows
 from wearsim.results.schema import Schema
 from wearsim.types import FloatArray
 
@@ -79,7 +78,7 @@ class EnsembleData(StudyData):
         Width of a strip [m].
     plan : str
         Name of the sampling design.
-    asked : int
+    requested : int
         Requested number of realisations, which is the number of rows of the file.
     until : str
         Stopping criterion, such as "depth.mean 1%"; empty if all realisations are required.
@@ -95,15 +94,19 @@ class EnsembleData(StudyData):
         of a file are read on access. Rows of pending realisations are undefined, those of failed
         ones are nan.
     status : ndarray
-        PENDING, DONE or FAILED of every realisation, shape (asked,).
+        PENDING, DONE or FAILED of every realisation, shape (requested,).
     errors : dict of int to str
         Error messages of failed realisations by their number.
     statistics : dict of str to object
         Estimates over the realisations, for other programs that read the file.
+    run_id : str
+        Identifies the ensemble; its part files carry it too.
+    merged : int
+        Number of the last part file whose rows are in the file.
     """
 
     separately_stored: ClassVar[frozenset[str]] = StudyData.separately_stored.union(
-        ("variables", "status", "errors"), state_slots.NAMES
+        ("variables", "status", "errors")
     )
 
     stepper: str
@@ -113,7 +116,7 @@ class EnsembleData(StudyData):
     total_time: float
     strip_width: float
     plan: str
-    asked: int
+    requested: int
     until: str = ""
     inputs: list[dict[str, str]]
     groups: list[dict[str, str]]
@@ -122,16 +125,13 @@ class EnsembleData(StudyData):
     status: npt.NDArray[np.uint8] = field(default_factory=lambda: np.zeros(0, np.uint8))
     errors: dict[int, str] = field(default_factory=dict)
     statistics: dict[str, Any] = field(default_factory=dict)
+    run_id: str = ""
+    merged: int = 0
 
     @property
     def schema(self) -> Schema:
         """Schema of the results file."""
         return ensemble_schema(self.inputs, self.control)
-
-    @property
-    def state(self) -> dict[str, Any]:
-        """Fields that change while the ensemble is computed, by name."""
-        return {name: getattr(self, name) for name in state_slots.NAMES}
 
     @property
     def done(self) -> npt.NDArray[np.int64]:
@@ -153,12 +153,12 @@ class EnsembleData(StudyData):
         start, stop : int
             The first realisation, and the one after the last.
         """
-        if isinstance(self.variables, StoredArrays):
+        if isinstance(self.variables, StoredRows):
             return self.variables.rows(name, start, stop)  # reads these rows only
         return self.variables[name][start:stop]
 
     def columns(self, name: str, records: slice) -> FloatArray:
-        """Return an observable at some records of all realisations, shape (asked, records).
+        """Return an observable at some records of all realisations, shape (requested, records).
 
         The rows of pending and failed realisations are included.
 
@@ -169,35 +169,43 @@ class EnsembleData(StudyData):
         records : slice
             The records.
         """
-        if isinstance(self.variables, StoredArrays):
-            return self.variables.columns(name, records)  # reads a few rows at a time
+        if isinstance(self.variables, StoredRows):
+            return self.variables.rows(name, 0, None, records)  # reads these records only
         return self.variables[name][:, records]
 
     def column(self, name: str, record: int) -> FloatArray:
-        """Return an observable at one record of all realisations, shape (asked,); see `columns`.
+        """Return an observable at one record of all realisations; see `columns`.
 
-        Negative numbers of a record count from the end.
+        Negative numbers of a record count from the end. The shape is (requested,).
         """
         return self.columns(name, slice(record, record + 1 or None))[:, 0]
 
-    @property
-    def content(self) -> Content:
-        """Content of a new file, in which the rows of the realisations are only allocated."""
-        schema = self.schema
-        static = {name: np.asarray(self.variables[name], float) for name in STATIC}
+    @cached_property
+    def shapes(self) -> dict[str, tuple[int, ...]]:
+        """Shape of every variable in the file."""
+        strips = len(self.variables["y"])
         lengths = {
-            "realisation": self.asked,
-            "record": len(static["record_passes"]),
-            "roller": len(static["multiplicity"]),
-            "y": len(static["y"]),
-            "kept": kept_profiles(self.asked, len(static["y"])),
+            "realisation": self.requested,
+            "record": len(self.variables["record_passes"]),
+            "roller": len(self.variables["multiplicity"]),
+            "y": strips,
+            "kept": kept_profiles(self.requested, strips),
             "quantile": len(QUANTILES),
         }
+        return {
+            name: tuple(lengths[dim] for dim in variable.dims)
+            for name, variable in self.schema.variables.items()
+        }
+
+    @property
+    def content(self) -> Content:
+        """Content of a new file, in which rows and statistics are written later."""
+        schema = self.schema
+        known: Arrays = {name: np.asarray(self.variables[name], float) for name in STATIC}
+        known["quantile"] = np.array(QUANTILES)
+        shapes = self.shapes | {name: array.shape for name, array in known.items()}
         variables: Arrays = {
-            name: np.broadcast_to(  # takes no memory
-                np.array(np.nan if variable.kind == "statistic" else 0, type_of(variable)),
-                [lengths[dim] for dim in variable.dims],
-            )
+            name: np.broadcast_to(np.zeros((), type_of(variable)), shapes[name])  # no memory
             for name, variable in schema.variables.items()
         }
         return Content(
@@ -205,7 +213,7 @@ class EnsembleData(StudyData):
             self.attributes,
             self.scenario_text,
             self.files,
-            {**variables, **static, "quantile": np.array(QUANTILES)},
-            state_slots.first_places(self.state),
-            frozenset(name for name, variable in schema.variables.items() if is_row(variable)),
+            {**variables, **known},
+            {},
+            frozenset(variables) - frozenset(known),
         )

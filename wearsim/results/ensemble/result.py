@@ -103,7 +103,7 @@ class EnsembleResult(StudyResult[EnsembleData]):
     """Result of an ensemble of wear tests, from its successful realisations."""
 
     def __repr__(self) -> str:
-        done = f"{self.count}" if self.finished else f"{self.count} of {self.asked}"
+        done = f"{self.count}" if self.finished else f"{self.count} of {self.requested}"
         depth = f", depth {self.estimate('depth').mean.value * 1e6:.4g} um" if self.count else ""
         return f"<EnsembleResult '{self.title}': {done} realisations{depth}>"
 
@@ -118,9 +118,9 @@ class EnsembleResult(StudyResult[EnsembleData]):
         return self.raw.until
 
     @property
-    def asked(self) -> int:
+    def requested(self) -> int:
         """Requested number of realisations."""
-        return self.raw.asked
+        return self.raw.requested
 
     @property
     def count(self) -> int:
@@ -294,7 +294,7 @@ class EnsembleResult(StudyResult[EnsembleData]):
 
     def _by_record(self, name: str) -> Iterator[FloatArray]:
         """Yield an observable of the independent realisations, record by record."""
-        records, block = len(self.record_passes), max(_READ_SIZE // max(self.asked, 1), 1)
+        records, block = len(self.record_passes), max(_READ_SIZE // max(self.requested, 1), 1)
         for first in range(0, records, block):
             some = self.raw.columns(name, slice(first, min(first + block, records)))
             yield from map(np.ascontiguousarray, some[self.numbers][self._independent].T)
@@ -302,7 +302,7 @@ class EnsembleResult(StudyResult[EnsembleData]):
     @property
     def kept(self) -> int:
         """Number of realisations, starting with the first, whose profile is stored."""
-        return kept_profiles(self.asked, len(self.y))
+        return kept_profiles(self.requested, len(self.y))
 
     @cached_property
     def profiles(self) -> FloatArray:

@@ -124,7 +124,7 @@ STATISTICS: Mapping[str, Variable] = by_name(
 
 ENSEMBLE = Schema(
     "wearsim-ensemble",
-    1,
+    2,
     "an ensemble of wear tests, from `wearsim ensemble`",
     by_name(
         (

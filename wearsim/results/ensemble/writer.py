@@ -1,108 +1,84 @@
-"""A file that is written in place, by one process alone."""
+"""Writing of an ensemble: part files while it is computed, which are merged at the end."""
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterable, Mapping, Sequence
+import uuid
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import IO, TYPE_CHECKING, Any, TypeAlias, cast
 
 import numpy as np
 import numpy.typing as npt
 
-from wearsim.errors import ResultsFileError
-from wearsim.results.ensemble import state_slots
+from wearsim.results.content import Arrays
 from wearsim.results.ensemble.data import EnsembleData, Outcome
-from wearsim.results.ensemble.reader import EnsembleFileParts, read_parts
-from wearsim.results.ensemble.row_encoding import Rows, rows_of, runs
-from wearsim.results.ensemble.schema import PENDING, STATIC, STATISTICS
-from wearsim.results.io.atomic_write import os_errors_converted, stage, write_chunks, write_pieces
-from wearsim.results.io.file_lock import lock_or_refuse, refuse_if_locked
-from wearsim.results.io.reader import kind_of
+from wearsim.results.ensemble.parts import (
+    NUMBER,
+    blank_rows,
+    joined,
+    part_numbers,
+    part_path,
+    rows_of,
+    write_part,
+)
+from wearsim.results.ensemble.reader import read_ensemble
+from wearsim.results.ensemble.schema import PENDING, STATIC, STATISTICS, is_row
+from wearsim.results.ensemble.stored_rows import StoredRows
+from wearsim.results.io.atomic_write import DISK, TEMPORARY, Storage, os_errors_converted
+from wearsim.results.io.file_lock import (
+    lock_or_refuse,
+    lock_path,
+    parts_folder,
+    refuse_if_locked,
+)
 
+if TYPE_CHECKING:
+    import h5py
 
-class FileInPlace:
-    """A file open for writing in place, which nobody else can write meanwhile.
+PART_BYTES = 1 << 21
+"""Size of a part file, beyond which rows go to the next one."""
 
-    Every call may raise a ResultsFileError that names the file: when the disk is full, say.
-
-    Parameters
-    ----------
-    path : Path
-        The file, which must be there.
-    """
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        with os_errors_converted(path):
-            self._file = path.open("r+b", buffering=0)
-        try:
-            lock_or_refuse(self._file, path)
-        except BaseException:
-            self._file.close()
-            raise
-
-    def read(self, offset: int, count: int) -> bytes:
-        """Return bytes of the file.
-
-        Parameters
-        ----------
-        offset, count : int
-            Bytes before the first, and how many.
-        """
-        try:
-            self._file.seek(offset)
-            return self._file.read(count)
-        except OSError as error:
-            raise ResultsFileError(f"{self._path}: cannot be read ({error.strerror})") from error
-
-    def write(self, offset: int, content: bytes) -> None:
-        """Write bytes over those that stand there.
-
-        Parameters
-        ----------
-        offset : int
-            Bytes before the first.
-        content : bytes
-            What to write.
-        """
-        with os_errors_converted(self._path):
-            self._file.seek(offset)
-            write_chunks(self._file, content)
-
-    def synchronise(self) -> None:
-        """Wait until all that was written is on the disk."""
-        with os_errors_converted(self._path), stage("fsync"):
-            os.fsync(self._file.fileno())
-
-    def close(self) -> None:
-        """Let go of the file, all of it on the disk."""
-        if self._file.closed:
-            return
-        try:
-            self.synchronise()
-        finally:
-            self._file.close()
+Completion: TypeAlias = Callable[[EnsembleData], tuple[Mapping[str, Any], Arrays]]
 
 
 class EnsembleFile:
-    """An ensemble's file open for writing, which nobody else can write meanwhile.
+    """An ensemble open for writing by this process alone.
 
-    What it writes depends neither on the order of the realisations nor on how they are batched.
-    Every call may raise a ResultsFileError that names the file: when the disk is full, say.
+    Rows are written to part files, of which the last is written again as a whole whenever
+    realisations finish, until it is large enough. `finish` merges them into the file of the
+    ensemble. What is stored depends neither on the order of the realisations nor on batches.
+
+    Every call may raise a ResultsFileError that names the file, for example when the disk is full.
+    What was stored before is then unchanged, and the call can be repeated.
     """
 
-    def __init__(self, path: Path, file: FileInPlace, parts: EnsembleFileParts) -> None:
+    def __init__(self, path: Path, storage: Storage, lock: IO[bytes]) -> None:
         self.path = path
-        self.data = parts.data
-        """What the file held when it was opened."""
-        self._file = file
-        self._extents = parts.extents
-        self._status = parts.data.status.copy()
-        self._state = parts.data.state
-        self._writing = parts.state_number
+        self._storage, self._lock = storage, lock
+        self._load()
+
+    def _load(self) -> None:
+        """Read the ensemble, and delete parts that are merged or left by another ensemble."""
+        self.data = read_ensemble(self.path)
+        """The content of the file and the parts when they were read."""
+        self._stored = cast("StoredRows", self.data.variables)
+        self._status = self.data.status.copy()
+        parts = self._stored.parts
+        self._state: dict[str, Any] = parts[-1].state if parts else {}
+        self._start_part(self.data.merged + len(parts) + 1)
+        with os_errors_converted(self.path):
+            for number in part_numbers(self.path):
+                if number <= self.data.merged:
+                    self._storage.remove(part_path(self.path, number))
+            for remains in parts_folder(self.path).glob(f"*{TEMPORARY}"):  # of a killed process
+                self._storage.remove(remains)
+
+    def _start_part(self, number: int) -> None:
+        self._number, self._rows = number, blank_rows([], self.data)
+        self._closed = len(self._stored.parts)
 
     @classmethod
     def create(
@@ -110,68 +86,89 @@ class EnsembleFile:
         path: str | Path,
         header: EnsembleData,
         static: Mapping[str, npt.NDArray[Any]],
+        storage: Storage = DISK,
     ) -> EnsembleFile:
-        """Write a file in which all realisations are pending, in place of any, and open it.
+        """Write a file in which all realisations are pending, replacing any, and open it.
 
         Parameters
         ----------
         path : str or Path
             The file.
         header : EnsembleData
-            What is known before the first realisation; its variables, status and errors are not
-            looked at.
+            What is known before the first realisation; its variables, status and errors are
+            ignored.
         static : mapping of str to ndarray
-            Those of `ensemble_layout.STATIC`.
+            The variables `schema.STATIC`.
+        storage : Storage
+            File operations.
 
         Raises
         ------
         ResultsFileError
-            If it cannot be written, or if another process is writing one that stands there.
+            If it cannot be written, or if another process is writing one with this name.
         ValueError
-            If static arrays are missing, unknown, or do not fit together.
+            If static arrays are missing, unknown, or inconsistent.
         """
         from wearsim.results.io import hdf5_write  # noqa: PLC0415  (h5py takes 0.2 s to import)
 
         if static.keys() != STATIC.keys():
             raise ValueError(f"static arrays are {sorted(STATIC)}, got {sorted(static)}")
-        image = hdf5_write.sparse_image(replace(header, variables=static).content)
+        path = Path(path)
         refuse_if_locked(path)
-        write_pieces(path, image.pieces(), image.size)
-        return cls.open(path)
+        folder = parts_folder(path)
+        is_new = not folder.exists()
+        # the parts of an ensemble that is replaced count as merged, and are deleted later
+        last = max(part_numbers(path), default=0)
+        header = replace(header, variables=static, run_id=uuid.uuid4().hex, merged=last)
+        with os_errors_converted(path):
+            folder.mkdir(exist_ok=True)  # before the file, which is incomplete without it
+        try:
+            with hdf5_write.new_file(path, storage) as (file, _):
+                hdf5_write.put_variables(file, header.content)
+                hdf5_write.put_texts(file, header.content)
+        except BaseException:
+            if is_new:
+                folder.rmdir()
+            raise
+        return cls.open(path, storage)
 
     @classmethod
-    def open(cls, path: str | Path) -> EnsembleFile:
-        """Open a file to go on with it.
+    def open(cls, path: str | Path, storage: Storage = DISK) -> EnsembleFile:
+        """Open an ensemble to continue it.
 
         Parameters
         ----------
         path : str or Path
             The file.
+        storage : Storage
+            File operations.
 
         Raises
         ------
         ResultsFileError
-            If it is not a sound file of an ensemble, cannot be written, or is being written by
-            another process.
+            If it cannot be read, cannot be written, or is being written by another process.
         """
         path = Path(path)
-        kind_of(path)  # where there is none, or no HDF5, that is said first
-        file = FileInPlace(path)
+        read_ensemble(path)  # refused before a folder is made
+        with os_errors_converted(path):
+            parts_folder(path).mkdir(exist_ok=True)
+            lock = lock_path(path).open("a+b")
         try:
-            return cls(path, file, read_parts(path))  # as another writer left it
+            lock_or_refuse(lock, path)
+            return cls(path, storage, lock)  # as another writer left it
         except BaseException:
-            file.close()
+            lock.close()
             raise
 
     @property
     def status(self) -> npt.NDArray[np.uint8]:
-        """PENDING, DONE or FAILED of every realisation, shape (asked,), not to be changed."""
+        """PENDING, DONE or FAILED of every realisation, shape (requested,), read-only."""
         view = self._status.view()
         view.flags.writeable = False
         return view
 
     def put(self, outcomes: Sequence[Outcome]) -> None:
-        """Write some realisations; once this returns they are in the file for good.
+        """Store some realisations; they are on the disk when this returns.
 
         Parameters
         ----------
@@ -181,85 +178,72 @@ class EnsembleFile:
         Raises
         ------
         ValueError
-            If one is not pending, or if its numbers are not those of the schema. Nothing is
+            If one is not pending, or if its values are not those of the schema. Nothing is
             written then.
         """
-        taken = [item.number for item in outcomes if self._status_of(item.number) != PENDING]
-        if taken or len({item.number for item in outcomes}) < len(outcomes):
+        numbers = [outcome.number for outcome in outcomes]
+        taken = [number for number in numbers if self._status_of(number) != PENDING]
+        if taken or len(set(numbers)) < len(numbers):
             raise ValueError(f"realisations {taken or 'twice in a batch'} are there already")
-        schema = self.data.schema
-        batch = [rows_of(run, schema, self._extents) for run in runs(outcomes)]
-        for rows in batch:
-            self._put_rows(rows)
-        self._file.synchronise()
-        for rows in batch:
-            self._put_status(rows.first, rows.status)
+        self._add(rows_of(outcomes, self.data))
 
     def clear(self, numbers: Iterable[int]) -> None:
-        """Make realisations pending again, so that they can be put anew.
+        """Make realisations pending again, so that they can be stored once more.
 
         Parameters
         ----------
         numbers : iterable of int
-            Those to clear.
+            The realisations.
         """
-        chosen = np.unique(np.fromiter(numbers, np.int64))
-        for number in chosen.tolist():
+        chosen = sorted(set(numbers))
+        for number in chosen:
             self._status_of(number)
-        for run in np.split(chosen, np.flatnonzero(np.diff(chosen) > 1) + 1):
-            if run.size:
-                self._put_status(int(run[0]), np.full(run.size, PENDING, np.uint8))
-        self._file.synchronise()  # before anything is written over their rows
+        self._add(blank_rows(chosen, self.data))
 
-    def put_state(self, state: Mapping[str, Any]) -> None:
-        """Write what has changed; a kill meanwhile leaves the state before it.
-
-        Parameters
-        ----------
-        state : mapping
-            Any of `state_slots.NAMES`; what it leaves out stays as it is.
+    def put_state(self, **state: Any) -> None:
+        """Store fields of `EnsembleData` that have changed, such as `wall_seconds`.
 
         Raises
         ------
         ValueError
-            If it holds other names, or is too long.
+            If there is no such field, or if it is stored separately.
         """
-        changed = {**self._state, **state}
-        number = self._writing + 1
-        content = state_slots.written(number, changed)
-        place = self._extents[state_slots.place_of(number)]
-        self._file.synchronise()  # what it tells of is on the disk before it
-        self._file.write(place.offset, content)
-        self._file.synchronise()  # before the other place is written over
-        self._state, self._writing = changed, number
+        unknown = state.keys() - set(EnsembleData.attribute_names())
+        if unknown:
+            raise ValueError(f"an ensemble has no fields {sorted(unknown)}")
+        self._add(blank_rows([], self.data), state)
 
-    def put_statistics(self, statistics: Mapping[str, npt.NDArray[Any]]) -> None:
-        """Write estimates for readers of the file.
+    def grow(self, requested: int) -> None:
+        """Add pending realisations; the ensemble is then unfinished.
 
         Parameters
         ----------
-        statistics : mapping of str to ndarray
-            Any of `ensemble_layout.STATISTICS`.
-
-        Raises
-        ------
-        ValueError
-            If one is unknown or does not fit.
+        requested : int
+            New number of realisations, larger than before.
         """
-        found = {name: np.asarray(array, "<f8") for name, array in statistics.items()}
-        for name, array in found.items():
-            if name not in STATISTICS:
-                raise ValueError(f"{name} is not a statistic of an ensemble")
-            if array.shape != self._extents[name].shape:
-                raise ValueError(
-                    f"{name} has the shape {array.shape}, expected {self._extents[name].shape}"
-                )
-        for name, array in found.items():
-            self._file.write(self._extents[name].offset, array.tobytes())
+        self._merge(replace(self.data, requested=requested, finished=False, statistics={}))
+
+    def finish(self, complete: Completion) -> None:
+        """Merge all parts into the file of the ensemble, and delete them.
+
+        Parameters
+        ----------
+        complete : callable
+            Function of the merged `EnsembleData`, which returns the fields that change, such as
+            `finished`, and the variables `schema.STATISTICS`.
+        """
+        self._merge(self.data, complete)
 
     def close(self) -> None:
-        """Let go of the file, all of it on the disk."""
-        self._file.close()
+        """Release the ensemble; the folder of its parts is removed if it is finished."""
+        if self._lock.closed:
+            return
+        with os_errors_converted(self.path):
+            lock_path(self.path).unlink(missing_ok=True)
+        self._lock.close()
+        if self.data.finished and not self._stored.parts:
+            with suppress(OSError):  # files of others are left there
+                parts_folder(self.path).rmdir()
 
     def __enter__(self) -> EnsembleFile:
         return self
@@ -277,17 +261,51 @@ class EnsembleFile:
             raise ValueError(f"there is no realisation {number} in {len(self._status)}")
         return int(self._status[number])
 
-    def _put_rows(self, rows: Rows) -> None:
-        for name, array in rows.arrays.items():
-            if len(array):
-                self._file.write(self._extents[name].at(rows.first), array.tobytes())
-        # a text of an earlier failure may stand there; where there is none it stays a hole
-        error = self._extents["error"]
-        errors = rows.errors.astype(error.dtype).tobytes()
-        nothing, offset = bytes(len(errors)), error.at(rows.first)
-        if errors != nothing or self._file.read(offset, len(errors)) != nothing:
-            self._file.write(offset, errors)
+    def _add(self, rows: Arrays, state: Mapping[str, Any] | None = None) -> None:
+        """Write the last part with further rows and changed fields."""
+        joint, changed = joined(self._rows, rows), {**self._state, **(state or {})}
+        path = part_path(self.path, self._number)
+        part = write_part(path, self.data.run_id, joint, changed, self._storage)
+        self._stored.parts[self._closed :] = [part]
+        self._status[rows[NUMBER]] = rows["status"]
+        self._rows, self._state = joint, changed
+        if sum(array.nbytes for array in joint.values()) >= PART_BYTES:
+            self._start_part(self._number + 1)
 
-    def _put_status(self, first: int, status: npt.NDArray[np.uint8]) -> None:
-        self._file.write(self._extents["status"].at(first), status.tobytes())
-        self._status[first : first + len(status)] = status
+    def _merge(self, header: EnsembleData, complete: Completion | None = None) -> None:
+        """Replace the file by one that contains the rows of all parts."""
+        from wearsim.results.io import hdf5_write  # noqa: PLC0415  (h5py takes 0.2 s to import)
+
+        static = {name: self._stored[name] for name in STATIC}
+        header = replace(header, **self._state, variables=static, merged=self._number)
+        with hdf5_write.new_file(self.path, self._storage) as (file, check):
+            hdf5_write.put_variables(file, header.content)
+            for start in range(0, len(self._status), hdf5_write.CHUNK_ROWS):
+                self._copy_rows(file, start, start + hdf5_write.CHUNK_ROWS)
+                check()
+            if complete is not None:
+                rows = StoredRows(lambda take: take(file), header.schema, [])
+                merged = replace(header, variables=rows, status=self._status.copy())
+                fields, statistics = complete(merged)
+                for name, array in statistics.items():
+                    _put_statistic(file[name], name, array)
+                header = replace(header, **fields)
+            hdf5_write.put_texts(file, header.content)
+        self._load()
+
+    def _copy_rows(self, file: h5py.File, start: int, stop: int) -> None:
+        if (self._status[start:stop] == PENDING).all():
+            return
+        for name, variable in self.data.schema.variables.items():
+            if is_row(variable):
+                rows = self._stored.rows(name, start, stop)
+                if len(rows) and (name != "error" or np.any(rows != b"")):
+                    file[name][start : start + len(rows)] = rows
+
+
+def _put_statistic(dataset: h5py.Dataset, name: str, array: npt.NDArray[Any]) -> None:
+    if name not in STATISTICS:
+        raise ValueError(f"{name} is not a statistic of an ensemble")
+    if np.shape(array) != dataset.shape:
+        raise ValueError(f"{name} has the shape {np.shape(array)}, expected {dataset.shape}")
+    dataset[...] = array

@@ -3,75 +3,86 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
 from wearsim.errors import ResultsFileError
 
-STAGES = ("open", "write", "flush", "fsync", "close", "rename", "fsync folder")
-
-_CHUNK = 1 << 18
-
-
-def _do_nothing(stage: str) -> None:
-    pass
+TEMPORARY = ".tmp"
+"""Added to the name of a file while its new content is written."""
 
 
-on_write_stage: Callable[[str], None] = _do_nothing
-"""Hook for fault injection, called with "before <stage>" and "after <stage>" for each of STAGES.
+_BUFFER = 1 << 18  # bytes
 
-A file is written in chunks, each of which is one "write". Tests replace the hook by a function
-that raises an exception or kills the process.
-"""
+
+class Storage:
+    """File operations of the writers of results.
+
+    A subclass may replace single operations, for example to let a test fail at one of them.
+    """
+
+    def open(self, path: Path) -> IO[bytes]:
+        """Open a file for new content, which can be read back."""
+        return path.open("w+b", buffering=_BUFFER)
+
+    def synchronise(self, file: IO[bytes]) -> None:
+        """Wait until all that was written to a file is on the disk."""
+        file.flush()
+        os.fsync(file.fileno())
+
+    def replace(self, source: Path, target: Path) -> None:
+        """Rename a file, in place of any with that name."""
+        source.replace(target)
+
+    def synchronise_folder(self, folder: Path) -> None:
+        """Wait until the names in a folder are on the disk."""
+        if os.name == "nt":  # Windows cannot open folders
+            return
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+    def remove(self, path: Path) -> None:
+        """Delete a file, if it exists."""
+        path.unlink(missing_ok=True)
+
+
+DISK = Storage()
+"""The file operations of the operating system."""
 
 
 @contextmanager
-def stage(name: str) -> Iterator[None]:
-    """Call the hook before and after the body of the with statement.
-
-    Parameters
-    ----------
-    name : str
-        One of STAGES.
-    """
-    on_write_stage(f"before {name}")
-    yield
-    on_write_stage(f"after {name}")
-
-
-def write_pieces(
-    path: str | Path, pieces: Iterable[tuple[int, bytes]], size: int | None = None
-) -> None:
-    """Write a file atomically; it may have holes.
+def replacement(path: str | Path, storage: Storage = DISK) -> Iterator[IO[bytes]]:
+    """Return an empty file that replaces another at the end of the with statement.
 
     Parameters
     ----------
     path : str or Path
-        The file; the pieces are first written to `path`.part.
-    pieces : iterable of tuple
-        Offset of each piece in bytes, and the piece.
-    size : int, optional
-        Size of the file in bytes, holes included; by default it ends with the last piece.
+        The file to replace, which need not exist.
+    storage : Storage
+        File operations.
 
     Raises
     ------
     ResultsFileError
-        If it cannot be written; an existing file is then unchanged.
+        If it cannot be written; an existing file is then unchanged, as after any other exception.
     """
     target = Path(path).resolve()  # follows links, which are kept
-    part = target.with_name(target.name + ".part")
+    temporary = target.with_name(target.name + TEMPORARY)
     with os_errors_converted(path):
         try:
-            _write_part(part, pieces, size)
-            with stage("rename"):
-                os.replace(part, target)
+            with storage.open(temporary) as file:
+                yield file
+                storage.synchronise(file)
+            storage.replace(temporary, target)
         except BaseException:
-            part.unlink(missing_ok=True)
+            temporary.unlink(missing_ok=True)
             raise
-        with stage("fsync folder"):
-            _sync_folder(target.parent)
+        storage.synchronise_folder(target.parent)
 
 
 @contextmanager
@@ -87,48 +98,3 @@ def os_errors_converted(path: str | Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise ResultsFileError(f"{path}: cannot be written ({error.strerror or error})") from error
-
-
-def write_chunks(file: IO[bytes], content: bytes | memoryview) -> None:
-    """Write at the current position of a file, in chunks that are separate "write" stages.
-
-    Parameters
-    ----------
-    file : binary file
-        Open file, buffered or not.
-    content : bytes or memoryview
-        The bytes to write.
-    """
-    view = memoryview(content)
-    for start in range(0, len(view), _CHUNK):
-        with stage("write"):
-            rest = view[start : start + _CHUNK]
-            while rest:  # an unbuffered file may write fewer bytes than given
-                rest = rest[file.write(rest) :]
-
-
-def _write_part(part: Path, pieces: Iterable[tuple[int, bytes]], size: int | None) -> None:
-    on_write_stage("before open")
-    with part.open("wb") as file:
-        on_write_stage("after open")
-        for offset, piece in pieces:
-            file.seek(offset)
-            write_chunks(file, piece)
-        with stage("flush"):
-            file.flush()
-            if size is not None:
-                file.truncate(size)  # the file may end with a hole
-        with stage("fsync"):
-            os.fsync(file.fileno())
-        with stage("close"):
-            file.close()
-
-
-def _sync_folder(folder: Path) -> None:
-    if os.name == "nt":  # Windows cannot open folders
-        return
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)

@@ -1,4 +1,4 @@
-"""Exclusive lock of the process that writes a file; readers are not blocked."""
+"""Exclusive lock of the process that writes an ensemble; readers are not blocked."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ def lock_or_refuse(file: IO[bytes], path: str | Path) -> None:
     file : binary file
         The file, open for writing.
     path : str or Path
-        Its name, as given by the user.
+        The file that it protects, for messages.
 
     Raises
     ------
     ResultsFileError
-        If another process holds the lock, or if the file was replaced after it was opened.
+        If another process holds the lock, or held it until now and deleted the file.
     """
     busy = ResultsFileError(f"{path}: is being written by another process")
     try:
@@ -37,25 +37,37 @@ def lock_or_refuse(file: IO[bytes], path: str | Path) -> None:
             raise busy from error
         reason = error.strerror or str(error)
         raise ResultsFileError(f"{path}: cannot be locked for writing ({reason})") from error
-    if not os.path.samestat(os.fstat(file.fileno()), os.stat(path)):
+    if os.fstat(file.fileno()).st_nlink == 0:
         raise busy
 
 
+def parts_folder(path: str | Path) -> Path:
+    """Return the folder of the part files of an ensemble, and of the lock of its writer."""
+    target = Path(path).resolve()  # follows links
+    return target.with_name(f"{target.name}.parts")
+
+
+def lock_path(path: str | Path) -> Path:
+    """Return the file that the writer of an ensemble locks."""
+    return parts_folder(path) / "lock"
+
+
 def refuse_if_locked(path: str | Path) -> None:
-    """Refuse a file that another process is writing.
+    """Refuse an ensemble that another process is writing.
 
     Parameters
     ----------
     path : str or Path
-        The file, which need not exist.
+        Its file, which need not exist.
 
     Raises
     ------
     ResultsFileError
         If another process is writing it.
     """
-    if os.access(path, os.R_OK | os.W_OK):
-        with Path(path).open("r+b", buffering=0) as file:
+    lock = lock_path(path)
+    if os.access(lock, os.R_OK | os.W_OK):
+        with lock.open("r+b", buffering=0) as file:
             lock_or_refuse(file, path)
 
 

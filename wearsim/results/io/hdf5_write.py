@@ -1,273 +1,243 @@
-"""Content of a results file as HDF5, written to memory."""
+"""Writing of HDF5 files in which every byte of data and metadata has a checksum of HDF5.
+
+Arrays are stored in chunks with Fletcher-32 checksums, scalars in the object headers, which have
+checksums since version 1.10 of the format.
+"""
 
 from __future__ import annotations
 
 import io
-import itertools
 import json
-import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import lru_cache
-from typing import Any
+from pathlib import Path
+from typing import IO, Any
 
+import h5py
 import numpy as np
 import numpy.typing as npt
-from h5py import h5a, h5d, h5ds, h5f, h5fd, h5g, h5p, h5s, h5t
+from h5py import h5d, h5f, h5fd, h5g, h5p, h5s, h5t
 
-from wearsim.results.content import Content, as_plain
+from wearsim.results.content import (
+    ABOUT,
+    CHECKPOINT,
+    ERRORS,
+    FILES,
+    INPUTS,
+    SCENARIO,
+    Content,
+    as_plain,
+)
+from wearsim.results.io.atomic_write import DISK, Storage, replacement
 from wearsim.results.schema import axis_lengths
 
-_PAGE = 1 << 16
-
-
-class SparseImage:
-    """In-memory file without storage for holes, with the file methods that HDF5 calls.
-
-    The image is then written to the disk without HDF5, which does not recover from a full disk.
-    """
-
-    def __init__(self) -> None:
-        self._pages: dict[int, bytearray] = {}
-        self._place = 0
-        self.size = 0  # in bytes, holes included
-
-    def pieces(self) -> Iterator[tuple[int, bytes]]:
-        """Yield the written bytes, each piece with its offset."""
-        for number in sorted(self._pages):
-            start = number * _PAGE
-            yield start, bytes(self._pages[number][: self.size - start])
-
-    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
-        """Set the position, as a file."""
-        start = {io.SEEK_SET: 0, io.SEEK_CUR: self._place, io.SEEK_END: self.size}[whence]
-        self._place = start + offset
-        return self._place
-
-    def tell(self) -> int:
-        """Return the position, as a file."""
-        return self._place
-
-    def truncate(self, size: int) -> int:
-        """Set the size, as a file."""
-        self.size = size
-        return size
-
-    def flush(self) -> None:
-        """Do nothing, since there is no disk."""
-
-    def write(self, content: bytes | memoryview) -> int:
-        """Write at the position, as a file."""
-        view = memoryview(content).cast("B")
-        for page, inside, done in self._spans(len(view)):
-            piece = view[done : done + _PAGE - inside]
-            self._pages.setdefault(page, bytearray(_PAGE))[inside : inside + len(piece)] = piece
-        self._place += len(view)
-        self.size = max(self.size, self._place)
-        return len(view)
-
-    def readinto(self, target: memoryview) -> int:
-        """Read at the position, as a file."""
-        view = memoryview(target).cast("B")
-        for page, inside, done in self._spans(len(view)):
-            piece = self._pages.get(page, bytes(_PAGE))[inside : inside + len(view) - done]
-            view[done : done + len(piece)] = piece
-        self._place += len(view)
-        return len(view)
-
-    def _spans(self, count: int) -> Iterator[tuple[int, int, int]]:
-        """Yield page number, offset in the page and bytes done, for bytes at the position."""
-        done = 0
-        while done < count:
-            page, inside = divmod(self._place + done, _PAGE)
-            yield page, inside, done
-            done += _PAGE - inside
-
-
-CHECKPOINT, INPUTS, ABOUT, SCENARIO, FILES = "checkpoint", "inputs", "about", "scenario", "files"
-
-ERRORS = "surrogatepass"  # so that every Python string can be stored
+CHUNK_ROWS = 4096
+"""Most rows of a chunk; who writes as many rows at a time writes each chunk once."""
+_CHUNK_NUMBERS = 1 << 15
 
 _LABEL_LENGTH = 1000  # an attribute holds 64 kB at most
 
-_SCALAR = h5s.create(h5s.SCALAR)
 
-_number = itertools.count()
+class _File:
+    """A file written by HDF5, which does not recover from errors: the first is raised later."""
 
+    def __init__(self, file: IO[bytes]) -> None:
+        self._file = file
+        self.error: BaseException | None = None
 
-def file_image(content: Content) -> bytes:
-    """Return the bytes of a results file.
+    def tell(self) -> int:
+        """Return the position, as a file."""
+        return self._attempt(self._file.tell)
 
-    Parameters
-    ----------
-    content : Content
-        Content of the file.
+    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
+        """Set the position, as a file."""
+        if whence == io.SEEK_SET and offset == self.tell():
+            return offset  # without emptying the buffer of the file
+        return self._attempt(self._file.seek, offset, whence)
 
-    Returns
-    -------
-    bytes
+    def readinto(self, target: memoryview) -> int:
+        """Read at the position, as a file."""
+        return self._attempt(self._file.readinto, target)  # type: ignore[attr-defined]
 
-    Raises
-    ------
-    ValueError
-        If the variables are not those of the schema, or their shapes are inconsistent.
-    """
-    access = h5p.create(h5p.FILE_ACCESS)
-    access.set_fapl_core(1 << 20, False)
-    name = f"wearsim-{os.getpid()}-{next(_number)}"  # the image stays in memory
-    with _new_file(name.encode(), access) as file:
-        _put_content(file, content)
-        h5f.flush(file)
-        return bytes(file.get_file_image())
+    def write(self, content: bytes | memoryview) -> int:
+        """Write at the position, as a file."""
+        return self._attempt(self._file.write, content)
 
+    def truncate(self, size: int) -> int:
+        """Set the size, as a file."""
+        return self._attempt(self._file.truncate, size)
 
-def sparse_image(content: Content) -> SparseImage:
-    """Return a results file whose reserved variables are holes, so that it may have any size.
+    def flush(self) -> None:
+        """Do nothing; the file is synchronised after HDF5 has closed it."""
 
-    Every variable is contiguous, at the offset returned by `hdf5_read.extents`, so that its rows
-    can be written later by plain writes, which leave the HDF5 structure unchanged.
+    def raise_error(self) -> None:
+        """Raise the first error of an operation, if there is one."""
+        if self.error is not None:
+            raise self.error
 
-    Parameters
-    ----------
-    content : Content
-        Content of the file.
-
-    Returns
-    -------
-    SparseImage
-
-    Raises
-    ------
-    ValueError
-        If the variables are not those of the schema, or their shapes are inconsistent.
-    """
-    image = SparseImage()
-    access = h5p.create(h5p.FILE_ACCESS)
-    access.set_fileobj_driver(h5fd.fileobj_driver, image)
-    with _new_file(b"sparse", access) as file:
-        _put_content(file, content)
-    return image
+    def _attempt(self, operation: Callable[..., int], *arguments: object) -> int:
+        if self.error is None:
+            try:
+                return operation(*arguments)
+            except BaseException as error:
+                self.error = error
+        return 0
 
 
 @contextmanager
-def _new_file(name: bytes, access: Any) -> Iterator[Any]:
-    access.set_fclose_degree(h5f.CLOSE_STRONG)
-    creation = h5p.create(h5p.FILE_CREATE)
+def new_file(
+    path: str | Path, storage: Storage = DISK
+) -> Iterator[tuple[h5py.File, Callable[[], None]]]:
+    """Return an empty HDF5 file that replaces another at the end of the with statement.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file to replace, which need not exist.
+    storage : Storage
+        File operations.
+
+    Returns
+    -------
+    file : h5py.File
+    check : callable
+        Raises the error of a write, such as a full disk; else it is raised at the end.
+
+    Raises
+    ------
+    ResultsFileError
+        If it cannot be written; an existing file is then unchanged.
+    """
+    creation, access = h5p.create(h5p.FILE_CREATE), h5p.create(h5p.FILE_ACCESS)
     creation.set_link_creation_order(h5p.CRT_ORDER_TRACKED | h5p.CRT_ORDER_INDEXED)
     creation.set_obj_track_times(False)
-    file = h5f.create(name, h5f.ACC_TRUNC, creation, access)
-    try:
-        yield file
-    finally:
-        file.close()
+    access.set_libver_bounds(h5f.LIBVER_V110, h5f.LIBVER_V110)
+    access.set_fclose_degree(h5f.CLOSE_STRONG)
+    with replacement(path, storage) as stored:
+        target = _File(stored)
+        access.set_fileobj_driver(h5fd.fileobj_driver, target)
+        name = str(path).encode("utf-8", ERRORS)
+        try:
+            with h5py.File(h5f.create(name, h5f.ACC_TRUNC, creation, access)) as file:
+                yield file, target.raise_error
+        finally:
+            target.raise_error()  # the cause of what HDF5 may have raised
 
 
-def _put_content(file: Any, content: Content) -> None:
-    lengths = axis_lengths(content.variables, content.schema.variables)
-    _put_labels(file, content)
-    _put_variables(file, content, lengths)
-    _put_inputs(_group(file, INPUTS), content)
-    checkpoint = _group(file, CHECKPOINT)
-    for name, array in content.checkpoint.items():
-        _put_array(checkpoint, name, array)
+def put_variables(file: h5py.File, content: Content) -> None:
+    """Write axes and variables; only space is described for those that are reserved.
 
-
-def _put_labels(file: Any, content: Content) -> None:
-    """Write short values as HDF5 attributes for other programs; wearsim reads them from JSON."""
-    _put_attribute(file, "format", content.schema.format)
-    _put_attribute(file, "format_version", content.schema.version)
-    for name, value in content.attributes.items():
-        if isinstance(value, str):
-            _put_attribute(file, name, value[:_LABEL_LENGTH])
-        elif isinstance(value, int | float | np.number | np.bool_):
-            is_bool = isinstance(value, bool | np.bool_)
-            _put_attribute(file, name, int(value) if is_bool else value)  # netCDF has no booleans
-
-
-def _put_variables(file: Any, content: Content, lengths: Mapping[str, int]) -> None:
+    Raises
+    ------
+    ValueError
+        If the variables are not those of the schema, or their shapes are inconsistent.
+    """
     schema = content.schema
-    scales: dict[str, Any] = {}
-    datasets: dict[str, Any] = {}
+    lengths = axis_lengths(content.variables, schema.variables)
+    scales: dict[str, h5py.Dataset] = {}
+    datasets: dict[str, h5py.Dataset] = {}
     for axis in schema.axes.values():
         numbers = np.arange(axis.first, axis.first + lengths[axis.name])
-        scales[axis.name] = _put_array(
-            file, axis.name, numbers, units="1", long_name=axis.long_name
-        )
+        scales[axis.name] = put_array(file, axis.name, numbers)
+        put_labels(scales[axis.name], units="1", long_name=axis.long_name)
     for name, variable in schema.variables.items():
-        dataset = _put_array(
-            file,
-            name,
-            content.variables[name],
-            name in content.reserved,
-            units=variable.unit,
-            long_name=variable.long_name,
-        )
+        put = _reserve if name in content.reserved else put_array
+        dataset = put(file, name, content.variables[name])
+        put_labels(dataset, units=variable.unit, long_name=variable.long_name)
         (scales if variable.dims == (name,) else datasets)[name] = dataset
     for name, scale in scales.items():
-        h5ds.set_scale(scale, name.encode())
+        scale.make_scale(name)
     for name, dataset in datasets.items():
         for position, dim in enumerate(schema.variables[name].dims):
-            h5ds.attach_scale(dataset, scales[dim], position)
+            dataset.dims[position].attach_scale(scales[dim])
 
 
-def _put_inputs(group: Any, content: Content) -> None:
-    _put_array(group, SCENARIO, _text(content.scenario_text))
-    _put_array(group, ABOUT, _text(json.dumps(content.attributes, default=as_plain)))
-    files = _group(group, FILES)
-    for number, (path, text) in enumerate(content.files.items()):
-        _put_array(files, str(number), _text(text), path=path)
+def put_texts(file: h5py.File, content: Content) -> None:
+    """Write everything except variables.
+
+    Short values are also written as HDF5 attributes, for other programs.
+    """
+    named = {"format": content.schema.format, "format_version": content.schema.version}
+    for name, value in {**named, **content.attributes}.items():
+        if isinstance(value, str | int | float | np.number | np.bool_):
+            put_labels(file, **{name: value})
+    inputs, checkpoint = put_group(file, INPUTS), put_group(file, CHECKPOINT)
+    put_text(inputs, SCENARIO, content.scenario_text)
+    put_text(inputs, ABOUT, json.dumps(content.attributes, default=as_plain))
+    put_text(inputs, FILES, json.dumps(content.files))
+    for name, array in content.checkpoint.items():
+        put_array(checkpoint, name, array)
 
 
-def _group(group: Any, name: str) -> Any:
+def put_group(parent: h5py.Group, name: str) -> h5py.Group:
+    """Return a new group without time stamps."""
     creation = h5p.create(h5p.GROUP_CREATE)
     creation.set_obj_track_times(False)
-    return h5g.create(group, name.encode(), gcpl=creation)
+    return h5py.Group(h5g.create(parent.id, name.encode(), gcpl=creation))
 
 
-def _put_array(
-    group: Any, name: str, array: npt.NDArray[Any], reserved: bool = False, **labels: str
-) -> Any:
-    """Write an array, or only allocate its space, which leaves a hole in the file."""
-    kind = _type_of(array.dtype)
-    space = h5s.create_simple(array.shape) if array.ndim else _SCALAR
-    dataset = h5d.create(group, name.encode(), kind, space, _creation(reserved))
-    if array.size and not reserved:
-        dataset.write(h5s.ALL, h5s.ALL, np.asarray(array, order="C"), kind)
-    for label, text in labels.items():
-        _put_attribute(dataset, label, text)
-    return dataset
+def put_text(group: h5py.Group, name: str, text: str) -> None:
+    """Write a text of up to 4 GB."""
+    group.create_dataset(name, data=[_text(text)], chunks=(1,), fletcher32=True)
 
 
-def _put_attribute(target: Any, name: str, value: object) -> None:
-    content = _text(value) if isinstance(value, str) else np.asarray(value)
-    kind = _type_of(content.dtype)
-    h5a.create(target, name.encode(), kind, _SCALAR).write(content, kind)
+def put_array(group: h5py.Group, name: str, array: npt.NDArray[Any]) -> h5py.Dataset:
+    """Write an array with checksums.
+
+    Raises
+    ------
+    ValueError
+        If it holds neither numbers nor texts of fixed length.
+    """
+    array = np.asarray(array)
+    if array.dtype.kind not in "biufS":
+        raise ValueError(f"an array of {array.dtype} cannot be stored")
+    if array.ndim == 0:  # there are no chunks, and no checksums outside the object header
+        creation = h5p.create(h5p.DATASET_CREATE)
+        creation.set_layout(h5d.COMPACT)
+        creation.set_obj_track_times(False)
+        kind, space = h5t.py_create(array.dtype, logical=True), h5s.create(h5s.SCALAR)
+        dataset = h5py.Dataset(h5d.create(group.id, name.encode(), kind, space, creation))
+        dataset[()] = array
+        return dataset
+    if array.size == 0:
+        return group.create_dataset(name, data=array)
+    return group.create_dataset(name, data=array, **_stored_as(array))
+
+
+def _reserve(group: h5py.Group, name: str, array: npt.NDArray[Any]) -> h5py.Dataset:
+    """Describe an array without storing it: what is not written is its fill value."""
+    return group.create_dataset(name, array.shape, array.dtype, **_stored_as(array))
+
+
+def _stored_as(array: npt.NDArray[Any]) -> dict[str, Any]:
+    """Return chunks, filters and fill value of an array."""
+    left, chunks = _CHUNK_NUMBERS, []
+    for length, most in zip(array.shape, (CHUNK_ROWS, *array.shape[1:]), strict=True):
+        chunks.append(max(min(length, most, left), 1))
+        left //= chunks[-1]
+    is_text = array.dtype.kind == "S" and len(array) > 1  # mostly empty
+    return {
+        "chunks": tuple(chunks),
+        "fletcher32": True,
+        "compression": "gzip" if is_text else None,
+        "fillvalue": np.nan if array.dtype.kind == "f" else None,
+    }
+
+
+def put_labels(
+    item: h5py.File | h5py.Dataset, **labels: str | float | np.number[Any] | np.bool_
+) -> None:
+    """Write short texts and numbers as attributes."""
+    for name, value in labels.items():
+        if isinstance(value, str):
+            item.attrs[name] = _text(value[:_LABEL_LENGTH])
+        else:
+            is_bool = isinstance(value, bool | np.bool_)  # netCDF has none
+            item.attrs[name] = int(value) if is_bool else value
 
 
 def _text(text: str) -> npt.NDArray[Any]:
-    """Return a text as an array of fixed length, which needs no heap and may have up to 4 GB."""
-    content = text.encode("utf-8", ERRORS)
-    return np.array(content, f"S{len(content) + 1}")
-
-
-@lru_cache(maxsize=256)
-def _type_of(dtype: np.dtype[Any]) -> Any:
-    if dtype.kind == "S":
-        kind = h5t.C_S1.copy()
-        kind.set_size(dtype.itemsize)
-        kind.set_cset(h5t.CSET_UTF8)
-        kind.set_strpad(h5t.STR_NULLTERM)
-        return kind
-    if dtype.kind not in "biuf":
-        raise ValueError(f"an array of {dtype} cannot be stored")
-    return h5t.py_create(dtype, logical=True)
-
-
-@lru_cache(maxsize=2)
-def _creation(reserved: bool) -> Any:
-    creation = h5p.create(h5p.DATASET_CREATE)
-    creation.set_obj_track_times(False)
-    if reserved:
-        creation.set_alloc_time(h5d.ALLOC_TIME_EARLY)
-        creation.set_fill_time(h5d.FILL_TIME_NEVER)
-    return creation
+    """Return a text as an array of fixed length with a final zero, which needs no heap."""
+    content = text.encode("utf-8", ERRORS) + b"\0"
+    return np.array(content, h5py.string_dtype("utf-8", len(content)))

@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Container, Iterable, Sequence
+from collections.abc import Callable, Container, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar
 
 import numpy as np
 
 from wearsim.errors import ResultsFileError
-from wearsim.results.content import Arrays, StudyData
+from wearsim.results.content import (
+    ABOUT,
+    CHECKPOINT,
+    ERRORS,
+    FILES,
+    INPUTS,
+    SCENARIO,
+    Arrays,
+    StudyData,
+)
 from wearsim.results.dissipation.data import DissipationData
 from wearsim.results.dissipation.schema import DISSIPATION, dissipation_schema
 from wearsim.results.ensemble.schema import ENSEMBLE
@@ -51,7 +60,7 @@ def read_results(path: str | Path) -> RunData:
     Raises
     ------
     ResultsFileError
-        If it is missing, foreign, truncated, damaged, or written by a newer wearsim.
+        If it is missing, foreign, truncated, damaged, or of another layout.
     """
     return read_file(path, lambda file: _run_data(path, file))
 
@@ -100,12 +109,12 @@ def read_file(path: str | Path, take: Callable[[h5py.File], Stored]) -> Stored:
 
     _check_signature(path)
     try:
-        # no lock is needed: the structure of a file never changes
+        # no lock is needed: a file is replaced whole
         with h5py.File(path, "r", locking=False) as file:
             return take(file)
     except _DAMAGE as error:
         if "truncated" in str(error):
-            raise ResultsFileError(truncated(path)) from error
+            raise ResultsFileError(_truncated(path)) from error
         text = str(error.args[0]) if isinstance(error, KeyError) and error.args else str(error)
         reason = next(iter(text.splitlines()), type(error).__name__)
         raise ResultsFileError(f"{path}: is damaged ({reason})") from error
@@ -124,28 +133,28 @@ def _check_signature(path: str | Path) -> None:
     if not (start.startswith(_SIGNATURE) or _SIGNATURE.startswith(start)):
         raise ResultsFileError(f"{path}: is not a results file of wearsim, not even HDF5")
     if len(start) < _SMALLEST:
-        raise ResultsFileError(truncated(path))
+        raise ResultsFileError(_truncated(path))
 
 
-def truncated(path: str | Path) -> str:
-    """Return the error message on a truncated file."""
+def _truncated(path: str | Path) -> str:
     return f"{path}: is truncated: its end is missing, as after a copy that was cut short"
 
 
 def _kind(path: str | Path, file: h5py.File) -> tuple[FileKind, Schema, str]:
-    name = file.attrs.get("format")
-    text = name.decode(errors="replace") if isinstance(name, bytes) else name
-    if not isinstance(text, str) or text not in _KINDS:
+    found = _KINDS.get(format_of(file))
+    if found is None:
         raise ResultsFileError(f"{path}: is HDF5, but not a results file of wearsim")
-    return _KINDS[text]
+    return found
+
+
+def format_of(file: h5py.File) -> str:
+    """Return the name of the format of a file, or another text if it has none."""
+    name = file.attrs.get("format")
+    return name.decode(errors="replace") if isinstance(name, bytes) else str(name)
 
 
 def _run_data(path: str | Path, file: h5py.File) -> RunData:
-    from wearsim.results.io import hdf5_read, hdf5_write  # noqa: PLC0415
-
-    # early files of layout 1, without random inputs, have no "drawn"
-    group = hdf5_write.CHECKPOINT
-    attributes = read_attributes(path, file, RUN, RunData, groups=[group], optional=["drawn"])
+    attributes = read_attributes(path, file, RUN, RunData)
     variables = _variables(file, RUN)
 
     def of_kind(kind: str) -> Arrays:
@@ -156,7 +165,7 @@ def _run_data(path: str | Path, file: h5py.File) -> RunData:
         static=of_kind("static"),
         history=of_kind("history"),
         records=of_kind("record"),
-        checkpoint=hdf5_read.get_arrays(file[group]),
+        checkpoint={name: np.asarray(item[()]) for name, item in file[CHECKPOINT].items()},
     )
 
 
@@ -174,12 +183,7 @@ def _variables(file: h5py.File, schema: Schema) -> Arrays:
 
 
 def read_attributes(
-    path: str | Path,
-    file: h5py.File,
-    schema: Schema,
-    data: type[StudyData],
-    groups: Sequence[str] = (),
-    optional: Sequence[str] = (),
+    path: str | Path, file: h5py.File, schema: Schema, data: type[StudyData]
 ) -> dict[str, Any]:
     """Return the fields of a file except arrays, after checks of its kind and completeness.
 
@@ -191,46 +195,48 @@ def read_attributes(
         The required kind of file.
     data : type of StudyData
         The class with these fields.
-    groups : sequence of str
-        Required groups.
-    optional : sequence of str
-        Fields that may be missing, as in files of older versions.
 
     Raises
     ------
     ResultsFileError
-        If the file is of another kind, written by a newer wearsim, or incomplete.
+        If the file is of another kind or layout, or incomplete.
     """
-    from wearsim.results.io import hdf5_read, hdf5_write  # noqa: PLC0415
-
     _, found, opener = _kind(path, file)
     if found is not schema:
         raise ResultsFileError(
             f"{path}: holds {found.holds}; what is needed is {schema.holds}. In Python,"
             f" wearsim.{opener} opens it"
         )
-    version = int(file.attrs["format_version"])
-    if version > schema.version:
-        raise ResultsFileError(
-            f"{path}: was written by a newer wearsim (format {version}, this one reads up to"
-            f" {schema.version}); update wearsim to read it"
-        )
-    about, scenario, files = (
-        f"{hdf5_write.INPUTS}/{name}"
-        for name in (hdf5_write.ABOUT, hdf5_write.SCENARIO, hdf5_write.FILES)
-    )
-    check_complete(path, file, [*schema.variables, about, scenario, files, *groups])
-    attributes: dict[str, Any] = json.loads(hdf5_read.get_text(file[about]))
+    check_layout(path, file, schema)
+    about, scenario, files = (f"{INPUTS}/{name}" for name in (ABOUT, SCENARIO, FILES))
+    check_complete(path, file, [*schema.variables, about, scenario, files, CHECKPOINT])
+    attributes: dict[str, Any] = json.loads(read_text(file[about]))
     names = data.attribute_names()
-    check_complete(path, {*attributes, *optional}, names)
-    return {name: attributes[name] for name in names if name in attributes} | {
-        "scenario_text": hdf5_read.get_text(file[scenario]),
-        "files": {
-            hdf5_read.get_label(item, "path"): hdf5_read.get_text(item)
-            for number in range(len(file[files]))
-            for item in [file[f"{files}/{number}"]]
-        },
+    check_complete(path, attributes, names)
+    return {name: attributes[name] for name in names} | {
+        "scenario_text": read_text(file[scenario]),
+        "files": json.loads(read_text(file[files])),
     }
+
+
+def check_layout(path: str | Path, file: h5py.File, schema: Schema) -> None:
+    """Raise a ResultsFileError unless a file has the layout of a schema."""
+    version = int(file.attrs["format_version"])
+    if version == schema.version:
+        return
+    remedy = "update wearsim to read it"
+    if version < schema.version:
+        remedy = "repeat the computation, or read it with the version of wearsim that wrote it"
+    raise ResultsFileError(
+        f"{path}: has layout {version} of {schema.format}, and this wearsim reads layout"
+        f" {schema.version}; {remedy}"
+    )
+
+
+def read_text(dataset: h5py.Dataset) -> str:
+    """Return a text written by `hdf5_write.put_text`."""
+    content: bytes = dataset[:].tobytes()  # a single element would lose zeros at its end
+    return content[:-1].decode("utf-8", ERRORS)
 
 
 def check_complete(path: str | Path, present: Container[str], names: Iterable[str]) -> None:

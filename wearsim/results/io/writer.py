@@ -5,11 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 from wearsim.results.dissipation.data import DissipationData
-from wearsim.results.io.atomic_write import write_pieces
+from wearsim.results.io.atomic_write import DISK, Storage
 from wearsim.results.run.data import RunData
 
 
-def write_results(path: str | Path, data: RunData | DissipationData) -> None:
+def write_results(
+    path: str | Path, data: RunData | DissipationData, storage: Storage = DISK
+) -> None:
     """Write a results file, replacing an existing one.
 
     Parameters
@@ -18,6 +20,8 @@ def write_results(path: str | Path, data: RunData | DissipationData) -> None:
         The file.
     data : RunData or DissipationData
         Content of the file.
+    storage : Storage
+        File operations.
 
     Raises
     ------
@@ -28,4 +32,6 @@ def write_results(path: str | Path, data: RunData | DissipationData) -> None:
     """
     from wearsim.results.io import hdf5_write  # noqa: PLC0415  (h5py takes 0.2 s to import)
 
-    write_pieces(path, [(0, hdf5_write.file_image(data.content))])
+    with hdf5_write.new_file(path, storage) as (file, _):
+        hdf5_write.put_variables(file, data.content)
+        hdf5_write.put_texts(file, data.content)

@@ -111,4 +111,4 @@ VARIABLES: Mapping[str, Variable] = by_name(
     )
 )
 
-RUN = Schema("wearsim-run", 1, "a wear test, from `wearsim run`", AXES, VARIABLES)
+RUN = Schema("wearsim-run", 2, "a wear test, from `wearsim run`", AXES, VARIABLES)

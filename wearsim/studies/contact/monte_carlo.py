@@ -163,7 +163,7 @@ class _Study:
             **origin_of(scenario),
             plan=scenario.sampling.plan,
             inputs=[{"key": key, "unit": unit} for key, unit in contacts.units.items()],
-            asked=contacts.count,
+            requested=contacts.count,
             finished=done == contacts.count,
             strip_width=contacts.grid.spacing,
             friction_grid=friction_grid if points else "",

@@ -10,11 +10,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wearsim.errors import CapabilityError, ScenarioError
+from wearsim.errors import CapabilityError, ResultsFileError, ScenarioError
 from wearsim.results import (
+    DISK,
     EnsembleData,
     EnsembleFile,
     EnsembleResult,
+    Storage,
     check_output,
     open_ensemble,
     read_ensemble,
@@ -56,6 +58,7 @@ def ensemble(
     on_progress: Watcher | None = None,
     stop_requested: Callable[[], bool] | None = None,
     on_notice: Callable[[str], None] | None = None,
+    storage: Storage = DISK,
 ) -> EnsembleResult:
     """Run a whole wear test for each realisation of a scenario's random inputs.
 
@@ -65,7 +68,8 @@ def ensemble(
     realisations : int
         Maximum number of realisations.
     output : path
-        Results file, extended as realisations finish.
+        Results file. Until the ensemble is finished, realisations are in a folder beside it,
+        ``rig.h5.parts`` for ``rig.h5``.
     plan : str, optional
         "monte-carlo", "latin-hypercube", "sobol", "control-variate" or "saltelli"; by default the
         scenario's.
@@ -85,6 +89,8 @@ def ensemble(
         Unfinished realisations are run by `resume_ensemble`.
     on_notice : callable, optional
         Called with a message when a worker is lost, or a cluster has no workers.
+    storage : Storage
+        File operations; those of the operating system, except in tests.
 
     Returns
     -------
@@ -113,7 +119,8 @@ def ensemble(
     ) as pool:
         grid = shared_grid(scenario)
         header = _header(scenario, request, grid)
-        with EnsembleFile.create(path, header, _static(scenario, grid)) as file:
+        static = _static(scenario, grid)
+        with EnsembleFile.create(path, header, static, storage) as file:
             runner = RealisationRunner(scenario, request.plan, request.realisations, grid)
             EnsembleWork(file, runner, request.target, pool, on_progress, stop_requested).finish()
     return open_ensemble(path)
@@ -144,7 +151,7 @@ def checked_request(
     require_run(scenario)
     chosen = parse_plan(plan or scenario.sampling.plan)
     target = None if until is None else parse_target(until)
-    check_plan(scenario, chosen, until or "")
+    check_plan(scenario, chosen, "--until" if until else "")
     drawer = Drawer(scenario, "monte-carlo")
     by_pass = any(item.persistence == "per-pass" for item in scenario.random)
     if not drawer.groups and not (by_pass and scenario.evolution.stepper == "per-pass"):
@@ -181,11 +188,13 @@ def resume_ensemble(
     file: str | Path,
     *,
     failed: bool = False,
+    realisations: int | None = None,
     workers: int | None = None,
     scheduler: str = "processes",
     on_progress: Watcher | None = None,
     stop_requested: Callable[[], bool] | None = None,
     on_notice: Callable[[str], None] | None = None,
+    storage: Storage = DISK,
 ) -> EnsembleResult:
     """Continue an ensemble from its file; the result is bit for bit that of an unbroken one.
 
@@ -195,7 +204,9 @@ def resume_ensemble(
         Results file of an ensemble that was stopped, or finished.
     failed : bool
         Run the failed realisations again, and no others.
-    workers, scheduler, on_progress, stop_requested, on_notice
+    realisations : int, optional
+        New maximum number of realisations, to extend the ensemble.
+    workers, scheduler, on_progress, stop_requested, on_notice, storage
         As in `ensemble`.
 
     Returns
@@ -205,19 +216,31 @@ def resume_ensemble(
     Raises
     ------
     ResultsFileError
-        If the file cannot be read, needs a plugin that is not installed, or is being written.
+        If the file cannot be read, needs a plugin that is not installed, is being written, or
+        has as many realisations already.
+    ScenarioError
+        If the size of the plan is fixed, so that it cannot be extended.
     WorkerError, Interrupted
         As in `ensemble`.
     """
     path = Path(file)
     data = read_ensemble(path)
     check_plugins(path, data)
-    if data.finished and not (failed and len(data.failed)):
+    if data.finished and realisations is None and not (failed and len(data.failed)):
         return open_ensemble(path)
     scenario = parse_scenario(data.scenario_text, data.scenario_file, data.files.__getitem__)
+    plan, total = parse_plan(data.plan), data.requested
+    if realisations is not None:
+        checked_count(scenario, realisations)
+        check_plan(scenario, plan, "-n")
+        if realisations < total or (data.finished and realisations == total):
+            raise ResultsFileError(
+                f"{path}: has {total} realisations; give a larger number with -n to extend it"
+            )
+        total = realisations
     target = Target.parse(data.until) if data.until else None
     grid = Grid(data.variables["y"], data.strip_width)
-    runner = RealisationRunner(scenario, parse_plan(data.plan), data.asked, grid)
+    runner = RealisationRunner(scenario, plan, total, grid)
     with (
         executor(
             scheduler,
@@ -226,8 +249,10 @@ def resume_ensemble(
             stop_requested=stop_requested,
             preload=RealisationRunner.__module__,
         ) as pool,
-        EnsembleFile.open(path) as opened,
+        EnsembleFile.open(path, storage) as opened,
     ):
+        if total > data.requested:
+            opened.grow(total)
         work = EnsembleWork(opened, runner, target, pool, on_progress, stop_requested)
         for text in changed_origins(data, scenario):
             work.warn(text)
@@ -265,7 +290,7 @@ def _header(scenario: Scenario, request: EnsembleRequest, grid: Grid) -> Ensembl
         total_time=scenario.total_time,
         strip_width=grid.spacing,
         plan=request.plan,
-        asked=request.realisations,
+        requested=request.realisations,
         until="" if request.target is None else str(request.target),
         inputs=[
             {

@@ -33,7 +33,7 @@ class Compared:
         "run" or "ensemble".
     count : int
         Independent realisations; in Saltelli's plan fewer than were run.
-    done, failed, asked : int
+    done, failed, requested : int
         Numbers of realisations: successful, failed, and maximum.
     finished : bool
         Whether the run or ensemble is complete.
@@ -61,7 +61,7 @@ class Compared:
     count: int
     done: int
     failed: int
-    asked: int
+    requested: int
     finished: bool
     passes: float
     time: float
@@ -158,7 +158,7 @@ def _row(label: str, result: Comparable, observable: str, first: Comparable | No
             count=1,
             done=1,
             failed=0,
-            asked=1,
+            requested=1,
             finished=result.finished,
             passes=float(result.passes[-1]),
             time=float(result.time[-1]),
@@ -179,7 +179,7 @@ def _row(label: str, result: Comparable, observable: str, first: Comparable | No
         count=len(values),
         done=result.count,
         failed=result.failed,
-        asked=result.asked,
+        requested=result.requested,
         finished=result.finished,
         passes=float(result.record_passes[-1]),
         time=float(result.record_time[-1]),
@@ -250,7 +250,7 @@ def have_same_draws(one: EnsembleResult, other: EnsembleResult) -> bool:
     return (
         plans[0] == plans[1]
         # strata depend on the number of realisations, and Saltelli's rows on that of the inputs
-        and (plans[0] != "latin-hypercube" or one.asked == other.asked)
+        and (plans[0] != "latin-hypercube" or one.requested == other.requested)
         and (plans[0] != "saltelli" or groups[0] == groups[1])
         and one.raw.seed == other.raw.seed
         and bool(keys[0] & keys[1])

@@ -91,23 +91,30 @@ def whole_count(plan: EnsemblePlan, groups: Sequence[str], realisations: int) ->
     return size * max(-(-realisations // size), 1)
 
 
-def check_plan(scenario: Scenario, plan: EnsemblePlan, until: str) -> None:
-    """Check that a plan supports the target and the correlations of an ensemble.
+def check_plan(scenario: Scenario, plan: EnsemblePlan, option: str = "") -> None:
+    """Check that a plan supports an option and the correlations of an ensemble.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    plan : str
+    option : str
+        An option of the command line for which the ensemble must be able to grow, "--until".
 
     Raises
     ------
     ScenarioError
-        If a target is given for a plan of fixed size, or inputs of Saltelli's plan are correlated.
+        If a plan of fixed size would have to grow, or inputs of Saltelli's plan are correlated.
     """
     mistakes = []
-    if until and plan in {"latin-hypercube", "saltelli"}:
+    if option and plan in {"latin-hypercube", "saltelli"}:
         what = {
             "latin-hypercube": "a Latin hypercube cannot grow: the number of its strata is that of"
             " its realisations",
             "saltelli": "Saltelli's plan is for sensitivity, and its size is chosen beforehand",
         }[plan]
-        expected = "monte-carlo, sobol or control-variate; or no --until"
-        mistakes.append(Mistake("sampling", "plan", what, f'"{plan}" with --until', expected))
+        expected = f"monte-carlo, sobol or control-variate; or no {option}"
+        mistakes.append(Mistake("sampling", "plan", what, f'"{plan}" with {option}', expected))
     if plan == "saltelli" and scenario.sampling.correlation:
         what = "Saltelli's plan draws the inputs independently, and these are correlated"
         expected = "no correlation, or another plan"

@@ -8,15 +8,17 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from itertools import islice
+from typing import Any
 
 import numpy as np
 
 from wearsim.errors import Interrupted, WorkerError
-from wearsim.results import EnsembleFile, EnsembleResult, Outcome
+from wearsim.results import EnsembleData, EnsembleFile, EnsembleResult, Outcome
 from wearsim.results.ensemble.schema import DONE, FAILED, PENDING
 from wearsim.studies.ensemble.designs import interim_sizes
 from wearsim.studies.ensemble.realisation import RealisationRunner
 from wearsim.studies.execution.processes import Executor
+from wearsim.types import FloatArray
 from wearsim.uq.estimation.intervals import UNKNOWN, Interval
 from wearsim.uq.estimation.stopping_rule import Target
 
@@ -33,7 +35,7 @@ class EnsembleProgress:
 
     Parameters
     ----------
-    done, failed, asked : int
+    done, failed, requested : int
         Numbers of realisations: successful, failed, and maximum.
     rate : float
         Realisations per second in this process.
@@ -49,7 +51,7 @@ class EnsembleProgress:
 
     done: int
     failed: int
-    asked: int
+    requested: int
     rate: float
     left: float
     what: str
@@ -114,7 +116,7 @@ def ensemble_warnings(result: EnsembleResult, target: Target | None, reached: bo
         ),
         (
             target is not None and not reached,
-            f"{target} was not reached by {result.asked} realisations",
+            f"{target} was not reached by {result.requested} realisations",
         ),
     )
     return [text for applies, text in warnings if applies]
@@ -161,7 +163,7 @@ class EnsembleWork:
         self._stopping = self._reached = False
         self._ahead = AHEAD * max(pool.workers, 1)
         self._run, self._rate = 0, 0.0
-        self._estimated, self._estimate = -math.inf, UNKNOWN
+        self._next_estimate, self._estimate = -math.inf, UNKNOWN
 
     def warn(self, text: str) -> None:
         """Store a warning with the results."""
@@ -180,14 +182,9 @@ class EnsembleWork:
         while not (self._is_complete() or self._stopping):
             self._run_batches(self._pending())
         if not self._is_complete():
-            self._write_state(finished=False)
+            self.file.put_state(**self._state())
             raise self._interrupted()
-        result = self._result()
-        if result.count:
-            self.file.put_statistics(result.statistics())
-        for text in ensemble_warnings(result, self.target, self._reached):
-            self.warn(text)
-        self._write_state(finished=True, statistics=result.final_estimates())
+        self.file.finish(self._complete)
 
     def run_failed_again(self) -> None:
         """Run the failed realisations again; raises as `finish`.
@@ -197,14 +194,13 @@ class EnsembleWork:
         """
         numbers = np.flatnonzero(self.file.status == FAILED).tolist()
         finished = self.file.data.finished
-        self._write_state(finished=False)  # first, so that a kill leaves a file to be resumed
-        self.file.clear(numbers)
+        self.file.clear(numbers)  # from now on a kill leaves an ensemble to be resumed
         if finished:
             self.finish()
             return
         self._sizes = []
         self._run_batches(numbers)
-        self._write_state(finished=False)
+        self.file.put_state(**self._state())
         if (self.file.status[numbers] == PENDING).any():
             raise self._interrupted()
 
@@ -297,15 +293,19 @@ class EnsembleWork:
         data = replace(self.file.data, status=self.file.status.copy())
         return EnsembleResult(data, self.file.path)
 
-    def _write_state(self, finished: bool, statistics: object = None) -> None:
-        self.file.put_state(
-            {
-                "finished": finished,
-                "warnings": self.warnings,
-                "wall_seconds": self.before + time.monotonic() - self.started,
-                "statistics": statistics or {},
-            }
-        )
+    def _state(self) -> dict[str, Any]:
+        """Return the fields of the results that have changed."""
+        wall_seconds = self.before + time.monotonic() - self.started
+        return {"warnings": self.warnings, "wall_seconds": wall_seconds}
+
+    def _complete(self, data: EnsembleData) -> tuple[dict[str, Any], dict[str, FloatArray]]:
+        """Return the final fields of a complete ensemble, and its statistics."""
+        result = EnsembleResult(data, self.file.path)
+        for text in ensemble_warnings(result, self.target, self._reached):
+            self.warn(text)
+        statistics = result.statistics() if result.count else {}
+        final = {"finished": True, "statistics": result.final_estimates()}
+        return {**self._state(), **final}, statistics
 
     def _interrupted(self) -> Interrupted:
         done = int((self.file.status != PENDING).sum())
@@ -317,14 +317,15 @@ class EnsembleWork:
     def _report_progress(self) -> None:
         status, target, now = self.file.status, self.target or DEFAULT_TARGET, time.monotonic()
         done, failed = int((status == DONE).sum()), int((status == FAILED).sum())
-        if done and now - self._estimated > BETWEEN_ESTIMATES:
-            self._estimated = now
+        if done and now > self._next_estimate:
             self._estimate = target.interval(self._result().estimate_for(target))
+            spent = time.monotonic() - now  # at most 5 % of the time
+            self._next_estimate = now + max(BETWEEN_ESTIMATES, 20.0 * spent)
         self.on_progress(
             EnsembleProgress(
                 done=done,
                 failed=failed,
-                asked=self.total,
+                requested=self.total,
                 rate=self._rate,
                 left=(self.total - done - failed) / self._rate if self._rate else math.nan,
                 what=target.what,

@@ -99,7 +99,7 @@ def _matches(path: Path, scenario: Scenario, request: EnsembleRequest) -> bool:
         return False
     until = "" if request.target is None else str(request.target)
     requested = (scenario.sha256, request.plan, request.realisations, until)
-    return requested == (data.sha256, data.plan, data.asked, data.until)
+    return requested == (data.sha256, data.plan, data.requested, data.until)
 
 
 def path_of(output: str | Path, value: str) -> Path:

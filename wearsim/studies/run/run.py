@@ -14,7 +14,16 @@ from wearsim.errors import Interrupted, ResultsFileError, SolverError
 from wearsim.evolution.error_control.error_estimates import greatest_depth, total_worn_volume
 from wearsim.evolution.integrate import evolve
 from wearsim.evolution.state import SIGMAS, WearState, fresh_state, widened, widened_state
-from wearsim.results import Result, RunData, check_output, kind_of, read_results, write_results
+from wearsim.results import (
+    DISK,
+    Result,
+    RunData,
+    Storage,
+    check_output,
+    kind_of,
+    read_results,
+    write_results,
+)
 from wearsim.results.run.schema import VARIABLES
 from wearsim.scenario import Scenario, parse_scenario
 from wearsim.studies.run.assemble import assemble_problem, start_height, strips_of_run
@@ -34,6 +43,7 @@ def run(
     force: bool = False,
     on_event: Watcher | None = None,
     stop_requested: Callable[[], bool] | None = None,
+    storage: Storage = DISK,
 ) -> Result:
     """Run a wear test from unworn bodies to its end.
 
@@ -48,6 +58,8 @@ def run(
         Called with every event, see `wearsim.studies.run.events`.
     stop_requested : callable, optional
         Called after every step; True stops the run after a checkpoint.
+    storage : Storage
+        File operations; those of the operating system, except in tests.
 
     Returns
     -------
@@ -65,7 +77,9 @@ def run(
     path = Path(output) if output is not None else None
     if path is not None:
         check_output(path, force, scenario.paths)
-    return _RunInProgress(scenario, draw(scenario), path, on_event, stop_requested).finish()
+    return _RunInProgress(
+        scenario, draw(scenario), path, storage, on_event, stop_requested
+    ).finish()
 
 
 def resume(
@@ -74,6 +88,7 @@ def resume(
     *,
     on_event: Watcher | None = None,
     stop_requested: Callable[[], bool] | None = None,
+    storage: Storage = DISK,
 ) -> Result:
     """Continue a run from its file; the result is bit for bit that of an unbroken one.
 
@@ -83,7 +98,7 @@ def resume(
         Results file of a run that was stopped, or finished.
     until : float, optional
         New simulated end of the test [s], to extend it.
-    on_event, stop_requested
+    on_event, stop_requested, storage
         As in `run`.
 
     Returns
@@ -124,7 +139,9 @@ def resume(
         return Result(data, path)
     draws = draw(scenario)
     data, state = _widened(draws, data, state)
-    return _RunInProgress(scenario, draws, path, on_event, stop_requested, data, state).finish()
+    return _RunInProgress(
+        scenario, draws, path, storage, on_event, stop_requested, data, state
+    ).finish()
 
 
 def _widened(draws: Draws, data: RunData, state: WearState) -> tuple[RunData, WearState]:
@@ -166,13 +183,14 @@ class _RunInProgress:
         scenario: Scenario,
         draws: Draws,
         path: Path | None,
+        storage: Storage,
         on_event: Watcher | None,
         stop_requested: Callable[[], bool] | None,
         data: RunData | None = None,
         state: WearState | None = None,
     ) -> None:
         grid = None if data is None else Grid(data.static["y"], float(data.checkpoint["spacing"]))
-        self.scenario, self.path = scenario, path
+        self.scenario, self.path, self.storage = scenario, path, storage
         self.problem, self.stepper, self.stepper_name = assemble_problem(draws, grid)
         self.on_event: Watcher = on_event or (lambda event: None)
         self.stop_requested = stop_requested or (lambda: False)
@@ -307,7 +325,7 @@ class _RunInProgress:
         if self.path is None:
             return
         begin = time.monotonic()
-        write_results(self.path, self._data(finished))
+        write_results(self.path, self._data(finished), self.storage)
         self._last_write = time.monotonic() - begin
         self.on_event(Checkpointed(str(self.path), self._passes))
 
