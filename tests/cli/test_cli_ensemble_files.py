@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from cli_examples import Command
 
 import wearsim
-from tests.studies.ensemble_cases import small
+from tests.studies.ensemble_cases import differences, small
 from wearsim.errors import Interrupted, ResultsFileError
 from wearsim.results import open_ensemble
 from wearsim.studies.ensemble.api import ensemble
@@ -81,6 +82,56 @@ def test_resumed_ensemble_equals_unbroken_ensemble(command: Command) -> None:
     np.testing.assert_array_equal(found.values("depth"), whole.values("depth"))
 
 
+def test_commands_open_an_ensemble_that_is_in_parts(command: Command) -> None:
+    ensemble(small(), 5, "whole.h5", scheduler="serial")
+    with pytest.raises(Interrupted):
+        ensemble(small(), 12, "part.h5", scheduler="serial", stop_requested=lambda: True)
+    assert Path("part.h5.parts/000001.h5").is_file()
+    for arguments in (
+        ["show", "part.h5"],
+        ["plot", "part.h5", "-o", "part.png"],
+        ["export", "part.h5", "-o", "tables"],
+        ["compare", "part.h5", "whole.h5"],
+    ):
+        result = command(*arguments)
+        assert result.exit_code == 0, result.output
+    Path("part.h5.parts").rename("elsewhere")
+    result = command("show", "part.h5")
+    assert result.exit_code == 2
+    assert "part.h5: is unfinished, and part of it is missing: there is no" in result.stderr
+
+
+@pytest.mark.parametrize("finished", [False, True])
+def test_resume_extends_an_ensemble(command: Command, finished: bool) -> None:
+    whole = ensemble(small(), 12, "whole.h5", scheduler="serial")
+    with nullcontext() if finished else pytest.raises(Interrupted):
+        ensemble(small(), 5, "part.h5", scheduler="serial", stop_requested=lambda: not finished)
+    result = command("resume", "part.h5", "-n", "12", "--scheduler", "serial", "-q")
+    assert result.exit_code == 0, result.output
+    assert "12 done, 0 failed, of 12" in result.stdout
+    assert differences(open_ensemble("part.h5"), whole) == []
+    assert not Path("part.h5.parts").exists()
+    result = command("resume", "part.h5", "-n", "12", "-q")
+    assert result.exit_code == 2
+    assert "part.h5: has 12 realisations; give a larger number with -n" in result.stderr
+
+
+@pytest.mark.parametrize("plan", ["latin-hypercube", "saltelli"])
+def test_plan_of_fixed_size_is_not_extended(command: Command, plan: str) -> None:
+    ensemble(small(), 6, "fixed.h5", plan=plan, scheduler="serial")
+    before = Path("fixed.h5").read_bytes()
+    result = command("resume", "fixed.h5", "-n", "500", "-q")
+    assert result.exit_code == 2
+    assert f'plan: found "{plan}" with -n' in " ".join(result.stderr.split())
+    assert Path("fixed.h5").read_bytes() == before
+
+
+def test_failed_realisations_are_not_repeated_while_extending(command: Command, done: Path) -> None:
+    result = command("resume", done, "-n", "500", "--failed")
+    assert result.exit_code == 2
+    assert "extend the ensemble first" in result.stderr
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -96,7 +147,10 @@ def test_resume_refuses_options_of_runs_for_an_ensemble(
     assert message in " ".join(result.stderr.split())
 
 
-@pytest.mark.parametrize("arguments", [["--failed"], ["--workers", "2"], ["--scheduler", "serial"]])
+@pytest.mark.parametrize(
+    "arguments",
+    [["--failed"], ["--workers", "2"], ["--scheduler", "serial"], ["--realisations", "9"]],
+)
 def test_resume_refuses_options_of_ensembles_for_a_run(
     command: Command, finished: Path, arguments: list[str]
 ) -> None:

@@ -94,6 +94,22 @@ def test_larger_ensemble_starts_with_the_smaller_one(twelve, tmp_path):
         np.testing.assert_array_equal(more.values(name)[:12], twelve.values(name))
 
 
+@pytest.mark.parametrize("plan", ["monte-carlo", "sobol", "control-variate"])
+def test_extended_ensemble_equals_the_larger_one(tmp_path, plan):
+    whole = ensemble(small(), 9, tmp_path / "whole.h5", plan=plan, **SERIAL)
+    path = tmp_path / "grown.h5"
+    ensemble(small(), 4, path, plan=plan, **SERIAL)
+    with pytest.raises(Interrupted):
+        resume_ensemble(path, realisations=9, stop_requested=lambda: True, **SERIAL)
+    assert not open_ensemble(path).finished
+    assert open_ensemble(path).requested == 9
+    grown = resume_ensemble(path, **SERIAL)
+    assert differences(grown, whole) == []
+    assert grown.raw.control == whole.raw.control
+    with pytest.raises(ResultsFileError, match="has 9 realisations; give a larger number"):
+        resume_ensemble(path, realisations=5)
+
+
 def test_seed_changes_the_ensemble(twelve, tmp_path):
     other = ensemble(small(seed=2), 3, tmp_path / "other.h5", **SERIAL)
     assert not np.isin(other.at_end("depth"), twelve.at_end("depth")).any()

@@ -48,6 +48,9 @@ class StoredRows(Mapping[str, "Array"]):
     def __iter__(self) -> Iterator[str]:
         return iter(self._schema.variables)
 
+    def __contains__(self, name: object) -> bool:
+        return name in self._schema.variables
+
     def __getitem__(self, name: str) -> Array:
         return self.rows(name, 0, None)
 

@@ -1,0 +1,83 @@
+"""Result files of all layouts: those of this wearsim open, others are refused with a remedy."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ensemble_examples import some_outcome
+from layout_files import FOLDER, LAYOUTS, run_of_file, study_of_file
+
+from wearsim.errors import ResultsFileError
+from wearsim.results import kind_of, read_dissipation, read_ensemble, read_results
+from wearsim.results.run.data import differences
+
+READERS = {
+    "run": read_results,
+    "dissipation": read_dissipation,
+    "ensemble": read_ensemble,
+    "unfinished": read_ensemble,
+}
+
+
+def _file(name: str) -> Path:
+    return FOLDER / f"{name}-{LAYOUTS[name]}.h5"
+
+
+def test_file_of_every_kind_is_kept_for_the_present_layout():
+    for name in READERS:
+        assert _file(name).is_file(), "python tests/results/layout_files.py writes it"
+    assert Path(f"{_file('unfinished')}.parts").is_dir()
+    assert not Path(f"{_file('ensemble')}.parts").exists()
+
+
+def test_run_of_this_layout_opens():
+    assert differences(read_results(_file("run")), run_of_file()) == []
+
+
+def test_dissipation_study_of_this_layout_opens():
+    found, expected = read_dissipation(_file("dissipation")), study_of_file()
+    assert found.attributes == expected.attributes
+    for name, array in expected.variables.items():
+        assert found.variables[name].tobytes() == array.tobytes()
+
+
+@pytest.mark.parametrize("name", ["ensemble", "unfinished"])
+def test_ensemble_of_this_layout_opens(name):
+    data = read_ensemble(_file(name))
+    assert data.finished == (name == "ensemble")
+    assert data.done.tolist() == [0, 1]
+    assert data.errors == {2: "lost"}
+    for number in data.done:
+        for variable, value in some_outcome(number, 3).values.items():
+            assert data.variables[variable][number].tobytes() == np.asarray(value).tobytes()
+
+
+@pytest.mark.parametrize("name", ["run", "dissipation", "ensemble"])
+def test_file_of_an_earlier_layout_is_refused_with_a_remedy(name):
+    path = FOLDER / f"{name}-1.h5"
+    assert kind_of(path) == name
+    with pytest.raises(ResultsFileError) as caught:
+        READERS[name](path)
+    assert str(caught.value) == (
+        f"{path}: has layout 1 of wearsim-{name}, and this wearsim reads layout {LAYOUTS[name]};"
+        " repeat the computation, or read it with the version of wearsim that wrote it"
+    )
+
+
+def test_part_of_another_layout_is_refused(tmp_path):
+    import h5py
+
+    shutil.copytree(FOLDER, tmp_path / "data")
+    path = tmp_path / "data" / _file("unfinished").name
+    part = Path(f"{path}.parts") / "000001.h5"
+    with h5py.File(part, "r+") as file:
+        file.attrs["format_version"] = 9
+    with pytest.raises(ResultsFileError) as caught:
+        read_ensemble(path)
+    assert str(caught.value) == (
+        f"{part}: has layout 9 of wearsim-ensemble-part, and this wearsim reads layout"
+        f" {LAYOUTS['unfinished']}; update wearsim to read it"
+    )
