@@ -66,6 +66,11 @@ class Grid:
         """Number of strips."""
         return len(self.y)
 
+    @property
+    def edges(self) -> tuple[float, float]:
+        """Positions of the outer edges of the first and the last strip [m]."""
+        return float(self.y[0]) - 0.5 * self.spacing, float(self.y[-1]) + 0.5 * self.spacing
+
 
 @dataclass(frozen=True)
 class Profile:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.scenario import Scenario, described_model
 from wearsim.studies.contact.single import study_contact
-from wearsim.studies.run.assemble import assemble_problem, load_range
+from wearsim.studies.run.assemble import assemble_problem
 from wearsim.studies.run.draws import draw
 from wearsim.studies.run.grid import fresh_patch
+from wearsim.studies.run.inputs import load_range
 
 TableRows = list[tuple[str, str]]
 

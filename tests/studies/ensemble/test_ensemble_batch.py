@@ -11,8 +11,9 @@ from wearsim.evolution.integrate import evolve
 from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.rkl2 import StabilisedStepper
 from wearsim.studies.ensemble.batch import RealisationRun, batch_groups, observe
-from wearsim.studies.run.assemble import assemble_problem, prepared_model, strips_of_run
+from wearsim.studies.run.assemble import assemble_problem, prepared_model
 from wearsim.studies.run.draws import Drawer
+from wearsim.studies.run.grid import strips_of_run
 from wearsim.studies.run.recorder import Recorder
 from wearsim.types import Grid
 

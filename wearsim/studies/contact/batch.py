@@ -12,16 +12,24 @@ from wearsim.errors import ContactError, Mistake, ScenarioError, SolverError
 from wearsim.evolution.operating_points import unworn_contacts
 from wearsim.scenario import RandomInput, Scenario, realise
 from wearsim.studies.contact.friction_field import LocalFriction
-from wearsim.studies.run.assemble import build_problem, check_model, load_range, prepared_model
+from wearsim.studies.run.assemble import build_problem, check_model, prepared_model
 from wearsim.studies.run.draws import Drawer, units_of
 from wearsim.studies.run.grid import (
     MOST_STRIPS,
+    contact_centre,
+    contact_grid,
     contact_positions,
     fresh_patch,
-    profile_grid,
     suggested_grid,
 )
-from wearsim.studies.run.inputs import FIELDS, OFFSET, TILT, contact_inputs, contact_values
+from wearsim.studies.run.inputs import (
+    FIELDS,
+    OFFSET,
+    TILT,
+    contact_inputs,
+    contact_values,
+    load_range,
+)
 from wearsim.types import FloatArray, Grid
 
 _MARGIN = 1e-9  # of a patch, against rounding at the outer edges
@@ -220,15 +228,10 @@ def realisation_grid(
     ScenarioError
         If the strips that the scenario defines do not cover all contacts, or too many are needed.
     """
-    choice, profile = scenario.contact, scenario.cylinder.profile
-    mean_b = fresh_patch(scenario, load).b
+    choice, mean_b = scenario.contact, fresh_patch(scenario, load).b
     half_widths = mean_b * np.cbrt(np.maximum(loads, 0.0) / load)
-    centre = choice.centre
-    if centre is None:
-        centre = contact_positions(scenario, contact_inputs(scenario, [0])).item()
+    centre = contact_centre(scenario, [0])
     away = np.abs(centres - centre)
-    if profile is not None and choice.width is None:
-        return profile_grid(profile, mean_b, choice.strips)
     if choice.width is not None:
         needed = 2.0 * float((away + half_widths).max())
         if choice.width < needed * (1.0 - _MARGIN):
@@ -236,8 +239,8 @@ def realisation_grid(
             got, expected = f"{choice.width * 1e3:.4g} mm", f"at least {needed * 1e3:.4g} mm"
             mistake = Mistake("contact", "width", what, got, expected)
             raise ScenarioError(scenario.file, [mistake])
-        half = 0.5 * choice.width
-        return Grid.spanning(centre - half, centre + half, choice.strips or 121)
+    if choice.width is not None or scenario.cylinder.profile is not None:
+        return contact_grid(scenario, load)
     grid = suggested_grid(scenario, load)
     if grid is None:
         grid = Grid.spanning(-1.2 * mean_b, 1.2 * mean_b, 121)

@@ -9,9 +9,9 @@ from wearsim.errors import WearsimError
 from wearsim.evolution.operating_points import unworn_contacts
 from wearsim.plugins import ContactModel
 from wearsim.scenario import Scenario, described_model
-from wearsim.studies.run.assemble import build_problem, check_model, load_range, prepared_model
-from wearsim.studies.run.grid import contact_positions, fresh_patch, profile_grid, suggested_grid
-from wearsim.studies.run.inputs import contact_inputs
+from wearsim.studies.run.assemble import build_problem, check_model, prepared_model
+from wearsim.studies.run.grid import contact_grid
+from wearsim.studies.run.inputs import load_range
 from wearsim.types import (
     ContactFields,
     ContactSolution,
@@ -62,23 +62,6 @@ class ContactStudy:
     notes: tuple[str, ...]
 
 
-def _grid(scenario: Scenario, load: float) -> Grid:
-    """Return the strips of the scenario, of the profile's whole width, or of the model's choice."""
-    choice, profile = scenario.contact, scenario.cylinder.profile
-    centre = choice.centre
-    if centre is None:
-        centre = contact_positions(scenario, contact_inputs(scenario, [0])).item()
-    half_width = fresh_patch(scenario, load).b
-    if choice.width is None and profile is not None:
-        return profile_grid(profile, half_width, choice.strips)
-    if choice.width is None and choice.strips is None:
-        grid = suggested_grid(scenario, load)
-        if grid is not None:
-            return Grid(grid.y + centre, grid.spacing)
-    width = choice.width if choice.width is not None else 2.4 * half_width
-    return Grid.spanning(centre - 0.5 * width, centre + 0.5 * width, choice.strips or 121)
-
-
 def study_contact(
     scenario: Scenario,
     profile: Profile | None = None,
@@ -112,7 +95,7 @@ def study_contact(
     if profile is not None:
         scenario = replace(scenario, cylinder=replace(scenario.cylinder, profile=profile))
     force = load_range(scenario, scenario.load.build(), 0.0)[0]
-    grid = _grid(scenario, force)
+    grid = contact_grid(scenario, force)
     model, gap, curvature, point = _contact(scenario, grid)
     solution = model.solve_one(gap, curvature, point)
     fields = model.fields(solution, gap, curvature, point) if with_fields else None
@@ -149,11 +132,10 @@ def _contact(
 
 def _grid_error(scenario: Scenario, grid: Grid, power: float) -> float | None:
     """Return the relative change of the power with half as many strips."""
-    ends = grid.y[0] - 0.5 * grid.spacing, grid.y[-1] + 0.5 * grid.spacing
     if grid.strips < 2 * _FEWEST or power == 0.0:
         return None
     try:
-        coarse = Grid.spanning(*ends, (grid.strips + 1) // 2)
+        coarse = Grid.spanning(*grid.edges, (grid.strips + 1) // 2)
         model, gap, curvature, point = _contact(scenario, coarse)
         solution = model.solve_one(gap, curvature, point)
     except WearsimError:

@@ -16,8 +16,9 @@ from wearsim.scenario import Scenario, parse_scenario
 from wearsim.studies.ensemble.batch import RealisationRun, RunObservations, batch_groups, observe
 from wearsim.studies.ensemble.control_variate import closed_form_depths
 from wearsim.studies.ensemble.designs import BASE_PLANS, EnsemblePlan, passes_of, sources
-from wearsim.studies.run.assemble import assemble_problem, prepared_model, strips_of_run
+from wearsim.studies.run.assemble import assemble_problem, prepared_model
 from wearsim.studies.run.draws import Drawer
+from wearsim.studies.run.grid import strips_of_run
 from wearsim.types import FloatArray, Grid
 
 GRID_REALISATIONS = 64  # realisations that determine the strips, whatever the ensemble's size
@@ -49,17 +50,12 @@ def shared_grid(scenario: Scenario) -> Grid:
     if not grids:
         raise error or AssertionError
     spacing = float(np.median([grid.spacing for grid in grids]))
-    edges = np.array([_edges(grid) for grid in grids])
+    edges = np.array([grid.edges for grid in grids])
     low, high = float(edges[:, 0].min()), float(edges[:, 1].max())
     strips = int(np.ceil(WIDTH_MARGIN * (high - low) / spacing))
     strips += (strips + 1) % 2
     middle, half = 0.5 * (low + high), 0.5 * strips * spacing
     return Grid.spanning(middle - half, middle + half, strips)
-
-
-def _edges(grid: Grid) -> tuple[float, float]:
-    """Return the positions of the outer edges of strips [m]."""
-    return float(grid.y[0]) - 0.5 * grid.spacing, float(grid.y[-1]) + 0.5 * grid.spacing
 
 
 class RealisationRunner:
@@ -130,7 +126,7 @@ class RealisationRunner:
         )
         drawn.update({**draws.values, **draws.time_means})
         grid = strips_of_run(draws)
-        (low, high), (first, last) = _edges(self.grid), _edges(grid)
+        (low, high), (first, last) = self.grid.edges, grid.edges
         margin = 1e-9 * self.grid.spacing
         if low <= first + margin and high >= last - margin:
             grid = self.grid

@@ -24,10 +24,10 @@ from wearsim.evolution.steppers.forward_euler import ExplicitStepper
 from wearsim.evolution.steppers.per_pass import PerPassStepper
 from wearsim.evolution.steppers.rkl2 import StabilisedStepper
 from wearsim.evolution.steppers.single_step import explicit_step
-from wearsim.plugins import ContactModel, Load
+from wearsim.plugins import ContactModel
 from wearsim.scenario import Scenario
 from wearsim.studies.run.draws import Draws
-from wearsim.studies.run.grid import InputMaxima, run_grid
+from wearsim.studies.run.grid import strips_of_run
 from wearsim.studies.run.inputs import contact_inputs
 from wearsim.studies.run.pass_quadrature import MAX_NODES, minimum_nodes, redrawing, with_nodes
 from wearsim.types import FloatArray, Grid
@@ -119,32 +119,6 @@ def start_height(scenario: Scenario, grid: Grid) -> FloatArray:
     return np.interp(grid.y, profile.y, profile.height)
 
 
-def load_range(scenario: Scenario, load: Load, stop: float) -> tuple[float, float]:
-    """Return the least and greatest load up to `stop` [s], before any feedback [N].
-
-    Raises
-    ------
-    ScenarioError
-        If the load is not defined for the whole time, or is not positive.
-    """
-    kind = scenario.load.kind
-    if load.span is not None and (load.span[0] > 0.0 or load.span[1] < stop * (1.0 - 1e-9)):
-        mistake = Mistake(
-            "load",
-            kind,
-            "the log does not cover the test",
-            f"{load.span[0] / 60.0:.6g} to {load.span[1] / 60.0:.6g} min",
-            f"0 to {stop / 60.0:.6g} min; log longer or shorten operation.duration",
-        )
-        raise ScenarioError(scenario.file, [mistake])
-    low, high = load.extremes(0.0, stop)
-    if low <= 0.0 and not scenario.load.terms:
-        what = "the load falls to zero or below, and contact is lost"
-        mistake = Mistake("load", kind, what, f"{low:.6g} N", "a load above zero at all times")
-        raise ScenarioError(scenario.file, [mistake])
-    return low, high
-
-
 def assemble_problem(
     draws: Draws, grid: Grid | None = None, model: ContactModel | None = None
 ) -> tuple[WearProblem, Stepper, str]:
@@ -203,20 +177,6 @@ def assemble_problem(
 def prepared_model(scenario: Scenario, grid: Grid) -> ContactModel:
     """Return the scenario's contact model for the strips."""
     return scenario.contact.build(grid, (scenario.cylinder.material, scenario.roller.material))
-
-
-def strips_of_run(draws: Draws) -> Grid:
-    """Return the strips for the random inputs and the final groove of a run."""
-    scenario = draws.scenario
-    greatest = load_range(scenario, scenario.load.build(), scenario.total_time)[1]
-    greatest += draws.range_of("normal_force_offset", 0.0)[1]
-    maxima = InputMaxima(
-        yaw=max(abs(angle) for angle in draws.range_of("yaw", 0.0)),
-        tilt=max(abs(angle) for angle in draws.range_of("tilt", 0.0)),
-        friction=draws.greatest_mean("friction", scenario.friction.coefficient),
-        longitudinal=draws.greatest_mean("longitudinal", scenario.creepage.longitudinal or 0.0),
-    )
-    return run_grid(scenario, greatest, maxima)
 
 
 def with_converged_nodes(problem: WearProblem, draws: Draws) -> WearProblem:

@@ -86,24 +86,23 @@ class Draws:
                 sizes += [float(np.abs(values).mean())] * _changes_sign(values)
         return max(sizes)
 
-    def range_of(self, name: str, mean: float) -> tuple[float, float]:
-        """Return the approximate range of an input of a contact.
+    def range_of(self, name: str) -> tuple[float, float]:
+        """Return the approximate range of the drawn values of an input of a contact, and of 0.
 
         Parameters
         ----------
         name : str
             Field of `ContactInputs`.
-        mean : float
-            The value where the input is not random.
         """
-        values = [mean, *self.rollers.get(name, ())]
-        for item in self.varying:
-            if item.name == name:
-                values += [float(item.paths[0].value.min()), float(item.paths[0].value.max())]
-        for random in self.passes:
-            for key, limits in zip(random.keys, _ranges(random), strict=True):
-                if CONTACT_FIELDS[key] == name:
-                    values += limits
+        paths = [item.paths[0].value for item in self.varying if item.name == name]
+        limits = [
+            limits
+            for random in self.passes
+            for key, limits in zip(random.keys, _ranges(random), strict=True)
+            if CONTACT_FIELDS[key] == name
+        ]
+        values = [0.0, *self.rollers.get(name, ()), *(end for pair in limits for end in pair)]
+        values += [float(end) for path in paths for end in (path.min(), path.max())]
         return min(values), max(values)
 
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -13,7 +12,8 @@ from wearsim.mechanics.hertz.ellipse import HertzContact, hertz
 from wearsim.plugins import WearLaw
 from wearsim.scenario import Scenario
 from wearsim.scenario.tables.plain import DEFAULT_TOLERANCE
-from wearsim.studies.run.inputs import contact_inputs
+from wearsim.studies.run.draws import Draws
+from wearsim.studies.run.inputs import contact_inputs, load_range
 from wearsim.types import ContactSolution, FloatArray, Grid, Profile
 
 STRIPS_PER_HALF_WIDTH = 12  # of the initial patch; the discretisation error is then below 1e-3
@@ -21,27 +21,6 @@ FEWEST_PER_HALF_WIDTH = 5  # error below 1e-2, proportional to the square of the
 MOST_STRIPS = 801
 PROFILE_STRIPS_PER_HALF_WIDTH = 24  # for one contact on the whole width of a profile
 FEWEST_PROFILE_STRIPS = 161
-
-
-@dataclass(frozen=True)
-class InputMaxima:
-    """Greatest values of random inputs.
-
-    Parameters
-    ----------
-    yaw, tilt : float
-        Greatest absolute angle of a roller during the run [rad].
-    friction, longitudinal : float, optional
-        Greatest mean friction coefficient and absolute creepage of a roller over the test.
-    """
-
-    yaw: float = 0.0
-    tilt: float = 0.0
-    friction: float = 0.0
-    longitudinal: float = 0.0
-
-
-NO_RANDOM_INPUTS = InputMaxima()
 
 
 def contact_positions(scenario: Scenario, inputs: Mapping[str, FloatArray]) -> FloatArray:
@@ -56,6 +35,31 @@ def contact_positions(scenario: Scenario, inputs: Mapping[str, FloatArray]) -> F
     if not scenario.creepage.tilt_shifts_contact:
         return inputs["offset"]
     return np.asarray(inputs["offset"] - scenario.roller.crown_radius * inputs["tilt"])
+
+
+def contact_centre(scenario: Scenario, rollers: Sequence[int]) -> float:
+    """Return the middle of the strips [m]: the scenario's, or that of the contacts of rollers."""
+    if scenario.contact.centre is not None:
+        return scenario.contact.centre
+    positions = contact_positions(scenario, contact_inputs(scenario, rollers))
+    return 0.5 * float(positions.min() + positions.max())
+
+
+def contact_grid(scenario: Scenario, load: float) -> Grid:
+    """Return the strips of the first roller's contact under `load` [N].
+
+    They are those of the scenario, those of the profile's whole width, or the choice of the model.
+    """
+    choice, profile = scenario.contact, scenario.cylinder.profile
+    centre, half_width = contact_centre(scenario, [0]), fresh_patch(scenario, load).b
+    if choice.width is None and profile is not None:
+        return profile_grid(profile, half_width, choice.strips)
+    if choice.width is None and choice.strips is None:
+        grid = suggested_grid(scenario, load)
+        if grid is not None:
+            return Grid(grid.y + centre, grid.spacing)
+    width = choice.width if choice.width is not None else 2.4 * half_width
+    return Grid.spanning(centre - 0.5 * width, centre + 0.5 * width, choice.strips or 121)
 
 
 def suggested_grid(scenario: Scenario, load: float) -> Grid | None:
@@ -93,24 +97,32 @@ def fresh_patch(scenario: Scenario, load: float) -> HertzContact:
     return hertz(along, 0.5 / scenario.roller.crown_radius, load, modulus)
 
 
-def predicted_half_width(scenario: Scenario, load: float, maxima: InputMaxima) -> float:
+def predicted_half_width(draws: Draws, load: float) -> float:
     """Return half the final width of the groove predicted for full slip [m].
 
     Rigid bodies in full slip wear to a depth d = [(3/4) c N n / sqrt(2 R)]^(2/3) and a width
     2 sqrt(2 R d), where c is the depth per pass and load of both bodies. For a nonlinear wear law c
     is the greater value of the initial contact and the final groove.
     """
+    scenario, creepage = draws.scenario, draws.scenario.creepage
     if scenario.wear is None:
         return 0.0
-    law, patch = scenario.wear.build(), fresh_patch(scenario, load)
-    friction = max(scenario.friction.coefficient, maxima.friction)
-    crown, profile = 2.0 * scenario.roller.crown_radius, scenario.cylinder.profile
+    law, patch, roller = scenario.wear.build(), fresh_patch(scenario, load), scenario.roller
+    friction = draws.greatest_mean("friction", scenario.friction.coefficient)
+    longitudinal = draws.greatest_mean("longitudinal", creepage.longitudinal or 0.0)
+    yaw, tilt = (
+        max(abs(angle) for angle in (*draws.range_of(name), *scenario.per_roller(given)))
+        for name, given in (("yaw", creepage.yaw), ("tilt", creepage.tilt))
+    )
+    differs = creepage.drive == "free" or creepage.differential_slip
+    curvature = 1.0 / roller.radius + 1.0 / scenario.cylinder.radius if differs else 0.0
+    crown, profile = 2.0 * roller.crown_radius, scenario.cylinder.profile
     start = 0.0 if profile is None else float(np.ptp(profile.height))
     half = patch.b
     for _ in range(20):  # the slip at the sides of the groove depends weakly on its width
-        slip = greatest_slip(scenario, half, maxima)
+        along = longitudinal + tilt / roller.radius * half + half**2 / crown * curvature
         line_loads = 0.75 * load / np.array([patch.b, max(half, patch.b)])
-        per_load = wear_per_load(scenario, law, line_loads, friction * slip)
+        per_load = wear_per_load(scenario, law, line_loads, friction * float(np.hypot(along, yaw)))
         depth = (0.75 * per_load * load * scenario.total_passes / np.sqrt(crown)) ** (2.0 / 3.0)
         before, half = half, float(np.sqrt(crown * (depth + start)))
         if half == before:
@@ -174,44 +186,25 @@ def strips_over(width: float, half_width: float, tolerance: float) -> int:
     return min(strips + (strips + 1) % 2, MOST_STRIPS)
 
 
-def greatest_slip(scenario: Scenario, half_width: float, maxima: InputMaxima) -> float:
-    """Return the greatest rigid slip within `half_width` [m] of the centre of a contact."""
-    creepage, roller = scenario.creepage, scenario.roller
-    longitudinal = max(abs(creepage.longitudinal or 0.0), maxima.longitudinal)
-    tilt = max(maxima.tilt, *(abs(angle) for angle in scenario.per_roller(creepage.tilt)))
-    longitudinal += tilt / roller.radius * half_width
-    if creepage.drive == "free" or creepage.differential_slip:
-        curvature = 1.0 / roller.radius + 1.0 / scenario.cylinder.radius
-        longitudinal += half_width**2 / (2.0 * roller.crown_radius) * curvature
-    yaw = max(maxima.yaw, *(abs(angle) for angle in scenario.per_roller(creepage.yaw)))
-    return float(np.hypot(longitudinal, yaw))
-
-
-def run_grid(scenario: Scenario, load: float, maxima: InputMaxima = NO_RANDOM_INPUTS) -> Grid:
-    """Return the strips of a run whose greatest load is `load` [N].
-
-    Parameters
-    ----------
-    scenario : Scenario
-    load : float
-    maxima : InputMaxima, optional
-        Greatest values of random inputs.
+def strips_of_run(draws: Draws) -> Grid:
+    """Return the strips for the random inputs and the final groove of a run.
 
     Raises
     ------
     ScenarioError
         If the contact does not fit on the strips that the scenario defines.
     """
-    patch, choice = fresh_patch(scenario, load), scenario.contact
-    centres = contact_positions(
-        scenario, contact_inputs(scenario, range(scenario.operation.rollers))
-    )
-    middle = 0.5 * float(centres.min() + centres.max())
-    centre = choice.centre if choice.centre is not None else middle
-    shift = float(np.abs(centres - centre).max())
+    scenario, choice = draws.scenario, draws.scenario.contact
+    load = load_range(scenario, scenario.load.build(), scenario.total_time)[1]
+    load += draws.range_of("normal_force_offset")[1]
+    patch, rollers = fresh_patch(scenario, load), range(scenario.operation.rollers)
+    centre = contact_centre(scenario, rollers)
+    positions = contact_positions(scenario, contact_inputs(scenario, rollers))
+    shift = float(np.abs(positions - centre).max())
     if scenario.creepage.tilt_shifts_contact:
-        shift += scenario.roller.crown_radius * maxima.tilt
-    half = shift + 1.1 * predicted_half_width(scenario, load, maxima) + 1.3 * patch.b
+        tilt = max(abs(angle) for angle in draws.range_of("tilt"))
+        shift += scenario.roller.crown_radius * tilt
+    half = shift + 1.1 * predicted_half_width(draws, load) + 1.3 * patch.b
     width = choice.width if choice.width is not None else 2.0 * half
     strips = choice.strips or strips_over(width, patch.b, scenario.evolution.tolerance)
     if width < 2.0 * (shift + patch.b):

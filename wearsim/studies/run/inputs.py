@@ -6,6 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
+from wearsim.errors import Mistake, ScenarioError
+from wearsim.plugins import Load
 from wearsim.scenario import RandomInput, Scenario
 from wearsim.scenario.random.model import CONTACT_FIELDS
 from wearsim.types import FloatArray
@@ -74,3 +76,29 @@ def contact_inputs(
         for name, value in values.items()
     }
     return {**columns, **(drawn or {})}
+
+
+def load_range(scenario: Scenario, load: Load, stop: float) -> tuple[float, float]:
+    """Return the least and greatest load up to `stop` [s], before any feedback [N].
+
+    Raises
+    ------
+    ScenarioError
+        If the load is not defined for the whole time, or is not positive.
+    """
+    kind = scenario.load.kind
+    if load.span is not None and (load.span[0] > 0.0 or load.span[1] < stop * (1.0 - 1e-9)):
+        mistake = Mistake(
+            "load",
+            kind,
+            "the log does not cover the test",
+            f"{load.span[0] / 60.0:.6g} to {load.span[1] / 60.0:.6g} min",
+            f"0 to {stop / 60.0:.6g} min; log longer or shorten operation.duration",
+        )
+        raise ScenarioError(scenario.file, [mistake])
+    low, high = load.extremes(0.0, stop)
+    if low <= 0.0 and not scenario.load.terms:
+        what = "the load falls to zero or below, and contact is lost"
+        mistake = Mistake("load", kind, what, f"{low:.6g} N", "a load above zero at all times")
+        raise ScenarioError(scenario.file, [mistake])
+    return low, high

@@ -10,8 +10,7 @@ import numpy as np
 from wearsim.evolution.contact_inputs import ContactInputs, Redraw
 from wearsim.evolution.problem import WearProblem
 from wearsim.scenario import RandomInput, Scenario
-from wearsim.scenario.random.model import CONTACT_FIELDS
-from wearsim.studies.run.inputs import origin
+from wearsim.studies.run.inputs import contact_values
 from wearsim.types import FloatArray
 from wearsim.uq.sampling.gaussian_copula import GaussianCopula
 from wearsim.uq.sampling.philox import Stream
@@ -26,13 +25,12 @@ def _with_values(
     inputs: ContactInputs, items: Sequence[RandomInput], uniforms: Mapping[str, FloatArray]
 ) -> ContactInputs:
     """Return inputs with drawn values, the same for every roller; loads are added to the load."""
-    columns = {}
+    values: dict[str, FloatArray] = {}
     for item in items:
         drawn = item.values(uniforms[item.name])
         rollers = len(inputs.friction) // len(drawn)
-        for column, (key, mean) in enumerate(zip(item.keys, item.mean, strict=True)):
-            values = np.tile(drawn[:, column] - origin(key, mean), rollers)
-            columns[CONTACT_FIELDS[key]] = values[:, None]
+        values |= zip(item.keys, np.tile(drawn, (rollers, 1)).T[..., None], strict=True)
+    columns = contact_values(items, values)
     if "normal_force_offset" in columns:
         columns["normal_force_offset"] = inputs.normal_force_offset + columns["normal_force_offset"]
     return inputs.with_values(columns)

@@ -26,9 +26,10 @@ from wearsim.results import (
 )
 from wearsim.results.run.schema import VARIABLES
 from wearsim.scenario import Scenario, parse_scenario
-from wearsim.studies.run.assemble import assemble_problem, start_height, strips_of_run
+from wearsim.studies.run.assemble import assemble_problem, start_height
 from wearsim.studies.run.draws import Draws, draw, drawn_values
 from wearsim.studies.run.events import Checkpointed, Event, Finished, Started, Stepped, Warned
+from wearsim.studies.run.grid import strips_of_run
 from wearsim.studies.run.provenance import changed_origins, check_plugins, origin_of
 from wearsim.studies.run.recorder import Recorder, RecordSchedule
 from wearsim.types import Grid

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from wearsim.scenario.examples import shipped_scenario
 from wearsim.scenario.tables.plain import DEFAULT_RECORDS
-from wearsim.studies.run.assemble import strips_of_run
 from wearsim.studies.run.draws import draw
+from wearsim.studies.run.grid import strips_of_run
 from wearsim_bench.contact.methods import DEFAULT_MODEL
 from wearsim_bench.growth.point import Workload
 from wearsim_bench.measure.machine import cores

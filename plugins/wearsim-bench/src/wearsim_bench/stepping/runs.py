@@ -18,8 +18,9 @@ from wearsim.evolution.state import WearState, fresh_state
 from wearsim.evolution.steppers.base import Stepper
 from wearsim.scenario import Scenario
 from wearsim.scenario.examples import shipped_scenario
-from wearsim.studies.run.assemble import assemble_problem, strips_of_run
+from wearsim.studies.run.assemble import assemble_problem
 from wearsim.studies.run.draws import draw
+from wearsim.studies.run.grid import strips_of_run
 from wearsim.types import FloatArray, Grid
 from wearsim_bench.contact.accuracy import l2
 
