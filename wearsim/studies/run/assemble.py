@@ -103,7 +103,7 @@ def merged_rollers(draws: Draws) -> tuple[list[int], FloatArray]:
     """Return the first roller of each group of identical ones, and the sizes of the groups."""
     scenario = draws.scenario
     creepage, count = scenario.creepage, scenario.operation.rollers
-    if draws.rollers_differ:
+    if draws.rollers or any(len(item.rollers) < count for item in draws.varying):
         return list(range(count)), np.ones(count)
     settings = scenario.roller.offset, creepage.yaw, creepage.tilt
     rows = list(zip(*(scenario.per_roller(value) for value in settings), strict=True))

@@ -54,12 +54,6 @@ class Draws:
     values: Mapping[str, FloatArray] = field(default_factory=dict)
     time_means: Mapping[str, FloatArray] = field(default_factory=dict)
 
-    @property
-    def rollers_differ(self) -> bool:
-        """Whether rollers that are identical in the scenario have different random inputs."""
-        count = self.scenario.operation.rollers
-        return bool(self.rollers) or any(len(v.rollers) < count for v in self.varying)
-
     def greatest_mean(self, name: str, mean: float) -> float:
         """Return the greatest mean absolute value of an input of a contact over the whole test.
 
