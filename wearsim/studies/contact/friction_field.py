@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -139,11 +140,6 @@ def finer_grid(
 
 
 def _least(count: int, unresolved: Callable[[int], str | None]) -> int:
-    """Return the least resolving count above one that does not resolve, by bisection."""
-    low, high = count, 2 * count
-    while unresolved(high) is not None and high < _MAX_POINTS:
-        low, high = high, 2 * high
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (low, middle) if unresolved(middle) is None else (middle, high)
-    return high
+    """Return the least resolving count above one that does not resolve."""
+    counts = range(count + 1, _MAX_POINTS)
+    return count + 1 + bisect_left(counts, True, key=lambda points: unresolved(points) is None)

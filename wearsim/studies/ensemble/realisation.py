@@ -148,11 +148,14 @@ class RealisationRunner:
         if isinstance(observations, Exception):
             return Outcome(number=run.number, drawn=drawn, error=_error_text(observations))
         rows, scalars = observations.rows, dict(observations.scalars)
-        for number, row in enumerate(rows):
-            for name, value in row.items():
-                if not math.isfinite(value):
-                    error = f"{name} is not finite at record {number}"
-                    return Outcome(number=run.number, drawn=drawn, error=error)
+        unusable = [
+            f"{name} is not finite at record {number}"
+            for number, row in enumerate(rows)
+            for name, value in row.items()
+            if not math.isfinite(value)
+        ]
+        if unusable:
+            return Outcome(number=run.number, drawn=drawn, error=unusable[0])
         if self.plan == "control-variate":
             columns = {key: value[None] for key, value in run.draws.values.items()}
             scalars["control"] = float(closed_form_depths(self.scenario, columns, 1)[0])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -48,11 +48,11 @@ class Draws:
     """
 
     scenario: Scenario
-    rollers: Mapping[str, FloatArray] = field(default_factory=dict)
-    varying: tuple[Varying, ...] = ()
-    passes: tuple[RandomInput, ...] = ()
-    values: Mapping[str, FloatArray] = field(default_factory=dict)
-    time_means: Mapping[str, FloatArray] = field(default_factory=dict)
+    rollers: Mapping[str, FloatArray]
+    varying: tuple[Varying, ...]
+    passes: tuple[RandomInput, ...]
+    values: Mapping[str, FloatArray]
+    time_means: Mapping[str, FloatArray]
 
     def greatest_mean(self, name: str, mean: float) -> float:
         """Return the greatest mean absolute value of an input of a contact over the whole test.
@@ -240,10 +240,8 @@ class Drawer:
         number = realisation if passes is None else passes
         table = self.scenario.sampling.model_copy(update={"realisation": number})
         scenario = replace(self.scenario, sampling=table)
-        if not scenario.random:
-            return Draws(scenario)
-        sources = sources or {}
-        numbers = {item.name: sources.get(item.name, realisation) for item in scenario.random}
+        numbers = dict.fromkeys((item.name for item in scenario.random), realisation)
+        numbers |= sources or {}
         columns = {n: self.columns(n, 1) for n in sorted({numbers[i.name] for i in self.items})}
         values = {
             key: np.asarray(columns[numbers[item.name]][key][0])
