@@ -121,7 +121,7 @@ class RandomTarget:
     limits : mapping of str to float
         Bounds of a number in SI: ``gt``, ``ge``, ``lt``, ``le``.
     components : tuple of str
-        Keys of the same table that the input sets together; none for the number of its own field.
+        Keys of the same table that the input sets together; none for the number of the key itself.
     """
 
     quantity: Quantity | None
