@@ -65,6 +65,14 @@ def amount(value: float, quantity: Quantity | None) -> str:
     return in_engineers_unit(value, quantity.kind.unit if quantity else "1")
 
 
+_ROLES: dict[Role, type] = {
+    "scalar": Distribution,
+    "joint": JointDistribution,
+    "field": FrictionField,
+    "process": Process,
+}
+
+
 @dataclass(frozen=True, eq=False)
 class RandomInput:
     """A random input of a scenario.
@@ -75,8 +83,6 @@ class RandomInput:
         Dotted key of the value that it replaces, "load.normal_force".
     kind : str
         Name of the distribution, "maxent".
-    role : {"scalar", "joint", "field", "process"}
-        One value, several values drawn together, or values that vary in space or in time.
     persistence : {"per-test", "per-roller", "per-pass"}
         Persistence of one draw.
     distribution : Distribution, JointDistribution, FrictionField or Process
@@ -91,12 +97,16 @@ class RandomInput:
 
     name: str
     kind: str
-    role: Role
     persistence: Persistence
     distribution: Distribution | JointDistribution | FrictionField | Process
     quantity: Quantity | None
     options: Mapping[str, object] = field(default_factory=dict)
     marginal: str = ""
+
+    @property
+    def role(self) -> Role:
+        """Role: a scalar, several scalars drawn together, a field or a process."""
+        return next(role for role, kind in _ROLES.items() if isinstance(self.distribution, kind))
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -130,11 +140,10 @@ class RandomInput:
     @property
     def scalar(self) -> Distribution:
         """Distribution of one value; the marginal one for a field or a process."""
-        if isinstance(self.distribution, FrictionField | Process):
-            return self.distribution.marginal
-        if isinstance(self.distribution, Distribution):
-            return self.distribution
-        raise TypeError(f"{self.name} sets several values")
+        found = getattr(self.distribution, "marginal", self.distribution)
+        if not isinstance(found, Distribution):
+            raise TypeError(f"{self.name} sets several values")
+        return found
 
     @property
     def extremes(self) -> tuple[float, float]:
@@ -145,9 +154,8 @@ class RandomInput:
     @property
     def greatest(self) -> float:
         """Greatest magnitude of the values that it sets."""
-        if isinstance(self.distribution, JointDistribution):
-            return max(self.distribution.reach)
-        return max(abs(end) for end in self.extremes)
+        item = self.distribution
+        return max(map(abs, item.reach if isinstance(item, JointDistribution) else self.extremes))
 
     def values(self, uniform: FloatArray) -> FloatArray:
         """Return draws of the values that a scalar or joint input sets.

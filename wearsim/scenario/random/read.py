@@ -197,7 +197,6 @@ def read_random_input(
     return RandomInput(
         name=name,
         kind=kind,
-        role=spec.role,
         persistence=table.persistence,
         distribution=distribution,
         quantity=target.quantity,
