@@ -192,7 +192,7 @@ def test_realisation_values_are_checked(rig: Scenario) -> None:
 def test_realisation_reads_and_writes_no_units(
     rig: Scenario, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("wearsim.quantities.measure", None)
+    monkeypatch.setattr(Quantity, "parse", None)
     monkeypatch.setattr(Quantity, "write", None)
     drawn = realise(rig, {"load.normal_force": 250.0, "wear.cylinder.k_over_h": 1e-11})
     assert drawn.load.options.normal_force == 250.0

@@ -171,11 +171,11 @@ def read_random_input(
     target : RandomTarget
         The number, or the numbers, that it sets.
     """
-    before, kind, spec = len(mistakes.entries), raw["distribution"], None
+    before, kind = len(mistakes.entries), raw["distribution"]
     own, options = split_keys(raw, RandomInputTable)
     table = validate_options(mistakes, RandomInputTable, own, name)
-    if isinstance(kind, str):
-        spec = mistakes.find_plugin(RandomInputSpec, kind, name, "distribution")
+    named = isinstance(kind, str)
+    spec = mistakes.find_plugin(RandomInputSpec, kind, name, "distribution") if named else None
     if spec is None or not _check_role(mistakes, spec, name, target):
         return None
     if table:

@@ -161,10 +161,8 @@ def _choose(
     model, key, kind = PLUGIN_TABLES[table]
     own, rest = split_keys(raw, model)
     name = own.get(key, model.model_fields[key].default)
-    spec = None
     values = validate(mistakes, model, own, table)
-    if isinstance(name, str):
-        spec = mistakes.find_plugin(kind, name, table, key)
+    spec = mistakes.find_plugin(kind, name, table, key) if isinstance(name, str) else None
     return values, spec, rest
 
 
