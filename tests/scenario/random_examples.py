@@ -109,7 +109,7 @@ class Square(JointDistribution):
     def values(self, uniform):
         return self.side * (uniform - 0.5)
 
-    mean = property(lambda self: (0.0, 0.0))
+    mean = property(lambda self: (0, 0))  # integers, as a plugin may have them
     reach = property(lambda self: (0.5 * self.side, 0.5 * self.side))
 
 

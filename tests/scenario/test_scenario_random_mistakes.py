@@ -79,6 +79,11 @@ rig.toml: [load.normal_force] persistance: unknown key (did you mean 'persistenc
         "radius = {si = 0.025}",
         'rig.toml: [cylinder] radius: is not a quantity, got a table, expected a length above zero such as "20 mm"',
     ),
+    "a table of a number among the options": (
+        MU,
+        'coefficient = {distribution = "patches", length = {si = 1e-6}, marginal = {distribution = "flat", low = 0, high = 1}}',
+        'rig.toml: [friction.coefficient] length: is not a quantity, got a table, expected a length above zero such as "20 mm"',
+    ),
     "an entry of a list": (
         XI,
         f'{XI}\nyaw = ["1 mrad", {{distribution = "flat"}}, "2 mrad"]',

@@ -141,7 +141,7 @@ def validate_options(
     table: str,
     other_keys: type[BaseModel] | None = None,
     quantity: Quantity | None = None,
-    refused: Sequence[tuple[str | int, ...]] = (),
+    refused: Sequence[tuple[str | int, ...]] | None = None,
 ) -> M | None:
     """Return `raw` as an instance of `model`, or None after adding its mistakes.
 
@@ -152,24 +152,26 @@ def validate_options(
     model : type of BaseModel
         The model of the table.
     raw : mapping of str to object
-        The table, without random inputs: a quantity in SI is ``{"si": 3.0}``.
+        The table.
     table : str
         Its name.
     other_keys : type of BaseModel, optional
         Model of the other keys of the same table, which `raw` lacks; for suggestions.
     quantity : Quantity, optional
         Quantity of the values, for the options of a random input.
-    refused : sequence of locations
-        Locations whose mistakes have been added already.
+    refused : sequence of locations, optional
+        Locations whose mistakes have been added already; for a table that had random inputs, whose
+        means are there as ``{"si": 3.0}`` or as plain numbers.
     """
     # as JSON: its strict mode rejects "3" for 3 but accepts a list for a tuple
-    context = {"read": mistakes.read, "quantity": quantity, "numbers": dict}
+    numbers = None if refused is None else dict
+    context = {"read": mistakes.read, "quantity": quantity, "numbers": numbers}
     try:
         return model.model_validate_json(json.dumps(raw, default=str), strict=True, context=context)
     except ValidationError as error:
         for details in error.errors(include_url=False):
             # a refused random input is still in the table, and fails again at or below its location
-            if not any(details["loc"][: len(place)] == place for place in refused):
+            if not any(details["loc"][: len(place)] == place for place in refused or ()):
                 _translate(mistakes, details, model, table, other_keys, quantity)
     except ScenarioError as error:
         mistakes.add_file(error, table, key_of_file(raw, error.file))

@@ -67,7 +67,7 @@ TABLES: dict[str, type[Options]] = {
 REQUIRED = ("roller", "cylinder", "operation", "load", "friction", "creepage")
 
 #: functions that read the tables with more checks than those of their models
-READERS: dict[str, Callable[[Mapping[str, object], Mistakes], Any]] = {
+READERS: dict[str, Callable[[Mistakes, Mapping[str, object]], Any]] = {
     "roller": read_roller,
     "cylinder": read_cylinder,
     "load": read_load,
@@ -157,8 +157,8 @@ def parse_scenario(
         return files[path]
 
     mistakes = Mistakes(name, read_and_keep, keys_by_place)
-    top = _read_top(data, mistakes)
-    sections = {table: _read_table(table, data, mistakes) for table in TABLES}
+    top = _read_top(mistakes, data)
+    sections = {table: _read_table(mistakes, table, data) for table in TABLES}
     check_lists(mistakes, data)
     check_correlation(mistakes, sections["sampling"])
     mistakes.raise_any()
@@ -200,7 +200,7 @@ def _syntax_mistake(text: str, message: str) -> Mistake:
     return Mistake("", match["place"], f"is not valid TOML: {what}", line, expected)
 
 
-def _read_top(data: Mapping[str, object], mistakes: Mistakes) -> TopTable:
+def _read_top(mistakes: Mistakes, data: Mapping[str, object]) -> TopTable:
     """Return the keys above the tables; add a mistake for each unknown key and table."""
     own = {key: data[key] for key in TopTable.model_fields if key in data}
     for key in [key for key in data if key not in TABLES and key not in own]:
@@ -211,7 +211,7 @@ def _read_top(data: Mapping[str, object], mistakes: Mistakes) -> TopTable:
     return validate(mistakes, TopTable, own, "") or TopTable()
 
 
-def _read_table(table: str, data: Mapping[str, object], mistakes: Mistakes) -> Any:
+def _read_table(mistakes: Mistakes, table: str, data: Mapping[str, object]) -> Any:
     if table not in data and table in REQUIRED:
         mistakes.add(table, "", "the table is missing")
     if table not in data and table in {*REQUIRED, "wear"}:
@@ -224,7 +224,7 @@ def _read_table(table: str, data: Mapping[str, object], mistakes: Mistakes) -> A
         return None
     check_alternatives(mistakes, raw, table)
     if table in READERS:
-        return READERS[table](raw, mistakes)
+        return READERS[table](mistakes, raw)
     return validate(mistakes, TABLES[table], raw, table)
 
 

@@ -112,7 +112,7 @@ def _means(
     if item is None or rivals or not _fits(mistakes, item, target, table, key):
         return {}
     mistakes.random[name] = item
-    means = [{"si": mean} if item.quantity else mean for mean in item.mean]
+    means = [{"si": float(mean)} if item.quantity else float(mean) for mean in item.mean]
     return dict(zip(target.components or (key,), means, strict=True))
 
 

@@ -127,7 +127,7 @@ def _radius(radius: float | None, diameter: float | None) -> float:
     return radius or 0.5 * (diameter or 0.0)
 
 
-def read_roller(raw: Mapping[str, object], mistakes: Mistakes) -> Roller | None:
+def read_roller(mistakes: Mistakes, raw: Mapping[str, object]) -> Roller | None:
     """Return the rollers, or None after adding the mistakes of the table [roller]."""
     table = validate(mistakes, RollerTable, raw, "roller")
     if table is None:
@@ -140,7 +140,7 @@ def read_roller(raw: Mapping[str, object], mistakes: Mistakes) -> Roller | None:
     )
 
 
-def read_cylinder(raw: Mapping[str, object], mistakes: Mistakes) -> Cylinder | None:
+def read_cylinder(mistakes: Mistakes, raw: Mapping[str, object]) -> Cylinder | None:
     """Return the cylinder, or None after adding the mistakes of the table [cylinder]."""
     table = validate(mistakes, CylinderTable, raw, "cylinder")
     if table is None:

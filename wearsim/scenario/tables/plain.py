@@ -191,7 +191,7 @@ def check_alternatives(mistakes: Mistakes, raw: Mapping[str, object], table: str
             )
 
 
-def read_creepage(raw: Mapping[str, object], mistakes: Mistakes) -> CreepageTable | None:
+def read_creepage(mistakes: Mistakes, raw: Mapping[str, object]) -> CreepageTable | None:
     """Return the table [creepage], or None after adding its mistakes."""
     drive = raw.get("drive", "creepage")
     if drive in ("creepage", "free"):
@@ -225,7 +225,7 @@ def check_angles(mistakes: Mistakes, table: CreepageTable) -> None:
             )
 
 
-def read_outputs(raw: Mapping[str, object], mistakes: Mistakes) -> OutputsTable | None:
+def read_outputs(mistakes: Mistakes, raw: Mapping[str, object]) -> OutputsTable | None:
     """Return the table [outputs], or None after adding its mistakes."""
     given = [key for key in CADENCES if key in raw]
     if not given:

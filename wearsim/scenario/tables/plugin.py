@@ -180,7 +180,7 @@ def _default_model(mistakes: Mistakes) -> str:
     return default
 
 
-def read_contact(raw: Mapping[str, object], mistakes: Mistakes) -> ContactChoice | None:
+def read_contact(mistakes: Mistakes, raw: Mapping[str, object]) -> ContactChoice | None:
     """Return the contact model, or None after adding the mistakes of the table [contact]."""
     raw = {"model": _default_model(mistakes), **raw} if "model" not in raw else raw
     own, spec, rest = _choose(mistakes, "contact", raw)
@@ -190,14 +190,14 @@ def read_contact(raw: Mapping[str, object], mistakes: Mistakes) -> ContactChoice
     return ContactChoice(own.model, options, own.strips, own.width, own.centre)
 
 
-def read_wear(raw: Mapping[str, object], mistakes: Mistakes) -> WearChoice | None:
+def read_wear(mistakes: Mistakes, raw: Mapping[str, object]) -> WearChoice | None:
     """Return the wear law, or None after adding the mistakes of the table [wear]."""
     own, spec, rest = _choose(mistakes, "wear", raw)
     options = validate(mistakes, spec.options, rest, "wear", WearTable) if spec else None
     return WearChoice(own.law, options) if own and options is not None else None
 
 
-def read_load(raw: Mapping[str, object], mistakes: Mistakes) -> LoadChoice | None:
+def read_load(mistakes: Mistakes, raw: Mapping[str, object]) -> LoadChoice | None:
     """Return the load with its terms, or None after adding the mistakes of the table [load]."""
     own, spec, rest = _choose(mistakes, "load", raw)
     kinds = {known.name: known.role for known in installed(LoadSpec)}
@@ -208,7 +208,7 @@ def read_load(raw: Mapping[str, object], mistakes: Mistakes) -> LoadChoice | Non
         and ("distribution" not in value or kinds.get(key) == "term")
         and (key not in spec.options.model_fields if spec else key in kinds)
     }
-    terms = [_read_term(name, options, mistakes) for name, options in tables.items()]
+    terms = [_read_term(mistakes, name, options) for name, options in tables.items()]
     if own is None or spec is None:
         return None
     if spec.role == "term":
@@ -238,7 +238,7 @@ def check_load(mistakes: Mistakes, load: LoadChoice) -> None:
         mistakes.add_file(error, "load", key_of_file(files, error.file))
 
 
-def _read_term(name: str, raw: dict[str, object], mistakes: Mistakes) -> TermChoice | None:
+def _read_term(mistakes: Mistakes, name: str, raw: dict[str, object]) -> TermChoice | None:
     table = f"load.{name}"
     spec = mistakes.find_plugin(LoadSpec, name, table, "")
     if spec and spec.role == "base":
