@@ -105,17 +105,7 @@ class Quantity:
         """
         number, unit = _split(value, self.expected)
         factor = conversion(unit, self.kind.unit, shown(value), self.expected)
-        return self._checked(_si(number, factor), value)
-
-    def _checked(self, number: float, text: object = None) -> float:
-        """Return a number in SI if it is allowed; `text` is what the file has instead of it."""
-        if number - number != 0.0:  # infinite or not a number
-            what = "must be finite"
-        elif _is_below(self.bound, number):
-            what = "must be above zero" if self.bound == "positive" else "must not be negative"
-        else:
-            return number
-        raise QuantityError(what, shown(text or self.write(number)), self.expected)
+        return _within(self.bound, _si(number, factor), value, self.expected)
 
     def _read(self, value: Any, info: ValidationInfo) -> float:
         """Return a value in SI.
@@ -127,7 +117,7 @@ class Quantity:
         if numbers is not None and isinstance(value, numbers):
             number = value.get("si") if isinstance(value, dict) else value
             if isinstance(number, float):
-                return self._checked(number)
+                return _within(self.bound, number, self.write(number), self.expected)
         return self.parse(value)
 
     def write(self, value: float | None) -> str | None:
@@ -146,8 +136,17 @@ class Quantity:
         return {"type": "string", "pattern": _PATTERN, "examples": [self.kind.example]}
 
 
-def _is_below(bound: Bound, value: float) -> bool:
-    return bound != "any" and (value < 0.0 or (bound == "positive" and value == 0.0))
+def _within(bound: Bound, number: float, written: object, expected: str) -> float:
+    """Return a number if it is finite and within a bound; otherwise raise a QuantityError."""
+    if number - number != 0.0:  # infinite or not a number
+        what = "must be finite"
+    elif bound == "positive" and number <= 0.0:
+        what = "must be above zero"
+    elif bound == "not negative" and number < 0.0:
+        what = "must not be negative"
+    else:
+        return number
+    raise QuantityError(what, shown(written), expected)
 
 
 def quantity(text: str, unit: str) -> float:
@@ -259,12 +258,7 @@ class HostQuantity:
         }[self.bound] + (' or "inf"' if self.infinite else "")
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise QuantityError("is not a number", shown(value), expected)
-        result = float(value)
-        if result - result != 0.0:  # infinite or not a number
-            raise QuantityError("must be finite", shown(value), expected)
-        if _is_below(self.bound, result):
-            raise QuantityError("is out of range", shown(value), expected)
-        return result
+        return _within(self.bound, float(value), value, expected)
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler

@@ -196,7 +196,7 @@ def test_mistakes_in_a_table_are_reported(text: str, message: str) -> None:
             "(numbers in N)",
         ),
         ("maxent", None, {"support": [0.0, "inf"]}, "alone determines no distribution"),
-        ("maxent", None, {"support": [0.0, 1.0], "mean": 0.5, "std": -1.0}, "is out of range"),
+        ("maxent", None, {"support": [0.0, 1.0], "mean": 0.5, "std": -1.0}, "must be above zero"),
         ("lognormal", None, {"mean": 1.0, "factor": 2.0}, "got mean and factor"),
         ("lognormal", None, {}, "expected either mean and std, or median and factor"),
         ("lognormal", None, {"median": 1.0, "factor": 1.0}, "greater than 1"),
