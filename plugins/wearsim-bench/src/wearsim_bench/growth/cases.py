@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 from wearsim.scenario.examples import shipped_scenario
 from wearsim.scenario.tables.plain import DEFAULT_RECORDS
+from wearsim.studies.execution.factory import available_processors
 from wearsim.studies.run.draws import draw
 from wearsim.studies.run.grid import strips_of_run
 from wearsim_bench.contact.methods import DEFAULT_MODEL
 from wearsim_bench.growth.point import Workload
-from wearsim_bench.measure.machine import cores
 from wearsim_bench.measure.measurement import Effort
 from wearsim_bench.sampling.jobs import CHEAP
 from wearsim_bench.sampling.jobs import RIG as SCATTERED
@@ -149,7 +149,7 @@ def _realisations(sizes: Sizes, model: str, repetitions: int) -> Iterator[Point]
 
 
 def _workers(sizes: Sizes, model: str, repetitions: int) -> Iterator[Point]:
-    most = min(cores(), sizes.workers)
+    most = min(available_processors(), sizes.workers)
     doubling: Sequence[int] = [2**k for k in range(most.bit_length())]
     for count in sorted({*doubling, most}):
         work = _ensemble(model, sizes.tests, count, repetitions)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import platform
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -11,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from wearsim.mechanics.numerics.jit import kernel
+from wearsim.studies.execution.factory import available_processors
 from wearsim.types import FloatArray
 from wearsim_bench.measure.timing import best_short
 
@@ -57,14 +57,9 @@ def this_machine(repetitions: int = 5) -> Machine:
     """
     libraries = {name: version(name) for name in LIBRARIES}
     seconds = yardstick_seconds(repetitions)
-    return Machine(_processor(), cores(), platform.python_version(), libraries, seconds)
-
-
-def cores() -> int:
-    """Return the number of processors available to this process."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    return Machine(
+        _processor(), available_processors(), platform.python_version(), libraries, seconds
+    )
 
 
 def yardstick_seconds(repetitions: int) -> float:

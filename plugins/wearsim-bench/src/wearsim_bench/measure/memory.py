@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from pathlib import Path
 
-_PROCESSES = Path("/proc")
+import psutil
 
 
 def peak_bytes() -> int | None:
@@ -15,7 +16,7 @@ def peak_bytes() -> int | None:
     Linux reports it in the status of the process. `getrusage`, used on other systems, starts with
     the peak of the parent process.
     """
-    own = _status_bytes(_PROCESSES / "self" / "status", "VmHWM")
+    own = _peak_in_status(os.getpid())
     return own if own is not None else _used(of_children=False)
 
 
@@ -32,43 +33,20 @@ def family_peak_bytes(workers: int) -> int | None:
     own = peak_bytes()
     if own is None:
         return None
-    if (_PROCESSES / "self" / "status").exists():
-        return own + sum(_peak_of(process) for process in _descendants(os.getpid()))
+    if _peak_in_status(os.getpid()) is not None:
+        others = psutil.Process().children(recursive=True)
+        return own + sum(_peak_in_status(process.pid) or 0 for process in others)
     return own + workers * (_used(of_children=True) or 0)
 
 
-def _peak_of(process: int) -> int:
-    return _status_bytes(_PROCESSES / str(process) / "status", "VmHWM") or 0
-
-
-def _descendants(process: int) -> list[int]:
-    """Return the process ids of all descendants."""
-    children: dict[int, list[int]] = {}
-    for folder in _PROCESSES.iterdir():
-        if folder.name.isdecimal():
-            parent = _status_number(folder / "status", "PPid")
-            children.setdefault(parent or 0, []).append(int(folder.name))
-    descendants, pending = list[int](), [process]
-    while pending:
-        started = children.get(pending.pop(), [])
-        descendants += started
-        pending += started
-    return descendants
-
-
-def _status_bytes(status: Path, name: str) -> int | None:
-    number = _status_number(status, name)
-    return None if number is None else 1024 * number
-
-
-def _status_number(status: Path, name: str) -> int | None:
-    """Return a number in the status of a process, or None if it has ended."""
+def _peak_in_status(process: int) -> int | None:
+    """Return the peak of a process [bytes], or None if it has ended or Linux does not report it."""
     try:
-        lines = status.read_text(encoding="utf-8", errors="replace").splitlines()
+        lines = Path(f"/proc/{process}/status").read_text(encoding="utf-8", errors="replace")
     except OSError:
         return None
-    words = next((line.split() for line in lines if line.startswith(f"{name}:")), None)
-    return int(words[1]) if words else None
+    found = re.search(r"^VmHWM:\s+(\d+) kB", lines, re.MULTILINE)
+    return 1024 * int(found[1]) if found else None
 
 
 def _used(*, of_children: bool) -> int | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from timeit import Timer, timeit
 from typing import TypeVar
 
 T = TypeVar("T")
@@ -13,15 +14,7 @@ _LONG = 1.0  # s, total time after which a call is not repeated
 
 def timed(function: Callable[[], object]) -> float:
     """Return the wall time of one call [s]."""
-    start = time.perf_counter()
-    function()
-    return time.perf_counter() - start
-
-
-def best(function: Callable[[], object], repetitions: int) -> float:
-    """Return the smallest wall time of `function` [s], after one untimed call."""
-    function()
-    return min(timed(function) for _ in range(repetitions))
+    return timeit(function, number=1)
 
 
 def timed_result(function: Callable[[], T], repetitions: int) -> tuple[T, float]:
@@ -52,21 +45,16 @@ def best_of(functions: Mapping[str, Callable[[], object]], repetitions: int) -> 
     Short functions are timed over many calls, after one untimed call. The functions are timed in
     rounds, so that a disturbance affects one time of each.
     """
-    loops = {name: _repeated(function) for name, function in functions.items()}
+    timers = {name: Timer(function) for name, function in functions.items()}
+    calls = {name: _calls(timer) for name, timer in timers.items()}
     rounds = [
-        {name: timed(call) / calls for name, (call, calls) in loops.items()}
+        {name: timer.timeit(calls[name]) / calls[name] for name, timer in timers.items()}
         for _ in range(repetitions)
     ]
     return {name: min(times[name] for times in rounds) for name in functions}
 
 
-def _repeated(function: Callable[[], object]) -> tuple[Callable[[], None], int]:
-    """Return a loop over a function that lasts `_SHORTEST`, and its number of calls."""
-    function()
-    calls = max(1, int(_SHORTEST / max(timed(function), 1e-7)))
-
-    def loop() -> None:
-        for _ in range(calls):
-            function()
-
-    return loop, calls
+def _calls(timer: Timer) -> int:
+    """Return the number of calls that last `_SHORTEST`, after one untimed call."""
+    timer.timeit(1)
+    return max(1, int(_SHORTEST / max(timer.timeit(1), 1e-7)))
