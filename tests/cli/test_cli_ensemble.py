@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import subprocess
 from pathlib import Path
@@ -245,6 +246,32 @@ def test_signal_ends_an_ensemble_that_can_be_resumed(tests: Path, tmp_path: Path
     assert not kept.finished
     assert f"stopped after {kept.count} of 100000 realisations" in message
     assert "continue with: wearsim resume a.h5" in message
+
+
+def test_second_signal_ends_an_ensemble_at_once(tests: Path, tmp_path: Path) -> None:
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    options = ["-n", "100000", "-o", "a.h5", "--workers", "2"]
+    with subprocess.Popen(
+        interruptible("-m", "wearsim", "ensemble", tests, *options),
+        cwd=tmp_path,
+        env=os.environ | {"TMPDIR": str(temporary)},
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    ) as running:
+        assert running.stderr is not None
+        while "100,000 realisations" not in running.stderr.readline():
+            pass
+        os.killpg(running.pid, signal.SIGINT)
+        message = running.stderr.readline()
+        os.killpg(running.pid, signal.SIGINT)
+        rest = running.stderr.read()  # ends with the last process
+    assert "stopping after the next batch" in message
+    if running.returncode != 130:  # a batch ended between the two signals
+        assert (running.returncode, rest) == (-signal.SIGINT, "")
+    assert list(temporary.iterdir()) == []
+    assert not open_ensemble(tmp_path / "a.h5").finished
 
 
 def test_scenario_without_random_inputs_is_bad_input(command: Command) -> None:

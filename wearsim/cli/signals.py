@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -39,6 +40,8 @@ def stop_on_signals(
         Written to stderr at the first signal.
     """
     stop = Stop()
+    # a process of loky outlives a process that is ended by a signal, and would warn of it
+    os.environ.setdefault("PYTHONWARNINGS", "ignore:resource_tracker:UserWarning")
     before = {number: signal.getsignal(number) for number in _SIGNALS}
 
     def handle(number: int, frame: Any) -> None:

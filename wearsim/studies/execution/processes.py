@@ -178,17 +178,17 @@ class Processes:
                     return
                 future = next(iter(wait(running, return_when=FIRST_COMPLETED).done))
                 worker = running.pop(future)
+                self._idle.append(worker)
                 try:
                     file_of_answer = future.result()
                 except BrokenExecutor:
-                    worker.end()
+                    self._idle.pop().end()
                     deaths[tuple(worker.numbers)] += 1
                     self._report_death(worker, deaths[tuple(worker.numbers)])
                     batches, finished = chain([worker.numbers], batches), []
                     continue
                 results, error = _load(file_of_answer)
                 Path(file_of_answer).unlink()
-                self._idle.append(worker)
                 if error is not None:
                     raise error
                 finished = [(worker.numbers, results)]
