@@ -106,6 +106,13 @@ def test_workers_are_processes_with_one_thread_each() -> None:
     assert results == [(9, os.getpid())]
 
 
+def test_no_more_processes_than_realisations_are_started() -> None:
+    with executor("processes", 4, realisations=2) as pool:
+        assert (pool.workers, pool.describe) == (2, "2 processes")
+        found = list(pool.results(Squares(0.1), batches_of(1, 4)))
+    assert len({pid for _, results in found for _, pid in results}) == 2
+
+
 def test_default_is_one_worker_per_available_processor() -> None:
     with executor("threads") as pool:
         assert pool.workers == available_processors()

@@ -116,6 +116,7 @@ def ensemble(
         on_notice=on_notice,
         stop_requested=stop_requested,
         preload=RealisationRunner.__module__,
+        realisations=request.realisations,
     ) as pool:
         grid = shared_grid(scenario)
         header = _header(scenario, request, grid)
@@ -248,6 +249,7 @@ def resume_ensemble(
             on_notice=on_notice,
             stop_requested=stop_requested,
             preload=RealisationRunner.__module__,
+            realisations=data.asked,
         ) as pool,
         EnsembleFile.open(path, storage) as opened,
     ):

@@ -24,6 +24,7 @@ def executor(
     on_notice: Notify | None = None,
     stop_requested: Callable[[], bool] | None = None,
     preload: str = "wearsim",
+    realisations: int | None = None,
 ) -> Iterator[Executor]:
     """Provide the executor of a study; results do not depend on it, only their order does.
 
@@ -42,6 +43,8 @@ def executor(
         Called while a cluster has no workers; True stops the study.
     preload : str
         Module that worker processes on this machine import as they start.
+    realisations : int, optional
+        Number of realisations, if known; no more processes are started on this machine.
 
     Raises
     ------
@@ -69,7 +72,7 @@ def executor(
     elif scheduler == "threads":
         yield Threads(count)
     else:
-        with closing(Processes(count, on_notice, preload)) as pool:
+        with closing(Processes(min(count, realisations or count), on_notice, preload)) as pool:
             yield pool
 
 
