@@ -21,6 +21,7 @@ from tests.benchmarks.wear_tests import SCENARIOS
 from wearsim import load_scenario, run
 from wearsim.errors import WearsimError
 from wearsim.plugins.template import template_folder
+from wearsim.report.text.units import brief
 from wearsim_bench.contact.accuracy import (
     PowerErrors,
     WornErrors,
@@ -33,7 +34,7 @@ from wearsim_bench.contact.accuracy import (
 from wearsim_bench.contact.cases import elliptic_cases
 from wearsim_bench.contact.methods import normal_methods
 from wearsim_bench.exact_solutions import WORN
-from wearsim_bench.figures.table import brief, markdown_table
+from wearsim_bench.figures.table import markdown_table
 from wearsim_bench.measure.machine import this_machine
 from wearsim_bench.measure.timing import best_short, timed
 

@@ -8,7 +8,7 @@ import pytest
 from wearsim.errors import ScenarioError
 from wearsim.report.parts.measured_profiles import read_measured
 from wearsim.report.parts.patch_size import patch_edges
-from wearsim.report.text.units import count, lapse, shown
+from wearsim.report.text.units import brief, count, lapse, shown
 
 
 @pytest.mark.parametrize(
@@ -68,3 +68,11 @@ def test_depth_is_positive_downwards_and_height_upwards() -> None:
 def test_measurement_without_depth_and_height_is_refused() -> None:
     with pytest.raises(ScenarioError, match="column 'height' is missing"):
         read_measured("y [mm], z [um]\n-1, -2\n1, -3\n", "probe.csv")
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [(2.5e-6, "2.5 us"), (0.0312, "31.2 ms"), (1.5, "1.5 s"), (84.0, "84 s"), (np.nan, "-")],
+)
+def test_short_times_have_a_suitable_unit(seconds, text):
+    assert brief(seconds) == text

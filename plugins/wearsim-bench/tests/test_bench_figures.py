@@ -6,7 +6,6 @@ import pytest
 from wearsim.report.parts.saving import save_figure
 from wearsim_bench.figures import table as bench_table
 from wearsim_bench.figures.table import (
-    brief,
     column_heads,
     count_text,
     markdown,
@@ -134,11 +133,3 @@ def test_savings_are_bars():
     axes = bench_figure(topic, MACHINE, Effort()).axes[0]
     assert [bar.get_width() for bar in axes.patches] == [2.5]
     assert axes.get_yticklabels()[0].get_text() == "full slip: strip, full slip"
-
-
-@pytest.mark.parametrize(
-    ("seconds", "text"),
-    [(2.5e-6, "2.5 us"), (0.0312, "31.2 ms"), (1.5, "1.5 s"), (84.0, "84 s"), (np.nan, "-")],
-)
-def test_short_times_have_a_suitable_unit(seconds, text):
-    assert brief(seconds) == text

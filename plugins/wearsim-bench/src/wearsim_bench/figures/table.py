@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from wearsim.report.text.units import NOTHING, shown
+from wearsim.report.text.units import NOTHING, brief, shown
 from wearsim_bench.measure.machine import Machine
 from wearsim_bench.measure.measurement import Effort, Measurement, Topic
 
@@ -153,13 +152,3 @@ def markdown_table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str
 
 def _escaped(cell: str) -> str:
     return cell.replace("|", r"\|").replace("\n", " ")
-
-
-def brief(seconds: float) -> str:
-    """Return a short time with three digits: "2.5 us", "84 s"."""
-    if not math.isfinite(seconds):
-        return NOTHING
-    for unit, scale in (("s", 1.0), ("ms", 1e3)):
-        if seconds * scale >= 1.0:
-            return f"{seconds * scale:.3g} {unit}"
-    return f"{seconds * 1e6:.3g} us"
