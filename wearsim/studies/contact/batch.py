@@ -167,7 +167,7 @@ def acting_inputs(
     verb = "have" if len(idle) > 1 else "has"
     note = f"{', '.join(idle)} {verb} no effect on the dissipation of a contact: not drawn"
     drawn = tuple(
-        replace(item, persistence="per-test", role="scalar", distribution=item.scalar)
+        replace(item, persistence="per-test", distribution=item.scalar)
         if item.role == "process"
         else replace(item, persistence="per-test")
         for item in acting

@@ -249,7 +249,7 @@ def resume_ensemble(
             on_notice=on_notice,
             stop_requested=stop_requested,
             preload=RealisationRunner.__module__,
-            realisations=data.asked,
+            realisations=data.requested,
         ) as pool,
         EnsembleFile.open(path, storage) as opened,
     ):
