@@ -223,7 +223,7 @@ def test_implicit_steps_beyond_the_limit_do_not_oscillate(half_worn):
 
 def test_limit_is_the_interpenetration_of_the_strips(half_worn):
     problem, state = half_worn
-    cylinder, _ = problem.shared_wear(*problem.wear_per_pass(list(state.contacts)))
+    cylinder, _ = problem.shared_wear(*problem.wear_per_pass(state.contacts))
     wear = stability_limit(problem, state) * cylinder.max()
     # 0.6 of twice the interpenetration: about 0.2 um for worn strips of 0.1 mm
     assert 0.1e-6 < wear < 0.4e-6
