@@ -125,7 +125,7 @@ def test_rarely_differing_load_option_changes_the_contact(example, place):
 def test_examples_pass_the_checks(example, hook, kind, name, checks, fixture):
     example(hook)
     chosen = ConfiguredSpec(registry().get(kind, name))
-    for check in checks:
+    for check in checks.values():
         check(fixture(chosen))
 
 
@@ -133,7 +133,7 @@ def test_example_of_a_random_input_runs(example):
     example("wearsim_random_inputs")
     spec = registry().get(RandomInputSpec, "flat")
     fixture = RandomInputFixture(ConfiguredSpec(spec, {"low": 2.0, "high": 4.0}))
-    for check in random_inputs.BY_ROLE["scalar"]:
+    for check in random_inputs.BY_ROLE["scalar"].values():
         check(fixture)
     flat = fixture.instance
     assert flat.quantile(np.array([0.25, 0.5])) == pytest.approx([2.5, 3.0])

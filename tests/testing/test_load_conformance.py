@@ -141,10 +141,10 @@ def test_violations_are_reported(role, name, load_class):
 
 @pytest.mark.parametrize(("role", "load_class"), [("base", Ramp), ("term", Lag)])
 def test_base_classes_of_the_mutants_conform(role, load_class):
-    for check in BY_ROLE[role]:
+    for check in BY_ROLE[role].values():
         check(fixture(load_class, role))
 
 
 def test_every_check_has_a_failing_load():
     for role, checks in MUTANTS.items():
-        assert set(BY_ROLE[role].names) == set(checks) | COMMON
+        assert set(BY_ROLE[role]) == set(checks) | COMMON

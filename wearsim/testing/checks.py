@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wearsim.errors import WearsimError
+from wearsim.types import FloatArray
 
 F = TypeVar("F")
 
@@ -62,22 +63,8 @@ class Check(Generic[F]):
         )
 
 
-class Checks(Generic[F]):
-    """The checks of one kind of plugin, in order."""
-
-    def __init__(self, *parts: Checks[F]) -> None:
-        self._checks: dict[str, Check[F]] = {check.name: check for part in parts for check in part}
-
-    def __iter__(self) -> Iterator[Check[F]]:
-        return iter(self._checks.values())
-
-    def __getitem__(self, name: str) -> Check[F]:
-        return self._checks[name]
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the checks."""
-        return tuple(self._checks)
+class Checks(dict[str, Check[F]]):
+    """The checks of one kind of plugin by their names, in order."""
 
     def specified_in(self, place: str) -> Callable[[Callable[[F], None]], Check[F]]:
         """Return a decorator that adds a function as a check.
@@ -92,9 +79,8 @@ class Checks(Generic[F]):
 
         def add(function: Callable[[F], None]) -> Check[F]:
             name = function.__name__.replace("_", "-")
-            check = Check(name, inspect.getdoc(function) or "", place, function)
-            self._checks[name] = check
-            return check
+            self[name] = Check(name, inspect.getdoc(function) or "", place, function)
+            return self[name]
 
         return add
 
@@ -103,6 +89,45 @@ def require(condition: object, message: str) -> None:
     """Raise ConformanceError with a message unless the condition holds."""
     if not condition:
         raise ConformanceError(message)
+
+
+def require_values(name: str, values: npt.ArrayLike, shape: tuple[int, ...]) -> None:
+    """Raise ConformanceError unless values have a shape and are finite."""
+    found = np.asarray(values)
+    require(found.shape == shape, f"{name} has the shape {found.shape}, not {shape}")
+    require(np.isfinite(found).all(), f"{name} is not finite")
+
+
+def require_repeatable(
+    name: str,
+    function: Callable[..., npt.ArrayLike],
+    others: Mapping[str, Callable[..., npt.ArrayLike]],
+    *inputs: FloatArray,
+) -> FloatArray:
+    """Return the result of a function that must be the same at every call, bit for bit.
+
+    Parameters
+    ----------
+    name : str
+        Name of the function, for the message.
+    function : callable
+    others : mapping of str to callable
+        Functions with the same result, by their description.
+    *inputs : ndarray
+        Arguments of the functions, which must not change them.
+
+    Raises
+    ------
+    ConformanceError
+        If an input is changed or a result differs.
+    """
+    copies = [array.copy() for array in inputs]
+    first = np.array(function(*inputs))
+    for array, copy in zip(inputs, copies, strict=True):
+        require(np.array_equal(array, copy), f"{name} changes its input")
+    for description, other in {"a second call": function, **others}.items():
+        require(np.array_equal(first, other(*copies)), f"{name}: {description} differs")
+    return first
 
 
 def agree(
@@ -126,11 +151,7 @@ def agree(
         Smallest reference magnitude of the relative difference.
     """
     actual, reference = np.asarray(got, dtype=np.float64), np.asarray(expected, dtype=np.float64)
-    require(
-        actual.shape == reference.shape,
-        f"{name} has the shape {actual.shape}, not {reference.shape}",
-    )
-    require(np.isfinite(actual).all(), f"{name} is not finite")
+    require_values(name, actual, reference.shape)
     size = max(float(np.abs(reference).max(initial=0.0)), scale)
     difference = np.abs(actual - reference)
     if (difference <= tolerance * size).all():

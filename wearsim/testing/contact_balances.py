@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from wearsim.testing.checks import Checks, agree, require
+from wearsim.testing.checks import Checks, agree, require, require_values
 from wearsim.testing.contact_fixtures import NUMBERS, STRIPS, ContactFixture
 from wearsim.types import ContactSolution, Creepage
 
@@ -25,16 +25,9 @@ def solution_is_complete_and_finite(fixture: ContactFixture) -> None:
     """Every field of a solution has the right shape and is finite, on the given strips."""
     for case, (_, solution) in fixture.solutions.items():
         for name in STRIPS:
-            values = np.asarray(getattr(solution, name))
-            require(
-                values.shape == fixture.grid.y.shape,
-                f"{case}: {name} has the shape {values.shape}, not {fixture.grid.y.shape}",
-            )
-            require(np.isfinite(values).all(), f"{case}: {name} is not finite")
+            require_values(f"{case}: {name}", getattr(solution, name), fixture.grid.y.shape)
         for name in NUMBERS:
-            value = getattr(solution, name)
-            require(np.ndim(value) == 0, f"{case}: {name} is not one number")
-            require(np.isfinite(value), f"{case}: {name} is {value}")
+            require_values(f"{case}: {name}", getattr(solution, name), ())
         agree(f"{case}: y", solution.y, fixture.grid.y, 0.0)
 
 

@@ -21,7 +21,7 @@ from wearsim.units import Kind
 
 F = TypeVar("F")
 Tests = Callable[[Check[F]], None]
-CONTACT_MODEL: Checks[ContactFixture] = Checks(spec_checks(), BALANCES, BEHAVIOUR, CAPABILITIES)
+CONTACT_MODEL = Checks(spec_checks() | BALANCES | BEHAVIOUR | CAPABILITIES)
 NOTHING: Mapping[str, str] = {}
 
 
@@ -44,8 +44,8 @@ def build_tests(checks: Checks[F], build: Callable[[], F], without: Mapping[str,
     """
     import pytest  # noqa: PLC0415  (a dependency of the author's tests, not of wearsim)
 
-    if unknown := [name for name in without if name not in checks.names]:
-        raise ValueError(f"no check is named '{unknown[0]}'; there are: {', '.join(checks.names)}")
+    if unknown := [name for name in without if name not in checks]:
+        raise ValueError(f"no check is named '{unknown[0]}'; there are: {', '.join(checks)}")
     fixture = cache(build)
 
     @pytest.mark.parametrize(
@@ -58,7 +58,7 @@ def build_tests(checks: Checks[F], build: Callable[[], F], without: Mapping[str,
                 if check.name in without
                 else [],
             )
-            for check in checks
+            for check in checks.values()
         ],
     )
     def test(check: Check[F]) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wearsim.plugins import BODIES, Body, WearLaw, WearLawSpec
-from wearsim.testing.checks import Checks, agree, require
+from wearsim.testing.checks import Checks, agree, require, require_values
 from wearsim.testing.specs import Fixture, spec_checks
 from wearsim.types import ContactSolution, FloatArray, Grid
 
@@ -55,7 +55,7 @@ class WearLawFixture(Fixture[WearLawSpec]):
         return np.asarray(self.instance.depth_per_pass(body, contact, speed))
 
 
-WEAR_LAW: Checks[WearLawFixture] = Checks(spec_checks())
+WEAR_LAW: Checks[WearLawFixture] = spec_checks()
 _DEPTH = "wearsim.plugins.WearLaw.depth_per_pass"
 
 
@@ -72,8 +72,7 @@ def depth_is_never_negative(fixture: WearLawFixture) -> None:
     contact = sliding_contact(200)
     for body in BODIES:
         depth = fixture.depth(body, contact)
-        require(depth.shape == contact.y.shape, f"{body}: the depth has the shape {depth.shape}")
-        require(np.isfinite(depth).all(), f"{body}: the depth is not finite")
+        require_values(f"{body}: the depth", depth, contact.y.shape)
         require(float(depth.min()) >= 0.0, f"{body}: the depth falls to {depth.min():.3g} m")
 
 

@@ -14,7 +14,6 @@ from wearsim.mechanics.slender import newton as kernels
 from wearsim.mechanics.slender.influence import HIGHEST, curvature_table, no_table
 from wearsim.mechanics.tangential.strip_theory import SUMS
 from wearsim.models.contact.slender_problems import (
-    Constants,
     NormalContacts,
     first_not_finite,
     strip_tractions,
@@ -141,17 +140,10 @@ class Slender(StripModel):
         warm: ContactBatchSolution | None,
     ) -> NormalContacts:
         """Solve the normal problems; arguments as in `solve`."""
-        constants = Constants(
-            self._grid.spacing, self._pair.contact_modulus, self._table, self._bend
-        )
+        constants = self._grid.spacing, self._pair.contact_modulus, self._table, self._bend
         size = 1 if coupling is None else len(coupling.bodies)
         normal = NormalContacts.starting(batch, size, warm)
-        if coupling is not None:
-            normal.solve(coupling, constants)
-        elif wear_compliance is not None:
-            normal.solve_independent(wear_compliance, constants)
-        else:
-            normal.solve_independent(np.zeros(normal.gap.shape), constants)
+        normal.solve(wear_compliance if coupling is None else coupling, constants)
         for number in normal.failed.tolist():
             try:
                 self._check(

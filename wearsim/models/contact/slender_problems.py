@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -19,13 +19,8 @@ from wearsim.types import FloatArray, Grid, IntArray
 _NONE = np.zeros(0, dtype=np.int64)
 
 
-class Constants(NamedTuple):
-    """Constants of all contacts; see `mechanics.slender.newton.solve_slender`."""
-
-    spacing: float
-    contact_modulus: float
-    table: FloatArray
-    bend: FloatArray
+Constants: TypeAlias = tuple[float, float, FloatArray, FloatArray]
+"""Strip width [m], E* [Pa] and the two tables of `mechanics.slender.newton.solve_slender`."""
 
 
 class NormalContacts(NamedTuple):
@@ -88,25 +83,25 @@ class NormalContacts(NamedTuple):
         ends = (first != 0.0) | (last != 0.0)
         return np.flatnonzero((self.status != CONVERGED) | ends.any(axis=1))
 
-    def solve_independent(self, own: FloatArray, constants: Constants) -> None:
-        """Solve contacts that wear no common body, in place.
+    def solve(self, wear: SharedWear | FloatArray | None, constants: Constants) -> None:
+        """Solve all sets in place.
 
         Parameters
         ----------
-        own : ndarray, shape (sets, contacts, strips) or (contacts, strips)
-            Increase of each contact's gap by its wear per unit of line load [m/(N/m)].
+        wear : SharedWear or ndarray, shape (sets, strips), optional
+            Wear compliance, with the sets as leading axis; an array where each set is one contact.
         constants : Constants
         """
-        self._solve(own_array(own).reshape(self.gap.shape), None, None, constants)
-
-    def solve(self, wear: SharedWear, constants: Constants) -> None:
-        """Solve all sets in place; the sets are the leading axis of the wear compliance."""
+        if not isinstance(wear, SharedWear):
+            own = np.zeros(self.gap.shape) if wear is None else own_array(wear)
+            self._solve(own.reshape(self.gap.shape), None, None, constants)
+            return
         for numbers, own, members, shared in wear.groups:
             part = self
             if len(numbers) < len(self.gap):
                 part = NormalContacts._make(array[numbers] for array in self)
             if (members == NO_BODY).all():
-                part.solve_independent(own, constants)
+                part._solve(own, None, None, constants)
             else:
                 part._solve(own, members, shared, constants)
             if part is not self:
@@ -120,7 +115,7 @@ class NormalContacts(NamedTuple):
         shared: FloatArray | None,
         constants: Constants,
     ) -> None:
-        """Solve all sets in place, and mark those with an infinite gap."""
+        """Solve sets in place; `members` and `shared` are those of `SharedWear.groups`."""
         solve_slender(
             self.gap,
             own,
@@ -135,7 +130,7 @@ class NormalContacts(NamedTuple):
             self.status,
             self.iterations,
         )
-        # the kernels skip strips whose gap is not finite
+        # the kernels skip strips with a gap that is not finite
         finite = np.isfinite(self.gap)
         if np.count_nonzero(finite) < finite.size:
             self.status[~finite.all(axis=(1, 2))] = NOT_FINITE
