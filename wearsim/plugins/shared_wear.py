@@ -64,32 +64,19 @@ class SharedWear:
                 gap[..., contact, :] += depth[number]
         return gap
 
-    @property
-    def reduced(self) -> tuple[FloatArray, IntArray, FloatArray]:
-        """Equivalent wear with the smallest number of shared bodies.
+    @cached_property
+    def groups(self) -> list[tuple[IntArray, FloatArray, IntArray, FloatArray]]:
+        """Equivalent wear with the smallest number of shared bodies, by the bodies that wear.
 
         A body touched by one contact only becomes a compliance of that contact; a cylinder and a
         roller touched by the same contacts become one body; a body that does not wear is dropped.
 
         Returns
         -------
-        own : ndarray, shape (contacts, strips)
-        members : ndarray of int, shape (contacts, 2)
-            Number of the shared bodies of each contact, counted over both columns, or -1.
-        shared : ndarray, shape (contacts, 2, strips)
-        """
-        _, own, members, shared = self.groups[0]
-        return own[0], members, shared[0]
-
-    @cached_property
-    def groups(self) -> list[tuple[IntArray, FloatArray, IntArray, FloatArray]]:
-        """Reduced wear of several sets, grouped by the bodies that wear.
-
-        Returns
-        -------
-        list of tuple
-            Numbers of the sets of a group, and `own`, `members` and `shared` as in `reduced`,
-            with the sets as leading axis of `own` and `shared`.
+        list of (numbers, own, members, shared)
+            Numbers of the sets of a group; compliance of separate contacts, (sets, contacts,
+            strips); numbers of the shared bodies of each contact, counted over both columns, or
+            -1, (contacts, 2); and its wear of them, (sets, contacts, 2, strips).
         """
         bodies, contacts = self.bodies.tobytes(), len(self.bodies)
         wear = self.compliance.reshape(-1, *self.compliance.shape[-3:])

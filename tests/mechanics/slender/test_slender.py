@@ -36,12 +36,12 @@ def solve(grid, gaps, loads, wear=None, start=None, lengths="coupled", found=Non
     line_load = np.zeros((count, n)) if start is None else start.copy()
     approach = np.zeros(count)
     half_length = np.zeros((count, n)) if found is None else found
-    own, members, shared = wear.reduced
+    ((_, own, members, shared),) = wear.groups
     status, iterations = np.zeros((2, 1), np.int64)
     solve_slender(
         np.ascontiguousarray(gaps)[None],
-        own[None],
-        *((members, shared[None]) if shared.any() else (None, None)),
+        own,
+        *((members, shared) if shared.any() else (None, None)),
         np.atleast_2d(np.asarray(loads, dtype=float)),
         np.full((1, count), CURVATURE),
         grid.spacing,
