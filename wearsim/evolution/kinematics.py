@@ -1,4 +1,4 @@
-"""Kinematics of rollers on a cylinder, and the wear law of a problem without wear."""
+"""Kinematics of rollers on a cylinder."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from wearsim.plugins import Body, WearLaw
-from wearsim.types import ContactSolution, FloatArray
+from wearsim.types import FloatArray
 
 
 @dataclass(frozen=True)
@@ -50,17 +49,3 @@ class Kinematics:
     def roller_share(self) -> float:
         """Overrollings of a point of one roller per pass of all rollers."""
         return self.cylinder_radius / self.roller_radius / self.physical_rollers
-
-
-class NoWear(WearLaw):
-    """Wear law of a problem without wear, such as a single contact."""
-
-    def depth_per_pass(
-        self, body: Body, solution: ContactSolution, rolling_speed: float
-    ) -> FloatArray:
-        """Return zeros, shape (strips,) [m]."""
-        return np.zeros_like(solution.dissipation)
-
-    def depth_per_dissipation(self, body: Body, rolling_speed: float) -> float:
-        """Return zero [m/(W/m)]."""
-        return 0.0

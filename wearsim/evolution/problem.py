@@ -40,9 +40,10 @@ class WearProblem:
     model : ContactModel
         Contact model, built for the grid.
     laws : tuple of WearLaw
-        Wear law of both bodies, one per realisation; one for all where none is worn.
+        Wear law of both bodies, one per realisation; none where contacts are only solved.
     loads : tuple of Load
-        Normal load of every roller over time, as `laws`.
+        Normal load of every roller over time, one per realisation; one for all of them where
+        contacts are only solved.
     terms : mapping of str to LoadTerm
         Terms added to the load, in a fixed order.
     kinematics : Kinematics

@@ -62,13 +62,6 @@ class StepControl:
         return step * min(self.grow, max(self.shrink, aim))
 
 
-def fitted(step: float, left: float) -> float:
-    """Return a step length that leaves no very short step before the stop, `left` passes ahead."""
-    if step >= left:
-        return left
-    return 0.5 * left if step > 0.5 * left else step
-
-
 SMALLEST_STEP = 1e-6  # passes; with a great wear factor ten passes wear a whole groove
 _SMALLEST_PART = 1e-8  # of the passes done; with shorter steps a test would not end
 
@@ -116,7 +109,10 @@ class Trial:
                 f" passes); {self._cause or 'the error does not fall with the step'}"
             )
         left = stop - passes
-        return min(self.proposed, left) if self._forced else fitted(self.proposed, left)
+        if self._forced or self.proposed >= left:
+            return min(self.proposed, left)
+        # leave no very short step before the stop
+        return 0.5 * left if self.proposed > 0.5 * left else self.proposed
 
     def reject(self, failure: StepError | ContactError, step: float) -> None:
         """Propose a shorter step after one that failed."""

@@ -15,7 +15,7 @@ from wearsim.evolution.error_control.error_estimates import (
     with_half_the_nodes,
 )
 from wearsim.evolution.error_control.step_size import StepControl
-from wearsim.evolution.kinematics import Kinematics, NoWear
+from wearsim.evolution.kinematics import Kinematics
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.backward_euler import ImplicitStepper
@@ -160,7 +160,7 @@ def assemble_problem(
             rollers=first,
             multiplicity=multiplicity,
         ),
-        laws=(scenario.wear.build() if scenario.wear is not None else NoWear(),),
+        laws=(scenario.wear.build(),) if scenario.wear is not None else (),
         varying=tuple(
             replace(item, rollers=tuple(place[r] for r in item.rollers if r in place))
             for item in draws.varying
@@ -239,7 +239,7 @@ def build_problem(
     return WearProblem(
         grid=grid,
         model=model,
-        laws=(NoWear(),),
+        laws=(),
         loads=(scenario.load.build(),),
         terms={term.name: term.build() for term in scenario.load.terms},
         kinematics=Kinematics(
