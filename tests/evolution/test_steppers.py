@@ -7,12 +7,14 @@ import pytest
 
 from tests.evolution import built, never, next_state, stepped
 from wearsim.errors import SolverError, StepError
+from wearsim.evolution.batch.join import joined_problem
 from wearsim.evolution.error_control.step_size import StepControl
 from wearsim.evolution.integrate import evolve
 from wearsim.evolution.observables import centroid, oscillation
 from wearsim.evolution.operating_points import unworn_contacts
 from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.backward_euler import ImplicitStepper
+from wearsim.evolution.steppers.base import Attempt
 from wearsim.evolution.steppers.forward_euler import ExplicitStepper, stability_limit
 from wearsim.evolution.steppers.per_pass import PerPassStepper, run_compiled, run_in_python
 from wearsim.evolution.steppers.single_step import cylinder_depth_of, cylinder_volume_of
@@ -234,6 +236,41 @@ def test_forced_step_beyond_the_limit_is_refused(half_worn):
     step = 2.0 * stability_limit(problem, state)[0]
     with pytest.raises(StepError, match=r"exceeds the stability limit.*allow_unstable = true"):
         next_state(problem, ExplicitStepper(StepControl(1.0), step), state)
+
+
+class Overflowing(ExplicitStepper):
+    """Stepper whose steps beyond ten passes dissipate an infinite energy."""
+
+    def proposed(self, problem, state):
+        return np.full(1, self.forced_step or 1e4)
+
+    def attempt(self, problem, state, step, stop, scheme):
+        end = replace(state, passes=state.passes + step, energy=np.where(step > 10.0, np.inf, 0.0))
+        return Attempt((end,), np.zeros(1))
+
+
+def test_step_to_a_value_that_is_not_finite_is_shortened_or_fails():
+    problem, _, _ = built(contact__strips=31)
+    state = fresh_state(problem)
+    end = next_state(problem, Overflowing(StepControl(1.0)), state)
+    assert 0.0 < end.passes[0] <= 10.0
+    assert end.rejected[0] > 0
+    with pytest.raises(StepError, match="a value is not finite after pass 20") as caught:
+        next_state(problem, Overflowing(StepControl(1.0), forced_step=20.0), state)
+    assert caught.value.state["passes"] == 20.0
+
+
+def test_realisations_can_be_stepped_pass_by_pass_together():
+    tests = [
+        built(creepage__longitudinal=creepage, evolution__stepper="per-pass", contact__strips=61)
+        for creepage in (3e-4, 1e-3)
+    ]
+    first, stepper, _ = tests[0]
+    problems = [replace(one, grid=first.grid, model=first.model) for one, _, _ in tests]
+    together, _ = stepped(joined_problem(problems), stepper, 400.0)
+    for place, problem in enumerate(problems):
+        alone, _ = stepped(problem, stepper, 400.0)
+        assert (together.at(np.array([place])).cylinder_depth == alone.cylinder_depth).all()
 
 
 def test_explicit_run_is_stable_and_matches_per_pass():
