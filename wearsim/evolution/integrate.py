@@ -124,14 +124,15 @@ class Evolution:
 
         done, failed = bisect_failures(attempt, np.arange(len(lengths)))
         failures = self._rejected(failed, lengths)
-        accepted: list[tuple[IntArray, Attempt]] = []
+        accepted: list[tuple[IntArray, list[WearState]]] = []
         for places, tried in done:
             columns = self.numbers[places], tried.excess, lengths[places]
             each = zip(*(column.tolist() for column in columns), strict=True)
             chosen = np.flatnonzero([self._trials[n].accepts(over, step) for n, over, step in each])
             if chosen.size:
-                accepted.append((places[chosen], tried.at(chosen)))
-        advance = self._continued(accepted) if accepted else None
+                accepted.append((places[chosen], [item.at(chosen) for item in tried.path]))
+        warning = done[0][1].warning if done else None
+        advance = self._continued(accepted, warning) if accepted else None
         self.fail(failures)
         return advance
 
@@ -177,11 +178,12 @@ class Evolution:
                 failures[number] = error
         return failures
 
-    def _continued(self, accepted: list[tuple[IntArray, Attempt]]) -> Advance:
-        """Continue from accepted steps, given with the increasing places of their tests."""
+    def _continued(
+        self, accepted: list[tuple[IntArray, list[WearState]]], warning: str | None
+    ) -> Advance:
+        """Continue from accepted steps, given by the increasing places of their tests and path."""
         places = np.concatenate([part for part, _ in accepted])
-        paths = zip(*(tried.path for _, tried in accepted), strict=True)
-        *middle, end = (joined_states(states) for states in paths)
+        *middle, end = map(joined_states, zip(*(path for _, path in accepted), strict=True))
         numbers, start = self.numbers[places], self.state.at(places)
         trials = [self._trials.pop(number) for number in numbers.tolist()]
         end = end.replaced(
@@ -189,8 +191,7 @@ class Evolution:
             rejected=end.rejected + np.array([trial.rejected for trial in trials]),
         )
         self.state = self.state.with_others(places, end)
-        path = (start, *middle, end)
-        return Advance(numbers, self.problem.at(places), path, accepted[0][1].warning)
+        return Advance(numbers, self.problem.at(places), (start, *middle, end), warning)
 
 
 def _finite(tried: Attempt) -> Attempt:

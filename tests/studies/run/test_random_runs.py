@@ -285,7 +285,7 @@ def test_step_is_shortened_where_coarse_solution_fails(monkeypatch):
     fresh = fresh_state(problem)
     plain = next(evolve(problem, fresh, stepper, 600.0, never, 10**6)).end
     original, failures = (
-        errors_of_steps.half_quadrature_start,
+        errors_of_steps.half_quadrature,
         [StepError("the coarse solution did not converge", {})],
     )
 
@@ -294,7 +294,7 @@ def test_step_is_shortened_where_coarse_solution_fails(monkeypatch):
             raise failures.pop()
         return original(*arguments)
 
-    monkeypatch.setattr(errors_of_steps, "half_quadrature_start", fails_once)
+    monkeypatch.setattr(errors_of_steps, "half_quadrature", fails_once)
     end = next(evolve(problem, fresh, stepper, 600.0, never, 10**6)).end
     assert not failures
     assert end.rejected >= 1

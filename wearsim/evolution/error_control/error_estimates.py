@@ -14,7 +14,7 @@ from wearsim.evolution.state import Depths, WearState
 from wearsim.evolution.steppers.base import Step
 from wearsim.evolution.steppers.single_step import carried_loads, solve_present
 from wearsim.evolution.steppers.wear_increment import WearIncrement
-from wearsim.types import FloatArray, IntArray
+from wearsim.types import FloatArray
 
 # lower bounds: the depth grows with a power of 2/3 to 1 of the passes, the volume with about 1
 DEPTH_EXPONENT, VOLUME_EXPONENT = 0.5, 0.75
@@ -170,26 +170,14 @@ def _shifted_wear(
     return WearIncrement(shifted, contacts, passes)
 
 
-def first_half(problem: WearProblem) -> IntArray:
-    """Return the first half of the quadrature nodes of every roller, as numbers of contacts.
-
-    Each half of the nodes is a quadrature too.
-    """
+def half_quadrature(problem: WearProblem, state: WearState) -> tuple[WearProblem, WearState]:
+    """Return problem and state with half the nodes of every roller, which are a quadrature too."""
     nodes = np.arange(len(problem.roller)).reshape(problem.rollers, -1)
-    return nodes[:, : nodes.shape[1] // 2].ravel()
-
-
-def with_half_the_nodes(problem: WearProblem) -> WearProblem:
-    """Return the problem with the first half of the quadrature nodes of every roller."""
-    half = problem.with_contacts(first_half(problem))
-    return replace(half, weight=2.0 * half.weight)
-
-
-def half_quadrature_start(problem: WearProblem, state: WearState) -> WearState:
-    """Return the initial half-quadrature solution: `state` with half the nodes per roller."""
-    numbers = np.arange(len(state.contacts)).reshape(problem.shape)[:, first_half(problem)]
-    return state.replaced(
-        contacts=state.contacts.at(numbers.ravel()),
+    first = nodes[:, : nodes.shape[1] // 2].ravel()
+    contacts = np.arange(len(state.contacts)).reshape(problem.shape)[:, first].ravel()
+    half = problem.with_contacts(first)
+    return replace(half, weight=2.0 * half.weight), state.replaced(
+        contacts=state.contacts.at(contacts),
         coarse_step_solution=None,
         half_quadrature_solution=None,
     )
@@ -223,8 +211,8 @@ def with_pass_errors(
     """
     if not problem.has_nodes:
         return end
-    half_start = start.half_quadrature_solution or half_quadrature_start(problem, start)
-    half = step(with_half_the_nodes(problem), half_start, passes)
+    halved, first = half_quadrature(problem, start)
+    half = step(halved, start.half_quadrature_solution or first, passes)
     volume = total_worn_volume(problem, end)
     variance = start.scatter[1] + _volume_variance(problem, end, passes)
     depth = np.square(greatest_depth(end) / np.where(volume > 0.0, volume, 1.0)) * variance

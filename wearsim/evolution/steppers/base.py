@@ -10,7 +10,7 @@ from typing import TypeAlias
 from wearsim.evolution.error_control.step_size import StepControl, Trial
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
-from wearsim.types import FloatArray, IntArray
+from wearsim.types import FloatArray
 
 Step: TypeAlias = Callable[[WearProblem, WearState, FloatArray], WearState]
 """Function from a problem, a state and a number of passes to the state after them."""
@@ -33,11 +33,6 @@ class Attempt:
     path: tuple[WearState, ...]
     excess: FloatArray
     warning: str | None = None
-
-    def at(self, places: IntArray) -> Attempt:
-        """Return the step of some of the tests, by place and in that order."""
-        path = tuple(state.at(places) for state in self.path)
-        return Attempt(path, self.excess[places], self.warning)
 
 
 class Stepper(ABC):

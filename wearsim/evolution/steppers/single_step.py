@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -33,32 +33,35 @@ def mean_loads(
     the ends of the step, and each load term its exact mean at constant `power`.
     """
     start, stop = problem.time(state.passes), problem.time(state.passes + passes)
-    loads = _loads(problem, problem.mean_load(start, stop))
+    terms = []
+    if problem.terms:
+        mean_power, duration = problem.per_roller(power).mean(axis=0), float((stop - start)[0])
+        each = zip(problem.terms.values(), state.terms, strict=True)
+        terms = [term.mean_force(value, mean_power, duration) for term, value in each]
+    return _with_feedback(problem, state, problem.mean_load(start, stop), depths, terms)
+
+
+def _with_feedback(
+    problem: WearProblem,
+    state: WearState,
+    force: FloatArray,
+    depths: Sequence[Depths],
+    terms: Iterable[FloatArray],
+) -> FloatArray:
+    """Return the loads for a load `force` before feedback; raise StepError unless positive."""
+    loads = np.empty(problem.shape)
+    loads[:] = force + problem.inputs.normal_force_offset
     if problem.has_spring:
         descents = [problem.descent(problem.gap(*worn)) for worn in depths]
         loads -= problem.stiffness * np.mean(descents, axis=0)
-    for number, term in enumerate(problem.terms.values()):
-        mean_power = problem.per_roller(power).mean(axis=0)
-        duration = float((stop - start)[0])
-        loads += term.mean_force(state.terms[number], mean_power, duration)[problem.roller]
-    return checked_loads(loads, state.passes)
-
-
-def _loads(problem: WearProblem, force: FloatArray) -> FloatArray:
-    """Return the load of every contact before feedback for a load `force` of the problem [N]."""
-    loads = np.empty(problem.shape)
-    loads[:] = force + problem.inputs.normal_force_offset
-    return loads
-
-
-def checked_loads(loads: FloatArray, passes: FloatArray) -> FloatArray:
-    """Return `loads`; raise StepError unless all are positive."""
+    for term in terms:
+        loads += term[problem.roller]
     if np.count_nonzero(loads > 0.0) < loads.size:
         raise StepError(
-            f"contact is lost at pass {passes[0]:.0f}: the load has fallen to"
+            f"contact is lost at pass {state.passes[0]:.0f}: the load has fallen to"
             f" {loads.min():.4g} N; the spring has run out of travel, or the recorded load or a"
             " random input falls to zero",
-            {"normal_force": loads, "passes": passes},
+            {"normal_force": loads, "passes": state.passes},
         )
     return loads
 
@@ -103,12 +106,8 @@ def present_problem(problem: WearProblem, state: WearState) -> WearProblem:
 def present_loads(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the load of each contact at the time of the state, shape (S, C, N) [N]."""
     problem = present_problem(problem, state)
-    loads = _loads(problem, problem.force(problem.time(state.passes)))
-    if problem.has_spring:
-        loads -= problem.stiffness * problem.descent(problem.gap(*state.depths))
-    for number in range(len(problem.terms)):
-        loads += problem.at_contacts(state.terms[number][None])[0]
-    return checked_loads(loads, state.passes)
+    force = problem.force(problem.time(state.passes))
+    return _with_feedback(problem, state, force, [state.depths], state.terms)
 
 
 def contacts_at(problem: WearProblem, state: WearState, loads: FloatArray) -> ContactBatchSolution:

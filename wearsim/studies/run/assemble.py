@@ -9,11 +9,7 @@ import numpy as np
 
 from wearsim.errors import CapabilityError, Mistake, ScenarioError
 from wearsim.evolution.contact_inputs import ContactInputs
-from wearsim.evolution.error_control.error_estimates import (
-    half_quadrature_start,
-    total_worn_volume,
-    with_half_the_nodes,
-)
+from wearsim.evolution.error_control.error_estimates import half_quadrature, total_worn_volume
 from wearsim.evolution.error_control.step_size import StepControl
 from wearsim.evolution.kinematics import Kinematics
 from wearsim.evolution.problem import WearProblem
@@ -193,10 +189,7 @@ def with_converged_nodes(problem: WearProblem, draws: Draws) -> WearProblem:
             return found
         fresh = fresh_state(found)
         full = total_worn_volume(problem, explicit_step(found, fresh, one))
-        half = total_worn_volume(
-            problem,
-            explicit_step(with_half_the_nodes(found), half_quadrature_start(found, fresh), one),
-        )
+        half = total_worn_volume(problem, explicit_step(*half_quadrature(found, fresh), one))
         if (np.abs(full - half) <= 0.5 * evolution.tolerance * full).all():
             return found
         count *= 2
