@@ -7,12 +7,6 @@ import numpy as np
 from wearsim.types import FloatArray
 
 
-def depth(worn: FloatArray) -> FloatArray:
-    """Return the greatest worn depth along the last axis [m]."""
-    greatest: FloatArray = worn.max(axis=-1)
-    return greatest
-
-
 def width(y: FloatArray, worn: FloatArray, threshold: float) -> float:
     """Return the extent of the groove where it is deeper than `threshold` [m].
 

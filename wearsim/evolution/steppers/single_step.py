@@ -8,7 +8,7 @@ import numpy as np
 
 from wearsim.contact_batch import ContactBatchSolution
 from wearsim.errors import StepError
-from wearsim.evolution.observables import depth, worn_volume
+from wearsim.evolution.observables import worn_volume
 from wearsim.evolution.operating_points import contact_batch
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import Depths, WearState
@@ -185,7 +185,7 @@ def worn_state(
 
 def cylinder_depth_of(state: WearState) -> FloatArray:
     """Return the greatest worn depth of the cylinder, shape (realisations,) [m]."""
-    return np.asarray(depth(state.cylinder_depth).max(axis=(0, 1)))
+    return np.asarray(state.cylinder_depth.max(axis=(0, 1, 3)))
 
 
 def cylinder_volume_of(problem: WearProblem, state: WearState) -> FloatArray:

@@ -10,12 +10,12 @@ import numpy as np
 from wearsim.evolution.batch.bisect_failures import bisect_failures
 from wearsim.evolution.batch.join import can_step_together, compatible, joined_problem
 from wearsim.evolution.batch.per_realisation import sum_in_order
-from wearsim.evolution.integrate import Evolution
+from wearsim.evolution.integrate import Advance, Evolution
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, fresh_state
 from wearsim.evolution.steppers.base import Stepper
 from wearsim.studies.run.draws import Draws
-from wearsim.studies.run.recorder import DueRecords, RecordSchedule, history_row
+from wearsim.studies.run.recorder import Due, RecordSchedule, due_records, history_row, states_at
 from wearsim.types import FloatArray, IntArray
 
 MAX_BATCH = 128  # realisations in one batch; larger batches are not faster
@@ -160,11 +160,9 @@ def _observed(runs: Sequence[RealisationRun]) -> list[RunObservations | Exceptio
     rows = [[row] for row in observables_of(stepper, problem, state, threshold)]
     results: dict[int, RunObservations | Exception] = {}
     for advance in tests:
-        due = DueRecords.of(advance, schedule, stop, stepper.pass_by_pass)
-        if due is not None:
-            every = np.arange(len(due.numbers))
-            for part in [every] if runs[0].can_be_batched else every[:, None]:
-                tests.fail(_record(stepper, due.at(part), threshold, rows))
+        due = due_records(advance, schedule, stop, stepper.pass_by_pass)
+        for part in [due] if runs[0].can_be_batched else [[one] for one in due]:
+            tests.fail(_record(stepper, advance, part, threshold, rows))
         for place in np.flatnonzero(advance.end.passes >= stop).tolist():
             number = int(advance.numbers[place])
             results[number] = RunObservations.of(rows[number], advance.end, place)
@@ -173,16 +171,21 @@ def _observed(runs: Sequence[RealisationRun]) -> list[RunObservations | Exceptio
 
 
 def _record(
-    stepper: Stepper, due: DueRecords, threshold: float, rows: list[list[Observables]]
+    stepper: Stepper,
+    advance: Advance,
+    due: Sequence[Due],
+    threshold: float,
+    rows: list[list[Observables]],
 ) -> dict[int, Exception]:
     """Append the observables at records to the rows of their tests; return errors by test."""
 
-    def observed(places: IntArray) -> list[Observables]:
-        some = due.at(places)
-        return observables_of(stepper, some.problem, some.recorded_state(stepper), threshold)
+    def observed(chosen: IntArray) -> list[Observables]:
+        some = states_at(stepper, advance, [due[number] for number in chosen])
+        return observables_of(stepper, *some, threshold)
 
-    done, failed = bisect_failures(observed, np.arange(len(due.numbers)))
-    for places, found in done:
-        for number, row in zip(due.numbers[places].tolist(), found, strict=True):
-            rows[number].append(row)
-    return {int(due.numbers[place]): error for place, error in failed.items()}
+    done, failed = bisect_failures(observed, np.arange(len(due))) if due else ([], {})
+    numbers = [int(advance.numbers[place]) for _, place, _ in due]
+    for chosen, found in done:
+        for number, row in zip(chosen.tolist(), found, strict=True):
+            rows[numbers[number]].append(row)
+    return {numbers[number]: error for number, error in failed.items()}

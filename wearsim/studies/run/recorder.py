@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby, pairwise
 from operator import itemgetter
+from typing import TypeAlias
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from wearsim.errors import ContactError, StepError
 from wearsim.evolution.batch.per_realisation import mean_along
 from wearsim.evolution.error_control.step_size import SMALLEST_STEP
 from wearsim.evolution.integrate import Advance
-from wearsim.evolution.observables import depth, width, worn_volume
+from wearsim.evolution.observables import width, worn_volume
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, joined_states
 from wearsim.evolution.steppers.base import Step, Stepper
@@ -28,9 +29,10 @@ from wearsim.evolution.steppers.single_step import (
 from wearsim.results.run.schema import VARIABLES
 from wearsim.scenario import Scenario
 from wearsim.scenario.tables.plain import DEFAULT_RECORDS
-from wearsim.types import FloatArray, IntArray
+from wearsim.types import FloatArray
 
 _ROUND_OFF = 1e-9
+_WITHOUT_REALISATION = {n for n, item in VARIABLES.items() if "realisation" not in item.dims}
 
 Variables = dict[str, FloatArray]
 
@@ -162,7 +164,7 @@ def history_row(
         "depth": cylinder_depth_of(state),
         "width": np.array([width(problem.grid.y, groove, threshold) for groove in worn]),
         "worn_volume": cylinder_volume_of(problem, state),
-        "roller_depth": depth(state.roller_depth)[0],
+        "roller_depth": state.roller_depth[0].max(axis=-1),
         "roller_worn_volume": worn_volume(
             state.roller_depth[0], problem.grid.spacing, problem.kinematics.roller_radius
         ),
@@ -228,68 +230,53 @@ def take_side_step(
     return take_side_step(step, problem, take_side_step(step, problem, state, half), half)
 
 
-@dataclass(frozen=True)
-class DueRecords:
-    """Records due within and at the end of a step of some tests.
+Due: TypeAlias = tuple[int, int, float]
+"""A record in or at the end of a step: the last state before or at it, by its number on the path;
+the place of its test; its passes."""
+
+
+def due_records(
+    advance: Advance, schedule: RecordSchedule, stop: float, pass_by_pass: bool
+) -> list[Due]:
+    """Return the records of a step in order; `stop` is the end of the tests [passes]."""
+    return sorted(
+        (source + at_end, place, passes)
+        for source, (start, end) in enumerate(pairwise(advance.path))
+        for place, (first, last) in enumerate(
+            zip(start.passes.tolist(), end.passes.tolist(), strict=True)
+        )
+        for passes, at_end in schedule.due_between(first, last, stop, pass_by_pass)
+    )
+
+
+def states_at(
+    stepper: Stepper, advance: Advance, due: Sequence[Due]
+) -> tuple[WearProblem, WearState]:
+    """Return problem and states at records of a step, by side steps where no state is.
 
     Parameters
     ----------
-    numbers : ndarray of int, shape (records,)
-        Number of the test of each record; the records of a test are in order.
-    problem : WearProblem
-        Its realisations are the tests of the records.
-    state : WearState
-        The last state of the step at or before each record.
-    passes : ndarray, shape (records,)
-        Passes of each record.
+    stepper : Stepper
+    advance : Advance
+        The step.
+    due : sequence of Due
+        Some of its records in order; each becomes a realisation.
     """
-
-    numbers: IntArray
-    problem: WearProblem
-    state: WearState
-    passes: FloatArray
-
-    @classmethod
-    def of(
-        cls, advance: Advance, schedule: RecordSchedule, stop: float, pass_by_pass: bool
-    ) -> DueRecords | None:
-        """Return the records due in a step; `stop` is the end of the test [passes]."""
-        due = [
-            (source + at_end, place, passes)
-            for source, (start, end) in enumerate(pairwise(advance.path))
-            for place, (first, last) in enumerate(
-                zip(start.passes.tolist(), end.passes.tolist(), strict=True)
-            )
-            for passes, at_end in schedule.due_between(first, last, stop, pass_by_pass)
-        ]
-        if not due:
-            return None
-        due.sort()
-        places, states = [], []
-        for source, group in groupby(due, key=itemgetter(0)):
-            places.append(np.array([place for _, place, _ in group]))
-            state = advance.path[source].replaced(
-                coarse_step_solution=None, half_quadrature_solution=None
-            )
-            states.append(state.at(places[-1]))
-        chosen = np.concatenate(places)
-        problem, passes = advance.problem.at(chosen), np.array([one[2] for one in due])
-        return cls(advance.numbers[chosen], problem, joined_states(states), passes)
-
-    def at(self, places: IntArray) -> DueRecords:
-        """Return some of the records, by place and in that order."""
-        problem, state = self.problem.at(places), self.state.at(places)
-        return DueRecords(self.numbers[places], problem, state, self.passes[places])
-
-    def recorded_state(self, stepper: Stepper) -> WearState:
-        """Return the states at the records, by side steps where no step ends."""
-        later = np.flatnonzero(self.passes > self.state.passes)
-        if not later.size:
-            return self.state
-        start, ends = self.state.at(later), self.passes[later]
-        length = ends - start.passes
-        end = take_side_step(stepper.side_step, self.problem.at(later), start, length)
-        return self.state.with_others(later, end.replaced(passes=ends))
+    places, states = [], []
+    for source, group in groupby(due, key=itemgetter(0)):
+        places.append(np.array([place for _, place, _ in group]))
+        state = advance.path[source].replaced(
+            coarse_step_solution=None, half_quadrature_solution=None
+        )
+        states.append(state.at(places[-1]))
+    problem, state = advance.problem.at(np.concatenate(places)), joined_states(states)
+    passes = np.array([one[2] for one in due])
+    later = np.flatnonzero(passes > state.passes)
+    if not later.size:
+        return problem, state
+    start, ends = state.at(later), passes[later]
+    end = take_side_step(stepper.side_step, problem.at(later), start, ends - start.passes)
+    return problem, state.with_others(later, end.replaced(passes=ends))
 
 
 class Recorder:
@@ -333,12 +320,9 @@ class Recorder:
     def add(self, advance: Advance, stop: float) -> None:
         """Add a step to the history, and record the states due within it or at its end."""
         stepper, end = self.stepper, advance.end
-        due = DueRecords.of(advance, self.schedule, stop, stepper.pass_by_pass)
-        if due is not None:
-            for place in range(len(due.passes)):
-                one = due.at(np.array([place]))
-                row = record_row(stepper, one.problem, one.recorded_state(stepper))
-                self._records.append(_single(row))
+        for one in due_records(advance, self.schedule, stop, stepper.pass_by_pass):
+            row = record_row(stepper, *states_at(stepper, advance, [one]))
+            self._records.append(_single(row))
         self._history.append(self._history_row(end, advance.path[0]))
         # a single assignment: an interrupt before it leaves the previous step current
         self._kept = len(self._history), len(self._records), end
@@ -365,7 +349,7 @@ class Recorder:
 
 def _single(row: Variables) -> Variables:
     """Return the row of a single test in the form of the results file."""
-    return {n: v[0] if len(VARIABLES[n].dims) == 1 else v for n, v in row.items()}
+    return {n: v[0] if n in _WITHOUT_REALISATION else v for n, v in row.items()}
 
 
 def _rows(columns: Mapping[str, FloatArray]) -> list[Variables]:
