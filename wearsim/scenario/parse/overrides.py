@@ -94,9 +94,7 @@ def _descend(document: Any, tables: list[str], key: str) -> MutableMapping[str, 
         raise ValueError("is not a key to override")
     table = document
     for name in tables:
-        if name not in table:
-            table[name] = {}
-        table = table[name]
+        table = table.setdefault(name, {})
         if not isinstance(table, MutableMapping):
             raise ValueError(f"cannot be set, since '{name}' is not a table")
     return table  # type: ignore[no-any-return]
