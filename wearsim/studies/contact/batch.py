@@ -233,9 +233,13 @@ def realisation_grid(
     if choice.width is not None:
         needed = 2.0 * float((away + half_widths).max())
         if choice.width < needed * (1.0 - _MARGIN):
-            what = "the contacts of all realisations do not fit"
-            got, expected = f"{choice.width * 1e3:.4g} mm", f"at least {needed * 1e3:.4g} mm"
-            mistake = Mistake("contact", "width", what, got, expected)
+            mistake = Mistake(
+                "contact",
+                "width",
+                "the contacts of all realisations do not fit",
+                f"{choice.width * 1e3:.4g} mm",
+                f"at least {needed * 1e3:.4g} mm",
+            )
             raise ScenarioError(scenario.file, [mistake])
     if choice.width is not None or scenario.cylinder.profile is not None:
         return contact_grid(scenario, load)
@@ -264,10 +268,6 @@ def _too_many_strips(scenario: Scenario, strips: int, half: float, away: float) 
     coarser = f"a number of strips, such as contact.strips = {MOST_STRIPS}"
     keys = {OFFSET, TILT} if scenario.creepage.tilt_shifts_contact else {OFFSET}
     shifting = [item for item in scenario.random if keys & set(item.keys)]
-    if not shifting:
-        expected = f"{coarser}, or inputs that vary less"
-        mistake = Mistake("contact", "strips", takes, None, expected)
-        return ScenarioError(scenario.file, [mistake])
     mistakes = []
     for item in shifting:
         table, key = item.name.split(".", 1)
@@ -281,4 +281,7 @@ def _too_many_strips(scenario: Scenario, strips: int, half: float, away: float) 
                 shift += f", crown radius x tilt = {crown * 1e3:.4g} mm x {angle}"
         expected = f"{less}, or {coarser}"
         mistakes.append(Mistake(table, key, f"{shift}: {takes}", item.describe(), expected))
+    if not mistakes:
+        expected = f"{coarser}, or inputs that vary less"
+        mistakes.append(Mistake("contact", "strips", takes, None, expected))
     return ScenarioError(scenario.file, mistakes)

@@ -155,10 +155,6 @@ class _Study:
             "mean_problem_dissipation": self._mean_problem.dissipation[0],
             **{key: values[:done] for key, values in contacts.values.items()},
         }
-        friction_grid = (
-            f"{points} points along each of {contacts.grid.strips} strips of"
-            f" {contacts.grid.spacing * 1e6:.4g} um"
-        )
         data = DissipationData(
             **origin_of(scenario),
             plan=scenario.sampling.plan,
@@ -166,7 +162,10 @@ class _Study:
             requested=contacts.count,
             finished=done == contacts.count,
             strip_width=contacts.grid.spacing,
-            friction_grid=friction_grid if points else "",
+            friction_grid=f"{points} points along each of {contacts.grid.strips} strips of"
+            f" {contacts.grid.spacing * 1e6:.4g} um"
+            if points
+            else "",
             mean_problem_power=float(self._mean_problem.power[0]),
             notes=[*scenario.notes, *contacts.notes],
             warnings=self._warnings(len(kept)),

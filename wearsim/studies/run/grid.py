@@ -208,9 +208,12 @@ def strips_of_run(draws: Draws) -> Grid:
     width = choice.width if choice.width is not None else 2.0 * half
     strips = choice.strips or strips_over(width, patch.b, scenario.evolution.tolerance)
     if width < 2.0 * (shift + patch.b):
-        needed = f"at least {2e3 * (shift + patch.b):.4g} mm"
         mistake = Mistake(
-            "contact", "width", "the initial contact does not fit", f"{width * 1e3:.4g} mm", needed
+            "contact",
+            "width",
+            "the initial contact does not fit",
+            f"{width * 1e3:.4g} mm",
+            f"at least {2e3 * (shift + patch.b):.4g} mm",
         )
         raise ScenarioError(scenario.file, [mistake])
     return Grid.spanning(centre - 0.5 * width, centre + 0.5 * width, strips)

@@ -98,7 +98,12 @@ def load_range(scenario: Scenario, load: Load, stop: float) -> tuple[float, floa
         raise ScenarioError(scenario.file, [mistake])
     low, high = load.extremes(0.0, stop)
     if low <= 0.0 and not scenario.load.terms:
-        what = "the load falls to zero or below, and contact is lost"
-        mistake = Mistake("load", kind, what, f"{low:.6g} N", "a load above zero at all times")
+        mistake = Mistake(
+            "load",
+            kind,
+            "the load falls to zero or below, and contact is lost",
+            f"{low:.6g} N",
+            "a load above zero at all times",
+        )
         raise ScenarioError(scenario.file, [mistake])
     return low, high
