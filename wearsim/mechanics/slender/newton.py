@@ -23,6 +23,7 @@ import math
 import numpy as np
 
 from wearsim.mechanics.numerics.jit import kernel, subroutine
+from wearsim.mechanics.numerics.lu import factor_in_place, solve_factored
 from wearsim.mechanics.slender.body_elimination import (
     add_depths,
     add_shared,
@@ -31,16 +32,22 @@ from wearsim.mechanics.slender.body_elimination import (
     new_depth_system,
     solve_depths,
 )
-from wearsim.mechanics.slender.half_length import NEWTON_REACH, fill_half_lengths, new_half_lengths
+from wearsim.mechanics.slender.half_length import (
+    NEWTON_REACH,
+    fill_half_lengths,
+    find_factors,
+    new_half_lengths,
+)
 from wearsim.mechanics.slender.influence import HIGHEST
 from wearsim.mechanics.slender.newton_step import (
     NewtonState,
+    add_approach,
     correct_residual,
     displace,
-    factor_jacobian,
     new_newton_state,
+    number_strips,
     predict_surface,
-    take_step,
+    sum_unit_load,
 )
 from wearsim.types import FloatArray, IntArray
 
@@ -335,12 +342,21 @@ def solve_slender(
                     add_depths(bodies, shared[number], total, surface)
                 renewed = False
                 for k in range(contacts):
-                    widest = displace(k, own, table, unit, lengths, total, work, surface, state)
-                    if widest > HIGHEST:
+                    fresh, matrix, order = state.fresh[k], state.matrix[k], state.order[k]
+                    if fresh:
+                        number_strips(k, total, state)
+                    if find_factors(k, total, fresh, lengths) > HIGHEST:
                         outcome = TOO_FINE
                         break
-                    if state.fresh[k]:
-                        if not factor_jacobian(k, state):
+                    displace(k, own, table, unit, lengths, total, work, surface, state)
+                    if fresh:
+                        size, step = state.size[k], state.step[k]
+                        if not factor_in_place(matrix, size, order):
+                            outcome = SINGULAR
+                            break
+                        step[:size] = 1.0
+                        solve_factored(matrix, size, order, step, state.unit_load[k])
+                        if not sum_unit_load(k, state):
                             outcome = SINGULAR
                             break
                         renewed = True
@@ -359,7 +375,11 @@ def solve_slender(
                     for k in range(contacts):
                         if sweep:
                             correct_residual(k, table, unit, total, lengths, state)
-                        take_step(k, load[k] / spacing, total, state, delta)
+                        size, step = state.size[k], state.step[k]
+                        solve_factored(
+                            state.matrix[k], size, state.order[k], state.missing[k], step
+                        )
+                        add_approach(k, load[k] / spacing, total, state, delta)
                     if bodies is not None:
                         solve_depths(bodies, shared[number], state.rows, system, state.step, delta)
                 change, left = update_loads(total, state, iteration > CAUTIOUS)

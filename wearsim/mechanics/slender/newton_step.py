@@ -15,12 +15,10 @@ from typing import NamedTuple
 import numpy as np
 
 from wearsim.mechanics.numerics.jit import subroutine
-from wearsim.mechanics.numerics.lu import factor_in_place, solve_factored
 from wearsim.mechanics.slender.half_length import (
     HalfLengths,
     add_around,
     add_length_slopes,
-    find_factors,
     gather_length_slopes,
 )
 from wearsim.mechanics.slender.influence import HIGHEST, read_influence, read_value, read_values
@@ -79,7 +77,7 @@ def new_newton_state(contacts: int, n: int) -> NewtonState:
 
 
 @subroutine
-def _number_strips(k: int, line_load: FloatArray, state: NewtonState) -> None:
+def number_strips(k: int, line_load: FloatArray, state: NewtonState) -> None:
     """Assign rows to the loaded strips of contact `k`."""
     count = 0
     for i in range(line_load.shape[1]):
@@ -102,19 +100,13 @@ def displace(
     work: FloatArray,
     surface: FloatArray,
     state: NewtonState,
-) -> float:
-    """Add displacement and wear of contact `k` to `surface`; return the greatest ln(a/dy).
+) -> None:
+    """Add displacement and wear of contact `k` to `surface`, and fill a fresh Jacobian.
 
-    `surface` contains the gap on entry and equals delta in contact at the solution. A fresh
-    Jacobian is filled. Where the returned value exceeds HIGHEST the results are incomplete.
+    `surface` contains the gap on entry and equals delta in contact at the solution.
     """
-    fresh = state.fresh[k]
-    if fresh:
-        _number_strips(k, line_load, state)
-    widest = find_factors(k, line_load, fresh, lengths)
-    if widest > HIGHEST:
-        return widest
-    n, value, tangent, pressed = line_load.shape[1], work[0], work[1], surface[k]
+    fresh, n = state.fresh[k], line_load.shape[1]
+    value, tangent, pressed = work[0], work[1], surface[k]
     for column in range(state.size[k]):
         j = state.place[k, column]
         push, tau, reach = unit * line_load[k, j], lengths.log_ratio[k, j], max(j + 1, n - j)
@@ -140,31 +132,24 @@ def displace(
         state.missing[k, row] = -surface[k, i]
         if fresh:
             state.matrix[k, row, row] += compliance[k, i]
-    return widest
 
 
 @subroutine
-def factor_jacobian(k: int, state: NewtonState) -> bool:
-    """Factor contact `k`'s fresh Jacobian; False if it is singular or approach adds no load."""
-    size = state.size[k]
-    if not factor_in_place(state.matrix[k], size, state.order[k]):
-        return False
-    state.step[k, :size] = 1.0
-    solve_factored(state.matrix[k], size, state.order[k], state.step[k], state.unit_load[k])
+def sum_unit_load(k: int, state: NewtonState) -> bool:
+    """Sum the loads per unit of approach from contact `k`'s new Jacobian; False if the sum is 0."""
     state.unit_load_sum[k] = 0.0
-    for row in range(size):
+    for row in range(state.size[k]):
         state.unit_load_sum[k] += state.unit_load[k, row]
     state.fresh[k] = False
     return bool(abs(state.unit_load_sum[k]) > 0.0)
 
 
 @subroutine
-def take_step(
+def add_approach(
     k: int, load: float, line_load: FloatArray, state: NewtonState, approach: FloatArray
 ) -> None:
-    """Compute contact `k`'s step and the approach at which its strips carry `load` [N/m]."""
+    """Add the approach at which contact `k`'s strips carry `load` [N/m] to its step."""
     size, step = state.size[k], state.step[k]
-    solve_factored(state.matrix[k], size, state.order[k], state.missing[k], step)
     lacking = load
     for row in range(size):
         lacking -= line_load[k, state.place[k, row]] + step[row]
