@@ -256,6 +256,7 @@ def test_limit_on_file_size_raises_one_line_error(tmp_path, limit, work):
     )
     message = f"wearsim.errors.ResultsFileError: {path}: cannot be written (File too large)"
     assert done.stderr.splitlines()[-1] == message
+    assert done.returncode == 1  # HDF5 has closed the file, else it crashes at the end
     assert "Exception ignored" not in done.stderr
     assert [item for item in sorted(tmp_path.rglob("*")) if item.name != "lock"] == before
 

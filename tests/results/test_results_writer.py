@@ -96,6 +96,26 @@ def test_full_disk_raises_one_line_error(tmp_path: Path, at: str) -> None:
     assert differences(read_results(path), OLD) == []
 
 
+@pytest.mark.parametrize("at", ["open", "write", "fsync", "close", "rename"])
+def test_process_ends_normally_after_a_failure(tmp_path: Path, at: str) -> None:
+    """HDF5 crashes at the end of a process if it still refers to a Python file."""
+    code = (
+        "import sys; from run_examples import some_run; from wearsim.results import write_results\n"
+        "from tests.faulty_storage import full_disk\n"
+        f"write_results(sys.argv[1], some_run(), full_disk({at!r}))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(tmp_path / "run.h5")],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=HERE,
+        env=os.environ | {"PYTHONPATH": str(HERE.parents[1])},
+    )
+    assert done.returncode == 1, done.stderr
+    assert done.stderr.rstrip().endswith("cannot be written (No space left on device)")
+
+
 def test_symbolic_link_is_kept(tmp_path: Path) -> None:
     (tmp_path / "disk").mkdir()
     target, link = tmp_path / "disk" / "run.h5", tmp_path / "run.h5"

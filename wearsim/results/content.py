@@ -8,8 +8,6 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from wearsim.results.schema import Schema
-
 Arrays = dict[str, npt.NDArray[Any]]
 
 CHECKPOINT, INPUTS = "checkpoint", "inputs"
@@ -17,37 +15,6 @@ CHECKPOINT, INPUTS = "checkpoint", "inputs"
 ABOUT, SCENARIO, FILES = "about", "scenario", "files"
 """Texts in the group of the inputs: the attributes, the scenario and its files."""
 ERRORS = "surrogatepass"  # so that every Python string can be stored
-
-
-@dataclass(frozen=True, eq=False)
-class Content:
-    """Content of a results file of any kind.
-
-    Parameters
-    ----------
-    schema : Schema
-        The kind of file.
-    attributes : dict of str to object
-        Everything except arrays and long texts, ready for JSON.
-    scenario_text : str
-        TOML of the scenario.
-    files : dict of str to str
-        Content of every file named in the scenario.
-    variables : dict of str to ndarray
-        The variables of the schema.
-    checkpoint : dict of str to ndarray
-        State for resuming; empty if nothing can be resumed.
-    reserved : frozenset of str
-        Variables whose rows are written later; their values are ignored.
-    """
-
-    schema: Schema
-    attributes: dict[str, Any]
-    scenario_text: str
-    files: dict[str, str]
-    variables: Arrays
-    checkpoint: Arrays
-    reserved: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
-from wearsim.results.content import Arrays, Content, StudyData
+from wearsim.results.content import Arrays, StudyData
 from wearsim.results.dissipation.schema import dissipation_schema
+from wearsim.results.schema import Schema
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -48,7 +49,6 @@ class DissipationData(StudyData):
     statistics: dict[str, Any] = field(default_factory=dict)
 
     @property
-    def content(self) -> Content:
-        """Content of the results file."""
-        schema = dissipation_schema(self.inputs)
-        return Content(schema, self.attributes, self.scenario_text, self.files, self.variables, {})
+    def schema(self) -> Schema:
+        """Schema of the results file."""
+        return dissipation_schema(self.inputs)

@@ -10,12 +10,11 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from wearsim.results.content import Arrays, Content, StudyData
+from wearsim.results.content import Arrays, StudyData
 from wearsim.results.ensemble.schema import (
     DONE,
     FAILED,
     QUANTILES,
-    STATIC,
     ensemble_schema,
     kept_profiles,
     type_of,
@@ -143,7 +142,7 @@ class EnsembleData(StudyData):
         """Numbers of the failed realisations, ascending."""
         return np.flatnonzero(self.status == FAILED)
 
-    def rows(self, name: str, start: int, stop: int) -> npt.NDArray[Any]:
+    def rows(self, name: str, start: int, stop: int | None, *rest: slice) -> npt.NDArray[Any]:
         """Return rows of a variable, including those of pending and failed realisations.
 
         Parameters
@@ -151,34 +150,20 @@ class EnsembleData(StudyData):
         name : str
             A variable with one row per realisation.
         start, stop : int
-            The first realisation, and the one after the last.
+            The first realisation, and the one after the last; None for all that follow.
+        *rest : slice
+            The entries of each row along further axes, by default all.
         """
         if isinstance(self.variables, StoredRows):
-            return self.variables.rows(name, start, stop)  # reads these rows only
-        return self.variables[name][start:stop]
-
-    def columns(self, name: str, records: slice) -> FloatArray:
-        """Return an observable at some records of all realisations, shape (requested, records).
-
-        The rows of pending and failed realisations are included.
-
-        Parameters
-        ----------
-        name : str
-            One of `schema.OBSERVABLES`.
-        records : slice
-            The records.
-        """
-        if isinstance(self.variables, StoredRows):
-            return self.variables.rows(name, 0, None, records)  # reads these records only
-        return self.variables[name][:, records]
+            return self.variables.rows(name, start, stop, *rest)  # reads nothing else
+        return self.variables[name][(slice(start, stop), *rest)]
 
     def column(self, name: str, record: int) -> FloatArray:
-        """Return an observable at one record of all realisations; see `columns`.
+        """Return an observable at one record of all realisations; see `rows`.
 
         Negative numbers of a record count from the end. The shape is (requested,).
         """
-        return self.columns(name, slice(record, record + 1 or None))[:, 0]
+        return self.rows(name, 0, None, slice(record, record + 1 or None))[:, 0]
 
     @cached_property
     def shapes(self) -> dict[str, tuple[int, ...]]:
@@ -198,22 +183,10 @@ class EnsembleData(StudyData):
         }
 
     @property
-    def content(self) -> Content:
-        """Content of a new file, in which rows and statistics are written later."""
-        schema = self.schema
-        known: Arrays = {name: np.asarray(self.variables[name], float) for name in STATIC}
-        known["quantile"] = np.array(QUANTILES)
-        shapes = self.shapes | {name: array.shape for name, array in known.items()}
-        variables: Arrays = {
-            name: np.broadcast_to(np.zeros((), type_of(variable)), shapes[name])  # no memory
-            for name, variable in schema.variables.items()
+    def reserved(self) -> Arrays:
+        """Shapes and types of the variables of a new file that are written later."""
+        return {
+            name: np.broadcast_to(np.zeros((), type_of(variable)), self.shapes[name])  # no memory
+            for name, variable in self.schema.variables.items()
+            if variable.kind != "static"
         }
-        return Content(
-            schema,
-            self.attributes,
-            self.scenario_text,
-            self.files,
-            {**variables, **known},
-            {},
-            frozenset(variables) - frozenset(known),
-        )

@@ -296,7 +296,7 @@ class EnsembleResult(StudyResult[EnsembleData]):
         """Yield an observable of the independent realisations, record by record."""
         records, block = len(self.record_passes), max(_READ_SIZE // max(self.requested, 1), 1)
         for first in range(0, records, block):
-            some = self.raw.columns(name, slice(first, min(first + block, records)))
+            some = self.raw.rows(name, 0, None, slice(first, min(first + block, records)))
             yield from map(np.ascontiguousarray, some[self.numbers][self._independent].T)
 
     @property

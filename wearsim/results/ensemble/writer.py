@@ -25,7 +25,7 @@ from wearsim.results.ensemble.parts import (
     write_part,
 )
 from wearsim.results.ensemble.reader import read_ensemble
-from wearsim.results.ensemble.schema import PENDING, STATIC, STATISTICS, is_row
+from wearsim.results.ensemble.schema import ENSEMBLE, PENDING, QUANTILES, STATIC, STATISTICS, is_row
 from wearsim.results.ensemble.stored_rows import StoredRows
 from wearsim.results.io.atomic_write import DISK, TEMPORARY, Storage, os_errors_converted
 from wearsim.results.io.file_lock import (
@@ -124,8 +124,8 @@ class EnsembleFile:
             folder.mkdir(exist_ok=True)  # before the file, which is incomplete without it
         try:
             with hdf5_write.new_file(path, storage) as (file, _):
-                hdf5_write.put_variables(file, header.content)
-                hdf5_write.put_texts(file, header.content)
+                _put_variables(file, header)
+                hdf5_write.put_texts(file, ENSEMBLE, header)
         except BaseException:
             if is_new:
                 folder.rmdir()
@@ -279,7 +279,7 @@ class EnsembleFile:
         static = {name: self._stored[name] for name in STATIC}
         header = replace(header, **self._state, variables=static, merged=self._number)
         with hdf5_write.new_file(self.path, self._storage) as (file, check):
-            hdf5_write.put_variables(file, header.content)
+            _put_variables(file, header)
             for start in range(0, len(self._status), hdf5_write.CHUNK_ROWS):
                 self._copy_rows(file, start, start + hdf5_write.CHUNK_ROWS)
                 check()
@@ -290,7 +290,7 @@ class EnsembleFile:
                 for name, array in statistics.items():
                     _put_statistic(file[name], name, array)
                 header = replace(header, **fields)
-            hdf5_write.put_texts(file, header.content)
+            hdf5_write.put_texts(file, ENSEMBLE, header)
         self._load()
 
     def _copy_rows(self, file: h5py.File, start: int, stop: int) -> None:
@@ -301,6 +301,15 @@ class EnsembleFile:
                 rows = self._stored.rows(name, start, stop)
                 if len(rows) and (name != "error" or np.any(rows != b"")):
                     file[name][start : start + len(rows)] = rows
+
+
+def _put_variables(file: h5py.File, header: EnsembleData) -> None:
+    """Write the variables that are known from the start, and describe the others."""
+    from wearsim.results.io import hdf5_write  # noqa: PLC0415  (h5py takes 0.2 s to import)
+
+    known = {name: np.asarray(array, float) for name, array in header.variables.items()}
+    known["quantile"] = np.array(QUANTILES)
+    hdf5_write.put_variables(file, header.schema, known, header.reserved)
 
 
 def _put_statistic(dataset: h5py.Dataset, name: str, array: npt.NDArray[Any]) -> None:

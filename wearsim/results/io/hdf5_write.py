@@ -25,11 +25,12 @@ from wearsim.results.content import (
     FILES,
     INPUTS,
     SCENARIO,
-    Content,
+    Arrays,
+    StudyData,
     as_plain,
 )
 from wearsim.results.io.atomic_write import DISK, Storage, replacement
-from wearsim.results.schema import axis_lengths
+from wearsim.results.schema import Schema, axis_lengths
 
 CHUNK_ROWS = 4096
 """Most rows of a chunk; who writes as many rows at a time writes each chunk once."""
@@ -39,33 +40,38 @@ _LABEL_LENGTH = 1000  # an attribute holds 64 kB at most
 
 
 class _File:
-    """A file written by HDF5, which does not recover from errors: the first is raised later."""
+    """A file written by HDF5, which does not recover from errors of a write, even on closing.
+
+    Only the first error is kept; what follows it is not written, and HDF5 does not notice.
+    """
 
     def __init__(self, file: IO[bytes]) -> None:
         self._file = file
+        self._place = self._size = 0  # [bytes]
         self.error: BaseException | None = None
 
     def tell(self) -> int:
         """Return the position, as a file."""
-        return self._attempt(self._file.tell)
+        return self._place
 
     def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
         """Set the position, as a file."""
-        if whence == io.SEEK_SET and offset == self.tell():
-            return offset  # without emptying the buffer of the file
-        return self._attempt(self._file.seek, offset, whence)
+        start = {io.SEEK_SET: 0, io.SEEK_CUR: self._place, io.SEEK_END: self._size}[whence]
+        self._place = start + offset
+        return self._place
 
     def readinto(self, target: memoryview) -> int:
         """Read at the position, as a file."""
-        return self._attempt(self._file.readinto, target)  # type: ignore[attr-defined]
+        return self._attempt(self._file.readinto, target, len(target))  # type: ignore[attr-defined]
 
-    def write(self, content: bytes | memoryview) -> int:
+    def write(self, content: memoryview) -> int:
         """Write at the position, as a file."""
-        return self._attempt(self._file.write, content)
+        return self._attempt(self._file.write, content, len(content))
 
     def truncate(self, size: int) -> int:
         """Set the size, as a file."""
-        return self._attempt(self._file.truncate, size)
+        self._place = self._size = size
+        return self._attempt(self._file.truncate, size, 0)
 
     def flush(self) -> None:
         """Do nothing; the file is synchronised after HDF5 has closed it."""
@@ -75,13 +81,18 @@ class _File:
         if self.error is not None:
             raise self.error
 
-    def _attempt(self, operation: Callable[..., int], *arguments: object) -> int:
+    def _attempt(self, operation: Callable[[Any], int], argument: object, count: int) -> int:
+        """Call an operation at the present position unless one has failed before."""
         if self.error is None:
             try:
-                return operation(*arguments)
+                if self._file.tell() != self._place:  # a change empties the buffer
+                    self._file.seek(self._place)
+                operation(argument)
             except BaseException as error:
                 self.error = error
-        return 0
+        self._place += count
+        self._size = max(self._size, self._place)
+        return count
 
 
 @contextmanager
@@ -108,32 +119,52 @@ def new_file(
     ResultsFileError
         If it cannot be written; an existing file is then unchanged.
     """
-    creation, access = h5p.create(h5p.FILE_CREATE), h5p.create(h5p.FILE_ACCESS)
-    creation.set_link_creation_order(h5p.CRT_ORDER_TRACKED | h5p.CRT_ORDER_INDEXED)
-    creation.set_obj_track_times(False)
-    access.set_libver_bounds(h5f.LIBVER_V110, h5f.LIBVER_V110)
-    access.set_fclose_degree(h5f.CLOSE_STRONG)
     with replacement(path, storage) as stored:
         target = _File(stored)
-        access.set_fileobj_driver(h5fd.fileobj_driver, target)
-        name = str(path).encode("utf-8", ERRORS)
         try:
-            with h5py.File(h5f.create(name, h5f.ACC_TRUNC, creation, access)) as file:
+            with _created(path, target) as file:
                 yield file, target.raise_error
         finally:
             target.raise_error()  # the cause of what HDF5 may have raised
 
 
-def put_variables(file: h5py.File, content: Content) -> None:
-    """Write axes and variables; only space is described for those that are reserved.
+def _created(path: str | Path, target: _File) -> h5py.File:
+    creation, access = h5p.create(h5p.FILE_CREATE), h5p.create(h5p.FILE_ACCESS)
+    creation.set_link_creation_order(h5p.CRT_ORDER_TRACKED | h5p.CRT_ORDER_INDEXED)
+    creation.set_obj_track_times(False)
+    try:
+        access.set_libver_bounds(h5f.LIBVER_V110, h5f.LIBVER_V110)
+        access.set_fclose_degree(h5f.CLOSE_STRONG)
+        access.set_fileobj_driver(h5fd.fileobj_driver, target)
+        name = str(path).encode("utf-8", ERRORS)
+        return h5py.File(h5f.create(name, h5f.ACC_TRUNC, creation, access))
+    finally:
+        access.close()  # HDF5 crashes at the end of the process if it still refers to an object
+
+
+def put_variables(
+    file: h5py.File, schema: Schema, variables: Arrays, reserved: Arrays | None = None
+) -> None:
+    """Write axes and variables.
+
+    Parameters
+    ----------
+    file : h5py.File
+        An empty file.
+    schema : Schema
+        Axes and variables of the file.
+    variables : dict of str to ndarray
+        Variables by name.
+    reserved : dict of str to ndarray, optional
+        Those of which only shape and type are described; their rows are written later.
 
     Raises
     ------
     ValueError
         If the variables are not those of the schema, or their shapes are inconsistent.
     """
-    schema = content.schema
-    lengths = axis_lengths(content.variables, schema.variables)
+    arrays = variables | (reserved or {})
+    lengths = axis_lengths(arrays, schema.variables)
     scales: dict[str, h5py.Dataset] = {}
     datasets: dict[str, h5py.Dataset] = {}
     for axis in schema.axes.values():
@@ -141,8 +172,7 @@ def put_variables(file: h5py.File, content: Content) -> None:
         scales[axis.name] = put_array(file, axis.name, numbers)
         put_labels(scales[axis.name], units="1", long_name=axis.long_name)
     for name, variable in schema.variables.items():
-        put = _reserve if name in content.reserved else put_array
-        dataset = put(file, name, content.variables[name])
+        dataset = (put_array if name in variables else _reserve)(file, name, arrays[name])
         put_labels(dataset, units=variable.unit, long_name=variable.long_name)
         (scales if variable.dims == (name,) else datasets)[name] = dataset
     for name, scale in scales.items():
@@ -152,24 +182,38 @@ def put_variables(file: h5py.File, content: Content) -> None:
             dataset.dims[position].attach_scale(scales[dim])
 
 
-def put_texts(file: h5py.File, content: Content) -> None:
+def put_texts(
+    file: h5py.File, schema: Schema, data: StudyData, checkpoint: Arrays | None = None
+) -> None:
     """Write everything except variables.
 
     Short values are also written as HDF5 attributes, for other programs.
+
+    Parameters
+    ----------
+    file : h5py.File
+        The file.
+    schema : Schema
+        Its format.
+    data : StudyData
+        Attributes and texts.
+    checkpoint : dict of str to ndarray, optional
+        State for resuming.
     """
-    named = {"format": content.schema.format, "format_version": content.schema.version}
-    for name, value in {**named, **content.attributes}.items():
+    named = {"format": schema.format, "format_version": schema.version}
+    for name, value in {**named, **data.attributes}.items():
         if isinstance(value, str | int | float | np.number | np.bool_):
             put_labels(file, **{name: value})
-    inputs, checkpoint = put_group(file, INPUTS), put_group(file, CHECKPOINT)
-    put_text(inputs, SCENARIO, content.scenario_text)
-    put_text(inputs, ABOUT, json.dumps(content.attributes, default=as_plain))
-    put_text(inputs, FILES, json.dumps(content.files))
-    for name, array in content.checkpoint.items():
-        put_array(checkpoint, name, array)
+    inputs = _put_group(file, INPUTS)
+    put_text(inputs, SCENARIO, data.scenario_text)
+    put_text(inputs, ABOUT, json.dumps(data.attributes, default=as_plain))
+    put_text(inputs, FILES, json.dumps(data.files))
+    group = _put_group(file, CHECKPOINT)
+    for name, array in (checkpoint or {}).items():
+        put_array(group, name, array)
 
 
-def put_group(parent: h5py.Group, name: str) -> h5py.Group:
+def _put_group(parent: h5py.Group, name: str) -> h5py.Group:
     """Return a new group without time stamps."""
     creation = h5p.create(h5p.GROUP_CREATE)
     creation.set_obj_track_times(False)

@@ -32,6 +32,7 @@ def write_results(
     """
     from wearsim.results.io import hdf5_write  # noqa: PLC0415  (h5py takes 0.2 s to import)
 
+    checkpoint = data.checkpoint if isinstance(data, RunData) else {}
     with hdf5_write.new_file(path, storage) as (file, _):
-        hdf5_write.put_variables(file, data.content)
-        hdf5_write.put_texts(file, data.content)
+        hdf5_write.put_variables(file, data.schema, data.variables)
+        hdf5_write.put_texts(file, data.schema, data, checkpoint)

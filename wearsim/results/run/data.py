@@ -7,8 +7,9 @@ from typing import Any, ClassVar
 
 import numpy.typing as npt
 
-from wearsim.results.content import Arrays, Content, StudyData
+from wearsim.results.content import Arrays, StudyData
 from wearsim.results.run.schema import RUN
+from wearsim.results.schema import Schema
 
 _ARRAYS = ("static", "history", "records", "checkpoint")
 
@@ -40,6 +41,7 @@ class RunData(StudyData):
     """
 
     separately_stored: ClassVar[frozenset[str]] = StudyData.separately_stored.union(_ARRAYS)
+    schema: ClassVar[Schema] = RUN
 
     stepper: str
     tolerance: float
@@ -56,13 +58,6 @@ class RunData(StudyData):
     def variables(self) -> Arrays:
         """Variables of all kinds by name."""
         return {**self.static, **self.history, **self.records}
-
-    @property
-    def content(self) -> Content:
-        """Content of the results file."""
-        return Content(
-            RUN, self.attributes, self.scenario_text, self.files, self.variables, self.checkpoint
-        )
 
 
 def differences(one: RunData, other: RunData) -> list[str]:

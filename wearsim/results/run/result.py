@@ -13,11 +13,32 @@ from wearsim.results.io.reader import read_results
 from wearsim.results.run.data import RunData
 from wearsim.results.run.schema import VARIABLES
 from wearsim.results.study_result import StudyResult
-from wearsim.types import FloatArray, IntArray
+from wearsim.types import FloatArray
 
 Number: TypeAlias = float | list[float]
 
 _DROPPED = {"station", "roller", "realisation"}
+
+
+class _Stored:
+    """A variable of the results file as an attribute of the result.
+
+    Parameters
+    ----------
+    name : str
+        Name of the variable.
+    text : str
+        Description of the attribute.
+    """
+
+    def __init__(self, name: str, text: str) -> None:
+        self._name = name
+        self.__doc__ = text
+
+    def __get__(self, result: Result | None, owner: type[Result]) -> npt.NDArray[Any]:
+        if result is None:
+            return self  # type: ignore[return-value]  # for `help`
+        return result.values(self._name)
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +47,60 @@ class Result(StudyResult[RunData]):
 
     The axes station, roller and realisation are dropped where their length is one.
     """
+
+    passes = _Stored(
+        "passes", "Roller passes after each step, all rollers together; the first row is 0."
+    )
+    time = _Stored("time", "Simulated time after each step [s].")
+    depth = _Stored(
+        "depth", "Greatest depth of the cylinder worn since the start, after each step [m]."
+    )
+    width = _Stored("width", "Width of the groove in the cylinder after each step [m].")
+    worn_volume = _Stored("worn_volume", "Worn volume of the cylinder after each step [m^3].")
+    roller_depth = _Stored(
+        "roller_depth", "Greatest depth of each roller worn since the start, after each step [m]."
+    )
+    roller_worn_volume = _Stored(
+        "roller_worn_volume", "Worn volume of one physical roller after each step [m^3]."
+    )
+    dissipated_energy = _Stored(
+        "dissipated_energy",
+        "Energy dissipated by all rollers since the start, after each step [J].",
+    )
+    power = _Stored("power", "Dissipated power of all rollers after each step [W].")
+    normal_force = _Stored("normal_force", "Normal force of each roller after each step [N].")
+    peak_pressure = _Stored(
+        "peak_pressure", "Greatest normal pressure of each roller after each step [Pa]."
+    )
+    longitudinal_creepage = _Stored(
+        "longitudinal_creepage", "Mean longitudinal creepage of each roller after each step."
+    )
+    depth_error = _Stored(
+        "depth_error", "Estimated error of the depth of either body after each step [m]."
+    )
+    volume_error = _Stored(
+        "volume_error", "Estimated error of the volume worn off both bodies, after each step [m^3]."
+    )
+    rejected = _Stored("rejected", "Rejected steps so far, after each step.")
+    solves = _Stored("solves", "Contact solves of accepted steps so far, after each step.")
+    full_solves = _Stored("full_solves", "Roller passes solved in full so far, after each step.")
+    y = _Stored("y", "Axial position of the strips [m].")
+    record_passes = _Stored("record_passes", "Roller passes at each record.")
+    record_time = _Stored("record_time", "Simulated time at each record [s].")
+    profiles = _Stored(
+        "cylinder_depth_profile",
+        "Worn depth of the cylinder at each record, positive down, (record, y) [m].",
+    )
+    roller_profiles = _Stored(
+        "roller_depth_profile",
+        "Worn depth of each roller at each record, positive into the roller [m].",
+    )
+    line_load = _Stored(
+        "line_load", "Normal force per axial length of each contact at each record [N/m]."
+    )
+    dissipation = _Stored(
+        "dissipation", "Dissipated power per axial length of each contact at each record [W/m]."
+    )
 
     def __repr__(self) -> str:
         passes, total = float(self.passes[-1]), self.raw.total_passes
@@ -64,111 +139,6 @@ class Result(StudyResult[RunData]):
         return self.raw.stepper
 
     @property
-    def passes(self) -> FloatArray:
-        """Roller passes after each step, all rollers together; the first row is 0."""
-        return self.values("passes")
-
-    @property
-    def time(self) -> FloatArray:
-        """Simulated time after each step [s]."""
-        return self.values("time")
-
-    @property
-    def depth(self) -> FloatArray:
-        """Greatest depth of the cylinder worn since the start, after each step [m]."""
-        return self.values("depth")
-
-    @property
-    def width(self) -> FloatArray:
-        """Width of the groove in the cylinder after each step [m]."""
-        return self.values("width")
-
-    @property
-    def worn_volume(self) -> FloatArray:
-        """Worn volume of the cylinder after each step [m^3]."""
-        return self.values("worn_volume")
-
-    @property
-    def roller_depth(self) -> FloatArray:
-        """Greatest depth of each roller worn since the start, after each step [m]."""
-        return self.values("roller_depth")
-
-    @property
-    def roller_worn_volume(self) -> FloatArray:
-        """Worn volume of one physical roller after each step [m^3]."""
-        return self.values("roller_worn_volume")
-
-    @property
-    def dissipated_energy(self) -> FloatArray:
-        """Energy dissipated by all rollers since the start, after each step [J]."""
-        return self.values("dissipated_energy")
-
-    @property
-    def power(self) -> FloatArray:
-        """Dissipated power of all rollers after each step [W]."""
-        return self.values("power")
-
-    @property
-    def normal_force(self) -> FloatArray:
-        """Normal force of each roller after each step [N]."""
-        return self.values("normal_force")
-
-    @property
-    def peak_pressure(self) -> FloatArray:
-        """Greatest normal pressure of each roller after each step [Pa]."""
-        return self.values("peak_pressure")
-
-    @property
-    def longitudinal_creepage(self) -> FloatArray:
-        """Mean longitudinal creepage of each roller after each step."""
-        return self.values("longitudinal_creepage")
-
-    @property
-    def depth_error(self) -> FloatArray:
-        """Estimated error of the depth of either body after each step [m]."""
-        return self.values("depth_error")
-
-    @property
-    def volume_error(self) -> FloatArray:
-        """Estimated error of the volume worn off both bodies, after each step [m^3]."""
-        return self.values("volume_error")
-
-    @property
-    def rejected(self) -> IntArray:
-        """Rejected steps so far, after each step."""
-        return self.values("rejected")
-
-    @property
-    def solves(self) -> IntArray:
-        """Contact solves of accepted steps so far, after each step."""
-        return self.values("solves")
-
-    @property
-    def full_solves(self) -> IntArray:
-        """Roller passes solved in full so far, after each step."""
-        return self.values("full_solves")
-
-    @property
-    def y(self) -> FloatArray:
-        """Axial position of the strips [m]."""
-        return self.values("y")
-
-    @property
-    def record_passes(self) -> FloatArray:
-        """Roller passes at each record."""
-        return self.values("record_passes")
-
-    @property
-    def record_time(self) -> FloatArray:
-        """Simulated time at each record [s]."""
-        return self.values("record_time")
-
-    @property
-    def profiles(self) -> FloatArray:
-        """Worn depth of the cylinder at each record, positive down, shape (record, y) [m]."""
-        return self.values("cylinder_depth_profile")
-
-    @property
     def depth_below_nominal(self) -> FloatArray:
         """Greatest depth of the cylinder below its nominal shape at each record [m].
 
@@ -177,21 +147,6 @@ class Result(StudyResult[RunData]):
         below = self.raw.records["cylinder_depth_profile"] - self.start_height
         deepest: FloatArray = below.max(axis=(1, 3))
         return deepest[:, 0] if deepest.shape[1] == 1 else deepest
-
-    @property
-    def roller_profiles(self) -> FloatArray:
-        """Worn depth of each roller at each record, positive into the roller [m]."""
-        return self.values("roller_depth_profile")
-
-    @property
-    def line_load(self) -> FloatArray:
-        """Normal force per axial length of each contact at each record [N/m]."""
-        return self.values("line_load")
-
-    @property
-    def dissipation(self) -> FloatArray:
-        """Dissipated power per axial length of each contact at each record [W/m]."""
-        return self.values("dissipation")
 
     @property
     def steps(self) -> int:
