@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from itertools import islice
-from typing import Any
 
 import numpy as np
 
@@ -293,19 +292,20 @@ class EnsembleWork:
         data = replace(self.file.data, status=self.file.status.copy())
         return EnsembleResult(data, self.file.path)
 
-    def _state(self) -> dict[str, Any]:
+    def _state(self) -> dict[str, object]:
         """Return the fields of the results that have changed."""
-        wall_seconds = self.before + time.monotonic() - self.started
-        return {"warnings": self.warnings, "wall_seconds": wall_seconds}
+        return {
+            "warnings": self.warnings,
+            "wall_seconds": self.before + time.monotonic() - self.started,
+        }
 
-    def _complete(self, data: EnsembleData) -> tuple[dict[str, Any], dict[str, FloatArray]]:
+    def _complete(self, data: EnsembleData) -> tuple[dict[str, object], dict[str, FloatArray]]:
         """Return the final fields of a complete ensemble, and its statistics."""
         result = EnsembleResult(data, self.file.path)
         for text in ensemble_warnings(result, self.target, self._reached):
             self.warn(text)
-        statistics = result.statistics() if result.count else {}
         final = {"finished": True, "statistics": result.final_estimates()}
-        return {**self._state(), **final}, statistics
+        return self._state() | final, result.statistics() if result.count else {}
 
     def _interrupted(self) -> Interrupted:
         done = int((self.file.status != PENDING).sum())
@@ -319,8 +319,8 @@ class EnsembleWork:
         done, failed = int((status == DONE).sum()), int((status == FAILED).sum())
         if done and now > self._next_estimate:
             self._estimate = target.interval(self._result().estimate_for(target))
-            spent = time.monotonic() - now  # at most 5 % of the time
-            self._next_estimate = now + max(BETWEEN_ESTIMATES, 20.0 * spent)
+            # at most 5 % of the time
+            self._next_estimate = now + max(BETWEEN_ESTIMATES, 20.0 * (time.monotonic() - now))
         self.on_progress(
             EnsembleProgress(
                 done=done,
