@@ -392,6 +392,6 @@ def open_ensemble(path: str | Path) -> EnsembleResult:
     Raises
     ------
     ResultsFileError
-        If it is missing, of another kind, truncated, damaged, or written by a newer wearsim.
+        If it is missing, of another kind, truncated, damaged, or of another layout.
     """
     return EnsembleResult(read_ensemble(path), Path(path))

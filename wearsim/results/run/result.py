@@ -218,6 +218,6 @@ def open_results(path: str | Path) -> Result:
     Raises
     ------
     ResultsFileError
-        If it is missing, foreign, truncated, damaged, or written by a newer wearsim.
+        If it is missing, foreign, truncated, damaged, or of another layout.
     """
     return Result(read_results(path), Path(path))
