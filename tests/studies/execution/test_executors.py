@@ -15,7 +15,6 @@ from pathlib import Path
 import pytest
 from batch_works import (
     Deadly,
-    EndsAfterwards,
     Exiting,
     Held,
     KilledAsItSends,
@@ -163,16 +162,17 @@ def test_batch_that_kills_every_process_raises(tmp_path: Path) -> None:
     assert list(tmp_path.glob("done *"))  # the other process continued
 
 
-def test_process_that_ends_between_batches_is_replaced() -> None:
+def test_process_killed_between_batches_is_replaced() -> None:
     messages: list[str] = []
     with executor("processes", 2, on_notice=messages.append) as pool:
-        found = pool.results(EndsAfterwards(), iter([[0], [1], [2]]))
-        results = [next(found), next(found)]
-        time.sleep(1.0)
-        results += [*found, *pool.results(EndsAfterwards(), iter([[3], [4]]))]
-    assert sorted(numbers[0] for numbers, _ in results) == list(range(5))
+        ((_, ((_, pid),)),) = pool.results(Squares(), iter([[1]]))
+        os.kill(pid, signal.SIGKILL)
+        while alive(pid):
+            time.sleep(0.01)
+        found = squares(pool.results(Squares(0.5), batches_of(1, 4)))
+    assert found == {number: number * number for number in range(4)}
     assert len(messages) == 1
-    assert messages[0].startswith("a worker process ended with exit code 3; realisation ")
+    assert "was killed by SIGKILL (out of memory?); realisation " in messages[0]
 
 
 def test_exit_of_the_work_fails_its_batch_only() -> None:
