@@ -8,7 +8,11 @@ from hypothesis import strategies as st
 from tests.materials import STEEL
 from tests.mechanics.tangential.line_contact import rolling_strip
 from wearsim.mechanics.hertz.elasticity import combine
-from wearsim.mechanics.tangential.carter import SPIN_LIMIT, TURNED, mean_direction, strip_force
+from wearsim.mechanics.numerics.jit import kernel
+from wearsim.mechanics.tangential import carter
+from wearsim.mechanics.tangential.carter import SPIN_LIMIT, TURNED, mean_direction
+
+strip_force = kernel(carter.strip_force)
 
 PAIR = combine(STEEL, STEEL)
 MODULI = PAIR.contact_modulus, PAIR.shear_modulus

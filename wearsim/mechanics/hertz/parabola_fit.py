@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from wearsim.mechanics.hertz.ellipse import hertz_ellipse
-from wearsim.mechanics.numerics.jit import subroutine
+from wearsim.mechanics.numerics.jit import kernel, subroutine
 from wearsim.types import FloatArray
 
 CONVERGED, NOT_CONVERGED, NO_CURVATURE, TOO_FEW_STRIPS, LEAVES_STRIPS = range(5)
@@ -138,7 +138,7 @@ def strips_within(y: FloatArray, centre: float, half_width: float) -> int:
     return count
 
 
-@subroutine
+@kernel
 def hertz_on_profile(
     y: FloatArray,
     gap: FloatArray,

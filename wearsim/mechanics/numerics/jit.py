@@ -24,12 +24,14 @@ from wearsim.types import FloatArray
 P = ParamSpec("P")
 R = TypeVar("R")
 
+_CONFIG: Any = numba.config
+
 # kernels are never passed to C code, for which numba would compile a second wrapper
-_OPTIONS = {"error_model": "numpy", "no_cfunc_wrapper": True}
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True}
 KEPT = 86400.0  # seconds for which the compiled kernels of other sources are kept
 
 
-class _WithoutCollection(event.Listener):  # type: ignore[misc]  # numba is not typed
+class _WithoutCollection(event.Listener):
     """Listener that disables Python's garbage collector, a tenth of the time, in compilations."""
 
     def __init__(self) -> None:
@@ -59,14 +61,14 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
     Every kernel is called with one signature only (C-contiguous float64 arrays, floats, ints), so
     that processes that start at the same time write identical cache entries.
     """
-    folder, folder_of_user = _cache_folder(), numba.config.CACHE_DIR
+    folder, folder_of_user = _cache_folder(), _CONFIG.CACHE_DIR
     if folder is None:
         return numba.njit(function, **_OPTIONS)  # type: ignore[no-any-return]
-    numba.config.CACHE_DIR = str(folder)
+    _CONFIG.CACHE_DIR = str(folder)
     try:
         compiled: Any = numba.njit(function, cache=True, **_OPTIONS)
     finally:
-        numba.config.CACHE_DIR = folder_of_user
+        _CONFIG.CACHE_DIR = folder_of_user
     return compiled  # type: ignore[no-any-return]
 
 
@@ -76,7 +78,7 @@ def subroutine(function: Callable[P, R]) -> Callable[P, R]:
     A subroutine needs no wrapper for Python and no entry in the cache, which saves a third of the
     compilation time.
     """
-    return register_jitable(**_OPTIONS)(function)  # type: ignore[no-any-return]
+    return register_jitable(**_OPTIONS)(function)
 
 
 def inlined_subroutine(function: Callable[P, R]) -> Callable[P, R]:
@@ -84,7 +86,7 @@ def inlined_subroutine(function: Callable[P, R]) -> Callable[P, R]:
 
     For small functions called in an inner loop: a loop that contains a call is not vectorised.
     """
-    return register_jitable(forceinline=True, **_OPTIONS)(function)  # type: ignore[no-any-return]
+    return register_jitable(forceinline=True, **_OPTIONS)(function)
 
 
 def own_array(array: FloatArray) -> FloatArray:
@@ -107,7 +109,7 @@ def _cache_folder() -> Path | None:
     for path in sorted(package.rglob("*.py")):
         digest.update(path.read_bytes())
     home = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA") or "~/.cache"
-    places = [numba.config.CACHE_DIR, package / "__pycache__", os.path.expanduser(home)]
+    places = [_CONFIG.CACHE_DIR, package / "__pycache__", os.path.expanduser(home)]
     for place in filter(None, places):
         folder = Path(place, install + digest.hexdigest()[:12])
         found = folder.is_dir()

@@ -19,6 +19,7 @@ coupled step.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -262,8 +263,8 @@ def log_scales_of(
 def solve_slender(
     gap: FloatArray,
     compliance: FloatArray,
-    bodies: IntArray | None,
-    shared: FloatArray | None,
+    bodies: Any,
+    shared: Any,
     loads: FloatArray,
     longitudinal_curvature: FloatArray,
     spacing: float,
