@@ -10,9 +10,9 @@ import pytest
 from ensemble_examples import some_outcome
 from layout_files import FOLDER, LAYOUTS, run_of_file, study_of_file
 
+from tests.results_compared import differences
 from wearsim.errors import ResultsFileError
 from wearsim.results import kind_of, read_dissipation, read_ensemble, read_results
-from wearsim.results.run.data import differences
 
 READERS = {
     "run": read_results,

@@ -16,9 +16,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from run_examples import some_run
 
+from tests.results_compared import differences
 from wearsim.errors import ResultsFileError
 from wearsim.results import read_results, write_results
-from wearsim.results.run.data import differences
 from wearsim.results.run.schema import AXES, VARIABLES
 
 TEXT = st.text(max_size=40)
@@ -41,7 +41,9 @@ def _error_of(path: Path) -> str:
     return message.removeprefix(f"{path}: ")
 
 
-@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 @given(
     lengths=st.fixed_dictionaries(
         {

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from tests.results_compared import differences
 from tests.rig_text import BODIES, RUBBING
 from wearsim.errors import Interrupted
 from wearsim.results import Result, RunData
-from wearsim.results.run.data import differences
 from wearsim.scenario import Scenario, parse_scenario
 from wearsim.studies.run import run as studies
 

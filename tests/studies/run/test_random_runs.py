@@ -5,6 +5,7 @@ import pytest
 
 import wearsim
 from tests.evolution import never
+from tests.results_compared import differences
 from tests.studies.random_examples import (
     CREEPAGE,
     FRICTION,
@@ -21,7 +22,6 @@ from wearsim.evolution.integrate import evolve
 from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.forward_euler import stability_limit
 from wearsim.results import open_results
-from wearsim.results.run.data import differences
 from wearsim.studies.run.assemble import assemble_problem
 from wearsim.studies.run.draws import draw
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
-import numpy.typing as npt
-
 from wearsim.results.content import Arrays, StudyData
 from wearsim.results.run.schema import RUN
 from wearsim.results.schema import Schema
@@ -58,41 +56,3 @@ class RunData(StudyData):
     def variables(self) -> Arrays:
         """Variables of all kinds by name."""
         return {**self.static, **self.history, **self.records}
-
-
-def differences(one: RunData, other: RunData) -> list[str]:
-    """Return the names of all fields and arrays in which two runs differ, bit for bit.
-
-    Parameters
-    ----------
-    one, other : RunData
-        The runs.
-
-    Returns
-    -------
-    list of str
-        Names such as "history.depth"; empty for identical runs.
-    """
-    names = [
-        name
-        for name in (*RunData.attribute_names(), "scenario_text", "files")
-        if getattr(one, name) != getattr(other, name)
-    ]
-    for kind in _ARRAYS:
-        first, second = getattr(one, kind), getattr(other, kind)
-        names += [
-            f"{kind}.{name}"
-            for name in sorted(first.keys() | second.keys())
-            if not _identical(first.get(name), second.get(name))
-        ]
-    return names
-
-
-def _identical(one: npt.NDArray[Any] | None, other: npt.NDArray[Any] | None) -> bool:
-    return (
-        one is not None
-        and other is not None
-        and one.dtype == other.dtype
-        and one.shape == other.shape
-        and one.tobytes() == other.tobytes()
-    )
