@@ -105,7 +105,7 @@ class Quantity:
         """
         number, unit = _split(value, self.expected)
         factor = conversion(unit, self.kind.unit, shown(value), self.expected)
-        return _within(self.bound, _si(number, factor), value, self.expected)
+        return _within(self.bound, _si(number, factor), lambda _: value, self.expected)
 
     def _read(self, value: Any, info: ValidationInfo) -> float:
         """Return a value in SI.
@@ -117,7 +117,7 @@ class Quantity:
         if numbers is not None and isinstance(value, numbers):
             number = value.get("si") if isinstance(value, dict) else value
             if isinstance(number, float):
-                return _within(self.bound, number, self.write(number), self.expected)
+                return _within(self.bound, number, self.write, self.expected)
         return self.parse(value)
 
     def write(self, value: float | None) -> str | None:
@@ -136,8 +136,13 @@ class Quantity:
         return {"type": "string", "pattern": _PATTERN, "examples": [self.kind.example]}
 
 
-def _within(bound: Bound, number: float, written: object, expected: str) -> float:
-    """Return a number if it is finite and within a bound; otherwise raise a QuantityError."""
+def _within(
+    bound: Bound, number: float, written: Callable[[float], object], expected: str
+) -> float:
+    """Return a number if it is finite and within a bound; otherwise raise a QuantityError.
+
+    `written` returns the value as it is written in a scenario.
+    """
     if number - number != 0.0:  # infinite or not a number
         what = "must be finite"
     elif bound == "positive" and number <= 0.0:
@@ -146,7 +151,7 @@ def _within(bound: Bound, number: float, written: object, expected: str) -> floa
         what = "must not be negative"
     else:
         return number
-    raise QuantityError(what, shown(written), expected)
+    raise QuantityError(what, shown(written(number)), expected)
 
 
 def quantity(text: str, unit: str) -> float:
@@ -258,7 +263,7 @@ class HostQuantity:
         }[self.bound] + (' or "inf"' if self.infinite else "")
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise QuantityError("is not a number", shown(value), expected)
-        return _within(self.bound, float(value), value, expected)
+        return _within(self.bound, float(value), lambda _: value, expected)
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
