@@ -35,8 +35,8 @@ print(json.dumps({{
 STRIP = """
 import json
 import wearsim
-from wearsim.mechanics.tangential.carter import mean_direction as kernel
-kernel(1e-3, 0.0, 2.0)
+from wearsim.mechanics.hertz.ellipse import hertz_ellipse as kernel
+kernel(45.0, 1.0, 300.0, 1.1e11)
 stats = kernel.stats
 print(json.dumps({"hits": sum(stats.cache_hits.values()), "path": stats.cache_path,
     "file": wearsim.__file__}))

@@ -49,6 +49,7 @@ from wearsim.mechanics.slender.newton_step import (
     number_strips,
     predict_surface,
     sum_unit_load,
+    update_loads,
 )
 from wearsim.types import FloatArray, IntArray
 
@@ -60,7 +61,6 @@ REUSED = 0.05  # relative change up to which the Jacobian may be reused
 SHRINKING = 0.2  # ratio of successive steps up to which it may be reused
 FIRST = 0.1  # assumed ratio of the second step to the first
 AT_BEST = 0.01  # least assumed ratio of successive steps, as the Jacobian is approximate
-MANIFOLD = 3.0  # ratio of new to old load of a strip up to which the Jacobian may be reused
 GAP_TOLERANCE = 1e-8  # of the approach
 MAX_ITERATIONS = 100
 CAUTIOUS = 12  # iterations after which the active set is changed cautiously
@@ -115,38 +115,6 @@ def start_contact(
     for i in range(n):
         line_load[k, i] = max(0.0, level - gap[k, i]) / (soft + compliance[k, i])
     approach[k] = level
-
-
-@subroutine
-def update_loads(line_load: FloatArray, state: NewtonState, cautious: bool) -> tuple[float, bool]:
-    """Add the step to the line loads and remove strips in tension from the active set.
-
-    A contact whose strips leave or change much is marked for a new Jacobian. Returns the greatest
-    change relative to the greatest line load, and whether strips left.
-    """
-    contacts, n = line_load.shape
-    change, left = 0.0, False
-    for k in range(contacts):
-        peak, greatest = 0.0, 0.0
-        for i in range(n):
-            state.change[k, i] = 0.0
-            peak = max(peak, line_load[k, i])
-        for row in range(state.size[k]):
-            i = state.place[k, row]
-            old = line_load[k, i]
-            new = old + state.step[k, row]
-            if not new > 0.0:
-                if np.isnan(new):
-                    return np.inf, left
-                # while cautious, the load of a strip is reduced before the strip is removed
-                new = 0.1 * old if cautious and old > 1e-6 * peak else 0.0
-                left = True
-            if new * MANIFOLD < old or new > MANIFOLD * old:
-                state.fresh[k] = True
-            greatest = max(greatest, abs(new - old))
-            line_load[k, i], state.change[k, i] = new, new - old
-        change = max(change, greatest / peak)
-    return change, left
 
 
 @subroutine

@@ -24,6 +24,7 @@ from wearsim.mechanics.slender.half_length import (
 from wearsim.mechanics.slender.influence import HIGHEST, read_influence, read_value, read_values
 from wearsim.types import BoolArray, FloatArray, IntArray
 
+MANIFOLD = 3.0  # ratio of new to old load of a strip up to which the Jacobian may be reused
 MAX_CORRECTED = 0.5  # relative change of a load up to which the residual is corrected
 
 
@@ -189,3 +190,35 @@ def predict_surface(k: int, surface: FloatArray, state: NewtonState) -> None:
         change = state.change[k, state.place[k, row]]
         for i in range(surface.shape[1]):
             surface[k, i] += change * state.outer[k, row, i]
+
+
+@subroutine
+def update_loads(line_load: FloatArray, state: NewtonState, cautious: bool) -> tuple[float, bool]:
+    """Add the step to the line loads and remove strips in tension from the active set.
+
+    A contact whose strips leave or change much is marked for a new Jacobian. Returns the greatest
+    change relative to the greatest line load, and whether strips left.
+    """
+    contacts, n = line_load.shape
+    change, left = 0.0, False
+    for k in range(contacts):
+        peak, greatest = 0.0, 0.0
+        for i in range(n):
+            state.change[k, i] = 0.0
+            peak = max(peak, line_load[k, i])
+        for row in range(state.size[k]):
+            i = state.place[k, row]
+            old = line_load[k, i]
+            new = old + state.step[k, row]
+            if not new > 0.0:
+                if np.isnan(new):
+                    return np.inf, left
+                # while cautious, the load of a strip is reduced before the strip is removed
+                new = 0.1 * old if cautious and old > 1e-6 * peak else 0.0
+                left = True
+            if new * MANIFOLD < old or new > MANIFOLD * old:
+                state.fresh[k] = True
+            greatest = max(greatest, abs(new - old))
+            line_load[k, i], state.change[k, i] = new, new - old
+        change = max(change, greatest / peak)
+    return change, left
