@@ -22,15 +22,23 @@ _CONTACT = "contact_"
 _AUXILIARY = ("coarse_step_solution", "half_quadrature_solution")
 #: axis of the realisations in the arrays of a `WearState`
 _AXES = {
+    "passes": 0,
     "cylinder_depth": 2,
     "roller_depth": 2,
     "terms": 2,
+    "energy": 0,
+    "depth_error": 0,
+    "volume_error": 0,
     "quadrature": 1,
     "scatter": 1,
+    "step": 0,
+    "steps": 0,
+    "rejected": 0,
+    "solves": 0,
+    "full_solves": 0,
     "loop_strips": 3,
     "loop_contacts": 3,
-    **dict.fromkeys(("passes", "energy", "depth_error", "volume_error", "decay"), 0),
-    **dict.fromkeys(("step", "steps", "rejected", "solves", "full_solves"), 0),
+    "decay": 0,
 }
 
 
