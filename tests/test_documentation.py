@@ -10,9 +10,9 @@ import pytest
 from typer.testing import CliRunner
 
 from wearsim.cli.app import app
-from wearsim.results.dissipation.schema import DISSIPATION
+from wearsim.results.dissipation import DISSIPATION
 from wearsim.results.ensemble.schema import ENSEMBLE
-from wearsim.results.run.schema import RUN
+from wearsim.results.run import RUN
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]

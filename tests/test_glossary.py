@@ -9,11 +9,11 @@ from typing import Any
 import pytest
 
 from wearsim import load_scenario, run
-from wearsim.report.text.labels import OBSERVABLES as LABELS
-from wearsim.report.text.labels import si_key
-from wearsim.results.dissipation.schema import VARIABLES as DISSIPATION
+from wearsim.report.text import OBSERVABLES as LABELS
+from wearsim.report.text import si_key
+from wearsim.results.dissipation import VARIABLES as DISSIPATION
 from wearsim.results.ensemble.schema import ENSEMBLE, STATISTICS
-from wearsim.results.run.schema import VARIABLES as RUN
+from wearsim.results.run import VARIABLES as RUN
 from wearsim.scenario import scenario_schema
 
 ROOT = Path(__file__).parents[1]

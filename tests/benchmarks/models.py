@@ -21,7 +21,7 @@ from tests.benchmarks.wear_tests import SCENARIOS
 from wearsim import load_scenario, run
 from wearsim.errors import WearsimError
 from wearsim.plugins.template import template_folder
-from wearsim.report.text.units import brief
+from wearsim.report.text import brief
 from wearsim_bench.contact.accuracy import (
     PowerErrors,
     WornErrors,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from wearsim.report.text.units import brief
+from wearsim.report.text import brief
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import pytest
 from cli_examples import Command
 
 import wearsim.cli.commands.check
-from wearsim.cli.verbs import BUILT_IN
+from wearsim.cli.app import BUILT_IN
 from wearsim.errors import CapabilityError, PluginError, ResultsFileError, SolverError
 
 VERBS = [

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from cli_examples import Command
 
-from wearsim.cli import verbs as installed_verbs
+from wearsim.cli import app as installed_verbs
 from wearsim.errors import CapabilityError, PluginError
 
 Install = Callable[..., str]
@@ -72,7 +72,6 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Install
 def nothing_installed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Hide the verbs that the environment of the tests has installed."""
     monkeypatch.setattr(installed_verbs, "installed_verbs", dict)
-    monkeypatch.setattr("wearsim.cli.errors.installed_verbs", dict)
 
 
 def help_lines(command: Command) -> dict[str, str]:

@@ -20,9 +20,9 @@ from wearsim.evolution.error_control.error_estimates import greatest_depth, tota
 from wearsim.evolution.error_control.step_size import StepControl
 from wearsim.evolution.observables import oscillation, worn_volume
 from wearsim.evolution.state import fresh_state
+from wearsim.evolution.steppers.forward_euler import decay_rates, stability_limit
 from wearsim.evolution.steppers.rkl2 import StabilisedStepper, stabilised_step
 from wearsim.evolution.steppers.single_step import cylinder_depth_of
-from wearsim.evolution.steppers.spectral_radius import decay_rates, stability_limit
 
 SPRING = {"load__kind": "spring", "load__stiffness": "20 kN/mm"}
 THERMAL = {"load.thermal": {"gain": "300 N/W", "time_constant": "3 min"}}

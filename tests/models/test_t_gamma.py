@@ -6,7 +6,7 @@ from pydantic import ValidationError
 
 from tests.evolution import built, stepped, worn
 from wearsim.evolution.steppers.per_pass import PerPassStepper
-from wearsim.models.wear.t_gamma import Regimes, TGamma, TGammaOptions
+from wearsim.models.wear import Regimes, TGamma, TGammaOptions
 from wearsim.types import ContactSolution
 
 SPEED = 2.0

@@ -26,11 +26,11 @@ from wearsim.plugins import (
     registry,
 )
 from wearsim.testing import loads, random_inputs
+from wearsim.testing.checks import ConfiguredSpec
 from wearsim.testing.contact_fixtures import ContactFixture
 from wearsim.testing.kit import CONTACT_MODEL
 from wearsim.testing.loads import LoadFixture
 from wearsim.testing.random_inputs import RandomInputFixture
-from wearsim.testing.specs import ConfiguredSpec
 from wearsim.testing.wear_laws import WEAR_LAW, WearLawFixture
 from wearsim.units import ANGLE, FORCE
 

@@ -17,9 +17,9 @@ import wearsim
 from wearsim.errors import ScenarioError
 from wearsim.plugins import LoadSpec, RandomInputSpec, WearLawSpec, hookspecs, registry
 from wearsim.testing import loads, random_inputs
+from wearsim.testing.checks import ConfiguredSpec
 from wearsim.testing.loads import LoadFixture
 from wearsim.testing.random_inputs import RandomInputFixture
-from wearsim.testing.specs import ConfiguredSpec
 from wearsim.testing.wear_laws import WEAR_LAW, WearLawFixture
 
 

@@ -15,9 +15,9 @@ from plugin_examples import Point, rig
 import wearsim
 from wearsim.plugins.template import clash, renamed, template_folder, write_plugin
 from wearsim.testing import contact_model_tests
+from wearsim.testing.checks import ConfiguredSpec
 from wearsim.testing.contact_fixtures import ContactFixture
 from wearsim.testing.kit import CONTACT_MODEL
-from wearsim.testing.specs import ConfiguredSpec
 
 FOLDER = template_folder()
 MODULE = FOLDER / "src" / "wearsim_template" / "__init__.py"

@@ -10,8 +10,8 @@ import pytest
 from tests.report.made_up_ensembles import made_up
 from tests.studies.study_examples import short
 from wearsim.report.figures.ensemble_comparison import MOST_POINTS, comparison_figure
-from wearsim.report.parts.saving import save_figure
-from wearsim.report.text.estimates import cells, part_with_interval, with_interval
+from wearsim.report.parts import save_figure
+from wearsim.report.text import cells, part_with_interval, with_interval
 from wearsim.studies.ensemble.compare import compare
 from wearsim.studies.run import run as study
 from wearsim.uq.estimation.intervals import UNKNOWN, Interval

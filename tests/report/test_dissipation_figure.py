@@ -10,7 +10,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from wearsim.report.figures.dissipation import CLASSES, MOST_LINES, dissipation_figure
-from wearsim.report.parts.saving import save_figure
+from wearsim.report.parts import save_figure
 from wearsim.results import DissipationResult
 from wearsim.scenario import load_scenario
 from wearsim.studies.contact.monte_carlo import dissipation

@@ -11,8 +11,7 @@ from matplotlib.colors import to_hex
 
 from tests.report.made_up_ensembles import INPUTS, made_up
 from wearsim.report.figures.ensemble import LINES, convergence_of, ensemble_figure
-from wearsim.report.parts.saving import save_figure
-from wearsim.report.parts.style import GREY
+from wearsim.report.parts import GREY, save_figure
 from wearsim.results import EnsembleResult
 from wearsim.uq.estimation.stopping_rule import Target
 

@@ -10,8 +10,7 @@ from matplotlib.figure import Figure
 from wearsim.errors import PluginError
 from wearsim.report.figures.contact import contact_figure
 from wearsim.report.figures.run import run_figure
-from wearsim.report.parts.measured_profiles import Measured
-from wearsim.report.parts.saving import save_figure
+from wearsim.report.parts import Measured, save_figure
 from wearsim.results import Result
 from wearsim.scenario import load_scenario
 from wearsim.studies.contact.single import ContactStudy, study_contact

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from wearsim.errors import ScenarioError
-from wearsim.report.parts.measured_profiles import read_measured
-from wearsim.report.parts.patch_size import patch_edges
-from wearsim.report.text.units import brief, count, lapse, shown
+from wearsim.report.parts import patch_edges, read_measured
+from wearsim.report.text import brief, count, lapse, shown
 
 
 @pytest.mark.parametrize(

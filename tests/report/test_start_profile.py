@@ -6,7 +6,7 @@ import pytest
 import wearsim
 from tests.evolution import SCENARIOS
 from wearsim.report.figures.run import _draw_profiles, run_figure
-from wearsim.report.text.units import shown
+from wearsim.report.text import shown
 
 
 class Lines:

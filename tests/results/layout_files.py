@@ -12,9 +12,9 @@ from run_examples import some_run
 from test_dissipation_files import some_study
 
 from wearsim.results import DissipationData, EnsembleFile, RunData, write_results
-from wearsim.results.dissipation.schema import DISSIPATION
+from wearsim.results.dissipation import DISSIPATION
 from wearsim.results.ensemble.schema import ENSEMBLE
-from wearsim.results.run.schema import RUN
+from wearsim.results.run import RUN
 
 FOLDER = Path(__file__).parent / "data"
 LAYOUTS = {

@@ -23,8 +23,7 @@ from wearsim.results import (
     read_dissipation,
     write_results,
 )
-from wearsim.results.dissipation.result import as_numbers, summaries
-from wearsim.results.dissipation.schema import VARIABLES, dissipation_schema
+from wearsim.results.dissipation import VARIABLES, as_numbers, dissipation_schema, summaries
 
 INPUTS = [{"key": "load.normal_force", "unit": "N"}, {"key": "friction.coefficient", "unit": "1"}]
 

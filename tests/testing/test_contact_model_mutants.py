@@ -7,9 +7,9 @@ from mutants import MUTANTS, Unmodified, spec_of
 
 from wearsim.plugins import Capabilities, Options
 from wearsim.testing import ConformanceError
+from wearsim.testing.checks import ConfiguredSpec
 from wearsim.testing.contact_fixtures import ContactFixture
 from wearsim.testing.kit import CONTACT_MODEL
-from wearsim.testing.specs import ConfiguredSpec
 
 PAIRS = [(name, model) for name, models in MUTANTS.items() for model in models]
 

@@ -8,8 +8,8 @@ import pytest
 from wearsim.models.loads import ThermalOptions, ThermalTerm
 from wearsim.plugins import Load, LoadSpec, Options, registry
 from wearsim.testing import ConformanceError, load_tests
+from wearsim.testing.checks import ConfiguredSpec
 from wearsim.testing.loads import BY_ROLE, LoadFixture
-from wearsim.testing.specs import ConfiguredSpec
 
 LOG = "time [min], load [N]\n0, 300\n5, 320\n7, 280\n60, 305\n"
 TESTED = {

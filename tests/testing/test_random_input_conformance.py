@@ -12,8 +12,8 @@ from wearsim.models.random.friction_fields import White, WhiteOptions
 from wearsim.models.random.processes import OrnsteinUhlenbeck, OrnsteinUhlenbeckOptions
 from wearsim.plugins import Distribution, Options, RandomInputSpec, registry
 from wearsim.testing import ConformanceError, random_input_tests
+from wearsim.testing.checks import ConfiguredSpec
 from wearsim.testing.random_inputs import BY_ROLE, RandomInputFixture
-from wearsim.testing.specs import ConfiguredSpec
 from wearsim.units import ANGLE, FORCE
 
 FILES = {"loads.csv": "value [N]\n280\n300\n300\n340\n", "table.csv":

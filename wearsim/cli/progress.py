@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, TypeAlias
 
 from wearsim.cli.output import console, note
-from wearsim.report.text.units import count, lapse, shown
+from wearsim.report.text import count, lapse, shown
 from wearsim.studies.run.events import Event, Finished, Started, Stepped, Warned
 
 if TYPE_CHECKING:
@@ -231,8 +231,7 @@ def progress_text(progress: EnsembleProgress, columns: float = math.inf) -> str:
 def _estimate(progress: EnsembleProgress) -> str:
     if progress.estimate is None or not math.isfinite(progress.estimate.value):
         return ""
-    from wearsim.report.text.estimates import with_interval
-    from wearsim.report.text.labels import OBSERVABLES
+    from wearsim.report.text import OBSERVABLES, with_interval
 
     unit = OBSERVABLES[progress.what.split(".", maxsplit=1)[0]].unit
     return f"{progress.what} {with_interval(progress.estimate, unit)}"

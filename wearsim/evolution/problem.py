@@ -18,8 +18,7 @@ from wearsim.evolution.batch.per_realisation import (
     sum_in_order,
     values_between,
 )
-from wearsim.evolution.contact_inputs import ContactInputs, Varying
-from wearsim.evolution.kinematics import Kinematics
+from wearsim.evolution.contact_inputs import ContactInputs, Kinematics, Varying
 from wearsim.plugins import BODIES, Body, ContactModel, Load, LoadTerm, WearLaw
 from wearsim.types import FloatArray, Grid, IntArray
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from wearsim.models import loads
+from wearsim.models import loads, wear
 from wearsim.models.contact import hertz as hertz_model
 from wearsim.models.contact import hertz_fastsim, semi_hertzian, slender
 from wearsim.models.random import distributions, friction_fields, processes
-from wearsim.models.wear import archard, t_gamma
 from wearsim.plugins import ContactModelSpec, LoadSpec, RandomInputSpec, WearLawSpec, hookimpl
 
 
@@ -21,7 +20,7 @@ def wearsim_contact_models() -> Iterable[ContactModelSpec]:
 @hookimpl
 def wearsim_wear_laws() -> Iterable[WearLawSpec]:
     """Yield the built-in wear laws."""
-    return (archard.SPEC, t_gamma.SPEC)
+    return wear.SPECS
 
 
 @hookimpl

@@ -8,14 +8,18 @@ from wearsim.plugins.capabilities import Capabilities, PassLoop
 from wearsim.plugins.contact_model import ContactModel, SingleContactModel, refuse_unclaimed
 from wearsim.plugins.hookspecs import hookimpl
 from wearsim.plugins.manager import registry
-from wearsim.plugins.protocols import BODIES, Body, Load, LoadTerm, WearLaw
-from wearsim.plugins.random_inputs import (
+from wearsim.plugins.protocols import (
+    BODIES,
+    Body,
     Distribution,
     Frame,
     FrictionField,
     JointDistribution,
+    Load,
+    LoadTerm,
     Process,
     Uniforms,
+    WearLaw,
 )
 from wearsim.plugins.shared_wear import SharedWear
 from wearsim.plugins.specs import (

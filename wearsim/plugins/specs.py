@@ -10,8 +10,15 @@ from pydantic import BaseModel, ConfigDict
 
 from wearsim.plugins.capabilities import Capabilities
 from wearsim.plugins.contact_model import ContactModel
-from wearsim.plugins.protocols import Load, LoadTerm, WearLaw
-from wearsim.plugins.random_inputs import Distribution, FrictionField, JointDistribution, Process
+from wearsim.plugins.protocols import (
+    Distribution,
+    FrictionField,
+    JointDistribution,
+    Load,
+    LoadTerm,
+    Process,
+    WearLaw,
+)
 from wearsim.types import Grid, Material
 
 Materials: TypeAlias = tuple[Material, Material]

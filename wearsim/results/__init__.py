@@ -1,18 +1,21 @@
 """The results: one HDF5 file per run or study, which opens after a kill at any moment."""
 
 from wearsim.results.csv_export import export_csv
-from wearsim.results.dissipation.data import DissipationData
-from wearsim.results.dissipation.result import DissipationResult, open_dissipation
+from wearsim.results.dissipation import DissipationData, DissipationResult
 from wearsim.results.ensemble.data import EnsembleData, Outcome
 from wearsim.results.ensemble.reader import read_ensemble
 from wearsim.results.ensemble.result import EnsembleResult, open_ensemble
 from wearsim.results.ensemble.writer import EnsembleFile
-from wearsim.results.io.atomic_write import DISK, Storage
 from wearsim.results.io.overwrite_guard import check_output, refuse_inputs, same_file
-from wearsim.results.io.reader import kind_of, read_dissipation, read_results
-from wearsim.results.io.writer import write_results
-from wearsim.results.run.data import RunData
-from wearsim.results.run.result import Result, open_results
+from wearsim.results.io.reader import (
+    kind_of,
+    open_dissipation,
+    open_results,
+    read_dissipation,
+    read_results,
+)
+from wearsim.results.io.writer import DISK, Storage, write_results
+from wearsim.results.run import Result, RunData
 
 __all__ = [
     "DISK",

@@ -1,12 +1,18 @@
-"""Content common to the results files of all studies, as plain values and arrays."""
+"""Content common to the results files of all studies, and properties common to their results."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
-from typing import Any, ClassVar
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
 import numpy as np
 import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from wearsim.scenario import Scenario
+
 
 Arrays = dict[str, npt.NDArray[Any]]
 
@@ -80,3 +86,63 @@ def as_plain(value: object) -> object:
     if isinstance(value, np.generic):
         return value.item()
     raise TypeError(f"{type(value).__name__} cannot be stored")
+
+
+Data = TypeVar("Data", bound=StudyData)
+
+
+@dataclass(frozen=True, eq=False)
+class StudyResult(Generic[Data]):
+    """Result of a study, finished or not.
+
+    Parameters
+    ----------
+    raw : RunData, DissipationData or EnsembleData
+        Content of the results file, with all axes.
+    path : Path, optional
+        The results file, if there is one.
+    """
+
+    raw: Data
+    path: Path | None = None
+
+    @cached_property
+    def scenario(self) -> Scenario:
+        """The scenario, parsed from the text and the files stored with the results."""
+        from wearsim.scenario import parse_scenario  # noqa: PLC0415  (reading results needs none)
+
+        return parse_scenario(
+            self.raw.scenario_text, self.raw.scenario_file, self.raw.files.__getitem__
+        )
+
+    @property
+    def title(self) -> str:
+        """Title of the scenario."""
+        return self.raw.title
+
+    @property
+    def model(self) -> str:
+        """Name of the contact model."""
+        return self.raw.model
+
+    @property
+    def described_model(self) -> str:
+        """The contact model with the options set in the scenario."""
+        from wearsim.scenario import described_model  # noqa: PLC0415  (slow to import)
+
+        return described_model(self.raw.model, self.raw.scenario_text)
+
+    @property
+    def finished(self) -> bool:
+        """Whether the study is complete."""
+        return self.raw.finished
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Remarks on the scenario."""
+        return tuple(self.raw.notes)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Remarks on the computation, such as limits of accuracy."""
+        return tuple(self.raw.warnings)

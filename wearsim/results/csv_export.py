@@ -14,16 +14,12 @@ import numpy.typing as npt
 
 from wearsim.errors import ResultsFileError
 from wearsim.results.content import ERRORS
-from wearsim.results.dissipation.data import DissipationData
-from wearsim.results.dissipation.result import DissipationResult
-from wearsim.results.dissipation.schema import dissipation_schema
+from wearsim.results.dissipation import DissipationData, DissipationResult, dissipation_schema
 from wearsim.results.ensemble.data import EnsembleData
 from wearsim.results.ensemble.result import EnsembleResult
 from wearsim.results.ensemble.schema import FAILED, OBSERVABLES, PENDING
-from wearsim.results.io.atomic_write import replacement
-from wearsim.results.run.data import RunData
-from wearsim.results.run.result import Result
-from wearsim.results.run.schema import AXES, VARIABLES
+from wearsim.results.io.writer import replacement
+from wearsim.results.run import AXES, VARIABLES, Result, RunData
 from wearsim.types import FloatArray
 from wearsim.units import engineers_unit
 

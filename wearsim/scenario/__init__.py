@@ -1,7 +1,6 @@
 """Scenarios: TOML with units, validated as a whole, immutable and in SI once read."""
 
-from wearsim.scenario.parse.overrides import parse_override
-from wearsim.scenario.parse.toml import load_scenario, parse_scenario
+from wearsim.scenario.parse.toml import load_scenario, parse_override, parse_scenario
 from wearsim.scenario.random.model import Persistence, RandomInput
 from wearsim.scenario.scenario import Drawn, Scenario, realise, require_run
 from wearsim.scenario.schema import scenario_schema

@@ -11,7 +11,7 @@ import numpy as np
 
 from wearsim.contact_batch import ContactBatch
 from wearsim.plugins import Capabilities, ContactModel, ContactModelSpec
-from wearsim.testing.specs import Fixture
+from wearsim.testing.checks import Fixture
 from wearsim.types import (
     ContactSolution,
     Creepage,

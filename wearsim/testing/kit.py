@@ -8,14 +8,13 @@ from typing import TypeVar
 
 from wearsim.plugins import ContactModelSpec, LoadSpec, RandomInputSpec, WearLawSpec
 from wearsim.testing import loads, random_inputs
-from wearsim.testing.checks import Check, Checks
+from wearsim.testing.checks import Check, Checks, ConfiguredSpec, resolve, spec_checks
 from wearsim.testing.contact_balances import BALANCES
 from wearsim.testing.contact_behaviour import BEHAVIOUR
 from wearsim.testing.contact_capabilities import CAPABILITIES
 from wearsim.testing.contact_fixtures import ContactCase, ContactFixture
 from wearsim.testing.loads import LoadFixture
 from wearsim.testing.random_inputs import RandomInputFixture
-from wearsim.testing.specs import ConfiguredSpec, resolve, spec_checks
 from wearsim.testing.wear_laws import WEAR_LAW, WearLawFixture
 from wearsim.units import Kind
 

@@ -9,8 +9,15 @@ from functools import cached_property, partial
 import numpy as np
 
 from wearsim.plugins import Load, LoadSpec, LoadTerm
-from wearsim.testing.checks import Checks, agree, require, require_repeatable, require_values
-from wearsim.testing.specs import Fixture, spec_checks
+from wearsim.testing.checks import (
+    Checks,
+    Fixture,
+    agree,
+    require,
+    require_repeatable,
+    require_values,
+    spec_checks,
+)
 from wearsim.types import FloatArray
 
 _SAMPLES = 200_000

@@ -16,8 +16,16 @@ from wearsim.plugins import (
     RandomInputSpec,
     Uniforms,
 )
-from wearsim.testing.checks import Checks, agree, require, require_repeatable, require_values
-from wearsim.testing.specs import ConfiguredSpec, Fixture, spec_checks
+from wearsim.testing.checks import (
+    Checks,
+    ConfiguredSpec,
+    Fixture,
+    agree,
+    require,
+    require_repeatable,
+    require_values,
+    spec_checks,
+)
 from wearsim.types import FloatArray
 from wearsim.uq.sampling.philox import Stream
 

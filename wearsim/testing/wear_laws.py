@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wearsim.plugins import BODIES, Body, WearLaw, WearLawSpec
-from wearsim.testing.checks import Checks, agree, require, require_values
-from wearsim.testing.specs import Fixture, spec_checks
+from wearsim.testing.checks import Checks, Fixture, agree, require, require_values, spec_checks
 from wearsim.types import ContactSolution, FloatArray, Grid
 
 _SPEED = 2.618

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wearsim.report.parts.saving import save_figure
+from wearsim.report.parts import save_figure
 from wearsim_bench.figures import table as bench_table
 from wearsim_bench.figures.table import (
     column_heads,

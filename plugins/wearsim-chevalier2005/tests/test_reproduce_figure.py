@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
-from wearsim.report.parts.style import RED
+from wearsim.report.parts import RED
 from wearsim_chevalier2005.figure_panels import normal, smoothed
 from wearsim_chevalier2005.figures import reproduction_figure
 from wearsim_chevalier2005.study import Reproduction, reproduce

@@ -67,7 +67,7 @@ def _open(file: Path) -> Result | EnsembleResult:
 
     result = open_any(file)
     if isinstance(result, DissipationResult):
-        from wearsim.results.dissipation.schema import DISSIPATION
+        from wearsim.results.dissipation import DISSIPATION
 
         raise ResultsFileError(
             f"{file}: holds {DISSIPATION.holds}; only runs and ensembles can be compared"

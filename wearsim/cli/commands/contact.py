@@ -54,13 +54,13 @@ def contact(
     if json:
         write_json(_data(loaded, study, notes, figure))
     else:
-        from wearsim.cli.render.run_footer import contact_line
+        from wearsim.cli.render.summary import contact_line
 
         write_table(loaded.title, _rows(study))
         typer.echo(contact_line(study))
     if figure is not None:
         from wearsim.report.figures.contact import contact_figure
-        from wearsim.report.parts.saving import save_figure
+        from wearsim.report.parts import save_figure
 
         save_figure(contact_figure(study, loaded.title), figure)
     if not json:
@@ -93,8 +93,8 @@ def _rows(study: ContactStudy) -> list[tuple[str, str]]:
     """Return the numbers of a contact in engineering units."""
     import numpy as np
 
-    from wearsim.report.parts.patch_size import patch_edges
-    from wearsim.report.text.units import NOTHING, shown
+    from wearsim.report.parts import patch_edges
+    from wearsim.report.text import NOTHING, shown
 
     point, solution = study.point, study.solution
     edges = patch_edges(solution.y, solution.half_length)
@@ -125,7 +125,7 @@ def _data(
     scenario: Scenario, study: ContactStudy, notes: list[str], figure: Path | None
 ) -> dict[str, Any]:
     """Return the contact and its strips in SI units."""
-    from wearsim.report.parts.patch_size import patch_edges
+    from wearsim.report.parts import patch_edges
 
     point, solution = study.point, study.solution
     edges = patch_edges(solution.y, solution.half_length)

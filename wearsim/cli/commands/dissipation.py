@@ -60,7 +60,7 @@ def dissipation(
     refuse_same_file(figure, path, loaded.paths)
     from wearsim.cli.progress import counting
     from wearsim.cli.render.dissipation_table import as_json, write_spread
-    from wearsim.cli.render.run_footer import dissipation_line
+    from wearsim.cli.render.summary import dissipation_line
     from wearsim.cli.signals import stop_on_signals
     from wearsim.studies.contact.monte_carlo import dissipation as study
 

@@ -161,7 +161,7 @@ def report(result: EnsembleResult, json: bool, figure: Path | None, workers: str
         If all realisations failed.
     """
     from wearsim.cli.render.ensemble_table import as_json, write_ensemble
-    from wearsim.cli.render.run_footer import ensemble_line
+    from wearsim.cli.render.summary import ensemble_line
     from wearsim.studies.execution.processes import InProcess
 
     if workers == InProcess.describe:

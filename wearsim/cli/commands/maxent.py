@@ -61,7 +61,7 @@ def maxent(
         raise Infeasible(re.sub(r"\bmean_log\b", "--mean-log", str(error))) from error
     if figure is not None:
         from wearsim.report.figures.maxent import maxent_figure
-        from wearsim.report.parts.saving import save_figure
+        from wearsim.report.parts import save_figure
 
         save_figure(maxent_figure(distribution), figure)
     if json:
@@ -85,7 +85,7 @@ def _limit(text: str) -> float:
 
 
 def _rows(distribution: MaxentDistribution) -> list[tuple[str, str]]:
-    from wearsim.report.text.maxent_numbers import multipliers, parent, value
+    from wearsim.report.text import multipliers, parent, value
 
     found = parent(distribution)
     return [
@@ -109,7 +109,7 @@ def _rows(distribution: MaxentDistribution) -> list[tuple[str, str]]:
 def _quantiles(distribution: MaxentDistribution) -> dict[float, float]:
     import numpy as np
 
-    from wearsim.report.text.maxent_numbers import value
+    from wearsim.report.text import value
 
     values = distribution.quantile(np.array(PROBABILITIES)).tolist()
     return {p: value(distribution, item) for p, item in zip(PROBABILITIES, values, strict=True)}
@@ -133,7 +133,7 @@ def _plot(distribution: MaxentDistribution) -> list[str]:
 
 def _data(distribution: MaxentDistribution, figure: Path | None) -> dict[str, Any]:
     """Return the distribution in the units of the given moments."""
-    from wearsim.report.text.maxent_numbers import multipliers, parent, value
+    from wearsim.report.text import multipliers, parent, value
 
     found = parent(distribution)
     return {

@@ -12,7 +12,7 @@ from wearsim.cli.arguments import Figure, Force, ResultsFile, check_figure, open
 from wearsim.cli.output import note
 
 if TYPE_CHECKING:
-    from wearsim.report.parts.measured_profiles import Measured
+    from wearsim.report.parts import Measured
     from wearsim.results import DissipationResult, EnsembleResult, Result
 
 MeasuredFiles = Annotated[
@@ -33,7 +33,7 @@ def plot(
     """Draw the figure of a results file of any kind."""
     path = figure if figure is not None else Path(f"{file.stem}.png")
     check_figure(path, force)
-    from wearsim.report.parts.measured_profiles import read_measured
+    from wearsim.report.parts import read_measured
     from wearsim.results import Result, refuse_inputs
 
     refuse_inputs(path, [file], "the figure")
@@ -62,7 +62,7 @@ def draw(
     measured : sequence of Measured
         Profiles drawn over those of a run.
     """
-    from wearsim.report.parts.saving import save_figure
+    from wearsim.report.parts import save_figure
     from wearsim.results import DissipationResult, EnsembleResult
 
     if isinstance(result, EnsembleResult):

@@ -47,8 +47,7 @@ def run(
 
 def report(result: Result, json: bool) -> None:
     """Write the summary of a run to stdout."""
-    from wearsim.cli.render.run_footer import run_line
-    from wearsim.cli.render.summary import as_json, draws, effort, end_state, standing
+    from wearsim.cli.render.summary import as_json, draws, effort, end_state, run_line, standing
 
     if json:
         write_json(as_json(result))

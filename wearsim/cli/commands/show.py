@@ -53,7 +53,7 @@ def _sources(raw: StudyData) -> list[tuple[str, str]]:
 def _contents(result: Result) -> list[tuple[str, str]]:
     """Return rows on how a run was computed."""
     from wearsim.cli.render.summary import draws, effort, standing
-    from wearsim.report.text.units import count
+    from wearsim.report.text import count
 
     first, last = (count(float(result.record_passes[place])) for place in (0, -1))
     return [

@@ -9,10 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from wearsim.cli.output import note, write_json, write_list, write_notes, write_table
 from wearsim.cli.render.ensemble_table import INTERVAL
-from wearsim.report.text.comparison_words import against, kind, length
-from wearsim.report.text.estimates import cells
-from wearsim.report.text.labels import OBSERVABLES, si_key
-from wearsim.report.text.units import NOTHING, count
+from wearsim.report.text import NOTHING, OBSERVABLES, against, cells, count, kind, length, si_key
 
 if TYPE_CHECKING:
     from wearsim.results import EnsembleResult, Result
@@ -51,7 +48,7 @@ def report_comparison(
     suffix = f"for values of {key}" if key else ""
     if figure is not None:
         from wearsim.report.figures.ensemble_comparison import comparison_figure
-        from wearsim.report.parts.saving import save_figure
+        from wearsim.report.parts import save_figure
 
         titles = {result.title for result in results}
         shared = titles.pop() if len(titles) == 1 else ""

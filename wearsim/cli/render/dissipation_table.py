@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from wearsim.cli.output import write_list, write_table
 from wearsim.cli.render.summary import CONSTANT, Rows, input_data, input_rows, still_random
-from wearsim.report.text.labels import Named
-from wearsim.report.text.units import NOTHING, count, in_unit, lapse, shown
+from wearsim.report.text import NOTHING, Named, count, in_unit, lapse, shown
 from wearsim.uq.estimation.moments import is_constant
 
 if TYPE_CHECKING:

@@ -10,9 +10,18 @@ import typer
 
 from wearsim.cli.output import note, write_list, write_table
 from wearsim.cli.render.summary import CONSTANT, Rows, input_data, input_rows, still_random
-from wearsim.report.text.estimates import TOO_FEW_REALISATIONS, cells, part_with_interval, too_few
-from wearsim.report.text.labels import OBSERVABLES, si_key
-from wearsim.report.text.units import NOTHING, count, lapse, shown
+from wearsim.report.text import (
+    NOTHING,
+    OBSERVABLES,
+    TOO_FEW_REALISATIONS,
+    cells,
+    count,
+    lapse,
+    part_with_interval,
+    shown,
+    si_key,
+    too_few,
+)
 from wearsim.uq.estimation.stopping_rule import Target
 
 if TYPE_CHECKING:

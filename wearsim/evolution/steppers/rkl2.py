@@ -14,6 +14,7 @@ from wearsim.evolution.error_control.step_doubling import StepDoublingStepper
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.base import Step
+from wearsim.evolution.steppers.forward_euler import decay_rates
 from wearsim.evolution.steppers.single_step import (
     contacts_at,
     mean_loads,
@@ -21,7 +22,6 @@ from wearsim.evolution.steppers.single_step import (
     solve_present,
     worn_state,
 )
-from wearsim.evolution.steppers.spectral_radius import decay_rates
 from wearsim.evolution.steppers.wear_increment import WearIncrement
 from wearsim.types import FloatArray
 

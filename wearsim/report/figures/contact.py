@@ -9,9 +9,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from wearsim.report.parts.patch_size import patch_edges, patches
-from wearsim.report.parts.style import BLUE, ORANGE, PRESSURE, name_axes, titled_figure
-from wearsim.report.text.units import PER_SI, shown
+from wearsim.report.parts import (
+    BLUE,
+    ORANGE,
+    PRESSURE,
+    name_axes,
+    patch_edges,
+    patches,
+    titled_figure,
+)
+from wearsim.report.text import PER_SI, shown
 from wearsim.studies.contact.single import ContactStudy
 from wearsim.types import ContactFields, ContactSolution, FloatArray, IntArray
 

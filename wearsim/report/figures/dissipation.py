@@ -9,17 +9,17 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from wearsim.report.parts.convergence import draw_convergence
-from wearsim.report.parts.style import (
+from wearsim.report.parts import (
     BLUE,
     GREEN,
     GREY,
     ORANGE,
+    draw_convergence,
     name_axes,
     titled_figure,
     write_message,
 )
-from wearsim.report.text.units import PER_SI, in_unit, number_of_realisations, shown
+from wearsim.report.text import PER_SI, in_unit, number_of_realisations, shown
 from wearsim.results import DissipationResult
 
 MM, W_MM = PER_SI["mm"], PER_SI["W/mm"]

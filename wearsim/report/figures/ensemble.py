@@ -8,25 +8,30 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from wearsim.report.parts.convergence import draw_convergence
-from wearsim.report.parts.style import (
+from wearsim.report.parts import (
     BLUE,
     GREEN,
     GREY,
     ORANGE,
+    draw_convergence,
     name_axes,
     set_depth_axes,
     titled_figure,
     write_message,
 )
-from wearsim.report.text.estimates import (
+from wearsim.report.text import (
     NINETY_PERCENT,
+    OBSERVABLES,
+    PER_SI,
     TOO_FEW_REALISATIONS,
+    count,
+    in_unit,
+    number_of_realisations,
+    shown,
+    statistic_in_words,
     sufficient_for,
     too_few,
 )
-from wearsim.report.text.labels import OBSERVABLES, statistic_in_words
-from wearsim.report.text.units import PER_SI, count, in_unit, number_of_realisations, shown
 from wearsim.results import EnsembleResult
 from wearsim.results.ensemble.result import Effect
 from wearsim.results.ensemble.schema import PENDING

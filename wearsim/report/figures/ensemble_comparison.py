@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
-from wearsim.report.parts.style import (
+from wearsim.report.parts import (
     BLUE,
     GREEN,
     ORANGE,
@@ -20,9 +20,7 @@ from wearsim.report.parts.style import (
     name_axes,
     titled_figure,
 )
-from wearsim.report.text.comparison_words import against, realisations
-from wearsim.report.text.estimates import sufficient_for
-from wearsim.report.text.labels import OBSERVABLES, Named
+from wearsim.report.text import OBSERVABLES, Named, against, realisations, sufficient_for
 from wearsim.studies.ensemble.compare import Compared, Comparison
 
 COLOURS = (BLUE, ORANGE, GREEN, RED)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from wearsim.report.parts.style import BLUE, GREY, ORANGE, name_axes, titled_figure
-from wearsim.report.text.maxent_numbers import multipliers, parent, value
+from wearsim.report.parts import BLUE, GREY, ORANGE, name_axes, titled_figure
+from wearsim.report.text import multipliers, parent, value
 from wearsim.uq.distributions.base import MaxentDistribution
 
 _POINTS = 1001

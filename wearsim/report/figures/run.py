@@ -12,20 +12,20 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
 from wearsim.errors import WearsimError
-from wearsim.report.parts.measured_profiles import Measured
-from wearsim.report.parts.style import (
+from wearsim.report.parts import (
     BLUE,
     GREEN,
     GREY,
     ORANGE,
     RECORDS,
     RED,
+    Measured,
     evenly_spaced,
     name_axes,
     set_depth_axes,
     titled_figure,
 )
-from wearsim.report.text.units import PER_SI, count, pass_unit, shown
+from wearsim.report.text import PER_SI, count, pass_unit, shown
 from wearsim.results import Result
 from wearsim.types import FloatArray, IntArray
 

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from wearsim.results.content import StudyResult
 from wearsim.results.ensemble.data import EnsembleData
 from wearsim.results.ensemble.reader import read_ensemble
 from wearsim.results.ensemble.schema import DONE, OBSERVABLES, QUANTILES, kept_profiles
-from wearsim.results.study_result import StudyResult
 from wearsim.types import FloatArray, IntArray
 from wearsim.uq.estimation.estimates import Design, Estimate, estimate
 from wearsim.uq.estimation.intervals import Interval

@@ -20,11 +20,14 @@ from wearsim.results.content import (
     Arrays,
     StudyData,
 )
-from wearsim.results.dissipation.data import DissipationData
-from wearsim.results.dissipation.schema import DISSIPATION, dissipation_schema
+from wearsim.results.dissipation import (
+    DISSIPATION,
+    DissipationData,
+    DissipationResult,
+    dissipation_schema,
+)
 from wearsim.results.ensemble.schema import ENSEMBLE
-from wearsim.results.run.data import RunData
-from wearsim.results.run.schema import RUN
+from wearsim.results.run import RUN, Result, RunData
 from wearsim.results.schema import Schema, axis_lengths
 
 if TYPE_CHECKING:
@@ -244,3 +247,28 @@ def check_complete(path: str | Path, present: Container[str], names: Iterable[st
     missing = [name for name in names if name not in present]
     if missing:
         raise ResultsFileError(f"{path}: is damaged (lacks {', '.join(missing)})")
+
+
+def open_results(path: str | Path) -> Result:
+    """Open a results file.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+
+    Returns
+    -------
+    Result
+
+    Raises
+    ------
+    ResultsFileError
+        If it is missing, foreign, truncated, damaged, or of another layout.
+    """
+    return Result(read_results(path), Path(path))
+
+
+def open_dissipation(path: str | Path) -> DissipationResult:
+    """Open the file of a dissipation study; see `open_results`."""
+    return DissipationResult(read_dissipation(path), Path(path))

@@ -11,7 +11,7 @@ import numpy as np
 
 from wearsim.errors import Interrupted, ScenarioError, SolverError
 from wearsim.results import DissipationData, DissipationResult, check_output, write_results
-from wearsim.results.dissipation.result import BAND, as_numbers, summaries
+from wearsim.results.dissipation import BAND, as_numbers, summaries
 from wearsim.scenario import Scenario
 from wearsim.studies.contact.batch import Realisations
 from wearsim.studies.limits import checked_count, nothing_random

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wearsim.evolution.batch.bisect_failures import bisect_failures
 from wearsim.evolution.batch.join import can_step_together, compatible, joined_problem
 from wearsim.evolution.batch.per_realisation import sum_in_order
-from wearsim.evolution.integrate import Advance, Evolution
+from wearsim.evolution.integrate import Advance, Evolution, bisect_failures
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, fresh_state
 from wearsim.evolution.steppers.base import Stepper

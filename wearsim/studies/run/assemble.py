@@ -8,10 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from wearsim.errors import CapabilityError, Mistake, ScenarioError
-from wearsim.evolution.contact_inputs import ContactInputs
+from wearsim.evolution.contact_inputs import ContactInputs, Kinematics
 from wearsim.evolution.error_control.error_estimates import half_quadrature, total_worn_volume
 from wearsim.evolution.error_control.step_size import StepControl
-from wearsim.evolution.kinematics import Kinematics
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.backward_euler import ImplicitStepper

@@ -26,7 +26,7 @@ from wearsim.evolution.steppers.single_step import (
     present_loads,
     solve_present,
 )
-from wearsim.results.run.schema import VARIABLES
+from wearsim.results.run import VARIABLES
 from wearsim.scenario import Scenario
 from wearsim.scenario.tables.plain import DEFAULT_RECORDS
 from wearsim.types import FloatArray

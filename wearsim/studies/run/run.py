@@ -24,7 +24,7 @@ from wearsim.results import (
     read_results,
     write_results,
 )
-from wearsim.results.run.schema import VARIABLES
+from wearsim.results.run import VARIABLES
 from wearsim.scenario import Scenario, parse_scenario
 from wearsim.studies.run.assemble import assemble_problem, start_height
 from wearsim.studies.run.draws import Draws, draw, drawn_values

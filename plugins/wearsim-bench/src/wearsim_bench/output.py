@@ -62,7 +62,7 @@ class Output:
 
     def topic(self, topic: Topic) -> None:
         """Write the measurements of a topic."""
-        from wearsim.report.parts.saving import save_figure
+        from wearsim.report.parts import save_figure
         from wearsim_bench.figures.table import markdown
         from wearsim_bench.figures.topic import bench_figure
 
@@ -108,7 +108,7 @@ class Output:
         self._write_text(f"{name}.json", text + "\n")
 
     def _write_text(self, name: str, text: str) -> None:
-        from wearsim.report.parts.saving import save_text
+        from wearsim.report.parts import save_text
 
         path = self.folder / name
         save_text(text, path)

@@ -67,7 +67,7 @@ def reproduce(
 
 
 def _draw(results: Reproduction, path: Path) -> None:
-    from wearsim.report.parts.saving import save_figure
+    from wearsim.report.parts import save_figure
     from wearsim_chevalier2005.figures import reproduction_figure
 
     save_figure(reproduction_figure(results), path)
@@ -80,7 +80,7 @@ def _write(results: Reproduction, rows: tuple[Row, ...]) -> None:
     from rich import box
     from rich.table import Table
 
-    from wearsim.report.text.units import count
+    from wearsim.report.text import count
     from wearsim_chevalier2005.paper import REFERENCE
 
     screen = console()
@@ -111,7 +111,7 @@ def _with_unit(numbers: str, unit: str) -> str:
 
 def _as_printed(row: Row) -> str:
     """Return the printed value with the printed digits."""
-    from wearsim.report.text.units import PER_SI
+    from wearsim.report.text import PER_SI
 
     factor = PER_SI.get(row.unit, 1.0)
     numbers = (f"{value * factor:.10g}" for value in _ends(row.paper if row.paper else 0.0))
@@ -130,7 +130,7 @@ def _computed(row: Row) -> str:
 
 def _shown(value: float, unit: str, digits: int) -> str:
     """Return a number converted to a unit, without the unit."""
-    from wearsim.report.text.units import PER_SI, in_unit
+    from wearsim.report.text import PER_SI, in_unit
 
     return in_unit(value, unit if unit in PER_SI else "1", digits)
 

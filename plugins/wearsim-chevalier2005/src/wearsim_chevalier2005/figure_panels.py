@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from matplotlib.axes import Axes
 
-from wearsim.report.parts.style import BLUE, GREEN, ORANGE, RED, name_axes
-from wearsim.report.text.units import PER_SI
+from wearsim.report.parts import BLUE, GREEN, ORANGE, RED, name_axes
+from wearsim.report.text import PER_SI
 from wearsim.studies.run.inputs import LOAD, TILT, YAW
 from wearsim.types import FloatArray
 from wearsim_chevalier2005 import paper

@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from wearsim.report.figures.contact import SLIDE, STICK
-from wearsim.report.parts.style import (
+from wearsim.report.parts import (
     BLUE,
     GREEN,
     GREY,
@@ -26,7 +26,7 @@ from wearsim.report.parts.style import (
     figure_style,
     name_axes,
 )
-from wearsim.report.text.units import PER_SI, count, shown
+from wearsim.report.text import PER_SI, count, shown
 from wearsim.types import FloatArray
 from wearsim_chevalier2005 import figure_panels as spread
 from wearsim_chevalier2005 import paper

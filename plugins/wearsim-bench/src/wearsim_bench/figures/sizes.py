@@ -10,7 +10,7 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from wearsim.report.parts.style import BLUE, GREEN, ORANGE, figure_style, name_axes
+from wearsim.report.parts import BLUE, GREEN, ORANGE, figure_style, name_axes
 from wearsim_bench.measure.measurement import Measurement, Topic
 
 _NUMBER = re.compile(r"\d[\d.]*(?:e[+-]?\d+)?")

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
-from wearsim.report.parts.style import GREY, figure_style, name_axes, write_message
+from wearsim.report.parts import GREY, figure_style, name_axes, write_message
 from wearsim_bench.figures.sizes import growth_figure, savings_figure
 from wearsim_bench.figures.table import measured_on
 from wearsim_bench.measure.machine import Machine

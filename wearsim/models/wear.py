@@ -1,4 +1,4 @@
-"""The wear law `t-gamma`: three wear regimes by dissipated energy per contact area."""
+"""Built-in wear laws: archard-dissipation and t-gamma."""
 
 from __future__ import annotations
 
@@ -10,12 +10,49 @@ from pydantic import Field, model_validator
 from wearsim.plugins import Body, Options, WearLaw, WearLawSpec
 from wearsim.quantities import (
     NonNegativeMassPerEnergy,
+    NonNegativeWearFactor,
     PositiveDensity,
     PositiveMassPerEnergy,
     Quantity,
 )
 from wearsim.types import ContactSolution, FloatArray
 from wearsim.units import Kind, QuantityError
+
+
+class BodyWear(Options):
+    """Wear factor of one body."""
+
+    k_over_h: NonNegativeWearFactor = Field(
+        description="wear factor K/H, volume per dissipated energy, e.g. '1.1e-11 1/Pa'"
+    )
+
+
+class ArchardOptions(Options):
+    """Options of the wear law `archard-dissipation`."""
+
+    cylinder: BodyWear = Field(description="wear factor of the cylinder")
+    roller: BodyWear = Field(description="wear factor of each roller; '0 1/Pa' for no wear")
+
+
+class ArchardDissipation(WearLaw):
+    """Depth per pass K/(H V) P_l(y) (eq. 4 of the paper, DOI 10.1016/j.wear.2004.11.012)."""
+
+    def __init__(self, options: ArchardOptions) -> None:
+        self._wear_factor = {
+            "cylinder": options.cylinder.k_over_h,
+            "roller": options.roller.k_over_h,
+        }
+
+    def depth_per_pass(
+        self, body: Body, solution: ContactSolution, rolling_speed: float
+    ) -> FloatArray:
+        """Return the depth worn off `body` in one pass, shape (strips,) [m]."""
+        return self.depth_per_dissipation(body, rolling_speed) * solution.dissipation
+
+    def depth_per_dissipation(self, body: Body, rolling_speed: float) -> float:
+        """Return K/(H V), depth per pass over dissipation [m/(W/m)]."""
+        return self._wear_factor[body] / rolling_speed
+
 
 RATE = Quantity(
     Kind("a mass per rolled distance and contact area", "kg/m^3", "55 ug/(m mm^2)"), "positive"
@@ -107,14 +144,27 @@ class TGamma(WearLaw):
         return np.where(touching, length * regimes.rate(index) / regimes.density, 0.0)
 
 
-SPEC = WearLawSpec(
-    name="t-gamma",
-    factory=TGamma,
-    options=TGammaOptions,
-    summary="mild, severe and catastrophic wear by dissipated energy per contact area",
-    references=(
-        "Lewis, Dwyer-Joyce, Proc. IMechE J 218 (2004), DOI 10.1243/1350650042794815",
-        "Braghin, Lewis, Dwyer-Joyce, Bruni, Wear 261 (2006), DOI 10.1016/j.wear.2006.03.025",
+SPECS = (
+    WearLawSpec(
+        name="archard-dissipation",
+        factory=ArchardDissipation,
+        options=ArchardOptions,
+        summary="wear proportional to the dissipated energy, strip by strip",
+        references=(
+            "Archard, J. Appl. Phys. 24 (1953), DOI 10.1063/1.1721448",
+            "Chevalier, Cloupet, Soize, Wear 258 (2005), DOI 10.1016/j.wear.2004.11.012",
+        ),
+        protocol=2,
     ),
-    protocol=2,
+    WearLawSpec(
+        name="t-gamma",
+        factory=TGamma,
+        options=TGammaOptions,
+        summary="mild, severe and catastrophic wear by dissipated energy per contact area",
+        references=(
+            "Lewis, Dwyer-Joyce, Proc. IMechE J 218 (2004), DOI 10.1243/1350650042794815",
+            "Braghin, Lewis, Dwyer-Joyce, Bruni, Wear 261 (2006), DOI 10.1016/j.wear.2006.03.025",
+        ),
+        protocol=2,
+    ),
 )

@@ -1,19 +1,174 @@
-"""Result of a run, in SI."""
+"""Results of one wear test: schema of the file, its content, and the result in SI."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, TypeAlias
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from wearsim.results.io.reader import read_results
-from wearsim.results.run.data import RunData
-from wearsim.results.run.schema import VARIABLES
-from wearsim.results.study_result import StudyResult
+from wearsim.results.content import Arrays, StudyData, StudyResult
+from wearsim.results.schema import Axis, Schema, Variable, by_name
 from wearsim.types import FloatArray
+
+# every axis except y, whose coordinate is a variable
+AXES: Mapping[str, Axis] = by_name(
+    (
+        Axis("step", "row of the history; row 0 is the start of the run", 0),
+        Axis("record", "record of profiles and contacts"),
+        Axis("station", "station around the cylinder"),
+        Axis("roller", "roller; identical rollers are merged"),
+        Axis("realisation", "realisation of the random inputs"),
+    )
+)
+
+_UNWORN = ("station", "roller", "realisation", "y")
+_STEP = ("step",)
+_TEST = ("step", "realisation")
+_ROLLER = ("step", "roller", "realisation")
+_CYLINDER_PROFILE = ("record", "station", "realisation", "y")
+_ROLLER_PROFILE = ("record", "roller", "realisation", "y")
+_CONTACT = ("record", "station", "roller", "realisation", "y")
+
+VARIABLES: Mapping[str, Variable] = by_name(
+    (
+        Variable("y", ("y",), "m", "axial position", "static"),
+        Variable("nominal_gap", _UNWORN, "m", "gap before wear", "static"),
+        Variable(
+            "start_height",
+            ("y",),
+            "m",
+            "height of the cylinder above its nominal shape at the start of the run",
+            "static",
+        ),
+        Variable(
+            "multiplicity", ("roller",), "1", "physical rollers per computed roller", "static"
+        ),
+        Variable("passes", _STEP, "1", "roller passes, all rollers together", "history"),
+        Variable("time", _STEP, "s", "simulated time", "history"),
+        Variable("step_passes", _STEP, "1", "roller passes of the step", "history"),
+        Variable(
+            "depth",
+            _TEST,
+            "m",
+            "greatest depth of the cylinder worn since the start of the run",
+            "history",
+        ),
+        Variable("width", _TEST, "m", "width of the groove in the cylinder", "history"),
+        Variable("worn_volume", _TEST, "m^3", "worn volume of the cylinder", "history"),
+        Variable(
+            "roller_depth",
+            _ROLLER,
+            "m",
+            "greatest depth of a roller worn since the start of the run",
+            "history",
+        ),
+        Variable(
+            "roller_worn_volume", _ROLLER, "m^3", "worn volume of one physical roller", "history"
+        ),
+        Variable(
+            "dissipated_energy",
+            _TEST,
+            "J",
+            "energy dissipated by all rollers since the start of the run",
+            "history",
+        ),
+        Variable("power", _TEST, "W", "dissipated power of all rollers", "history"),
+        Variable("normal_force", _ROLLER, "N", "normal force of a roller", "history"),
+        Variable("peak_pressure", _ROLLER, "Pa", "greatest normal pressure", "history"),
+        Variable("approach", _ROLLER, "m", "approach of the bodies", "history"),
+        Variable("longitudinal_creepage", _ROLLER, "1", "mean longitudinal creepage", "history"),
+        Variable(
+            "adhesion_fraction", _ROLLER, "1", "part of the contact area that adheres", "history"
+        ),
+        Variable(
+            "depth_error", _TEST, "m", "estimated error of the depth of either body", "history"
+        ),
+        Variable(
+            "volume_error",
+            _TEST,
+            "m^3",
+            "estimated error of the volume worn off both bodies",
+            "history",
+        ),
+        Variable("rejected", _STEP, "1", "rejected steps so far", "history"),
+        Variable("solves", _STEP, "1", "contact solves of accepted steps so far", "history"),
+        Variable("full_solves", _STEP, "1", "roller passes solved in full so far", "history"),
+        Variable("record_passes", ("record",), "1", "roller passes at a record", "record"),
+        Variable("record_time", ("record",), "s", "simulated time at a record", "record"),
+        Variable(
+            "cylinder_depth_profile",
+            _CYLINDER_PROFILE,
+            "m",
+            "worn depth of the cylinder, positive down",
+            "record",
+        ),
+        Variable(
+            "roller_depth_profile",
+            _ROLLER_PROFILE,
+            "m",
+            "worn depth of a roller, positive into the roller",
+            "record",
+        ),
+        Variable("line_load", _CONTACT, "N/m", "normal force per axial length", "record"),
+        Variable("half_length", _CONTACT, "m", "half-length of the contact", "record"),
+        Variable("dissipation", _CONTACT, "W/m", "dissipated power per axial length", "record"),
+    )
+)
+
+RUN = Schema("wearsim-run", 2, "a wear test, from `wearsim run`", AXES, VARIABLES)
+
+
+_ARRAYS = ("static", "history", "records", "checkpoint")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RunData(StudyData):
+    """Data of a run, in SI, in addition to `StudyData`.
+
+    Parameters
+    ----------
+    stepper : str
+        Name of the stepper.
+    tolerance : float
+        Required relative error of the final depth and worn volume.
+    width_threshold : float
+        Worn depth above which the profile counts towards the width [m].
+    total_passes : float
+        Roller passes of the whole test.
+    kinematics : dict of str to float
+        rolling_speed [m/s], cylinder_radius, roller_radius, crown_radius [m], pass_rate [1/s],
+        physical_rollers.
+    static, history, records : dict of str to ndarray
+        The variables of `wearsim.results.run`, by kind and name.
+    checkpoint : dict of str to ndarray
+        State for resuming the run.
+    drawn : dict of str to dict
+        Drawn values of the random inputs by scenario key: `values`, one for the test or one per
+        roller, and their SI `unit`.
+    """
+
+    separately_stored: ClassVar[frozenset[str]] = StudyData.separately_stored.union(_ARRAYS)
+    schema: ClassVar[Schema] = RUN
+
+    stepper: str
+    tolerance: float
+    width_threshold: float
+    total_passes: float
+    kinematics: dict[str, float]
+    static: Arrays
+    history: Arrays
+    records: Arrays
+    checkpoint: Arrays
+    drawn: dict[str, dict[str, Any]] = field(default_factory=dict)
+
+    @property
+    def variables(self) -> Arrays:
+        """Variables of all kinds by name."""
+        return {**self.static, **self.history, **self.records}
+
 
 Number: TypeAlias = float | list[float]
 
@@ -201,23 +356,3 @@ def _number(values: npt.NDArray[Any]) -> Number:
 def _relative(error: FloatArray, value: FloatArray) -> FloatArray:
     worn = value > 0.0
     return np.asarray(worn * error / (value + ~worn))  # without division by zero
-
-
-def open_results(path: str | Path) -> Result:
-    """Open a results file.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file.
-
-    Returns
-    -------
-    Result
-
-    Raises
-    ------
-    ResultsFileError
-        If it is missing, foreign, truncated, damaged, or of another layout.
-    """
-    return Result(read_results(path), Path(path))

@@ -1,0 +1,295 @@
+"""Parts that figures share: style, saving, contact patches, convergence and measured profiles."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path, PurePath
+from typing import IO, TYPE_CHECKING, Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+
+from wearsim.csv_tables import column_names, read_columns
+from wearsim.report.text import count, pass_unit
+from wearsim.types import BoolArray, FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+RECORDS = "viridis"
+PRESSURE = "magma"
+BLUE, ORANGE, GREEN, RED, GREY = "#2066a8", "#d1701c", "#3a8a5c", "#b3282d", "#8a8a8a"
+
+_SETTINGS: dict[Any, Any] = {
+    "font.size": 9.0,
+    "axes.titlesize": 9.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.labelsize": 9.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#e4e4e4",
+    "grid.linewidth": 0.6,
+    "legend.frameon": False,
+    "legend.fontsize": 8.0,
+    "lines.linewidth": 1.3,
+    "xtick.labelsize": 8.0,
+    "ytick.labelsize": 8.0,
+    "figure.titlesize": 11.0,
+    "svg.fonttype": "none",
+    "pdf.fonttype": 42,
+}
+
+
+@contextmanager
+def figure_style() -> Iterator[None]:
+    """Apply the settings of wearsim to the figures drawn in the context."""
+    with mpl.rc_context(_SETTINGS):
+        yield
+
+
+@contextmanager
+def titled_figure(width: float, height: float, title: str | None = None) -> Iterator[Figure]:
+    """Return a figure of a width and height in inches, drawn with the settings of wearsim."""
+    with figure_style():
+        figure = Figure(figsize=(width, height), layout="constrained")
+        if title is not None:
+            figure.suptitle(title, fontsize=10.5)
+        yield figure
+
+
+def name_axes(axes: Axes, title: str, x: str, y: str) -> None:
+    """Set the title of a panel and the labels of its axes."""
+    axes.set(title=title, xlabel=x, ylabel=y)
+
+
+def evenly_spaced(count: int, most: int) -> IntArray:
+    """Return at most `most` evenly spaced indices of `count` items, with the first and the last."""
+    return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.int64))
+
+
+def write_message(axes: Axes, title: str, lines: Sequence[str]) -> None:
+    """Write lines of text into a panel that has nothing to draw."""
+    axes.text(0.5, 0.5, "\n".join(lines), ha="center", va="center", transform=axes.transAxes)
+    axes.set_title(title)
+    axes.set_axis_off()
+
+
+def set_depth_axes(
+    axes: Axes, passes: FloatArray, depth: FloatArray
+) -> tuple[BoolArray, float, str]:
+    """Set the scales of a panel of depth against passes, logarithmic from two decades of passes on.
+
+    Parameters
+    ----------
+    axes : Axes
+    passes, depth : ndarray, shape (points,)
+        Points to be drawn [1, m].
+
+    Returns
+    -------
+    drawn : ndarray of bool, shape (points,)
+        Points that can be drawn on these scales.
+    unit : float
+        Unit of the axis of passes.
+    name : str
+        Label of the axis of passes.
+    """
+    worn = (passes > 0.0) & (depth > 0.0)
+    if worn.sum() > 3 and passes[worn][-1] > 100.0 * passes[worn][0]:
+        axes.set(xscale="log", yscale="log")
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        return worn, 1.0, "roller passes"
+    return passes >= 0.0, *pass_unit(float(passes[-1]))
+
+
+DPI = 150
+
+
+def save_figure(figure: Figure, path: Path) -> None:
+    """Write a figure; the suffix gives the format.
+
+    Parameters
+    ----------
+    figure : Figure
+    path : Path
+        Ends in .png, .pdf or .svg; an existing file is replaced.
+    """
+    with _replacing(path) as file:
+        figure.savefig(file, format=path.suffix[1:].lower(), dpi=DPI)
+
+
+def save_text(text: str, path: Path) -> None:
+    """Write a text in UTF-8.
+
+    Parameters
+    ----------
+    text : str
+    path : Path
+        An existing file is replaced.
+    """
+    with _replacing(path) as file:
+        file.write(text.encode("utf-8"))
+
+
+@contextmanager
+def _replacing(path: Path) -> Iterator[IO[bytes]]:
+    """Open a temporary file in the same folder and rename it to `path` when it is complete."""
+    number, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+    try:
+        with os.fdopen(number, "wb") as file:
+            yield file
+        mask = os.umask(0)
+        os.umask(mask)
+        Path(name).chmod(0o666 & ~mask)  # mkstemp restricts it to the owner
+        Path(name).replace(path)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise
+
+
+def patch_edges(y: FloatArray, half_length: FloatArray) -> tuple[float, float] | None:
+    """Return the axial positions of the two edges of the contact [m], or None without contact.
+
+    Near an edge the square of the half-length decreases linearly; the edge is its zero,
+    extrapolated from the two outermost strips by at most one strip width.
+
+    Parameters
+    ----------
+    y : ndarray, shape (strips,)
+        Axial position of the strips [m].
+    half_length : ndarray, shape (strips,)
+        Half-length a(y) of the contact [m].
+    """
+    touching = np.flatnonzero(half_length > 0.0)
+    if len(touching) == 0:
+        return None
+    first, last = int(touching[0]), int(touching[-1])
+    spacing = float(y[1] - y[0])
+    return (
+        float(y[first]) - spacing * _beyond(half_length, first, 1),
+        float(y[last]) + spacing * _beyond(half_length, last, -1),
+    )
+
+
+def patches(half_length: FloatArray) -> list[slice]:
+    """Return the range of strips of each patch of a contact.
+
+    Parameters
+    ----------
+    half_length : ndarray, shape (strips,)
+        Half-length a(y) of the contact [m].
+    """
+    touching = np.concatenate([[False], half_length > 0.0, [False]])
+    ends = np.flatnonzero(np.diff(touching.astype(np.int8)))
+    return [slice(int(i), int(j)) for i, j in zip(ends[::2], ends[1::2], strict=True)]
+
+
+def _beyond(half_length: FloatArray, strip: int, inwards: int) -> float:
+    """Return the distance of the edge from the centre of the outermost strip, in strips."""
+    inner = strip + inwards
+    if not 0 <= inner < len(half_length):
+        return 0.5
+    outer_square, inner_square = half_length[strip] ** 2, half_length[inner] ** 2
+    if inner_square <= outer_square:
+        return 0.5
+    return float(np.clip(outer_square / (inner_square - outer_square), 0.0, 1.0))
+
+
+_SCALED_FROM = 10  # realisations from which an estimate sets the scale of the panel,
+_SCALED_PART = 1 / 30  # or this part of all realisations
+_LINEAR_UP_TO = 20  # realisations
+_DECADES_FROM = 3000  # realisations from which powers of ten suffice as ticks
+
+
+def draw_convergence(
+    axes: Axes, counts: IntArray, value: FloatArray, low: FloatArray, high: FloatArray
+) -> None:
+    """Draw an estimate against the number of realisations, and its interval as a band.
+
+    Parameters
+    ----------
+    axes : Axes
+    counts : ndarray of int, shape (points,)
+        Numbers of realisations, ascending.
+    value, low, high : ndarray, shape (points,)
+        Estimate and ends of its interval, nan or infinite where unknown.
+    """
+    known = np.isfinite(low) & np.isfinite(high)
+    if np.isfinite(value[-1]) and not np.any(known & (high > low)):
+        top = 2.0 * float(value[-1]) or 1.0
+        axes.set_ylim(-0.05 * top, top)  # keeps a line at zero off the axis
+    lower, upper = (np.where(known, end, np.nan) for end in (low, high))
+    axes.fill_between(counts, lower, upper, color=BLUE, alpha=0.25, lw=0)
+    axes.plot(counts, value, color=BLUE, marker="o" if len(counts) == 1 else "")
+    last = int(counts[-1])
+    if last > _LINEAR_UP_TO:
+        axes.set_xscale("log")
+        if last < _DECADES_FROM:
+            axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.xaxis.set_minor_formatter(NullFormatter())
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda number, _: count(number)))
+    else:
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    scaling = (counts >= min(max(_SCALED_FROM, _SCALED_PART * last), last)) & known
+    if scaling.any() and (high - low)[scaling].max() > 0.0:
+        least, greatest = low[scaling].min(), high[scaling].max()
+        margin = 0.05 * (greatest - least)
+        axes.set_ylim(least - margin, greatest + margin)
+        axes.axhline(value[-1], color=GREY, lw=0.8, ls="--")
+    axes.set_xlim(0.5 * _SCALED_FROM if last > _LINEAR_UP_TO else 1.0, max(2.0, 1.05 * last))
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A measured profile.
+
+    Parameters
+    ----------
+    label : str
+        Label in the figure.
+    y : ndarray, shape (points,)
+        Axial position [m].
+    height : ndarray, shape (points,)
+        Height above the nominal surface [m]; worn material is negative.
+    """
+
+    label: str
+    y: FloatArray
+    height: FloatArray
+
+
+def read_measured(text: str, file: str) -> Measured:
+    """Return the measured profile in a CSV.
+
+    Parameters
+    ----------
+    text : str
+        Content of the file: columns y and either depth (positive downwards) or height.
+    file : str
+        Name of the file, for messages and the label.
+
+    Returns
+    -------
+    Measured
+
+    Raises
+    ------
+    ScenarioError
+        With all mistakes in the file.
+    """
+    names = column_names(text)
+    name = "depth" if "depth" in names and "height" not in names else "height"
+    columns = read_columns(text, file, {"y": "m", name: "m"})
+    height = -columns[name] if name == "depth" else columns[name]
+    return Measured(PurePath(file).stem, columns["y"], height)

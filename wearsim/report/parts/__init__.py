@@ -1,1 +1,0 @@
-"""Common parts of the figures: style, files, profiles, contact patches."""

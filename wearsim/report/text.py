@@ -1,0 +1,394 @@
+"""Text of figures and tables: units, labels, estimates and comparisons."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from wearsim.results import EnsembleResult
+from wearsim.results.ensemble.schema import OBSERVABLES as STORED
+from wearsim.studies.ensemble.compare import Compared, Comparison
+from wearsim.uq.distributions.base import MaxentDistribution
+from wearsim.uq.estimation.intervals import Interval
+from wearsim.uq.estimation.mann_whitney import FEWEST, Paired
+from wearsim.uq.estimation.stopping_rule import Target
+from wearsim.uq.sensitivity.sobol_indices import FEWEST_BASES, fewest_realisations
+
+# One SI unit in each engineering unit.
+PER_SI = {
+    "1": 1.0,
+    "%": 1e2,
+    "um": 1e6,
+    "mm": 1e3,
+    "mm^3": 1e9,
+    "m/s": 1.0,
+    "s": 1.0,
+    "min": 1.0 / 60.0,
+    "N": 1.0,
+    "N mm": 1e3,
+    "N/mm": 1e-3,
+    "MPa": 1e-6,
+    "W": 1.0,
+    "W/mm": 1e-3,
+    "W/mm^2": 1e-6,
+    "J": 1.0,
+}
+NOTHING = "-"
+
+
+def shown(value: float | None, unit: str, digits: int = 4) -> str:
+    """Return an SI value in an engineering unit, with that unit; parameters as of `in_unit`."""
+    text = in_unit(value, unit, digits)
+    return text if unit == "1" or text == NOTHING else f"{text} {unit}"
+
+
+def in_unit(value: float | None, unit: str, digits: int = 4) -> str:
+    """Return an SI value as a number in an engineering unit; very small and large with exponent.
+
+    Parameters
+    ----------
+    value : float or None
+        In SI units; None and values that are not finite become a dash.
+    unit : str
+        A key of `PER_SI`.
+    digits : int
+        Significant digits.
+
+    Returns
+    -------
+    str
+    """
+    if value is None or not math.isfinite(value):
+        return NOTHING
+    text = f"{value * PER_SI[unit]:.{digits - 1}e}"
+    rounded = float(text)
+    if rounded == 0.0:
+        return "0"
+    if not 1e-4 <= abs(value * PER_SI[unit]) < 1e7:
+        return text
+    return f"{rounded:.{max(digits - 1 - math.floor(math.log10(abs(rounded))), 0)}f}"
+
+
+def count(value: float) -> str:
+    """Return a number of passes or steps with separated thousands, "1,350,000"."""
+    return f"{value:,.0f}"
+
+
+def number_of_realisations(number: int) -> str:
+    """Return "1 realisation" or "1,000 realisations"."""
+    return f"{count(number)} realisation{'' if number == 1 else 's'}"
+
+
+def pass_unit(greatest: float) -> tuple[float, str]:
+    """Return the unit of an axis of roller passes, and its label.
+
+    Parameters
+    ----------
+    greatest : float
+        Number of passes at the end of the axis.
+    """
+    if greatest >= 1e6:
+        return 1e6, "million roller passes"
+    if greatest >= 1e4:
+        return 1e3, "thousand roller passes"
+    return 1.0, "roller passes"
+
+
+def lapse(seconds: float) -> str:
+    """Return a wall time as text: "0.05 s", "12 s", "3 min 20 s", "2 h 5 min"."""
+    if not math.isfinite(seconds):
+        return NOTHING
+    if seconds < 9.95:
+        return f"{seconds:.2g} s" if seconds < 0.995 else f"{seconds:.1f} s"
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60} s"
+    return f"{whole // 3600} h {whole % 3600 // 60} min"
+
+
+def brief(seconds: float) -> str:
+    """Return a short time with three digits: "2.5 us", "84 s"."""
+    if not math.isfinite(seconds):
+        return NOTHING
+    for unit, scale in (("s", 1.0), ("ms", 1e3)):
+        if seconds * scale >= 1.0:
+            return f"{seconds * scale:.3g} {unit}"
+    return f"{seconds * 1e6:.3g} us"
+
+
+class Named(NamedTuple):
+    """Label of an observable.
+
+    Parameters
+    ----------
+    words : str
+        Name of the quantity.
+    unit : str
+        A key of `PER_SI`.
+    """
+
+    words: str
+    unit: str
+
+    @property
+    def label(self) -> str:
+        """Name with the unit, for an axis or a table."""
+        return f"{self.words} [{self.unit}]"
+
+    @property
+    def per_si(self) -> float:
+        """One SI unit in the engineering unit."""
+        return PER_SI[self.unit]
+
+
+#: observables of an ensemble by name
+OBSERVABLES: Mapping[str, Named] = {
+    "depth": Named("depth", "um"),
+    "width": Named("width", "mm"),
+    "worn_volume": Named("worn volume", "mm^3"),
+    "roller_depth": Named("roller depth", "um"),
+    "total_roller_worn_volume": Named("total roller worn volume", "mm^3"),
+    "dissipated_energy": Named("dissipated energy", "J"),
+    "mean_power": Named("mean power", "W"),
+    "power": Named("dissipated power", "W"),
+    "normal_force": Named("normal force", "N"),
+    "peak_pressure": Named("peak pressure", "MPa"),
+}
+
+
+def si_key(name: str) -> str:
+    """Return the name of an observable with its SI unit, for JSON: "worn_volume_m3"."""
+    return f"{name}_{STORED[name].unit.replace('^', '')}"
+
+
+def statistic_in_words(target: Target) -> str:
+    """Return the statistic of a target, "mean of depth" or "95 % quantile of width"."""
+    statistic: str | float = target.statistic
+    if statistic == 0.5:
+        statistic = "median"
+    elif not isinstance(statistic, str):
+        statistic = f"{100.0 * statistic:g} % quantile"
+    return f"{statistic} of {OBSERVABLES[target.observable].words}"
+
+
+TOO_FEW = "too few"
+TOO_FEW_REALISATIONS = "too few realisations"
+NINETY_PERCENT = (0.05, 0.95)
+_HALF_WIDTH_DIGITS = 2  # significant digits of the half-width, which set the decimals
+_MIN_DIGITS, _MAX_DIGITS = 3, 8  # significant digits of an estimate
+_WITHOUT_EXPONENT = (1e-4, 1e7)
+_ONE = 1.0 - 1e-9  # with a margin for rounding: 1 - 0.95 is slightly more than 0.05
+
+
+def cells(found: Interval, unit: str) -> tuple[str, str]:
+    """Return an estimate and its interval without the unit, for a table.
+
+    Parameters
+    ----------
+    found : Interval
+        In SI units.
+    unit : str
+        A key of `PER_SI`.
+
+    Returns
+    -------
+    estimate, interval : str
+        The interval is empty if it has no width.
+    """
+    value, low, high = _numbers(found, unit)
+    return value, f"{low}..{high}" if high else low
+
+
+def with_interval(found: Interval, unit: str) -> str:
+    """Return "22.10 um [21.90, 22.31]"; parameters as of `cells`."""
+    value, low, high = _numbers(found, unit)
+    named = value if unit == "1" or value == NOTHING else f"{value} {unit}"
+    return f"{named} [{low}, {high}]" if high else f"{named} {low}".rstrip()
+
+
+def _numbers(found: Interval, unit: str) -> tuple[str, str, str]:
+    """Return an estimate and the ends of its interval, or a remark instead of the ends."""
+    if not math.isfinite(found.value):
+        return NOTHING, TOO_FEW, ""
+    if found.low == found.high:
+        return in_unit(found.value, unit), "", ""
+    if not math.isfinite(found.half_width):
+        return in_unit(found.value, unit), TOO_FEW, ""
+    value, low, high = (end * PER_SI[unit] for end in (found.value, found.low, found.high))
+    sizes = [abs(end) for end in (value, low, high) if end]
+    if min(sizes) < _WITHOUT_EXPONENT[0] or max(sizes) >= _WITHOUT_EXPONENT[1]:
+        return in_unit(found.value, unit), in_unit(found.low, unit), in_unit(found.high, unit)
+    place = math.floor(math.log10(abs(value))) if value else 0
+    decimals = _HALF_WIDTH_DIGITS - 1 - math.floor(math.log10(0.5 * (high - low)))
+    decimals = max(min(max(decimals, _MIN_DIGITS - 1 - place), _MAX_DIGITS - 1 - place), 0)
+    return f"{value:.{decimals}f}", f"{low:.{decimals}f}", f"{high:.{decimals}f}"
+
+
+def part_with_interval(found: Interval) -> str:
+    """Return a fraction in per cent, "57.1 % [54.0, 60.2]"."""
+    if not math.isfinite(found.value):
+        return NOTHING
+    value, low, high = (f"{100.0 * end:.1f}" for end in (found.value, found.low, found.high))
+    if found.low == found.high:
+        return f"{value} %"
+    return f"{value} % " + (f"[{low}, {high}]" if math.isfinite(found.half_width) else TOO_FEW)
+
+
+def sufficient_for(realisations: int, probability: float) -> bool:
+    """Return whether a quantile is drawn: if one realisation is beyond it on average.
+
+    A smaller sample would show its extreme value as the quantile; 5 % takes 20 realisations.
+
+    Parameters
+    ----------
+    realisations : int
+    probability : float
+        Of the quantile.
+    """
+    return realisations * min(probability, 1.0 - probability) >= _ONE
+
+
+def too_few(result: EnsembleResult, names: list[str] | None = None) -> str:
+    """Return a message with the sample size that Sobol indices require.
+
+    Parameters
+    ----------
+    result : EnsembleResult
+    names : list of str, optional
+        Random inputs; all by default.
+    """
+    groups = [item["name"] for item in result.raw.groups]
+    if result.plan == "saltelli":
+        needed = FEWEST_BASES * (len(groups) + 2)
+    else:
+        needed = max(_needed(result, name) for name in (groups if names is None else names))
+    return f"{TOO_FEW_REALISATIONS}, {count(needed)} are sufficient"
+
+
+def _needed(result: EnsembleResult, name: str) -> int:
+    """Return the sample size that the Sobol index of one input requires."""
+    keys = [item["key"] for item in result.raw.inputs if item["input"] == name]
+    columns = np.column_stack([result.inputs[key].reshape(result.count, -1) for key in keys])
+    # equal columns carry the same information
+    return fewest_realisations(np.unique(columns, axis=1).shape[1])
+
+
+EQUAL = "equal in all tests"
+
+
+def realisations(row: Compared) -> str:
+    """Return the number of realisations of an ensemble: "7 of 10, 3 failed"."""
+    text = count(row.done)
+    if row.done < row.requested:
+        text += f" of {count(row.requested)}"
+        # an ensemble that reached its target, without failures
+        text += " at most" if row.finished and row.done + row.failed < row.requested else ""
+    text += f", {count(row.failed)} failed" if row.failed else ""
+    text += f", {count(row.count)} of them independent" if row.count < row.done else ""
+    return text if row.finished else f"{text}, unfinished"
+
+
+def kind(row: Compared) -> str:
+    """Return the kind of a result, "ensemble of 40" or "run"."""
+    if row.kind == "run":
+        return "run" if row.finished else "run, unfinished"
+    return f"ensemble of {realisations(row)}"
+
+
+def length(row: Compared) -> str:
+    """Return the length of the tests, "3,000 passes, 1.000 min"."""
+    return f"{count(row.passes)} passes, {shown(row.time, 'min')}"
+
+
+def against(found: Comparison, row: Compared) -> list[tuple[str, str]]:
+    """Return the comparison of a result with the first one, as table rows.
+
+    Parameters
+    ----------
+    found : Comparison
+    row : Compared
+        One of its rows except the first.
+    """
+    first = found.rows[0]
+    unit = OBSERVABLES[found.observable].unit
+    more, less = ("deeper", "shallower") if found.observable == "depth" else ("more", "less")
+    if row.difference is not None:
+        errors = (first.value.half_width, row.value.half_width)
+        text = _of_runs(row.difference, errors, unit, more, less)
+        return [(f"{row.label} against {first.label}", text)]
+    rows = []
+    if row.deeper is not None:
+        rows.append((f"{row.label} {more} than {first.label}", _of_tests(first, row, row.deeper)))
+    if row.paired is not None:
+        rows.append(("  with the same draws", _of_pairs(row.paired, unit, more, less)))
+    return rows
+
+
+def _of_runs(
+    difference: Interval, errors: tuple[float, float], unit: str, more: str, less: str
+) -> str:
+    """Return the difference of two runs, with their estimated errors."""
+    texts = " and ".join(shown(error, unit, 2) for error in errors)
+    stated = f"estimated errors {texts}" if any(errors) else "no error estimate"
+    by = difference.value
+    if by == 0.0:
+        return f"equal ({stated})"
+    if difference.low <= 0.0 <= difference.high:
+        return f"not significant: difference {shown(abs(by), unit, 3)}, within the {stated}"
+    return f"{more if by > 0.0 else less} by {shown(abs(by), unit)} ({stated})"
+
+
+def _of_tests(first: Compared, row: Compared, deeper: Interval) -> str:
+    """Return the probability that a test of one ensemble exceeds a test of the other."""
+    low = min(first.values[0], row.values[0])
+    high = max(first.values[-1], row.values[-1])
+    if low == high and row.count + first.count > 2:
+        return EQUAL
+    if not math.isfinite(deeper.value):
+        return f"too few realisations, {FEWEST} of each are sufficient"
+    pairs = "pairs of tests" if row.kind == first.kind else "the tests of the ensemble"
+    return f"in {part_with_interval(deeper)} of {pairs}"
+
+
+def _of_pairs(found: Paired, unit: str, more: str, less: str) -> str:
+    """Return the difference between tests with the same draws."""
+    by = found.difference
+    if found.count == 1:
+        amount = f"{more if by.value > 0.0 else less} by {shown(abs(by.value), unit)}"
+        return f"{amount if by.value else 'equal'} in the only pair of tests"
+    if by.low == by.value == by.high == 0.0:
+        return EQUAL
+    return f"in {part_with_interval(found.share)}, by {with_interval(by, unit)} on average"
+
+
+_ROUNDING = 1e-12  # in standard deviations
+
+
+def value(distribution: MaxentDistribution, number: float) -> float:
+    """Return a value, or 0 if it is a rounding error near 0 inside the support."""
+    low, high = distribution.support
+    return 0.0 if low < 0.0 < high and abs(number) < _ROUNDING * distribution.std else number
+
+
+def multipliers(distribution: MaxentDistribution) -> tuple[float, float, float]:
+    """Return the multipliers l0, l1 and l2, with 0 for rounding errors of l1 and l2."""
+    l0, l1, l2 = distribution.multipliers
+    scale = distribution.std**2 if distribution.third == "x^2" else 1.0
+    return (
+        l0,
+        0.0 if abs(l1) * distribution.std < _ROUNDING else l1,
+        0.0 if abs(l2) * scale < _ROUNDING else l2,
+    )
+
+
+def parent(distribution: MaxentDistribution) -> tuple[float, float] | None:
+    """Return mean and standard deviation of the parent normal distribution, if there is one."""
+    return distribution.parent and (
+        value(distribution, distribution.parent[0]),
+        distribution.parent[1],
+    )

@@ -1,1 +1,0 @@
-"""Numbers, units and labels as text."""

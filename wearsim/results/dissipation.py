@@ -1,0 +1,223 @@
+"""Results of a dissipation study: schema of the file, its content, and the result in SI."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+
+from wearsim.results.content import Arrays, StudyData, StudyResult
+from wearsim.results.schema import Axis, Schema, Variable, by_name, with_random_inputs
+from wearsim.types import FloatArray
+from wearsim.uq.estimation.moments import Convergence, Summary, converge, summarise
+
+_DRAW = ("realisation",)
+_STRIPS = ("y",)
+_PER_LENGTH = "dissipated power per axial length"
+
+VARIABLES: Mapping[str, Variable] = by_name(
+    (
+        Variable("y", _STRIPS, "m", "axial position", "static"),
+        Variable("power", _DRAW, "W", "dissipated power of the contact", "record"),
+        Variable("force_x", _DRAW, "N", "longitudinal force on the cylinder", "record"),
+        Variable("force_y", _DRAW, "N", "lateral force on the cylinder", "record"),
+        Variable("spin_moment", _DRAW, "N m", "spin moment on the cylinder", "record"),
+        Variable("normal_force", _DRAW, "N", "normal force of a roller", "record"),
+        Variable("longitudinal_creepage", _DRAW, "1", "mean longitudinal creepage", "record"),
+        Variable("peak_pressure", _DRAW, "Pa", "greatest normal pressure", "record"),
+        Variable(
+            "adhesion_fraction", _DRAW, "1", "part of the contact area that adheres", "record"
+        ),
+        Variable("dissipation", ("kept", "y"), "W/m", _PER_LENGTH, "record"),
+        *(
+            Variable(
+                f"dissipation_{ending}", _STRIPS, "W/m", f"{words}: {_PER_LENGTH}", "statistic"
+            )
+            for ending, words in (
+                ("mean", "mean over all realisations"),
+                ("std", "standard deviation over all realisations"),
+                ("low", "2.5 % quantile over kept realisations"),
+                ("high", "97.5 % quantile over kept realisations"),
+            )
+        ),
+        Variable(
+            "mean_problem_dissipation",
+            _STRIPS,
+            "W/m",
+            f"{_PER_LENGTH}, every random input at its mean",
+            "static",
+        ),
+    )
+)
+
+DISSIPATION = Schema(
+    "wearsim-dissipation",
+    2,
+    "realisations of one contact, from `wearsim dissipation`",
+    by_name(
+        (
+            Axis("realisation", "realisation of the random inputs", 0),
+            Axis("kept", "realisation whose dissipation per strip is stored", 0),
+        )
+    ),
+    VARIABLES,
+)
+"""Schema without the random inputs, which differ between studies."""
+
+
+def dissipation_schema(inputs: Sequence[Mapping[str, str]]) -> Schema:
+    """Return the schema of a study, with its drawn values; see `with_random_inputs`."""
+    return with_random_inputs(DISSIPATION, inputs)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class DissipationData(StudyData):
+    """Realisations of one contact, in SI, in addition to `StudyData`.
+
+    Parameters
+    ----------
+    plan : str
+        Name of the sampling design.
+    inputs : list of dict
+        Dotted key and SI unit of each drawn value.
+    requested : int
+        Requested number of realisations.
+    strip_width : float
+        Width of a strip [m].
+    friction_grid : str
+        Points and strips at which a friction field was evaluated; empty if there is none.
+    mean_problem_power : float
+        Dissipated power with every random input at its mean [W].
+    variables : dict of str to ndarray
+        Variables of `wearsim.results.dissipation`, and the drawn values by dotted key.
+    statistics : dict of str to object
+        Estimates over the realisations, for other programs that read the file.
+    solve_seconds : float
+        Time spent on contact solves [s].
+    """
+
+    separately_stored: ClassVar[frozenset[str]] = StudyData.separately_stored | {"variables"}
+
+    plan: str
+    inputs: list[dict[str, str]]
+    requested: int
+    strip_width: float
+    friction_grid: str
+    mean_problem_power: float
+    variables: Arrays
+    solve_seconds: float
+    statistics: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def schema(self) -> Schema:
+        """Schema of the results file."""
+        return dissipation_schema(self.inputs)
+
+
+BAND = (0.025, 0.975)
+"""Probabilities that bound 95 % of the realisations."""
+PAPER_BAND = (0.05, 0.95)
+"""Probabilities of eq. 21 of Chevalier et al. (2005), where the labels P+ and P- are swapped."""
+
+SUMMARISED = ("power", "force_x", "force_y", "spin_moment", "normal_force", "peak_pressure")
+
+
+@dataclass(frozen=True, eq=False)
+class DissipationResult(StudyResult[DissipationData]):
+    """Realisations of one contact, finished or not."""
+
+    def __repr__(self) -> str:
+        done = f"{self.count}" if self.finished else f"{self.count} of {self.raw.requested}"
+        noun = "realisation" if done == "1" else "realisations"
+        power = self.summaries["power"]
+        std = f", std {power.std:.4g} W" if power.count > 1 else ""
+        return f"<DissipationResult '{self.title}': {done} {noun}, power {power.mean:.4g} W{std}>"
+
+    def values(self, name: str) -> FloatArray:
+        """Return a variable of the results file, or the drawn values of an input.
+
+        Parameters
+        ----------
+        name : str
+            Name or dotted key, such as "peak_pressure" or "load.normal_force".
+        """
+        return self.raw.variables[name]
+
+    @property
+    def count(self) -> int:
+        """Number of finished realisations."""
+        return len(self.power)
+
+    @property
+    def inputs(self) -> dict[str, FloatArray]:
+        """Drawn values by scenario key, shape (realisations,) [SI]."""
+        return {item["key"]: self.values(item["key"]) for item in self.raw.inputs}
+
+    @property
+    def power(self) -> FloatArray:
+        """Dissipated power P_d, shape (realisations,) [W]."""
+        return self.values("power")
+
+    @property
+    def mean_problem_power(self) -> float:
+        """Dissipated power with every random input at its mean [W]."""
+        return self.raw.mean_problem_power
+
+    @property
+    def y(self) -> FloatArray:
+        """Axial position of the strips [m]."""
+        return self.values("y")
+
+    @property
+    def dissipation(self) -> FloatArray:
+        """Dissipated power per axial length, shape (kept realisations, strips) [W/m]."""
+        return self.values("dissipation")
+
+    @cached_property
+    def summaries(self) -> dict[str, Summary]:
+        """Estimates of power, forces, moment and pressure over the realisations, by variable."""
+        return summaries(self.raw.variables)
+
+    def convergence(self, points: int = 200) -> Convergence:
+        """Return mean and standard deviation of the power against the number of realisations.
+
+        Parameters
+        ----------
+        points : int
+            Approximate number of points, evenly spaced in the logarithm of the sample size.
+        """
+        counts = np.geomspace(1, self.count, min(points, self.count)).round()
+        return converge(self.power, np.unique(counts.astype(np.int64)))
+
+
+def summaries(variables: Arrays) -> dict[str, Summary]:
+    """Return estimates over the realisations, for each variable of `SUMMARISED`.
+
+    Parameters
+    ----------
+    variables : dict of str to ndarray
+        Variables of a dissipation study.
+
+    Returns
+    -------
+    dict of str to Summary
+    """
+    probabilities = tuple(sorted({*BAND, *PAPER_BAND, 0.5}))
+    return {name: summarise(variables[name], probabilities) for name in SUMMARISED}
+
+
+def as_numbers(found: dict[str, Summary]) -> dict[str, Any]:
+    """Return estimates ready for JSON, with None where they are not finite."""
+    return {name: _finite(asdict(summary)) for name, summary in found.items()}
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _finite(item) for name, item in value.items()}
+    if isinstance(value, tuple | list):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,1 +1,0 @@
-"""Results of a Monte Carlo study of one contact."""

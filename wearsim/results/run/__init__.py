@@ -1,1 +1,0 @@
-"""Results of one wear test."""
