@@ -6,6 +6,7 @@ from wearsim.results.ensemble.data import EnsembleData, Outcome
 from wearsim.results.ensemble.reader import read_ensemble
 from wearsim.results.ensemble.result import EnsembleResult, open_ensemble
 from wearsim.results.ensemble.writer import EnsembleFile
+from wearsim.results.io.atomic_write import DISK, Storage
 from wearsim.results.io.overwrite_guard import check_output, refuse_inputs, same_file
 from wearsim.results.io.reader import (
     kind_of,
@@ -14,7 +15,7 @@ from wearsim.results.io.reader import (
     read_dissipation,
     read_results,
 )
-from wearsim.results.io.writer import DISK, Storage, write_results
+from wearsim.results.io.writer import write_results
 from wearsim.results.run import Result, RunData
 
 __all__ = [

@@ -18,7 +18,7 @@ from wearsim.results.dissipation import DissipationData, DissipationResult, diss
 from wearsim.results.ensemble.data import EnsembleData
 from wearsim.results.ensemble.result import EnsembleResult
 from wearsim.results.ensemble.schema import FAILED, OBSERVABLES, PENDING
-from wearsim.results.io.writer import replacement
+from wearsim.results.io.atomic_write import replacement
 from wearsim.results.run import AXES, VARIABLES, Result, RunData
 from wearsim.types import FloatArray
 from wearsim.units import engineers_unit

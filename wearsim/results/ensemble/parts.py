@@ -27,9 +27,9 @@ from wearsim.results.ensemble.schema import (
     is_row,
     type_of,
 )
+from wearsim.results.io.atomic_write import Storage
 from wearsim.results.io.overwrite_guard import parts_folder
 from wearsim.results.io.reader import check_complete, check_layout, format_of, read_file, read_text
-from wearsim.results.io.writer import Storage
 from wearsim.results.schema import Schema
 
 if TYPE_CHECKING:

@@ -27,13 +27,13 @@ from wearsim.results.ensemble.parts import (
 from wearsim.results.ensemble.reader import read_ensemble
 from wearsim.results.ensemble.schema import ENSEMBLE, PENDING, QUANTILES, STATIC, STATISTICS, is_row
 from wearsim.results.ensemble.stored_rows import StoredRows
+from wearsim.results.io.atomic_write import DISK, TEMPORARY, Storage, os_errors_converted
 from wearsim.results.io.overwrite_guard import (
     lock_or_refuse,
     lock_path,
     parts_folder,
     refuse_if_locked,
 )
-from wearsim.results.io.writer import DISK, TEMPORARY, Storage, os_errors_converted
 
 if TYPE_CHECKING:
     import h5py

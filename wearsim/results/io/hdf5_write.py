@@ -29,7 +29,7 @@ from wearsim.results.content import (
     StudyData,
     as_plain,
 )
-from wearsim.results.io.writer import DISK, Storage, replacement
+from wearsim.results.io.atomic_write import DISK, Storage, replacement
 from wearsim.results.schema import Schema, axis_lengths
 
 CHUNK_ROWS = 4096

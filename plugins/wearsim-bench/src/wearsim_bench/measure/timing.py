@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from timeit import Timer, timeit
+from timeit import Timer, repeat, timeit
 from typing import TypeVar
 
 T = TypeVar("T")
@@ -15,6 +15,11 @@ _LONG = 1.0  # s, total time after which a call is not repeated
 def timed(function: Callable[[], object]) -> float:
     """Return the wall time of one call [s]."""
     return timeit(function, number=1)
+
+
+def best(function: Callable[[], object], repetitions: int) -> float:
+    """Return the smallest wall time of `function` [s], after one untimed call."""
+    return min(repeat(function, number=1, repeat=repetitions + 1)[1:])
 
 
 def timed_result(function: Callable[[], T], repetitions: int) -> tuple[T, float]:
