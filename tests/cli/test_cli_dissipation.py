@@ -6,7 +6,6 @@ import json
 import re
 import signal
 import subprocess
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +13,7 @@ import pytest
 from cli_examples import SCENARIOS, Command
 
 from tests.interruptible import interruptible
-from wearsim.cli import progress
+from wearsim.cli.progress import Counter
 from wearsim.results import open_dissipation
 from wearsim.studies.limits import MOST_BYTES
 
@@ -167,8 +166,7 @@ def test_counted_lines_are_a_second_apart(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     now = [0.0]
-    monkeypatch.setattr(progress, "Display", partial(progress.Display, now=lambda: now[0]))
-    with progress.counting(quiet=False, items="realisations") as counted:
+    with Counter(quiet=False, now=lambda: now[0]) as counted:
         for time, done in ((0.5, 10), (1.1, 20), (1.2, 30), (2.2, 40)):
             now[0] = time
             counted(done, 1040)

@@ -15,7 +15,7 @@ from tests.interruptible import interruptible
 from tests.studies.ensemble_cases import partly_failing, small
 from wearsim.results import open_ensemble
 from wearsim.studies.ensemble.designs import interim_sizes
-from wearsim.uq.estimation.stopping_rule import Target
+from wearsim.uq.estimation.estimates import Target
 
 HERE = ("--scheduler", "serial", "-q")
 

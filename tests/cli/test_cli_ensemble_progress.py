@@ -8,7 +8,7 @@ import pytest
 from rich.console import Console
 
 from wearsim.cli import progress
-from wearsim.cli.progress import Display, EnsembleWatcher, progress_text, watching_ensemble
+from wearsim.cli.progress import EnsembleWatcher, progress_text
 from wearsim.studies.ensemble.driver import EnsembleProgress
 from wearsim.uq.estimation.intervals import UNKNOWN, Interval
 
@@ -38,7 +38,7 @@ def test_progress_omits_unknown_values() -> None:
 
 def test_progress_lines_are_a_second_apart(capsys: pytest.CaptureFixture[str]) -> None:
     now = [0.0]
-    watch = EnsembleWatcher(Display(quiet=False, now=lambda: now[0]))
+    watch = EnsembleWatcher(quiet=False, now=lambda: now[0])
     for time in (0.5, 1.1, 1.2, 2.2):
         now[0] = time
         watch(PROGRESS)
@@ -63,7 +63,7 @@ def test_line_of_60_columns_is_not_cut(monkeypatch: pytest.MonkeyPatch) -> None:
     screen = io.StringIO()
     terminal = Console(file=screen, force_terminal=True, width=60, markup=False, highlight=False)
     monkeypatch.setattr(progress, "console", lambda **_: terminal)
-    with watching_ensemble(quiet=False) as watch:
+    with EnsembleWatcher(quiet=False) as watch:
         watch(PROGRESS)
     assert "5 min 8 s left, 12.3/s" in screen.getvalue()
     assert "\u2026" not in screen.getvalue()
@@ -74,14 +74,14 @@ def test_terminal_shows_a_live_line(monkeypatch: pytest.MonkeyPatch) -> None:
     screen = io.StringIO()
     terminal = Console(file=screen, force_terminal=True, width=140, markup=False, highlight=False)
     monkeypatch.setattr(progress, "console", lambda **_: terminal)
-    with watching_ensemble(quiet=False) as watch:
+    with EnsembleWatcher(quiet=False) as watch:
         watch(PROGRESS)
     assert "24 %" in screen.getvalue()
     assert progress_text(PROGRESS, 111) in screen.getvalue()
 
 
 def test_quiet_shows_nothing(capsys: pytest.CaptureFixture[str]) -> None:
-    with watching_ensemble(quiet=True) as watch:
+    with EnsembleWatcher(quiet=True) as watch:
         watch(PROGRESS)
     assert capsys.readouterr() == ("", "")
     assert watch.workers == "2 processes"

@@ -5,7 +5,7 @@ from rich.console import Console
 
 from wearsim.cli import progress
 from wearsim.cli.output import plain
-from wearsim.cli.progress import Display, RunWatcher
+from wearsim.cli.progress import RunWatcher
 from wearsim.studies.run.events import Event, Finished, Started, Stepped, Warned
 
 STARTED = Started(1000.0, 60.0, 0.0, "implicit", "slender")
@@ -26,7 +26,7 @@ class Time:
 def shown_steps(capsys: pytest.CaptureFixture[str], steps: list[tuple[float, float]]) -> list[str]:
     """Return the lines of steps given as time and passes."""
     time = Time()
-    watch = RunWatcher(Display(quiet=False, now=time))
+    watch = RunWatcher(quiet=False, now=time)
     watch(STARTED)
     for now, passes in steps:
         time.now = now
@@ -53,7 +53,7 @@ def test_time_left_follows_from_the_rate_of_passes(capsys: pytest.CaptureFixture
 
 def test_continued_run_starts_at_its_pass(capsys: pytest.CaptureFixture[str]) -> None:
     time = Time()
-    watch = RunWatcher(Display(quiet=False, now=time))
+    watch = RunWatcher(quiet=False, now=time)
     watch(Started(1000.0, 60.0, 500.0, "implicit", "slender"))
     time.now = 10.0
     watch(step(600.0))
@@ -63,7 +63,7 @@ def test_continued_run_starts_at_its_pass(capsys: pytest.CaptureFixture[str]) ->
 
 
 def test_warnings_and_the_end_are_shown(capsys: pytest.CaptureFixture[str]) -> None:
-    watch = RunWatcher(Display(quiet=False))
+    watch = RunWatcher(quiet=False)
     events: list[Event] = [Warned("unstable [step]"), Finished(75.0)]
     for event in events:
         watch(event)
@@ -74,7 +74,7 @@ def test_warnings_and_the_end_are_shown(capsys: pytest.CaptureFixture[str]) -> N
 
 
 def test_quiet_shows_warnings_only(capsys: pytest.CaptureFixture[str]) -> None:
-    with progress.watching(quiet=True) as watch:
+    with RunWatcher(quiet=True) as watch:
         events: list[Event] = [STARTED, step(10.0), Warned("look"), Finished(1.0)]
         for event in events:
             watch(event)
@@ -85,7 +85,7 @@ def test_terminal_shows_a_live_line(monkeypatch: pytest.MonkeyPatch) -> None:
     screen = io.StringIO()
     terminal = Console(file=screen, force_terminal=True, width=140, markup=False, highlight=False)
     monkeypatch.setattr(progress, "console", lambda **_: terminal)
-    with progress.watching(quiet=False) as watch:
+    with RunWatcher(quiet=False) as watch:
         events: list[Event] = [STARTED, step(500.0), Warned("look [here]"), step(1000.0)]
         for event in [*events, Finished(2.0)]:
             watch(event)

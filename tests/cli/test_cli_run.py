@@ -116,10 +116,10 @@ def test_signal_stops_a_run_that_resume_finishes(
 
 def test_second_signal_ends_a_run_at_once(tmp_path: Path) -> None:
     code = (
-        "import os, signal, time\nfrom wearsim.cli.signals import stop_on_signals\n"
+        "import os, signal, time\nfrom wearsim.cli.progress import stop_on_signals\n"
         "with stop_on_signals() as stop:\n"
         "    os.kill(os.getpid(), signal.SIGINT)\n"
-        "    assert stop.requested()\n    print('requested', flush=True)\n    time.sleep(60)\n"
+        "    assert stop.is_set()\n    print('requested', flush=True)\n    time.sleep(60)\n"
     )
     arguments = interruptible("-c", code)
     quiet = {"stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}

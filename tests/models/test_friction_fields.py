@@ -5,7 +5,7 @@ import pytest
 from pydantic import ValidationError
 from scipy.special import ndtri
 
-from wearsim.models.random.friction_fields import (
+from wearsim.models.random.varying import (
     GaussianField,
     GaussianFieldOptions,
     White,

@@ -6,7 +6,7 @@ from pydantic import ValidationError
 from scipy import stats
 from scipy.special import ndtr
 
-from wearsim.models.random.processes import OrnsteinUhlenbeck, OrnsteinUhlenbeckOptions
+from wearsim.models.random.varying import OrnsteinUhlenbeck, OrnsteinUhlenbeckOptions
 from wearsim.plugins import Distribution, RandomInputSpec, registry
 from wearsim.uq.sampling.philox import Stream
 

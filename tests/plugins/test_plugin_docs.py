@@ -22,16 +22,15 @@ from wearsim.plugins import (
     LoadSpec,
     RandomInputSpec,
     WearLawSpec,
-    hookspecs,
     registry,
 )
-from wearsim.testing import loads, random_inputs
+from wearsim.plugins.manager import HookSpecs
+from wearsim.testing import random_inputs
 from wearsim.testing.checks import ConfiguredSpec
 from wearsim.testing.contact_fixtures import ContactFixture
 from wearsim.testing.kit import CONTACT_MODEL
-from wearsim.testing.loads import LoadFixture
 from wearsim.testing.random_inputs import RandomInputFixture
-from wearsim.testing.wear_laws import WEAR_LAW, WearLawFixture
+from wearsim.testing.wear_and_loads import LOADS, WEAR_LAW, LoadFixture, WearLawFixture
 from wearsim.units import ANGLE, FORCE
 
 PAGE = (Path(__file__).parents[2] / "docs" / "plugins.md").read_text(encoding="utf-8")
@@ -74,7 +73,7 @@ def run_checks(checks, fixture):
         check(fixture)
 
 
-@pytest.mark.parametrize("hook", [name for name in vars(hookspecs.HookSpecs) if "wearsim" in name])
+@pytest.mark.parametrize("hook", [name for name in vars(HookSpecs) if "wearsim" in name])
 def test_every_hook_is_documented_and_tested(hook):
     code = blocks(section(f"`{hook}`"), "python")[0]
     assert f"@hookimpl\ndef {hook}():" in code
@@ -115,11 +114,9 @@ def test_documented_loads_pass_the_checks_and_run(documented, stepper):
     tables = documented("wearsim_loads")
     wave = {"normal_force": "300 N", "amplitude": "20 N", "period": "90 s"}
     warmth = {"time_constant": "1 min"}
+    run_checks(LOADS["base"], LoadFixture(ConfiguredSpec(registry().get(LoadSpec, "wave"), wave)))
     run_checks(
-        loads.BY_ROLE["base"], LoadFixture(ConfiguredSpec(registry().get(LoadSpec, "wave"), wave))
-    )
-    run_checks(
-        loads.BY_ROLE["term"],
+        LOADS["term"],
         LoadFixture(ConfiguredSpec(registry().get(LoadSpec, "warmth"), warmth)),
     )
     result = wearsim.run(rig({"evolution.stepper": stepper}, **tables))

@@ -15,17 +15,17 @@ from plugin_examples import HOOKS, Point, rig
 
 import wearsim
 from wearsim.errors import ScenarioError
-from wearsim.plugins import LoadSpec, RandomInputSpec, WearLawSpec, hookspecs, registry
-from wearsim.testing import loads, random_inputs
+from wearsim.plugins import LoadSpec, RandomInputSpec, WearLawSpec, registry
+from wearsim.plugins.manager import HookSpecs
+from wearsim.testing import random_inputs
 from wearsim.testing.checks import ConfiguredSpec
-from wearsim.testing.loads import LoadFixture
 from wearsim.testing.random_inputs import RandomInputFixture
-from wearsim.testing.wear_laws import WEAR_LAW, WearLawFixture
+from wearsim.testing.wear_and_loads import LOADS, WEAR_LAW, LoadFixture, WearLawFixture
 
 
 def example_of(hook: str) -> str:
     """Return the example code of a hook's docstring."""
-    text = inspect.getdoc(getattr(hookspecs.HookSpecs, hook)) or ""
+    text = inspect.getdoc(getattr(HookSpecs, hook)) or ""
     marker = ".. code-block:: python\n"
     assert marker in text, f"{hook} shows no example"
     return textwrap.dedent(text.split(marker, 1)[1])
@@ -46,13 +46,13 @@ def example(install, monkeypatch, request):
 
 
 def test_every_hook_is_listed_in_these_tests():
-    specified = {name for name in vars(hookspecs.HookSpecs) if name.startswith("wearsim_")}
+    specified = {name for name in vars(HookSpecs) if name.startswith("wearsim_")}
     assert specified == set(HOOKS)
 
 
 @pytest.mark.parametrize("hook", HOOKS)
 def test_every_hook_is_documented(hook):
-    text = inspect.getdoc(getattr(hookspecs.HookSpecs, hook)) or ""
+    text = inspect.getdoc(getattr(HookSpecs, hook)) or ""
     assert text[0].isupper()
     assert "Returns\n-------\n" in text
     assert f"@hookimpl\ndef {hook}():" in example_of(hook)
@@ -119,7 +119,7 @@ def test_rarely_differing_load_option_changes_the_contact(example, place):
     ("hook", "kind", "name", "checks", "fixture"),
     [
         ("wearsim_wear_laws", WearLawSpec, "constant-depth", WEAR_LAW, WearLawFixture),
-        ("wearsim_loads", LoadSpec, "ramp", loads.BY_ROLE["base"], LoadFixture),
+        ("wearsim_loads", LoadSpec, "ramp", LOADS["base"], LoadFixture),
     ],
 )
 def test_examples_pass_the_checks(example, hook, kind, name, checks, fixture):

@@ -13,7 +13,7 @@ from tests.report.made_up_ensembles import INPUTS, made_up
 from wearsim.report.figures.ensemble import LINES, convergence_of, ensemble_figure
 from wearsim.report.parts import GREY, save_figure
 from wearsim.results import EnsembleResult
-from wearsim.uq.estimation.stopping_rule import Target
+from wearsim.uq.estimation.estimates import Target
 
 
 @pytest.fixture(scope="module")

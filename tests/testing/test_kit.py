@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from wearsim.testing import contact_model_tests, load_tests, loads, random_inputs
+from wearsim.testing import contact_model_tests, load_tests, random_inputs
 from wearsim.testing.kit import CONTACT_MODEL
-from wearsim.testing.wear_laws import WEAR_LAW
+from wearsim.testing.wear_and_loads import LOADS, WEAR_LAW
 
 PLUGIN_TESTS = """
 from wearsim.plugins import LoadSpec, Load, Options
@@ -67,7 +67,7 @@ def test_kit_does_not_import_pytest():
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-ALL = [CONTACT_MODEL, WEAR_LAW, *loads.BY_ROLE.values(), *random_inputs.BY_ROLE.values()]
+ALL = [CONTACT_MODEL, WEAR_LAW, *LOADS.values(), *random_inputs.BY_ROLE.values()]
 
 
 @pytest.mark.parametrize("check", [check for checks in ALL for check in checks.values()])

@@ -9,7 +9,7 @@ from wearsim.models.loads import ThermalOptions, ThermalTerm
 from wearsim.plugins import Load, LoadSpec, Options, registry
 from wearsim.testing import ConformanceError, load_tests
 from wearsim.testing.checks import ConfiguredSpec
-from wearsim.testing.loads import BY_ROLE, LoadFixture
+from wearsim.testing.wear_and_loads import LOADS, LoadFixture
 
 LOG = "time [min], load [N]\n0, 300\n5, 320\n7, 280\n60, 305\n"
 TESTED = {
@@ -136,15 +136,15 @@ def fixture(load_class, role):
 @pytest.mark.parametrize(("role", "name", "load_class"), CASES)
 def test_violations_are_reported(role, name, load_class):
     with pytest.raises(ConformanceError, match="load 'mutant': "):
-        BY_ROLE[role][name](fixture(load_class, role))
+        LOADS[role][name](fixture(load_class, role))
 
 
 @pytest.mark.parametrize(("role", "load_class"), [("base", Ramp), ("term", Lag)])
 def test_base_classes_of_the_mutants_conform(role, load_class):
-    for check in BY_ROLE[role].values():
+    for check in LOADS[role].values():
         check(fixture(load_class, role))
 
 
 def test_every_check_has_a_failing_load():
     for role, checks in MUTANTS.items():
-        assert set(BY_ROLE[role]) == set(checks) | COMMON
+        assert set(LOADS[role]) == set(checks) | COMMON

@@ -8,8 +8,12 @@ import numpy as np
 import pytest
 
 from wearsim.models.random.distributions import Disc, DiscOptions
-from wearsim.models.random.friction_fields import White, WhiteOptions
-from wearsim.models.random.processes import OrnsteinUhlenbeck, OrnsteinUhlenbeckOptions
+from wearsim.models.random.varying import (
+    OrnsteinUhlenbeck,
+    OrnsteinUhlenbeckOptions,
+    White,
+    WhiteOptions,
+)
 from wearsim.plugins import Distribution, Options, RandomInputSpec, registry
 from wearsim.testing import ConformanceError, random_input_tests
 from wearsim.testing.checks import ConfiguredSpec

@@ -10,7 +10,7 @@ import pytest
 from wearsim.plugins import Options, WearLaw, WearLawSpec, registry
 from wearsim.testing import ConformanceError, sliding_contact, wear_law_tests
 from wearsim.testing.checks import ConfiguredSpec
-from wearsim.testing.wear_laws import WEAR_LAW, WearLawFixture
+from wearsim.testing.wear_and_loads import WEAR_LAW, WearLawFixture
 
 FACTORS = {"cylinder": {"k_over_h": "1.1e-11 1/Pa"}, "roller": {"k_over_h": "0 1/Pa"}}
 TESTED = {

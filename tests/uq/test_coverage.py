@@ -11,7 +11,7 @@ from scipy.special import ndtri
 
 from wearsim.uq.estimation.estimates import estimate
 from wearsim.uq.estimation.standard_errors import Control
-from wearsim.uq.sampling.plans import REPLICATES, drawing
+from wearsim.uq.sampling.sampler import REPLICATES, drawing
 
 REPEATS = 500
 SPREADS = np.array([0.2, 0.12, 0.08])  # of ln x

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from wearsim.uq.sampling.gaussian_copula import GaussianCopula
-from wearsim.uq.sampling.sampler import Sampler
+from wearsim.uq.sampling.sampler import GaussianCopula, Sampler
 
 NAMES = ("a", "b", "c", "d")
 COUNT = 20_000

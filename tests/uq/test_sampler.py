@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from wearsim.uq.sampling.plans import PLANS
-from wearsim.uq.sampling.sampler import Sampler
+from wearsim.uq.sampling.sampler import PLANS, Sampler
 
 INPUTS = [
     ("load.normal_force", 1),

@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from wearsim.uq.estimation.estimates import estimate
-from wearsim.uq.estimation.stopping_rule import Target
+from wearsim.uq.estimation.estimates import Target, estimate
 
 
 @pytest.mark.parametrize(

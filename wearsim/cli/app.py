@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import traceback
-from abc import abstractmethod
+from collections.abc import Callable
+from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -42,15 +43,23 @@ BUILT_IN = {
 
 
 class LazyVerb(TyperCommand):
-    """Help line of a verb whose code is imported when the verb is called."""
+    """Help line of a verb whose code is imported when the verb is called.
 
-    @abstractmethod
-    def load(self) -> typer.Typer:
-        """Import the verb and return its app."""
+    Parameters
+    ----------
+    name, line : str
+        The verb and its help line.
+    load : callable
+        Imports the verb and returns its app.
+    """
+
+    def __init__(self, name: str, line: str, load: Callable[[], typer.Typer]) -> None:
+        super().__init__(name, help=line)
+        self._load = load
 
     def make_context(self, *args: Any, **kwargs: Any) -> Any:
         """Import the verb and return the context of its command, with the arguments parsed."""
-        command = typer.main.get_command(self.load())
+        command = typer.main.get_command(self._load())
         command.name = self.name
         # Typer adds them to every app; they would install the completion of `wearsim`
         completion = ("install_completion", "show_completion")
@@ -58,66 +67,60 @@ class LazyVerb(TyperCommand):
         return command.make_context(*args, **kwargs)
 
 
-class BuiltInVerb(LazyVerb):
-    """Verb of wearsim, in the module of its name in `wearsim.cli.commands`."""
-
-    def __init__(self, name: str) -> None:
-        super().__init__(name, help=BUILT_IN[name])
-
-    def load(self) -> typer.Typer:
-        """Import the verb and return its app."""
-        verb = getattr(import_module(f"wearsim.cli.commands.{self.name}"), str(self.name))
-        if isinstance(verb, typer.Typer):
-            return verb
-        app = typer.Typer(rich_markup_mode=None)
-        app.command()(verb)
-        return app
+def _built_in(name: str) -> typer.Typer:
+    """Return the app of a verb of wearsim, in the module of its name in `wearsim.cli.commands`."""
+    verb = getattr(import_module(f"wearsim.cli.commands.{name}"), name)
+    if isinstance(verb, typer.Typer):
+        return verb
+    app = typer.Typer(rich_markup_mode=None)
+    app.command()(verb)
+    return app
 
 
-class InstalledVerb(LazyVerb):
-    """Verb of another distribution.
+def _installed(verb: str, points: list[EntryPoint]) -> typer.Typer:
+    """Return the app of a verb of another distribution.
 
     Parameters
     ----------
-    name : str
+    verb : str
         The verb.
     points : list of EntryPoint
-        All entry points of this name; more than one is an error once the verb is called.
+        All entry points of this name.
+
+    Raises
+    ------
+    PluginError
+        If there are several, or the verb cannot be loaded.
     """
-
-    def __init__(self, name: str, points: list[EntryPoint]) -> None:
-        super().__init__(name, help="; ".join(map(_summary, points)))
-        self.points = points
-
-    def load(self) -> typer.Typer:
-        """Import the verb and return its app, or raise a PluginError."""
-        point, name = self.points[0], f"the verb '{self.name}'"
-        distributions = sorted(map(_distribution, self.points))
-        if len(self.points) > 1:
-            raise PluginError(
-                f"{name} is added by {' and by '.join(distributions)}; uninstall one of them"
-            )
-        try:
-            app = point.load()
-            if not isinstance(app, typer.Typer):
-                raise TypeError(f"{point.value} is a {type(app).__name__}, expected a typer.Typer")
-            typer.main.get_command(app)  # an app without commands cannot be called
-        except (Exception, SystemExit) as error:  # an import may even end the process
-            raise PluginError(
-                f"{name} of {distributions[0]} cannot be loaded:"
-                f" {type(error).__name__}: {error}; update or uninstall it"
-            ) from error
-        return app
+    point, name = points[0], f"the verb '{verb}'"
+    distributions = sorted(map(_distribution, points))
+    if len(points) > 1:
+        raise PluginError(
+            f"{name} is added by {' and by '.join(distributions)}; uninstall one of them"
+        )
+    try:
+        app = point.load()
+        if not isinstance(app, typer.Typer):
+            raise TypeError(f"{point.value} is a {type(app).__name__}, expected a typer.Typer")
+        typer.main.get_command(app)  # an app without commands cannot be called
+    except (Exception, SystemExit) as error:  # an import may even end the process
+        raise PluginError(
+            f"{name} of {distributions[0]} cannot be loaded:"
+            f" {type(error).__name__}: {error}; update or uninstall it"
+        ) from error
+    return app
 
 
-def installed_verbs() -> dict[str, InstalledVerb]:
+def installed_verbs() -> dict[str, LazyVerb]:
     """Return the verbs of all installed distributions by name, sorted."""
     from importlib.metadata import entry_points
 
-    points = entry_points(group=GROUP)
-    return {
-        name: InstalledVerb(name, list(points.select(name=name))) for name in sorted(points.names)
-    }
+    found, verbs = entry_points(group=GROUP), {}
+    for name in sorted(found.names):
+        points = list(found.select(name=name))
+        line = "; ".join(map(_summary, points))
+        verbs[name] = LazyVerb(name, line, partial(_installed, name, points))
+    return verbs
 
 
 def installation_hint(name: str) -> str | None:
@@ -154,7 +157,8 @@ class Shell(TyperGroup):
 
     def __init__(self, **attributes: Any) -> None:
         super().__init__(**attributes)
-        self.commands.update({name: BuiltInVerb(name) for name in BUILT_IN})
+        for name, line in BUILT_IN.items():
+            self.commands[name] = LazyVerb(name, line, partial(_built_in, name))
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of all verbs, built-in ones first."""
@@ -195,17 +199,12 @@ class Shell(TyperGroup):
         except Exception as error:
             if type(error).__module__.split(".")[0] in {"click", "typer"}:
                 raise
-            write_error(error)
+            if os.environ.get(TRACEBACK, "") not in {"", "0"}:
+                typer.echo("".join(traceback.format_exception(error)), err=True, nl=False)
+            else:
+                typer.echo(_message(error), err=True)
             code = error.exit_code if isinstance(error, WearsimError) else FAILED
             raise typer.Exit(code) from error
-
-
-def write_error(error: BaseException) -> None:
-    """Write the message of an error to stderr, or its traceback if requested."""
-    if os.environ.get(TRACEBACK, "") not in {"", "0"}:
-        typer.echo("".join(traceback.format_exception(error)), err=True, nl=False)
-        return
-    typer.echo(_message(error), err=True)
 
 
 def _state(state: dict[str, Any]) -> str:

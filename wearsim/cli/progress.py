@@ -1,12 +1,15 @@
-"""Progress on stderr: one live line on a terminal, plain lines one second apart elsewhere."""
+"""Progress on stderr, and the signals that stop a run."""
 
 from __future__ import annotations
 
 import math
+import os
+import signal
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, Self
 
 from wearsim.cli.output import console, note
 from wearsim.report.text import count, lapse, shown
@@ -15,7 +18,7 @@ from wearsim.studies.run.events import Event, Finished, Started, Stepped, Warned
 if TYPE_CHECKING:
     from wearsim.studies.ensemble.driver import EnsembleProgress
 
-Counter: TypeAlias = Callable[[int, int], None]
+
 BETWEEN_LINES = 1.0  # s
 _BAR, _COLUMNS_FOR_BAR = 24, 115
 
@@ -58,6 +61,13 @@ class Display:
         (self._task,) = self.live.tasks
         self._quiet, self._now, self._written = quiet, now, now()
 
+    def __enter__(self) -> Self:
+        self.live.start()
+        return self
+
+    def __exit__(self, *failure: object) -> None:
+        self.live.stop()
+
     def advance(self, done: float, total: float) -> str:
         """Set how much is done, and return the time left in the form ", 12 s left"."""
         self.live.update(self._task.id, completed=done, total=total)
@@ -80,74 +90,45 @@ class Display:
             note(text)
 
 
-@contextmanager
-def counting(quiet: bool, items: str) -> Iterator[Counter]:
-    """Open a display of a number of realisations; it takes done and total.
+class Counter(Display):
+    """Display of a number of realisations."""
 
-    Parameters
-    ----------
-    quiet : bool
-        Whether to show nothing.
-    items : str
-        Name of the counted items, "realisations".
-    """
-    display = Display(quiet)
-
-    def show(done: int, total: int) -> None:
-        left = display.advance(done, total)
-        display.show(f"{count(done)} of {count(total)} {items}{left}")
-
-    with display.live:
-        yield show
+    def __call__(self, done: int, total: int) -> None:
+        """Show how many of them are done."""
+        left = self.advance(done, total)
+        self.show(f"{count(done)} of {count(total)} realisations{left}")
 
 
-@contextmanager
-def watching(quiet: bool) -> Iterator[RunWatcher]:
-    """Open a display of the events of a run.
+class RunWatcher(Display):
+    """Display of the events of a run; the first and the last step are always shown.
 
-    Parameters
-    ----------
-    quiet : bool
-        Whether to show warnings only.
-    """
-    display = Display(quiet)
-    with display.live:
-        yield RunWatcher(display)
-
-
-class RunWatcher:
-    """Receiver of the events of a run; the first and the last step are always shown.
-
-    Parameters
-    ----------
-    display : Display
+    A quiet one shows warnings only.
     """
 
-    def __init__(self, display: Display) -> None:
-        self._display, self._is_first_step = display, True
+    _is_first_step = True
 
     def __call__(self, event: Event) -> None:
         """Show an event."""
         if isinstance(event, Started):
-            self._display.advance(event.from_passes, event.total_passes)
-            self._display.write(_start(event))
+            self.advance(event.from_passes, event.total_passes)
+            self.write(_start(event))
         elif isinstance(event, Stepped):
             self._show_step(event)
         elif isinstance(event, Warned):
-            self._display.write(f"warning: {event.message}", also_quiet=True)
+            self.write(f"warning: {event.message}", also_quiet=True)
         elif isinstance(event, Finished):
-            self._display.show(f"done in {lapse(event.wall_seconds)}", always=True)
+            self.show(f"done in {lapse(event.wall_seconds)}", always=True)
 
     def _show_step(self, step: Stepped) -> None:
-        left = self._display.advance(step.passes, step.total_passes)
+        left = self.advance(step.passes, step.total_passes)
         part = f" ({100.0 * step.passes / step.total_passes:.0f} %)"
         text = (
-            f"pass {count(step.passes)}{part if self._display.live.disable else ''},"
+            f"pass {count(step.passes)}{part if self.live.disable else ''},"
             f" {shown(step.time, 'min')}, depth {shown(step.depth, 'um')},"
             f" step {count(step.step_passes)}{left}"
         )
         is_last = step.passes >= step.total_passes
-        self._display.show(text, always=self._is_first_step or is_last)
+        self.show(text, always=self._is_first_step or is_last)
         self._is_first_step = False
 
 
@@ -161,26 +142,8 @@ def _start(event: Started) -> str:
     return f"{passes}, {shown(event.total_time, 'min')}, with {event.model}, {event.stepper}"
 
 
-@contextmanager
-def watching_ensemble(quiet: bool) -> Iterator[EnsembleWatcher]:
-    """Open a display of the progress of an ensemble.
-
-    Parameters
-    ----------
-    quiet : bool
-        Whether to show nothing.
-    """
-    display = Display(quiet)
-    with display.live:
-        yield EnsembleWatcher(display)
-
-
-class EnsembleWatcher:
-    """Receiver of the progress of an ensemble.
-
-    Parameters
-    ----------
-    display : Display
+class EnsembleWatcher(Display):
+    """Display of the progress of an ensemble.
 
     Attributes
     ----------
@@ -190,18 +153,15 @@ class EnsembleWatcher:
 
     workers = ""
 
-    def __init__(self, display: Display) -> None:
-        self._display = display
-
     def notice(self, text: str) -> None:
         """Show a notice, also if nothing else is shown."""
-        self._display.write(text, also_quiet=True)
+        self.write(text, also_quiet=True)
 
     def __call__(self, progress: EnsembleProgress) -> None:
         """Store the workers and show the progress."""
         self.workers = progress.workers
-        self._display.advance(progress.done + progress.failed, progress.requested)
-        self._display.show(progress_text(progress, self._display.columns))
+        self.advance(progress.done + progress.failed, progress.requested)
+        self.show(progress_text(progress, self.columns))
 
 
 def progress_text(progress: EnsembleProgress, columns: float = math.inf) -> str:
@@ -235,3 +195,40 @@ def _estimate(progress: EnsembleProgress) -> str:
 
     unit = OBSERVABLES[progress.what.split(".", maxsplit=1)[0]].unit
     return f"{progress.what} {with_interval(progress.estimate, unit)}"
+
+
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+@contextmanager
+def stop_on_signals(
+    message: str = "stopping at a checkpoint; repeat to stop at once",
+) -> Iterator[threading.Event]:
+    """Catch SIGINT and SIGTERM while the context is open.
+
+    The first signal sets the event and restores the default handlers, so that a second one ends the
+    process even while compiled code runs; the results file remains readable.
+
+    Parameters
+    ----------
+    message : str
+        Written to stderr at the first signal.
+    """
+    stop = threading.Event()
+    # a process of loky outlives a process that is ended by a signal, and would warn of it
+    os.environ.setdefault("PYTHONWARNINGS", "ignore:resource_tracker:UserWarning")
+    before = {number: signal.getsignal(number) for number in _SIGNALS}
+
+    def handle(number: int, frame: Any) -> None:
+        stop.set()
+        for caught in _SIGNALS:
+            signal.signal(caught, signal.SIG_DFL)
+        note(message)
+
+    for number in _SIGNALS:
+        signal.signal(number, handle)
+    try:
+        yield stop
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

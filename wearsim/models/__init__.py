@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from wearsim.models import loads, wear
 from wearsim.models.contact import hertz as hertz_model
 from wearsim.models.contact import hertz_fastsim, semi_hertzian, slender
-from wearsim.models.random import distributions, friction_fields, processes
+from wearsim.models.random import distributions, varying
 from wearsim.plugins import ContactModelSpec, LoadSpec, RandomInputSpec, WearLawSpec, hookimpl
 
 
@@ -32,4 +32,4 @@ def wearsim_loads() -> Iterable[LoadSpec]:
 @hookimpl
 def wearsim_random_inputs() -> Iterable[RandomInputSpec]:
     """Yield the built-in distributions, friction fields and processes."""
-    return (*distributions.SPECS, *friction_fields.SPECS, *processes.SPECS)
+    return (*distributions.SPECS, *varying.SPECS)

@@ -4,30 +4,32 @@ from pydantic import Field
 
 from wearsim.contact_batch import ContactBatch, ContactBatchSolution
 from wearsim.errors import CapabilityError, ContactError
-from wearsim.plugins.capabilities import Capabilities, PassLoop
-from wearsim.plugins.contact_model import ContactModel, SingleContactModel, refuse_unclaimed
-from wearsim.plugins.hookspecs import hookimpl
-from wearsim.plugins.manager import registry
-from wearsim.plugins.protocols import (
+from wearsim.plugins.contact_model import (
+    Capabilities,
+    ContactModel,
+    PassLoop,
+    SingleContactModel,
+    refuse_unclaimed,
+)
+from wearsim.plugins.manager import hookimpl, registry
+from wearsim.plugins.shared_wear import SharedWear
+from wearsim.plugins.specs import (
     BODIES,
     Body,
+    ContactModelSpec,
     Distribution,
     Frame,
     FrictionField,
     JointDistribution,
     Load,
-    LoadTerm,
-    Process,
-    Uniforms,
-    WearLaw,
-)
-from wearsim.plugins.shared_wear import SharedWear
-from wearsim.plugins.specs import (
-    ContactModelSpec,
     LoadSpec,
+    LoadTerm,
     Options,
+    Process,
     RandomInputSpec,
     Spec,
+    Uniforms,
+    WearLaw,
     WearLawSpec,
 )
 from wearsim.quantities import (

@@ -1,25 +1,191 @@
-"""Specs that the hooks of a plugin yield: name, options, factory and description."""
+"""Base classes of wear laws, loads and random inputs, and the specs that hooks yield."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal, TypeAlias
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict
 
-from wearsim.plugins.capabilities import Capabilities
-from wearsim.plugins.contact_model import ContactModel
-from wearsim.plugins.protocols import (
-    Distribution,
-    FrictionField,
-    JointDistribution,
-    Load,
-    LoadTerm,
-    Process,
-    WearLaw,
-)
-from wearsim.types import Grid, Material
+from wearsim.plugins.contact_model import Capabilities, ContactModel
+from wearsim.types import ContactSolution, FloatArray, Grid, Material
+from wearsim.uq.distributions.base import Distribution as Distribution  # noqa: PLC0414  (exported)
+
+Body: TypeAlias = Literal["cylinder", "roller"]
+
+BODIES: tuple[Body, ...] = ("cylinder", "roller")
+
+
+class WearLaw(ABC):
+    """Wear of both bodies as a function of a solved contact."""
+
+    @abstractmethod
+    def depth_per_pass(
+        self, body: Body, solution: ContactSolution, rolling_speed: float
+    ) -> FloatArray:
+        """Return the depth worn off `body` in one pass, shape (strips,) [m]."""
+
+    def depth_per_dissipation(self, body: Body, rolling_speed: float) -> float | None:
+        """Return depth per pass over dissipation [m/(W/m)], or None if the law is not linear."""
+        return None
+
+
+class Load(ABC):
+    """Load on a roller as a function of time, before any feedback.
+
+    `stiffness` [N/m] is the decrease of the load per displacement of the roller into worn material.
+    """
+
+    stiffness: float = 0.0
+
+    @property
+    def span(self) -> tuple[float, float] | None:
+        """First and last time at which the load is known [s], or None if at all times."""
+        return None
+
+    @abstractmethod
+    def force(self, time: FloatArray) -> FloatArray:
+        """Return the load at each `time` [s], shape as `time` [N]."""
+
+    @abstractmethod
+    def mean(self, start: float, stop: float) -> float:
+        """Return the exact mean of the load between two times [s] [N]."""
+
+    def extremes(self, start: float, stop: float) -> tuple[float, float]:
+        """Return the minimum and maximum load between two times [s] [N]; by default sampled."""
+        forces = self.force(np.linspace(start, stop, 10_001))
+        return float(forces.min()), float(forces.max())
+
+    def deviation(self, start: float, stop: float) -> float:
+        """Return the exact standard deviation of the load between two times [s] [N]."""
+        return 0.0
+
+
+class LoadTerm(ABC):
+    """Term added to a load; its state is one force per roller [N] that follows the power."""
+
+    @abstractmethod
+    def advance(self, state: FloatArray, power: FloatArray, duration: float) -> FloatArray:
+        """Return the state, shape (rollers,), after `duration` [s] at constant `power` [W]."""
+
+    @abstractmethod
+    def mean_force(self, state: FloatArray, power: FloatArray, duration: float) -> FloatArray:
+        """Return the mean of the term over `duration` [s], shape (rollers,) [N]."""
+
+    def lag(self) -> tuple[float, float] | None:
+        """Return gain [N/W] and time constant [s] if the term is a first-order lag, else None.
+
+        The compiled per-pass loop supports first-order lags only; other terms need Python.
+        """
+        return None
+
+
+Frame: TypeAlias = Literal["contact", "cylinder", "roller"]
+
+#: uniform random numbers of one stream, by first index and count; reproducible by index
+Uniforms: TypeAlias = Callable[[int, int], FloatArray]
+
+
+class JointDistribution(ABC):
+    """Joint distribution of several random numbers, such as the misalignment angles of a roller.
+
+    Attributes
+    ----------
+    components : tuple of str
+        Keys of the scenario's table that are set, such as ("yaw", "tilt").
+    dimension : int
+        Number of independent uniform random numbers per realisation.
+    """
+
+    components: tuple[str, ...] = ()
+    dimension: int = 1
+
+    @abstractmethod
+    def values(self, uniform: FloatArray) -> FloatArray:
+        """Return the components, shape (draws, components), from uniforms (draws, dimension)."""
+
+    @property
+    @abstractmethod
+    def mean(self) -> tuple[float, ...]:
+        """Mean of each component."""
+
+    @property
+    @abstractmethod
+    def reach(self) -> tuple[float, ...]:
+        """Maximum magnitude of each component."""
+
+
+class FrictionField(ABC):
+    """Random field of the friction coefficient within one contact.
+
+    Attributes
+    ----------
+    frame : {"contact", "cylinder", "roller"}
+        Frame in which the field is fixed: the contact, or a body that carries it through.
+    marginal : Distribution
+        Distribution of the friction coefficient at a point.
+    """
+
+    frame: Frame = "contact"
+    marginal: Distribution
+
+    @abstractmethod
+    def values(self, x: FloatArray, y: FloatArray, uniforms: Uniforms) -> FloatArray:
+        """Return one realisation of the friction coefficient at given points.
+
+        Parameters
+        ----------
+        x : ndarray, shape (points, strips)
+            Position along rolling, starting at the leading edge [m].
+        y : ndarray, shape (strips,)
+            Axial position [m].
+        uniforms : callable
+            Stream of uniform random numbers of the realisation.
+
+        Returns
+        -------
+        ndarray, shape (points, strips)
+        """
+
+    def unresolved(self, along: float, across: float) -> str | None:
+        """Return why a grid of these spacings [m] does not resolve the field, or None."""
+        return None
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Warnings about the validity, for the user."""
+        return self.marginal.warnings
+
+
+class Process(ABC):
+    """Random process in time, linear between the points of an equally spaced time grid.
+
+    Attributes
+    ----------
+    marginal : Distribution
+        Distribution at a point of the time grid.
+    spacing : float
+        Spacing of the time grid [s].
+    """
+
+    marginal: Distribution
+    spacing: float
+
+    @abstractmethod
+    def path(self, points: int, uniforms: Uniforms) -> FloatArray:
+        """Return one realisation at the times 0, spacing, 2 spacing, ..., shape (points,).
+
+        A longer path starts with the values of a shorter one, bit for bit.
+        """
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Warnings about the validity, for the user."""
+        return self.marginal.warnings
+
 
 Materials: TypeAlias = tuple[Material, Material]
 SuggestGrid: TypeAlias = Callable[[Any, float, float, float, Materials], Grid | None]

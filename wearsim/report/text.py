@@ -12,9 +12,9 @@ from wearsim.results import EnsembleResult
 from wearsim.results.ensemble.schema import OBSERVABLES as STORED
 from wearsim.studies.ensemble.compare import Compared, Comparison
 from wearsim.uq.distributions.base import MaxentDistribution
+from wearsim.uq.estimation.estimates import Target
 from wearsim.uq.estimation.intervals import Interval
 from wearsim.uq.estimation.mann_whitney import FEWEST, Paired
-from wearsim.uq.estimation.stopping_rule import Target
 from wearsim.uq.sensitivity.sobol_indices import FEWEST_BASES, fewest_realisations
 
 # One SI unit in each engineering unit.

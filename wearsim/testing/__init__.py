@@ -13,7 +13,7 @@ from wearsim.testing.kit import (
     random_input_tests,
     wear_law_tests,
 )
-from wearsim.testing.wear_laws import sliding_contact
+from wearsim.testing.wear_and_loads import sliding_contact
 
 __all__ = [
     "STEEL",

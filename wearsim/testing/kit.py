@@ -7,15 +7,14 @@ from functools import cache
 from typing import TypeVar
 
 from wearsim.plugins import ContactModelSpec, LoadSpec, RandomInputSpec, WearLawSpec
-from wearsim.testing import loads, random_inputs
+from wearsim.testing import random_inputs
 from wearsim.testing.checks import Check, Checks, ConfiguredSpec, resolve, spec_checks
 from wearsim.testing.contact_balances import BALANCES
 from wearsim.testing.contact_behaviour import BEHAVIOUR
 from wearsim.testing.contact_capabilities import CAPABILITIES
 from wearsim.testing.contact_fixtures import ContactCase, ContactFixture
-from wearsim.testing.loads import LoadFixture
 from wearsim.testing.random_inputs import RandomInputFixture
-from wearsim.testing.wear_laws import WEAR_LAW, WearLawFixture
+from wearsim.testing.wear_and_loads import LOADS, WEAR_LAW, LoadFixture, WearLawFixture
 from wearsim.units import Kind
 
 F = TypeVar("F")
@@ -184,7 +183,7 @@ def load_tests(
     """
     resolved = resolve(LoadSpec, spec)
     return build_tests(
-        loads.BY_ROLE[resolved.role],
+        LOADS[resolved.role],
         lambda: LoadFixture(ConfiguredSpec(resolved, options, files=files), duration),
         without,
     )

@@ -10,8 +10,7 @@ from wearsim.scenario.examples import shipped_scenario
 from wearsim.studies.ensemble.api import ensemble
 from wearsim.studies.ensemble.control_variate import closed_form_depths
 from wearsim.studies.run.draws import Drawer
-from wearsim.uq.sampling.plans import PLANS, REPLICATES
-from wearsim.uq.sampling.sampler import Sampler
+from wearsim.uq.sampling.sampler import PLANS, REPLICATES, Sampler
 from wearsim_bench.measure.measurement import Effort
 from wearsim_bench.sampling.errors import MEAN, PROBABILITY, QUANTILE, Reference, Study, references
 from wearsim_bench.sampling.jobs import ControlDraws, Part, rig

@@ -7,7 +7,7 @@ import wearsim
 from tests.studies.random_examples import LOAD, WANDERING, scenario_of
 from wearsim.errors import Interrupted
 from wearsim.evolution.state import fresh_state
-from wearsim.models.random.processes import OrnsteinUhlenbeck
+from wearsim.models.random.varying import OrnsteinUhlenbeck
 from wearsim.studies.run.assemble import build_problem, prepared_model
 from wearsim.studies.run.draws import draw
 from wearsim.studies.run.grid import strips_of_run

@@ -56,7 +56,7 @@ def compare(
                 f"{label} has no '{observable}', expected one of {', '.join(known)}",
                 param_hint="--observable",
             )
-    from wearsim.cli.render.comparison_table import report_comparison
+    from wearsim.cli.render.ensemble_table import report_comparison
 
     report_comparison(results, labels, observable, "", figure, json)
 

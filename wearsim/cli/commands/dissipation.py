@@ -58,27 +58,25 @@ def dissipation(
     loaded = read_scenario(scenario, [*(settings or []), *options])
     path = output if output is not None else Path(f"{scenario.stem}-dissipation.h5")
     refuse_same_file(figure, path, loaded.paths)
-    from wearsim.cli.progress import counting
-    from wearsim.cli.render.dissipation_table import as_json, write_spread
-    from wearsim.cli.render.summary import dissipation_line
-    from wearsim.cli.signals import stop_on_signals
+    from wearsim.cli.progress import Counter, stop_on_signals
+    from wearsim.cli.render.summary import dissipation_json, dissipation_line, write_spread
     from wearsim.studies.contact.monte_carlo import dissipation as study
 
-    with stop_on_signals(_STOPPING) as stop, counting(quiet, "realisations") as counter:
+    with stop_on_signals(_STOPPING) as stop, Counter(quiet) as counter:
         result = study(
             loaded,
             realisations,
             path,
             force=force,
             on_progress=counter,
-            stop_requested=stop.requested,
+            stop_requested=stop.is_set,
         )
     if figure is not None:
         from wearsim.cli.commands.plot import draw
 
         draw(result, figure)
     if json:
-        write_json({**as_json(result), "figure": figure})
+        write_json({**dissipation_json(result), "figure": figure})
         return
     more = [("results file", str(result.path))]
     write_spread(result, [*more, *([("figure", str(figure))] if figure else [])])

@@ -83,8 +83,7 @@ def ensemble(
 ) -> None:
     """Run a wear test for each realisation of the random inputs."""
     check_figure(figure, force, "--figure")
-    from wearsim.cli.progress import watching_ensemble
-    from wearsim.cli.signals import stop_on_signals
+    from wearsim.cli.progress import EnsembleWatcher, stop_on_signals
     from wearsim.studies.ensemble import api
     from wearsim.studies.ensemble.designs import parse_plan
     from wearsim.studies.ensemble.sweep import path_of
@@ -117,10 +116,10 @@ def ensemble(
         if not quiet:
             note(f"{key} = {value}: {file}")
 
-    with stop_on_signals(STOPPING) as stop, watching_ensemble(quiet) as watch:
+    with stop_on_signals(STOPPING) as stop, EnsembleWatcher(quiet) as watch:
         options |= {
             "on_progress": watch,
-            "stop_requested": stop.requested,
+            "stop_requested": stop.is_set,
             "on_notice": watch.notice,
         }
         if key:
@@ -135,7 +134,7 @@ def ensemble(
             draw(results[0], figure)
         report(results[0], json, figure, watch.workers)
         return
-    from wearsim.cli.render.comparison_table import report_comparison
+    from wearsim.cli.render.ensemble_table import report_comparison
 
     for result in results:
         _end(result)
@@ -160,14 +159,14 @@ def report(result: EnsembleResult, json: bool, figure: Path | None, workers: str
     SolverError
         If all realisations failed.
     """
-    from wearsim.cli.render.ensemble_table import as_json, write_ensemble
+    from wearsim.cli.render.ensemble_table import ensemble_json, write_ensemble
     from wearsim.cli.render.summary import ensemble_line
     from wearsim.studies.execution.processes import InProcess
 
     if workers == InProcess.describe:
         workers = "this process, one realisation at a time"
     if json:
-        write_json({**as_json(result), "workers": workers or None, "figure": figure})
+        write_json({**ensemble_json(result), "workers": workers or None, "figure": figure})
     else:
         more = [("results file", str(result.path))]
         more += [("figure", str(figure))] if figure else []

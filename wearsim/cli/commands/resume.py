@@ -85,12 +85,11 @@ def _resume_run(file: Path, until: str | None, json: bool, quiet: bool) -> None:
             if seconds <= 0.0:
                 raise ValueError(f"must be above zero, got '{until}'")
     from wearsim.cli.commands.run import report
-    from wearsim.cli.progress import watching
-    from wearsim.cli.signals import stop_on_signals
+    from wearsim.cli.progress import RunWatcher, stop_on_signals
     from wearsim.studies.run import run as study
 
-    with stop_on_signals() as stop, watching(quiet) as watch:
-        result = study.resume(file, seconds, on_event=watch, stop_requested=stop.requested)
+    with stop_on_signals() as stop, RunWatcher(quiet) as watch:
+        result = study.resume(file, seconds, on_event=watch, stop_requested=stop.is_set)
     report(result, json)
 
 
@@ -105,15 +104,14 @@ def _resume_ensemble(
 ) -> None:
     chosen = checked_scheduler(scheduler, workers)
     from wearsim.cli.commands.ensemble import STOPPING, report
-    from wearsim.cli.progress import watching_ensemble
-    from wearsim.cli.signals import stop_on_signals
+    from wearsim.cli.progress import EnsembleWatcher, stop_on_signals
     from wearsim.results import open_ensemble
     from wearsim.studies.ensemble.api import resume_ensemble
 
     nothing = _nothing_to_do(open_ensemble(file), failed)
     if nothing and realisations is None:
         note(f"note: nothing to do: {nothing}")
-    with stop_on_signals(STOPPING) as stop, watching_ensemble(quiet) as watch:
+    with stop_on_signals(STOPPING) as stop, EnsembleWatcher(quiet) as watch:
         result = resume_ensemble(
             file,
             failed=failed,
@@ -121,7 +119,7 @@ def _resume_ensemble(
             workers=workers,
             scheduler=chosen,
             on_progress=watch,
-            stop_requested=stop.requested,
+            stop_requested=stop.is_set,
             on_notice=watch.notice,
         )
     report(result, json, None, watch.workers)

@@ -35,22 +35,21 @@ def run(
     """Run a wear test and write its results file."""
     loaded = read_scenario(scenario, settings)
     path = output if output is not None else Path(f"{scenario.stem}.h5")
-    from wearsim.cli.progress import watching
-    from wearsim.cli.signals import stop_on_signals
+    from wearsim.cli.progress import RunWatcher, stop_on_signals
     from wearsim.studies.run import run as study
 
     write_notes(loaded.notes)
-    with stop_on_signals() as stop, watching(quiet) as watch:
-        result = study.run(loaded, path, force=force, on_event=watch, stop_requested=stop.requested)
+    with stop_on_signals() as stop, RunWatcher(quiet) as watch:
+        result = study.run(loaded, path, force=force, on_event=watch, stop_requested=stop.is_set)
     report(result, json)
 
 
 def report(result: Result, json: bool) -> None:
     """Write the summary of a run to stdout."""
-    from wearsim.cli.render.summary import as_json, draws, effort, end_state, run_line, standing
+    from wearsim.cli.render.summary import draws, effort, end_state, run_json, run_line, standing
 
     if json:
-        write_json(as_json(result))
+        write_json(run_json(result))
         return
     rows = [("test", standing(result)), *draws(result), *end_state(result), *effort(result)]
     write_table(result.title, [*rows, ("results file", str(result.path))])

@@ -8,21 +8,33 @@ from wearsim.cli.arguments import Json, ResultsFile, open_any
 from wearsim.cli.output import write_json, write_notes, write_table
 
 if TYPE_CHECKING:
-    from wearsim.results import DissipationResult, EnsembleResult, Result
+    from wearsim.results import Result
     from wearsim.results.content import StudyData
 
 
 def show(file: ResultsFile, json: Json = False) -> None:
     """Show the content of a results file and the end state."""
-    from wearsim.cli.render import dissipation_table, ensemble_table, summary
+    from wearsim.cli.render import ensemble_table, summary
     from wearsim.results import DissipationResult, EnsembleResult
 
     result = open_any(file)
     if json:
-        write_json({**_data(result), **_origin(result.raw)})
+        data: dict[str, Any]
+        if isinstance(result, DissipationResult):
+            data = summary.dissipation_json(result)
+        elif isinstance(result, EnsembleResult):
+            data = ensemble_table.ensemble_json(result)
+        else:
+            data = {
+                **summary.run_json(result),
+                "total_passes": result.raw.total_passes,
+                "tolerance": result.raw.tolerance,
+                "record_passes": result.record_passes,
+            }
+        write_json({**data, **_origin(result.raw)})
         return
     if isinstance(result, DissipationResult):
-        dissipation_table.write_spread(result, _sources(result.raw))
+        summary.write_spread(result, _sources(result.raw))
     elif isinstance(result, EnsembleResult):
         groups = [(f"random {item['name']}", item["text"]) for item in result.raw.groups]
         ensemble_table.write_ensemble(result, [*groups, *_sources(result.raw)])
@@ -67,22 +79,6 @@ def _contents(result: Result) -> list[tuple[str, str]]:
         *effort(result),
         *_sources(result.raw),
     ]
-
-
-def _data(result: Result | DissipationResult | EnsembleResult) -> dict[str, Any]:
-    from wearsim.cli.render import dissipation_table, ensemble_table, summary
-    from wearsim.results import DissipationResult, EnsembleResult
-
-    if isinstance(result, DissipationResult):
-        return dissipation_table.as_json(result)
-    if isinstance(result, EnsembleResult):
-        return ensemble_table.as_json(result)
-    return {
-        **summary.as_json(result),
-        "total_passes": result.raw.total_passes,
-        "tolerance": result.raw.tolerance,
-        "record_passes": result.record_passes,
-    }
 
 
 def _origin(raw: StudyData) -> dict[str, Any]:

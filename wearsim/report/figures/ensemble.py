@@ -36,8 +36,8 @@ from wearsim.results import EnsembleResult
 from wearsim.results.ensemble.result import Effect
 from wearsim.results.ensemble.schema import PENDING
 from wearsim.types import FloatArray, IntArray
+from wearsim.uq.estimation.estimates import Target
 from wearsim.uq.estimation.intervals import UNKNOWN, Interval
-from wearsim.uq.estimation.stopping_rule import Target
 
 UM, MM = PER_SI["um"], PER_SI["mm"]
 LINES = 12  # realisations drawn as lines

@@ -19,10 +19,10 @@ from wearsim.uq.estimation.estimates import Design, Estimate, estimate
 from wearsim.uq.estimation.intervals import Interval
 from wearsim.uq.estimation.moments import summarise
 from wearsim.uq.estimation.standard_errors import Control
-from wearsim.uq.sampling.plans import REPLICATES
+from wearsim.uq.sampling.sampler import REPLICATES
 
 if TYPE_CHECKING:
-    from wearsim.uq.estimation.stopping_rule import Target
+    from wearsim.uq.estimation.estimates import Target
 
 _READ_SIZE = 4_000_000  # numbers read at once
 PROBABILITIES = (0.025, 0.05, 0.5, 0.95, 0.975)

@@ -14,7 +14,7 @@ from wearsim.plugins import Distribution, FrictionField, JointDistribution, Opti
 from wearsim.quantities import Quantity
 from wearsim.types import FloatArray
 from wearsim.units import in_engineers_unit
-from wearsim.uq.sampling.plans import BELOW_ONE
+from wearsim.uq.sampling.sampler import BELOW_ONE
 
 Persistence: TypeAlias = Literal["per-test", "per-roller", "per-pass"]
 Role: TypeAlias = Literal["scalar", "joint", "field", "process"]

@@ -22,7 +22,7 @@ from wearsim.scenario.parse.fields import RandomTarget
 from wearsim.scenario.parse.mistakes import Mistakes, nearest
 from wearsim.scenario.random.read import validate
 from wearsim.units import ANGLE, QuantityError, shown
-from wearsim.uq.sampling.gaussian_copula import GaussianCopula
+from wearsim.uq.sampling.sampler import GaussianCopula
 
 DEFAULT_TOLERANCE = 1e-3
 

@@ -40,7 +40,7 @@ from wearsim.studies.run.draws import Drawer, draw, units_of
 from wearsim.studies.run.provenance import changed_origins, check_plugins, origin_of
 from wearsim.studies.run.recorder import RecordSchedule
 from wearsim.types import FloatArray, Grid
-from wearsim.uq.estimation.stopping_rule import Target
+from wearsim.uq.estimation.estimates import Target
 
 Watcher = Callable[[EnsembleProgress], None]
 

@@ -13,7 +13,7 @@ from wearsim.types import FloatArray, IntArray
 from wearsim.uq.estimation.estimates import Design
 from wearsim.uq.estimation.intervals import Interval
 from wearsim.uq.estimation.mann_whitney import Paired, paired, superiority
-from wearsim.uq.sampling.plans import REPLICATES
+from wearsim.uq.sampling.sampler import REPLICATES
 
 QUANTILES = (0.05, 0.5, 0.95)
 _ROUND_OFF = 1e-9  # relative difference of the ends of tests of equal length

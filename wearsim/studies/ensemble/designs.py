@@ -7,7 +7,7 @@ from typing import Literal, TypeAlias, get_args
 
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.scenario import Scenario
-from wearsim.uq.sampling.plans import PlanName
+from wearsim.uq.sampling.sampler import PlanName
 
 EnsemblePlan: TypeAlias = Literal[
     "monte-carlo", "latin-hypercube", "sobol", "control-variate", "saltelli"

@@ -18,8 +18,8 @@ from wearsim.studies.ensemble.designs import interim_sizes
 from wearsim.studies.ensemble.realisation import RealisationRunner
 from wearsim.studies.execution.processes import Executor
 from wearsim.types import FloatArray
+from wearsim.uq.estimation.estimates import Target
 from wearsim.uq.estimation.intervals import UNKNOWN, Interval
-from wearsim.uq.estimation.stopping_rule import Target
 
 SECONDS = 4.0  # duration of a batch; a test costs a third more in batches of 20 than of 40
 MOST_IN_BATCH = 256

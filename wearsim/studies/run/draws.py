@@ -17,8 +17,7 @@ from wearsim.scenario.random.model import CONTACT_FIELDS
 from wearsim.studies.run.inputs import OFFSET, TILT, YAW, contact_values, origin
 from wearsim.types import FloatArray
 from wearsim.uq.sampling.philox import Stream
-from wearsim.uq.sampling.plans import REPLICATES, PlanName
-from wearsim.uq.sampling.sampler import Sampler
+from wearsim.uq.sampling.sampler import REPLICATES, PlanName, Sampler
 
 LISTED = {OFFSET, YAW, TILT}  # a scenario may give one per roller
 LONGEST_PATH = 5_000_000  # samples of a process
@@ -152,7 +151,7 @@ class Drawer:
     ----------
     scenario : Scenario
     plan : str
-        Name of a plan of `wearsim.uq.sampling.plans`.
+        Name of a plan of `wearsim.uq.sampling.sampler`.
     total : int, optional
         Realisations of the whole plan, where it depends on their number.
     replicates : int

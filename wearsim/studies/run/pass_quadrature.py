@@ -12,9 +12,8 @@ from wearsim.evolution.problem import WearProblem
 from wearsim.scenario import RandomInput, Scenario
 from wearsim.studies.run.inputs import contact_values
 from wearsim.types import FloatArray
-from wearsim.uq.sampling.gaussian_copula import GaussianCopula
 from wearsim.uq.sampling.philox import Stream
-from wearsim.uq.sampling.sampler import Sampler
+from wearsim.uq.sampling.sampler import GaussianCopula, Sampler
 
 MAX_NODES = 128
 REFERENCE_POINTS = 2**15  # Sobol points of the exact means

@@ -49,11 +49,11 @@ def reproduce(
 ) -> None:
     """Compute the numbers of the paper; -o draws its figures too."""
     check_figure(figure, force)
-    from wearsim.cli.progress import counting
+    from wearsim.cli.progress import Counter
     from wearsim_chevalier2005.comparison import compare
     from wearsim_chevalier2005.study import reproduce as study
 
-    with counting(quiet, "realisations") as counted:
+    with Counter(quiet) as counted:
         results = study(realisations, seed, on_progress=counted)
     rows = compare(results)
     if figure is not None:

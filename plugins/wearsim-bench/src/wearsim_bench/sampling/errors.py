@@ -12,7 +12,7 @@ from wearsim.types import FloatArray
 from wearsim.uq.estimation.estimates import Estimate, WeightedDistribution, estimate
 from wearsim.uq.estimation.intervals import Interval
 from wearsim.uq.estimation.standard_errors import Control, Controlled
-from wearsim.uq.sampling.plans import REPLICATES
+from wearsim.uq.sampling.sampler import REPLICATES
 
 PROBABILITY = 0.95
 MEAN, QUANTILE = "mean of depth", "95 % quantile of depth"

@@ -24,7 +24,7 @@ from wearsim.studies.ensemble.realisation import RealisationRunner, shared_grid
 from wearsim.studies.execution.factory import executor
 from wearsim.studies.run.draws import Drawer
 from wearsim.types import FloatArray, Grid
-from wearsim.uq.sampling.plans import PlanName
+from wearsim.uq.sampling.sampler import PlanName
 from wearsim_bench.measure.measurement import OnProgress
 
 RIG = "rig-ensemble"

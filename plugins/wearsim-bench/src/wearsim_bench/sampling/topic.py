@@ -14,7 +14,7 @@ from wearsim.scenario.tables.plain import SamplingTable
 from wearsim.studies.ensemble.control_variate import DRAWS
 from wearsim.studies.ensemble.designs import BASE_PLANS, EnsemblePlan
 from wearsim.types import FloatArray
-from wearsim.uq.sampling.plans import PLANS, PlanName
+from wearsim.uq.sampling.sampler import PLANS, PlanName
 from wearsim_bench.measure.measurement import Effort, Measurement, OnProgress, Topic
 from wearsim_bench.sampling.errors import MEAN, QUANTILE, Reference, Study, plan_error, references
 from wearsim_bench.sampling.jobs import ControlDraws, Job, Part, Timing, parts, run_jobs
