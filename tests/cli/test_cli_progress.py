@@ -4,8 +4,8 @@ import pytest
 from rich.console import Console
 
 from wearsim.cli import progress
-from wearsim.cli.output import plain
 from wearsim.cli.progress import RunWatcher
+from wearsim.cli.shared import plain
 from wearsim.studies.run.events import Event, Finished, Started, Stepped, Warned
 
 STARTED = Started(1000.0, 60.0, 0.0, "implicit", "slender")

@@ -11,7 +11,7 @@ from wearsim.errors import ContactError
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.models.contact.hertz import HertzModel, HertzOptions, strips_over_patch
 from wearsim.models.tangential.base import spread_work
-from wearsim.models.tangential.fastrip import FastripTheory
+from wearsim.models.tangential.fastsim import FastripTheory
 from wearsim.types import Creepage, Grid, OperatingPoint
 
 MATERIALS = (STEEL, STEEL)

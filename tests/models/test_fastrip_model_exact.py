@@ -5,7 +5,7 @@ import pytest
 from test_fastrip_model import PAIR, contact, errors, hard, rms
 
 from wearsim.models.tangential.base import Strips, complete
-from wearsim.models.tangential.fastrip import FastripTheory
+from wearsim.models.tangential.fastsim import FastripTheory
 from wearsim.types import Creepage, OperatingPoint
 from wearsim_bench.exact_solutions import CREEPAGES, rows, strips_of, worn_profile
 

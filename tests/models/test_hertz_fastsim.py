@@ -13,9 +13,8 @@ from tests.mechanics.tangential.kalker_closed_form import closed_form_parabolic
 from wearsim.errors import CapabilityError, ContactError
 from wearsim.mechanics.hertz.ellipse import hertz
 from wearsim.mechanics.tangential.kalker_coefficients import creepage_coefficients, flexibilities
-from wearsim.models.contact.equivalent_ellipse import equivalent_ellipse
 from wearsim.models.contact.hertz_fastsim import SPEC, HertzFastsim, HertzFastsimOptions
-from wearsim.models.tangential.base import Strips, complete
+from wearsim.models.tangential.base import Strips, complete, equivalent_ellipse
 from wearsim.models.tangential.fastsim import FastsimTheory
 from wearsim.types import Creepage, Grid, OperatingPoint
 

@@ -8,9 +8,9 @@ from wearsim.contact_batch import ContactBatch
 from wearsim.errors import CapabilityError, ContactError
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.mechanics.hertz.ellipse import hertz
-from wearsim.models.contact.equivalent_ellipse import EllipseStrips
 from wearsim.models.contact.hertz import SPEC, HertzModel, Patch, strips_over_patch
 from wearsim.models.contact.hertz_fastsim import HertzFastsim, HertzFastsimOptions
+from wearsim.models.tangential.base import EllipseStrips
 from wearsim.models.tangential.options import tangential_theory
 from wearsim.types import Creepage, Grid, OperatingPoint
 

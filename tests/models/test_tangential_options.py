@@ -4,8 +4,7 @@ import pytest
 from pydantic import ValidationError
 
 from wearsim.errors import ScenarioError
-from wearsim.models.tangential.fastrip import FastripTheory
-from wearsim.models.tangential.fastsim import FastsimTheory
+from wearsim.models.tangential.fastsim import FastripTheory, FastsimTheory
 from wearsim.models.tangential.options import TangentialOptions, tangential_theory
 from wearsim.models.tangential.strip_theory import StripTheory
 from wearsim.scenario import parse_scenario

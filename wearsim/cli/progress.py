@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Self
 
-from wearsim.cli.output import console, note
+from wearsim.cli.shared import console, note
 from wearsim.report.text import count, lapse, shown
 from wearsim.studies.run.events import Event, Finished, Started, Stepped, Warned
 

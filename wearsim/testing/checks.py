@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -24,10 +24,7 @@ from wearsim.plugins import (
 )
 from wearsim.plugins.specs import PROTOCOL
 from wearsim.types import FloatArray
-
-if TYPE_CHECKING:
-    from wearsim.units import Kind
-
+from wearsim.units import Kind
 
 F = TypeVar("F")
 

@@ -1,4 +1,4 @@
-"""Reproducibility, errors and batches of contact models."""
+"""Balances, reproducibility, errors and batches of contact models."""
 
 from __future__ import annotations
 
@@ -9,11 +9,218 @@ import numpy as np
 
 from wearsim.contact_batch import ContactBatch, ContactBatchSolution
 from wearsim.errors import ContactError
-from wearsim.testing.checks import Checks, ConformanceError, agree, require
+from wearsim.testing.checks import Checks, ConformanceError, agree, require, require_values
 from wearsim.testing.contact_fixtures import NUMBERS, STRIPS, ContactFixture
 from wearsim.types import ContactSolution, Creepage, FloatArray, Grid
 
 BEHAVIOUR: Checks[ContactFixture] = Checks()
+_SOLUTION = "wearsim.types.ContactSolution"
+_MODEL = "wearsim.plugins.ContactModel"
+_SATURATION_ERROR = 0.02  # relative deviation from mu N allowed in gross sliding
+
+
+def _gross_sliding(fixture: ContactFixture) -> ContactSolution:
+    return fixture.solve(fixture.point(Creepage(0.1)))
+
+
+@BEHAVIOUR.specified_in(_SOLUTION)
+def solution_is_complete_and_finite(fixture: ContactFixture) -> None:
+    """Every field of a solution has the right shape and is finite, on the given strips."""
+    for case, (_, solution) in fixture.solutions.items():
+        for name in STRIPS:
+            require_values(f"{case}: {name}", getattr(solution, name), fixture.grid.y.shape)
+        for name in NUMBERS:
+            require_values(f"{case}: {name}", getattr(solution, name), ())
+        agree(f"{case}: y", solution.y, fixture.grid.y, 0.0)
+
+
+@BEHAVIOUR.specified_in(_SOLUTION)
+def strips_carry_the_load(fixture: ContactFixture) -> None:
+    """The line loads add up to the normal force."""
+    for case, (point, solution) in fixture.solutions.items():
+        carried = float(solution.line_load.sum()) * fixture.grid.spacing
+        agree(f"{case}: load of the strips", carried, point.normal_force, fixture.case.tolerance)
+
+
+@BEHAVIOUR.specified_in(_SOLUTION)
+def zero_outside_the_contact(fixture: ContactFixture) -> None:
+    """Half-length, line load and dissipation are never negative, and zero outside the contact."""
+    for case, (_, solution) in fixture.solutions.items():
+        outside = solution.half_length <= 0.0
+        require(outside[[0, -1]].all(), f"{case}: the first or last strip is in contact")
+        for name in STRIPS:
+            values = getattr(solution, name)
+            require(float(values.min()) >= 0.0, f"{case}: {name} falls to {values.min():.3g}")
+            largest = float(np.abs(values[outside]).max())
+            require(largest == 0.0, f"{case}: {name} is {largest:.3g} where half_length is 0")
+        require(
+            (solution.line_load[~outside] > 0.0).all(),
+            f"{case}: a strip with a positive half_length carries no load",
+        )
+
+
+@BEHAVIOUR.specified_in(_SOLUTION)
+def power_equals_strip_sum(fixture: ContactFixture) -> None:
+    """The power is the sum of the dissipation over the strips."""
+    for case, (_, solution) in fixture.solutions.items():
+        total = float(solution.dissipation.sum()) * fixture.grid.spacing
+        agree(f"{case}: power", solution.power, total, fixture.case.tolerance)
+
+
+@BEHAVIOUR.specified_in(_MODEL)
+def power_equals_rigid_slip_work(fixture: ContactFixture) -> None:
+    """P = -V (xi F_x + eta F_y + phi M_z) for all creepages."""
+    for case, (point, solution) in fixture.solutions.items():
+        parts = point.rolling_speed * np.array(
+            [
+                solution.longitudinal_creepage * solution.force_x,
+                point.creepage.lateral * solution.force_y,
+                point.creepage.spin * solution.spin_moment,
+            ]
+        )
+        agree(
+            f"{case}: power, compared with -V (xi F_x + eta F_y + phi M_z),",
+            solution.power,
+            -float(parts.sum()),
+            fixture.case.tolerance,
+            float(np.abs(parts).sum()),
+        )
+
+
+@BEHAVIOUR.specified_in("wearsim.types.Creepage")
+def mean_creepage_is_preserved(fixture: ContactFixture) -> None:
+    """Without a bearing torque the mean longitudinal creepage equals the prescribed one."""
+    for case, (point, solution) in fixture.solutions.items():
+        agree(
+            f"{case}: longitudinal_creepage",
+            solution.longitudinal_creepage,
+            point.creepage.longitudinal,
+            1e-12,
+        )
+
+
+@BEHAVIOUR.specified_in("wearsim.types.OperatingPoint")
+def force_within_coulomb_bound(fixture: ContactFixture) -> None:
+    """The tangential force never exceeds mu N, and reaches it in gross sliding."""
+    bound = fixture.case.friction * fixture.case.normal_force
+    for case, (_, solution) in fixture.solutions.items():
+        force = float(np.hypot(solution.force_x, solution.force_y))
+        # models that integrate over points bound the traction at each point, not the sum
+        require(
+            force <= bound * (1.0 + 1e-3),
+            f"{case}: the tangential force is {force:.6g} N, above mu N = {bound:.6g} N",
+        )
+    force_x = _gross_sliding(fixture).force_x
+    agree("the force at a creepage of 0.1", force_x, -bound, _SATURATION_ERROR)
+
+
+@BEHAVIOUR.specified_in(_SOLUTION)
+def no_adhesion_in_gross_sliding(fixture: ContactFixture) -> None:
+    """The adhesion fraction is between 0 and 1, and zero in gross sliding."""
+    for case, (_, solution) in fixture.solutions.items():
+        fraction = solution.adhesion_fraction
+        require(0.0 <= fraction <= 1.0, f"{case}: adhesion_fraction is {fraction:.3g}")
+    # Carter: a strip at (1 - s) of its full friction adheres over sqrt(s) of its length
+    fraction, limit = _gross_sliding(fixture).adhesion_fraction, _SATURATION_ERROR**0.5
+    require(
+        fraction <= limit,
+        f"adhesion_fraction at a creepage of 0.1 is {fraction:.3g}, and {limit:.2g} is allowed",
+    )
+
+
+@BEHAVIOUR.specified_in(_SOLUTION)
+def peak_pressure_exceeds_strip_means(fixture: ContactFixture) -> None:
+    """The peak pressure is at least the mean pressure q/(2 a) of every strip."""
+    for case, (_, solution) in fixture.solutions.items():
+        inside = solution.half_length > 0.0
+        mean = float((solution.line_load[inside] / (2.0 * solution.half_length[inside])).max())
+        require(
+            solution.peak_pressure >= mean * (1.0 - fixture.case.tolerance),
+            f"{case}: peak_pressure is {solution.peak_pressure:.6g} Pa, the mean of a strip"
+            f" {mean:.6g} Pa",
+        )
+
+
+@BEHAVIOUR.specified_in(_MODEL)
+def no_power_without_creepage(fixture: ContactFixture) -> None:
+    """Bodies that roll without creepage exchange no tangential force and dissipate no power."""
+    solution = fixture.solve(fixture.point(Creepage(0.0)))
+    force = fixture.case.friction * fixture.case.normal_force
+    agree("power without creepage", solution.power, 0.0, 1e-9, fixture.sliding_power)
+    agree("force_x without creepage", solution.force_x, 0.0, 1e-9, force)
+    agree("force_y without creepage", solution.force_y, 0.0, 1e-9, force)
+
+
+@BEHAVIOUR.specified_in(_MODEL)
+def mirror_symmetry(fixture: ContactFixture) -> None:
+    """With gap, lateral creepage and spin mirrored in y, the solution is mirrored."""
+    tolerance = fixture.case.tolerance
+    point = fixture.point(Creepage(3e-4, 4e-4, 0.3))
+    mirrored_point = replace(point, creepage=Creepage(3e-4, -4e-4, -0.3))
+    for case, gap in fixture.gaps.items():
+        solution = fixture.solve(point, gap)
+        image = fixture.solve(mirrored_point, gap[::-1].copy())
+        for name in STRIPS:
+            mirrored = getattr(image, name)[::-1]
+            agree(f"{case}: mirrored {name}", mirrored, getattr(solution, name), tolerance)
+        for name, sign in (("force_x", 1.0), ("force_y", -1.0), ("spin_moment", -1.0)):
+            arm = fixture.case.width if name == "spin_moment" else 1.0
+            agree(
+                f"{case}: mirrored {name}",
+                getattr(image, name),
+                sign * getattr(solution, name),
+                tolerance,
+                fixture.case.friction * fixture.case.normal_force * arm,
+            )
+
+
+@BEHAVIOUR.specified_in("wearsim.plugins.ContactModel.solve")
+def gap_offset_shifts_approach(fixture: ContactFixture) -> None:
+    """A constant added to the gap is added to the approach and changes nothing else."""
+    base = fixture.solution
+    for fraction in (0.25, -2.0):
+        shift = fraction * float(np.ptp(fixture.gap))
+        solution = fixture.solve(gap=fixture.gap + shift)
+        when = f"after {shift:.3g} m was added to the gap"
+        agree(f"the approach {when}", solution.approach, base.approach + shift, 1e-6)
+        agree(f"the line load {when}", solution.line_load, base.line_load, 1e-5)
+    require(
+        base.approach > float(fixture.gap.min()),
+        "the approach does not exceed the smallest gap: the bodies do not overlap",
+    )
+
+
+@BEHAVIOUR.specified_in(_SOLUTION)
+def approach_rises_with_load(fixture: ContactFixture) -> None:
+    """The approach rises with the load, and the peak pressure does not fall."""
+    loads = fixture.case.normal_force * np.array([0.5, 0.75, 1.0, 1.25])
+    solutions = [fixture.solve(fixture.point(normal_force=float(load))) for load in loads]
+    for name, smallest in (("approach", 1e-12), ("peak_pressure", -1e-9)):
+        values = np.array([getattr(solution, name) for solution in solutions])
+        require(
+            (np.diff(values) > smallest * np.abs(values[1:])).all(),
+            f"{name} at loads of {loads} N is {values}",
+        )
+
+
+@BEHAVIOUR.specified_in("wearsim.types.Grid")
+def convergence_with_strips(fixture: ContactFixture) -> None:
+    """Doubling the number of strips twice changes the result less the second time."""
+    case, solutions = fixture.case, []
+    for times in (1, 2, 4):
+        grid = case.grid(times)
+        point = fixture.point(Creepage(3e-4, 4e-4, 0.3))
+        solutions.append(fixture.fresh(grid).solve_one(case.gap(grid), case.curvature, point))
+    for name in ("approach", "peak_pressure", "power", "force_x", "force_y"):
+        coarse, middle, fine = (getattr(solution, name) for solution in solutions)
+        first, second, noise = abs(middle - coarse), abs(fine - middle), 2e-3 * abs(fine)
+        require(
+            second <= 0.75 * first + noise and abs(fine - coarse) <= 0.1 * abs(fine),
+            f"{name} is {coarse:.6g}, {middle:.6g} and {fine:.6g} with {case.strips},"
+            f" {2 * case.strips} and {4 * case.strips} strips: it does not converge",
+        )
+
+
 _SOLVE = "wearsim.plugins.ContactModel.solve"
 
 
@@ -184,20 +391,3 @@ def batch_error_names_contact(fixture: ContactFixture) -> None:
         error.state.get("contact") == [2] and "contact 2" in str(error),
         f"the error of a batch names no contact: {error}",
     )
-
-
-@BEHAVIOUR.specified_in("wearsim.plugins.ContactModelSpec")
-def suggested_grid_holds_contact(fixture: ContactFixture) -> None:
-    """The suggested strips are equally wide and contain the contact."""
-    case, suggest = fixture.case, fixture.configured.spec.suggest_grid
-    if suggest is None:
-        return
-    problem = 1.0 / case.crown_radius, case.curvature, case.normal_force, case.materials
-    grid = suggest(fixture.configured.options, *problem)
-    if grid is None:
-        return
-    equal = np.full(grid.strips - 1, grid.spacing)
-    agree("the spacing of the suggested strips", np.diff(grid.y), equal, 1e-9)
-    solution = fixture.fresh(grid).solve_one(case.gap(grid), case.curvature, fixture.point())
-    carried = float(solution.line_load.sum()) * grid.spacing
-    agree("load of the suggested strips", carried, case.normal_force, case.tolerance)

@@ -42,6 +42,23 @@ def _is_refused(fixture: ContactFixture, capability: str, call: Callable[[], Any
 
 
 @CAPABILITIES.specified_in("wearsim.plugins.ContactModelSpec")
+def suggested_grid_holds_contact(fixture: ContactFixture) -> None:
+    """The suggested strips are equally wide and contain the contact."""
+    case, suggest = fixture.case, fixture.configured.spec.suggest_grid
+    if suggest is None:
+        return
+    problem = 1.0 / case.crown_radius, case.curvature, case.normal_force, case.materials
+    grid = suggest(fixture.configured.options, *problem)
+    if grid is None:
+        return
+    equal = np.full(grid.strips - 1, grid.spacing)
+    agree("the spacing of the suggested strips", np.diff(grid.y), equal, 1e-9)
+    solution = fixture.fresh(grid).solve_one(case.gap(grid), case.curvature, fixture.point())
+    carried = float(solution.line_load.sum()) * grid.spacing
+    agree("load of the suggested strips", carried, case.normal_force, case.tolerance)
+
+
+@CAPABILITIES.specified_in("wearsim.plugins.ContactModelSpec")
 def spec_and_model_capabilities_agree(fixture: ContactFixture) -> None:
     """The spec claims all capabilities of its models, and with default options no others."""
     of_spec = set(fixture.configured.spec.capabilities.names())

@@ -9,7 +9,6 @@ from typing import TypeVar
 from wearsim.plugins import ContactModelSpec, LoadSpec, RandomInputSpec, WearLawSpec
 from wearsim.testing import random_inputs
 from wearsim.testing.checks import Check, Checks, ConfiguredSpec, resolve, spec_checks
-from wearsim.testing.contact_balances import BALANCES
 from wearsim.testing.contact_behaviour import BEHAVIOUR
 from wearsim.testing.contact_capabilities import CAPABILITIES
 from wearsim.testing.contact_fixtures import ContactCase, ContactFixture
@@ -19,7 +18,7 @@ from wearsim.units import Kind
 
 F = TypeVar("F")
 Tests = Callable[[Check[F]], None]
-CONTACT_MODEL = Checks(spec_checks() | BALANCES | BEHAVIOUR | CAPABILITIES)
+CONTACT_MODEL = Checks(spec_checks() | BEHAVIOUR | CAPABILITIES)
 NOTHING: Mapping[str, str] = {}
 
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from wearsim.cli.arguments import ScenarioFile, Settings, read_scenario
-from wearsim.cli.output import write_notes, write_table
+from wearsim.cli.shared import ScenarioFile, Settings, read_scenario, write_notes, write_table
 
 
 def check(scenario: ScenarioFile, settings: Settings = None) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from wearsim.cli.arguments import Figure, Force, Json, check_figure, open_any
+from wearsim.cli.shared import Figure, Force, Json, check_figure, open_any
 
 if TYPE_CHECKING:
     from wearsim.results import EnsembleResult, Result

@@ -7,9 +7,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wearsim.cli.arguments import Figure, Force, Json, ScenarioFile, Settings, check_figure
-from wearsim.cli.arguments import read_scenario as load
-from wearsim.cli.output import note, write_json, write_table
+from wearsim.cli.shared import (
+    Figure,
+    Force,
+    Json,
+    ScenarioFile,
+    Settings,
+    check_figure,
+    note,
+    write_json,
+    write_table,
+)
+from wearsim.cli.shared import read_scenario as load
 
 if TYPE_CHECKING:
     from wearsim.scenario import Scenario
@@ -82,7 +91,7 @@ def _profile(path: Path | None) -> Profile | None:
     """Return the profile in a CSV, or None if no file is given."""
     if path is None:
         return None
-    from wearsim.cli.arguments import read_text
+    from wearsim.cli.shared import read_text
     from wearsim.quantities import InputFile
     from wearsim.scenario import read_profile
 

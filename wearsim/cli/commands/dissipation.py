@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from wearsim.cli.arguments import (
+from wearsim.cli.shared import (
     FigureOption,
     Force,
     Json,
@@ -20,8 +20,9 @@ from wearsim.cli.arguments import (
     read_scenario,
     refuse_same_file,
     results_option,
+    write_json,
+    write_notes,
 )
-from wearsim.cli.output import write_json, write_notes
 
 Output = Annotated[Path | None, results_option("-dissipation.h5")]
 Plan = Annotated[

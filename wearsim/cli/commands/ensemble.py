@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wearsim.cli.arguments import (
+from wearsim.cli.shared import (
     FigureOption,
     Force,
     Json,
@@ -22,11 +22,13 @@ from wearsim.cli.arguments import (
     check_figure,
     checked_scheduler,
     checking,
+    note,
     read_scenario,
     refuse_same_file,
     results_option,
+    write_json,
+    write_notes,
 )
-from wearsim.cli.output import note, write_json, write_notes
 
 if TYPE_CHECKING:
     from wearsim.results import EnsembleResult

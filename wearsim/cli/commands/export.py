@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from wearsim.cli.arguments import ResultsFile, open_any
+from wearsim.cli.shared import ResultsFile, open_any
 
 Folder = Annotated[
     Path,

@@ -7,8 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wearsim.cli.arguments import Figure, Force, Json, check_figure
-from wearsim.cli.output import note, write_json, write_notes, write_table
+from wearsim.cli.shared import (
+    Figure,
+    Force,
+    Json,
+    check_figure,
+    note,
+    write_json,
+    write_notes,
+    write_table,
+)
 
 if TYPE_CHECKING:
     from pathlib import Path

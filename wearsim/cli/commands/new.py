@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from wearsim.cli.arguments import Force, checking
-from wearsim.cli.output import note, refuse_existing
+from wearsim.cli.shared import Force, checking, note, refuse_existing
 
 new = typer.Typer(
     name="new",

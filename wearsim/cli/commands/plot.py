@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from wearsim.cli.arguments import Figure, Force, ResultsFile, check_figure, open_any, read_text
-from wearsim.cli.output import note
+from wearsim.cli.shared import Figure, Force, ResultsFile, check_figure, note, open_any, read_text
 
 if TYPE_CHECKING:
     from wearsim.report.parts import Measured

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from wearsim.cli.arguments import Json
-from wearsim.cli.output import note, write_json, write_list
+from wearsim.cli.shared import Json, note, write_json, write_list
 
 if TYPE_CHECKING:
     from wearsim.plugins.manager import Registered

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from wearsim.cli.arguments import (
+from wearsim.cli.shared import (
     Json,
     Quiet,
     ResultsFile,
@@ -15,8 +15,8 @@ from wearsim.cli.arguments import (
     Workers,
     checked_scheduler,
     checking,
+    note,
 )
-from wearsim.cli.output import note
 
 if TYPE_CHECKING:
     from wearsim.results import EnsembleResult

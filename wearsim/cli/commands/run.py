@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from wearsim.cli.arguments import (
+from wearsim.cli.shared import (
     Force,
     Json,
     Quiet,
@@ -15,8 +15,10 @@ from wearsim.cli.arguments import (
     Settings,
     read_scenario,
     results_option,
+    write_json,
+    write_notes,
+    write_table,
 )
-from wearsim.cli.output import write_json, write_notes, write_table
 
 if TYPE_CHECKING:
     from wearsim.results import Result

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from wearsim.cli.output import write_json
+from wearsim.cli.shared import write_json
 
 
 def schema() -> None:

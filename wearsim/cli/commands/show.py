@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from wearsim.cli.arguments import Json, ResultsFile, open_any
-from wearsim.cli.output import write_json, write_notes, write_table
+from wearsim.cli.shared import Json, ResultsFile, open_any, write_json, write_notes, write_table
 
 if TYPE_CHECKING:
     from wearsim.results import Result

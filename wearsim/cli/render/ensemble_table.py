@@ -6,12 +6,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import typer
 
-from wearsim.cli.output import note, write_json, write_list, write_notes, write_table
 from wearsim.cli.render.summary import CONSTANT, Rows, input_data, input_rows, still_random
+from wearsim.cli.shared import note, write_json, write_list, write_notes, write_table
 from wearsim.report.text import (
     NOTHING,
     OBSERVABLES,
@@ -27,14 +27,10 @@ from wearsim.report.text import (
     si_key,
     too_few,
 )
-from wearsim.uq.estimation.estimates import Target
-
-if TYPE_CHECKING:
-    from wearsim.results import EnsembleResult, Result
-    from wearsim.results.ensemble.result import Effect
-    from wearsim.studies.ensemble.compare import Compared, Comparison
-    from wearsim.uq.estimation.estimates import Estimate
-
+from wearsim.results import EnsembleResult, Result
+from wearsim.results.ensemble.result import Effect
+from wearsim.studies.ensemble.compare import Compared, Comparison, compare
+from wearsim.uq.estimation.estimates import Estimate, Target
 
 QUANTILES = (0.05, 0.5, 0.95)
 _HEADS = ("at the end", "mean", "std", "5 %", "median", "95 %")
@@ -238,8 +234,6 @@ def report_comparison(
     json : bool
         Whether to write JSON instead of tables.
     """
-    from wearsim.studies.ensemble.compare import compare
-
     found = compare(results, labels, observable)
     files = [str(result.path) for result in results]
     suffix = f"for values of {key}" if key else ""

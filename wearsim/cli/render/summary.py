@@ -7,15 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wearsim.cli.output import write_list, write_table
+from wearsim.cli.shared import write_list, write_table
+from wearsim.errors import PluginError, ScenarioError
 from wearsim.report.text import NOTHING, Named, brief, count, in_unit, lapse, shown
-from wearsim.uq.estimation.moments import is_constant
+from wearsim.results import DissipationResult, EnsembleResult, Result
+from wearsim.types import FloatArray
+from wearsim.units import engineers_unit, in_engineers_unit
+from wearsim.uq.estimation.moments import Summary, is_constant
 
 if TYPE_CHECKING:
-    from wearsim.results import DissipationResult, EnsembleResult, Result
     from wearsim.studies.contact.single import ContactStudy
-    from wearsim.types import FloatArray
-    from wearsim.uq.estimation.moments import Summary
 
 
 Rows = list[tuple[str, str]]
@@ -57,8 +58,6 @@ def end_state(result: Result) -> Rows:
 
 def draws(result: Result) -> Rows:
     """Return rows on the random inputs of a run: drawn values and inputs that vary in time."""
-    from wearsim.units import engineers_unit
-
     rows = []
     for key, drawn in result.raw.drawn.items():
         unit, size = engineers_unit(drawn["unit"])
@@ -69,8 +68,6 @@ def draws(result: Result) -> Rows:
 
 def input_rows(result: DissipationResult | EnsembleResult) -> Rows:
     """Return rows on the random inputs of a study: mean and standard deviation of the draws."""
-    from wearsim.units import in_engineers_unit
-
     rows = []
     for item in result.raw.inputs if result.count else []:
         values, unit = result.inputs[item["key"]], item["unit"]
@@ -110,9 +107,6 @@ def still_random(result: Result | DissipationResult | EnsembleResult) -> dict[st
     These are fields, processes and inputs drawn at every pass. They are read from the stored
     scenario; if one of its plugins is not installed, the reason is returned instead.
     """
-    from wearsim.errors import PluginError, ScenarioError
-    from wearsim.results import DissipationResult, Result
-
     try:
         random = result.scenario.random
     except (PluginError, ScenarioError) as error:

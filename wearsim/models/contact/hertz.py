@@ -14,8 +14,8 @@ from wearsim.mechanics.hertz import parabola_fit
 from wearsim.mechanics.hertz.elasticity import ElasticPair, combine
 from wearsim.mechanics.hertz.ellipse import HertzContact, given_ellipse, hertz
 from wearsim.mechanics.hertz.patches import fit_within
-from wearsim.models.contact.equivalent_ellipse import EllipseStrips
 from wearsim.models.tangential.base import (
+    EllipseStrips,
     Strips,
     TangentialTheory,
     complete,

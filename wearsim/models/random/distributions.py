@@ -68,10 +68,16 @@ def _read_quantiles(file: InputFile, unit: str) -> tuple[FloatArray, FloatArray]
 
 
 class TableDistribution(Distribution):
-    """Quantile function that interpolates linearly in a table."""
+    """Quantile function that interpolates linearly in a table.
 
-    def __init__(self, options: TableOptions) -> None:
-        self._probability, self._value = options.quantiles
+    Parameters
+    ----------
+    probability, value : ndarray, shape (points,)
+        Probabilities from 0 to 1, and the quantiles; two equal ones are a constant.
+    """
+
+    def __init__(self, probability: FloatArray, value: FloatArray) -> None:
+        self._probability, self._value = probability, value
 
     def quantile(self, probability: FloatArray) -> FloatArray:
         """Return the quantiles, shape as `probability`."""
@@ -272,32 +278,6 @@ class Lognormal(Distribution):
         return self.mean * math.sqrt(math.expm1(self._spread**2))
 
 
-class Constant(Distribution):
-    """Distribution of a constant."""
-
-    def __init__(self, options: ConstantOptions) -> None:
-        self._value = options.value
-
-    def quantile(self, probability: FloatArray) -> FloatArray:
-        """Return the value, shape as `probability`."""
-        return np.full(np.shape(probability), self._value)
-
-    @cached_property
-    def support(self) -> tuple[float, float]:
-        """The value as minimum and maximum."""
-        return self._value, self._value
-
-    @cached_property
-    def mean(self) -> float:
-        """The value."""
-        return self._value
-
-    @cached_property
-    def std(self) -> float:
-        """Zero."""
-        return 0.0
-
-
 _ENTROPY = (
     "Jaynes, Physical Review 106 (1957), DOI 10.1103/PhysRev.106.620",
     "Chevalier, Cloupet, Soize, Wear 258 (2005), DOI 10.1016/j.wear.2004.11.012",
@@ -344,14 +324,14 @@ SPECS = (
     ),
     RandomInputSpec(
         name="constant",
-        factory=Constant,
+        factory=lambda options: TableDistribution(np.array([0.0, 1.0]), np.full(2, options.value)),
         options=ConstantOptions,
         summary="a constant value",
         protocol=2,
     ),
     RandomInputSpec(
         name="table",
-        factory=TableDistribution,
+        factory=lambda options: TableDistribution(*options.quantiles),
         options=TableOptions,
         summary="measured samples, or a table of quantiles, from a CSV file",
         protocol=2,

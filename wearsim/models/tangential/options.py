@@ -7,6 +7,7 @@ from typing import Literal
 from pydantic import Field, ValidationInfo, field_validator
 
 from wearsim.models.tangential.base import TangentialTheory
+from wearsim.models.tangential.fastsim import FastripTheory, FastsimTheory
 from wearsim.models.tangential.strip_theory import StripTheory
 from wearsim.plugins import Options
 from wearsim.units import QuantityError, shown
@@ -49,11 +50,6 @@ def tangential_theory(options: TangentialOptions) -> TangentialTheory:
     """Return the tangential theory that the options select."""
     if options.tangential == "strip":
         return StripTheory()
-    # the kernels of marches are slow to load
     if options.tangential == "fastrip":
-        from wearsim.models.tangential.fastrip import FastripTheory  # noqa: PLC0415
-
         return FastripTheory(options.mx)
-    from wearsim.models.tangential.fastsim import FastsimTheory  # noqa: PLC0415
-
     return FastsimTheory(options.bound, options.mx, flexibility=options.flexibility)

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated, TypeAlias
 
 import typer
 
-from wearsim.cli.arguments import Force, Json, Quiet
-from wearsim.cli.output import note, refuse_existing
+from wearsim.cli.shared import Force, Json, Quiet, note, refuse_existing
 
 if TYPE_CHECKING:
     from wearsim_bench.measure.measurement import Effort, OnProgress, Topic
@@ -167,7 +166,7 @@ def progress_bar(name: str, quiet: bool) -> Iterator[OnProgress]:
     quiet : bool
         Show nothing.
     """
-    from wearsim.cli.output import console
+    from wearsim.cli.shared import console
 
     screen = console(err=True)
     if quiet:

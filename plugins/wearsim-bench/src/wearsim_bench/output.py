@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from wearsim.cli.output import console, note, plain, write_json
+from wearsim.cli.shared import console, note, plain, write_json
 
 if TYPE_CHECKING:
     from rich.console import Console

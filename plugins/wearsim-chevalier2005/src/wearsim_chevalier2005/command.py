@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from wearsim.cli.arguments import Figure, Force, Json, Quiet, check_figure
-from wearsim.cli.output import console, note, write_json
+from wearsim.cli.shared import Figure, Force, Json, Quiet, check_figure, console, note, write_json
 
 if TYPE_CHECKING:
     from pathlib import Path
