@@ -27,7 +27,7 @@ def _is_refused(fixture: ContactFixture, capability: str, call: Callable[[], Any
     ConformanceError
         If the capability is not claimed and `call`, which requires it, raises no CapabilityError.
     """
-    if getattr(fixture.capabilities, capability):
+    if getattr(fixture.model.capabilities, capability):
         return False
     message = f"{capability} is not claimed, and a call that requires it"
     try:
@@ -62,7 +62,7 @@ def suggested_grid_holds_contact(fixture: ContactFixture) -> None:
 def spec_and_model_capabilities_agree(fixture: ContactFixture) -> None:
     """The spec claims all capabilities of its models, and with default options no others."""
     of_spec = set(fixture.configured.spec.capabilities.names())
-    of_model = set(fixture.capabilities.names())
+    of_model = set(fixture.model.capabilities.names())
     extra = ", ".join(sorted(of_model - of_spec))
     require(not extra, f"the model claims {extra}, and its spec does not")
     missing = "" if fixture.configured.raw else ", ".join(sorted(of_spec - of_model))

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from wearsim.contact_batch import ContactBatch
-from wearsim.plugins import Capabilities, ContactModel, ContactModelSpec
+from wearsim.plugins import ContactModel, ContactModelSpec
 from wearsim.testing.checks import Fixture
 from wearsim.types import (
     ContactSolution,
@@ -132,11 +132,6 @@ class ContactFixture(Fixture[ContactModelSpec]):
         return self.instance  # type: ignore[no-any-return]
 
     @property
-    def capabilities(self) -> Capabilities:
-        """The capabilities that the model claims."""
-        return self.model.capabilities
-
-    @property
     def gap(self) -> FloatArray:
         """Gap of a crown in the middle of the strips [m]."""
         return self.gaps["fresh"]
@@ -191,9 +186,3 @@ class ContactFixture(Fixture[ContactModelSpec]):
             for shape, gap in self.gaps.items()
             for slip, point in ((slip, self.point(creep)) for slip, creep in CREEPAGES.items())
         }
-
-    @property
-    def sliding_power(self) -> float:
-        """Power of the whole load sliding at the base creepage [W], a scale for differences."""
-        case = self.case
-        return case.friction * case.normal_force * case.rolling_speed * 1e-3

@@ -15,10 +15,11 @@ from wearsim.cli.shared import (
     Settings,
     check_figure,
     note,
+    read_scenario,
+    read_text,
     write_json,
     write_table,
 )
-from wearsim.cli.shared import read_scenario as load
 
 if TYPE_CHECKING:
     from wearsim.scenario import Scenario
@@ -46,7 +47,7 @@ def contact(
 ) -> None:
     """Solve one contact: the first roller at the start of the load."""
     check_figure(figure, force)
-    loaded = load(scenario, settings)
+    loaded = read_scenario(scenario, settings)
     from wearsim.results import refuse_inputs
     from wearsim.studies.contact.single import study_contact
 
@@ -91,7 +92,6 @@ def _profile(path: Path | None) -> Profile | None:
     """Return the profile in a CSV, or None if no file is given."""
     if path is None:
         return None
-    from wearsim.cli.shared import read_text
     from wearsim.quantities import InputFile
     from wearsim.scenario import read_profile
 

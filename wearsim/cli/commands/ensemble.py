@@ -103,7 +103,8 @@ def ensemble(
     if sweep is None:
         key, files = "", {"": path}
     else:
-        key, values = parse_sweep(sweep)
+        with checking("--sweep"):
+            key, values = parse_sweep(sweep)
         if any(text.partition("=")[0].strip() == key for text in texts):
             raise typer.BadParameter(f"{key} is also the key of --sweep", param_hint="--set")
         files = {value: path_of(path, value) for value in values}
@@ -205,29 +206,25 @@ def parse_sweep(text: str) -> tuple[str, tuple[str, ...]]:
 
     Raises
     ------
-    typer.BadParameter
+    ValueError
         If there is no key, an empty value, fewer than two values, or two equal ones.
     """
     key, equals, listed = text.partition("=")
     if not equals or not key.strip():
-        raise _sweep_error(f"'{text}' is not a key with values, expected one {_EXAMPLE}")
+        raise ValueError(f"'{text}' is not a key with values, expected one {_EXAMPLE}")
     values = tuple(
         _WITHOUT_SPACE.sub(r"\1 \2", value) if _WITHOUT_SPACE.fullmatch(value) else value
         for value in map(str.strip, listed.split(","))
     )
     if not all(values):
-        raise _sweep_error(f"'{text}' has an empty value, expected values {_EXAMPLE}")
+        raise ValueError(f"'{text}' has an empty value, expected values {_EXAMPLE}")
     if len(values) < 2:
-        raise _sweep_error(f"'{text}' has one value, expected two or more {_EXAMPLE}")
+        raise ValueError(f"'{text}' has one value, expected two or more {_EXAMPLE}")
     for number, value in enumerate(values):
         for before in values[:number]:
             if _are_equal(before, value):
-                raise _sweep_error(f"'{before}' and '{value}' are the same value; remove one")
+                raise ValueError(f"'{before}' and '{value}' are the same value; remove one")
     return key.strip(), values
-
-
-def _sweep_error(message: str) -> typer.BadParameter:
-    return typer.BadParameter(message, param_hint="--sweep")
 
 
 def _are_equal(one: str, other: str) -> bool:

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from wearsim.cli.shared import Json, note, write_json, write_list
-
-if TYPE_CHECKING:
-    from wearsim.plugins.manager import Registered
 
 _HEADS = ("name", "kind", "distribution", "version", "protocol", "capabilities", "summary")
 
@@ -17,7 +14,20 @@ def plugins(json: Json = False) -> None:
     from wearsim.plugins import registry
 
     found = registry()
-    entries = [_entry(item) for item in found.all()]
+    entries: list[dict[str, Any]] = [
+        {
+            "name": item.spec.name,
+            "kind": item.spec.kind,
+            "distribution": item.distribution,
+            "version": item.version,
+            "protocol": item.spec.protocol,
+            "refused": item.refusal,
+            "capabilities": item.spec.describe(),
+            "summary": item.spec.summary,
+            "references": list(item.spec.references),
+        }
+        for item in found.all()
+    ]
     if json:
         keys = ("entry_point", "distribution", "version", "cause")
         broken = [{key: getattr(item, key) for key in keys} for item in found.broken]
@@ -33,17 +43,3 @@ def plugins(json: Json = False) -> None:
             f"broken: plugin '{item.entry_point}' of {item.distribution} {item.version}"
             f" failed to load: {item.cause}"
         )
-
-
-def _entry(item: Registered) -> dict[str, Any]:
-    return {
-        "name": item.spec.name,
-        "kind": item.spec.kind,
-        "distribution": item.distribution,
-        "version": item.version,
-        "protocol": item.spec.protocol,
-        "refused": item.refusal,
-        "capabilities": item.spec.describe(),
-        "summary": item.spec.summary,
-        "references": list(item.spec.references),
-    }

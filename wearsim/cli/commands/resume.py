@@ -62,7 +62,27 @@ def resume(
             raise typer.BadParameter("only wear tests can be extended", param_hint="--until")
         if failed and realisations is not None:
             raise typer.BadParameter("extend the ensemble first", param_hint="--failed")
-        _resume_ensemble(file, failed, realisations, workers, scheduler, json, quiet)
+        chosen = checked_scheduler(scheduler, workers)
+        from wearsim.cli.commands.ensemble import STOPPING, report
+        from wearsim.cli.progress import EnsembleWatcher, stop_on_signals
+        from wearsim.results import open_ensemble
+        from wearsim.studies.ensemble.api import resume_ensemble
+
+        nothing = _nothing_to_do(open_ensemble(file), failed)
+        if nothing and realisations is None:
+            note(f"note: nothing to do: {nothing}")
+        with stop_on_signals(STOPPING) as stop, EnsembleWatcher(quiet) as watch:
+            result = resume_ensemble(
+                file,
+                failed=failed,
+                realisations=realisations,
+                workers=workers,
+                scheduler=chosen,
+                on_progress=watch,
+                stop_requested=stop.is_set,
+                on_notice=watch.notice,
+            )
+        report(result, json, None, watch.workers)
         return
     for option, is_given in (
         ("--failed", failed),
@@ -91,38 +111,6 @@ def _resume_run(file: Path, until: str | None, json: bool, quiet: bool) -> None:
     with stop_on_signals() as stop, RunWatcher(quiet) as watch:
         result = study.resume(file, seconds, on_event=watch, stop_requested=stop.is_set)
     report(result, json)
-
-
-def _resume_ensemble(
-    file: Path,
-    failed: bool,
-    realisations: int | None,
-    workers: int | None,
-    scheduler: str | None,
-    json: bool,
-    quiet: bool,
-) -> None:
-    chosen = checked_scheduler(scheduler, workers)
-    from wearsim.cli.commands.ensemble import STOPPING, report
-    from wearsim.cli.progress import EnsembleWatcher, stop_on_signals
-    from wearsim.results import open_ensemble
-    from wearsim.studies.ensemble.api import resume_ensemble
-
-    nothing = _nothing_to_do(open_ensemble(file), failed)
-    if nothing and realisations is None:
-        note(f"note: nothing to do: {nothing}")
-    with stop_on_signals(STOPPING) as stop, EnsembleWatcher(quiet) as watch:
-        result = resume_ensemble(
-            file,
-            failed=failed,
-            realisations=realisations,
-            workers=workers,
-            scheduler=chosen,
-            on_progress=watch,
-            stop_requested=stop.is_set,
-            on_notice=watch.notice,
-        )
-    report(result, json, None, watch.workers)
 
 
 def _nothing_to_do(before: EnsembleResult, failed: bool) -> str:

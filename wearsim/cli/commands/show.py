@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 from wearsim.cli.shared import Json, ResultsFile, open_any, write_json, write_notes, write_table
 
 if TYPE_CHECKING:
-    from wearsim.results import Result
     from wearsim.results.content import StudyData
 
 
 def show(file: ResultsFile, json: Json = False) -> None:
     """Show the content of a results file and the end state."""
     from wearsim.cli.render import ensemble_table, summary
+    from wearsim.report.text import count
     from wearsim.results import DissipationResult, EnsembleResult
 
     result = open_any(file)
@@ -38,7 +38,18 @@ def show(file: ResultsFile, json: Json = False) -> None:
         groups = [(f"random {item['name']}", item["text"]) for item in result.raw.groups]
         ensemble_table.write_ensemble(result, [*groups, *_sources(result.raw)])
     else:
-        write_table(result.title, _contents(result))
+        first, last = (count(float(result.record_passes[place])) for place in (0, -1))
+        rows = [
+            ("test", summary.standing(result)),
+            ("contact model", result.described_model),
+            ("stepper", f"{result.stepper}, tolerance {result.raw.tolerance:g}"),
+            ("seed", str(result.raw.seed)),
+            *summary.draws(result),
+            ("records", f"{len(result.record_passes)}, at passes {first} to {last}"),
+            ("strips", str(len(result.y))),
+            *summary.effort(result),
+        ]
+        write_table(result.title, [*rows, *_sources(result.raw)])
         title = "end state" if result.finished else "current state"
         write_table(title, summary.end_state(result))
     write_notes(result.notes, result.warnings)
@@ -58,25 +69,6 @@ def _sources(raw: StudyData) -> list[tuple[str, str]]:
         ("plugins", "\n".join(plugins)),
         ("software", ", ".join(f"{name} {number}" for name, number in raw.software.items())),
         ("written", raw.created),
-    ]
-
-
-def _contents(result: Result) -> list[tuple[str, str]]:
-    """Return rows on how a run was computed."""
-    from wearsim.cli.render.summary import draws, effort, standing
-    from wearsim.report.text import count
-
-    first, last = (count(float(result.record_passes[place])) for place in (0, -1))
-    return [
-        ("test", standing(result)),
-        ("contact model", result.described_model),
-        ("stepper", f"{result.stepper}, tolerance {result.raw.tolerance:g}"),
-        ("seed", str(result.raw.seed)),
-        *draws(result),
-        ("records", f"{len(result.record_passes)}, at passes {first} to {last}"),
-        ("strips", str(len(result.y))),
-        *effort(result),
-        *_sources(result.raw),
     ]
 
 

@@ -19,8 +19,8 @@ from wearsim.models.tangential.base import (
     Strips,
     TangentialTheory,
     complete,
-    fields_inside,
     friction_per_strip,
+    local_slip,
     power_not_finite,
 )
 from wearsim.models.tangential.options import TangentialOptions, tangential_theory
@@ -120,14 +120,13 @@ class HertzModel(SingleContactModel):
     ) -> ContactFields:
         """Return pressure, traction and slip in a solved contact."""
         strips = self._theory_strips(gap, longitudinal_curvature, point)
-        return fields_inside(
-            self.theory,
+        return self.theory.fields(
             strips,
             self._pair,
-            point,
-            solution.longitudinal_creepage,
-            points_along,
+            local_slip(strips, point, solution.longitudinal_creepage),
             self._friction(strips, point),
+            point.rolling_speed,
+            points_along,
         )
 
     def _friction(self, strips: Strips, point: OperatingPoint) -> FloatArray:

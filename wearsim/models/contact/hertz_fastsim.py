@@ -159,12 +159,15 @@ class HertzFastsim(HertzModel):
         gaps, row = _distinct_gaps(batch.gap)
         patches = _new_patches(len(row))
         results = ContactResults(*np.zeros((3, len(row), strips)), *np.zeros((5, len(row))))
+        # axes without variation have the length 1
+        contacts, rank = len(row), batch.friction.ndim
+        shape = {1: (contacts, 1, 1), 2: (contacts, 1, strips)}.get(rank, batch.friction.shape)
         inputs = ContactInputs(
             _usable_loads(batch),
             _column(batch.longitudinal),
             _column(batch.lateral),
             _column(batch.spin),
-            self._friction_array(batch.friction),
+            _column(batch.friction).reshape(shape),
             batch.friction_carried,
             np.zeros((0, strips)) if batch.variation is None else _column(batch.variation),
             _column(batch.rolling_speed),
@@ -225,12 +228,6 @@ class HertzFastsim(HertzModel):
             TOLERANCE,
             LIMIT,
         )
-
-    def _friction_array(self, friction: FloatArray) -> FloatArray:
-        """Return friction as (contacts, points, strips), axes without variation of length 1."""
-        contacts = len(friction)
-        shape = {1: (contacts, 1, 1), 2: (contacts, 1, self._grid.strips)}
-        return _column(friction).reshape(shape.get(friction.ndim, friction.shape))
 
     def _check_shapes(self, batch: ContactBatch) -> None:
         strips, given = self._grid.strips, batch.friction.shape[1:]

@@ -11,7 +11,13 @@ from wearsim.errors import ContactError
 from wearsim.mechanics.hertz.elasticity import ElasticPair, combine
 from wearsim.mechanics.hertz.ellipse import hertz
 from wearsim.mechanics.slender.influence import influence_table
-from wearsim.models.tangential.base import Strips, TangentialTheory, complete, fields_inside
+from wearsim.models.tangential.base import (
+    Strips,
+    TangentialTheory,
+    complete,
+    friction_per_strip,
+    local_slip,
+)
 from wearsim.plugins import ContactModel
 from wearsim.types import (
     ContactFields,
@@ -63,8 +69,14 @@ class StripModel(ContactModel):
             solution.approach,
             solution.iterations,
         )
-        creepage = solution.longitudinal_creepage
-        return fields_inside(self.theory, strips, self._pair, point, creepage, points_along)
+        return self.theory.fields(
+            strips,
+            self._pair,
+            local_slip(strips, point, solution.longitudinal_creepage),
+            friction_per_strip(strips, point),
+            point.rolling_speed,
+            points_along,
+        )
 
     def _complete(
         self,

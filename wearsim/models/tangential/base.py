@@ -185,29 +185,6 @@ def _balanced_creepage(
     return float(brentq(excess, -reach, reach, xtol=1e-16, rtol=1e-14))
 
 
-def fields_inside(
-    theory: TangentialTheory,
-    strips: Strips,
-    pair: ElasticPair,
-    point: OperatingPoint,
-    longitudinal: float,
-    points_along: int,
-    friction: FloatArray | None = None,
-) -> ContactFields:
-    """Return pressure, traction and slip in a contact with the mean creepage `longitudinal`.
-
-    `friction` has a shape that the theory supports; by default it is that of each strip.
-    """
-    return theory.fields(
-        strips,
-        pair,
-        local_slip(strips, point, longitudinal),
-        friction_per_strip(strips, point) if friction is None else friction,
-        point.rolling_speed,
-        points_along,
-    )
-
-
 def spread_work(work: FloatArray) -> FloatArray:
     """Return a dissipation without negative values that has the sum of the work.
 

@@ -137,7 +137,7 @@ class FastsimTheory(TangentialTheory):
                 ) from error
         return flexibilities(coefficients, a, b, pair.shear_modulus)
 
-    def _flexibilities_under(
+    def flexibilities_under(
         self, strips: Strips, pair: ElasticPair, slip: LocalSlip
     ) -> Flexibilities:
         """Return the flexibilities of the march for a creepage."""
@@ -156,7 +156,7 @@ class FastsimTheory(TangentialTheory):
     ) -> Tractions:
         """Return the tractions for a local slip; strips outside the contact are skipped."""
         part = touching(strips)
-        flexibility = self._flexibilities_under(strips, pair, slip)
+        flexibility = self.flexibilities_under(strips, pair, slip)
         problem = self._problem(strips, flexibility, slip, friction, part)
         out = np.zeros((5, len(strips.y)))
         allowed = self.closed_form == "always" or (self.closed_form == "exact" and slip.spin == 0.0)
@@ -195,7 +195,7 @@ class FastsimTheory(TangentialTheory):
         `friction` has the shape (points, strips), its points are those of the march, and
         `points_along` is not used.
         """
-        flexibility = self._flexibilities_under(strips, pair, slip)
+        flexibility = self.flexibilities_under(strips, pair, slip)
         problem = self._problem(strips, flexibility, slip, friction, slice(0, len(strips.y)))
         half_length, _, elliptic, gradient_x, gradient_y, gradient_spin = problem
         steps = len(friction) if friction.ndim == 2 else points_along - 1
@@ -292,6 +292,8 @@ class FastripTheory(TangentialTheory):
 
     def __init__(self, mx: int = 50) -> None:
         self.mx = mx
+        # for strips with too much spin for strip theory
+        self._march = FastsimTheory("elliptic", mx, flexibility="one")
 
     def tractions(
         self,
@@ -305,7 +307,8 @@ class FastripTheory(TangentialTheory):
         part = touching(strips)
         problem = self._problem(strips, pair, slip, friction, part)
         out = np.zeros((4, len(strips.y)))
-        out[:, part] = fastrip(*problem, self._beyond(strips, pair, slip), self.mx)
+        beyond = self._march.flexibilities_under(strips, pair, slip).longitudinal
+        out[:, part] = fastrip(*problem, beyond, self.mx)
         out[:3] *= covered_share(strips)
         force_x, force_y, moment, adhesion = out
         work = slip.longitudinal * force_x + slip.lateral * force_y + slip.spin * moment
@@ -325,8 +328,7 @@ class FastripTheory(TangentialTheory):
         The slip is that of strip theory, opposite to the traction. Strips for which strip theory is
         not valid have the fields of FASTSIM.
         """
-        march = FastsimTheory("elliptic", self.mx, flexibility="one")
-        marched = march.fields(strips, pair, slip, friction, rolling_speed, points_along)
+        marched = self._march.fields(strips, pair, slip, friction, rolling_speed, points_along)
         problem = self._problem(strips, pair, slip, friction, slice(0, len(strips.y)))
         valid = [not beyond_strip_theory(j, *problem) for j in range(len(strips.y))]
         traction_x, traction_y, slip_x, slip_y = (
@@ -348,14 +350,6 @@ class FastripTheory(TangentialTheory):
             adhesion=(slip_x == 0.0) & (slip_y == 0.0) & (strips.half_length > 0.0),
             power_density=-rolling_speed * (traction_x * slip_x + traction_y * slip_y),
         )
-
-    @staticmethod
-    def _beyond(strips: Strips, pair: ElasticPair, slip: LocalSlip) -> float:
-        """Return the flexibility of the strips that are solved by FASTSIM."""
-        a, b = equivalent_ellipse(strips)
-        coefficients = creepage_coefficients(a / b, pair.poisson_ratio)
-        three = flexibilities(coefficients, a, b, pair.shear_modulus)
-        return single_flexibility(strips, three, slip)
 
     @staticmethod
     def _problem(

@@ -12,7 +12,6 @@ import numpy as np
 from wearsim.types import FloatArray, IntArray
 from wearsim.uq.sampling import sobol
 from wearsim.uq.sampling.philox import Stream
-from wearsim.uq.sampling.sobol import slots
 
 PlanName: TypeAlias = Literal["monte-carlo", "latin-hypercube", "sobol"]
 PLANS: tuple[PlanName, ...] = get_args(PlanName)
@@ -322,7 +321,7 @@ class Sampler:
         self._copula = GaussianCopula(correlations, self._dimensions)
         owner: dict[int, str] = {}
         for name, dimension in self._dimensions.items() if plan == "sobol" else ():
-            for slot in slots(name, dimension) or ():
+            for slot in sobol.slots(name, dimension) or ():
                 if slot in owner:
                     raise ValueError(
                         f"{owner[slot]} and {name} are one quantity and share a dimension of the"
