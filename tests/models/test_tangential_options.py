@@ -5,8 +5,7 @@ from pydantic import ValidationError
 
 from wearsim.errors import ScenarioError
 from wearsim.models.tangential.fastsim import FastripTheory, FastsimTheory
-from wearsim.models.tangential.options import TangentialOptions, tangential_theory
-from wearsim.models.tangential.strip_theory import StripTheory
+from wearsim.models.tangential.strip_theory import StripTheory, TangentialOptions, tangential_theory
 from wearsim.scenario import parse_scenario
 
 RIG = """

@@ -23,7 +23,7 @@ from wearsim.models.tangential.base import (
     local_slip,
     power_not_finite,
 )
-from wearsim.models.tangential.options import TangentialOptions, tangential_theory
+from wearsim.models.tangential.strip_theory import TangentialOptions, tangential_theory
 from wearsim.plugins import Capabilities, ContactModelSpec, Options, SingleContactModel
 from wearsim.quantities import PositiveLength
 from wearsim.types import (

@@ -19,7 +19,7 @@ from wearsim.mechanics.semi_hertzian.penetration import (
 from wearsim.mechanics.slender.influence import HIGHEST
 from wearsim.models.contact.strip_model import StripModel, check_edges, grid_about_hertz
 from wearsim.models.tangential.base import TangentialTheory
-from wearsim.models.tangential.options import TangentialOptions, tangential_theory
+from wearsim.models.tangential.strip_theory import TangentialOptions, tangential_theory
 from wearsim.plugins import Capabilities, ContactModelSpec, SingleContactModel
 from wearsim.types import ContactSolution, FloatArray, Grid, Material, OperatingPoint
 

@@ -18,8 +18,7 @@ from wearsim.mechanics.tangential.strip_interaction import strip_elasticity
 from wearsim.mechanics.tangential.strip_theory import SUMS, strip_contacts
 from wearsim.models.contact.strip_model import StripModel, check_edges, grid_about_hertz
 from wearsim.models.tangential.base import TangentialTheory, power_not_finite
-from wearsim.models.tangential.options import TangentialOptions, tangential_theory
-from wearsim.models.tangential.strip_theory import StripTheory
+from wearsim.models.tangential.strip_theory import StripTheory, TangentialOptions, tangential_theory
 from wearsim.plugins import (
     Capabilities,
     ContactModelSpec,

@@ -16,8 +16,13 @@ from wearsim.uq.distributions.base import (
     Mirrored,
     Uniform,
 )
-from wearsim.uq.distributions.quantile_table import InverseTable, Piece
-from wearsim.uq.distributions.truncated_normal import QuadraticExponent, TruncatedNormal, has_parent
+from wearsim.uq.distributions.truncated_normal import (
+    InverseTable,
+    Piece,
+    QuadraticExponent,
+    TruncatedNormal,
+    has_parent,
+)
 
 _LARGE = 50.0  # shape above which digamma and logarithm cancel
 
