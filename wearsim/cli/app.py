@@ -123,18 +123,6 @@ def installed_verbs() -> dict[str, LazyVerb]:
     return verbs
 
 
-def installation_hint(name: str) -> str | None:
-    """Return how to install a verb of this project, or None for other names."""
-    if name not in FIRST_PARTY:
-        return None
-    distribution = FIRST_PARTY[name]
-    return (
-        f"No such command '{name}'. It is part of {distribution}, which is not installed: pip"
-        f" install 'wearsim[{distribution.removeprefix('wearsim-')}]', or from a clone pip install"
-        f" ./plugins/{distribution}"
-    )
-
-
 def _distribution(point: EntryPoint) -> str:
     return f"{point.dist.name} {point.dist.version}" if point.dist else "an unknown distribution"
 
@@ -173,8 +161,14 @@ class Shell(TyperGroup):
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Return name, verb and remaining arguments; fail with a hint if it is not installed."""
-        if self.get_command(ctx, args[0]) is None and (hint := installation_hint(args[0])):
-            ctx.fail(hint)
+        name = args[0]
+        if self.get_command(ctx, name) is None and name in FIRST_PARTY:
+            distribution = FIRST_PARTY[name]
+            ctx.fail(
+                f"No such command '{name}'. It is part of {distribution}, which is not installed:"
+                f" pip install 'wearsim[{distribution.removeprefix('wearsim-')}]', or from a clone"
+                f" pip install ./plugins/{distribution}"
+            )
         return super().resolve_command(ctx, args)
 
     def _add_installed(self) -> None:

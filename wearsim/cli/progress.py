@@ -54,9 +54,8 @@ class Display:
             get_time=now,
             disable=quiet or not screen.is_terminal,
         )
-        self.columns = math.inf
-        if not self.live.disable:
-            self.columns = screen.width - len("100 %  ") - len(bar) * (_BAR + 1)
+        taken = len("100 %  ") + len(bar) * (_BAR + 1)
+        self.columns = math.inf if self.live.disable else screen.width - taken
         self.live.add_task("starting")
         (self._task,) = self.live.tasks
         self._quiet, self._now, self._written = quiet, now, now()

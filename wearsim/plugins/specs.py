@@ -231,7 +231,8 @@ class Spec:
 
     def describe(self) -> list[str]:
         """Return the capabilities or the role as words."""
-        return []
+        role = getattr(self, "role", None)  # of the specs that have roles
+        return [role] if role else []
 
 
 @dataclass(frozen=True)
@@ -280,10 +281,6 @@ class LoadSpec(Spec):
     factory: Callable[[Any], Load | LoadTerm] = field(kw_only=True)
     role: Literal["base", "term"] = "base"
 
-    def describe(self) -> list[str]:
-        """Return the role."""
-        return [self.role]
-
 
 @dataclass(frozen=True)
 class RandomInputSpec(Spec):
@@ -305,7 +302,3 @@ class RandomInputSpec(Spec):
         kw_only=True
     )
     role: Literal["scalar", "joint", "field", "process"] = "scalar"
-
-    def describe(self) -> list[str]:
-        """Return the role."""
-        return [self.role]

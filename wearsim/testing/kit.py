@@ -133,12 +133,10 @@ def random_input_tests(
 
     def build() -> RandomInputFixture:
         configured = ConfiguredSpec(resolved, options, kind, files)
-        if marginal is None:
-            return RandomInputFixture(configured)
-        name, values = marginal
-        return RandomInputFixture(
-            configured, ConfiguredSpec(resolve(RandomInputSpec, name), values, kind, files)
-        )
+        own = None
+        if marginal is not None:
+            own = ConfiguredSpec(resolve(RandomInputSpec, marginal[0]), marginal[1], kind, files)
+        return RandomInputFixture(configured, own)
 
     return build_tests(random_inputs.BY_ROLE[resolved.role], build, without)
 

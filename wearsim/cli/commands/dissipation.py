@@ -54,8 +54,8 @@ def dissipation(
 ) -> None:
     """Solve one contact for many realisations of its random inputs."""
     check_figure(figure, force, "--figure")
-    options = [f"sampling.plan={plan}"] if plan is not None else []
-    options += [f"seed={seed}"] if seed is not None else []
+    given = {"sampling.plan": plan, "seed": seed}
+    options = [f"{key}={value}" for key, value in given.items() if value is not None]
     loaded = read_scenario(scenario, [*(settings or []), *options])
     path = output if output is not None else Path(f"{scenario.stem}-dissipation.h5")
     refuse_same_file(figure, path, loaded.paths)
