@@ -157,7 +157,9 @@ def test_every_kernel_has_one_signature(tmp_path: Path):
     counts = run(EVERYTHING, NUMBA_CACHE_DIR=tmp_path)
     unused = kernels() - set(counts)
     assert not unused, f"not reached by this test's runs: {unused}"
-    assert len(counts.pop("newton.solve_slender")) == 2  # with and without shared bodies
+    # with and without shared bodies, friction field and derivative
+    for name in ("newton.solve_slender", "fastsim.march_into", "influence.read_influence"):
+        assert len(counts.pop(name)) == 2
     several = {name: signatures for name, signatures in counts.items() if len(signatures) > 1}
     assert not several, json.dumps(several, indent=1)
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from wearsim.mechanics.tangential.fastsim_closed_form import closed_form
+from wearsim.mechanics.tangential.fastsim import closed_form
 
 
 def closed_form_parabolic(

@@ -3,7 +3,7 @@
 import pytest
 from test_fastsim import SPEED, rig
 
-from wearsim.mechanics.tangential.fastsim_closed_form import closed_form
+from wearsim.mechanics.tangential.fastsim import closed_form
 from wearsim_bench.exact_solutions import rows, table
 
 

@@ -3,16 +3,47 @@
 from __future__ import annotations
 
 import math
+from typing import TypeAlias
 
 from wearsim.mechanics.hertz.ellipse import hertz_ellipse
 from wearsim.mechanics.numerics.jit import kernel, subroutine
 from wearsim.types import FloatArray
+
+Moments: TypeAlias = tuple[float, float, float, float, float, float, float, float]
 
 CONVERGED, NOT_CONVERGED, NO_CURVATURE, TOO_FEW_STRIPS, LEAVES_STRIPS = range(5)
 
 ROUND_OFF = 4e-15  # of the greatest height of the gap: tolerance of `is_parabola`
 
 HOLLOW = 1.0  # upper bound of ln(b'/b), and its value in the concave part of a groove
+
+
+NO_MOMENTS = (0.0,) * 8
+
+
+@subroutine
+def add_moments(moments: Moments, weight: float, t: float, height: float) -> Moments:
+    """Add a weighted point to the moments of a least-squares parabola.
+
+    Parameters
+    ----------
+    moments : tuple of float
+        Sums of the weight times 1, t, ..., t^4, and of weight and height times 1, t, t^2.
+    weight, t, height : float
+        Weight, position and height of the point.
+    """
+    m0, m1, m2, m3, m4, s0, s1, s2 = moments
+    first, second = weight * t, weight * t * t
+    return (
+        m0 + weight,
+        m1 + first,
+        m2 + second,
+        m3 + second * t,
+        m4 + second * t * t,
+        s0 + weight * height,
+        s1 + first * height,
+        s2 + second * height,
+    )
 
 
 @subroutine
@@ -35,8 +66,7 @@ def fit_parabola(
     used : int
         Number of strips with positive weight; a parabola requires at least three.
     """
-    m0 = m1 = m2 = m3 = m4 = s0 = s1 = s2 = 0.0
-    used = nearest = 0
+    moments, used, nearest = NO_MOMENTS, 0, 0
     for i in range(1, len(y)):
         if abs(y[i] - centre) < abs(y[nearest] - centre):
             nearest = i
@@ -47,18 +77,10 @@ def fit_parabola(
         if weight <= 1e-12:
             continue
         used += 1
-        first, second = weight * t, weight * t * t
-        height = gap[i] - shift
-        m0 += weight
-        m1 += first
-        m2 += second
-        m3 += second * t
-        m4 += second * t * t
-        s0 += weight * height
-        s1 += first * height
-        s2 += second * height
+        moments = add_moments(moments, weight, t, gap[i] - shift)
     if used < 3:
         return math.nan, math.nan, math.nan, used
+    m0, m1, m2, m3, m4, s0, s1, s2 = moments
     det = m0 * (m2 * m4 - m3 * m3) - m1 * (m1 * m4 - m2 * m3) + m2 * (m1 * m3 - m2 * m2)
     constant = s0 * (m2 * m4 - m3 * m3) - m1 * (s1 * m4 - s2 * m3) + m2 * (s1 * m3 - s2 * m2)
     slope = m0 * (s1 * m4 - s2 * m3) - s0 * (m1 * m4 - m2 * m3) + m2 * (m1 * s2 - m2 * s1)

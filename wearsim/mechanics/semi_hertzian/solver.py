@@ -26,6 +26,7 @@ from math import pi
 import numpy as np
 
 from wearsim.mechanics.hertz.ellipse import hertz
+from wearsim.mechanics.hertz.parabola_fit import NO_MOMENTS, add_moments
 from wearsim.mechanics.numerics.jit import kernel, subroutine
 from wearsim.mechanics.semi_hertzian.penetration import (
     CONVERGED,
@@ -271,8 +272,7 @@ def curvature_at(
         Half-width of the window, and width of a strip [m].
     """
     n = len(gap)
-    m0 = m1 = m2 = m3 = m4 = s0 = s1 = s2 = 0.0
-    share = spacing / window
+    moments, share = NO_MOMENTS, spacing / window
     for side in range(2):
         step = 2 * side - 1
         ridge, t, j = gap[i] - bottom, 0.0, i
@@ -282,17 +282,10 @@ def curvature_at(
             weight = (1.0 - t * t) * max(limit - ridge, 0.0)
             if j == i:
                 weight *= 0.5  # visited from both sides
-            first, second = weight * t, weight * t * t
-            m0 += weight
-            m1 += first
-            m2 += second
-            m3 += second * t
-            m4 += second * t * t
-            s0 += weight * height
-            s1 += first * height
-            s2 += second * height
+            moments = add_moments(moments, weight, t, height)
             t += step * share
             j += step
+    m0, m1, m2, m3, m4, s0, s1, s2 = moments
     det = m0 * (m2 * m4 - m3 * m3) - m1 * (m1 * m4 - m2 * m3) + m2 * (m1 * m3 - m2 * m2)
     if not det > SINGULAR * (m0 * m2 * m4):
         return np.nan

@@ -59,23 +59,12 @@ def new_depth_system(bodies: IntArray, n: int) -> DepthSystem:
 
 
 @subroutine
-def add_shared(shared: FloatArray, compliance: FloatArray) -> None:
-    """Add the wear of the shared bodies, (contacts, 2, strips), to the separate compliance."""
-    for k in range(compliance.shape[0]):
-        for i in range(compliance.shape[1]):
-            compliance[k, i] = compliance[k, i] + shared[k, 0, i] + shared[k, 1, i]
-
-
-@subroutine
 def fill_responses(k: int, state: NewtonState, system: DepthSystem) -> None:
     """Fill the derivatives of contact `k`'s step and approach by its gap at constant load."""
     size, response, approach_slope = state.size[k], system.response, system.approach_slope
     invert_factored(state.matrix[k], size, state.order[k], response[k])
     for column in range(size):
-        total = 0.0
-        for row in range(size):
-            total += response[k, column, row]
-        approach_slope[k, column] = total / state.unit_load_sum[k]
+        approach_slope[k, column] = response[k, column, :size].sum() / state.unit_load_sum[k]
         for row in range(size):
             response[k, column, row] -= state.unit_load[k, row] * approach_slope[k, column]
 

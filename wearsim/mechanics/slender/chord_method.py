@@ -41,7 +41,7 @@ from wearsim.mechanics.slender.newton import (
     log_scales_of,
     solve_slender,
 )
-from wearsim.mechanics.tangential.strip_interaction import StripElasticity, strip_elasticity
+from wearsim.mechanics.tangential.strip_interaction import StripElasticity
 from wearsim.mechanics.tangential.strip_theory import StripTractions, new_tractions
 from wearsim.types import FloatArray, IntArray
 
@@ -104,26 +104,6 @@ class ChordState(NamedTuple):
     order: IntArray
     strip_inputs: FloatArray
     tractions: StripTractions
-
-
-def contact_constants(
-    spacing: float,
-    contact_modulus: float,
-    shear_modulus: float,
-    longitudinal_curvature: FloatArray,
-    table: FloatArray,
-    curvature_influence: FloatArray,
-) -> ContactConstants:
-    """Return the `ContactConstants` of strips of width `spacing`, tables as in `solve_slender`."""
-    return ContactConstants(
-        spacing,
-        1.0 / (np.pi * contact_modulus),
-        contact_modulus,
-        longitudinal_curvature,
-        table,
-        curvature_influence,
-        strip_elasticity(contact_modulus, shear_modulus),
-    )
 
 
 def new_chord_state(constants: ContactConstants, contacts: int, n: int) -> ChordState:

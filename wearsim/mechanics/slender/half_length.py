@@ -25,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wearsim.mechanics.numerics.jit import subroutine
-from wearsim.mechanics.slender.influence import HIGHEST, read_influence, read_values
+from wearsim.mechanics.slender.influence import HIGHEST, read_influence
 from wearsim.types import FloatArray, IntArray
 
 SWEEPS = 2
@@ -216,7 +216,7 @@ def find_factors(k: int, line_load: FloatArray, sloped: bool, lengths: HalfLengt
                 read_influence(lengths.table, lengths.log_ratio[k, j], count, value, tangent)
                 _add_slope(j, weight, value, tangent, sweep > 0, slope, lengths.slope_part)
             else:
-                read_values(lengths.table, lengths.log_ratio[k, j], far, value)
+                read_influence(lengths.table, lengths.log_ratio[k, j], far, value, None)
             add_around(j, first, last, weight, value, total)
         widest = max(widest, _update_factors(k, first, last, line_load, total, lengths))
         if sloped:

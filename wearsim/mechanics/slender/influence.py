@@ -21,6 +21,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cache
 from math import comb
+from typing import Any
 
 import numpy as np
 
@@ -194,20 +195,12 @@ def read_value(table: FloatArray, tau: float, distance: int) -> float:
 
 
 @subroutine
-def read_values(table: FloatArray, tau: float, count: int, value: FloatArray) -> None:
-    """Interpolate F_k or C_k of one strip; parameters as in `read_influence`."""
-    node, _, (v0, v1, w0, w1) = _weights(table, tau)
-    low, low_slope = table[node, 0], table[node, 1]
-    high, high_slope = table[node + 1, 0], table[node + 1, 1]
-    for k in range(count):
-        value[k] = v0 * low[k] + v1 * low_slope[k] + w0 * high[k] + w1 * high_slope[k]
-
-
-@subroutine
 def read_influence(
-    table: FloatArray, tau: float, count: int, value: FloatArray, tangent: FloatArray
+    table: FloatArray, tau: float, count: int, value: FloatArray, tangent: Any
 ) -> None:
     """Interpolate F_k or C_k of one strip, and its derivative for Newton's method.
+
+    Compiled separately without the derivative (`tangent` None).
 
     Parameters
     ----------
@@ -219,7 +212,7 @@ def read_influence(
         Number of distances k to fill.
     value : ndarray, shape (>= count,)
         Filled: F_k (or C_k).
-    tangent : ndarray, shape (>= count,)
+    tangent : ndarray, shape (>= count,), or None
         Filled: d(q F_k)/dq = F_k + (dF_k/dtau)/2, as a is proportional to the square root of q.
     """
     node, s, (v0, v1, w0, w1) = _weights(table, tau)
@@ -233,4 +226,5 @@ def read_influence(
     for k in range(count):
         a, b, c, d = low[k], low_slope[k], high[k], high_slope[k]
         value[k] = v0 * a + v1 * b + w0 * c + w1 * d
-        tangent[k] = d0 * a + d1 * b + e0 * c + e1 * d
+        if tangent is not None:
+            tangent[k] = d0 * a + d1 * b + e0 * c + e1 * d

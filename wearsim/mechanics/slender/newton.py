@@ -27,7 +27,6 @@ from wearsim.mechanics.numerics.jit import kernel, subroutine
 from wearsim.mechanics.numerics.lu import factor_in_place, solve_factored
 from wearsim.mechanics.slender.body_elimination import (
     add_depths,
-    add_shared,
     factor_depths,
     fill_responses,
     new_depth_system,
@@ -48,7 +47,6 @@ from wearsim.mechanics.slender.newton_step import (
     new_newton_state,
     number_strips,
     predict_surface,
-    sum_unit_load,
     update_loads,
 )
 from wearsim.types import FloatArray, IntArray
@@ -97,9 +95,8 @@ def start_contact(
         if line_load[k, i] > 0.0:
             return
     soft = 8.0 / (np.pi * contact_modulus)
-    lowest, highest, softest = gap[k, 0], gap[k, 0], 0.0
+    highest, softest = gap[k, 0], 0.0
     for i in range(n):
-        lowest = min(lowest, gap[k, i])
         highest = max(highest, gap[k, i])
         softest = max(softest, compliance[k, i])
     level = load / spacing * (soft + softest) + highest
@@ -204,18 +201,6 @@ def check_convergence(
 
 
 @subroutine
-def least_gap(k: int, gap: FloatArray) -> float:
-    """Return the least gap of contact `k`, the reference of its displacements.
-
-    Under a vanishing load they would otherwise be lost in the rounding of a deep groove.
-    """
-    lowest = gap[k, 0]
-    for i in range(gap.shape[1]):
-        lowest = min(lowest, gap[k, i])
-    return float(lowest)
-
-
-@subroutine
 def log_scales_of(
     contact_modulus: float, longitudinal_curvature: FloatArray, spacing: float
 ) -> FloatArray:
@@ -292,14 +277,18 @@ def solve_slender(
             for k in range(contacts):
                 for i in range(n):  # a loop, as numba takes seconds to compile an array assignment
                     surface[k, i] = own[k, i]
+                    if bodies is not None:
+                        surface[k, i] += shared[number, k, 0, i]
+                        surface[k, i] += shared[number, k, 1, i]
             if bodies is not None:
                 system = new_depth_system(bodies, n)
-                add_shared(shared[number], surface)
             for k in range(contacts):
                 start_contact(
                     k, gap[number], surface, contact_modulus, load[k], spacing, total, delta
                 )
-                lowest[k] = least_gap(k, gap[number])
+                # relative to the least gap, as the displacements under a vanishing load would be
+                # lost in the rounding of a deep groove
+                lowest[k] = gap[number, k].min()
                 delta[k] -= lowest[k]
             outcome, before, iteration = CONTINUE, 0.0, 0
             while outcome == CONTINUE:
@@ -325,7 +314,9 @@ def solve_slender(
                             break
                         step[:size] = 1.0
                         solve_factored(matrix, size, order, step, state.unit_load[k])
-                        if not sum_unit_load(k, state):
+                        state.unit_load_sum[k] = state.unit_load[k, :size].sum()
+                        state.fresh[k] = False
+                        if not abs(state.unit_load_sum[k]) > 0.0:
                             outcome = SINGULAR
                             break
                         renewed = True

@@ -21,7 +21,7 @@ from wearsim.mechanics.slender.half_length import (
     add_length_slopes,
     gather_length_slopes,
 )
-from wearsim.mechanics.slender.influence import HIGHEST, read_influence, read_value, read_values
+from wearsim.mechanics.slender.influence import HIGHEST, read_influence, read_value
 from wearsim.types import BoolArray, FloatArray, IntArray
 
 MANIFOLD = 3.0  # ratio of new to old load of a strip up to which the Jacobian may be reused
@@ -122,7 +122,7 @@ def displace(
             if lengths.table.shape[0] > 0:
                 gather_length_slopes(k, j, push, value, tangent, lengths)
         else:
-            read_values(table, tau, reach, value)
+            read_influence(table, tau, reach, value, None)
         state.pressed[k, column] = push * value[0]
         add_around(j, 0, n - 1, push, value, pressed)
     if fresh and lengths.table.shape[0] > 0:
@@ -133,16 +133,6 @@ def displace(
         state.missing[k, row] = -surface[k, i]
         if fresh:
             state.matrix[k, row, row] += compliance[k, i]
-
-
-@subroutine
-def sum_unit_load(k: int, state: NewtonState) -> bool:
-    """Sum the loads per unit of approach from contact `k`'s new Jacobian; False if the sum is 0."""
-    state.unit_load_sum[k] = 0.0
-    for row in range(state.size[k]):
-        state.unit_load_sum[k] += state.unit_load[k, row]
-    state.fresh[k] = False
-    return bool(abs(state.unit_load_sum[k]) > 0.0)
 
 
 @subroutine

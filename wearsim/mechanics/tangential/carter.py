@@ -37,8 +37,9 @@ SPIN_LIMIT = 0.9  # psi above which full sliding in both directions is blended i
 TURNED = 0.2  # phi a over the slip above which the rotation of the slip along the strip is included
 
 # Gauss quadrature for the weight sqrt(1 - s^2) with mean 1: nodes cos(k pi/8), weights sin^2/4
-_ANGLES = [k * math.pi / 8.0 for k in range(1, 8)]
-_RULE = tuple((math.cos(angle), 0.25 * math.sin(angle) ** 2) for angle in _ANGLES)
+_RULE = tuple(
+    (math.cos(k * math.pi / 8.0), 0.25 * math.sin(k * math.pi / 8.0) ** 2) for k in range(1, 8)
+)
 
 
 class StripState(NamedTuple):

@@ -18,7 +18,15 @@ import math
 import numpy as np
 
 from wearsim.mechanics.numerics.jit import kernel, subroutine
-from wearsim.mechanics.tangential.fastsim import Sums, march_into, new_sums, slice_sums, stack_sums
+from wearsim.mechanics.tangential.fastsim import (
+    ADHESION,
+    FORCE_X,
+    FORCE_Y,
+    MOMENT,
+    ROWS,
+    WORK,
+    march_into,
+)
 from wearsim.mechanics.tangential.strip_with_spin import (
     Moduli,
     Motion,
@@ -63,7 +71,7 @@ def fastrip(
     ndarray, shape (4, strips)
         As of `fastsim.march`; the adhesion length is exact except in strips solved by FASTSIM.
     """
-    sums = new_sums(len(half_length))
+    sums, marched = np.zeros((ROWS, len(half_length))), np.empty((ROWS, 1))
     gradient = np.empty(len(half_length))
     elliptic = points > 0  # always true; a literal would be compiled as another signature
     for j in range(len(half_length)):
@@ -75,13 +83,18 @@ def fastrip(
                 1,
                 half_length[j : j + 1],
                 bound_peak[j : j + 1],
+                None,
+                0,
                 elliptic,
                 gradient[j : j + 1],
                 motion.lateral / flexibility,
                 motion.spin / flexibility,
+                0.0,
+                0.0,
                 points,
-                slice_sums(sums, j, j + 1),
+                marched,
             )
+            sums[:, j] = marched[:, 0]
         else:
             strip = strip_of(j, half_length, bound_peak, motion, moduli)
             one_way = motion.lateral == 0.0 or motion.longitudinal[j] == 0.0
@@ -89,11 +102,11 @@ def fastrip(
             steps = 1 if motion.spin == 0.0 and one_way else 1 + points // _STEP_RATIO
             _integrate_adhesion(j, strip, sums)
             _march_slip(j, strip, steps, sums)
-    return stack_sums(sums)
+    return sums[:WORK].copy()
 
 
 @subroutine
-def _integrate_adhesion(j: int, strip: Strip, sums: Sums) -> None:
+def _integrate_adhesion(j: int, strip: Strip, sums: FloatArray) -> None:
     """Integrate the traction over the adhesion zone of strip `j`."""
     a, radius = strip.half_length, strip.half_length - strip.shift
     if not radius > 0.0:
@@ -107,14 +120,14 @@ def _integrate_adhesion(j: int, strip: Strip, sums: Sums) -> None:
     lever = (a * sine) ** 3 / 3.0
     back = 0.5 * math.pi * radius * radius
     across, rest = strip.direction_y, strip.direction_y + strip.twist
-    sums.force_x[j] += strip.rise * strip.direction_x * area
-    sums.force_y[j] += strip.rise * (across * area - strip.twist * back)
-    sums.moment[j] += strip.rise * (across * lever - rest * back * d)
-    sums.adhesion[j] += 2.0 * radius
+    sums[FORCE_X, j] += strip.rise * strip.direction_x * area
+    sums[FORCE_Y, j] += strip.rise * (across * area - strip.twist * back)
+    sums[MOMENT, j] += strip.rise * (across * lever - rest * back * d)
+    sums[ADHESION, j] += 2.0 * radius
 
 
 @subroutine
-def _march_slip(j: int, strip: Strip, steps: int, sums: Sums) -> None:
+def _march_slip(j: int, strip: Strip, steps: int, sums: FloatArray) -> None:
     """Integrate the traction's direction through the slip zone of strip `j`."""
     if not strip.shift > 0.0:
         return
@@ -135,9 +148,9 @@ def _march_slip(j: int, strip: Strip, steps: int, sums: Sums) -> None:
         bound = 0.5 * a * a * (arc - next_sin * next_cos + sine * cosine)
         lever = a**3 * (next_sin**3 - sine**3) / 3.0
         along, across = 0.5 * strip.rise * (e_x + n_x), 0.5 * strip.rise * (e_y + n_y)
-        sums.force_x[j] += along * bound
-        sums.force_y[j] += across * bound
-        sums.moment[j] += across * lever
+        sums[FORCE_X, j] += along * bound
+        sums[FORCE_Y, j] += across * bound
+        sums[MOMENT, j] += across * lever
         cosine, sine, e_x, e_y = next_cos, next_sin, n_x, n_y
 
 

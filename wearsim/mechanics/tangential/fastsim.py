@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -13,20 +13,11 @@ from wearsim.types import FloatArray
 _ROOT_CORNER = 0.2078862249773546  # -zeta(-1/2)
 
 
-class Sums(NamedTuple):
-    """Integrals over every strip and the traction at the current point, all (strips,).
-
-    Integrals of the longitudinal and the lateral traction [N/m] and of x times the latter [N],
-    adhesion length [m], the element sum over V [N/m] and the tractions [Pa].
-    """
-
-    force_x: FloatArray
-    force_y: FloatArray
-    moment: FloatArray
-    adhesion: FloatArray
-    work: FloatArray
-    traction_x: FloatArray
-    traction_y: FloatArray
+# rows of the integrals over every strip, and of the traction at the current point, (7, strips):
+# integrals of the longitudinal and the lateral traction [N/m] and of x times the latter [N],
+# adhesion length [m], the element sum over V [N/m] and the tractions [Pa]
+ROWS = 7
+FORCE_X, FORCE_Y, MOMENT, ADHESION, WORK, TRACTION_X, TRACTION_Y = range(ROWS)
 
 
 @kernel
@@ -72,90 +63,23 @@ def march(
     -----
     Kalker (1982), DOI 10.1080/00423118208968684.
     """
-    sums = new_sums(len(half_length))
+    sums = np.empty((ROWS, len(half_length)))
     march_into(
         len(half_length),
         half_length,
         bound_peak,
+        None,
+        0,
         elliptic,
         gradient_x,
         gradient_y,
         gradient_spin,
+        0.0,
+        0.0,
         points,
         sums,
     )
-    return stack_sums(sums)
-
-
-@subroutine
-def new_sums(strips: int) -> Sums:
-    """Return `Sums` of zeros for a number of strips.
-
-    Parameters
-    ----------
-    strips : int
-        Number of strips.
-    """
-    rows = np.zeros((7, strips))
-    return Sums(rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6])
-
-
-@subroutine
-def slice_sums(sums: Sums, first: int, stop: int) -> Sums:
-    """Return a view of the sums of the strips from `first` to before `stop`.
-
-    Parameters
-    ----------
-    sums : Sums
-        Sums of all strips.
-    first, stop : int
-        Number of the first strip, and of the one after the last.
-    """
-    return Sums(
-        sums.force_x[first:stop],
-        sums.force_y[first:stop],
-        sums.moment[first:stop],
-        sums.adhesion[first:stop],
-        sums.work[first:stop],
-        sums.traction_x[first:stop],
-        sums.traction_y[first:stop],
-    )
-
-
-@subroutine
-def stack_sums(sums: Sums) -> FloatArray:
-    """Return forces, moment and adhesion length as one array, shape (4, strips)."""
-    out = np.empty((4, len(sums.force_x)))
-    out[0], out[1], out[2], out[3] = sums.force_x, sums.force_y, sums.moment, sums.adhesion
-    return out
-
-
-@subroutine
-def clear(strips: int, sums: Sums) -> None:
-    """Set the sums and tractions of the first strips to zero, as at the leading edge.
-
-    Parameters
-    ----------
-    strips : int
-        Number of strips.
-    sums : Sums
-        Overwritten.
-    """
-    for j in range(strips):
-        sums.force_x[j] = sums.force_y[j] = sums.moment[j] = 0.0
-        sums.adhesion[j] = sums.work[j] = 0.0
-        sums.traction_x[j] = sums.traction_y[j] = 0.0
-
-
-@subroutine
-def _times_step(strips: int, sums: Sums, half_length: FloatArray, cell: float) -> None:
-    """Multiply the sums over points of the first strips by the step, to obtain integrals."""
-    for j in range(strips):
-        dx = cell * half_length[j]
-        sums.force_x[j] *= dx
-        sums.force_y[j] *= dx
-        sums.moment[j] *= dx * half_length[j]
-        sums.adhesion[j] *= dx
+    return sums[:WORK].copy()
 
 
 @subroutine
@@ -163,25 +87,42 @@ def march_into(
     strips: int,
     half_length: FloatArray,
     bound_peak: FloatArray,
+    friction: Any,
+    first: int,
     elliptic: bool,
     gradient_x: FloatArray,
     gradient_y: float,
     gradient_spin: float,
+    longitudinal: float,
+    lateral: float,
     points: int,
-    sums: Sums,
+    sums: FloatArray,
 ) -> None:
-    """Integrate as `march` does, into an existing `Sums`.
+    """Integrate as `march` does, into existing rows.
+
+    Compiled separately for a bound without a friction field (`friction` None), without the element
+    sum.
 
     Parameters
     ----------
     strips : int
         Number of strips to integrate, the first ones; a multiple of four is fastest.
-    half_length, bound_peak, elliptic, gradient_x, gradient_y, gradient_spin, points
+    half_length, elliptic, gradient_x, gradient_y, gradient_spin
         As in `march`.
-    sums : Sums
-        Overwritten.
+    bound_peak : ndarray, shape (strips,)
+        As in `march`; with a friction field its pressure [Pa], without friction.
+    friction : ndarray, shape (points, all strips), or None
+        Friction coefficient at the end of each step, from the leading edge on.
+    first : int
+        Column of `friction` of the first strip.
+    longitudinal, lateral : float
+        Flexibilities L1 and L2 [m/Pa], used for the element sum only.
+    points : int
+        As in `march`.
+    sums : ndarray, shape (7, >= strips)
+        Overwritten, for the first strips; row `WORK` is the element sum over the rolling velocity.
     """
-    clear(strips, sums)
+    sums[:, :strips] = 0.0
     cell = 2.0 / points
     for k in range(1, points + 1):
         place = place_of(k, points)
@@ -189,51 +130,28 @@ def march_into(
         sticking, sliding = end_weights(k, points, elliptic)
         for j in range(strips):
             a, bound = half_length[j], shape * bound_peak[j]
+            if friction is not None:
+                bound = shape * (friction[k - 1, first + j] * bound_peak[j])
             across = gradient_y + gradient_spin * (place + 0.5 * cell) * a
-            _step(j, place, cell * a, gradient_x[j], across, bound, sticking, sliding, sums)
-    _times_step(strips, sums, half_length, cell)
-
-
-@inlined_subroutine
-def _step(
-    j: int,
-    place: float,
-    dx: float,
-    along: float,
-    across: float,
-    bound: float,
-    sticking: float,
-    sliding: float,
-    sums: Sums,
-) -> tuple[float, float, float]:
-    """Advance strip `j` by one step; return the trial tractions and their scale factor.
-
-    Parameters
-    ----------
-    j : int
-        Number of the strip.
-    place, dx : float
-        x/a at the end of the step, and its length [m].
-    along, across : float
-        Gradients of the tractions over the step [Pa/m].
-    bound : float
-        Traction bound at the end of the step [Pa].
-    sticking, sliding : float
-        Weight of the point in the sums in adhesion and in slip.
-    sums : Sums
-        Updated, except for the work.
-    """
-    tx = sums.traction_x[j] - along * dx
-    ty = sums.traction_y[j] - across * dx
-    sticks, scale = limit_traction(tx, ty, bound)
-    sums.traction_x[j] = scale * tx
-    sums.traction_y[j] = scale * ty
-    weighed = scale * (sticking if sticks else sliding)
-    sums.force_x[j] += weighed * tx
-    sums.force_y[j] += weighed * ty
-    sums.moment[j] += place * (weighed * ty)
-    sums.adhesion[j] += 1.0 if sticks else 0.0
-    return tx, ty, scale
+            tx = sums[TRACTION_X, j] - gradient_x[j] * (cell * a)
+            ty = sums[TRACTION_Y, j] - across * (cell * a)
+            sticks, scale = limit_traction(tx, ty, bound)
+            sums[TRACTION_X, j] = scale * tx
+            sums[TRACTION_Y, j] = scale * ty
+            weighed = scale * (sticking if sticks else sliding)
+            sums[FORCE_X, j] += weighed * tx
+            sums[FORCE_Y, j] += weighed * ty
+            sums[MOMENT, j] += place * (weighed * ty)
+            sums[ADHESION, j] += 1.0 if sticks else 0.0
+            if friction is not None:
+                cut = scale * (1.0 - scale)
+                sums[WORK, j] += cut * (longitudinal * tx * tx + lateral * ty * ty)
+    for j in range(strips):
+        dx = cell * half_length[j]
+        sums[FORCE_X, j] *= dx
+        sums[FORCE_Y, j] *= dx
+        sums[MOMENT, j] *= dx * half_length[j]
+        sums[ADHESION, j] *= dx
 
 
 @subroutine
@@ -304,53 +222,167 @@ def limit_traction(traction_x: float, traction_y: float, bound: float) -> tuple[
     return sticks, 1.0 if sticks else bound / math.sqrt(square)
 
 
-@subroutine
-def march_local(
-    strips: int,
+@kernel
+def closed_form(
     half_length: FloatArray,
     bound_peak: FloatArray,
-    friction: FloatArray,
-    first: int,
     elliptic: bool,
     gradient_x: FloatArray,
     gradient_y: float,
-    gradient_spin: float,
-    longitudinal: float,
-    lateral: float,
-    sums: Sums,
+) -> FloatArray:
+    """Return the limit of `march` for small steps without spin.
+
+    With G = |gradient| the traction increases as G s behind the leading edge until it reaches the
+    bound, and is then equal to it: from s = 2a - kappa, kappa = G a^2/bound_peak, for the parabolic
+    bound, and from s = 2a/(1 + k^2), k = G a/bound_peak, for the elliptic one.
+
+    Parameters
+    ----------
+    half_length, bound_peak, elliptic, gradient_x, gradient_y
+        As in `march`.
+
+    Returns
+    -------
+    ndarray, shape (4, strips)
+        As of `march`; the moment is that of the same tractions.
+
+    Notes
+    -----
+    Derived from Kalker (1982), DOI 10.1080/00423118208968684.
+    """
+    sums = np.empty((ROWS, len(half_length)))
+    closed_form_into(
+        len(half_length), half_length, bound_peak, elliptic, gradient_x, gradient_y, sums
+    )
+    return sums[:WORK].copy()
+
+
+@subroutine
+def closed_form_into(
+    strips: int,
+    half_length: FloatArray,
+    bound_peak: FloatArray,
+    elliptic: bool,
+    gradient_x: FloatArray,
+    gradient_y: float,
+    sums: FloatArray,
 ) -> None:
-    """Integrate as `march` does with a friction coefficient that varies from point to point.
+    """Integrate as `closed_form` does, into existing rows.
 
     Parameters
     ----------
     strips : int
-        As in `march_into`.
-    half_length, elliptic, gradient_x, gradient_y, gradient_spin
+        Number of strips to integrate, the first ones.
+    half_length, bound_peak, elliptic, gradient_x, gradient_y
         As in `march`.
-    bound_peak : ndarray, shape (strips,)
-        Pressure of the traction bound at x = 0 [Pa], without friction.
-    friction : ndarray, shape (points, all strips)
-        Friction coefficient at the end of each step, from the leading edge on.
-    first : int
-        Column of `friction` of the first strip.
-    longitudinal, lateral : float
-        Flexibilities L1 and L2 [m/Pa], used for the element sum only.
-    sums : Sums
-        Overwritten; `work` is the element sum over the rolling velocity.
+    sums : ndarray, shape (7, >= strips)
+        Overwritten, for the first strips.
     """
-    clear(strips, sums)
-    points = len(friction)
+    sums[:, :strips] = 0.0
+    for j in range(strips):
+        a, peak = half_length[j], bound_peak[j]
+        size = math.sqrt(gradient_x[j] * gradient_x[j] + gradient_y * gradient_y)
+        if a > 0.0 and size > 0.0 and peak > 0.0:
+            slip = _elliptic(a, size, peak) if elliptic else _parabolic(a, size, peak)
+            stick = slip[0]
+            force = 0.5 * size * stick**2 + slip[1]
+            moment = size * stick**2 * (0.5 * a - stick / 3.0) + slip[2]
+            sums[FORCE_X, j] = -force * (gradient_x[j] / size)
+            sums[FORCE_Y, j] = -force * (gradient_y / size)
+            sums[MOMENT, j] = -moment * (gradient_y / size)
+            sums[ADHESION, j] = stick
+        elif size == 0.0:
+            sums[ADHESION, j] = 2.0 * a
+
+
+@subroutine
+def _parabolic(a: float, steep: float, peak: float) -> tuple[float, float, float]:
+    """Return adhesion length, force and moment of the slip zone for the parabolic bound."""
+    kappa = min(steep * a**2 / peak, 2.0 * a)
+    # x = a - s; the traction is G s in adhesion and peak s(2a - s)/a^2 in slip
+    slip_force = peak * kappa**2 * (3.0 * a - kappa) / (3.0 * a**2)
+    edge = kappa - a  # x at the onset of slip
+    return 2.0 * a - kappa, slip_force, -0.25 * peak * (a**2 - edge**2) ** 2 / a**2
+
+
+@subroutine
+def _elliptic(a: float, steep: float, peak: float) -> tuple[float, float, float]:
+    """Return adhesion length, force and moment of the slip zone for the elliptic bound."""
+    k = steep * a / peak
+    cosine = (k**2 - 1.0) / (k**2 + 1.0)  # x/a at the onset of slip
+    sine = 2.0 * k / (1.0 + k**2)
+    slip_force = 0.5 * peak * a * (cosine * sine + math.atan2(cosine, sine) + 0.5 * math.pi)
+    return 2.0 * a / (1.0 + k**2), slip_force, -peak * a**2 * sine**3 / 3.0
+
+
+@kernel
+def march_fields(
+    half_length: FloatArray,
+    bound_peak: FloatArray,
+    elliptic: bool,
+    gradient_x: FloatArray,
+    gradient_y: float,
+    gradient_spin: float,
+    friction: FloatArray,
+) -> FloatArray:
+    """Return the traction fields of `march_into`.
+
+    Parameters
+    ----------
+    half_length, bound_peak, elliptic, gradient_x, gradient_y, gradient_spin
+        As in `march`.
+    friction : ndarray, shape (points, strips)
+        Friction coefficient at the end of each step that `bound_peak` is multiplied by.
+
+    Returns
+    -------
+    ndarray, shape (4, points + 1, strips)
+        Longitudinal and lateral traction, and the excess of each trial traction over the traction
+        bound [Pa]; from the leading edge x = a to the trailing edge x = -a. Slip over the rolling
+        velocity is ``-excess * L / dx`` in each direction, with its flexibility L.
+    """
+    points, strips = friction.shape
+    out = np.zeros((4, points + 1, strips))
     cell = 2.0 / points
     for k in range(1, points + 1):
         place = place_of(k, points)
+        middle = place + 0.5 * cell
         shape = bound_shape(place, elliptic)
-        sticking, sliding = end_weights(k, points, elliptic)
         for j in range(strips):
-            a, bound = half_length[j], shape * (friction[k - 1, first + j] * bound_peak[j])
-            across = gradient_y + gradient_spin * (place + 0.5 * cell) * a
-            tx, ty, scale = _step(
-                j, place, cell * a, gradient_x[j], across, bound, sticking, sliding, sums
-            )
-            cut = scale * (1.0 - scale)
-            sums.work[j] += cut * (longitudinal * tx * tx + lateral * ty * ty)
-    _times_step(strips, sums, half_length, cell)
+            a = half_length[j]
+            dx = cell * a
+            tx = out[0, k - 1, j] - gradient_x[j] * dx
+            ty = out[1, k - 1, j] - (gradient_y + gradient_spin * middle * a) * dx
+            _, scale = limit_traction(tx, ty, shape * (friction[k - 1, j] * bound_peak[j]))
+            out[0, k, j] = scale * tx
+            out[1, k, j] = scale * ty
+            out[2, k, j] = (1.0 - scale) * tx
+            out[3, k, j] = (1.0 - scale) * ty
+    return out
+
+
+def element_sum(
+    fields: FloatArray, longitudinal: float, lateral: float, rolling_speed: float
+) -> FloatArray:
+    """Return the dissipation as a sum over elements of their new traction times their slip.
+
+    The error is of first order in dx and negative; used for comparison with the work of the rigid
+    slip.
+
+    Parameters
+    ----------
+    fields : ndarray, shape (4, points + 1, strips)
+        From `march_fields`.
+    longitudinal, lateral : float
+        Flexibilities L1 and L2 [m/Pa].
+    rolling_speed : float
+        V [m/s].
+
+    Returns
+    -------
+    ndarray, shape (strips,)
+        P_l [W/m].
+    """
+    traction_x, traction_y, excess_x, excess_y = fields
+    work = longitudinal * traction_x * excess_x + lateral * traction_y * excess_y
+    return np.asarray(rolling_speed * work.sum(axis=0))

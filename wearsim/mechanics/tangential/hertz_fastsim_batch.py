@@ -10,11 +10,22 @@ import numpy as np
 from wearsim.mechanics.hertz.parabola_fit import CONVERGED
 from wearsim.mechanics.hertz.patches import Bodies, Patches, cut_into_strips, find_patches
 from wearsim.mechanics.numerics.jit import kernel, subroutine
-from wearsim.mechanics.tangential.fastsim import Sums, clear, march_into, march_local, new_sums
-from wearsim.mechanics.tangential.fastsim_closed_form import closed_form_into
+from wearsim.mechanics.tangential.fastsim import (
+    ADHESION,
+    FORCE_X,
+    FORCE_Y,
+    MOMENT,
+    ROWS,
+    TRACTION_X,
+    WORK,
+    closed_form_into,
+    march_into,
+)
 from wearsim.mechanics.tangential.kalker_coefficients import (
+    CreepageCoefficients,
     Spline,
     coefficient,
+    flexibilities,
     one_flexibility,
     short_limit,
 )
@@ -131,20 +142,20 @@ def solve_contacts(
     strips = len(bodies.y)
     rows, lanes = np.empty((5, strips)), np.empty((3, _whole_lanes(strips)))
     work = Workspace(rows[0], rows[1], rows[2], rows[3], rows[4], lanes[0], lanes[1], lanes[2])
-    total, sums = new_sums(strips), new_sums(_whole_lanes(strips))
+    total, sums = np.empty((ROWS, strips)), np.empty((ROWS, _whole_lanes(strips)))
     ones = np.ones((theory.points, strips))
     given = theory.given
     find_patches(bodies, gaps, row, inputs.normal_force, patches)
-    last_ratio, last = math.nan, (math.nan, math.nan, math.nan)
+    last_ratio, last = math.nan, CreepageCoefficients(math.nan, math.nan, math.nan, math.nan)
     for k in range(len(row)):
         if patches.status[k] != CONVERGED:
             return k
         a, b, ratio = patches.a[k], patches.b[k], patches.ratio[k]
         if theory.kalker == GIVEN:
-            last = given[0], given[1], given[2]
+            last = CreepageCoefficients(given[0], given[1], given[2], math.nan)
         elif ratio != last_ratio:
             last_ratio, last = ratio, _coefficients(theory, ratio)
-        if not last[2] > 0.0:
+        if not last.c23 > 0.0:
             patches.status[k] = NO_LIMIT
             return k
         first, stop = cut_into_strips(
@@ -170,22 +181,23 @@ def solve_contacts(
 
 
 @subroutine
-def _coefficients(theory: Theory, ratio: float) -> tuple[float, float, float]:
-    """Return C11, C22 and C23 at a/b = `ratio`."""
+def _coefficients(theory: Theory, ratio: float) -> CreepageCoefficients:
+    """Return C11, C22 and C23 at a/b = `ratio`; C33, which is not used, is nan."""
     nu = theory.poisson_ratio
     if theory.kalker == LINE_LIMIT:
-        limits = short_limit(ratio, nu)
-        return limits[0], limits[1], limits[2]
+        c11, c22, c23, _ = short_limit(ratio, nu)
+        return CreepageCoefficients(c11, c22, c23, math.nan)
     values = (math.nan, math.nan, math.nan)
     for which in range(3):
         values = values[1], values[2], coefficient(which, ratio, nu, theory.tables[which])
-    return values
+    return CreepageCoefficients(values[0], values[1], values[2], math.nan)
 
 
 @subroutine
 def _load_weighted_mean(values: FloatArray, line_load: FloatArray) -> float:
+    """Return the mean of the values of the strips, weighted by their loads."""
     product, load = 0.0, 0.0
-    for j in range(len(values)):
+    for j in range(len(line_load)):
         product += values[j] * line_load[j]
         load += line_load[j]
     return product / load
@@ -217,25 +229,23 @@ def _solve_tractions(
     k: int,
     first: int,
     stop: int,
-    coefficients: tuple[float, float, float],
+    coefficients: CreepageCoefficients,
     theory: Theory,
     inputs: ContactInputs,
     patches: Patches,
     results: ContactResults,
     work: Workspace,
     ones: FloatArray,
-    sums: Sums,
-    total: Sums,
+    sums: FloatArray,
+    total: FloatArray,
 ) -> None:
     """Integrate the tractions of contact `k` along its strips into `total`."""
-    a, b, shear_modulus = patches.a[k], patches.b[k], theory.shear_modulus
-    c11, c22, c23 = coefficients
-    # L1, L2 and L3 [m/Pa], as in `kalker_coefficients.flexibilities`
-    longitudinal = 8.0 * a / (3.0 * c11 * shear_modulus)
-    lateral = 8.0 * a / (3.0 * c22 * shear_modulus)
-    turning = math.pi * a * math.sqrt(a / b) / (4.0 * c23 * shear_modulus)
+    a, b = patches.a[k], patches.b[k]
+    longitudinal, lateral, turning = flexibilities(coefficients, a, b, theory.shear_modulus)
     if theory.single:
-        along = _mean_magnitude(results.line_load[k], work)
+        for j in range(len(work.peak)):
+            work.gradient_x[j] = abs(work.longitudinal[j] - work.spin_part[j])
+        along = _load_weighted_mean(work.gradient_x, results.line_load[k])
         spinning = inputs.spin[k] * math.sqrt(a * b)
         longitudinal = one_flexibility(
             longitudinal, lateral, turning, along, inputs.lateral[k], spinning
@@ -257,14 +267,25 @@ def _solve_tractions(
     for j in range(count, whole):  # padding by strips of zero length
         work.gradient_x[j] = work.half_length[j] = work.bound[j] = 0.0
     gradient_y, gradient_spin = inputs.lateral[k] / lateral, inputs.spin[k] / turning
-    slopes = gradient_y, gradient_spin, longitudinal, lateral
     half_length, gradient_x, bound = work.half_length, work.gradient_x, work.bound
     friction = inputs.friction[k]
     lanes, columns = friction.shape
-    clear(len(total.force_x), total)
+    total[:] = 0.0
     if lanes > 1 and not inputs.carried:
-        march_local(
-            count, half_length, bound, friction, first, theory.elliptic, gradient_x, *slopes, sums
+        march_into(
+            count,
+            half_length,
+            bound,
+            friction,
+            first,
+            theory.elliptic,
+            gradient_x,
+            gradient_y,
+            gradient_spin,
+            longitudinal,
+            lateral,
+            lanes,
+            sums,
         )
         _accumulate(count, sums, 1.0, first, total)
         return
@@ -274,8 +295,20 @@ def _solve_tractions(
         for j in range(count):
             bound[j] = friction[lane, first + j if columns > 1 else 0] * work.peak[first + j]
         if theory.element_sum:
-            march_local(
-                count, half_length, bound, ones, first, theory.elliptic, gradient_x, *slopes, sums
+            march_into(
+                count,
+                half_length,
+                bound,
+                ones,
+                first,
+                theory.elliptic,
+                gradient_x,
+                gradient_y,
+                gradient_spin,
+                longitudinal,
+                lateral,
+                theory.points,
+                sums,
             )
         elif closed:
             closed_form_into(
@@ -283,16 +316,20 @@ def _solve_tractions(
             )
             if inputs.spin[k] != 0.0:
                 for j in range(count):
-                    sums.moment[j] = 0.0  # phi x is neglected in the work and in the traction
+                    sums[MOMENT, j] = 0.0  # phi x is neglected in the work and in the traction
         else:
             march_into(
                 whole,
                 half_length,
                 bound,
+                None,
+                0,
                 theory.elliptic,
                 gradient_x,
                 gradient_y,
                 gradient_spin,
+                longitudinal,
+                lateral,
                 theory.points,
                 sums,
             )
@@ -306,24 +343,11 @@ def _whole_lanes(strips: int) -> int:
 
 
 @subroutine
-def _mean_magnitude(line_load: FloatArray, work: Workspace) -> float:
-    """Return the load-weighted mean magnitude of the longitudinal creepage without spin."""
-    product, load = 0.0, 0.0
-    for j in range(len(line_load)):
-        product += abs(work.longitudinal[j] - work.spin_part[j]) * line_load[j]
-        load += line_load[j]
-    return product / load
-
-
-@subroutine
-def _accumulate(count: int, part: Sums, weight: float, first: int, total: Sums) -> None:
-    """Add the weighted sums of the strips from `first` on to the totals."""
-    for j in range(count):
-        total.force_x[first + j] += weight * part.force_x[j]
-        total.force_y[first + j] += weight * part.force_y[j]
-        total.moment[first + j] += weight * part.moment[j]
-        total.adhesion[first + j] += weight * part.adhesion[j]
-        total.work[first + j] += weight * part.work[j]
+def _accumulate(count: int, part: FloatArray, weight: float, first: int, total: FloatArray) -> None:
+    """Add the weighted integrals of the strips from `first` on to the totals."""
+    for row in range(TRACTION_X):
+        for j in range(count):
+            total[row, first + j] += weight * part[row, j]
 
 
 @subroutine
@@ -334,7 +358,7 @@ def _fill_results(
     inputs: ContactInputs,
     results: ContactResults,
     work: Workspace,
-    total: Sums,
+    total: FloatArray,
 ) -> None:
     """Fill the solution of contact `k` from the integrals along its strips."""
     eta, phi, speed = inputs.lateral[k], inputs.spin[k], inputs.rolling_speed[k]
@@ -342,15 +366,15 @@ def _fill_results(
     force_x, force_y, moment, power, sticking, length = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(len(bodies.y)):
         part = work.coverage[j]
-        tx, ty, turning = total.force_x[j], total.force_y[j], total.moment[j]
+        tx, ty, turning = total[FORCE_X, j], total[FORCE_Y, j], total[MOMENT, j]
         rigid_work = work.longitudinal[j] * tx + eta * ty + phi * turning
-        dissipation = part * (speed * total.work[j] if theory.element_sum else -speed * rigid_work)
+        dissipation = part * (speed * total[WORK, j] if theory.element_sum else -speed * rigid_work)
         results.dissipation[k, j] = dissipation
         power += dissipation
         force_x += part * tx
         force_y += part * ty
         moment += part * turning - (bodies.y[j] - centre) * (part * tx)
-        sticking += total.adhesion[j]
+        sticking += total[ADHESION, j]
         length += results.half_length[k, j]
     results.force_x[k], results.force_y[k] = force_x * bodies.spacing, force_y * bodies.spacing
     results.spin_moment[k], results.power[k] = moment * bodies.spacing, power * bodies.spacing

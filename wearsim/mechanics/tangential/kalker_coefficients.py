@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -47,14 +46,10 @@ _NODES = (0.0, 0.25, 0.5)  # Poisson's ratio of the table's columns
 _FADE = (1.5, 1.5, 2.5, 1.5)
 
 
-@dataclass(frozen=True)
-class CreepageCoefficients:
+class CreepageCoefficients(NamedTuple):
     """Kalker's creepage coefficients, dimensionless.
 
-    Parameters
-    ----------
-    c11, c22, c23, c33 : float
-        Longitudinal, lateral, lateral and spin, and spin coefficient.
+    Longitudinal, lateral, lateral and spin, and spin coefficient.
     """
 
     c11: float
@@ -74,14 +69,10 @@ class Spline(NamedTuple):
     slopes: FloatArray
 
 
-@dataclass(frozen=True)
-class Flexibilities:
+class Flexibilities(NamedTuple):
     """FASTSIM's flexibilities: displacement over traction [m/Pa].
 
-    Parameters
-    ----------
-    longitudinal, lateral, spin : float
-        L1 = 8a/(3 C11 G), L2 = 8a/(3 C22 G) and L3 = pi a sqrt(a/b)/(4 C23 G).
+    L1 = 8a/(3 C11 G), L2 = 8a/(3 C22 G) and L3 = pi a sqrt(a/b)/(4 C23 G).
     """
 
     longitudinal: float
@@ -284,6 +275,7 @@ def line_limit_coefficients(ratio: float, poisson_ratio: float) -> CreepageCoeff
     return limits
 
 
+@subroutine
 def flexibilities(
     coefficients: CreepageCoefficients,
     semi_axis_x: float,
@@ -310,9 +302,9 @@ def flexibilities(
     Kalker (1982), DOI 10.1080/00423118208968684.
     """
     return Flexibilities(
-        longitudinal=8.0 * semi_axis_x / (3.0 * coefficients.c11 * shear_modulus),
-        lateral=8.0 * semi_axis_x / (3.0 * coefficients.c22 * shear_modulus),
-        spin=math.pi
+        8.0 * semi_axis_x / (3.0 * coefficients.c11 * shear_modulus),
+        8.0 * semi_axis_x / (3.0 * coefficients.c22 * shear_modulus),
+        math.pi
         * semi_axis_x
         * math.sqrt(semi_axis_x / semi_axis_y)
         / (4.0 * coefficients.c23 * shear_modulus),

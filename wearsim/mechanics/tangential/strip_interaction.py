@@ -194,17 +194,12 @@ def _add_group(
     three = math.sqrt(math.sqrt(two))
     four = math.sqrt(math.sqrt(three))
     second, third, fourth = weight / 16.0, weight / 256.0, weight / 4096.0
-    x1, x2, x3, x4, y1, y2, y3, y4 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for i in range(first, last + 1):
-        induced_x[i] -= (weight * y1 + second * y2) + (third * y3 + fourth * y4)
-        induced_y[i] -= (weight * x1 + second * x2) + (third * x3 + fourth * x4)
-        x, y = force_x[i], force_y[i]
-        x1, x2, x3, x4 = decay * (x1 + x), two * (x2 + x), three * (x3 + x), four * (x4 + x)
-        y1, y2, y3, y4 = decay * (y1 + y), two * (y2 + y), three * (y3 + y), four * (y4 + y)
-    x1, x2, x3, x4, y1, y2, y3, y4 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for i in range(last, first - 1, -1):
-        induced_x[i] += (weight * y1 + second * y2) + (third * y3 + fourth * y4)
-        induced_y[i] += (weight * x1 + second * x2) + (third * x3 + fourth * x4)
-        x, y = force_x[i], force_y[i]
-        x1, x2, x3, x4 = decay * (x1 + x), two * (x2 + x), three * (x3 + x), four * (x4 + x)
-        y1, y2, y3, y4 = decay * (y1 + y), two * (y2 + y), three * (y3 + y), four * (y4 + y)
+    for sign in (-1.0, 1.0):
+        x1, x2, x3, x4, y1, y2, y3, y4 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for k in range(last - first + 1):
+            i = first + k if sign < 0.0 else last - k
+            induced_x[i] += sign * ((weight * y1 + second * y2) + (third * y3 + fourth * y4))
+            induced_y[i] += sign * ((weight * x1 + second * x2) + (third * x3 + fourth * x4))
+            x, y = force_x[i], force_y[i]
+            x1, x2, x3, x4 = decay * (x1 + x), two * (x2 + x), three * (x3 + x), four * (x4 + x)
+            y1, y2, y3, y4 = decay * (y1 + y), two * (y2 + y), three * (y3 + y), four * (y4 + y)

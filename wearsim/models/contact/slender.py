@@ -335,13 +335,15 @@ class Slender(StripModel):
             return super().pass_loop(loop)
         from wearsim.mechanics.slender import chord_method, pass_loop  # noqa: PLC0415  (slow to load, rarely needed)
 
-        constants = chord_method.contact_constants(
+        modulus = self._pair.contact_modulus
+        constants = chord_method.ContactConstants(
             self._grid.spacing,
-            self._pair.contact_modulus,
-            self._pair.shear_modulus,
+            1.0 / (np.pi * modulus),
+            modulus,
             loop.longitudinal_curvature,
             self._table,
             self._bend,
+            strip_elasticity(modulus, self._pair.shear_modulus),
         )
         status, done, full_solves = pass_loop.run_passes(
             loop.order,

@@ -10,13 +10,7 @@ from wearsim.errors import ContactError
 from wearsim.mechanics.hertz.elasticity import ElasticPair
 from wearsim.mechanics.tangential import hertz_fastsim_batch as batches
 from wearsim.mechanics.tangential.fastrip import fastrip, fastrip_fields
-from wearsim.mechanics.tangential.fastsim import march
-from wearsim.mechanics.tangential.fastsim_closed_form import closed_form
-from wearsim.mechanics.tangential.fastsim_fields import (
-    element_sum,
-    march_fields,
-    march_local_fields,
-)
+from wearsim.mechanics.tangential.fastsim import closed_form, element_sum, march, march_fields
 from wearsim.mechanics.tangential.kalker_coefficients import (
     CreepageCoefficients,
     Flexibilities,
@@ -168,7 +162,7 @@ class FastsimTheory(TangentialTheory):
             out[:4, part] = march(*problem, self.mx)
         force_x, force_y, moment, adhesion, dissipation = out
         if self.element_sum:
-            fields = march_fields(*problem, self.mx)
+            fields = march_fields(*problem, np.ones((self.mx, len(problem[0]))))
             dissipation[part] = element_sum(
                 fields, flexibility.longitudinal, flexibility.lateral, rolling_speed
             )
@@ -203,8 +197,8 @@ class FastsimTheory(TangentialTheory):
             np.broadcast_to(friction, (steps, len(strips.y))), np.float64, ["C", "W"]
         )
         peak = peak_pressure(strips, elliptic=self.elliptic)
-        traction_x, traction_y, cut_x, cut_y = march_local_fields(
-            half_length, peak, local, elliptic, gradient_x, gradient_y, gradient_spin
+        traction_x, traction_y, cut_x, cut_y = march_fields(
+            half_length, peak, elliptic, gradient_x, gradient_y, gradient_spin, local
         )[:, ::-1]
         a, inside = strips.half_length, strips.half_length > 0.0
         place = np.linspace(-1.0, 1.0, steps + 1)[:, None]
