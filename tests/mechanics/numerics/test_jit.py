@@ -8,7 +8,7 @@ import numba
 import numpy as np
 import pytest
 
-from wearsim.mechanics.numerics.jit import inlined_subroutine, kernel, subroutine
+from wearsim.mechanics.numerics.jit import kernel, subroutine
 
 
 def _third_of_root(x: float) -> float:
@@ -23,7 +23,7 @@ def _shifted(x: float) -> float:
     return _root(x) + 0.1
 
 
-@inlined_subroutine
+@subroutine
 def _inverse(x: float) -> float:
     return 1.0 / x
 

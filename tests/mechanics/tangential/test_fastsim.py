@@ -146,6 +146,7 @@ def local(case, friction, first=0):
         *flexible,
         len(friction),
         sums,
+        None,
     )
     return sums
 

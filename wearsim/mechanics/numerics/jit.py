@@ -81,14 +81,6 @@ def subroutine(function: Callable[P, R]) -> Callable[P, R]:
     return register_jitable(**_OPTIONS)(function)
 
 
-def inlined_subroutine(function: Callable[P, R]) -> Callable[P, R]:
-    """Let kernels call `function`, inlined into the machine code of the caller.
-
-    For small functions called in an inner loop: a loop that contains a call is not vectorised.
-    """
-    return register_jitable(forceinline=True, **_OPTIONS)(function)
-
-
 def own_array(array: FloatArray) -> FloatArray:
     """Return a writable contiguous copy, the only kind of array that kernels accept."""
     return np.array(array, dtype=np.float64, order="C")

@@ -64,7 +64,10 @@ def fill_responses(k: int, state: NewtonState, system: DepthSystem) -> None:
     size, response, approach_slope = state.size[k], system.response, system.approach_slope
     invert_factored(state.matrix[k], size, state.order[k], response[k])
     for column in range(size):
-        approach_slope[k, column] = response[k, column, :size].sum() / state.unit_load_sum[k]
+        total = 0.0
+        for row in range(size):
+            total += response[k, column, row]
+        approach_slope[k, column] = total / state.unit_load_sum[k]
         for row in range(size):
             response[k, column, row] -= state.unit_load[k, row] * approach_slope[k, column]
 

@@ -27,6 +27,7 @@ from wearsim.mechanics.numerics.lu import factor_in_place, invert_factored
 from wearsim.mechanics.slender.half_length import (
     REACH,
     HalfLengths,
+    add_around,
     add_length_slopes,
     find_factors,
     gather_length_slopes,
@@ -194,8 +195,7 @@ def set_anchor(
             )
         for r in range(guards):
             state.guard_row[g, r, c] = constants.unit * work[1, abs(state.guard[g, r] - j)]
-        for i in range(n):
-            state.surface[g, i] += constants.unit * q * work[0, abs(i - j)]
+        add_around(j, 0, n - 1, constants.unit * q, work[0], state.surface[g])
         if constants.curvature_influence.shape[0] > 0:
             gather_length_slopes(g, j, constants.unit * q, work[0], work[1], state.lengths)
     if constants.curvature_influence.shape[0] > 0:
@@ -232,11 +232,8 @@ def fill_remainder(g: int, loads: Loads, constants: ContactConstants, state: Cho
             for k in range(reach):
                 phi = constants.unit * q * work[2, k]
                 work[0, k] = phi - state.near[g, c, 0, k] - state.near[g, c, 1, k] * x
-        remainder[j] += work[0, 0]
-        for k in range(1, min(reach, n - j)):
-            remainder[j + k] += work[0, k]
-        for k in range(1, min(reach, j + 1)):
-            remainder[j - k] += work[0, k]
+        first, last = max(0, j - reach + 1), min(n, j + reach) - 1
+        add_around(j, first, last, 1.0, work[0], remainder)
 
 
 @subroutine
@@ -343,12 +340,10 @@ def solve_fully(
 ) -> int:
     """Solve contact `g` by Newton's method and set its anchor if `anchored`; return the status."""
     n = state.gap.shape[0]
-    gap, line_load = np.empty((1, 1, n)), np.empty((1, 1, n))
+    line_load = loads.line_load[g].copy().reshape((1, 1, n))
     approach, status = np.full((1, 1), loads.approach[g]), np.zeros((2, 1), np.int64)
-    for i in range(n):
-        gap[0, 0, i], line_load[0, 0, i] = state.gap[i], loads.line_load[g, i]
     solve_slender(
-        gap,
+        state.gap.reshape((1, 1, n)),
         np.zeros((1, 1, n)),
         None,
         None,

@@ -34,16 +34,18 @@ from wearsim.mechanics.slender.body_elimination import (
 )
 from wearsim.mechanics.slender.half_length import (
     NEWTON_REACH,
+    add_around,
+    add_length_slopes,
     fill_half_lengths,
     find_factors,
+    gather_length_slopes,
     new_half_lengths,
 )
-from wearsim.mechanics.slender.influence import HIGHEST
+from wearsim.mechanics.slender.influence import HIGHEST, read_influence
 from wearsim.mechanics.slender.newton_step import (
     NewtonState,
     add_approach,
     correct_residual,
-    displace,
     new_newton_state,
     number_strips,
     predict_surface,
@@ -270,7 +272,7 @@ def solve_slender(
         for attempt in range(2 if np.any(total) else 1):
             if attempt > 0:
                 total[:] = 0.0
-            surface, work = np.empty((contacts, n)), np.empty((2, n))
+            surface, value, tangent = np.empty((contacts, n)), np.empty(n), np.empty(n)
             state, lowest = new_newton_state(contacts, n), np.empty(contacts)
             log_scale = log_scales_of(contact_modulus, longitudinal_curvature[number], spacing)
             lengths = new_half_lengths(curvature_influence, log_scale, NEWTON_REACH)
@@ -288,7 +290,9 @@ def solve_slender(
                 )
                 # relative to the least gap, as the displacements under a vanishing load would be
                 # lost in the rounding of a deep groove
-                lowest[k] = gap[number, k].min()
+                lowest[k] = gap[number, k, 0]
+                for i in range(n):
+                    lowest[k] = min(lowest[k], gap[number, k, i])
                 delta[k] -= lowest[k]
             outcome, before, iteration = CONTINUE, 0.0, 0
             while outcome == CONTINUE:
@@ -306,15 +310,43 @@ def solve_slender(
                     if find_factors(k, total, fresh, lengths) > HIGHEST:
                         outcome = TOO_FINE
                         break
-                    displace(k, own, table, unit, lengths, total, work, surface, state)
+                    size, step, pressed = state.size[k], state.step[k], surface[k]
+                    # add the displacement, and fill a fresh Jacobian
+                    for column in range(size):
+                        j = state.place[k, column]
+                        push, tau = unit * total[k, j], lengths.log_ratio[k, j]
+                        reach = max(j + 1, n - j)
+                        if fresh:
+                            read_influence(table, tau, reach, value, tangent)
+                            state.diagonal[k, column] = unit * tangent[0]
+                            outer = state.outer[k, column]
+                            outer[:] = 0.0
+                            add_around(j, 0, n - 1, unit, tangent, outer)
+                            for row in range(size):
+                                matrix[column, row] = outer[state.place[k, row]]
+                            if curvature_influence.shape[0] > 0:
+                                gather_length_slopes(k, j, push, value, tangent, lengths)
+                        else:
+                            read_influence(table, tau, reach, value, None)
+                        state.pressed[k, column] = push * value[0]
+                        add_around(j, 0, n - 1, push, value, pressed)
+                    if fresh and curvature_influence.shape[0] > 0:
+                        add_length_slopes(k, total, state.rows, lengths, matrix)
+                    for row in range(size):
+                        i = state.place[k, row]
+                        surface[k, i] += own[k, i] * total[k, i]
+                        state.missing[k, row] = -surface[k, i]
+                        if fresh:
+                            matrix[row, row] += own[k, i]
                     if fresh:
-                        size, step = state.size[k], state.step[k]
                         if not factor_in_place(matrix, size, order):
                             outcome = SINGULAR
                             break
                         step[:size] = 1.0
                         solve_factored(matrix, size, order, step, state.unit_load[k])
-                        state.unit_load_sum[k] = state.unit_load[k, :size].sum()
+                        state.unit_load_sum[k] = 0.0
+                        for row in range(size):
+                            state.unit_load_sum[k] += state.unit_load[k, row]
                         state.fresh[k] = False
                         if not abs(state.unit_load_sum[k]) > 0.0:
                             outcome = SINGULAR

@@ -15,13 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from wearsim.mechanics.numerics.jit import subroutine
-from wearsim.mechanics.slender.half_length import (
-    HalfLengths,
-    add_around,
-    add_length_slopes,
-    gather_length_slopes,
-)
-from wearsim.mechanics.slender.influence import HIGHEST, read_influence, read_value
+from wearsim.mechanics.slender.half_length import HalfLengths
+from wearsim.mechanics.slender.influence import HIGHEST, read_value
 from wearsim.types import BoolArray, FloatArray, IntArray
 
 MANIFOLD = 3.0  # ratio of new to old load of a strip up to which the Jacobian may be reused
@@ -88,51 +83,6 @@ def number_strips(k: int, line_load: FloatArray, state: NewtonState) -> None:
             state.place[k, count] = i
             count += 1
     state.size[k] = count
-
-
-@subroutine
-def displace(
-    k: int,
-    compliance: FloatArray,
-    table: FloatArray,
-    unit: float,
-    lengths: HalfLengths,
-    line_load: FloatArray,
-    work: FloatArray,
-    surface: FloatArray,
-    state: NewtonState,
-) -> None:
-    """Add displacement and wear of contact `k` to `surface`, and fill a fresh Jacobian.
-
-    `surface` contains the gap on entry and equals delta in contact at the solution.
-    """
-    fresh, n = state.fresh[k], line_load.shape[1]
-    value, tangent, pressed = work[0], work[1], surface[k]
-    for column in range(state.size[k]):
-        j = state.place[k, column]
-        push, tau, reach = unit * line_load[k, j], lengths.log_ratio[k, j], max(j + 1, n - j)
-        if fresh:
-            read_influence(table, tau, reach, value, tangent)
-            state.diagonal[k, column] = unit * tangent[0]
-            outer = state.outer[k, column]
-            outer[:] = 0.0
-            add_around(j, 0, n - 1, unit, tangent, outer)
-            for row in range(state.size[k]):
-                state.matrix[k, column, row] = outer[state.place[k, row]]
-            if lengths.table.shape[0] > 0:
-                gather_length_slopes(k, j, push, value, tangent, lengths)
-        else:
-            read_influence(table, tau, reach, value, None)
-        state.pressed[k, column] = push * value[0]
-        add_around(j, 0, n - 1, push, value, pressed)
-    if fresh and lengths.table.shape[0] > 0:
-        add_length_slopes(k, line_load, state.rows, lengths, state.matrix[k])
-    for row in range(state.size[k]):
-        i = state.place[k, row]
-        surface[k, i] += compliance[k, i] * line_load[k, i]
-        state.missing[k, row] = -surface[k, i]
-        if fresh:
-            state.matrix[k, row, row] += compliance[k, i]
 
 
 @subroutine

@@ -93,6 +93,7 @@ def fastrip(
                 0.0,
                 points,
                 marched,
+                None,
             )
             sums[:, j] = marched[:, 0]
         else:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from wearsim.mechanics.numerics.jit import inlined_subroutine, kernel, subroutine
+from wearsim.mechanics.numerics.jit import kernel, subroutine
 from wearsim.types import FloatArray
 
 _ROOT_CORNER = 0.2078862249773546  # -zeta(-1/2)
@@ -78,6 +78,7 @@ def march(
         0.0,
         points,
         sums,
+        None,
     )
     return sums[:WORK].copy()
 
@@ -97,11 +98,12 @@ def march_into(
     lateral: float,
     points: int,
     sums: FloatArray,
+    fields: Any,
 ) -> None:
     """Integrate as `march` does, into existing rows.
 
     Compiled separately for a bound without a friction field (`friction` None), without the element
-    sum.
+    sum, and without fields (`fields` None).
 
     Parameters
     ----------
@@ -121,6 +123,8 @@ def march_into(
         As in `march`.
     sums : ndarray, shape (7, >= strips)
         Overwritten, for the first strips; row `WORK` is the element sum over the rolling velocity.
+    fields : ndarray, shape (4, points + 1, strips), or None
+        Filled behind the leading edge, as by `march_fields`.
     """
     sums[:, :strips] = 0.0
     cell = 2.0 / points
@@ -135,7 +139,9 @@ def march_into(
             across = gradient_y + gradient_spin * (place + 0.5 * cell) * a
             tx = sums[TRACTION_X, j] - gradient_x[j] * (cell * a)
             ty = sums[TRACTION_Y, j] - across * (cell * a)
-            sticks, scale = limit_traction(tx, ty, bound)
+            square = tx * tx + ty * ty
+            sticks = square <= bound * bound
+            scale = 1.0 if sticks else bound / math.sqrt(square)
             sums[TRACTION_X, j] = scale * tx
             sums[TRACTION_Y, j] = scale * ty
             weighed = scale * (sticking if sticks else sliding)
@@ -146,6 +152,9 @@ def march_into(
             if friction is not None:
                 cut = scale * (1.0 - scale)
                 sums[WORK, j] += cut * (longitudinal * tx * tx + lateral * ty * ty)
+            if fields is not None:
+                fields[0, k, j], fields[1, k, j] = scale * tx, scale * ty
+                fields[2, k, j], fields[3, k, j] = (1.0 - scale) * tx, (1.0 - scale) * ty
     for j in range(strips):
         dx = cell * half_length[j]
         sums[FORCE_X, j] *= dx
@@ -206,20 +215,6 @@ def bound_shape(place: float, elliptic: bool) -> float:
     """
     shape = (1.0 - place) * (1.0 + place)
     return math.sqrt(shape) if elliptic else shape
-
-
-@inlined_subroutine
-def limit_traction(traction_x: float, traction_y: float, bound: float) -> tuple[bool, float]:
-    """Return whether the traction is within the bound, and the factor that scales it to the bound.
-
-    Parameters
-    ----------
-    traction_x, traction_y, bound : float
-        Trial traction and its bound [Pa].
-    """
-    square = traction_x * traction_x + traction_y * traction_y
-    sticks = square <= bound * bound
-    return sticks, 1.0 if sticks else bound / math.sqrt(square)
 
 
 @kernel
@@ -343,21 +338,22 @@ def march_fields(
     """
     points, strips = friction.shape
     out = np.zeros((4, points + 1, strips))
-    cell = 2.0 / points
-    for k in range(1, points + 1):
-        place = place_of(k, points)
-        middle = place + 0.5 * cell
-        shape = bound_shape(place, elliptic)
-        for j in range(strips):
-            a = half_length[j]
-            dx = cell * a
-            tx = out[0, k - 1, j] - gradient_x[j] * dx
-            ty = out[1, k - 1, j] - (gradient_y + gradient_spin * middle * a) * dx
-            _, scale = limit_traction(tx, ty, shape * (friction[k - 1, j] * bound_peak[j]))
-            out[0, k, j] = scale * tx
-            out[1, k, j] = scale * ty
-            out[2, k, j] = (1.0 - scale) * tx
-            out[3, k, j] = (1.0 - scale) * ty
+    march_into(
+        strips,
+        half_length,
+        bound_peak,
+        friction,
+        0,
+        elliptic,
+        gradient_x,
+        gradient_y,
+        gradient_spin,
+        0.0,
+        0.0,
+        points,
+        np.empty((ROWS, strips)),
+        out,
+    )
     return out
 
 

@@ -286,6 +286,7 @@ def _solve_tractions(
             lateral,
             lanes,
             sums,
+            None,
         )
         _accumulate(count, sums, 1.0, first, total)
         return
@@ -309,6 +310,7 @@ def _solve_tractions(
                 lateral,
                 theory.points,
                 sums,
+                None,
             )
         elif closed:
             closed_form_into(
@@ -332,6 +334,7 @@ def _solve_tractions(
                 lateral,
                 theory.points,
                 sums,
+                None,
             )
         _accumulate(count, sums, 1.0 / lanes, first, total)
 

@@ -84,53 +84,6 @@ def bound_steepness(half_length: FloatArray, line_load: FloatArray) -> float:
 
 
 @subroutine
-def _fill_forces(
-    half_length: FloatArray,
-    line_load: FloatArray,
-    friction: FloatArray,
-    slip_x: FloatArray,
-    slip_y: float,
-    spin: float,
-    steepness: float,
-    modulus_x: float,
-    modulus_y: float,
-    out: StripTractions,
-) -> None:
-    """Fill the forces for the effective slip; the induced slip is read from `out`.
-
-    All strips are computed without branches: those without load or friction have placeholder inputs
-    and a traction bound of zero. Strips that require the full formula for spin are then repeated.
-    """
-    turned = 0
-    if spin != 0.0:
-        for i in range(line_load.shape[0]):
-            x, y = slip_x[i] + out.induced_x[i], slip_y + out.induced_y[i]
-            if spin_turns(half_length[i], friction[i] * steepness, x, y, spin, modulus_y):
-                turned += 1
-    for i in range(line_load.shape[0]):
-        loaded = 1.0 if line_load[i] > 0.0 else 0.0
-        force_x, force_y, moment, adhering = straight_force(
-            loaded * half_length[i] + (1.0 - loaded),
-            max(friction[i] * (loaded * line_load[i]), 0.0),
-            friction[i] * steepness + _LEAST,
-            slip_x[i] + out.induced_x[i],
-            slip_y + out.induced_y[i],
-            spin,
-            modulus_x,
-            modulus_y,
-        )
-        out.force_x[i], out.force_y[i], out.moment[i] = force_x, force_y, moment
-        out.adhesion_length[i] = loaded * adhering
-    for i in range(line_load.shape[0] if turned > 0 else 0):
-        if line_load[i] > 0.0:
-            x, y = slip_x[i] + out.induced_x[i], slip_y + out.induced_y[i]
-            a, q, mu = half_length[i], line_load[i], friction[i]
-            out.force_x[i], out.force_y[i], out.moment[i], out.adhesion_length[i] = strip_force(
-                a, q, mu, steepness, x, y, spin, modulus_x, modulus_y
-            )
-
-
-@subroutine
 def _fill_work(slip_x: FloatArray, slip_y: float, spin: float, out: StripTractions) -> None:
     """Fill the work on the effective slip, scaled so that the total is that of the rigid slip."""
     seen, rigid = 0.0, 0.0
@@ -158,6 +111,9 @@ def solve_strips(
     out: StripTractions,
 ) -> None:
     """Fill the tractions of the strips of one contact.
+
+    All strips are computed without branches: those without load or friction have placeholder inputs
+    and a traction bound of zero. Strips that require the full formula for spin are then repeated.
 
     Parameters
     ----------
@@ -187,32 +143,46 @@ def solve_strips(
     coupled = last >= 0 and (slip_y != 0.0 or spin != 0.0)
     for sweep in range(2 if coupled else 1):
         if sweep > 0:
-            adhering = 0.0
+            sticking = 0.0
             for i in range(first, last + 1):
-                adhering += line_load[i] * out.adhesion_length[i]
+                sticking += line_load[i] * out.adhesion_length[i]
             induced_slip(
                 out.force_x,
                 out.force_y,
                 first,
                 last,
                 spacing,
-                coupling_length(mean / load, 0.5 * adhering / mean),
+                coupling_length(mean / load, 0.5 * sticking / mean),
                 elasticity,
                 out.induced_x,
                 out.induced_y,
             )
-        _fill_forces(
-            half_length,
-            line_load,
-            friction,
-            slip_x,
-            slip_y,
-            spin,
-            steepness,
-            modulus_x,
-            modulus_y,
-            out,
-        )
+        turned = 0
+        for i in range(n if spin != 0.0 else 0):
+            x, y = slip_x[i] + out.induced_x[i], slip_y + out.induced_y[i]
+            if spin_turns(half_length[i], friction[i] * steepness, x, y, spin, modulus_y):
+                turned += 1
+        for i in range(n):
+            loaded = 1.0 if line_load[i] > 0.0 else 0.0
+            force_x, force_y, moment, adhering = straight_force(
+                loaded * half_length[i] + (1.0 - loaded),
+                max(friction[i] * (loaded * line_load[i]), 0.0),
+                friction[i] * steepness + _LEAST,
+                slip_x[i] + out.induced_x[i],
+                slip_y + out.induced_y[i],
+                spin,
+                modulus_x,
+                modulus_y,
+            )
+            out.force_x[i], out.force_y[i], out.moment[i] = force_x, force_y, moment
+            out.adhesion_length[i] = loaded * adhering
+        for i in range(n if turned > 0 else 0):
+            if line_load[i] > 0.0:
+                x, y = slip_x[i] + out.induced_x[i], slip_y + out.induced_y[i]
+                a, q, mu = half_length[i], line_load[i], friction[i]
+                out.force_x[i], out.force_y[i], out.moment[i], out.adhesion_length[i] = strip_force(
+                    a, q, mu, steepness, x, y, spin, modulus_x, modulus_y
+                )
     _fill_work(slip_x, slip_y, spin, out)
 
 
