@@ -9,7 +9,7 @@ import pytest
 
 from tests.report.made_up_ensembles import made_up
 from tests.studies.study_examples import short
-from wearsim.report.figures.ensemble_comparison import MOST_POINTS, comparison_figure
+from wearsim.report.figures.ensemble import MOST_POINTS, comparison_figure
 from wearsim.report.parts import save_figure
 from wearsim.report.text import cells, part_with_interval, with_interval
 from wearsim.studies.ensemble.compare import compare

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from wearsim.report.figures.dissipation import CLASSES, MOST_LINES, dissipation_figure
+from wearsim.report.figures.contact import CLASSES, MOST_LINES, dissipation_figure
 from wearsim.report.parts import save_figure
 from wearsim.results import DissipationResult
 from wearsim.scenario import load_scenario

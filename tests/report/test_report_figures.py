@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from wearsim.errors import PluginError
+from wearsim.errors import PluginError, ResultsFileError
 from wearsim.report.figures.contact import contact_figure
 from wearsim.report.figures.run import run_figure
 from wearsim.report.parts import Measured, save_figure
@@ -131,7 +131,7 @@ def test_figure_is_written_completely_or_not_at_all(
 
     with monkeypatch.context() as patch:
         patch.setattr(figure, "savefig", fail)
-        with pytest.raises(OSError, match="disk full"):
+        with pytest.raises(ResultsFileError, match=r"x\.png: cannot be written \(disk full\)"):
             save_figure(figure, path)
     assert [item.name for item in tmp_path.iterdir()] == ["x.png"]
     assert path.read_text() == "mine"

@@ -23,7 +23,8 @@ from wearsim.results import (
     read_dissipation,
     write_results,
 )
-from wearsim.results.dissipation import VARIABLES, as_numbers, dissipation_schema, summaries
+from wearsim.results.content import with_random_inputs
+from wearsim.results.dissipation import DISSIPATION, VARIABLES, as_numbers, summaries
 
 INPUTS = [{"key": "load.normal_force", "unit": "N"}, {"key": "friction.coefficient", "unit": "1"}]
 
@@ -34,7 +35,7 @@ def some_study(count: int = 40, kept: int = 30, **changes: object) -> Dissipatio
     lengths = {"realisation": count, "kept": kept, "y": 9}
     variables = {
         name: rng.random([lengths[dim] for dim in variable.dims])
-        for name, variable in dissipation_schema(INPUTS).variables.items()
+        for name, variable in with_random_inputs(DISSIPATION, INPUTS).variables.items()
     }
     values: dict[str, object] = {
         "scenario_text": 'title = "µ"\n',

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path, PurePath
-from typing import IO, TYPE_CHECKING, Any
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -18,11 +16,8 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 
 from wearsim.csv_tables import column_names, read_columns
 from wearsim.report.text import count, pass_unit
+from wearsim.results.io.atomic_write import replacement
 from wearsim.types import BoolArray, FloatArray, IntArray
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 
 RECORDS = "viridis"
 PRESSURE = "magma"
@@ -124,8 +119,13 @@ def save_figure(figure: Figure, path: Path) -> None:
     figure : Figure
     path : Path
         Ends in .png, .pdf or .svg; an existing file is replaced.
+
+    Raises
+    ------
+    ResultsFileError
+        If it cannot be written; an existing file is then unchanged.
     """
-    with _replacing(path) as file:
+    with replacement(path) as file:
         figure.savefig(file, format=path.suffix[1:].lower(), dpi=DPI)
 
 
@@ -137,25 +137,14 @@ def save_text(text: str, path: Path) -> None:
     text : str
     path : Path
         An existing file is replaced.
+
+    Raises
+    ------
+    ResultsFileError
+        As `save_figure`.
     """
-    with _replacing(path) as file:
+    with replacement(path) as file:
         file.write(text.encode("utf-8"))
-
-
-@contextmanager
-def _replacing(path: Path) -> Iterator[IO[bytes]]:
-    """Open a temporary file in the same folder and rename it to `path` when it is complete."""
-    number, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-    try:
-        with os.fdopen(number, "wb") as file:
-            yield file
-        mask = os.umask(0)
-        os.umask(mask)
-        Path(name).chmod(0o666 & ~mask)  # mkstemp restricts it to the owner
-        Path(name).replace(path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
 
 
 def patch_edges(y: FloatArray, half_length: FloatArray) -> tuple[float, float] | None:

@@ -369,7 +369,7 @@ def _of_pairs(found: Paired, unit: str, more: str, less: str) -> str:
 _ROUNDING = 1e-12  # in standard deviations
 
 
-def value(distribution: MaxentDistribution, number: float) -> float:
+def without_rounding(distribution: MaxentDistribution, number: float) -> float:
     """Return a value, or 0 if it is a rounding error near 0 inside the support."""
     low, high = distribution.support
     return 0.0 if low < 0.0 < high and abs(number) < _ROUNDING * distribution.std else number
@@ -389,6 +389,6 @@ def multipliers(distribution: MaxentDistribution) -> tuple[float, float, float]:
 def parent(distribution: MaxentDistribution) -> tuple[float, float] | None:
     """Return mean and standard deviation of the parent normal distribution, if there is one."""
     return distribution.parent and (
-        value(distribution, distribution.parent[0]),
+        without_rounding(distribution, distribution.parent[0]),
         distribution.parent[1],
     )

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from wearsim.errors import ResultsFileError
 from wearsim.results.content import ERRORS
-from wearsim.results.dissipation import DissipationData, DissipationResult, dissipation_schema
+from wearsim.results.dissipation import DissipationData, DissipationResult
 from wearsim.results.ensemble.data import EnsembleData
 from wearsim.results.ensemble.result import EnsembleResult
 from wearsim.results.ensemble.schema import FAILED, OBSERVABLES, PENDING
@@ -239,7 +239,7 @@ def _columns(name: str, array: FloatArray, dims: Sequence[str], title: str) -> I
 
 
 def _study_tables(raw: DissipationData) -> dict[str, Iterable[str]]:
-    variables = dissipation_schema(raw.inputs).variables
+    variables = raw.schema.variables
 
     def columns(dim: str) -> dict[str, Column]:
         return {

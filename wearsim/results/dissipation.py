@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 
-from wearsim.results.content import Arrays, StudyData, StudyResult
-from wearsim.results.schema import Axis, Schema, Variable, by_name, with_random_inputs
+from wearsim.results.content import (
+    Arrays,
+    Axis,
+    Schema,
+    StudyData,
+    StudyResult,
+    Variable,
+    by_name,
+    with_random_inputs,
+)
 from wearsim.types import FloatArray
 from wearsim.uq.estimation.moments import Convergence, Summary, converge, summarise
 
@@ -66,12 +74,7 @@ DISSIPATION = Schema(
     ),
     VARIABLES,
 )
-"""Schema without the random inputs, which differ between studies."""
-
-
-def dissipation_schema(inputs: Sequence[Mapping[str, str]]) -> Schema:
-    """Return the schema of a study, with its drawn values; see `with_random_inputs`."""
-    return with_random_inputs(DISSIPATION, inputs)
+"""Schema without the random inputs, which differ between studies; see `with_random_inputs`."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -115,7 +118,7 @@ class DissipationData(StudyData):
     @property
     def schema(self) -> Schema:
         """Schema of the results file."""
-        return dissipation_schema(self.inputs)
+        return with_random_inputs(DISSIPATION, self.inputs)
 
 
 BAND = (0.025, 0.975)

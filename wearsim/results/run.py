@@ -9,8 +9,7 @@ from typing import Any, ClassVar, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from wearsim.results.content import Arrays, StudyData, StudyResult
-from wearsim.results.schema import Axis, Schema, Variable, by_name
+from wearsim.results.content import Arrays, Axis, Schema, StudyData, StudyResult, Variable, by_name
 from wearsim.types import FloatArray
 
 # every axis except y, whose coordinate is a variable

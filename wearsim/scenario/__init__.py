@@ -1,9 +1,9 @@
 """Scenarios: TOML with units, validated as a whole, immutable and in SI once read."""
 
+from wearsim.scenario.examples import scenario_schema
+from wearsim.scenario.parse.fields import Persistence, RandomInput
 from wearsim.scenario.parse.toml import load_scenario, parse_override, parse_scenario
-from wearsim.scenario.random.model import Persistence, RandomInput
 from wearsim.scenario.scenario import Drawn, Scenario, realise, require_run
-from wearsim.scenario.schema import scenario_schema
 from wearsim.scenario.tables.bodies import Cylinder, Roller, read_profile
 from wearsim.scenario.tables.plain import (
     CreepageTable,

@@ -1,12 +1,28 @@
-"""The scenarios shipped with wearsim."""
+"""Help for authors of scenarios: shipped scenarios, and JSON Schema for editors."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any, Literal, TypeAlias, Union
 
-from wearsim.scenario.parse.toml import load_scenario
+from pydantic import BaseModel, Field, RootModel, create_model
+from pydantic.json_schema import GenerateJsonSchema
+from pydantic_core import core_schema
+
+from wearsim.plugins import Options, RandomInputSpec
+from wearsim.scenario.parse.fields import (
+    FRICTION,
+    RandomInputTable,
+    can_be_random,
+    model_at,
+    target_of,
+)
+from wearsim.scenario.parse.mistakes import installed
+from wearsim.scenario.parse.toml import REQUIRED, TABLES, load_scenario
 from wearsim.scenario.scenario import Scenario
+from wearsim.scenario.tables.plain import TopTable
+from wearsim.scenario.tables.plugin import PLUGIN_TABLES
 
 _PACKAGE = Path(__file__).parents[1]
 
@@ -40,3 +56,133 @@ def shipped_scenario(name: str, overrides: Mapping[str, object] | None = None) -
 def starter_scenario() -> str:
     """Return the TOML of a complete scenario, with alternatives as comments."""
     return Path(__file__).with_name("starter.toml").read_text(encoding="utf-8")
+
+
+Model: TypeAlias = type[BaseModel]
+RandomInputs: TypeAlias = tuple[Model | None, Model | None, Model | None]
+
+
+class _ScenarioSchema(GenerateJsonSchema):
+    """Pydantic's schema with defaults as a scenario holds them, without null, which TOML lacks."""
+
+    def nullable_schema(self, schema: core_schema.NullableSchema) -> dict[str, Any]:
+        return self.generate_inner(schema["schema"])
+
+    def default_schema(self, schema: core_schema.WithDefaultSchema) -> dict[str, Any]:
+        result = super().default_schema(schema)
+        default, value = schema.get("default"), schema["schema"]
+        if value["type"] == "union":  # a number or a random input
+            value = value["choices"][0]
+        write = value.get("serialization", {}).get("function")
+        if default is None:
+            result.pop("default", None)
+        elif write is not None:
+            result["default"] = write(default)
+        return result
+
+
+def scenario_schema() -> dict[str, Any]:
+    """Return the JSON Schema (draft 2020-12) of a scenario with the installed plugins.
+
+    Returns
+    -------
+    dict
+    """
+    random = _random_inputs()
+    tables: dict[str, Any] = {}
+    for table, model in TABLES.items():
+        kind = _one_of(table, _choices(table, random) if table in PLUGIN_TABLES else [])
+        kind = kind or _model(table, model.__doc__, _fields(model, table, random))
+        tables[table] = kind, Field(... if table in REQUIRED else None, description=model.__doc__)
+    scenario = _model(
+        "wearsim scenario",
+        "Scenario of a wear simulation of a rolling contact, for wearsim.",
+        {**_fields(TopTable), **tables},
+    )
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **scenario.model_json_schema(schema_generator=_ScenarioSchema),
+    }
+
+
+def _model(name: str, description: str | None, fields: dict[str, Any]) -> Model:
+    return create_model(name, __base__=Options, __doc__=description, **fields)
+
+
+def _one_of(name: str, models: list[Model]) -> Model | None:
+    """Return a model of one of several tables, or None if there are none."""
+    kind: Any = Union[tuple(models)] if models else None  # noqa: UP007
+    return create_model(name, __base__=RootModel, root=(kind, ...)) if models else None
+
+
+def _random_inputs() -> RandomInputs:
+    """Return the models of what may replace a number, the friction and several numbers."""
+    own, specs = RandomInputTable.model_fields, installed(RandomInputSpec)
+
+    def models(role: str, keys: dict[str, Any], name: str = "{}") -> list[Model]:
+        return [
+            _model(
+                name.format(spec.name),
+                spec.summary,
+                {
+                    "distribution": (Literal[spec.name], own["distribution"]),
+                    **keys,
+                    **_fields(spec.options),
+                },
+            )
+            for spec in specs
+            if spec.role == role
+        ]
+
+    marginal = _one_of("MarginalDistribution", models("scalar", {}, "{} as marginal"))
+    drawn = {"persistence": (own["persistence"].annotation, own["persistence"])}
+    full = {**drawn, "marginal": (marginal, Field(description=own["marginal"].description))}
+    processes = models("process", full) if marginal else []
+    number = _one_of("RandomInput", models("scalar", drawn) + processes)
+    friction = _one_of("RandomFriction", [number, *models("field", full)] if number else [])
+    return number, friction, _one_of("JointRandomInput", models("joint", drawn))
+
+
+def _choices(table: str, random: RandomInputs) -> list[Model]:
+    """Return the model of a table for each plugin that it may choose."""
+    base, key, kind = PLUGIN_TABLES[table]
+    named, specs = base.model_fields[key], installed(kind)
+    terms: dict[str, Any] = {}
+    options: dict[str, Any] = {}
+    for spec in specs:
+        fields = _fields(spec.options, table, random)
+        if getattr(spec, "role", "base") == "term":
+            model = _model(f"{table} {spec.name}", spec.summary, fields)
+            terms[spec.name] = model, Field(None, description=spec.summary)
+        else:
+            default = spec.name if spec.name == named.default else ...
+            described = Field(default, description=named.description)
+            options[spec.name] = {**fields, **_fields(base), key: (Literal[spec.name], described)}
+    return [
+        _model(f"{table} {spec.name}", spec.summary, {**terms, **options[spec.name]})
+        for spec in specs
+        if spec.name in options
+    ]
+
+
+def _fields(
+    model: Model, table: str = "", random: RandomInputs = (None, None, None)
+) -> dict[str, Any]:
+    """Return a table's fields, with the type "number or random input" where that is possible."""
+    number, friction, joint = random
+    fields: dict[str, Any] = {}
+    for key, field in model.model_fields.items():
+        name, inner, target = f"{table}.{key}", model_at(model, (key,)), target_of(field)
+        kind: Any = field.annotation
+        described: Any = field
+        if target and target.components:
+            kind, described = joint, Field(None, description=field.description)
+        elif target and number and can_be_random(name):
+            kind = Union[field.rebuild_annotation(), friction if name == FRICTION else number]  # noqa: UP007
+            described = Field(field.get_default(), description=field.description)
+        elif inner and can_be_random(name):
+            within = _fields(inner, table, random)
+            kind = _model(f"{inner.__name__} of {key}", inner.__doc__, within)
+        if kind:
+            fields[key] = kind, described
+    return fields

@@ -12,8 +12,8 @@ from typing import Any, TypeAlias
 from pydantic import BaseModel
 
 from wearsim.errors import Mistake, ScenarioError
+from wearsim.scenario.parse.fields import RandomInput
 from wearsim.scenario.parse.mistakes import Mistakes, replace_numbers
-from wearsim.scenario.random.model import RandomInput
 from wearsim.scenario.tables.bodies import Cylinder, Roller
 from wearsim.scenario.tables.plain import (
     CreepageTable,

@@ -68,7 +68,7 @@ def maxent(
     except Infeasible as error:
         raise Infeasible(re.sub(r"\bmean_log\b", "--mean-log", str(error))) from error
     if figure is not None:
-        from wearsim.report.figures.maxent import maxent_figure
+        from wearsim.report.figures.contact import maxent_figure
         from wearsim.report.parts import save_figure
 
         save_figure(maxent_figure(distribution), figure)
@@ -93,7 +93,7 @@ def _limit(text: str) -> float:
 
 
 def _rows(distribution: MaxentDistribution) -> list[tuple[str, str]]:
-    from wearsim.report.text import multipliers, parent, value
+    from wearsim.report.text import multipliers, parent, without_rounding
 
     found = parent(distribution)
     return [
@@ -105,7 +105,7 @@ def _rows(distribution: MaxentDistribution) -> list[tuple[str, str]]:
             "parent normal distribution",
             f"mean {found[0]:.7g}, standard deviation {found[1]:.7g}" if found else "none",
         ),
-        ("mean", f"{value(distribution, distribution.mean):.7g}"),
+        ("mean", f"{without_rounding(distribution, distribution.mean):.7g}"),
         ("standard deviation", f"{distribution.std:.7g}"),
         *(
             (f"{100.0 * probability:g} % quantile", f"{item:.7g}")
@@ -117,10 +117,13 @@ def _rows(distribution: MaxentDistribution) -> list[tuple[str, str]]:
 def _quantiles(distribution: MaxentDistribution) -> dict[float, float]:
     import numpy as np
 
-    from wearsim.report.text import value
+    from wearsim.report.text import without_rounding
 
     values = distribution.quantile(np.array(PROBABILITIES)).tolist()
-    return {p: value(distribution, item) for p, item in zip(PROBABILITIES, values, strict=True)}
+    return {
+        p: without_rounding(distribution, item)
+        for p, item in zip(PROBABILITIES, values, strict=True)
+    }
 
 
 def _plot(distribution: MaxentDistribution) -> list[str]:
@@ -141,7 +144,7 @@ def _plot(distribution: MaxentDistribution) -> list[str]:
 
 def _data(distribution: MaxentDistribution, figure: Path | None) -> dict[str, Any]:
     """Return the distribution in the units of the given moments."""
-    from wearsim.report.text import multipliers, parent, value
+    from wearsim.report.text import multipliers, parent, without_rounding
 
     found = parent(distribution)
     return {
@@ -150,7 +153,7 @@ def _data(distribution: MaxentDistribution, figure: Path | None) -> dict[str, An
         "multipliers": dict(zip(("l0", "l1", "l2"), multipliers(distribution), strict=True)),
         "l2_multiplies": distribution.third,
         "parent": found and {"mean": found[0], "std": found[1]},
-        "mean": value(distribution, distribution.mean),
+        "mean": without_rounding(distribution, distribution.mean),
         "std": distribution.std,
         "quantiles": _quantiles(distribution),
         "warnings": list(distribution.warnings),

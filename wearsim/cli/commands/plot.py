@@ -69,7 +69,7 @@ def draw(
 
         figure = ensemble_figure(result)
     elif isinstance(result, DissipationResult):
-        from wearsim.report.figures.dissipation import dissipation_figure
+        from wearsim.report.figures.contact import dissipation_figure
 
         figure = dissipation_figure(result)
     else:

@@ -1,14 +1,16 @@
-"""Part files of an ensemble: rows of realisations until they are merged into its file.
+"""Part files of an ensemble, and reading of an ensemble with its parts.
 
-They are in a folder beside the file, rig.h5.parts for rig.h5, and have numbers in the order in
-which they were written.
+Parts are rows of realisations until they are merged into the file of the ensemble. They are in a
+folder beside it, rig.h5.parts for rig.h5, and have numbers in the order in which they were written.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,24 +18,31 @@ import numpy as np
 import numpy.typing as npt
 
 from wearsim.errors import ResultsFileError
-from wearsim.results.content import Arrays, as_plain
-from wearsim.results.ensemble.data import EnsembleData, Outcome
+from wearsim.results.content import Arrays, Schema, as_plain, axis_lengths
+from wearsim.results.ensemble.data import EnsembleData, Outcome, StoredRows
 from wearsim.results.ensemble.schema import (
     DONE,
     ENSEMBLE,
     ERROR_BYTES,
     FAILED,
     PENDING,
+    ensemble_schema,
     is_row,
     type_of,
 )
-from wearsim.results.io.atomic_write import Storage
-from wearsim.results.io.overwrite_guard import parts_folder
-from wearsim.results.io.reader import check_complete, check_layout, format_of, read_file, read_text
-from wearsim.results.schema import Schema
+from wearsim.results.io.atomic_write import Storage, parts_folder
+from wearsim.results.io.files import (
+    check_complete,
+    check_layout,
+    format_of,
+    read_attributes,
+    read_file,
+    read_text,
+)
 
 if TYPE_CHECKING:
     import h5py
+
 
 PART = Schema(f"{ENSEMBLE.format}-part", ENSEMBLE.version, "rows of an ensemble", {}, {})
 NUMBER, STATE, RUN_ID = "number", "state", "run_id"
@@ -277,3 +286,73 @@ def _stored_text(error: str) -> bytes:
         return content
     end = _CUT.encode()
     return content[: most - len(end)].decode("utf-8", "ignore").encode() + end
+
+
+def read_ensemble(path: str | Path) -> EnsembleData:
+    """Read an ensemble from its file and its parts; arrays are read on access.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+
+    Returns
+    -------
+    EnsembleData
+
+    Raises
+    ------
+    ResultsFileError
+        If the file or a part is missing, foreign, truncated, damaged, or of another layout.
+    """
+    try:
+        return _read(Path(path))
+    except ResultsFileError:  # its parts may have been merged since the file was opened
+        return _read(Path(path))
+
+
+def _read(path: Path) -> EnsembleData:
+    data, stored = read_file(path, lambda file: _merged(path, file))
+    stored.parts += read_parts(path, data)
+    status, errors = data.status, data.errors
+    for part in stored.parts:
+        status[part.numbers] = part.status
+        errors |= part.errors
+    failed = np.flatnonzero(status == FAILED).tolist()
+    changed = {"finished": False, **stored.parts[-1].state} if stored.parts else {}
+    return replace(data, errors={number: errors[number] for number in failed}, **changed)
+
+
+def _merged(path: Path, file: h5py.File) -> tuple[EnsembleData, StoredRows]:
+    """Return what the file of an ensemble holds without its parts."""
+    attributes = read_attributes(path, file, ENSEMBLE, EnsembleData)
+    schema = ensemble_schema(attributes["inputs"], attributes["control"])
+    check_complete(path, file, schema.variables)
+    datasets = {name: file[name] for name in schema.variables}
+    rows = axis_lengths(datasets, schema.variables)["realisation"]
+    if rows != attributes["requested"]:
+        raise ValueError(f"{rows} rows for {attributes['requested']} realisations")
+    for name, variable in schema.variables.items():
+        if datasets[name].dtype != type_of(variable):
+            raise ValueError(f"{name} is stored as {datasets[name].dtype}")
+    status = datasets["status"][:]
+    if (status > FAILED).any():
+        raise ValueError(f"a realisation has the status {status.max()}")
+    failed = np.flatnonzero(status == FAILED).tolist()
+    errors = {number: text_of(datasets["error"][number]) for number in failed}
+    identity = os.fstat(file.id.get_vfd_handle())
+    stored = StoredRows(partial(_read_unchanged, path, identity), schema, [])
+    return EnsembleData(**attributes, variables=stored, status=status, errors=errors), stored
+
+
+def _read_unchanged(
+    path: Path, identity: os.stat_result, take: Callable[[h5py.File], npt.NDArray[Any]]
+) -> npt.NDArray[Any]:
+    """Return what `take` reads from a file, which must be the one that was opened before."""
+
+    def checked(file: h5py.File) -> npt.NDArray[Any]:
+        if not os.path.samestat(os.fstat(file.id.get_vfd_handle()), identity):
+            raise ResultsFileError(f"{path}: was replaced by another; open it again")
+        return take(file)
+
+    return read_file(path, checked)

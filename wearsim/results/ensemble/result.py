@@ -12,7 +12,7 @@ import numpy as np
 
 from wearsim.results.content import StudyResult
 from wearsim.results.ensemble.data import EnsembleData
-from wearsim.results.ensemble.reader import read_ensemble
+from wearsim.results.ensemble.parts import read_ensemble
 from wearsim.results.ensemble.schema import DONE, OBSERVABLES, QUANTILES, kept_profiles
 from wearsim.types import FloatArray, IntArray
 from wearsim.uq.estimation.estimates import Design, Estimate, estimate

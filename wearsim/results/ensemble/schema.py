@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from wearsim.results.schema import Axis, Schema, Variable, by_name, with_random_inputs
+from wearsim.results.content import Axis, Schema, Variable, by_name, with_random_inputs
 
 PENDING, DONE, FAILED = 0, 1, 2
 """Values of the status of a realisation."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import uuid
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
@@ -14,23 +14,25 @@ import numpy as np
 import numpy.typing as npt
 
 from wearsim.results.content import Arrays
-from wearsim.results.ensemble.data import EnsembleData, Outcome
+from wearsim.results.ensemble.data import EnsembleData, Outcome, StoredRows
 from wearsim.results.ensemble.parts import (
     NUMBER,
     blank_rows,
     joined,
     part_numbers,
     part_path,
+    read_ensemble,
     rows_of,
     write_part,
 )
-from wearsim.results.ensemble.reader import read_ensemble
 from wearsim.results.ensemble.schema import ENSEMBLE, PENDING, QUANTILES, STATIC, STATISTICS, is_row
-from wearsim.results.ensemble.stored_rows import StoredRows
-from wearsim.results.io.atomic_write import DISK, TEMPORARY, Storage, os_errors_converted
-from wearsim.results.io.overwrite_guard import (
+from wearsim.results.io.atomic_write import (
+    DISK,
+    TEMPORARY,
+    Storage,
     lock_or_refuse,
     lock_path,
+    os_errors_converted,
     parts_folder,
     refuse_if_locked,
 )
@@ -44,7 +46,7 @@ PART_BYTES = 1 << 21
 Completion: TypeAlias = Callable[[EnsembleData], tuple[Mapping[str, Any], Arrays]]
 
 
-class EnsembleFile:
+class EnsembleFile(AbstractContextManager["EnsembleFile"]):
     """An ensemble open for writing by this process alone.
 
     Rows are written to part files, of which the last is written again as a whole whenever
@@ -244,9 +246,6 @@ class EnsembleFile:
         if self.data.finished and not self._stored.parts:
             with suppress(OSError):  # files of others are left there
                 parts_folder(self.path).rmdir()
-
-    def __enter__(self) -> EnsembleFile:
-        return self
 
     def __exit__(
         self,

@@ -1,9 +1,14 @@
-"""Atomic writing of files: after a kill either the old or the new content is complete."""
+"""Atomic writing of files, the lock of their writer, and checks of an output path.
+
+After a kill either the old or the new content of a file is complete.
+"""
 
 from __future__ import annotations
 
+import errno
 import os
-from collections.abc import Iterator
+import struct
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
@@ -12,7 +17,6 @@ from wearsim.errors import ResultsFileError
 
 TEMPORARY = ".tmp"
 """Added to the name of a file while its new content is written."""
-
 
 _BUFFER = 1 << 18  # bytes
 
@@ -98,3 +102,169 @@ def os_errors_converted(path: str | Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise ResultsFileError(f"{path}: cannot be written ({error.strerror or error})") from error
+
+
+def lock_or_refuse(file: IO[bytes], path: str | Path) -> None:
+    """Lock an open file until it is closed or the process ends.
+
+    Where available, the lock belongs to the open file description (OFD): HDF5 uses the other
+    kind, flock, when it opens a file for reading.
+
+    Parameters
+    ----------
+    file : binary file
+        The file, open for writing.
+    path : str or Path
+        The file that it protects, for messages.
+
+    Raises
+    ------
+    ResultsFileError
+        If another process holds the lock, or held it until now and deleted the file.
+    """
+    busy = ResultsFileError(f"{path}: is being written by another process")
+    try:
+        _lock(file.fileno())
+    except OSError as error:
+        if error.errno in {errno.EAGAIN, errno.EACCES}:
+            raise busy from error
+        reason = error.strerror or str(error)
+        raise ResultsFileError(f"{path}: cannot be locked for writing ({reason})") from error
+    if os.fstat(file.fileno()).st_nlink == 0:
+        raise busy
+
+
+def parts_folder(path: str | Path) -> Path:
+    """Return the folder of the part files of an ensemble, and of the lock of its writer."""
+    target = Path(path).resolve()  # follows links
+    return target.with_name(f"{target.name}.parts")
+
+
+def lock_path(path: str | Path) -> Path:
+    """Return the file that the writer of an ensemble locks."""
+    return parts_folder(path) / "lock"
+
+
+def refuse_if_locked(path: str | Path) -> None:
+    """Refuse an ensemble that another process is writing.
+
+    Parameters
+    ----------
+    path : str or Path
+        Its file, which need not exist.
+
+    Raises
+    ------
+    ResultsFileError
+        If another process is writing it.
+    """
+    lock = lock_path(path)
+    if os.access(lock, os.R_OK | os.W_OK):
+        with lock.open("r+b", buffering=0) as file:
+            lock_or_refuse(file, path)
+
+
+def _lock(handle: int) -> None:
+    if os.name == "nt":  # a lock would block readers on Windows
+        return
+    import fcntl  # noqa: PLC0415  (not on every system)
+
+    if hasattr(fcntl, "F_OFD_SETLK"):
+        whole = struct.pack("hhqqi", fcntl.F_WRLCK, os.SEEK_SET, 0, 0, 0)
+        fcntl.fcntl(handle, fcntl.F_OFD_SETLK, whole)
+    else:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+# suffixes of figures, scenarios and tables, which are refused for results files
+_OTHER_KINDS = (".png", ".pdf", ".svg", ".toml", ".csv")
+
+
+def refuse_inputs(
+    path: str | Path, inputs: Iterable[Path], what: str = "the scenario", option: str = "-o"
+) -> None:
+    """Raise if an output would replace an input file.
+
+    Parameters
+    ----------
+    path : str or Path
+        The output.
+    inputs : iterable of Path
+        The input files.
+    what : str
+        Description of the inputs.
+    option : str
+        The option that set the output.
+
+    Raises
+    ------
+    ResultsFileError
+        If the output is one of the inputs, also by another name.
+    """
+    for source in inputs:
+        if same_file(path, source):
+            raise ResultsFileError(
+                f"{path}: {what} is read from {source}, and --force replaces no input; choose"
+                f" another name with {option}"
+            )
+
+
+def same_file(one: str | Path, other: str | Path) -> bool:
+    """Return whether two paths refer to the same file.
+
+    Parameters
+    ----------
+    one, other : str or Path
+        The paths; the files need not exist.
+
+    Returns
+    -------
+    bool
+    """
+    try:
+        return os.path.samefile(one, other)
+    except OSError:  # one of them does not exist
+        return Path(one).resolve() == Path(other).resolve()
+
+
+def check_output(path: str | Path, force: bool, inputs: Iterable[Path] = ()) -> None:
+    """Check before a long computation that a results file may be written.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    force : bool
+        Whether an existing file may be replaced.
+    inputs : iterable of Path
+        Files of the scenario, which are never replaced.
+
+    Raises
+    ------
+    ResultsFileError
+        If the file exists and `force` is not set, is an input, has the suffix of a figure, a
+        scenario or a table, is being written by another process, or if its folder is missing or
+        not writable.
+    """
+    refuse_inputs(path, inputs)
+    target, suffix = Path(path).resolve(), Path(path).suffix
+    folder = target.parent
+    if suffix.lower() in _OTHER_KINDS:
+        raise ResultsFileError(
+            f"{path}: no results file ends in {suffix}; choose another name with -o, such as"
+            f" {Path(path).with_suffix('.h5').name}"
+        )
+    if target.is_dir():
+        raise ResultsFileError(f"{path}: is a folder; name a file in it with -o")
+    if not folder.is_dir():
+        raise ResultsFileError(f"{path}: there is no folder {folder}; make it, or choose with -o")
+    if target.exists():
+        if not target.is_file():
+            raise ResultsFileError(f"{path}: is not a regular file; choose another with -o")
+        if not force:
+            raise ResultsFileError(
+                f"{path}: already exists; --force replaces it, -o chooses another"
+            )
+        refuse_if_locked(path)
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise ResultsFileError(f"{path}: the folder {folder} is not writable; choose with -o")

@@ -26,11 +26,12 @@ from wearsim.results.content import (
     INPUTS,
     SCENARIO,
     Arrays,
+    Schema,
     StudyData,
     as_plain,
+    axis_lengths,
 )
 from wearsim.results.io.atomic_write import DISK, Storage, replacement
-from wearsim.results.schema import Schema, axis_lengths
 
 CHUNK_ROWS = 4096
 """Most rows of a chunk; who writes as many rows at a time writes each chunk once."""

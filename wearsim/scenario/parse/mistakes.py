@@ -15,8 +15,7 @@ from pydantic_core import ErrorDetails
 from wearsim.errors import Mistake, PluginError, ScenarioError
 from wearsim.plugins import Spec, registry
 from wearsim.quantities import Quantity
-from wearsim.scenario.parse.fields import choices, field_at, form, model_at
-from wearsim.scenario.random.model import RandomInput
+from wearsim.scenario.parse.fields import RandomInput, choices, field_at, form, model_at
 from wearsim.units import QuantityError, shown
 
 M = TypeVar("M", bound=BaseModel)

@@ -11,9 +11,9 @@ from typing import Any
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.plugins import LoadSpec, Options, RandomInputSpec
+from wearsim.scenario.parse.fields import RandomInput, RandomInputTable
 from wearsim.scenario.parse.mistakes import Mistakes, installed, nearest
-from wearsim.scenario.random.model import RandomInput, RandomInputTable
-from wearsim.scenario.random.read import validate
+from wearsim.scenario.parse.random_inputs import validate
 from wearsim.scenario.scenario import Scenario
 from wearsim.scenario.tables.bodies import (
     Cylinder,

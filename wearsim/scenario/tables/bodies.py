@@ -14,7 +14,7 @@ from wearsim.errors import ScenarioError
 from wearsim.plugins import Options
 from wearsim.quantities import InputFile, Length, PerRoller, PositiveLength, PositivePressure
 from wearsim.scenario.parse.mistakes import Mistakes
-from wearsim.scenario.random.read import validate
+from wearsim.scenario.parse.random_inputs import validate
 from wearsim.types import Material, Profile
 from wearsim.units import QuantityError, shown
 

@@ -20,7 +20,7 @@ from wearsim.quantities import (
 )
 from wearsim.scenario.parse.fields import RandomTarget
 from wearsim.scenario.parse.mistakes import Mistakes, nearest
-from wearsim.scenario.random.read import validate
+from wearsim.scenario.parse.random_inputs import validate
 from wearsim.units import ANGLE, QuantityError, shown
 from wearsim.uq.sampling.sampler import GaussianCopula
 

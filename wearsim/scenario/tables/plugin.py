@@ -24,7 +24,7 @@ from wearsim.plugins import (
 )
 from wearsim.quantities import Length, PositiveLength
 from wearsim.scenario.parse.mistakes import Mistakes, installed, key_of_file, split_keys
-from wearsim.scenario.random.read import validate
+from wearsim.scenario.parse.random_inputs import validate
 from wearsim.types import Grid, Material
 from wearsim.units import shown
 

@@ -13,7 +13,7 @@ from wearsim.evolution.contact_inputs import Varying
 from wearsim.mechanics.numerics.piecewise_linear import PiecewiseLinear
 from wearsim.plugins import JointDistribution, Process
 from wearsim.scenario import RandomInput, Scenario, realise, require_run
-from wearsim.scenario.random.model import CONTACT_FIELDS
+from wearsim.scenario.parse.fields import CONTACT_FIELDS
 from wearsim.studies.run.inputs import OFFSET, TILT, YAW, contact_values, origin
 from wearsim.types import FloatArray
 from wearsim.uq.sampling.philox import Stream

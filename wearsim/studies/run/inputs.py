@@ -9,7 +9,7 @@ import numpy as np
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.plugins import Load
 from wearsim.scenario import RandomInput, Scenario
-from wearsim.scenario.random.model import CONTACT_FIELDS
+from wearsim.scenario.parse.fields import CONTACT_FIELDS
 from wearsim.types import FloatArray
 
 LOAD, FRICTION, LONGITUDINAL = "load.normal_force", "friction.coefficient", "creepage.longitudinal"

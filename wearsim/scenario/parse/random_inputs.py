@@ -13,16 +13,7 @@ from pydantic.fields import FieldInfo
 from wearsim.errors import ScenarioError
 from wearsim.plugins import Distribution, JointDistribution, RandomInputSpec
 from wearsim.quantities import Quantity
-from wearsim.scenario.parse.fields import RandomTarget, form, in_words, model_at, target_of
-from wearsim.scenario.parse.mistakes import (
-    M,
-    Mistakes,
-    installed,
-    key_of_file,
-    split_keys,
-    validate_options,
-)
-from wearsim.scenario.random.model import (
+from wearsim.scenario.parse.fields import (
     CONTACT_FIELDS,
     FRICTION,
     MISALIGNMENT,
@@ -33,8 +24,21 @@ from wearsim.scenario.random.model import (
     Persistence,
     RandomInput,
     RandomInputTable,
+    RandomTarget,
     amount,
     can_be_random,
+    form,
+    in_words,
+    model_at,
+    target_of,
+)
+from wearsim.scenario.parse.mistakes import (
+    M,
+    Mistakes,
+    installed,
+    key_of_file,
+    split_keys,
+    validate_options,
 )
 from wearsim.units import QuantityError, shown
 

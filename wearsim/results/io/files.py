@@ -1,4 +1,4 @@
-"""Reading of results files, with one-line messages on missing, foreign or damaged files."""
+"""Reading and writing of results files; what is missing, foreign or damaged gets one line."""
 
 from __future__ import annotations
 
@@ -18,20 +18,23 @@ from wearsim.results.content import (
     INPUTS,
     SCENARIO,
     Arrays,
+    Schema,
     StudyData,
+    axis_lengths,
+    with_random_inputs,
 )
 from wearsim.results.dissipation import (
     DISSIPATION,
     DissipationData,
     DissipationResult,
-    dissipation_schema,
 )
 from wearsim.results.ensemble.schema import ENSEMBLE
+from wearsim.results.io.atomic_write import DISK, Storage
 from wearsim.results.run import RUN, Result, RunData
-from wearsim.results.schema import Schema, axis_lengths
 
 if TYPE_CHECKING:
     import h5py
+
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _SMALLEST = 96  # bytes: no HDF5 file is shorter
@@ -174,7 +177,7 @@ def _run_data(path: str | Path, file: h5py.File) -> RunData:
 
 def _dissipation_data(path: str | Path, file: h5py.File) -> DissipationData:
     attributes = read_attributes(path, file, DISSIPATION, DissipationData)
-    schema = dissipation_schema(attributes["inputs"])
+    schema = with_random_inputs(DISSIPATION, attributes["inputs"])
     check_complete(path, file, schema.variables)
     return DissipationData(**attributes, variables=_variables(file, schema))
 
@@ -272,3 +275,32 @@ def open_results(path: str | Path) -> Result:
 def open_dissipation(path: str | Path) -> DissipationResult:
     """Open the file of a dissipation study; see `open_results`."""
     return DissipationResult(read_dissipation(path), Path(path))
+
+
+def write_results(
+    path: str | Path, data: RunData | DissipationData, storage: Storage = DISK
+) -> None:
+    """Write a results file, replacing an existing one.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    data : RunData or DissipationData
+        Content of the file.
+    storage : Storage
+        File operations.
+
+    Raises
+    ------
+    ResultsFileError
+        If it cannot be written; an existing file is then unchanged.
+    ValueError
+        If the variables are not those of the schema, or their shapes are inconsistent.
+    """
+    from wearsim.results.io import hdf5_write  # noqa: PLC0415  (h5py takes 0.2 s to import)
+
+    checkpoint = data.checkpoint if isinstance(data, RunData) else {}
+    with hdf5_write.new_file(path, storage) as (file, _):
+        hdf5_write.put_variables(file, data.schema, data.variables)
+        hdf5_write.put_texts(file, data.schema, data, checkpoint)

@@ -1,1 +1,0 @@
-"""Random inputs of a scenario."""
