@@ -152,7 +152,8 @@ def axis_lengths(arrays: Arrays, table: Mapping[str, Variable]) -> dict[str, int
     return lengths
 
 
-Arrays = dict[str, npt.NDArray[Any]]
+Array: TypeAlias = npt.NDArray[Any]
+Arrays: TypeAlias = dict[str, Array]
 
 CHECKPOINT, INPUTS = "checkpoint", "inputs"
 """Groups of a results file."""
@@ -284,3 +285,25 @@ class StudyResult(Generic[Data]):
     def warnings(self) -> tuple[str, ...]:
         """Remarks on the computation, such as limits of accuracy."""
         return tuple(self.raw.warnings)
+
+
+class Stored:
+    """A variable of the results file as an attribute of the result.
+
+    Parameters
+    ----------
+    name : str
+        Name of the variable.
+    text : str
+        Description of the attribute.
+    """
+
+    def __init__(self, name: str, text: str) -> None:
+        self._name = name
+        self.__doc__ = text
+
+    def __get__(self, result: Any, owner: type) -> Array:
+        if result is None:
+            return self  # type: ignore[return-value]  # for `help`
+        found: Array = result.values(self._name)
+        return found

@@ -7,13 +7,12 @@ import io
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path, PurePosixPath
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
 from wearsim.errors import ResultsFileError
-from wearsim.results.content import ERRORS
+from wearsim.results.content import ERRORS, Array
 from wearsim.results.dissipation import DissipationData, DissipationResult
 from wearsim.results.ensemble.data import EnsembleData
 from wearsim.results.ensemble.result import EnsembleResult
@@ -54,7 +53,7 @@ def _table(columns: Iterable[Column]) -> str:
     return _csv([titles]) + _rows(np.column_stack(values))
 
 
-def _rows(numbers: npt.NDArray[Any]) -> str:
+def _rows(numbers: Array) -> str:
     # adding zero avoids -0
     return _csv([f"{value + 0.0:.12g}" for value in row] for row in numbers.tolist())
 

@@ -14,6 +14,7 @@ from wearsim.results.content import (
     Arrays,
     Axis,
     Schema,
+    Stored,
     StudyData,
     StudyResult,
     Variable,
@@ -133,6 +134,13 @@ SUMMARISED = ("power", "force_x", "force_y", "spin_moment", "normal_force", "pea
 class DissipationResult(StudyResult[DissipationData]):
     """Realisations of one contact, finished or not."""
 
+    power = Stored("power", "Dissipated power P_d, shape (realisations,) [W].")
+    y = Stored("y", "Axial position of the strips [m].")
+    dissipation = Stored(
+        "dissipation",
+        "Dissipated power per axial length, shape (kept realisations, strips) [W/m].",
+    )
+
     def __repr__(self) -> str:
         done = f"{self.count}" if self.finished else f"{self.count} of {self.raw.requested}"
         noun = "realisation" if done == "1" else "realisations"
@@ -161,24 +169,9 @@ class DissipationResult(StudyResult[DissipationData]):
         return {item["key"]: self.values(item["key"]) for item in self.raw.inputs}
 
     @property
-    def power(self) -> FloatArray:
-        """Dissipated power P_d, shape (realisations,) [W]."""
-        return self.values("power")
-
-    @property
     def mean_problem_power(self) -> float:
         """Dissipated power with every random input at its mean [W]."""
         return self.raw.mean_problem_power
-
-    @property
-    def y(self) -> FloatArray:
-        """Axial position of the strips [m]."""
-        return self.values("y")
-
-    @property
-    def dissipation(self) -> FloatArray:
-        """Dissipated power per axial length, shape (kept realisations, strips) [W/m]."""
-        return self.values("dissipation")
 
     @cached_property
     def summaries(self) -> dict[str, Summary]:

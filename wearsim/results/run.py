@@ -7,9 +7,18 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
-from wearsim.results.content import Arrays, Axis, Schema, StudyData, StudyResult, Variable, by_name
+from wearsim.results.content import (
+    Array,
+    Arrays,
+    Axis,
+    Schema,
+    Stored,
+    StudyData,
+    StudyResult,
+    Variable,
+    by_name,
+)
 from wearsim.types import FloatArray
 
 # every axis except y, whose coordinate is a variable
@@ -174,27 +183,6 @@ Number: TypeAlias = float | list[float]
 _DROPPED = {"station", "roller", "realisation"}
 
 
-class _Stored:
-    """A variable of the results file as an attribute of the result.
-
-    Parameters
-    ----------
-    name : str
-        Name of the variable.
-    text : str
-        Description of the attribute.
-    """
-
-    def __init__(self, name: str, text: str) -> None:
-        self._name = name
-        self.__doc__ = text
-
-    def __get__(self, result: Result | None, owner: type[Result]) -> npt.NDArray[Any]:
-        if result is None:
-            return self  # type: ignore[return-value]  # for `help`
-        return result.values(self._name)
-
-
 @dataclass(frozen=True, eq=False)
 class Result(StudyResult[RunData]):
     """Result of a run, finished or not.
@@ -202,57 +190,61 @@ class Result(StudyResult[RunData]):
     The axes station, roller and realisation are dropped where their length is one.
     """
 
-    passes = _Stored(
+    passes = Stored(
         "passes", "Roller passes after each step, all rollers together; the first row is 0."
     )
-    time = _Stored("time", "Simulated time after each step [s].")
-    depth = _Stored(
+    time = Stored("time", "Simulated time after each step [s].")
+    depth = Stored(
         "depth", "Greatest depth of the cylinder worn since the start, after each step [m]."
     )
-    width = _Stored("width", "Width of the groove in the cylinder after each step [m].")
-    worn_volume = _Stored("worn_volume", "Worn volume of the cylinder after each step [m^3].")
-    roller_depth = _Stored(
+    width = Stored("width", "Width of the groove in the cylinder after each step [m].")
+    worn_volume = Stored("worn_volume", "Worn volume of the cylinder after each step [m^3].")
+    roller_depth = Stored(
         "roller_depth", "Greatest depth of each roller worn since the start, after each step [m]."
     )
-    roller_worn_volume = _Stored(
+    roller_worn_volume = Stored(
         "roller_worn_volume", "Worn volume of one physical roller after each step [m^3]."
     )
-    dissipated_energy = _Stored(
+    dissipated_energy = Stored(
         "dissipated_energy",
         "Energy dissipated by all rollers since the start, after each step [J].",
     )
-    power = _Stored("power", "Dissipated power of all rollers after each step [W].")
-    normal_force = _Stored("normal_force", "Normal force of each roller after each step [N].")
-    peak_pressure = _Stored(
+    power = Stored("power", "Dissipated power of all rollers after each step [W].")
+    normal_force = Stored("normal_force", "Normal force of each roller after each step [N].")
+    peak_pressure = Stored(
         "peak_pressure", "Greatest normal pressure of each roller after each step [Pa]."
     )
-    longitudinal_creepage = _Stored(
+    longitudinal_creepage = Stored(
         "longitudinal_creepage", "Mean longitudinal creepage of each roller after each step."
     )
-    depth_error = _Stored(
+    depth_error = Stored(
         "depth_error", "Estimated error of the depth of either body after each step [m]."
     )
-    volume_error = _Stored(
+    volume_error = Stored(
         "volume_error", "Estimated error of the volume worn off both bodies, after each step [m^3]."
     )
-    rejected = _Stored("rejected", "Rejected steps so far, after each step.")
-    solves = _Stored("solves", "Contact solves of accepted steps so far, after each step.")
-    full_solves = _Stored("full_solves", "Roller passes solved in full so far, after each step.")
-    y = _Stored("y", "Axial position of the strips [m].")
-    record_passes = _Stored("record_passes", "Roller passes at each record.")
-    record_time = _Stored("record_time", "Simulated time at each record [s].")
-    profiles = _Stored(
+    rejected = Stored("rejected", "Rejected steps so far, after each step.")
+    solves = Stored("solves", "Contact solves of accepted steps so far, after each step.")
+    full_solves = Stored("full_solves", "Roller passes solved in full so far, after each step.")
+    y = Stored("y", "Axial position of the strips [m].")
+    start_height = Stored(
+        "start_height",
+        "Height of the cylinder above its nominal shape at the start, shape (strips,) [m].",
+    )
+    record_passes = Stored("record_passes", "Roller passes at each record.")
+    record_time = Stored("record_time", "Simulated time at each record [s].")
+    profiles = Stored(
         "cylinder_depth_profile",
         "Worn depth of the cylinder at each record, positive down, (record, y) [m].",
     )
-    roller_profiles = _Stored(
+    roller_profiles = Stored(
         "roller_depth_profile",
         "Worn depth of each roller at each record, positive into the roller [m].",
     )
-    line_load = _Stored(
+    line_load = Stored(
         "line_load", "Normal force per axial length of each contact at each record [N/m]."
     )
-    dissipation = _Stored(
+    dissipation = Stored(
         "dissipation", "Dissipated power per axial length of each contact at each record [W/m]."
     )
 
@@ -262,7 +254,7 @@ class Result(StudyResult[RunData]):
         depth = float(np.max(self.depth[-1])) * 1e6
         return f"<Result '{self.title}': {done} roller passes, depth {depth:.4g} um>"
 
-    def values(self, name: str) -> npt.NDArray[Any]:
+    def values(self, name: str) -> Array:
         """Return a variable of the results file, axes of length one dropped as above.
 
         Parameters
@@ -281,11 +273,6 @@ class Result(StudyResult[RunData]):
         Inputs that vary during the run (processes, draws at every pass) are not included.
         """
         return {key: tuple(item["values"]) for key, item in self.raw.drawn.items()}
-
-    @property
-    def start_height(self) -> FloatArray:
-        """Height of the cylinder above its nominal shape at the start, shape (strips,) [m]."""
-        return self.raw.static["start_height"]
 
     @property
     def stepper(self) -> str:
@@ -347,7 +334,7 @@ class Result(StudyResult[RunData]):
         }
 
 
-def _number(values: npt.NDArray[Any]) -> Number:
+def _number(values: Array) -> Number:
     numbers: list[float] = values.astype(float).ravel().tolist()
     return numbers[0] if len(numbers) == 1 else numbers
 

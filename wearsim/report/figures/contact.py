@@ -187,7 +187,6 @@ def _draw_strips(panels: dict[str, Axes], solution: ContactSolution) -> None:
         panels[name].set_ylim(bottom=0.0)
 
 
-MM, W_MM = PER_SI["mm"], PER_SI["W/mm"]
 MOST_LINES = 200
 CLASSES = 30
 _HEADROOM = 1.28  # height of the density's panel relative to its highest class, for the legend

@@ -27,7 +27,7 @@ from wearsim.report.parts import (
 )
 from wearsim.report.text import PER_SI, count, pass_unit, shown
 from wearsim.results import Result
-from wearsim.types import FloatArray, IntArray
+from wearsim.types import FloatArray
 
 UM, MM, MIN, W_MM = PER_SI["um"], PER_SI["mm"], PER_SI["min"], PER_SI["W/mm"]
 MOST_RECORDS = 24
@@ -93,10 +93,6 @@ class _Colours:
         self._passes = passes / unit
         self._norm = LogNorm(float(worn[0]), last) if crowded else Normalize(0.0, last / unit)
         self._map = colormaps[RECORDS].reversed()
-
-    def selection(self, number: int) -> IntArray:
-        """Return at most `number` records, the first and the last included."""
-        return self.records[evenly_spaced(len(self.records), number)]
 
     def of(self, record: int) -> tuple[float, float, float, float] | str:
         passes = float(self._passes[record])
@@ -173,7 +169,8 @@ def _draw_dissipation(axes: Axes, result: Result, colours: _Colours) -> None:
     power = np.asarray(result.dissipation) * W_MM
     power = power if power.ndim == 3 else power[:, None]  # (record, roller, strip)
     styles = [STYLES[roller % len(STYLES)] for roller in range(power.shape[1])]
-    for record in colours.selection(10 if len(styles) == 1 else 5):
+    most = 10 if len(styles) == 1 else 5
+    for record in colours.records[evenly_spaced(len(colours.records), most)]:
         for line, style in zip(power[record], styles, strict=True):
             axes.plot(y, line, style, color=colours.of(record), lw=1.1)
     if len(styles) > 1:

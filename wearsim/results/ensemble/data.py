@@ -8,9 +8,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
-from wearsim.results.content import Arrays, Schema, StudyData
+from wearsim.results.content import Array, Arrays, Schema, StudyData
 from wearsim.results.ensemble.schema import (
     DONE,
     FAILED,
@@ -20,14 +19,12 @@ from wearsim.results.ensemble.schema import (
     kept_profiles,
     type_of,
 )
-from wearsim.types import FloatArray
+from wearsim.types import FloatArray, IntArray
 
 if TYPE_CHECKING:
     import h5py
 
     from wearsim.results.ensemble.parts import Part
-
-    Array = npt.NDArray[Any]
 
 
 class StoredRows(Mapping[str, "Array"]):
@@ -187,8 +184,8 @@ class EnsembleData(StudyData):
     inputs: list[dict[str, str]]
     groups: list[dict[str, str]]
     control: dict[str, float] = field(default_factory=dict)
-    variables: Mapping[str, npt.NDArray[Any]] = field(default_factory=dict)
-    status: npt.NDArray[np.uint8] = field(default_factory=lambda: np.zeros(0, np.uint8))
+    variables: Mapping[str, Array] = field(default_factory=dict)
+    status: Array = field(default_factory=lambda: np.zeros(0, np.uint8))
     errors: dict[int, str] = field(default_factory=dict)
     statistics: dict[str, Any] = field(default_factory=dict)
     run_id: str = ""
@@ -200,16 +197,16 @@ class EnsembleData(StudyData):
         return ensemble_schema(self.inputs, self.control)
 
     @property
-    def done(self) -> npt.NDArray[np.int64]:
+    def done(self) -> IntArray:
         """Numbers of the successful realisations, ascending."""
         return np.flatnonzero(self.status == DONE)
 
     @property
-    def failed(self) -> npt.NDArray[np.int64]:
+    def failed(self) -> IntArray:
         """Numbers of the failed realisations, ascending."""
         return np.flatnonzero(self.status == FAILED)
 
-    def rows(self, name: str, start: int, stop: int | None, *rest: slice) -> npt.NDArray[Any]:
+    def rows(self, name: str, start: int, stop: int | None, *rest: slice) -> Array:
         """Return rows of a variable, including those of pending and failed realisations.
 
         Parameters

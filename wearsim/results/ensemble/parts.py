@@ -15,10 +15,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from wearsim.errors import ResultsFileError
-from wearsim.results.content import Arrays, Schema, as_plain, axis_lengths
+from wearsim.results.content import Array, Arrays, Schema, as_plain, axis_lengths
 from wearsim.results.ensemble.data import EnsembleData, Outcome, StoredRows
 from wearsim.results.ensemble.schema import (
     DONE,
@@ -39,6 +38,7 @@ from wearsim.results.io.files import (
     read_file,
     read_text,
 )
+from wearsim.types import IntArray
 
 if TYPE_CHECKING:
     import h5py
@@ -69,12 +69,12 @@ class Part:
     """
 
     path: Path
-    numbers: npt.NDArray[np.int64]
-    status: npt.NDArray[np.uint8]
+    numbers: IntArray
+    status: Array
     errors: dict[int, str]
     state: dict[str, Any]
 
-    def put_rows(self, rows: npt.NDArray[Any], name: str, start: int, *rest: slice) -> None:
+    def put_rows(self, rows: Array, name: str, start: int, *rest: slice) -> None:
         """Replace those rows of a variable that are in this part.
 
         Parameters
@@ -346,11 +346,11 @@ def _merged(path: Path, file: h5py.File) -> tuple[EnsembleData, StoredRows]:
 
 
 def _read_unchanged(
-    path: Path, identity: os.stat_result, take: Callable[[h5py.File], npt.NDArray[Any]]
-) -> npt.NDArray[Any]:
+    path: Path, identity: os.stat_result, take: Callable[[h5py.File], Array]
+) -> Array:
     """Return what `take` reads from a file, which must be the one that was opened before."""
 
-    def checked(file: h5py.File) -> npt.NDArray[Any]:
+    def checked(file: h5py.File) -> Array:
         if not os.path.samestat(os.fstat(file.id.get_vfd_handle()), identity):
             raise ResultsFileError(f"{path}: was replaced by another; open it again")
         return take(file)

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
 
@@ -15,14 +15,11 @@ from wearsim.results.ensemble.data import EnsembleData
 from wearsim.results.ensemble.parts import read_ensemble
 from wearsim.results.ensemble.schema import DONE, OBSERVABLES, QUANTILES, kept_profiles
 from wearsim.types import FloatArray, IntArray
-from wearsim.uq.estimation.estimates import Design, Estimate, estimate
+from wearsim.uq.estimation.estimates import Design, Estimate, Target, estimate
 from wearsim.uq.estimation.intervals import Interval
 from wearsim.uq.estimation.moments import summarise
 from wearsim.uq.estimation.standard_errors import Control
 from wearsim.uq.sampling.sampler import REPLICATES
-
-if TYPE_CHECKING:
-    from wearsim.uq.estimation.estimates import Target
 
 _READ_SIZE = 4_000_000  # numbers read at once
 PROBABILITIES = (0.025, 0.05, 0.5, 0.95, 0.975)

@@ -11,9 +11,8 @@ from types import TracebackType
 from typing import IO, TYPE_CHECKING, Any, TypeAlias, cast
 
 import numpy as np
-import numpy.typing as npt
 
-from wearsim.results.content import Arrays
+from wearsim.results.content import Array, Arrays
 from wearsim.results.ensemble.data import EnsembleData, Outcome, StoredRows
 from wearsim.results.ensemble.parts import (
     NUMBER,
@@ -87,7 +86,7 @@ class EnsembleFile(AbstractContextManager["EnsembleFile"]):
         cls,
         path: str | Path,
         header: EnsembleData,
-        static: Mapping[str, npt.NDArray[Any]],
+        static: Mapping[str, Array],
         storage: Storage = DISK,
     ) -> EnsembleFile:
         """Write a file in which all realisations are pending, replacing any, and open it.
@@ -121,12 +120,14 @@ class EnsembleFile(AbstractContextManager["EnsembleFile"]):
         is_new = not folder.exists()
         # the parts of an ensemble that is replaced count as merged, and are deleted later
         last = max(part_numbers(path), default=0)
-        header = replace(header, variables=static, run_id=uuid.uuid4().hex, merged=last)
+        known = {name: np.asarray(array, float) for name, array in static.items()}
+        known["quantile"] = np.array(QUANTILES)
+        header = replace(header, variables=known, run_id=uuid.uuid4().hex, merged=last)
         with os_errors_converted(path):
             folder.mkdir(exist_ok=True)  # before the file, which is incomplete without it
         try:
             with hdf5_write.new_file(path, storage) as (file, _):
-                _put_variables(file, header)
+                hdf5_write.put_variables(file, header.schema, known, header.reserved)
                 hdf5_write.put_texts(file, ENSEMBLE, header)
         except BaseException:
             if is_new:
@@ -163,7 +164,7 @@ class EnsembleFile(AbstractContextManager["EnsembleFile"]):
             raise
 
     @property
-    def status(self) -> npt.NDArray[np.uint8]:
+    def status(self) -> Array:
         """PENDING, DONE or FAILED of every realisation, shape (requested,), read-only."""
         view = self._status.view()
         view.flags.writeable = False
@@ -275,10 +276,10 @@ class EnsembleFile(AbstractContextManager["EnsembleFile"]):
         """Replace the file by one that contains the rows of all parts."""
         from wearsim.results.io import hdf5_write  # noqa: PLC0415  (h5py takes 0.2 s to import)
 
-        static = {name: self._stored[name] for name in STATIC}
-        header = replace(header, **self._state, variables=static, merged=self._number)
+        known = {name: self._stored[name] for name in (*STATIC, "quantile")}
+        header = replace(header, **self._state, variables=known, merged=self._number)
         with hdf5_write.new_file(self.path, self._storage) as (file, check):
-            _put_variables(file, header)
+            hdf5_write.put_variables(file, header.schema, known, header.reserved)
             for start in range(0, len(self._status), hdf5_write.CHUNK_ROWS):
                 self._copy_rows(file, start, start + hdf5_write.CHUNK_ROWS)
                 check()
@@ -302,16 +303,7 @@ class EnsembleFile(AbstractContextManager["EnsembleFile"]):
                     file[name][start : start + len(rows)] = rows
 
 
-def _put_variables(file: h5py.File, header: EnsembleData) -> None:
-    """Write the variables that are known from the start, and describe the others."""
-    from wearsim.results.io import hdf5_write  # noqa: PLC0415  (h5py takes 0.2 s to import)
-
-    known = {name: np.asarray(array, float) for name, array in header.variables.items()}
-    known["quantile"] = np.array(QUANTILES)
-    hdf5_write.put_variables(file, header.schema, known, header.reserved)
-
-
-def _put_statistic(dataset: h5py.Dataset, name: str, array: npt.NDArray[Any]) -> None:
+def _put_statistic(dataset: h5py.Dataset, name: str, array: Array) -> None:
     if name not in STATISTICS:
         raise ValueError(f"{name} is not a statistic of an ensemble")
     if np.shape(array) != dataset.shape:

@@ -15,7 +15,6 @@ from typing import IO, Any
 
 import h5py
 import numpy as np
-import numpy.typing as npt
 from h5py import h5d, h5f, h5fd, h5g, h5p, h5s, h5t
 
 from wearsim.results.content import (
@@ -25,6 +24,7 @@ from wearsim.results.content import (
     FILES,
     INPUTS,
     SCENARIO,
+    Array,
     Arrays,
     Schema,
     StudyData,
@@ -226,7 +226,7 @@ def put_text(group: h5py.Group, name: str, text: str) -> None:
     group.create_dataset(name, data=[_text(text)], chunks=(1,), fletcher32=True)
 
 
-def put_array(group: h5py.Group, name: str, array: npt.NDArray[Any]) -> h5py.Dataset:
+def put_array(group: h5py.Group, name: str, array: Array) -> h5py.Dataset:
     """Write an array with checksums.
 
     Raises
@@ -250,12 +250,12 @@ def put_array(group: h5py.Group, name: str, array: npt.NDArray[Any]) -> h5py.Dat
     return group.create_dataset(name, data=array, **_stored_as(array))
 
 
-def _reserve(group: h5py.Group, name: str, array: npt.NDArray[Any]) -> h5py.Dataset:
+def _reserve(group: h5py.Group, name: str, array: Array) -> h5py.Dataset:
     """Describe an array without storing it: what is not written is its fill value."""
     return group.create_dataset(name, array.shape, array.dtype, **_stored_as(array))
 
 
-def _stored_as(array: npt.NDArray[Any]) -> dict[str, Any]:
+def _stored_as(array: Array) -> dict[str, Any]:
     """Return chunks, filters and fill value of an array."""
     left, chunks = _CHUNK_NUMBERS, []
     for length, most in zip(array.shape, (CHUNK_ROWS, *array.shape[1:]), strict=True):
@@ -282,7 +282,7 @@ def put_labels(
             item.attrs[name] = int(value) if is_bool else value
 
 
-def _text(text: str) -> npt.NDArray[Any]:
+def _text(text: str) -> Array:
     """Return a text as an array of fixed length with a final zero, which needs no heap."""
     content = text.encode("utf-8", ERRORS) + b"\0"
     return np.array(content, h5py.string_dtype("utf-8", len(content)))
