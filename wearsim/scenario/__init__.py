@@ -3,8 +3,15 @@
 from wearsim.scenario.examples import scenario_schema
 from wearsim.scenario.parse.fields import Persistence, RandomInput
 from wearsim.scenario.parse.toml import load_scenario, parse_override, parse_scenario
-from wearsim.scenario.scenario import Drawn, Scenario, realise, require_run
-from wearsim.scenario.tables.bodies import Cylinder, Roller, read_profile
+from wearsim.scenario.scenario import (
+    Cylinder,
+    Drawn,
+    Roller,
+    Scenario,
+    read_profile,
+    realise,
+    require_run,
+)
 from wearsim.scenario.tables.plain import (
     CreepageTable,
     EvolutionTable,

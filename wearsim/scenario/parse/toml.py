@@ -14,12 +14,12 @@ from wearsim.plugins import LoadSpec, Options, RandomInputSpec
 from wearsim.scenario.parse.fields import RandomInput, RandomInputTable
 from wearsim.scenario.parse.mistakes import Mistakes, installed, nearest
 from wearsim.scenario.parse.random_inputs import validate
-from wearsim.scenario.scenario import Scenario
-from wearsim.scenario.tables.bodies import (
+from wearsim.scenario.scenario import (
     Cylinder,
     CylinderTable,
     Roller,
     RollerTable,
+    Scenario,
     read_cylinder,
     read_roller,
 )
