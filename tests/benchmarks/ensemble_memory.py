@@ -35,10 +35,12 @@ class ClosedForm(RealisationRunner):
         return [
             Outcome(
                 number=first + k,
-                drawn={key: column[k] for key, column in columns.items()},
-                observables={name: depths[k] * np.array([0.0, 1.0]) for name in OBSERVABLES},
-                scalars=dict.fromkeys(("depth_error", "volume_error", "steps", "solves"), 0.0),
-                profile=np.zeros(self.grid.strips),
+                values={
+                    **{key: column[k] for key, column in columns.items()},
+                    **{name: depths[k] * np.array([0.0, 1.0]) for name in OBSERVABLES},
+                    **dict.fromkeys(("depth_error", "volume_error", "steps", "solves"), 0.0),
+                    "depth_profile": np.zeros(self.grid.strips),
+                },
             )
             for k in range(count)
         ]

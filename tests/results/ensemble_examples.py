@@ -69,14 +69,11 @@ def some_outcome(number: int, strips: int = STRIPS, error: str = "") -> Outcome:
         "creepage.yaw": random.random(ROLLERS),
     }
     if error:
-        return Outcome(number=number, error=error, drawn=drawn)
-    return Outcome(
-        number=number,
-        drawn=drawn,
-        observables={name: random.random(RECORDS) for name in OBSERVABLES},
-        scalars={name: random.random() for name in SCALARS},
-        profile=random.random(strips),
-    )
+        return Outcome(number=number, error=error, values=drawn)
+    courses = {name: random.random(RECORDS) for name in OBSERVABLES}
+    scalars = {name: random.random() for name in SCALARS}
+    profile = random.random(strips)
+    return Outcome(number=number, values={**drawn, **courses, **scalars, "depth_profile": profile})
 
 
 def some_statistics(data: EnsembleData) -> Arrays:

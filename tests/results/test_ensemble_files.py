@@ -116,7 +116,7 @@ def test_long_error_is_cut_between_two_characters(tmp_path):
 def test_control_variate_is_stored_as_a_variable(tmp_path):
     path, control = tmp_path / "ensemble.h5", {"mean": 1.5, "std": 0.1, "draws": 1000000}
     outcome = some_outcome(0)
-    outcome.scalars["control"] = 1.25
+    outcome.values["control"] = 1.25
     with EnsembleFile.create(path, some_header(control=control), some_static()) as file:
         file.put([outcome])
     data = read_ensemble(path)
@@ -280,5 +280,5 @@ def test_pending_realisations_take_no_memory_and_no_disk(tmp_path):
     assert stored < 0.1 * 8 * numbers
     assert data.done.tolist() == [3, million - 1]
     for number in data.done:
-        assert depth[number] == some_outcome(number, 500).observables["depth"][1]
+        assert depth[number] == some_outcome(number, 500).values["depth"][1]
     assert len(data.variables["depth_profile"]) == 4_000_000 // 500

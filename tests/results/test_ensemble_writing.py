@@ -184,7 +184,7 @@ def test_ensemble_is_readable_while_it_is_written(tmp_path):
             assert data.done.tolist() == list(range(number + 1))
             with h5py.File(f"{path}.parts/000001.h5") as plain:
                 assert plain["status"][number] == DONE
-                expected = some_outcome(number).observables["depth"]
+                expected = some_outcome(number).values["depth"]
                 np.testing.assert_array_equal(plain["depth"][number], expected)
             with xarray.open_dataset(path, engine="h5netcdf") as dataset:
                 assert np.isnan(dataset["depth"].values).all()
@@ -274,15 +274,15 @@ def test_folder_that_cannot_be_written_is_refused(tmp_path, monkeypatch):
 
 
 def _incomplete(outcome):
-    del outcome.observables["width"]
+    del outcome.values["width"]
 
 
 def _with_unknown(outcome):
-    outcome.scalars["speed"] = 1.0
+    outcome.values["speed"] = 1.0
 
 
 def _with_scalar_depth(outcome):
-    outcome.observables["depth"] = 1.0
+    outcome.values["depth"] = 1.0
 
 
 @pytest.mark.parametrize(
@@ -329,7 +329,7 @@ def test_profiles_beyond_the_kept_ones_are_not_stored(tmp_path, monkeypatch):
     data = read_ensemble(path)
     assert len(data.variables["depth_profile"]) == 3
     np.testing.assert_array_equal(data.variables["depth_profile"][2], some_outcome(2).profile)
-    np.testing.assert_array_equal(data.variables["depth"][4], some_outcome(4).observables["depth"])
+    np.testing.assert_array_equal(data.variables["depth"][4], some_outcome(4).values["depth"])
 
 
 def test_unknown_field_is_refused(tmp_path):
@@ -361,5 +361,5 @@ def test_inconsistent_statistics_and_static_are_refused(tmp_path):
 def test_examples_contain_all_variables(tmp_path):
     """Otherwise the tests above would not cover the missing variables."""
     outcome = some_outcome(0)
-    assert outcome.observables.keys() == OBSERVABLES.keys()
-    assert set(outcome.scalars) == set(SCALARS)
+    drawn = {item["key"] for item in some_header().inputs}
+    assert outcome.values.keys() == {*drawn, *OBSERVABLES, *SCALARS, "depth_profile"}

@@ -98,29 +98,17 @@ class Outcome:
         Number of the realisation, from 0.
     error : str
         Error message of a failed realisation; empty on success.
-    drawn : dict of str to float or ndarray
-        Drawn values by dotted key, a number or shape (rollers,).
-    observables : dict of str to ndarray
-        Every variable of `schema.OBSERVABLES`, shape (records,).
-    scalars : dict of str to float
-        steps, solves, depth_error, volume_error, and control if the plan has a control variate.
-    profile : ndarray, optional
-        Worn depth of the cylinder at the end, shape (strips,) [m]; not needed for realisations
-        whose profile is not stored.
+    values : dict of str to float or ndarray
+        Numbers by variable. Always: drawn values by dotted key, a number or shape (rollers,). On
+        success also: every variable of `schema.OBSERVABLES`, shape (records,); steps, solves,
+        depth_error, volume_error, and control if the plan has a control variate; depth_profile,
+        the worn depth of the cylinder at the end, shape (strips,) [m], which is not needed for
+        realisations whose profile is not stored.
     """
 
     number: int
     error: str = ""
-    drawn: dict[str, float | FloatArray] = field(default_factory=dict)
-    observables: dict[str, FloatArray] = field(default_factory=dict)
-    scalars: dict[str, float] = field(default_factory=dict)
-    profile: FloatArray | None = None
-
-    @property
-    def values(self) -> dict[str, float | FloatArray]:
-        """All numbers by variable name."""
-        profile = {} if self.profile is None else {"depth_profile": self.profile}
-        return {**self.drawn, **self.observables, **self.scalars, **profile}
+    values: dict[str, float | FloatArray] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

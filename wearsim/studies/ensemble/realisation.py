@@ -112,7 +112,7 @@ class RealisationRunner:
             try:
                 runs.append(self._prepare(number, drawn))
             except Exception as error:  # an error fails this realisation only
-                outcomes[number] = Outcome(number=number, drawn=drawn, error=_error_text(error))
+                outcomes[number] = Outcome(number=number, values=drawn, error=_error_text(error))
         for group in batch_groups(runs):
             for run, observations in zip(group, observe(group), strict=True):
                 outcomes[run.number] = self._outcome(run, observations)
@@ -146,7 +146,7 @@ class RealisationRunner:
     def _outcome(self, run: RealisationRun, observations: RunObservations | Exception) -> Outcome:
         drawn = dict(run.drawn)
         if isinstance(observations, Exception):
-            return Outcome(number=run.number, drawn=drawn, error=_error_text(observations))
+            return Outcome(number=run.number, values=drawn, error=_error_text(observations))
         rows, scalars = observations.rows, dict(observations.scalars)
         unusable = [
             f"{name} is not finite at record {number}"
@@ -155,20 +155,16 @@ class RealisationRunner:
             if not math.isfinite(value)
         ]
         if unusable:
-            return Outcome(number=run.number, drawn=drawn, error=unusable[0])
+            return Outcome(number=run.number, values=drawn, error=unusable[0])
         if self.plan == "control-variate":
             columns = {key: value[None] for key, value in run.draws.values.items()}
             scalars["control"] = float(closed_form_depths(self.scenario, columns, 1)[0])
         profile, grid = observations.profile, run.problem.grid
         if grid is not self.grid:
             profile = np.interp(self.grid.y, grid.y, profile, left=0.0, right=0.0)
-        return Outcome(
-            number=run.number,
-            drawn=drawn,
-            observables={name: np.array([row[name] for row in rows]) for name in rows[0]},
-            scalars=scalars,
-            profile=profile,
-        )
+        courses = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+        values = {**drawn, **courses, **scalars, "depth_profile": profile}
+        return Outcome(number=run.number, values=values)
 
 
 def _error_text(error: Exception) -> str:
