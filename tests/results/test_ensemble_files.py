@@ -87,7 +87,7 @@ def test_ensemble_is_read_back_bit_for_bit(any_file):
 
 def test_rows_of_failed_realisations_keep_only_drawn_values(any_file):
     variables = read_ensemble(any_file).variables
-    for name, value in some_outcome(5, error=ERROR).drawn.items():
+    for name, value in some_outcome(5, error=ERROR).values.items():
         assert variables[name][5].tobytes() == np.asarray(value).tobytes()
     for name in (*OBSERVABLES, *SCALARS, "depth_profile"):
         assert np.isnan(variables[name][5]).all(), name

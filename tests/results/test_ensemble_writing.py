@@ -320,15 +320,19 @@ def test_realisation_is_written_only_once(tmp_path):
 def test_profiles_beyond_the_kept_ones_are_not_stored(tmp_path, monkeypatch):
     monkeypatch.setattr("wearsim.results.ensemble.schema.MOST_KEPT", 27)
     path = tmp_path / "a.h5"
-    bare = replace(some_outcome(5), profile=None)
+    bare, first = some_outcome(5), some_outcome(0)
+    for outcome in (bare, first):
+        del outcome.values["depth_profile"]
     with _new(path) as file:
         file.put([some_outcome(number) for number in (1, 2, 3, 4)])
         file.put([bare])
         with pytest.raises(ValueError, match=r"missing values \['depth_profile'\]"):
-            file.put([replace(some_outcome(0), profile=None)])
+            file.put([first])
     data = read_ensemble(path)
     assert len(data.variables["depth_profile"]) == 3
-    np.testing.assert_array_equal(data.variables["depth_profile"][2], some_outcome(2).profile)
+    np.testing.assert_array_equal(
+        data.variables["depth_profile"][2], some_outcome(2).values["depth_profile"]
+    )
     np.testing.assert_array_equal(data.variables["depth"][4], some_outcome(4).values["depth"])
 
 
