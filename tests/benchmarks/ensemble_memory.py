@@ -20,8 +20,7 @@ from tests.benchmarks.ensemble_cases import Size, drawn
 from wearsim.results import Outcome
 from wearsim.results.ensemble.schema import OBSERVABLES
 from wearsim.studies.ensemble import api as study
-from wearsim.studies.ensemble.control_variate import closed_form_depths
-from wearsim.studies.ensemble.realisation import RealisationRunner
+from wearsim.studies.ensemble.realisation import RealisationRunner, closed_form_depths
 
 
 class ClosedForm(RealisationRunner):

@@ -17,9 +17,9 @@ from tests.evolution.test_steppers import CASES, SPIKE, THREE, roughened
 from tests.studies.random_examples import SLACK, end_of, scenario_of
 from wearsim.errors import ContactError
 from wearsim.evolution.error_control.error_estimates import greatest_depth, total_worn_volume
-from wearsim.evolution.error_control.step_size import StepControl
 from wearsim.evolution.observables import oscillation, worn_volume
 from wearsim.evolution.state import fresh_state
+from wearsim.evolution.steppers.base import StepControl
 from wearsim.evolution.steppers.forward_euler import decay_rates, stability_limit
 from wearsim.evolution.steppers.rkl2 import StabilisedStepper, stabilised_step
 from wearsim.evolution.steppers.single_step import cylinder_depth_of

@@ -7,17 +7,15 @@ import pytest
 
 from tests.evolution import built, never, next_state, stepped
 from wearsim.errors import SolverError, StepError
-from wearsim.evolution.batch.join import joined_problem
-from wearsim.evolution.error_control.step_size import StepControl
 from wearsim.evolution.integrate import evolve
 from wearsim.evolution.observables import centroid, oscillation
-from wearsim.evolution.operating_points import unworn_contacts
-from wearsim.evolution.state import fresh_state
+from wearsim.evolution.state import fresh_state, unworn_contacts
 from wearsim.evolution.steppers.backward_euler import ImplicitStepper
-from wearsim.evolution.steppers.base import Attempt
+from wearsim.evolution.steppers.base import Attempt, StepControl
 from wearsim.evolution.steppers.forward_euler import ExplicitStepper, stability_limit
 from wearsim.evolution.steppers.per_pass import PerPassStepper, run_compiled, run_in_python
 from wearsim.evolution.steppers.single_step import cylinder_depth_of, cylinder_volume_of
+from wearsim.studies.ensemble.batch import joined_problem
 
 THREE = {"roller__offset": ["-1 mm", "0.3 mm", "1 mm"]}
 THERMAL = {"gain": "0.1 N/W", "time_constant": "1 min"}

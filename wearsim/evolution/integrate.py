@@ -9,10 +9,9 @@ from typing import TypeVar
 import numpy as np
 
 from wearsim.errors import ContactError, SolverError, StepError
-from wearsim.evolution.error_control.step_size import Trial
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, joined_states
-from wearsim.evolution.steppers.base import Attempt, Step, Stepper
+from wearsim.evolution.steppers.base import Attempt, Step, Stepper, Trial
 from wearsim.types import FloatArray, IntArray
 
 T = TypeVar("T")

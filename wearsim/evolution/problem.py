@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 
 from wearsim.contact_batch import ContactBatchSolution
-from wearsim.evolution.batch.per_realisation import (
+from wearsim.evolution.contact_inputs import ContactInputs, Kinematics, Varying
+from wearsim.evolution.observables import (
     is_every,
     mean_along,
     sum_along,
     sum_in_order,
     values_between,
 )
-from wearsim.evolution.contact_inputs import ContactInputs, Kinematics, Varying
 from wearsim.plugins import BODIES, Body, ContactModel, Load, LoadTerm, WearLaw
 from wearsim.types import FloatArray, Grid, IntArray
 

@@ -8,7 +8,7 @@ from scipy.special import ndtr
 
 from wearsim.scenario.examples import shipped_scenario
 from wearsim.studies.ensemble.api import ensemble
-from wearsim.studies.ensemble.control_variate import closed_form_depths
+from wearsim.studies.ensemble.realisation import closed_form_depths
 from wearsim.studies.run.draws import Drawer
 from wearsim.uq.sampling.sampler import PLANS, REPLICATES, Sampler
 from wearsim_bench.measure.measurement import Effort

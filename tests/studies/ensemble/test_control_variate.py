@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.studies.random_examples import CREEPAGE, FRICTION, LOAD, SLACK, scenario_of
-from wearsim.studies.ensemble.control_variate import closed_form_depths, control_of
+from wearsim.studies.ensemble.realisation import closed_form_depths, control_of
 from wearsim.studies.run.draws import Drawer
 
 CROWN = 1.0  # 2 R_crown of the rig [m]

@@ -1,4 +1,4 @@
-"""Error estimates of steps over many passes."""
+"""Error estimates of steps over many passes, and step doubling."""
 
 from __future__ import annotations
 
@@ -6,14 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from wearsim.evolution.batch.per_realisation import mean_along, sum_in_order
-from wearsim.evolution.error_control.step_size import StepControl
-from wearsim.evolution.observables import worn_volume
+from wearsim.evolution.observables import mean_along, sum_in_order, worn_volume
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import Depths, WearState
-from wearsim.evolution.steppers.base import Step
-from wearsim.evolution.steppers.single_step import carried_loads, solve_present
-from wearsim.evolution.steppers.wear_increment import WearIncrement
+from wearsim.evolution.steppers.base import Attempt, Step, StepControl, Stepper
+from wearsim.evolution.steppers.single_step import WearIncrement, carried_loads, solve_present
 from wearsim.types import FloatArray
 
 # lower bounds: the depth grows with a power of 2/3 to 1 of the passes, the volume with about 1
@@ -277,3 +274,69 @@ def excess(
                 allowed_first = control.allowance(size, exponent, 0.0, part)
                 worst[v] = max(worst[v], min(error / allowed, total / allowed_first))
     return worst
+
+
+class StepDoublingStepper(Stepper):
+    """Stepper that takes two half steps, and one whole step for a coarse-step solution.
+
+    The error estimate of the depth is the difference to the coarse-step solution, which has been
+    stepped along since the start of the test: it contains the effect of all earlier errors on the
+    present profile. The volumes of the two solutions may cross while both are wrong; the error
+    estimate of the volume is therefore the sum of the absolute changes of the difference over all
+    steps. The step-size control limits the error added by each step.
+    """
+
+    def proposed(self, problem: WearProblem, state: WearState) -> FloatArray:
+        """Return the forced step, the one proposed after the last step, or a first step."""
+        if self.forced_step is not None:
+            return np.full(state.passes.shape, self.forced_step)
+        if state.step.all():
+            return state.step
+        return np.where(state.step > 0.0, state.step, first_steps(problem, state))
+
+    def attempt(
+        self, problem: WearProblem, state: WearState, step: FloatArray, stop: float, scheme: Step
+    ) -> Attempt:
+        """Take a step as two halves and as a whole, and estimate the error that it adds."""
+        coarse_start = state.coarse_step_solution or state
+        half = scheme(problem, state, 0.5 * step)
+        end = scheme(problem, half, 0.5 * step)
+        coarse = scheme(problem, coarse_start, step)
+        end = with_pass_errors(problem, state, end, coarse, scheme, step)
+        bias = variation_bias(problem, end, state.passes, step)
+        coarse = biased_coarse_solution(end, coarse, bias)
+        passes = np.where(step == stop - state.passes, stop, end.passes)
+        before, after = depth_difference(state, coarse_start), depth_difference(end, coarse)
+        change = after[0] - before[0], after[1] - before[1]
+        cover = FIRST_ORDER_COVER if self.order == 1 else COVER
+        added = cover * np.array(
+            [greatest_where_deep(end, change), np.abs(volume_of(problem, change))]
+        )
+        auxiliary = {
+            name: solution.replaced(
+                passes=passes, coarse_step_solution=None, half_quadrature_solution=None
+            )
+            for name, solution in {**end.auxiliary, "coarse_step_solution": coarse}.items()
+        }
+        fixed, fixed_before = end.irreducible, state.irreducible
+        end = end.replaced(
+            passes=passes,
+            steps=state.steps + 1,
+            solves=end.solves + coarse.solves - coarse_start.solves,
+            depth_error=cover * greatest_where_deep(end, after) + fixed[0],
+            volume_error=state.volume_error - fixed_before[1] + added[1] + fixed[1],
+            **auxiliary,
+        )
+        reached = np.array([end.depth_error, end.volume_error]) - fixed
+        over = excess(self.control, problem, state, end, added, stop, reached)
+        return Attempt((half, end), over)
+
+
+def first_steps(problem: WearProblem, state: WearState) -> FloatArray:
+    """Return the passes that wear off a tenth of the elastic approach, shape (realisations,)."""
+    cylinder, roller = problem.shared_wear(*problem.wear_per_pass(state.contacts))
+    rate = (cylinder + roller).max(axis=(0, 1, 3))
+    least_gap = problem.gap(*state.depths).min(axis=-1)
+    approach = problem.values_of(state.contacts, "approach") - least_gap
+    worn = np.where(rate > 0.0, rate, 1.0)
+    return np.asarray(np.where(rate > 0.0, 0.1 * approach.min(axis=(0, 1)) / worn, np.inf))

@@ -6,13 +6,17 @@ import numpy as np
 
 from wearsim.contact_batch import ContactBatch, ContactBatchSolution
 from wearsim.errors import StepError
-from wearsim.evolution.error_control.step_doubling import StepDoublingStepper
-from wearsim.evolution.operating_points import contact_batch
+from wearsim.evolution.error_control.error_estimates import StepDoublingStepper
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import WearState
+from wearsim.evolution.state import WearState, contact_batch
 from wearsim.evolution.steppers.base import Step
-from wearsim.evolution.steppers.single_step import REALISATION, end_depths, end_loads, worn_state
-from wearsim.evolution.steppers.wear_increment import WearIncrement
+from wearsim.evolution.steppers.single_step import (
+    REALISATION,
+    WearIncrement,
+    end_depths,
+    end_loads,
+    worn_state,
+)
 from wearsim.plugins import SharedWear
 from wearsim.types import BoolArray, FloatArray
 

@@ -1,16 +1,143 @@
-"""Interface of the steppers."""
+"""Interface of the steppers, and their step-size control."""
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from wearsim.evolution.error_control.step_size import StepControl, Trial
+from wearsim.errors import ContactError, StepError
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
 from wearsim.types import FloatArray
+
+MIN_BUDGET = 0.02  # part of the error budget that a step may always add, so that a run never stalls
+
+
+@dataclass(frozen=True)
+class StepControl:
+    """Control of the error that each step adds, by the budget that the tolerance leaves.
+
+    Wear reduces earlier errors: a groove that is too deep in one place carries less load there, so
+    that errors of shape decay while the groove deepens. The budget is therefore absolute in depth
+    and is compared with the present error, not with the sum of all errors made.
+
+    Parameters
+    ----------
+    tolerance : float
+        Required relative error of the final depth and worn volume.
+    share : float
+        Part of the tolerance that one step may use.
+    safety : float
+        Part of its allowance that the next step aims at.
+    shrink, grow : float
+        Bounds on the ratio of successive steps.
+    """
+
+    tolerance: float
+    share: float = 0.7
+    safety: float = 0.7
+    shrink: float = 0.2
+    grow: float = 5.0
+
+    def allowance(self, reached: float, exponent: float, error: float, part: float) -> float:
+        """Return the error that a step may add.
+
+        Parameters
+        ----------
+        reached : float
+            Depth or volume at the step's end.
+        exponent : float
+            Lower bound of the exponent of its growth to the end of the test.
+        error : float
+            Its estimated error before the step.
+        part : float
+            Part of all passes done at the step's end.
+        """
+        budget = self.tolerance * reached / math.pow(part, exponent)
+        return self.share * max(budget - error, MIN_BUDGET * budget)
+
+    def next_step(self, step: float, excess: float, order: int = 1) -> float:
+        """Return the next step length after a step whose error was `excess` times its allowance.
+
+        The error that a step adds grows as the step to the power order + 1.
+        """
+        aim = self.safety / math.pow(excess, 1.0 / (order + 1)) if excess > 0.0 else self.grow
+        return step * min(self.grow, max(self.shrink, aim))
+
+
+SMALLEST_STEP = 1e-6  # passes; with a great wear factor ten passes wear a whole groove
+_SMALLEST_PART = 1e-8  # of the passes done; with shorter steps a test would not end
+
+
+class Trial:
+    """Search for the length of the next step of a test.
+
+    Parameters
+    ----------
+    proposed : float
+        Length of the first trial step [passes].
+    control : StepControl
+    order : int
+        Order of the scheme.
+    forced : bool
+        Whether every step has the proposed length, for any error.
+
+    Attributes
+    ----------
+    proposed : float
+        Length of the next trial step, or of the next step after an accepted one [passes].
+    rejected : int
+        Trial steps rejected.
+    """
+
+    def __init__(self, proposed: float, control: StepControl, order: int, forced: bool) -> None:
+        self.proposed, self.rejected = proposed, 0
+        self._control, self._order, self._forced = control, order, forced
+        self._cause: StepError | ContactError | None = None
+
+    def step(self, passes: float, stop: float) -> float:
+        """Return the length of the next trial step from `passes` to `stop` at the latest.
+
+        Raises
+        ------
+        StepError, ContactError
+            If it would be too short.
+        """
+        shortest = max(SMALLEST_STEP, _SMALLEST_PART * passes)
+        if self.proposed < shortest:
+            if isinstance(self._cause, ContactError):
+                raise self._cause
+            raise StepError(
+                f"no step is short enough at pass {passes:.0f} (tried down to {shortest:.2g}"
+                f" passes); {self._cause or 'the error does not fall with the step'}"
+            )
+        left = stop - passes
+        if self._forced or self.proposed >= left:
+            return min(self.proposed, left)
+        # leave no very short step before the stop
+        return 0.5 * left if self.proposed > 0.5 * left else self.proposed
+
+    def reject(self, failure: StepError | ContactError, step: float) -> None:
+        """Propose a shorter step after one that failed."""
+        self._cause, self.proposed = failure, 0.2 * step
+        self.rejected += 1
+
+    def accepts(self, excess: float, step: float) -> bool:
+        """Return whether a step with such an excess of error is accepted; propose the next."""
+        if self._forced:
+            return True
+        chosen = self._control.next_step(step, excess, self._order)
+        if excess <= 1.0:
+            # a step shortened by the stop does not limit the length of the next one
+            self.proposed = max(chosen, self.proposed) if step < self.proposed else chosen
+            return True
+        self.rejected += 1
+        self.proposed = min(chosen, 0.7 * step)
+        return False
+
 
 Step: TypeAlias = Callable[[WearProblem, WearState, FloatArray], WearState]
 """Function from a problem, a state and a number of passes to the state after them."""

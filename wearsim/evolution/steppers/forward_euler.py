@@ -13,12 +13,12 @@ from wearsim.evolution.error_control.error_estimates import (
     with_added_depths,
     with_pass_errors,
 )
-from wearsim.evolution.error_control.step_size import StepControl
 from wearsim.evolution.observables import oscillation
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import Depths, WearState
-from wearsim.evolution.steppers.base import Attempt, Step, Stepper
+from wearsim.evolution.steppers.base import Attempt, Step, StepControl, Stepper
 from wearsim.evolution.steppers.single_step import (
+    WearIncrement,
     carried_loads,
     contacts_at,
     explicit_step,
@@ -26,7 +26,6 @@ from wearsim.evolution.steppers.single_step import (
     present_problem,
     solve_present,
 )
-from wearsim.evolution.steppers.wear_increment import WearIncrement
 from wearsim.types import FloatArray
 
 MAX_POWER_ITERATIONS = 12

@@ -10,11 +10,9 @@ import numpy as np
 
 from wearsim.contact_batch import ContactBatchSolution
 from wearsim.evolution.contact_inputs import Redraw
-from wearsim.evolution.error_control.step_size import StepControl
-from wearsim.evolution.operating_points import contact_batch
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import WearState, joined_states
-from wearsim.evolution.steppers.base import Attempt, Step, Stepper
+from wearsim.evolution.state import WearState, contact_batch, joined_states
+from wearsim.evolution.steppers.base import Attempt, Step, StepControl, Stepper
 from wearsim.evolution.steppers.single_step import present_loads, solve_present
 from wearsim.plugins import BODIES, PassLoop
 from wearsim.types import FloatArray, IntArray

@@ -10,19 +10,19 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from wearsim.contact_batch import ContactBatchSolution
-from wearsim.evolution.error_control.step_doubling import StepDoublingStepper
+from wearsim.evolution.error_control.error_estimates import StepDoublingStepper
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.base import Step
 from wearsim.evolution.steppers.forward_euler import decay_rates
 from wearsim.evolution.steppers.single_step import (
+    WearIncrement,
     contacts_at,
     mean_loads,
     present_loads,
     solve_present,
     worn_state,
 )
-from wearsim.evolution.steppers.wear_increment import WearIncrement
 from wearsim.types import FloatArray
 
 MIN_STAGES = 3  # with two, profiles that decay within a step are inaccurate

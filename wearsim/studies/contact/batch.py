@@ -9,7 +9,7 @@ import numpy as np
 
 from wearsim.contact_batch import ContactBatch, ContactBatchSolution
 from wearsim.errors import ContactError, Mistake, ScenarioError, SolverError
-from wearsim.evolution.operating_points import unworn_contacts
+from wearsim.evolution.state import unworn_contacts
 from wearsim.scenario import RandomInput, Scenario, realise
 from wearsim.studies.contact.friction_field import LocalFriction
 from wearsim.studies.run.assemble import build_problem, check_model, prepared_model

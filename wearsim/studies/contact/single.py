@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from time import perf_counter
 
 from wearsim.errors import WearsimError
-from wearsim.evolution.operating_points import unworn_contacts
+from wearsim.evolution.state import unworn_contacts
 from wearsim.plugins import ContactModel
 from wearsim.scenario import Scenario, described_model
 from wearsim.studies.run.assemble import build_problem, check_model, prepared_model

@@ -23,7 +23,6 @@ from wearsim.results import (
 )
 from wearsim.results.ensemble.schema import OBSERVABLES
 from wearsim.scenario import Scenario, parse_scenario, require_run
-from wearsim.studies.ensemble.control_variate import control_of
 from wearsim.studies.ensemble.designs import (
     BASE_PLANS,
     EnsemblePlan,
@@ -32,7 +31,7 @@ from wearsim.studies.ensemble.designs import (
     whole_count,
 )
 from wearsim.studies.ensemble.driver import EnsembleProgress, EnsembleWork
-from wearsim.studies.ensemble.realisation import RealisationRunner, shared_grid
+from wearsim.studies.ensemble.realisation import RealisationRunner, control_of, shared_grid
 from wearsim.studies.execution.factory import executor
 from wearsim.studies.limits import checked_count, nothing_random
 from wearsim.studies.run.assemble import assemble_problem

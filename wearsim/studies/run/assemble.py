@@ -10,11 +10,10 @@ import numpy as np
 from wearsim.errors import CapabilityError, Mistake, ScenarioError
 from wearsim.evolution.contact_inputs import ContactInputs, Kinematics
 from wearsim.evolution.error_control.error_estimates import half_quadrature, total_worn_volume
-from wearsim.evolution.error_control.step_size import StepControl
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.backward_euler import ImplicitStepper
-from wearsim.evolution.steppers.base import Stepper
+from wearsim.evolution.steppers.base import StepControl, Stepper
 from wearsim.evolution.steppers.forward_euler import ExplicitStepper
 from wearsim.evolution.steppers.per_pass import PerPassStepper
 from wearsim.evolution.steppers.rkl2 import StabilisedStepper
@@ -23,8 +22,13 @@ from wearsim.plugins import ContactModel
 from wearsim.scenario import Scenario
 from wearsim.studies.run.draws import Draws
 from wearsim.studies.run.grid import strips_of_run
-from wearsim.studies.run.inputs import contact_inputs
-from wearsim.studies.run.pass_quadrature import MAX_NODES, minimum_nodes, redrawing, with_nodes
+from wearsim.studies.run.inputs import (
+    MAX_NODES,
+    contact_inputs,
+    minimum_nodes,
+    redrawing,
+    with_nodes,
+)
 from wearsim.types import FloatArray, Grid
 
 ITERATION_FRACTION = 1e-3  # convergence criterion of a step's iterations, over the tolerance

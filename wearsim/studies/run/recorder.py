@@ -12,13 +12,11 @@ from typing import TypeAlias
 import numpy as np
 
 from wearsim.errors import ContactError, StepError
-from wearsim.evolution.batch.per_realisation import mean_along
-from wearsim.evolution.error_control.step_size import SMALLEST_STEP
 from wearsim.evolution.integrate import Advance
-from wearsim.evolution.observables import width, worn_volume
+from wearsim.evolution.observables import mean_along, width, worn_volume
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, joined_states
-from wearsim.evolution.steppers.base import Step, Stepper
+from wearsim.evolution.steppers.base import SMALLEST_STEP, Step, Stepper
 from wearsim.evolution.steppers.single_step import (
     contacts_at,
     cylinder_depth_of,

@@ -18,9 +18,14 @@ from wearsim.scenario import Scenario
 from wearsim.scenario.examples import shipped_scenario
 from wearsim.studies.ensemble.api import ensemble
 from wearsim.studies.ensemble.batch import MAX_BATCH
-from wearsim.studies.ensemble.control_variate import DRAWS, closed_form_depths, control_of
 from wearsim.studies.ensemble.designs import EnsemblePlan
-from wearsim.studies.ensemble.realisation import RealisationRunner, shared_grid
+from wearsim.studies.ensemble.realisation import (
+    DRAWS,
+    RealisationRunner,
+    closed_form_depths,
+    control_of,
+    shared_grid,
+)
 from wearsim.studies.execution.factory import executor
 from wearsim.studies.run.draws import Drawer
 from wearsim.types import FloatArray, Grid

@@ -11,8 +11,8 @@ from typing import TypeAlias
 import numpy as np
 
 from wearsim.scenario.tables.plain import SamplingTable
-from wearsim.studies.ensemble.control_variate import DRAWS
 from wearsim.studies.ensemble.designs import BASE_PLANS, EnsemblePlan
+from wearsim.studies.ensemble.realisation import DRAWS
 from wearsim.types import FloatArray
 from wearsim.uq.sampling.sampler import PLANS, PlanName
 from wearsim_bench.measure.measurement import Effort, Measurement, OnProgress, Topic

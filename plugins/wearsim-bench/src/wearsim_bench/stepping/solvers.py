@@ -11,8 +11,12 @@ from wearsim.errors import StepError
 from wearsim.evolution.error_control.error_estimates import DEPTHS
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, fresh_state
-from wearsim.evolution.steppers.single_step import present_loads, present_problem, solve_present
-from wearsim.evolution.steppers.wear_increment import WearIncrement
+from wearsim.evolution.steppers.single_step import (
+    WearIncrement,
+    present_loads,
+    present_problem,
+    solve_present,
+)
 from wearsim.types import FloatArray
 
 Solver = Literal["BDF", "LSODA"]

@@ -1,1 +1,0 @@
-"""Wear tests that are stepped together as realisations of one problem."""
