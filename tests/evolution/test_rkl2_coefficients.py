@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wearsim.evolution.steppers.rkl2 import MIN_STAGES, legendre_stages, reach, stages_for
+from wearsim.evolution.steppers.step_doubling import MIN_STAGES, legendre_stages, reach, stages_for
 
 COUNTS = (2, 3, 4, 5, 8, 17, 60)
 
@@ -11,11 +11,10 @@ COUNTS = (2, 3, 4, 5, 8, 17, 60)
 def stability(z, count):
     """Return the result of a step of u' = z u from u = 1."""
     stages = legendre_stages(count)
-    before, last = np.ones_like(z), 1.0 + stages[0].start_rate * z
-    for stage in stages[1:]:
-        start = 1.0 - stage.last - stage.before_last + stage.start_rate * z
-        new = start + (stage.last + stage.rate * z) * last + stage.before_last * before
-        before, last = last, new
+    before, last = np.ones_like(z), 1.0 + stages[0][3] * z
+    for of_last, of_before, rate, start_rate in stages[1:]:
+        start = 1.0 - of_last - of_before + start_rate * z
+        before, last = last, start + (of_last + rate * z) * last + of_before * before
     return last
 
 

@@ -46,14 +46,10 @@ class ContactInputs:
         shape = (contacts, realisations)
         return cls(*(np.full(shape, values.get(item.name, 0.0)) for item in fields(cls)))
 
-    def at(self, contacts: IntArray) -> ContactInputs:
-        """Return the inputs of some contacts, by number."""
-        return ContactInputs(*(getattr(self, item.name)[contacts] for item in fields(self)))
-
-    def of_realisations(self, numbers: IntArray) -> ContactInputs:
-        """Return the inputs of some realisations, by number."""
+    def at(self, numbers: IntArray, axis: int = 0) -> ContactInputs:
+        """Return the inputs of some contacts, or with axis 1 of some realisations, by number."""
         columns = (getattr(self, item.name) for item in fields(self))
-        return ContactInputs(*(np.take(column, numbers, axis=1) for column in columns))
+        return ContactInputs(*(column.take(numbers, axis=axis) for column in columns))
 
     def with_values(self, values: Mapping[str, FloatArray]) -> ContactInputs:
         """Return these inputs with some of them replaced; arrays broadcast to the shape."""

@@ -141,7 +141,7 @@ class WearProblem:
             loads=tuple(self.loads[number] for number in numbers),
             flat_gap=np.take(self.flat_gap, realisations, axis=2),
             from_apex=part(self.from_apex, 1),
-            inputs=self.inputs.of_realisations(realisations),
+            inputs=self.inputs.at(realisations, axis=1),
             slip_profile=None if self.slip_profile is None else part(self.slip_profile, 1),
             varying=tuple(
                 replace(item, paths=tuple(item.paths[number] for number in numbers))

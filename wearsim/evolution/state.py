@@ -203,6 +203,11 @@ class WearState:
         state.__dict__.update(self.__dict__, **others)
         return state
 
+    def with_added(self, depths: Depths) -> WearState:
+        """Return the state with depths added to those of cylinder and rollers [m]."""
+        cylinder, roller = self.cylinder_depth + depths[0], self.roller_depth + depths[1]
+        return self.replaced(cylinder_depth=cylinder, roller_depth=roller)
+
     def contacts_of(self, realisations: IntArray) -> IntArray:
         """Return the numbers of the contacts of some realisations, in the state's order."""
         every = np.arange(len(self.contacts)).reshape(-1, len(self.passes))

@@ -16,8 +16,8 @@ from tests.studies.random_examples import (
     scenario_of,
 )
 from wearsim.errors import CapabilityError, Interrupted, ScenarioError, StepError
-from wearsim.evolution.error_control import error_estimates as errors_of_steps
-from wearsim.evolution.error_control.error_estimates import total_worn_volume
+from wearsim.evolution import error_estimates as errors_of_steps
+from wearsim.evolution.error_estimates import volume_of
 from wearsim.evolution.integrate import evolve
 from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.forward_euler import stability_limit
@@ -100,7 +100,7 @@ def test_expectation_over_passes_agrees_with_per_pass_draws(drawn):
     problem, state = end_of(scenario_of(evolution__step=step, contact__strips=91, **inputs))
     assert state.steps < 20
     assert abs(depth_of(state) - depth_of(reference)) <= state.depth_error[0]
-    volumes = total_worn_volume(problem, state), total_worn_volume(problem, reference)
+    volumes = volume_of(problem, state.depths), volume_of(problem, reference.depths)
     assert abs(volumes[0] - volumes[1])[0] <= state.volume_error[0]
     assert state.depth_error[0] < 0.02 * depth_of(state)
 
@@ -204,9 +204,7 @@ def test_error_estimate_includes_variation_of_processes(key, monkeypatch):
     # in full slip wear is linear in friction and depends on its mean only
     scenario = scenario_of(evolution__step=1500, creepage__longitudinal=3e-4, **inputs)
     _, state = end_of(scenario)
-    monkeypatch.setattr(
-        "wearsim.evolution.error_control.error_estimates.variation_bias", lambda *_: None
-    )
+    monkeypatch.setattr("wearsim.evolution.error_estimates.variation_bias", lambda *_: None)
     _, without = end_of(scenario)
     # variation within a step changes the error estimate, and not the solution
     assert (without.cylinder_depth == state.cylinder_depth).all()
@@ -224,7 +222,7 @@ def test_run_with_random_load_is_within_its_error_estimate(rollers):
         difference = abs(depth_of(state) - depth_of(fine))
         assert difference <= state.depth_error[0] + fine.depth_error[0]
         assert state.depth_error[0] <= tolerance * depth_of(state)
-        volumes = [total_worn_volume(problem, one) for one in (state, fine)]
+        volumes = [volume_of(problem, one.depths) for one in (state, fine)]
         assert abs(volumes[0] - volumes[1]) <= state.volume_error[0] + fine.volume_error[0]
 
 

@@ -9,8 +9,8 @@ import pytest
 from study_examples import LOADS, ROLLERS, STEPPERS, run_differences, short
 
 from wearsim.errors import StepError
-from wearsim.evolution.error_control.error_estimates import StepDoublingStepper
 from wearsim.evolution.steppers.per_pass import PerPassStepper
+from wearsim.evolution.steppers.step_doubling import StepDoublingStepper
 from wearsim.results import Result
 from wearsim.studies.run import run as studies
 

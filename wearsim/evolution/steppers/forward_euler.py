@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from wearsim.errors import ContactError, StepError
-from wearsim.evolution.error_control.error_estimates import (
+from wearsim.evolution.error_estimates import (
     COVER,
     excess,
+    greatest_depth,
     state_difference,
     variation_bias,
-    with_added_depths,
     with_pass_errors,
 )
 from wearsim.evolution.observables import oscillation
@@ -74,15 +74,10 @@ def decay_rates(problem: WearProblem, state: WearState) -> FloatArray:
             if state.decay is None:
                 raise
             return state.decay
-        rates = _maximum_norm(profile)
+        rates = greatest_depth((np.abs(profile[0]), np.abs(profile[1])))
         if (np.abs(rates - before) <= RATE_TOLERANCE * rates).all():
             break
     return rates
-
-
-def _maximum_norm(profile: Depths) -> FloatArray:
-    """Return the greatest change of either body, shape (realisations,)."""
-    return np.asarray(np.maximum(*(np.abs(part).max(axis=(0, 1, 3)) for part in profile)))
 
 
 def _decrease(
@@ -102,12 +97,9 @@ def _decrease(
     least_gap = problem.gap(*state.depths).min(axis=-1)
     approach = problem.values_of(state.contacts, "approach") - least_gap
     step = PERTURBATION * np.maximum(approach.min(axis=(0, 1)), 1e-12)
-    size = _maximum_norm(profile)
+    size = greatest_depth((np.abs(profile[0]), np.abs(profile[1])))
     factor = (step / np.where(size > 0.0, size, 1.0))[:, None]
-    changed = state.replaced(
-        cylinder_depth=state.cylinder_depth + factor * profile[0],
-        roller_depth=state.roller_depth + factor * profile[1],
-    )
+    changed = state.with_added((factor * profile[0], factor * profile[1]))
     # constant loads: the feedback of a spring on the total descent is weaker than that of strips
     contacts = solve_present(problem, changed, carried_loads(problem, state.contacts))
     new = WearIncrement(present_problem(problem, state), contacts, 1.0)
@@ -203,12 +195,8 @@ def _errors(problem: WearProblem, start: WearState, end: WearState, step: FloatA
     loads = mean_loads(here, start, step, depths, here.values_of(end.contacts, "power"))
     solve = solve_present if problem.varying else contacts_at
     wear = WearIncrement(here, solve(here, end, loads), step)
-    other = end.replaced(
-        cylinder_depth=start.cylinder_depth + wear.cylinder,
-        roller_depth=start.roller_depth + wear.roller,
-    )
-    errors = COVER * 0.5 * state_difference(problem, end, other)
+    errors = COVER * 0.5 * state_difference(problem, end, start.with_added(wear.depths))
     bias = variation_bias(problem, end, start.passes, step)
     if bias is None:
         return errors
-    return errors + COVER * state_difference(problem, end, with_added_depths(end, bias))
+    return errors + COVER * state_difference(problem, end, end.with_added(bias))

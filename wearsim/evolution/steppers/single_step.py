@@ -171,11 +171,6 @@ def _with_feedback(
     return loads
 
 
-def end_depths(state: WearState, wear: WearIncrement) -> Depths:
-    """Return the worn depths at the end of a step."""
-    return state.cylinder_depth + wear.cylinder, state.roller_depth + wear.roller
-
-
 def end_loads(
     problem: WearProblem,
     state: WearState,
@@ -191,14 +186,14 @@ def end_loads(
 def explicit_step(problem: WearProblem, state: WearState, passes: FloatArray) -> WearState:
     """Step over `passes` passes on the profiles of the step's start, under its mean load."""
     here = problem.at_time(problem.time(state.passes), problem.time(state.passes + passes))
-    predicted = WearIncrement(here, state.contacts, passes)
-    mean = end_loads(here, state, passes, end_depths(state, predicted), state.contacts)
+    predicted = state.with_added(WearIncrement(here, state.contacts, passes).depths)
+    mean = end_loads(here, state, passes, predicted.depths, state.contacts)
     solve = solve_present if problem.varying else contacts_at
     contacts = solve(here, state, mean)
     solves = problem.contacts_each * (1 if contacts is state.contacts else 2)
-    ends = end_depths(state, WearIncrement(here, contacts, passes))
     begun = state.replaced(contacts=contacts, solves=state.solves + solves)
-    worn = worn_state(here, begun, passes, ends, here.values_of(contacts, "power"))
+    ends = begun.with_added(WearIncrement(here, contacts, passes).depths)
+    worn = worn_state(here, ends, passes, here.values_of(contacts, "power"))
     return worn.replaced(contacts=solve_present(problem, worn, present_loads(problem, worn)))
 
 
@@ -256,7 +251,6 @@ def worn_state(
     problem: WearProblem,
     state: WearState,
     passes: FloatArray,
-    ends: Depths,
     power: FloatArray,
 ) -> WearState:
     """Return the state at the end of a step.
@@ -265,11 +259,9 @@ def worn_state(
     ----------
     problem : WearProblem
     state : WearState
-        State at the step's start, with the contacts that the state returned keeps.
+        State at the step's start, with the contacts and worn depths that the state returned keeps.
     passes : ndarray, shape (realisations,)
         Length of the step.
-    ends : tuple of ndarray
-        Worn depths of cylinder and rollers at the step's end, shapes as in `WearState` [m].
     power : ndarray, shape (stations, contacts, realisations)
         Mean dissipated power of the step [W], of the same dissipation as the wear.
     """
@@ -281,8 +273,6 @@ def worn_state(
         terms = np.array([term.advance(value, mean, duration) for term, value in each])
     return state.replaced(
         passes=begin + passes,
-        cylinder_depth=ends[0],
-        roller_depth=ends[1],
         terms=terms,
         energy=state.energy + problem.total_power(power) * (passes / problem.kinematics.pass_rate),
     )

@@ -12,8 +12,8 @@ from wearsim.evolution.integrate import Advance, Evolution, bisect_failures
 from wearsim.evolution.observables import sum_in_order
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, fresh_state
-from wearsim.evolution.steppers.backward_euler import ImplicitStepper
 from wearsim.evolution.steppers.base import Stepper
+from wearsim.evolution.steppers.step_doubling import ImplicitStepper
 from wearsim.plugins import BODIES
 from wearsim.studies.run.draws import Draws
 from wearsim.studies.run.recorder import Due, RecordSchedule, due_records, history_row, states_at

@@ -9,15 +9,14 @@ import numpy as np
 
 from wearsim.errors import CapabilityError, Mistake, ScenarioError
 from wearsim.evolution.contact_inputs import ContactInputs, Kinematics
-from wearsim.evolution.error_control.error_estimates import half_quadrature, total_worn_volume
+from wearsim.evolution.error_estimates import half_quadrature, volume_of
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import fresh_state
-from wearsim.evolution.steppers.backward_euler import ImplicitStepper
 from wearsim.evolution.steppers.base import StepControl, Stepper
 from wearsim.evolution.steppers.forward_euler import ExplicitStepper
 from wearsim.evolution.steppers.per_pass import PerPassStepper
-from wearsim.evolution.steppers.rkl2 import StabilisedStepper
 from wearsim.evolution.steppers.single_step import explicit_step
+from wearsim.evolution.steppers.step_doubling import ImplicitStepper, StabilisedStepper
 from wearsim.plugins import ContactModel
 from wearsim.scenario import Scenario
 from wearsim.studies.run.draws import Draws
@@ -191,8 +190,8 @@ def with_converged_nodes(problem: WearProblem, draws: Draws) -> WearProblem:
         if evolution.nodes or 2 * count > MAX_NODES:
             return found
         fresh = fresh_state(found)
-        full = total_worn_volume(problem, explicit_step(found, fresh, one))
-        half = total_worn_volume(problem, explicit_step(*half_quadrature(found, fresh), one))
+        full = volume_of(problem, explicit_step(found, fresh, one).depths)
+        half = volume_of(problem, explicit_step(*half_quadrature(found, fresh), one).depths)
         if (np.abs(full - half) <= 0.5 * evolution.tolerance * full).all():
             return found
         count *= 2

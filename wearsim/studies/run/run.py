@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from wearsim.errors import Interrupted, ResultsFileError, SolverError
-from wearsim.evolution.error_control.error_estimates import greatest_depth, total_worn_volume
+from wearsim.evolution.error_estimates import greatest_depth, volume_of
 from wearsim.evolution.integrate import evolve
 from wearsim.evolution.state import SIGMAS, WearState, fresh_state, widened, widened_state
 from wearsim.results import (
@@ -247,7 +247,7 @@ class _RunInProgress:
     def _check_errors(self) -> None:
         """Warn if an estimated error exceeds the tolerance."""
         state, tolerance = self.recorder.state, self.scenario.evolution.tolerance
-        sizes = greatest_depth(state), total_worn_volume(self.problem, state)
+        sizes = greatest_depth(state.depths), volume_of(self.problem, state.depths)
         errors = state.depth_error, state.volume_error
         for kind, name in enumerate(("depth", "worn volume")):
             parts = [errors[kind], state.quadrature[kind], SIGMAS * np.sqrt(state.scatter[kind])]

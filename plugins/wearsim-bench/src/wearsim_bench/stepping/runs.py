@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from wearsim.evolution.error_control.error_estimates import (
+from wearsim.evolution.error_estimates import (
     DEPTHS,
     greatest_depth,
-    total_worn_volume,
+    volume_of,
 )
 from wearsim.evolution.integrate import evolve
 from wearsim.evolution.problem import WearProblem
@@ -121,10 +121,10 @@ def errors_of(approximate: EndState, exact: EndState) -> dict[str, float]:
         Errors of the largest `depth`, the `profile` (L2 over all bodies) and the worn `volume`.
     """
     y = approximate.problem.grid.y
-    volumes = [total_worn_volume(end.problem, end.state) for end in (approximate, exact)]
+    volumes = [volume_of(end.problem, end.state.depths) for end in (approximate, exact)]
     return {
         "depth": _relative_difference(
-            greatest_depth(approximate.state), greatest_depth(exact.state)
+            greatest_depth(approximate.state.depths), greatest_depth(exact.state.depths)
         ),
         "profile": l2(approximate.profiles_at(y), exact.profiles_at(y)),
         "volume": _relative_difference(*volumes),

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from wearsim.errors import StepError
-from wearsim.evolution.error_control.error_estimates import DEPTHS
+from wearsim.evolution.error_estimates import DEPTHS
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, fresh_state
 from wearsim.evolution.steppers.single_step import (

@@ -1,4 +1,4 @@
-"""Error estimates of steps over many passes, and step doubling."""
+"""Error estimates of steps over many passes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from wearsim.evolution.observables import mean_along, sum_in_order, worn_volume
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import Depths, WearState
-from wearsim.evolution.steppers.base import Attempt, Step, StepControl, Stepper
+from wearsim.evolution.steppers.base import Step, StepControl
 from wearsim.evolution.steppers.single_step import WearIncrement, carried_loads, solve_present
 from wearsim.types import FloatArray
 
@@ -21,14 +21,9 @@ DEEP = 0.5  # depths are compared where the groove is deeper than this part of i
 DEPTHS = ("cylinder_depth", "roller_depth")
 
 
-def greatest_depth(state: WearState) -> FloatArray:
-    """Return the greatest worn depth of either body, shape (realisations,) [m]."""
-    return np.asarray(np.maximum(*(worn.max(axis=(0, 1, 3)) for worn in state.depths)))
-
-
-def total_worn_volume(problem: WearProblem, state: WearState) -> FloatArray:
-    """Return the volume worn off the cylinder and all its rollers, shape (realisations,) [m^3]."""
-    return volume_of(problem, state.depths)
+def greatest_depth(depths: Depths) -> FloatArray:
+    """Return the greatest depth of cylinder and rollers, shape (realisations,) [m]."""
+    return np.asarray(np.maximum(*(worn.max(axis=(0, 1, 3)) for worn in depths)))
 
 
 def volume_of(problem: WearProblem, depths: Depths) -> FloatArray:
@@ -51,7 +46,7 @@ def greatest_where_deep(state: WearState, depths: Depths) -> FloatArray:
         np.where(worn >= DEEP * worn.max(axis=(0, 1, 3), keepdims=True), np.abs(depth), 0.0)
         for worn, depth in zip(state.depths, depths, strict=True)
     )
-    return np.asarray(np.maximum(cylinder.max(axis=(0, 1, 3)), roller.max(axis=(0, 1, 3))))
+    return greatest_depth((cylinder, roller))
 
 
 def state_difference(problem: WearProblem, one: WearState, other: WearState) -> FloatArray:
@@ -59,7 +54,7 @@ def state_difference(problem: WearProblem, one: WearState, other: WearState) -> 
 
     The difference in depth is the greatest where the first state is worn deep.
     """
-    volumes = total_worn_volume(problem, one), total_worn_volume(problem, other)
+    volumes = volume_of(problem, one.depths), volume_of(problem, other.depths)
     depth = greatest_where_deep(one, depth_difference(one, other))
     return np.array([depth, np.abs(volumes[0] - volumes[1])])
 
@@ -138,15 +133,7 @@ def biased_coarse_solution(end: WearState, coarse: WearState, bias: Depths | Non
         for axis, a, b in zip((0, 1), depth_difference(coarse, end), bias, strict=True)
     )
     sign = np.where(along < 0.0, -1.0, 1.0)[:, None]
-    return with_added_depths(coarse, (sign * bias[0], sign * bias[1]))
-
-
-def with_added_depths(state: WearState, depths: Depths) -> WearState:
-    """Return a state with depths of cylinder and rollers added, shapes as in `WearState` [m]."""
-    return state.replaced(
-        cylinder_depth=state.cylinder_depth + depths[0],
-        roller_depth=state.roller_depth + depths[1],
-    )
+    return coarse.with_added((sign * bias[0], sign * bias[1]))
 
 
 def _shifted_wear(
@@ -210,9 +197,9 @@ def with_pass_errors(
         return end
     halved, first = half_quadrature(problem, start)
     half = step(halved, start.half_quadrature_solution or first, passes)
-    volume = total_worn_volume(problem, end)
+    volume = volume_of(problem, end.depths)
     variance = start.scatter[1] + _volume_variance(problem, end, passes)
-    depth = np.square(greatest_depth(end) / np.where(volume > 0.0, volume, 1.0)) * variance
+    depth = np.square(greatest_depth(end.depths) / np.where(volume > 0.0, volume, 1.0)) * variance
     return end.replaced(
         quadrature=state_difference(problem, coarse, half),
         scatter=np.array([depth, variance]),
@@ -262,7 +249,7 @@ def excess(
     """
     worst = np.zeros(problem.shape[2])
     parts = (end.passes / stop).tolist()
-    sizes = greatest_depth(end), total_worn_volume(problem, end)
+    sizes = greatest_depth(end.depths), volume_of(problem, end.depths)
     # errors that a shorter step would not reduce must not shorten it
     reducible = np.array([start.depth_error, start.volume_error]) - start.irreducible
     arrays = reducible, added, reducible + added if reached is None else reached
@@ -274,69 +261,3 @@ def excess(
                 allowed_first = control.allowance(size, exponent, 0.0, part)
                 worst[v] = max(worst[v], min(error / allowed, total / allowed_first))
     return worst
-
-
-class StepDoublingStepper(Stepper):
-    """Stepper that takes two half steps, and one whole step for a coarse-step solution.
-
-    The error estimate of the depth is the difference to the coarse-step solution, which has been
-    stepped along since the start of the test: it contains the effect of all earlier errors on the
-    present profile. The volumes of the two solutions may cross while both are wrong; the error
-    estimate of the volume is therefore the sum of the absolute changes of the difference over all
-    steps. The step-size control limits the error added by each step.
-    """
-
-    def proposed(self, problem: WearProblem, state: WearState) -> FloatArray:
-        """Return the forced step, the one proposed after the last step, or a first step."""
-        if self.forced_step is not None:
-            return np.full(state.passes.shape, self.forced_step)
-        if state.step.all():
-            return state.step
-        return np.where(state.step > 0.0, state.step, first_steps(problem, state))
-
-    def attempt(
-        self, problem: WearProblem, state: WearState, step: FloatArray, stop: float, scheme: Step
-    ) -> Attempt:
-        """Take a step as two halves and as a whole, and estimate the error that it adds."""
-        coarse_start = state.coarse_step_solution or state
-        half = scheme(problem, state, 0.5 * step)
-        end = scheme(problem, half, 0.5 * step)
-        coarse = scheme(problem, coarse_start, step)
-        end = with_pass_errors(problem, state, end, coarse, scheme, step)
-        bias = variation_bias(problem, end, state.passes, step)
-        coarse = biased_coarse_solution(end, coarse, bias)
-        passes = np.where(step == stop - state.passes, stop, end.passes)
-        before, after = depth_difference(state, coarse_start), depth_difference(end, coarse)
-        change = after[0] - before[0], after[1] - before[1]
-        cover = FIRST_ORDER_COVER if self.order == 1 else COVER
-        added = cover * np.array(
-            [greatest_where_deep(end, change), np.abs(volume_of(problem, change))]
-        )
-        auxiliary = {
-            name: solution.replaced(
-                passes=passes, coarse_step_solution=None, half_quadrature_solution=None
-            )
-            for name, solution in {**end.auxiliary, "coarse_step_solution": coarse}.items()
-        }
-        fixed, fixed_before = end.irreducible, state.irreducible
-        end = end.replaced(
-            passes=passes,
-            steps=state.steps + 1,
-            solves=end.solves + coarse.solves - coarse_start.solves,
-            depth_error=cover * greatest_where_deep(end, after) + fixed[0],
-            volume_error=state.volume_error - fixed_before[1] + added[1] + fixed[1],
-            **auxiliary,
-        )
-        reached = np.array([end.depth_error, end.volume_error]) - fixed
-        over = excess(self.control, problem, state, end, added, stop, reached)
-        return Attempt((half, end), over)
-
-
-def first_steps(problem: WearProblem, state: WearState) -> FloatArray:
-    """Return the passes that wear off a tenth of the elastic approach, shape (realisations,)."""
-    cylinder, roller = problem.shared_wear(*problem.wear_per_pass(state.contacts))
-    rate = (cylinder + roller).max(axis=(0, 1, 3))
-    least_gap = problem.gap(*state.depths).min(axis=-1)
-    approach = problem.values_of(state.contacts, "approach") - least_gap
-    worn = np.where(rate > 0.0, rate, 1.0)
-    return np.asarray(np.where(rate > 0.0, 0.1 * approach.min(axis=(0, 1)) / worn, np.inf))

@@ -1,1 +1,0 @@
-"""Error estimates and step-size control."""

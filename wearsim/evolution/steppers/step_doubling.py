@@ -1,0 +1,368 @@
+"""Steppers with step doubling: implicit, and stabilised explicit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import lru_cache, partial
+from typing import TypeAlias
+
+import numpy as np
+
+from wearsim.contact_batch import ContactBatch, ContactBatchSolution
+from wearsim.errors import StepError
+from wearsim.evolution.error_estimates import (
+    COVER,
+    FIRST_ORDER_COVER,
+    biased_coarse_solution,
+    depth_difference,
+    excess,
+    greatest_where_deep,
+    variation_bias,
+    volume_of,
+    with_pass_errors,
+)
+from wearsim.evolution.problem import WearProblem
+from wearsim.evolution.state import WearState, contact_batch
+from wearsim.evolution.steppers.base import Attempt, Step, Stepper
+from wearsim.evolution.steppers.forward_euler import decay_rates
+from wearsim.evolution.steppers.single_step import (
+    REALISATION,
+    WearIncrement,
+    contacts_at,
+    end_loads,
+    mean_loads,
+    present_loads,
+    solve_present,
+    worn_state,
+)
+from wearsim.plugins import SharedWear
+from wearsim.types import BoolArray, FloatArray
+
+
+class StepDoublingStepper(Stepper):
+    """Stepper that takes two half steps, and one whole step for a coarse-step solution.
+
+    The error estimate of the depth is the difference to the coarse-step solution, which has been
+    stepped along since the start of the test: it contains the effect of all earlier errors on the
+    present profile. The volumes of the two solutions may cross while both are wrong; the error
+    estimate of the volume is therefore the sum of the absolute changes of the difference over all
+    steps. The step-size control limits the error added by each step.
+    """
+
+    def proposed(self, problem: WearProblem, state: WearState) -> FloatArray:
+        """Return the forced step, the one proposed after the last step, or a first step."""
+        if self.forced_step is not None:
+            return np.full(state.passes.shape, self.forced_step)
+        if state.step.all():
+            return state.step
+        return np.where(state.step > 0.0, state.step, first_steps(problem, state))
+
+    def attempt(
+        self, problem: WearProblem, state: WearState, step: FloatArray, stop: float, scheme: Step
+    ) -> Attempt:
+        """Take a step as two halves and as a whole, and estimate the error that it adds."""
+        coarse_start = state.coarse_step_solution or state
+        half = scheme(problem, state, 0.5 * step)
+        end = scheme(problem, half, 0.5 * step)
+        coarse = scheme(problem, coarse_start, step)
+        end = with_pass_errors(problem, state, end, coarse, scheme, step)
+        bias = variation_bias(problem, end, state.passes, step)
+        coarse = biased_coarse_solution(end, coarse, bias)
+        passes = np.where(step == stop - state.passes, stop, end.passes)
+        before, after = depth_difference(state, coarse_start), depth_difference(end, coarse)
+        change = after[0] - before[0], after[1] - before[1]
+        cover = FIRST_ORDER_COVER if self.order == 1 else COVER
+        added = cover * np.array(
+            [greatest_where_deep(end, change), np.abs(volume_of(problem, change))]
+        )
+        auxiliary = {
+            name: solution.replaced(
+                passes=passes, coarse_step_solution=None, half_quadrature_solution=None
+            )
+            for name, solution in {**end.auxiliary, "coarse_step_solution": coarse}.items()
+        }
+        fixed, fixed_before = end.irreducible, state.irreducible
+        end = end.replaced(
+            passes=passes,
+            steps=state.steps + 1,
+            solves=end.solves + coarse.solves - coarse_start.solves,
+            depth_error=cover * greatest_where_deep(end, after) + fixed[0],
+            volume_error=state.volume_error - fixed_before[1] + added[1] + fixed[1],
+            **auxiliary,
+        )
+        reached = np.array([end.depth_error, end.volume_error]) - fixed
+        over = excess(self.control, problem, state, end, added, stop, reached)
+        return Attempt((half, end), over)
+
+
+def first_steps(problem: WearProblem, state: WearState) -> FloatArray:
+    """Return the passes that wear off a tenth of the elastic approach, shape (realisations,)."""
+    cylinder, roller = problem.shared_wear(*problem.wear_per_pass(state.contacts))
+    rate = (cylinder + roller).max(axis=(0, 1, 3))
+    least_gap = problem.gap(*state.depths).min(axis=-1)
+    approach = problem.values_of(state.contacts, "approach") - least_gap
+    worn = np.where(rate > 0.0, rate, 1.0)
+    return np.asarray(np.where(rate > 0.0, 0.1 * approach.min(axis=(0, 1)) / worn, np.inf))
+
+
+MAX_FIXED_POINT = 60
+RELAXATION_INTERVAL = 20  # iterations between relaxations of the tolerance by a factor of ten
+
+
+class ImplicitStepper(StepDoublingStepper):
+    """Stepper of first order that solves the contacts on the profiles at the end of each step.
+
+    It is stable for any step length. The error of the coarse-step solution is about twice that of
+    the test, so that the difference of the two is about the error of the test.
+    """
+
+    def scheme(self, problem: WearProblem, state: WearState) -> Step:
+        """Return the implicit step."""
+        return implicit_step
+
+
+def _relative_change(new: FloatArray, old: FloatArray) -> FloatArray:
+    """Return the greatest relative change per realisation, shape (N,), from (S, C, N, ...)."""
+    axes = (0, 1, 3)[: new.ndim - 1]
+    change, scale = np.abs(new - old).max(axis=axes), np.abs(new).max(axis=axes)
+    scale[scale == 0.0] = np.inf
+    return np.asarray(change / scale)
+
+
+def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) -> WearState:
+    """Step over `passes` passes with the contacts solved on the profiles at the step's end.
+
+    The wear of the step enters the contact problem as a compliance, so that the step is stable for
+    any length. Compliance, loads and creepage depend on the solution and are iterated. Where wear
+    is not proportional to the line load, its exponent is estimated from successive iterates.
+    Realisations that have converged are not solved again while others continue.
+
+    Raises
+    ------
+    StepError
+        If the iteration does not converge.
+    """
+    begin = state.passes
+    problem = problem.at_time(problem.time(begin), problem.time(begin + passes))
+    gap = problem.gap(state.cylinder_depth, state.roller_depth)
+    contacts = state.contacts
+    wear = WearIncrement(problem, contacts, passes)
+    ends = state.with_added(wear.depths)
+    loads = end_loads(problem, state, passes, ends.depths, contacts)
+    active = np.ones(problem.shape[REALISATION], dtype=np.bool_)
+    iterations = np.zeros(len(active), dtype=np.int64)
+    for iteration in range(1, MAX_FIXED_POINT + 1):
+        batch = contact_batch(problem, gap + wear.offset, loads, *ends.depths)
+        solved = solve_compliant(problem, batch, wear.compliance, contacts, active)
+        iterations += active
+        new = WearIncrement(problem, solved, passes)
+        ends = state.with_added(new.depths)
+        predicted = wear.predicted_opening(problem.values_of(solved, "line_load"))
+        change, new_loads = _relative_change(new.opening, predicted), loads
+        if problem.has_spring or problem.terms:
+            new_loads = end_loads(problem, state, passes, ends.depths, solved)
+            change = np.maximum(change, _relative_change(new_loads, loads))
+        if problem.slip_profile is not None:
+            change = np.maximum(change, _relative_change(new.cylinder, wear.cylinder))
+        # strips at an edge may enter and leave the contact in turn: relax the tolerance slowly
+        relaxation = 10.0 ** ((iteration - 1) // RELAXATION_INTERVAL)
+        active &= ~(change < problem.iteration_tolerance * relaxation)
+        if not np.count_nonzero(active):
+            solves = state.solves + iterations * problem.contacts_each
+            end = ends.replaced(solves=solves, contacts=solved)
+            return worn_state(problem, end, passes, problem.values_of(solved, "power"))
+        new.estimate_exponents(wear)
+        contacts, wear, loads = solved, new, new_loads
+    raise StepError(
+        f"an implicit step of {passes[0]:.4g} passes from pass {begin[0]:.0f} did not"
+        f" converge (last relative change {change.max():.1e})",
+        state.to_arrays(),
+    )
+
+
+def solve_compliant(
+    problem: WearProblem,
+    batch: ContactBatch,
+    wear: SharedWear,
+    warm: ContactBatchSolution,
+    active: BoolArray,
+) -> ContactBatchSolution:
+    """Solve the contacts of the active realisations; the others keep their solutions.
+
+    Parameters
+    ----------
+    problem : WearProblem
+    batch : ContactBatch
+        The contacts, in the problem's order.
+    wear : SharedWear
+        Wear compliance with a first axis of realisations.
+    warm : ContactBatchSolution
+        Solutions to start from, in the problem's order.
+    active : ndarray of bool, shape (realisations,)
+
+    Returns
+    -------
+    ContactBatchSolution
+        In the problem's order; those of inactive realisations are taken from `warm`.
+    """
+    model, realisations = problem.model, problem.shape[REALISATION]
+    coupled = len(batch) // realisations
+    everywhere = np.count_nonzero(active) == realisations
+    if everywhere and coupled == 1:
+        return model.solve(batch, wear.total.reshape(batch.gap.shape), None, warm)
+    if everywhere and realisations == 1:
+        return model.solve(batch, None, wear, warm)
+    # the contacts of one realisation next to each other, which the problem has `realisations` apart
+    numbers = np.flatnonzero(active)
+    order = np.arange(len(batch)).reshape(coupled, realisations)[:, numbers].T.ravel()
+    some, near, part = batch.at(order), warm.at(order), wear.at(numbers)
+    if coupled == 1:
+        solved = model.solve(some, part.total.reshape(some.gap.shape), None, near)
+    else:
+        solved = model.solve(some, None, part, near)
+    return warm.with_others(order, solved)
+
+
+MIN_STAGES = 3  # with two, profiles that decay within a step are inaccurate
+SAFETY = 1.2  # on the greatest decay rate, which is estimated and may grow within the step
+
+#: change of the state in a step or in a part of it: depth of cylinder and rollers [m], and the
+#: power of every contact times the part of the step it lasted [W]
+Change: TypeAlias = tuple[FloatArray, FloatArray, FloatArray]
+
+
+def reach(count: int) -> float:
+    """Return the longest stable step of `count` stages, times the greatest decay rate.
+
+    It grows with the square of the number of stages; steps of Euler's method reach 2 each.
+    """
+    return 0.5 * (count * count + count - 2)
+
+
+def stages_for(decay: float) -> int:
+    """Return the least number of stages whose `reach` is `decay`, `MIN_STAGES` at least."""
+    return max(MIN_STAGES, math.ceil(0.5 * (math.sqrt(9.0 + 8.0 * decay) - 1.0)))
+
+
+@lru_cache(maxsize=256)
+def legendre_stages(count: int) -> tuple[tuple[float, float, float, float], ...]:
+    """Return the weights of `count` stages, two at least; the last stage is the step's end.
+
+    They are the weights of the last stage and of the one before it, and the parts of the step taken
+    at the rate of the last stage and at that of the step's start. The start has the weight that is
+    left of 1.
+
+    The stability polynomial of the scheme is a shifted Legendre polynomial: profiles that decay
+    fast are halved in a step, without change of sign. Chebyshev's polynomial reaches 1.3 times as
+    far but damps them much less, and the kink at a contact's edge then causes ripples on the
+    profile.
+
+    References
+    ----------
+    .. [1] C.D. Meyer, D.S. Balsara, T.D. Aslam, A stabilized Runge-Kutta-Legendre method for
+       explicit super-time-stepping of parabolic and mixed equations, J. Comput. Phys. 257 (2014)
+       594-626, DOI 10.1016/j.jcp.2013.08.021.
+    """
+    b = [1.0 / 3.0] * 2 + [(j * j + j - 2) / (2.0 * j * (j + 1)) for j in range(2, count + 1)]
+    scale = 2.0 / reach(count)
+    stages = [(0.0, 0.0, 0.0, b[1] * scale)]
+    for j in range(2, count + 1):
+        last = (2 * j - 1) / j * b[j] / b[j - 1]
+        before_last = -(j - 1) / j * b[j] / b[j - 2]
+        stages.append((last, before_last, scale * last, (b[j - 1] - 1.0) * scale * last))
+    return tuple(stages)
+
+
+class StabilisedStepper(StepDoublingStepper):
+    """Stepper of second order for any contact model: Runge-Kutta-Legendre method.
+
+    A step of s stages is stable up to s^2/4 times the stability limit of Euler's method. The
+    number of stages follows from the greatest decay rate at the start of each step.
+
+    For a scheme of second order the difference to the coarse-step solution is three times the
+    error of the test. It is not divided by three: strips that enter the contact cause kinks in
+    time, which reduce the order towards one, and then the difference equals the error.
+    """
+
+    order = 2
+
+    def scheme(self, problem: WearProblem, state: WearState) -> Step:
+        """Return a step for the decay rates at `state`."""
+        return partial(stabilised_step, decay=decay_rates(problem, state))
+
+
+def stabilised_step(
+    problem: WearProblem, state: WearState, passes: FloatArray, decay: FloatArray
+) -> WearState:
+    """Step over `passes` passes with the number of stages that the decay rate requires.
+
+    Every stage is an explicit step on the profiles of the previous one, combined with earlier
+    stages. Wear and energy have the same weights, so that Archard's wear law holds to round-off.
+
+    Parameters
+    ----------
+    problem : WearProblem
+    state : WearState
+    passes : ndarray, shape (realisations,)
+        Length of the step.
+    decay : ndarray, shape (realisations,)
+        Greatest decay rate [1/pass].
+    """
+    here = problem.at_time(problem.time(state.passes), problem.time(state.passes + passes))
+    stages = legendre_stages(stages_for(float((SAFETY * decay * passes).max())))
+    before = (
+        np.zeros_like(state.cylinder_depth),
+        np.zeros_like(state.roller_depth),
+        np.zeros(problem.shape),
+    )
+    solve = solve_present if problem.varying else contacts_at
+    contacts, first = _rate(here, state, passes, before, solve)
+    solves = (len(stages) + (contacts is not state.contacts)) * problem.contacts_each
+    change = _sum((stages[0][3], first))
+    for weights in stages[1:]:
+        contacts, rate = _rate(here, state.replaced(contacts=contacts), passes, change)
+        weighted = zip(weights, (change, before, rate, first), strict=True)
+        before, change = change, _sum(*weighted)
+    begun = state.replaced(contacts=contacts, solves=state.solves + solves, decay=decay)
+    worn = worn_state(here, begun.with_added(change[:2]), passes, change[2])
+    return worn.replaced(contacts=solve_present(problem, worn, present_loads(problem, worn)))
+
+
+def _rate(
+    here: WearProblem,
+    state: WearState,
+    passes: FloatArray,
+    change: Change,
+    solve: Callable[[WearProblem, WearState, FloatArray], ContactBatchSolution] = solve_present,
+) -> tuple[ContactBatchSolution, Change]:
+    """Return the contacts on the profiles of a stage, and the change in a whole step with them.
+
+    The load is the mean over the step, with the spring force at the descent of the stage.
+
+    Parameters
+    ----------
+    here : WearProblem
+        Problem with every process at its mean over the step.
+    state : WearState
+        State at the step's start, with contacts for the solver to start from.
+    passes : ndarray, shape (realisations,)
+        Length of the step.
+    change : Change
+        Change from the start to the stage.
+    solve : callable
+        Solves the contacts on the profiles of a state under given loads.
+    """
+    stage, power = state.with_added(change[:2]), here.values_of(state.contacts, "power")
+    loads = mean_loads(here, state, passes, (stage.depths,), power)
+    contacts = solve(here, stage, loads)
+    wear = WearIncrement(here, contacts, passes)
+    return contacts, (*wear.depths, here.values_of(contacts, "power"))
+
+
+def _sum(*terms: tuple[float, Change]) -> Change:
+    """Return the weighted sum of changes."""
+    cylinder, roller, power = (
+        np.sum([weight * change[part] for weight, change in terms], axis=0) for part in range(3)
+    )
+    return cylinder, roller, power
