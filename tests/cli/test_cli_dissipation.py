@@ -15,7 +15,7 @@ from cli_examples import SCENARIOS, Command
 from tests.interruptible import interruptible
 from wearsim.cli.progress import Counter
 from wearsim.results import open_dissipation
-from wearsim.studies.limits import MOST_BYTES
+from wearsim.studies.preparation import MOST_BYTES
 
 PAPER = SCENARIOS / "paper-monte-carlo.toml"
 SMALL = ("--set", "contact.mx=8", "--set", "contact.my=12", "-n", 50)

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from wearsim.evolution.integrate import evolve
+from wearsim.evolution.quantities import worn_volume
 from wearsim.evolution.state import fresh_state
 from wearsim.scenario import load_scenario
 from wearsim.studies.run.assemble import assemble_problem
@@ -43,3 +44,14 @@ def worn(name="rig-450min", **changes):
 def next_state(problem, stepper, state):
     """Return the state after one more step of a test without end."""
     return next(evolve(problem, state, stepper, 1e12, never, 10**6)).end
+
+
+def cylinder_depth_of(state):
+    """Return the greatest worn depth of the cylinder for each realisation."""
+    return state.cylinder_depth.max(axis=(0, 1, 3))
+
+
+def cylinder_volume_of(problem, state):
+    """Return the cylinder's worn volume for each realisation, the mean over stations."""
+    radius, spacing = problem.kinematics.cylinder_radius, problem.grid.spacing
+    return worn_volume(state.cylinder_depth, spacing, radius).mean(axis=(0, 1))

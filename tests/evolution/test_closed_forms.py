@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from tests.evolution import built, stepped, worn
-from wearsim.evolution.observables import width, worn_volume
-from wearsim.evolution.steppers.single_step import cylinder_depth_of, cylinder_volume_of
+from tests.evolution import built, cylinder_depth_of, cylinder_volume_of, stepped, worn
+from wearsim.evolution.quantities import width, worn_volume
 
 K_OVER_H = 1.1e-11
 PER_LOAD = K_OVER_H * 0.1 * 1e-3  # depth per pass and line load in full slip [m/(N/m)]

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.evolution import built, next_state, stepped
+from tests.evolution import built, cylinder_depth_of, next_state, stepped
 from tests.evolution.black_box import BlackBox, boxed
 from tests.evolution.test_closed_forms import (
     K_OVER_H,
@@ -17,11 +17,10 @@ from tests.evolution.test_steppers import CASES, SPIKE, THREE, roughened
 from tests.studies.random_examples import SLACK, end_of, scenario_of
 from wearsim.errors import ContactError
 from wearsim.evolution.error_estimates import greatest_depth, volume_of
-from wearsim.evolution.observables import oscillation, worn_volume
+from wearsim.evolution.quantities import oscillation, worn_volume
 from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.base import StepControl
 from wearsim.evolution.steppers.forward_euler import decay_rates, stability_limit
-from wearsim.evolution.steppers.single_step import cylinder_depth_of
 from wearsim.evolution.steppers.step_doubling import StabilisedStepper, stabilised_step
 
 SPRING = {"load__kind": "spring", "load__stiffness": "20 kN/mm"}

@@ -5,15 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.evolution import built, never, next_state, stepped
+from tests.evolution import built, cylinder_depth_of, cylinder_volume_of, never, next_state, stepped
 from wearsim.errors import SolverError, StepError
 from wearsim.evolution.integrate import evolve
-from wearsim.evolution.observables import centroid, oscillation
+from wearsim.evolution.quantities import centroid, oscillation
 from wearsim.evolution.state import fresh_state, unworn_contacts
 from wearsim.evolution.steppers.base import Attempt, StepControl
 from wearsim.evolution.steppers.forward_euler import ExplicitStepper, stability_limit
 from wearsim.evolution.steppers.per_pass import PerPassStepper, run_compiled, run_in_python
-from wearsim.evolution.steppers.single_step import cylinder_depth_of, cylinder_volume_of
 from wearsim.evolution.steppers.step_doubling import ImplicitStepper
 from wearsim.studies.ensemble.batch import joined_problem
 

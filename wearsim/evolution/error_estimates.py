@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from wearsim.evolution.observables import mean_along, sum_in_order, worn_volume
 from wearsim.evolution.problem import WearProblem
+from wearsim.evolution.quantities import mean_along, sum_in_order, worn_volume
 from wearsim.evolution.state import Depths, WearState
 from wearsim.evolution.steppers.base import Step, StepControl
 from wearsim.evolution.steppers.single_step import WearIncrement, carried_loads, solve_present

@@ -11,8 +11,10 @@ from typing import Any
 import numpy as np
 
 from wearsim.contact_batch import ContactBatchSolution
-from wearsim.evolution.contact_inputs import ContactInputs, Kinematics, Varying
-from wearsim.evolution.observables import (
+from wearsim.evolution.quantities import (
+    ContactInputs,
+    Kinematics,
+    Varying,
     is_every,
     mean_along,
     sum_along,
@@ -209,10 +211,6 @@ class WearProblem:
         each = zip(self.loads, time[:, None], strict=True)
         return np.array([load.force(own)[0] for load, own in each])
 
-    def mean_load(self, start: FloatArray, stop: FloatArray) -> FloatArray:
-        """Return the exact mean of the load between two times [s], shape (realisations,) [N]."""
-        return values_between([load.mean for load in self.loads], start, stop)
-
     def deviations(
         self, start: FloatArray, stop: FloatArray
     ) -> list[tuple[str, tuple[int, ...], FloatArray]]:
@@ -247,14 +245,6 @@ class WearProblem:
     def gap(self, cylinder_depth: FloatArray, roller_depth: FloatArray) -> FloatArray:
         """Return the gap of every contact [m]; depths as in `WearState`."""
         return self.nominal_gap + cylinder_depth + self.at_contacts(roller_depth)
-
-    def descent(self, gap: FloatArray) -> FloatArray:
-        """Return the descent of each contact's roller into worn material, shape (S, C, N) [m].
-
-        It is the rise of the least gap, by which rigid bodies would approach. On one track it
-        equals the worn depth.
-        """
-        return np.asarray(gap.min(axis=-1) - self.nominal_gap.min(axis=-1))
 
     def values_of(self, contacts: ContactBatchSolution, name: str) -> FloatArray:
         """Return the field `name` of all contacts, with the axes of `shape` first."""

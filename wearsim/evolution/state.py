@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from wearsim.contact_batch import ContactBatch, ContactBatchSolution
-from wearsim.evolution.observables import is_every
 from wearsim.evolution.problem import WearProblem
+from wearsim.evolution.quantities import is_every
 from wearsim.types import FloatArray, IntArray
 
 

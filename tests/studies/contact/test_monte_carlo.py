@@ -17,7 +17,7 @@ from wearsim.studies.contact import monte_carlo as study
 from wearsim.studies.contact.batch import Realisations, acting_inputs
 from wearsim.studies.contact.monte_carlo import dissipation
 from wearsim.studies.contact.single import study_contact
-from wearsim.studies.limits import bytes_per_realisation
+from wearsim.studies.preparation import bytes_per_realisation
 from wearsim.studies.run.draws import Drawer
 
 # mean and std [W]: converged, from another program

@@ -84,7 +84,7 @@ def test_mean_is_computed_from_separate_draws():
     drawer = Drawer(scenario, "monte-carlo")
     control = control_of(drawer, 200_000)
     own = closed_form_depths(scenario, drawer.columns(0, 20_000), 20_000)
-    error = control.std / np.sqrt(20_000)
-    assert abs(own.mean() - control.mean) < 4.0 * error
-    assert own.std() == pytest.approx(control.std, rel=0.05)
+    error = control["std"] / np.sqrt(20_000)
+    assert abs(own.mean() - control["mean"]) < 4.0 * error
+    assert own.std() == pytest.approx(control["std"], rel=0.05)
     assert control_of(drawer, 200_000) == control

@@ -13,8 +13,8 @@ from wearsim.evolution.error_estimates import (
     variation_bias,
     with_pass_errors,
 )
-from wearsim.evolution.observables import oscillation
 from wearsim.evolution.problem import WearProblem
+from wearsim.evolution.quantities import oscillation
 from wearsim.evolution.state import Depths, WearState
 from wearsim.evolution.steppers.base import Attempt, Step, StepControl, Stepper
 from wearsim.evolution.steppers.single_step import (
@@ -42,8 +42,7 @@ def stability_limit(problem: WearProblem, state: WearState) -> FloatArray:
         2 over the greatest decay rate, infinite without wear.
     """
     rates = decay_rates(problem, state)
-    limits: FloatArray = 2.0 / np.where(rates > 0.0, rates, 1.0)
-    return np.where(rates > 0.0, limits, np.inf)
+    return np.where(rates > 0.0, 2.0 / np.where(rates > 0.0, rates, 1.0), np.inf)
 
 
 def decay_rates(problem: WearProblem, state: WearState) -> FloatArray:
@@ -191,8 +190,7 @@ def _errors(problem: WearProblem, start: WearState, end: WearState, step: FloatA
     """
     # processes at their means over the step, as in the step
     here = problem.at_time(problem.time(start.passes), problem.time(start.passes + step))
-    depths = start.depths, end.depths
-    loads = mean_loads(here, start, step, depths, here.values_of(end.contacts, "power"))
+    loads = mean_loads(here, start, step, (start.depths, end.depths), end.contacts)
     solve = solve_present if problem.varying else contacts_at
     wear = WearIncrement(here, solve(here, end, loads), step)
     errors = COVER * 0.5 * state_difference(problem, end, start.with_added(wear.depths))

@@ -9,8 +9,8 @@ from functools import partial
 import numpy as np
 
 from wearsim.contact_batch import ContactBatchSolution
-from wearsim.evolution.contact_inputs import Redraw
 from wearsim.evolution.problem import WearProblem
+from wearsim.evolution.quantities import Redraw
 from wearsim.evolution.state import WearState, contact_batch, joined_states
 from wearsim.evolution.steppers.base import Attempt, Step, StepControl, Stepper
 from wearsim.evolution.steppers.single_step import present_loads, solve_present

@@ -9,8 +9,8 @@ import numpy as np
 
 from wearsim.contact_batch import ContactBatchSolution
 from wearsim.errors import StepError
-from wearsim.evolution.observables import worn_volume
 from wearsim.evolution.problem import WearProblem
+from wearsim.evolution.quantities import values_between
 from wearsim.evolution.state import Depths, WearState, contact_batch
 from wearsim.mechanics.numerics.wear_exponent import estimate_exponents, ratio_to_load
 from wearsim.plugins import SharedWear
@@ -129,21 +129,23 @@ def mean_loads(
     state: WearState,
     passes: FloatArray,
     depths: Sequence[Depths],
-    power: FloatArray,
+    contacts: ContactBatchSolution,
 ) -> FloatArray:
     """Return the mean load of each contact over a step, shape (S, C, N) [N].
 
     Processes are at their means over the step in `problem`. The load before feedback is integrated
     exactly. The spring takes the mean of the descents at the worn depths `depths`, usually those at
-    the ends of the step, and each load term its exact mean at constant `power`.
+    the ends of the step, and each load term its exact mean at the constant power of `contacts`.
     """
     start, stop = problem.time(state.passes), problem.time(state.passes + passes)
     terms = []
     if problem.terms:
-        mean_power, duration = problem.per_roller(power).mean(axis=0), float((stop - start)[0])
+        power = problem.per_roller(problem.values_of(contacts, "power"))
+        mean_power, duration = power.mean(axis=0), float((stop - start)[0])
         each = zip(problem.terms.values(), state.terms, strict=True)
         terms = [term.mean_force(value, mean_power, duration) for term, value in each]
-    return _with_feedback(problem, state, problem.mean_load(start, stop), depths, terms)
+    force = values_between([load.mean for load in problem.loads], start, stop)
+    return _with_feedback(problem, state, force, depths, terms)
 
 
 def _with_feedback(
@@ -157,7 +159,9 @@ def _with_feedback(
     loads = np.empty(problem.shape)
     loads[:] = force + problem.inputs.normal_force_offset
     if problem.has_spring:
-        descents = [problem.descent(problem.gap(*worn)) for worn in depths]
+        # the rise of the least gap, by which rigid bodies would approach; the depth on one track
+        unworn = problem.nominal_gap.min(axis=-1)
+        descents = [problem.gap(*worn).min(axis=-1) - unworn for worn in depths]
         loads -= problem.stiffness * np.mean(descents, axis=0)
     for term in terms:
         loads += term[problem.roller]
@@ -171,23 +175,11 @@ def _with_feedback(
     return loads
 
 
-def end_loads(
-    problem: WearProblem,
-    state: WearState,
-    passes: FloatArray,
-    ends: Depths,
-    contacts: ContactBatchSolution,
-) -> FloatArray:
-    """Return the mean loads of a step with worn depths `ends` at its end."""
-    power = problem.values_of(contacts, "power")
-    return mean_loads(problem, state, passes, (state.depths, ends), power)
-
-
 def explicit_step(problem: WearProblem, state: WearState, passes: FloatArray) -> WearState:
     """Step over `passes` passes on the profiles of the step's start, under its mean load."""
     here = problem.at_time(problem.time(state.passes), problem.time(state.passes + passes))
     predicted = state.with_added(WearIncrement(here, state.contacts, passes).depths)
-    mean = end_loads(here, state, passes, predicted.depths, state.contacts)
+    mean = mean_loads(here, state, passes, (state.depths, predicted.depths), state.contacts)
     solve = solve_present if problem.varying else contacts_at
     contacts = solve(here, state, mean)
     solves = problem.contacts_each * (1 if contacts is state.contacts else 2)
@@ -276,15 +268,3 @@ def worn_state(
         terms=terms,
         energy=state.energy + problem.total_power(power) * (passes / problem.kinematics.pass_rate),
     )
-
-
-def cylinder_depth_of(state: WearState) -> FloatArray:
-    """Return the greatest worn depth of the cylinder, shape (realisations,) [m]."""
-    return np.asarray(state.cylinder_depth.max(axis=(0, 1, 3)))
-
-
-def cylinder_volume_of(problem: WearProblem, state: WearState) -> FloatArray:
-    """Return the cylinder's worn volume, shape (realisations,) [m^3]: the mean over stations."""
-    kinematics, spacing = problem.kinematics, problem.grid.spacing
-    volume = worn_volume(state.cylinder_depth, spacing, kinematics.cylinder_radius)
-    return np.asarray(volume.mean(axis=(0, 1)))

@@ -30,7 +30,6 @@ from wearsim.evolution.steppers.single_step import (
     REALISATION,
     WearIncrement,
     contacts_at,
-    end_loads,
     mean_loads,
     present_loads,
     solve_present,
@@ -149,7 +148,7 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
     contacts = state.contacts
     wear = WearIncrement(problem, contacts, passes)
     ends = state.with_added(wear.depths)
-    loads = end_loads(problem, state, passes, ends.depths, contacts)
+    loads = mean_loads(problem, state, passes, (state.depths, ends.depths), contacts)
     active = np.ones(problem.shape[REALISATION], dtype=np.bool_)
     iterations = np.zeros(len(active), dtype=np.int64)
     for iteration in range(1, MAX_FIXED_POINT + 1):
@@ -161,7 +160,7 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
         predicted = wear.predicted_opening(problem.values_of(solved, "line_load"))
         change, new_loads = _relative_change(new.opening, predicted), loads
         if problem.has_spring or problem.terms:
-            new_loads = end_loads(problem, state, passes, ends.depths, solved)
+            new_loads = mean_loads(problem, state, passes, (state.depths, ends.depths), solved)
             change = np.maximum(change, _relative_change(new_loads, loads))
         if problem.slip_profile is not None:
             change = np.maximum(change, _relative_change(new.cylinder, wear.cylinder))
@@ -353,8 +352,8 @@ def _rate(
     solve : callable
         Solves the contacts on the profiles of a state under given loads.
     """
-    stage, power = state.with_added(change[:2]), here.values_of(state.contacts, "power")
-    loads = mean_loads(here, state, passes, (stage.depths,), power)
+    stage = state.with_added(change[:2])
+    loads = mean_loads(here, state, passes, (stage.depths,), state.contacts)
     contacts = solve(here, stage, loads)
     wear = WearIncrement(here, contacts, passes)
     return contacts, (*wear.depths, here.values_of(contacts, "power"))

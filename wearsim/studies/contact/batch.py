@@ -1,39 +1,163 @@
-"""Realisations of one contact: gaps and operating points from random inputs, and solutions."""
+"""Realisations of one contact: gaps and operating points, local friction, and solutions."""
 
 from __future__ import annotations
 
-import math
+from bisect import bisect_left
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from wearsim.contact_batch import ContactBatch, ContactBatchSolution
-from wearsim.errors import ContactError, Mistake, ScenarioError, SolverError
+from wearsim.errors import CapabilityError, ContactError, Mistake, ScenarioError, SolverError
 from wearsim.evolution.state import unworn_contacts
+from wearsim.plugins import ContactModel, ContactModelSpec, FrictionField, registry
 from wearsim.scenario import RandomInput, Scenario, realise
-from wearsim.studies.contact.friction_field import LocalFriction
-from wearsim.studies.run.assemble import build_problem, check_model, prepared_model
+from wearsim.studies.run.assemble import build_problem, prepared_model
 from wearsim.studies.run.draws import Drawer, units_of
 from wearsim.studies.run.grid import (
-    MOST_STRIPS,
-    contact_centre,
-    contact_grid,
     contact_positions,
-    fresh_patch,
-    suggested_grid,
+    realisation_grid,
 )
 from wearsim.studies.run.inputs import (
     FIELDS,
-    OFFSET,
-    TILT,
     contact_inputs,
     contact_values,
     load_range,
 )
-from wearsim.types import FloatArray, Grid
+from wearsim.types import FloatArray
+from wearsim.uq.sampling.philox import Stream
 
-_MARGIN = 1e-9  # of a patch, against rounding at the outer edges
-_ROUNDING = 1e-12
+_MAX_POINTS = 2**20  # upper limit of the search for a sufficient number
+
+
+class LocalFriction:
+    """The friction field of a scenario.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    model : ContactModel
+    item : RandomInput
+        The field.
+
+    Raises
+    ------
+    CapabilityError
+        If the model supports no friction field, or the creepage is not prescribed.
+    """
+
+    def __init__(self, scenario: Scenario, model: ContactModel, item: RandomInput) -> None:
+        if not isinstance(item.distribution, FrictionField):
+            raise TypeError(f"{item.name} is no field")
+        self._scenario, self._item, self._field = scenario, item, item.distribution
+        self._stream = Stream(scenario.seed, item.name, "field")
+        if not model.capabilities.friction_field:
+            specs = [
+                registry().get(ContactModelSpec, name)
+                for name in registry().names(ContactModelSpec)
+            ]
+            names = [f"'{spec.name}'" for spec in specs if spec.capabilities.friction_field]
+            models = f"contact.model = {' or '.join(names)}" if names else "another distribution"
+            raise CapabilityError(
+                f"{scenario.file}: contact model '{scenario.contact.model}' does not support"
+                f" friction that varies within the contact, {item.name} with distribution ="
+                f" '{item.kind}'; choose {models}"
+            )
+        if scenario.creepage.drive != "creepage":
+            raise CapabilityError(
+                f"{scenario.file}: a friction field, {item.name}, requires prescribed creepage; set"
+                " creepage.drive = 'creepage', or give the friction a distribution"
+            )
+
+    def check(self, x: FloatArray, spacing: float) -> None:
+        """Check that points resolve the field.
+
+        Parameters
+        ----------
+        x : ndarray, shape (points, strips)
+            Positions along rolling in the longest contact [m].
+        spacing : float
+            Width of a strip [m].
+
+        Raises
+        ------
+        ScenarioError
+            If the points are too far apart.
+        """
+        # the first point is one spacing behind the leading edge, the last at the trailing edge
+        along = float(2.0 * np.abs(x).max() / len(x))
+        mistake = self._field.unresolved(along, spacing)
+        if mistake is not None:
+            table, key = self._item.name.split(".", 1)
+            remedy = finer_grid(self._scenario, self._field, len(x), along, spacing)
+            raise ScenarioError(
+                self._scenario.file, [Mistake(table, key, mistake, self._item.describe(), remedy)]
+            )
+
+    def put(self, batch: ContactBatch, x: FloatArray, y: FloatArray, first: int) -> ContactBatch:
+        """Return the contacts of consecutive realisations with their local friction.
+
+        Parameters
+        ----------
+        batch : ContactBatch
+        x : ndarray, shape (contacts, points, strips)
+            Positions along rolling, from the leading edge [m].
+        y : ndarray, shape (strips,)
+            Axial position [m].
+        first : int
+            The first realisation.
+        """
+        friction = np.empty_like(x)
+        for row in range(len(x)):
+            uniforms = partial(self._stream.uniforms, realisation=first + row)
+            friction[row] = self._field.values(x[row], y, uniforms)
+        carried = self._field.frame != "contact"
+        return replace(batch, friction=friction, friction_carried=carried)
+
+
+def finer_grid(
+    scenario: Scenario, friction: FrictionField, points: int, along: float, across: float
+) -> str:
+    """Return the settings for which a grid resolves a friction field.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    friction : FrictionField
+    points : int
+        Points along rolling in each strip.
+    along, across : float
+        Their spacing, and the width of a strip [m].
+
+    Returns
+    -------
+    str
+        "contact.my = 124": key and least value for either direction that is too coarse.
+    """
+    choice = scenario.contact
+    settings = []
+    if friction.unresolved(along, 0.0) is not None:
+        needed = _least(points, lambda count: friction.unresolved(along * points / count, 0.0))
+        has_key = hasattr(choice.options, "mx")
+        settings.append(f"contact.mx = {needed}" if has_key else f"{needed} points along rolling")
+    if friction.unresolved(0.0, across) is not None:
+        strips = choice.strips or getattr(choice.options, "my", None)
+        if strips is None:
+            settings.append("more contact.strips")
+        else:
+            needed = _least(strips, lambda count: friction.unresolved(0.0, across * strips / count))
+            settings.append(f"contact.{'strips' if choice.strips else 'my'} = {needed}")
+    return " and ".join(settings)
+
+
+def _least(count: int, unresolved: Callable[[int], str | None]) -> int:
+    """Return the least resolving count above one that does not resolve."""
+    counts = range(count + 1, _MAX_POINTS)
+    return count + 1 + bisect_left(counts, True, key=lambda points: unresolved(points) is None)
+
+
 # probabilities between the extremes at which a random option of the load is tried
 _BETWEEN = np.array([0.01, 0.1, 0.25, 0.5, 0.75, 0.9, 0.99])
 
@@ -69,7 +193,6 @@ class Realisations:
         centres = contact_positions(scenario, contact_inputs(scenario, [0], drawn))
         self.grid = realisation_grid(scenario, mean_load, self.loads, centres)
         self.model = prepared_model(scenario, self.grid)
-        check_model(scenario, self.model)
         self._field = LocalFriction(scenario, self.model, field) if field is not None else None
         self.friction_points = 0 if self._field is None else self._checked_points(self._field)
 
@@ -197,91 +320,3 @@ def _acts(scenario: Scenario, item: RandomInput) -> bool:
     what = "changes the load of the contact, and only load.normal_force can be random here"
     expected = f"one value, such as {written}"
     raise ScenarioError(scenario.file, [Mistake(table, key, what, item.kind, expected)])
-
-
-def realisation_grid(
-    scenario: Scenario, load: float, loads: FloatArray, centres: FloatArray
-) -> Grid:
-    """Return strips that cover the contacts of all realisations.
-
-    The strips of the contact with every input at its mean are those that the model suggests, and
-    further strips of the same width cover the others.
-
-    Parameters
-    ----------
-    scenario : Scenario
-    load : float
-        Load with every input at its mean [N].
-    loads : ndarray, shape (realisations,)
-        Loads [N].
-    centres : ndarray, shape (realisations,)
-        Contact positions on an unworn cylinder [m].
-
-    Returns
-    -------
-    Grid
-
-    Raises
-    ------
-    ScenarioError
-        If the strips that the scenario defines do not cover all contacts, or too many are needed.
-    """
-    choice, mean_b = scenario.contact, fresh_patch(scenario, load).b
-    half_widths = mean_b * np.cbrt(np.maximum(loads, 0.0) / load)
-    centre = contact_centre(scenario, [0])
-    away = np.abs(centres - centre)
-    if choice.width is not None:
-        needed = 2.0 * float((away + half_widths).max())
-        if choice.width < needed * (1.0 - _MARGIN):
-            mistake = Mistake(
-                "contact",
-                "width",
-                "the contacts of all realisations do not fit",
-                f"{choice.width * 1e3:.4g} mm",
-                f"at least {needed * 1e3:.4g} mm",
-            )
-            raise ScenarioError(scenario.file, [mistake])
-    if choice.width is not None or scenario.cylinder.profile is not None:
-        return contact_grid(scenario, load)
-    grid = suggested_grid(scenario, load)
-    if grid is None:
-        grid = Grid.spanning(-1.2 * mean_b, 1.2 * mean_b, 121)
-    margin = 0.5 * grid.spacing * grid.strips / mean_b  # 1 where the strips end with the patch
-    half = float((away + margin * half_widths).max())
-    if choice.strips is not None:
-        half *= 1.0 + _MARGIN
-        return Grid.spanning(centre - half, centre + half, choice.strips)
-    beyond = half / grid.spacing - 0.5 * grid.strips
-    strips = grid.strips + 2 * max(math.ceil(beyond - _ROUNDING * grid.strips), 0)
-    if strips > MOST_STRIPS:
-        raise _too_many_strips(scenario, strips, half, float(away.max()))
-    half = 0.5 * strips * grid.spacing
-    return Grid.spanning(centre - half, centre + half, strips)
-
-
-def _too_many_strips(scenario: Scenario, strips: int, half: float, away: float) -> ScenarioError:
-    """Return the error of too many strips, with the inputs that move the contacts apart."""
-    takes = (
-        f"the contacts of all realisations span {2e3 * half:.4g} mm, which takes {strips} strips of"
-        f" the width that suits one contact; the maximum is {MOST_STRIPS}"
-    )
-    coarser = f"a number of strips, such as contact.strips = {MOST_STRIPS}"
-    keys = {OFFSET, TILT} if scenario.creepage.tilt_shifts_contact else {OFFSET}
-    shifting = [item for item in scenario.random if keys & set(item.keys)]
-    mistakes = []
-    for item in shifting:
-        table, key = item.name.split(".", 1)
-        shift = f"moves contacts by up to {away * 1e3:.4g} mm"
-        less = f"a smaller {'radius' if 'radius' in item.options else 'spread'}"
-        if TILT in item.keys:
-            less += ", creepage.tilt_shifts_contact = false"
-            if len(shifting) == 1 and scenario.contact.centre is None:
-                crown = scenario.roller.crown_radius
-                angle = f"{away / crown * 1e3:.4g} mrad"
-                shift += f", crown radius x tilt = {crown * 1e3:.4g} mm x {angle}"
-        expected = f"{less}, or {coarser}"
-        mistakes.append(Mistake(table, key, f"{shift}: {takes}", item.describe(), expected))
-    if not mistakes:
-        expected = f"{coarser}, or inputs that vary less"
-        mistakes.append(Mistake("contact", "strips", takes, None, expected))
-    return ScenarioError(scenario.file, mistakes)

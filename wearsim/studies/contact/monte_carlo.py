@@ -14,8 +14,7 @@ from wearsim.results import DissipationData, DissipationResult, check_output, wr
 from wearsim.results.dissipation import BAND, as_numbers, summaries
 from wearsim.scenario import Scenario
 from wearsim.studies.contact.batch import Realisations
-from wearsim.studies.limits import checked_count, nothing_random
-from wearsim.studies.run.provenance import origin_of
+from wearsim.studies.preparation import checked_count, nothing_random, origin_of
 from wearsim.uq.estimation.moments import RowMoments
 
 BATCH = 1024  # realisations of a batch

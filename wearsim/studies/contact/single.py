@@ -9,7 +9,7 @@ from wearsim.errors import WearsimError
 from wearsim.evolution.state import unworn_contacts
 from wearsim.plugins import ContactModel
 from wearsim.scenario import Scenario, described_model
-from wearsim.studies.run.assemble import build_problem, check_model, prepared_model
+from wearsim.studies.run.assemble import build_problem, prepared_model
 from wearsim.studies.run.grid import contact_grid
 from wearsim.studies.run.inputs import load_range
 from wearsim.types import (
@@ -124,7 +124,6 @@ def _contact(
 ) -> tuple[ContactModel, FloatArray, float, OperatingPoint]:
     """Return the model for strips, gap [m], curvature along rolling [1/m] and the point."""
     model = prepared_model(scenario, grid)
-    check_model(scenario, model)
     problem = build_problem(scenario, model, grid, {})
     batch = unworn_contacts(problem)
     return model, batch.gap[0], float(batch.longitudinal_curvature[0]), batch.point(0)

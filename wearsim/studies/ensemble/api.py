@@ -33,10 +33,15 @@ from wearsim.studies.ensemble.designs import (
 from wearsim.studies.ensemble.driver import EnsembleProgress, EnsembleWork
 from wearsim.studies.ensemble.realisation import RealisationRunner, control_of, shared_grid
 from wearsim.studies.execution.factory import executor
-from wearsim.studies.limits import checked_count, nothing_random
+from wearsim.studies.preparation import (
+    changed_origins,
+    check_plugins,
+    checked_count,
+    nothing_random,
+    origin_of,
+)
 from wearsim.studies.run.assemble import assemble_problem
 from wearsim.studies.run.draws import Drawer, draw, units_of
-from wearsim.studies.run.provenance import changed_origins, check_plugins, origin_of
 from wearsim.studies.run.recorder import RecordSchedule
 from wearsim.types import FloatArray, Grid
 from wearsim.uq.estimation.estimates import Target
@@ -119,8 +124,7 @@ def ensemble(
     ) as pool:
         grid = shared_grid(scenario)
         header = _header(scenario, request, grid)
-        static = _static(scenario, grid)
-        with EnsembleFile.create(path, header, static, storage) as file:
+        with EnsembleFile.create(path, header, _static(scenario, grid), storage) as file:
             runner = RealisationRunner(scenario, request.plan, request.realisations, grid)
             EnsembleWork(file, runner, request.target, pool, on_progress, stop_requested).finish()
     return open_ensemble(path)
@@ -255,8 +259,7 @@ def resume_ensemble(
         if total > data.requested:
             opened.grow(total)
         work = EnsembleWork(opened, runner, target, pool, on_progress, stop_requested)
-        for text in changed_origins(data, scenario):
-            work.warn(text)
+        work.warn(changed_origins(data, scenario))
         if failed:
             work.run_failed_again()
         else:
@@ -278,6 +281,12 @@ def _header(scenario: Scenario, request: EnsembleRequest, grid: Grid) -> Ensembl
     averaged = tuple(item for item in scenario.random if item.name not in drawer.groups)
     # a scenario that cannot run is refused before anything is written
     _, _, stepper = assemble_problem(draw(replace(scenario, random=averaged)), grid)
+    control = control_of(drawer) if request.plan == "control-variate" else {}
+    if control is None:
+        raise CapabilityError(
+            f"{scenario.file}: the control variate is a depth in closed form, which needs a wear"
+            " law linear in the dissipation; choose another plan, such as monte-carlo"
+        )
     return EnsembleData(
         **origin_of(scenario),
         finished=False,
@@ -312,19 +321,8 @@ def _header(scenario: Scenario, request: EnsembleRequest, grid: Grid) -> Ensembl
             }
             for item in drawn
         ],
-        control=_control(drawer) if request.plan == "control-variate" else {},
+        control=control,
     )
-
-
-def _control(drawer: Drawer) -> dict[str, float]:
-    """Return the moments of the control variate, and the number of draws they are from."""
-    control = control_of(drawer)
-    if control is None:
-        raise CapabilityError(
-            f"{drawer.scenario.file}: the control variate is a depth in closed form, which needs a"
-            " wear law linear in the dissipation; choose another plan, such as monte-carlo"
-        )
-    return control._asdict()
 
 
 def _static(scenario: Scenario, grid: Grid) -> dict[str, FloatArray]:

@@ -7,10 +7,9 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from wearsim.evolution.contact_inputs import ContactInputs
 from wearsim.evolution.integrate import Advance, Evolution, bisect_failures
-from wearsim.evolution.observables import sum_in_order
 from wearsim.evolution.problem import WearProblem
+from wearsim.evolution.quantities import ContactInputs, sum_in_order
 from wearsim.evolution.state import WearState, fresh_state
 from wearsim.evolution.steppers.base import Stepper
 from wearsim.evolution.steppers.step_doubling import ImplicitStepper
@@ -80,6 +79,7 @@ MAX_BATCH = 128  # realisations in one batch; larger batches are not faster
 MAX_STRIPS = 50_000  # strips of all contacts of a batch; about 100 arrays of this size are in use
 
 Observables = dict[str, float]
+_SCALARS = ("depth_error", "volume_error", "steps", "solves")
 
 
 @dataclass(frozen=True)
@@ -144,13 +144,6 @@ class RunObservations:
     rows: list[Observables]
     scalars: dict[str, float]
     profile: FloatArray
-
-    @classmethod
-    def of(cls, rows: list[Observables], end: WearState, place: int) -> RunObservations:
-        """Return the results of a test from the final state of its batch and its place there."""
-        names = "depth_error", "volume_error", "steps", "solves"
-        scalars = {name: float(getattr(end, name)[place]) for name in names}
-        return cls(rows, scalars, end.cylinder_depth[:, 0, place].mean(axis=0))
 
 
 def batch_groups(runs: Sequence[RealisationRun]) -> list[list[RealisationRun]]:
@@ -220,9 +213,11 @@ def _observed(runs: Sequence[RealisationRun]) -> list[RunObservations | Exceptio
         due = due_records(advance, schedule, stop, stepper.pass_by_pass)
         for part in [due] if runs[0].can_be_batched else [[one] for one in due]:
             tests.fail(_record(stepper, advance, part, threshold, rows))
-        for place in np.flatnonzero(advance.end.passes >= stop).tolist():
-            number = int(advance.numbers[place])
-            results[number] = RunObservations.of(rows[number], advance.end, place)
+        end = advance.end
+        for place in np.flatnonzero(end.passes >= stop).tolist():
+            number, profile = int(advance.numbers[place]), end.cylinder_depth[:, 0, place]
+            scalars = {name: float(getattr(end, name)[place]) for name in _SCALARS}
+            results[number] = RunObservations(rows[number], scalars, profile.mean(axis=0))
     results |= tests.failures
     return [results[number] for number in range(len(runs))]
 

@@ -41,12 +41,14 @@ def parse_plan(name: str) -> EnsemblePlan:
     raise ValueError(f"unknown plan '{name}', expected one of {', '.join(ENSEMBLE_PLANS)}")
 
 
-def sources(plan: EnsemblePlan, groups: Sequence[str], realisation: int) -> dict[str, int]:
+def sources(
+    plan: EnsemblePlan, groups: Sequence[str], realisation: int
+) -> tuple[dict[str, int], int]:
     """Return the number of the draw that each input takes in a realisation.
 
     It is the number of the realisation, except in Saltelli's plan: there d + 2 consecutive
-    realisations share two draws A and B of d inputs. They are A, B, and A with each input in turn
-    replaced by that of B.
+    realisations, a row, share two draws A and B of d inputs. They are A, B, and A with each input
+    in turn replaced by that of B.
 
     Parameters
     ----------
@@ -57,30 +59,24 @@ def sources(plan: EnsemblePlan, groups: Sequence[str], realisation: int) -> dict
 
     Returns
     -------
-    dict of str to int
+    sources : dict of str to int
         Empty where all inputs take the draw of the realisation.
+    passes : int
+        Number of the draws of inputs drawn at every pass, the same within a row, so that its
+        realisations differ only in the inputs that are replaced.
 
     Notes
     -----
     Saltelli et al., Comput. Phys. Commun. 181 (2010), DOI 10.1016/j.cpc.2009.09.018.
     """
     if plan != "saltelli":
-        return {}
+        return {}, realisation
     row, block = divmod(realisation, len(groups) + 2)
     first, second = 2 * row, 2 * row + 1
     return {
         name: second if block == 1 or block == 2 + place else first
         for place, name in enumerate(groups)
-    }
-
-
-def passes_of(plan: EnsemblePlan, groups: Sequence[str], realisation: int) -> int:
-    """Return the number of the per-pass draws of a realisation.
-
-    In Saltelli's plan they are the same within a row, so that its realisations differ only in the
-    inputs that are replaced.
-    """
-    return realisation // (len(groups) + 2) if plan == "saltelli" else realisation
+    }, row
 
 
 def whole_count(plan: EnsemblePlan, groups: Sequence[str], realisations: int) -> int:

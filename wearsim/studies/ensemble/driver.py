@@ -164,10 +164,9 @@ class EnsembleWork:
         self._run, self._rate = 0, 0.0
         self._next_estimate, self._estimate = -math.inf, UNKNOWN
 
-    def warn(self, text: str) -> None:
-        """Store a warning with the results."""
-        if text not in self.warnings:
-            self.warnings.append(text)
+    def warn(self, texts: Iterable[str]) -> None:
+        """Store warnings with the results, each once."""
+        self.warnings = list(dict.fromkeys([*self.warnings, *texts]))
 
     def finish(self) -> None:
         """Run all pending realisations.
@@ -302,8 +301,7 @@ class EnsembleWork:
     def _complete(self, data: EnsembleData) -> tuple[dict[str, object], dict[str, FloatArray]]:
         """Return the final fields of a complete ensemble, and its statistics."""
         result = EnsembleResult(data, self.file.path)
-        for text in ensemble_warnings(result, self.target, self._reached):
-            self.warn(text)
+        self.warn(ensemble_warnings(result, self.target, self._reached))
         final = {"finished": True, "statistics": result.final_estimates()}
         return self._state() | final, result.statistics() if result.count else {}
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from wearsim.plugins import ContactModel
 from wearsim.results import Outcome
 from wearsim.scenario import Scenario, parse_scenario
 from wearsim.studies.ensemble.batch import RealisationRun, RunObservations, batch_groups, observe
-from wearsim.studies.ensemble.designs import BASE_PLANS, EnsemblePlan, passes_of, sources
+from wearsim.studies.ensemble.designs import BASE_PLANS, EnsemblePlan, sources
 from wearsim.studies.run.assemble import assemble_problem, prepared_model
 from wearsim.studies.run.draws import Drawer
 from wearsim.studies.run.grid import strips_of_run
@@ -26,26 +26,11 @@ _FIRST_DRAW = 2**31  # number of the first of these draws, beyond any realisatio
 _NEWTON_TOLERANCE = 1e-14
 
 
-class ControlVariate(NamedTuple):
-    """Moments of the control variate.
-
-    Parameters
-    ----------
-    mean, std : float
-        Mean and standard deviation of the closed-form depth [m].
-    draws : int
-        Number of draws they are computed from.
-    """
-
-    mean: float
-    std: float
-    draws: int
-
-
-def control_of(drawer: Drawer, draws: int = DRAWS) -> ControlVariate | None:
+def control_of(drawer: Drawer, draws: int = DRAWS) -> dict[str, float] | None:
     """Return the moments of the closed-form depth, or None where it is not defined.
 
-    The draws follow those of all realisations and are independent of them.
+    They are "mean" and "std" [m], from the number "draws" of draws, which follow those of all
+    realisations and are independent of them.
 
     Parameters
     ----------
@@ -61,7 +46,7 @@ def control_of(drawer: Drawer, draws: int = DRAWS) -> ControlVariate | None:
     )
     if not np.isfinite(depths).all():
         return None
-    return ControlVariate(float(depths.mean()), float(depths.std(ddof=1)), draws)
+    return {"mean": float(depths.mean()), "std": float(depths.std(ddof=1)), "draws": draws}
 
 
 def closed_form_depths(
@@ -258,10 +243,7 @@ class RealisationRunner:
 
     def _prepare(self, number: int, drawn: dict[str, float | FloatArray]) -> RealisationRun:
         """Return the run of a realisation, and add the values of its random inputs to `drawn`."""
-        groups = self.drawer.groups
-        draws = self.drawer.draw(
-            number, sources(self.plan, groups, number), passes_of(self.plan, groups, number)
-        )
+        draws = self.drawer.draw(number, *sources(self.plan, self.drawer.groups, number))
         drawn.update({**draws.values, **draws.time_means})
         grid = strips_of_run(draws)
         (low, high), (first, last) = self.grid.edges, grid.edges

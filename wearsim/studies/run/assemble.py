@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from wearsim.errors import CapabilityError, Mistake, ScenarioError
-from wearsim.evolution.contact_inputs import ContactInputs, Kinematics
 from wearsim.evolution.error_estimates import half_quadrature, volume_of
 from wearsim.evolution.problem import WearProblem
+from wearsim.evolution.quantities import ContactInputs, Kinematics
 from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.base import StepControl, Stepper
 from wearsim.evolution.steppers.forward_euler import ExplicitStepper
@@ -32,21 +32,6 @@ from wearsim.types import FloatArray, Grid
 
 ITERATION_FRACTION = 1e-3  # convergence criterion of a step's iterations, over the tolerance
 ITERATION_RANGE = 1e-8, 1e-5
-
-
-def check_model(scenario: Scenario, model: ContactModel) -> None:
-    """Raise CapabilityError if the contact model does not support the scenario's creepage."""
-    creepage = scenario.creepage
-    needs = {
-        "bearing_torque": ("creepage.drive = 'free'", creepage.drive == "free"),
-        "creepage_variation": ("creepage.differential_slip = true", creepage.differential_slip),
-    }
-    for capability, (setting, needed) in needs.items():
-        if needed and not getattr(model.capabilities, capability):
-            raise CapabilityError(
-                f"{scenario.file}: contact model '{scenario.contact.model}' does not support"
-                f" {setting}; choose another contact.model"
-            )
 
 
 def chosen_stepper(scenario: Scenario, model: ContactModel, contacts: int) -> str:
@@ -141,7 +126,6 @@ def assemble_problem(
     scenario = draws.scenario
     grid = grid if grid is not None else strips_of_run(draws)
     chosen = model or prepared_model(scenario, grid)
-    check_model(scenario, chosen)
     first, multiplicity = merged_rollers(draws)
     name = chosen_stepper(scenario, chosen, 2 if draws.passes else len(first))
     stepper = build_stepper(scenario, name)
@@ -173,8 +157,26 @@ def assemble_problem(
 
 
 def prepared_model(scenario: Scenario, grid: Grid) -> ContactModel:
-    """Return the scenario's contact model for the strips."""
-    return scenario.contact.build(grid, (scenario.cylinder.material, scenario.roller.material))
+    """Return the scenario's contact model for the strips.
+
+    Raises
+    ------
+    CapabilityError
+        If the model does not support the scenario's creepage.
+    """
+    creepage, materials = scenario.creepage, (scenario.cylinder.material, scenario.roller.material)
+    model = scenario.contact.build(grid, materials)
+    needs = {
+        "bearing_torque": ("creepage.drive = 'free'", creepage.drive == "free"),
+        "creepage_variation": ("creepage.differential_slip = true", creepage.differential_slip),
+    }
+    for capability, (setting, needed) in needs.items():
+        if needed and not getattr(model.capabilities, capability):
+            raise CapabilityError(
+                f"{scenario.file}: contact model '{scenario.contact.model}' does not support"
+                f" {setting}; choose another contact.model"
+            )
+    return model
 
 
 def with_converged_nodes(problem: WearProblem, draws: Draws) -> WearProblem:

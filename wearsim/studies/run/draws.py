@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from wearsim.errors import CapabilityError, Mistake, ScenarioError
-from wearsim.evolution.contact_inputs import Varying
+from wearsim.evolution.quantities import Varying
 from wearsim.mechanics.numerics.piecewise_linear import PiecewiseLinear
 from wearsim.plugins import JointDistribution, Process
 from wearsim.scenario import RandomInput, Scenario, realise, require_run
@@ -133,14 +133,18 @@ def draw(scenario: Scenario) -> Draws:
     """
     require_run(scenario)
     if scenario.sampling.plan == "latin-hypercube" and scenario.random:
-        mistake = Mistake(
-            "sampling",
-            "plan",
-            "a Latin hypercube requires a study of many realisations, and a run is one",
-            '"latin-hypercube"',
-            '"monte-carlo" or "sobol"',
+        raise ScenarioError(
+            scenario.file,
+            [
+                Mistake(
+                    "sampling",
+                    "plan",
+                    "a Latin hypercube requires a study of many realisations, and a run is one",
+                    '"latin-hypercube"',
+                    '"monte-carlo" or "sobol"',
+                )
+            ],
         )
-        raise ScenarioError(scenario.file, [mistake])
     return Drawer(scenario, scenario.sampling.plan).draw(scenario.sampling.realisation)
 
 
@@ -208,8 +212,11 @@ class Drawer:
     @property
     def groups(self) -> list[str]:
         """Names of the inputs that differ between realisations; without per-pass inputs."""
-        names = {item.name for item in (*self.items, *self._processes)}
-        return [item.name for item in self.scenario.random if item.name in names]
+        return [
+            item.name
+            for item in self.scenario.random
+            if item.role == "process" or item.persistence != "per-pass"
+        ]
 
     def draw(
         self,
@@ -294,27 +301,6 @@ class Drawer:
         return columns
 
 
-def drawn_values(scenario: Scenario, draws: Draws) -> dict[str, dict[str, object]]:
-    """Return the values drawn for the test and its rollers in the form of a results file.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario with its random inputs.
-    draws : Draws
-
-    Returns
-    -------
-    dict of str to dict
-        By the scenario's key: `values`, one for the test or one per roller, and their SI `unit`.
-    """
-    units = units_of(scenario)
-    return {
-        key: {"values": np.atleast_1d(value).tolist(), "unit": units[key]}
-        for key, value in draws.values.items()
-    }
-
-
 def units_of(scenario: Scenario) -> dict[str, str]:
     """Return the SI unit of every value that random inputs set, by the scenario's key."""
     return {
@@ -332,14 +318,19 @@ def _paths(scenario: Scenario, item: RandomInput, realisation: int) -> list[Vary
     points = int(np.ceil(scenario.total_time / process.spacing)) + 2
     if points > LONGEST_PATH:
         table, key = item.name.rsplit(".", 1)
-        mistake = Mistake(
-            table,
-            key,
-            f"the process would take {points:,} steps of {process.spacing:.3g} s over the test",
-            None,
-            'a longer correlation_time, or persistence = "per-pass" instead of a process',
+        raise ScenarioError(
+            scenario.file,
+            [
+                Mistake(
+                    table,
+                    key,
+                    f"the process would take {points:,} steps of {process.spacing:.3g} s over the"
+                    " test",
+                    None,
+                    'a longer correlation_time, or persistence = "per-pass" instead of a process',
+                )
+            ],
         )
-        raise ScenarioError(scenario.file, [mistake])
     rollers = tuple(range(scenario.operation.rollers))
     groups = [rollers] if item.persistence == "per-test" else [(r,) for r in rollers]
     times = process.spacing * np.arange(points, dtype=np.float64)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -13,7 +14,7 @@ from wearsim.plugins import WearLaw
 from wearsim.scenario import Scenario
 from wearsim.scenario.tables.plain import DEFAULT_TOLERANCE
 from wearsim.studies.run.draws import Draws
-from wearsim.studies.run.inputs import contact_inputs, load_range
+from wearsim.studies.run.inputs import OFFSET, TILT, contact_inputs, load_range
 from wearsim.types import ContactSolution, FloatArray, Grid, Profile
 
 STRIPS_PER_HALF_WIDTH = 12  # of the initial patch; the discretisation error is then below 1e-3
@@ -21,6 +22,8 @@ FEWEST_PER_HALF_WIDTH = 5  # error below 1e-2, proportional to the square of the
 MOST_STRIPS = 801
 PROFILE_STRIPS_PER_HALF_WIDTH = 24  # for one contact on the whole width of a profile
 FEWEST_PROFILE_STRIPS = 161
+_MARGIN = 1e-9  # of a patch, against rounding at the outer edges
+_ROUNDING = 1e-12
 
 
 def contact_positions(scenario: Scenario, inputs: Mapping[str, FloatArray]) -> FloatArray:
@@ -208,12 +211,108 @@ def strips_of_run(draws: Draws) -> Grid:
     width = choice.width if choice.width is not None else 2.0 * half
     strips = choice.strips or strips_over(width, patch.b, scenario.evolution.tolerance)
     if width < 2.0 * (shift + patch.b):
-        mistake = Mistake(
-            "contact",
-            "width",
-            "the initial contact does not fit",
-            f"{width * 1e3:.4g} mm",
-            f"at least {2e3 * (shift + patch.b):.4g} mm",
+        raise ScenarioError(
+            scenario.file,
+            [
+                Mistake(
+                    "contact",
+                    "width",
+                    "the initial contact does not fit",
+                    f"{width * 1e3:.4g} mm",
+                    f"at least {2e3 * (shift + patch.b):.4g} mm",
+                )
+            ],
         )
-        raise ScenarioError(scenario.file, [mistake])
     return Grid.spanning(centre - 0.5 * width, centre + 0.5 * width, strips)
+
+
+def realisation_grid(
+    scenario: Scenario, load: float, loads: FloatArray, centres: FloatArray
+) -> Grid:
+    """Return strips that cover the contacts of all realisations.
+
+    The strips of the contact with every input at its mean are those that the model suggests, and
+    further strips of the same width cover the others.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    load : float
+        Load with every input at its mean [N].
+    loads : ndarray, shape (realisations,)
+        Loads [N].
+    centres : ndarray, shape (realisations,)
+        Contact positions on an unworn cylinder [m].
+
+    Returns
+    -------
+    Grid
+
+    Raises
+    ------
+    ScenarioError
+        If the strips that the scenario defines do not cover all contacts, or too many are needed.
+    """
+    choice, mean_b = scenario.contact, fresh_patch(scenario, load).b
+    half_widths = mean_b * np.cbrt(np.maximum(loads, 0.0) / load)
+    centre = contact_centre(scenario, [0])
+    away = np.abs(centres - centre)
+    if choice.width is not None:
+        needed = 2.0 * float((away + half_widths).max())
+        if choice.width < needed * (1.0 - _MARGIN):
+            raise ScenarioError(
+                scenario.file,
+                [
+                    Mistake(
+                        "contact",
+                        "width",
+                        "the contacts of all realisations do not fit",
+                        f"{choice.width * 1e3:.4g} mm",
+                        f"at least {needed * 1e3:.4g} mm",
+                    )
+                ],
+            )
+    if choice.width is not None or scenario.cylinder.profile is not None:
+        return contact_grid(scenario, load)
+    grid = suggested_grid(scenario, load)
+    if grid is None:
+        grid = Grid.spanning(-1.2 * mean_b, 1.2 * mean_b, 121)
+    margin = 0.5 * grid.spacing * grid.strips / mean_b  # 1 where the strips end with the patch
+    half = float((away + margin * half_widths).max())
+    if choice.strips is not None:
+        half *= 1.0 + _MARGIN
+        return Grid.spanning(centre - half, centre + half, choice.strips)
+    beyond = half / grid.spacing - 0.5 * grid.strips
+    strips = grid.strips + 2 * max(math.ceil(beyond - _ROUNDING * grid.strips), 0)
+    if strips > MOST_STRIPS:
+        raise _too_many_strips(scenario, strips, half, float(away.max()))
+    half = 0.5 * strips * grid.spacing
+    return Grid.spanning(centre - half, centre + half, strips)
+
+
+def _too_many_strips(scenario: Scenario, strips: int, half: float, away: float) -> ScenarioError:
+    """Return the error of too many strips, with the inputs that move the contacts apart."""
+    takes = (
+        f"the contacts of all realisations span {2e3 * half:.4g} mm, which takes {strips} strips of"
+        f" the width that suits one contact; the maximum is {MOST_STRIPS}"
+    )
+    coarser = f"a number of strips, such as contact.strips = {MOST_STRIPS}"
+    keys = {OFFSET, TILT} if scenario.creepage.tilt_shifts_contact else {OFFSET}
+    shifting = [item for item in scenario.random if keys & set(item.keys)]
+    mistakes = []
+    for item in shifting:
+        table, key = item.name.split(".", 1)
+        shift = f"moves contacts by up to {away * 1e3:.4g} mm"
+        less = f"a smaller {'radius' if 'radius' in item.options else 'spread'}"
+        if TILT in item.keys:
+            less += ", creepage.tilt_shifts_contact = false"
+            if len(shifting) == 1 and scenario.contact.centre is None:
+                crown = scenario.roller.crown_radius
+                angle = f"{away / crown * 1e3:.4g} mrad"
+                shift += f", crown radius x tilt = {crown * 1e3:.4g} mm x {angle}"
+        expected = f"{less}, or {coarser}"
+        mistakes.append(Mistake(table, key, f"{shift}: {takes}", item.describe(), expected))
+    if not mistakes:
+        expected = f"{coarser}, or inputs that vary less"
+        mistakes.append(Mistake("contact", "strips", takes, None, expected))
+    return ScenarioError(scenario.file, mistakes)

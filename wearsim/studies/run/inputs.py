@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from wearsim.errors import Mistake, ScenarioError
-from wearsim.evolution.contact_inputs import ContactInputs, Redraw
 from wearsim.evolution.problem import WearProblem
+from wearsim.evolution.quantities import ContactInputs, Redraw
 from wearsim.plugins import Load
 from wearsim.scenario import RandomInput, Scenario
 from wearsim.scenario.parse.fields import CONTACT_FIELDS
@@ -94,24 +94,32 @@ def load_range(scenario: Scenario, load: Load, stop: float) -> tuple[float, floa
     """
     kind = scenario.load.kind
     if load.span is not None and (load.span[0] > 0.0 or load.span[1] < stop * (1.0 - 1e-9)):
-        mistake = Mistake(
-            "load",
-            kind,
-            "the log does not cover the test",
-            f"{load.span[0] / 60.0:.6g} to {load.span[1] / 60.0:.6g} min",
-            f"0 to {stop / 60.0:.6g} min; log longer or shorten operation.duration",
+        raise ScenarioError(
+            scenario.file,
+            [
+                Mistake(
+                    "load",
+                    kind,
+                    "the log does not cover the test",
+                    f"{load.span[0] / 60.0:.6g} to {load.span[1] / 60.0:.6g} min",
+                    f"0 to {stop / 60.0:.6g} min; log longer or shorten operation.duration",
+                )
+            ],
         )
-        raise ScenarioError(scenario.file, [mistake])
     low, high = load.extremes(0.0, stop)
     if low <= 0.0 and not scenario.load.terms:
-        mistake = Mistake(
-            "load",
-            kind,
-            "the load falls to zero or below, and contact is lost",
-            f"{low:.6g} N",
-            "a load above zero at all times",
+        raise ScenarioError(
+            scenario.file,
+            [
+                Mistake(
+                    "load",
+                    kind,
+                    "the load falls to zero or below, and contact is lost",
+                    f"{low:.6g} N",
+                    "a load above zero at all times",
+                )
+            ],
         )
-        raise ScenarioError(scenario.file, [mistake])
     return low, high
 
 

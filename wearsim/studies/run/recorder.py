@@ -13,14 +13,12 @@ import numpy as np
 
 from wearsim.errors import ContactError, StepError
 from wearsim.evolution.integrate import Advance
-from wearsim.evolution.observables import mean_along, width, worn_volume
 from wearsim.evolution.problem import WearProblem
+from wearsim.evolution.quantities import mean_along, width, worn_volume
 from wearsim.evolution.state import WearState, joined_states
 from wearsim.evolution.steppers.base import SMALLEST_STEP, Step, Stepper
 from wearsim.evolution.steppers.single_step import (
     contacts_at,
-    cylinder_depth_of,
-    cylinder_volume_of,
     present_loads,
     solve_present,
 )
@@ -151,6 +149,7 @@ def history_row(
     """Return the observables of every realisation; `threshold` [m] bounds the groove's width."""
     problem, state, loads = present_contacts(stepper, problem, state)
     worn = state.cylinder_depth[:, 0].max(axis=0)
+    kinematics, spacing = problem.kinematics, problem.grid.spacing
 
     def per_roller(name: str) -> FloatArray:
         return problem.per_roller(problem.values_of(state.contacts, name))
@@ -159,13 +158,13 @@ def history_row(
         "passes": state.passes,
         "time": problem.time(state.passes),
         "step_passes": state.passes - (state if before is None else before).passes,
-        "depth": cylinder_depth_of(state),
+        "depth": state.cylinder_depth.max(axis=(0, 1, 3)),
         "width": np.array([width(problem.grid.y, groove, threshold) for groove in worn]),
-        "worn_volume": cylinder_volume_of(problem, state),
-        "roller_depth": state.roller_depth[0].max(axis=-1),
-        "roller_worn_volume": worn_volume(
-            state.roller_depth[0], problem.grid.spacing, problem.kinematics.roller_radius
+        "worn_volume": worn_volume(state.cylinder_depth, spacing, kinematics.cylinder_radius).mean(
+            axis=(0, 1)
         ),
+        "roller_depth": state.roller_depth[0].max(axis=-1),
+        "roller_worn_volume": worn_volume(state.roller_depth[0], spacing, kinematics.roller_radius),
         "dissipated_energy": state.energy,
         "power": problem.total_power(problem.values_of(state.contacts, "power")),
         "normal_force": mean_along(problem.per_roller(loads), axis=0)[0],

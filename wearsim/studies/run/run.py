@@ -26,11 +26,11 @@ from wearsim.results import (
 )
 from wearsim.results.run import VARIABLES
 from wearsim.scenario import Scenario, parse_scenario
+from wearsim.studies.preparation import changed_origins, check_plugins, origin_of
 from wearsim.studies.run.assemble import assemble_problem, start_height
-from wearsim.studies.run.draws import Draws, draw, drawn_values
+from wearsim.studies.run.draws import Draws, draw, units_of
 from wearsim.studies.run.events import Checkpointed, Event, Finished, Started, Stepped, Warned
 from wearsim.studies.run.grid import strips_of_run
-from wearsim.studies.run.provenance import changed_origins, check_plugins, origin_of
 from wearsim.studies.run.recorder import Recorder, RecordSchedule
 from wearsim.types import Grid
 
@@ -126,9 +126,7 @@ def resume(
     scenario = parse_scenario(
         data.scenario_text, data.scenario_file, data.files.__getitem__, overrides
     )
-    state = WearState.from_arrays(
-        {name: array for name, array in data.checkpoint.items() if name not in _EXTRA}
-    )
+    state = WearState.from_arrays(data.checkpoint)
     done = float(state.passes[0])
     if scenario.total_passes < done:
         raise ResultsFileError(
@@ -167,10 +165,6 @@ def _widened(draws: Draws, data: RunData, state: WearState) -> tuple[RunData, We
     return data, widened_state(state, wider, strips)
 
 
-#: values of a checkpoint that are not part of the state
-_EXTRA = ("record_base", "spacing")
-
-
 class _RunInProgress:
     """A run in this process, with its recorder, clock and file.
 
@@ -197,10 +191,15 @@ class _RunInProgress:
         self.stop_requested = stop_requested or (lambda: False)
         self.stop = float(scenario.total_passes)
         self.origin = origin_of(scenario)
-        self.drawn = drawn_values(scenario, draws)
+        units = units_of(scenario)
+        self.drawn: dict[str, dict[str, object]] = {
+            key: {"values": np.atleast_1d(value).tolist(), "unit": units[key]}
+            for key, value in draws.values.items()
+        }
         self.warnings: list[str] = [] if data is None else list(data.warnings)
-        now = datetime.now(UTC).isoformat(timespec="seconds")
-        self.created = now if data is None else data.created
+        self.created = (
+            datetime.now(UTC).isoformat(timespec="seconds") if data is None else data.created
+        )
         self.wall_before = 0.0 if data is None else data.wall_seconds
         self.started = time.monotonic()
         self.record_base = self.stop if data is None else float(data.checkpoint["record_base"])

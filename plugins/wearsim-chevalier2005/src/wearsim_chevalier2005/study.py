@@ -12,7 +12,7 @@ from wearsim.contact_batch import ContactBatch
 from wearsim.results import DissipationResult
 from wearsim.scenario import Scenario
 from wearsim.scenario.examples import shipped_scenario
-from wearsim.studies.contact.friction_field import LocalFriction
+from wearsim.studies.contact.batch import LocalFriction
 from wearsim.studies.contact.monte_carlo import dissipation
 from wearsim.studies.contact.single import ContactStudy, study_contact
 from wearsim.studies.run.grid import fresh_patch

@@ -7,7 +7,7 @@ from itertools import groupby, pairwise
 
 import numpy as np
 
-from wearsim.evolution.observables import centroid, oscillation
+from wearsim.evolution.quantities import centroid, oscillation
 from wearsim.results import Result
 from wearsim.scenario import Scenario
 from wearsim.studies.run.assemble import merged_rollers

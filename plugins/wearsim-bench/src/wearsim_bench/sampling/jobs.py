@@ -133,7 +133,7 @@ class ControlDraws:
         control = control_of(Drawer(rig(self.seed), "monte-carlo"), self.draws)
         if control is None:
             raise SolverError(f"the wear law of {RIG} has no closed form for full slip")
-        return np.array([control.mean, control.std / np.sqrt(control.draws)])
+        return np.array([control["mean"], control["std"] / np.sqrt(control["draws"])])
 
 
 @dataclass(frozen=True)
