@@ -229,8 +229,7 @@ def _finite(tried: Attempt) -> Attempt:
     """Return a step; raise StepError if it leads to a value that is not finite."""
     end = tried.path[-1]
     if not (np.isfinite(end.cylinder_depth).all() and np.isfinite(end.energy).all()):
-        message = f"a value is not finite after pass {end.passes[0]:.0f}"
-        raise StepError(message, end.to_arrays())
+        raise StepError(f"a value is not finite after pass {end.passes[0]:.0f}", end.to_arrays())
     return tried
 
 

@@ -271,8 +271,7 @@ class WearProblem:
         cylinder, roller : ndarray, shape (stations, contacts, realisations, strips)
         """
         each = np.asarray(passes)[..., None]
-        shares = self.wear_shares.items()
-        return self._depths(contacts, {body: share * each for body, share in shares})
+        return self._depths(contacts, {b: share * each for b, share in self.wear_shares.items()})
 
     def _depths(
         self, contacts: ContactBatchSolution, passes: Mapping[Body, FloatArray | float]

@@ -323,13 +323,12 @@ def fresh_state(problem: WearProblem) -> WearState:
     zeros, counts = np.zeros(realisations), np.zeros(realisations, dtype=np.int64)
     problem = problem.at_time(zeros, zeros)
     n = problem.grid.strips
-    solved = problem.model.solve(unworn_contacts(problem))
     return WearState(
         passes=zeros,
         cylinder_depth=np.zeros((stations, 1, realisations, n)),
         roller_depth=np.zeros((1, problem.rollers, realisations, n)),
         terms=np.zeros((len(problem.terms), problem.rollers, realisations)),
-        contacts=solved,
+        contacts=problem.model.solve(unworn_contacts(problem)),
         energy=zeros,
         depth_error=zeros,
         volume_error=zeros,

@@ -96,7 +96,6 @@ def plan(scenario: Scenario) -> TableRows:
         f"{2e3 * patch.a:.4g} x {2e3 * patch.b:.4g} mm,"
         f" peak pressure {patch.peak_pressure / 1e6:.4g} MPa"
     )
-    model = described_model(choice.model, scenario.text)
     rows = [
         ("roller", radii),
         ("cylinder", f"radius {cylinder.radius * 1e3:.6g} mm"),
@@ -106,7 +105,7 @@ def plan(scenario: Scenario) -> TableRows:
         ("friction", f"{scenario.friction.coefficient:.4g}"),
         ("creepage", _creepage(scenario)),
         *_random(scenario),
-        ("contact model", f"{model}: {choice.spec.summary}"),
+        ("contact model", f"{described_model(choice.model, scenario.text)}: {choice.spec.summary}"),
         ("initial patch (Hertz)", size),
     ]
     if is_run:

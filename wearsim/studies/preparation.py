@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -20,6 +19,7 @@ from wearsim.plugins import (
 )
 from wearsim.results.content import StudyData
 from wearsim.scenario import Scenario
+from wearsim.studies.execution.factory import whole_number
 
 MOST_BYTES = 4_000_000_000
 """Memory limit for the results of a study."""
@@ -50,13 +50,7 @@ def checked_count(scenario: Scenario, realisations: int) -> int:
         raise TypeError(
             f"scenario must be a Scenario, got {scenario!r}; wearsim.load_scenario reads one"
         )
-    try:
-        count = operator.index(realisations)
-    except TypeError:
-        what = f"realisations must be a whole number such as 1000, got {realisations!r}"
-        raise TypeError(what) from None
-    if count < 1:
-        raise ValueError(f"realisations must be 1 or more, got {count}")
+    count = whole_number("realisations", realisations, 1000)
     size = bytes_per_realisation(scenario)
     if count * size > MOST_BYTES:
         what = f"would take {count * size / 1e9:,.4g} GB of memory, {size} bytes each"

@@ -21,6 +21,7 @@ from wearsim.evolution.steppers.single_step import (
     WearIncrement,
     carried_loads,
     contacts_at,
+    elastic_approach,
     explicit_step,
     mean_loads,
     present_problem,
@@ -93,9 +94,7 @@ def _decrease(
     profile : tuple of ndarray
         Change of cylinder and rollers, of any size.
     """
-    least_gap = problem.gap(*state.depths).min(axis=-1)
-    approach = problem.values_of(state.contacts, "approach") - least_gap
-    step = PERTURBATION * np.maximum(approach.min(axis=(0, 1)), 1e-12)
+    step = PERTURBATION * np.maximum(elastic_approach(problem, state), 1e-12)
     size = greatest_depth((np.abs(profile[0]), np.abs(profile[1])))
     factor = (step / np.where(size > 0.0, size, 1.0))[:, None]
     changed = state.with_added((factor * profile[0], factor * profile[1]))

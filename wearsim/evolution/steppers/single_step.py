@@ -227,6 +227,13 @@ def carried_loads(problem: WearProblem, contacts: ContactBatchSolution) -> Float
     return np.asarray(problem.values_of(contacts, "line_load").sum(axis=-1) * problem.grid.spacing)
 
 
+def elastic_approach(problem: WearProblem, state: WearState) -> FloatArray:
+    """Return the least elastic approach of the contacts, shape (realisations,) [m]."""
+    least_gap = problem.gap(*state.depths).min(axis=-1)
+    approach = problem.values_of(state.contacts, "approach") - least_gap
+    return np.asarray(approach.min(axis=(0, 1)))
+
+
 def solve_present(
     problem: WearProblem, state: WearState, loads: FloatArray, cold: bool = False
 ) -> ContactBatchSolution:

@@ -30,6 +30,7 @@ from wearsim.evolution.steppers.single_step import (
     REALISATION,
     WearIncrement,
     contacts_at,
+    elastic_approach,
     mean_loads,
     present_loads,
     solve_present,
@@ -99,10 +100,8 @@ def first_steps(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the passes that wear off a tenth of the elastic approach, shape (realisations,)."""
     cylinder, roller = problem.shared_wear(*problem.wear_per_pass(state.contacts))
     rate = (cylinder + roller).max(axis=(0, 1, 3))
-    least_gap = problem.gap(*state.depths).min(axis=-1)
-    approach = problem.values_of(state.contacts, "approach") - least_gap
     worn = np.where(rate > 0.0, rate, 1.0)
-    return np.asarray(np.where(rate > 0.0, 0.1 * approach.min(axis=(0, 1)) / worn, np.inf))
+    return np.asarray(np.where(rate > 0.0, 0.1 * elastic_approach(problem, state) / worn, np.inf))
 
 
 MAX_FIXED_POINT = 60
@@ -321,8 +320,8 @@ def stabilised_step(
     change = _sum((stages[0][3], first))
     for weights in stages[1:]:
         contacts, rate = _rate(here, state.replaced(contacts=contacts), passes, change)
-        weighted = zip(weights, (change, before, rate, first), strict=True)
-        before, change = change, _sum(*weighted)
+        changes = zip(weights, (change, before, rate, first), strict=True)
+        before, change = change, _sum(*changes)
     begun = state.replaced(contacts=contacts, solves=state.solves + solves, decay=decay)
     worn = worn_state(here, begun.with_added(change[:2]), passes, change[2])
     return worn.replaced(contacts=solve_present(problem, worn, present_loads(problem, worn)))

@@ -221,8 +221,9 @@ class Realisations:
 
     def solve_mean_problem(self) -> ContactBatchSolution:
         """Solve the contact with every input at its mean."""
-        problem = build_problem(self.scenario, self.model, self.grid, {})
-        return self.model.solve(unworn_contacts(problem))
+        return self.model.solve(
+            unworn_contacts(build_problem(self.scenario, self.model, self.grid, {}))
+        )
 
     def _drawn(self, part: slice) -> dict[str, FloatArray]:
         """Return the drawn inputs of some realisations by the names of `contact_values`."""

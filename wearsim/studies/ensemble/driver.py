@@ -288,8 +288,9 @@ class EnsembleWork:
 
     def _result(self) -> EnsembleResult:
         """Return the present content of the file."""
-        data = replace(self.file.data, status=self.file.status.copy())
-        return EnsembleResult(data, self.file.path)
+        return EnsembleResult(
+            replace(self.file.data, status=self.file.status.copy()), self.file.path
+        )
 
     def _state(self) -> dict[str, object]:
         """Return the fields of the results that have changed."""

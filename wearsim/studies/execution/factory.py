@@ -55,8 +55,7 @@ def executor(
     Interrupted
         If a stop was requested before a cluster had workers.
     """
-    check_scheduler(scheduler, workers)
-    count = available_processors() if workers is None else operator.index(workers)
+    count = check_scheduler(scheduler, workers) or available_processors()
     if scheduler == "dask" or scheduler not in LOCAL:
         try:
             from wearsim.studies.execution.dask import cluster  # noqa: PLC0415  (optional)
@@ -76,8 +75,26 @@ def executor(
             yield pool
 
 
-def check_scheduler(scheduler: str, workers: int | None = None) -> None:
-    """Check arguments of `executor`.
+def whole_number(name: str, value: int, example: int) -> int:
+    """Return an argument as an int.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If it is not a whole number, such as `example`, or below 1.
+    """
+    try:
+        count = operator.index(value)
+    except TypeError:
+        message = f"{name} must be a whole number such as {example}, got {value!r}"
+        raise TypeError(message) from None
+    if count < 1:
+        raise ValueError(f"{name} must be 1 or more, got {count}")
+    return count
+
+
+def check_scheduler(scheduler: str, workers: int | None = None) -> int | None:
+    """Check arguments of `executor`, and return the number of workers, if given, as an int.
 
     Raises
     ------
@@ -91,19 +108,15 @@ def check_scheduler(scheduler: str, workers: int | None = None) -> None:
             " a Dask scheduler such as tcp://host:8786"
         )
     if workers is None:
-        return
-    try:
-        count = operator.index(workers)
-    except TypeError:
-        raise TypeError(f"workers must be a whole number such as 4, got {workers!r}") from None
-    if count < 1:
-        raise ValueError(f"workers must be 1 or more, got {count}")
+        return None
+    count = whole_number("workers", workers, 4)
     if is_remote:
         raise ValueError(f"the workers of {scheduler} are all used; leave out the number {count}")
     if scheduler == "serial" and count > 1:
         raise ValueError(
             f"there is one worker where the scheduler is 'serial', got {count}; use processes"
         )
+    return count
 
 
 def available_processors() -> int:

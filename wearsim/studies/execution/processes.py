@@ -278,8 +278,7 @@ def _run_stored(file: str, numbers: Batch) -> str:
     """Run a batch in a worker process, and return the file with its `Answer`."""
 
     def work(numbers: Batch) -> list[Any]:
-        loaded: Work = _load_work(file)
-        return loaded(numbers)
+        return _load_work(file)(numbers)
 
     return _store(run_batch(work, numbers), str(Path(file).parent))
 
@@ -301,7 +300,7 @@ def _load(file: str) -> Any:
         return pickle.load(stream)
 
 
-_load_work = lru_cache(maxsize=1)(_load)
+_load_work: Callable[[str], Work] = lru_cache(maxsize=1)(_load)
 
 
 def run_batch(work: Work, numbers: Batch) -> Answer:

@@ -130,8 +130,10 @@ def assemble_problem(
     name = chosen_stepper(scenario, chosen, 2 if draws.passes else len(first))
     stepper = build_stepper(scenario, name)
     if scenario.evolution.nodes is not None and (stepper.pass_by_pass or not draws.passes):
-        what = "has no meaning without an expectation over passes"
-        raise ScenarioError(scenario.file, [Mistake("evolution", "nodes", what)])
+        raise ScenarioError(
+            scenario.file,
+            [Mistake("evolution", "nodes", "has no meaning without an expectation over passes")],
+        )
     place = {number: k for k, number in enumerate(first)}
     problem = replace(
         build_problem(

@@ -318,8 +318,7 @@ class Recorder:
         """Add a step to the history, and record the states due within it or at its end."""
         stepper, end = self.stepper, advance.end
         for one in due_records(advance, self.schedule, stop, stepper.pass_by_pass):
-            row = record_row(stepper, *states_at(stepper, advance, [one]))
-            self._records.append(_single(row))
+            self._records.append(_single(record_row(stepper, *states_at(stepper, advance, [one]))))
         self._history.append(self._history_row(end, advance.path[0]))
         # a single assignment: an interrupt before it leaves the previous step current
         self._kept = len(self._history), len(self._records), end
