@@ -163,8 +163,7 @@ def worn_volume(worn: FloatArray, spacing: float, radius: float) -> FloatArray:
 
     First order in depth over radius: the volume for which Archard's wear law holds exactly.
     """
-    volume: FloatArray = 2.0 * np.pi * radius * worn.sum(axis=-1) * spacing
-    return volume
+    return np.asarray(2.0 * np.pi * radius * worn.sum(axis=-1) * spacing)
 
 
 def centroid(y: FloatArray, worn: FloatArray) -> float:

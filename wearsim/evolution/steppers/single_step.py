@@ -104,10 +104,8 @@ class WearIncrement:
             Wear of another solution of the same contacts.
         """
         problem = self.problem
-        if old.exponents is None:
-            self.exponents = np.ones((*problem.shape, problem.grid.strips))
-        else:
-            self.exponents = old.exponents.copy()
+        shape = (*problem.shape, problem.grid.strips)
+        self.exponents = np.ones(shape) if old.exponents is None else old.exponents.copy()
         load, new_load = old.contacts.line_load, self.contacts.line_load
         linear = problem.wear_factors["cylinder"] is not None
         estimate_exponents(

@@ -123,8 +123,8 @@ def ensemble(
         realisations=request.realisations,
     ) as pool:
         grid = shared_grid(scenario)
-        header = _header(scenario, request, grid)
-        with EnsembleFile.create(path, header, _static(scenario, grid), storage) as file:
+        content = _content(scenario, request, grid)
+        with EnsembleFile.create(path, *content, storage) as file:
             runner = RealisationRunner(scenario, request.plan, request.realisations, grid)
             EnsembleWork(file, runner, request.target, pool, on_progress, stop_requested).finish()
     return open_ensemble(path)
@@ -267,8 +267,12 @@ def resume_ensemble(
     return open_ensemble(path)
 
 
-def _header(scenario: Scenario, request: EnsembleRequest, grid: Grid) -> EnsembleData:
+def _content(
+    scenario: Scenario, request: EnsembleRequest, grid: Grid
+) -> tuple[EnsembleData, dict[str, FloatArray]]:
     """Return the content of an ensemble's file before its first realisation.
+
+    It is the header, and the arrays that are common to all realisations.
 
     Raises
     ------
@@ -287,7 +291,11 @@ def _header(scenario: Scenario, request: EnsembleRequest, grid: Grid) -> Ensembl
             f"{scenario.file}: the control variate is a depth in closed form, which needs a wear"
             " law linear in the dissipation; choose another plan, such as monte-carlo"
         )
-    return EnsembleData(
+    stop = float(scenario.total_passes)
+    passes = RecordSchedule.of(scenario, stop).all_records(
+        stop, scenario.evolution.stepper == "per-pass"
+    )
+    header = EnsembleData(
         **origin_of(scenario),
         finished=False,
         wall_seconds=0.0,
@@ -296,7 +304,7 @@ def _header(scenario: Scenario, request: EnsembleRequest, grid: Grid) -> Ensembl
         stepper=stepper,
         tolerance=scenario.evolution.tolerance,
         width_threshold=scenario.outputs.width_threshold,
-        total_passes=float(scenario.total_passes),
+        total_passes=stop,
         total_time=scenario.total_time,
         strip_width=grid.spacing,
         plan=request.plan,
@@ -323,15 +331,7 @@ def _header(scenario: Scenario, request: EnsembleRequest, grid: Grid) -> Ensembl
         ],
         control=control,
     )
-
-
-def _static(scenario: Scenario, grid: Grid) -> dict[str, FloatArray]:
-    """Return the arrays that are common to all realisations."""
-    stop = float(scenario.total_passes)
-    passes = RecordSchedule.of(scenario, stop).all_records(
-        stop, scenario.evolution.stepper == "per-pass"
-    )
-    return {
+    return header, {
         "y": grid.y,
         "multiplicity": np.ones(scenario.operation.rollers),
         "record_passes": passes,

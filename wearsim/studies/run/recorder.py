@@ -307,19 +307,19 @@ class Recorder:
         self.stepper = stepper
         self.schedule = schedule
         self.threshold = threshold
-        self._history = _rows(history or {}) or [self._history_row(state, None)]
+        self._history = _rows(history or {}) or [
+            _single(history_row(stepper, problem, state, None, threshold))
+        ]
         self._records = _rows(records or {}) or [_single(record_row(stepper, problem, state))]
         self._kept = len(self._history), len(self._records), state
-
-    def _history_row(self, state: WearState, before: WearState | None) -> Variables:
-        return _single(history_row(self.stepper, self.problem, state, before, self.threshold))
 
     def add(self, advance: Advance, stop: float) -> None:
         """Add a step to the history, and record the states due within it or at its end."""
         stepper, end = self.stepper, advance.end
         for one in due_records(advance, self.schedule, stop, stepper.pass_by_pass):
             self._records.append(_single(record_row(stepper, *states_at(stepper, advance, [one]))))
-        self._history.append(self._history_row(end, advance.path[0]))
+        row = history_row(stepper, self.problem, end, advance.path[0], self.threshold)
+        self._history.append(_single(row))
         # a single assignment: an interrupt before it leaves the previous step current
         self._kept = len(self._history), len(self._records), end
 
