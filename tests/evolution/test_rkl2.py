@@ -19,7 +19,6 @@ from wearsim.errors import ContactError
 from wearsim.evolution.error_estimates import greatest_depth, volume_of
 from wearsim.evolution.quantities import oscillation, worn_volume
 from wearsim.evolution.state import fresh_state
-from wearsim.evolution.steppers.base import StepControl
 from wearsim.evolution.steppers.forward_euler import decay_rates, stability_limit
 from wearsim.evolution.steppers.step_doubling import StabilisedStepper, stabilised_step
 
@@ -62,8 +61,8 @@ def test_depth_with_a_spring_equals_closed_form():
 
 def test_tighter_tolerance_gives_a_smaller_error(foundation):
     problem, _, stop = boxed(foundation=True)
-    exact = stepped(problem, StabilisedStepper(StepControl(3e-5)), stop)[0]
-    loose = stepped(problem, StabilisedStepper(StepControl(1e-2)), stop)[0]
+    exact = stepped(problem, StabilisedStepper(3e-5), stop)[0]
+    loose = stepped(problem, StabilisedStepper(1e-2), stop)[0]
     assert_covered(problem, exact, foundation[1])
     assert_covered(problem, exact, loose)
     errors = [
@@ -81,7 +80,7 @@ def test_steps_are_of_second_order(changes):
     problem, _, _ = boxed(foundation=True, contact__strips=41, **changes)
     profiles = []
     for steps in (6, 12, 24, 96):
-        stepper = StabilisedStepper(StepControl(1.0), forced_step=passes / steps)
+        stepper = StabilisedStepper(1.0, forced_step=passes / steps)
         state, _ = stepped(problem, stepper, passes)
         profiles.append(state.cylinder_depth)
     errors = np.array([np.abs(p - profiles[-1]).max() for p in profiles[:-1]])
@@ -152,7 +151,7 @@ def test_steps_beyond_explicit_limit_smooth_a_scratch(half_worn, factor):
     step = factor * stability_limit(problem, state)[0]
     first = stabilised_step(problem, state, np.ones(1), decay_rates(problem, state))
     worst = oscillation(first.contacts[0].line_load)
-    stepper = StabilisedStepper(StepControl(1.0), forced_step=step)
+    stepper = StabilisedStepper(1.0, forced_step=step)
     for _ in range(8):
         state = next_state(problem, stepper, state)
         assert oscillation(state.contacts[0].line_load) < worst
@@ -222,4 +221,4 @@ def test_error_of_a_model_that_always_fails_is_raised():
         stepped(problem, stepper, stop)
     assert caught.value.state["gap"].min() > 1e-6
     with pytest.raises(ContactError, match="no solution beyond a micrometre"):
-        stepped(problem, StabilisedStepper(StepControl(1e-3), forced_step=1e5), stop)
+        stepped(problem, StabilisedStepper(1e-3, forced_step=1e5), stop)

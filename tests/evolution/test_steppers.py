@@ -10,7 +10,7 @@ from wearsim.errors import SolverError, StepError
 from wearsim.evolution.integrate import evolve
 from wearsim.evolution.quantities import centroid, oscillation
 from wearsim.evolution.state import fresh_state, unworn_contacts
-from wearsim.evolution.steppers.base import Attempt, StepControl
+from wearsim.evolution.steppers.base import Attempt
 from wearsim.evolution.steppers.forward_euler import ExplicitStepper, stability_limit
 from wearsim.evolution.steppers.per_pass import PerPassStepper, run_compiled, run_in_python
 from wearsim.evolution.steppers.step_doubling import ImplicitStepper
@@ -121,7 +121,7 @@ def test_offset_rollers_converge_with_the_step_length():
     y = problem.grid.y
     depth_errors, centre_errors = [], []
     for steps in (10, 20, 40):
-        stepper = ImplicitStepper(StepControl(1.0), forced_step=passes / steps)
+        stepper = ImplicitStepper(1.0, forced_step=passes / steps)
         found, _ = stepped(problem, stepper, passes)
         depth_errors.append(abs(cylinder_depth_of(found)[0] - cylinder_depth_of(reference)[0]))
         ours, exact = (centroid(y, s.cylinder_depth[0, 0, 0]) for s in (found, reference))
@@ -194,7 +194,7 @@ def roughened(state):
 def test_explicit_steps_oscillate_beyond_the_limit(half_worn, factor, unstable):
     problem, state = half_worn
     limit = stability_limit(problem, state)[0]
-    stepper = ExplicitStepper(StepControl(1.0), factor * limit, allow_unstable=True)
+    stepper = ExplicitStepper(1.0, factor * limit, allow_unstable=True)
     state, warnings = roughened(state), []
     first = None
     for _ in range(25):
@@ -214,7 +214,7 @@ def test_explicit_steps_oscillate_beyond_the_limit(half_worn, factor, unstable):
 def test_implicit_steps_beyond_the_limit_do_not_oscillate(half_worn):
     problem, state = half_worn
     step = 10.0 * stability_limit(problem, state)[0]
-    state, stepper = roughened(state), ImplicitStepper(StepControl(1.0), forced_step=step)
+    state, stepper = roughened(state), ImplicitStepper(1.0, forced_step=step)
     for _ in range(10):
         state = next_state(problem, stepper, state)
         assert oscillation(state.contacts[0].line_load) < 1e-3
@@ -232,7 +232,7 @@ def test_forced_step_beyond_the_limit_is_refused(half_worn):
     problem, state = half_worn
     step = 2.0 * stability_limit(problem, state)[0]
     with pytest.raises(StepError, match=r"exceeds the stability limit.*allow_unstable = true"):
-        next_state(problem, ExplicitStepper(StepControl(1.0), step), state)
+        next_state(problem, ExplicitStepper(1.0, step), state)
 
 
 class Overflowing(ExplicitStepper):
@@ -249,11 +249,11 @@ class Overflowing(ExplicitStepper):
 def test_step_to_a_value_that_is_not_finite_is_shortened_or_fails():
     problem, _, _ = built(contact__strips=31)
     state = fresh_state(problem)
-    end = next_state(problem, Overflowing(StepControl(1.0)), state)
+    end = next_state(problem, Overflowing(1.0), state)
     assert 0.0 < end.passes[0] <= 10.0
     assert end.rejected[0] > 0
     with pytest.raises(StepError, match="a value is not finite after pass 20") as caught:
-        next_state(problem, Overflowing(StepControl(1.0), forced_step=20.0), state)
+        next_state(problem, Overflowing(1.0, forced_step=20.0), state)
     assert caught.value.state["passes"] == 20.0
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import mean_along, sum_in_order, worn_volume
 from wearsim.evolution.state import Depths, WearState
-from wearsim.evolution.steppers.base import Step, StepControl
+from wearsim.evolution.steppers.base import Step
 from wearsim.evolution.steppers.single_step import WearIncrement, carried_loads, solve_present
 from wearsim.types import FloatArray
 
@@ -17,6 +18,8 @@ from wearsim.types import FloatArray
 DEPTH_EXPONENT, VOLUME_EXPONENT = 0.5, 0.75
 COVER = 1.5  # safety factor on an error estimate
 FIRST_ORDER_COVER = 2.0  # for schemes of first order, with less conservative estimates
+SHARE = 0.7  # part of the tolerance that one step may use
+MIN_BUDGET = 0.02  # part of the error budget that a step may always add, so that a run never stalls
 DEEP = 0.5  # depths are compared where the groove is deeper than this part of its greatest depth
 DEPTHS = ("cylinder_depth", "roller_depth")
 
@@ -220,8 +223,34 @@ def _volume_variance(problem: WearProblem, end: WearState, passes: FloatArray) -
     return np.asarray(passes * variance)
 
 
+def _allowance(
+    tolerance: float, reached: float, exponent: float, error: float, part: float
+) -> float:
+    """Return the error that a step may add, by the budget that the tolerance leaves.
+
+    Wear reduces earlier errors: a groove that is too deep in one place carries less load there, so
+    that errors of shape decay while the groove deepens. The budget is therefore absolute in depth
+    and is compared with the present error, not with the sum of all errors made.
+
+    Parameters
+    ----------
+    tolerance : float
+        Required relative error of the final depth and worn volume.
+    reached : float
+        Depth or volume at the step's end.
+    exponent : float
+        Lower bound of the exponent of its growth to the end of the test.
+    error : float
+        Its estimated error before the step.
+    part : float
+        Part of all passes done at the step's end.
+    """
+    budget = tolerance * reached / math.pow(part, exponent)
+    return SHARE * max(budget - error, MIN_BUDGET * budget)
+
+
 def excess(
-    control: StepControl,
+    tolerance: float,
     problem: WearProblem,
     start: WearState,
     end: WearState,
@@ -236,7 +265,8 @@ def excess(
 
     Parameters
     ----------
-    control : StepControl
+    tolerance : float
+        Required relative error of the final depth and worn volume.
     problem : WearProblem
     start, end : WearState
         The test before and after the step.
@@ -257,7 +287,7 @@ def excess(
         columns = (a[kind].tolist() for a in (sizes, *arrays))
         for v, (part, size, before, error, total) in enumerate(zip(parts, *columns, strict=True)):
             if size > 0.0:
-                allowed = control.allowance(size, exponent, before, part)
-                allowed_first = control.allowance(size, exponent, 0.0, part)
+                allowed = _allowance(tolerance, size, exponent, before, part)
+                allowed_first = _allowance(tolerance, size, exponent, 0.0, part)
                 worst[v] = max(worst[v], min(error / allowed, total / allowed_first))
     return worst

@@ -88,7 +88,7 @@ def test_realisations_are_recorded_at_the_same_passes():
 
 def test_incompatible_realisations_are_in_separate_groups():
     runs = runs_of(4, **ONE)
-    stepper = StabilisedStepper(runs[0].stepper.control)
+    stepper = StabilisedStepper(runs[0].stepper.tolerance)
     other = runs_of(1, **ONE)[0]  # with separate strips and model
     groups = batch_groups([runs[0], replace(runs[1], stepper=stepper), *runs[2:], other])
     assert [[run.number for run in group] for group in groups] == [[0, 2, 3], [1], [0]]

@@ -13,63 +13,10 @@ from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
 from wearsim.types import FloatArray
 
-MIN_BUDGET = 0.02  # part of the error budget that a step may always add, so that a run never stalls
-
-
-@dataclass(frozen=True)
-class StepControl:
-    """Control of the error that each step adds, by the budget that the tolerance leaves.
-
-    Wear reduces earlier errors: a groove that is too deep in one place carries less load there, so
-    that errors of shape decay while the groove deepens. The budget is therefore absolute in depth
-    and is compared with the present error, not with the sum of all errors made.
-
-    Parameters
-    ----------
-    tolerance : float
-        Required relative error of the final depth and worn volume.
-    share : float
-        Part of the tolerance that one step may use.
-    safety : float
-        Part of its allowance that the next step aims at.
-    shrink, grow : float
-        Bounds on the ratio of successive steps.
-    """
-
-    tolerance: float
-    share: float = 0.7
-    safety: float = 0.7
-    shrink: float = 0.2
-    grow: float = 5.0
-
-    def allowance(self, reached: float, exponent: float, error: float, part: float) -> float:
-        """Return the error that a step may add.
-
-        Parameters
-        ----------
-        reached : float
-            Depth or volume at the step's end.
-        exponent : float
-            Lower bound of the exponent of its growth to the end of the test.
-        error : float
-            Its estimated error before the step.
-        part : float
-            Part of all passes done at the step's end.
-        """
-        budget = self.tolerance * reached / math.pow(part, exponent)
-        return self.share * max(budget - error, MIN_BUDGET * budget)
-
-    def next_step(self, step: float, excess: float, order: int = 1) -> float:
-        """Return the next step length after a step whose error was `excess` times its allowance.
-
-        The error that a step adds grows as the step to the power order + 1.
-        """
-        aim = self.safety / math.pow(excess, 1.0 / (order + 1)) if excess > 0.0 else self.grow
-        return step * min(self.grow, max(self.shrink, aim))
-
-
 SMALLEST_STEP = 1e-6  # passes; with a great wear factor ten passes wear a whole groove
 _SMALLEST_PART = 1e-8  # of the passes done; with shorter steps a test would not end
+SAFETY = 0.7  # part of its allowance that the next step aims at
+SHRINK, GROW = 0.2, 5.0  # bounds on the ratio of successive steps
 
 
 class Trial:
@@ -79,7 +26,6 @@ class Trial:
     ----------
     proposed : float
         Length of the first trial step [passes].
-    control : StepControl
     order : int
         Order of the scheme.
     forced : bool
@@ -93,9 +39,9 @@ class Trial:
         Trial steps rejected.
     """
 
-    def __init__(self, proposed: float, control: StepControl, order: int, forced: bool) -> None:
+    def __init__(self, proposed: float, order: int, forced: bool) -> None:
         self.proposed, self.rejected = proposed, 0
-        self._control, self._order, self._forced = control, order, forced
+        self._order, self._forced = order, forced
         self._cause: StepError | ContactError | None = None
 
     def step(self, passes: float, stop: float) -> float:
@@ -129,7 +75,9 @@ class Trial:
         """Return whether a step with such an excess of error is accepted; propose the next."""
         if self._forced:
             return True
-        chosen = self._control.next_step(step, excess, self._order)
+        # the error that a step adds grows as the step to the power order + 1
+        aim = SAFETY / math.pow(excess, 1.0 / (self._order + 1)) if excess > 0.0 else GROW
+        chosen = step * min(GROW, max(SHRINK, aim))
         if excess <= 1.0:
             # a step shortened by the stop does not limit the length of the next one
             self.proposed = max(chosen, self.proposed) if step < self.proposed else chosen
@@ -167,8 +115,8 @@ class Stepper(ABC):
 
     Parameters
     ----------
-    control : StepControl
-        Step-size control.
+    tolerance : float
+        Required relative error of the final depth and worn volume.
     forced_step : float, optional
         Passes per step, instead of the step-size control.
     """
@@ -179,12 +127,12 @@ class Stepper(ABC):
     #: order of the scheme: a step adds an error that grows as the step to the power order + 1
     order = 1
 
-    def __init__(self, control: StepControl, forced_step: float | None = None) -> None:
-        self.control, self.forced_step = control, forced_step
+    def __init__(self, tolerance: float, forced_step: float | None = None) -> None:
+        self.tolerance, self.forced_step = tolerance, forced_step
 
     def trial(self, proposed: float) -> Trial:
         """Return the search for the length of a step, with the first trial [passes]."""
-        return Trial(proposed, self.control, self.order, forced=self.forced_step is not None)
+        return Trial(proposed, self.order, forced=self.forced_step is not None)
 
     @abstractmethod
     def proposed(self, problem: WearProblem, state: WearState) -> FloatArray:

@@ -16,7 +16,7 @@ from wearsim.evolution.error_estimates import (
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import oscillation
 from wearsim.evolution.state import Depths, WearState
-from wearsim.evolution.steppers.base import Attempt, Step, StepControl, Stepper
+from wearsim.evolution.steppers.base import Attempt, Step, Stepper
 from wearsim.evolution.steppers.single_step import (
     WearIncrement,
     carried_loads,
@@ -119,7 +119,7 @@ class ExplicitStepper(Stepper):
 
     Parameters
     ----------
-    control, forced_step
+    tolerance, forced_step
         As for `Stepper`; the stability limit applies in addition.
     allow_unstable : bool
         Allow a forced step beyond the stability limit.
@@ -127,11 +127,11 @@ class ExplicitStepper(Stepper):
 
     def __init__(
         self,
-        control: StepControl,
+        tolerance: float,
         forced_step: float | None = None,
         allow_unstable: bool = False,
     ) -> None:
-        super().__init__(control, forced_step)
+        super().__init__(tolerance, forced_step)
         self.allow_unstable = allow_unstable
 
     def proposed(self, problem: WearProblem, state: WearState) -> FloatArray:
@@ -158,7 +158,7 @@ class ExplicitStepper(Stepper):
         """Take a step, and estimate its error by another one with the wear rate of its end."""
         end = scheme(problem, state, step)
         added = _errors(problem, state, end, step)
-        over = excess(self.control, problem, state, end, added, stop)
+        over = excess(self.tolerance, problem, state, end, added, stop)
         end = with_pass_errors(problem, state, end, end, scheme, step)
         added = added + end.irreducible - state.irreducible
         passes = np.where(step == stop - state.passes, stop, end.passes)

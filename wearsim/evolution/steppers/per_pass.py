@@ -12,7 +12,7 @@ from wearsim.contact_batch import ContactBatchSolution
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import Redraw
 from wearsim.evolution.state import WearState, contact_batch, joined_states
-from wearsim.evolution.steppers.base import Attempt, Step, StepControl, Stepper
+from wearsim.evolution.steppers.base import Attempt, Step, Stepper
 from wearsim.evolution.steppers.single_step import present_loads, solve_present
 from wearsim.plugins import BODIES, PassLoop
 from wearsim.types import FloatArray, IntArray
@@ -40,7 +40,7 @@ class PerPassStepper(Stepper):
     def __init__(
         self, redraw: Redraw | None = None, expectation: WearProblem | None = None
     ) -> None:
-        super().__init__(StepControl(math.inf), forced_step=CHUNK)
+        super().__init__(math.inf, forced_step=CHUNK)
         self._redraw, self._expectation = redraw, expectation
 
     def recorded(self, problem: WearProblem) -> WearProblem:

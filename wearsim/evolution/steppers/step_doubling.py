@@ -92,7 +92,7 @@ class StepDoublingStepper(Stepper):
             **auxiliary,
         )
         reached = np.array([end.depth_error, end.volume_error]) - fixed
-        over = excess(self.control, problem, state, end, added, stop, reached)
+        over = excess(self.tolerance, problem, state, end, added, stop, reached)
         return Attempt((half, end), over)
 
 

@@ -12,7 +12,7 @@ from wearsim.evolution.error_estimates import half_quadrature, volume_of
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import ContactInputs, Kinematics
 from wearsim.evolution.state import fresh_state
-from wearsim.evolution.steppers.base import StepControl, Stepper
+from wearsim.evolution.steppers.base import Stepper
 from wearsim.evolution.steppers.forward_euler import ExplicitStepper
 from wearsim.evolution.steppers.per_pass import PerPassStepper
 from wearsim.evolution.steppers.single_step import explicit_step
@@ -71,14 +71,13 @@ def build_stepper(scenario: Scenario, name: str) -> Stepper:
     ]
     if mistakes:
         raise ScenarioError(scenario.file, mistakes)
-    control = StepControl(evolution.tolerance)
     forced = float(evolution.step) if evolution.step is not None else None
     if name == "implicit":
-        return ImplicitStepper(control, forced)
+        return ImplicitStepper(evolution.tolerance, forced)
     if name == "stabilised":
-        return StabilisedStepper(control, forced)
+        return StabilisedStepper(evolution.tolerance, forced)
     if name == "explicit":
-        return ExplicitStepper(control, forced, evolution.allow_unstable)
+        return ExplicitStepper(evolution.tolerance, forced, evolution.allow_unstable)
     return PerPassStepper()
 
 
