@@ -17,7 +17,7 @@ from wearsim.plugins import Distribution, FrictionField, JointDistribution, Opti
 from wearsim.quantities import HostQuantity, Quantity
 from wearsim.types import FloatArray
 from wearsim.units import in_engineers_unit, shown
-from wearsim.uq.sampling.plans import BELOW_ONE
+from wearsim.uq.sampling.sampler import BELOW_ONE
 
 _LIMITS = {"gt": "above", "ge": "at least", "lt": "below", "le": "at most"}
 

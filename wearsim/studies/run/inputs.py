@@ -14,9 +14,8 @@ from wearsim.plugins import Load
 from wearsim.scenario import RandomInput, Scenario
 from wearsim.scenario.parse.fields import CONTACT_FIELDS
 from wearsim.types import FloatArray
-from wearsim.uq.sampling.gaussian_copula import GaussianCopula
 from wearsim.uq.sampling.philox import Stream
-from wearsim.uq.sampling.sampler import Sampler
+from wearsim.uq.sampling.sampler import GaussianCopula, Sampler
 
 LOAD, FRICTION, LONGITUDINAL = "load.normal_force", "friction.coefficient", "creepage.longitudinal"
 YAW, TILT, OFFSET = "creepage.yaw", "creepage.tilt", "roller.offset"
