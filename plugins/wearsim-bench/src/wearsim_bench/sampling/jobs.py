@@ -97,7 +97,7 @@ class Part:
         if failed:
             where = f"{self.plan}, seed {self.seed}, realisation {failed[0].number}"
             raise SolverError(f"{len(failed)} tests failed, the first ({where}): {failed[0].error}")
-        depths = np.array([outcome.values["depth"][-1] for outcome in outcomes])
+        depths = np.array([np.asarray(outcome.values["depth"])[-1] for outcome in outcomes])
         columns = runner.drawer.columns(self.first, self.count)
         return np.array([depths, closed_form_depths(scenario, columns, self.count)])
 
