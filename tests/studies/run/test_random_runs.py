@@ -204,7 +204,7 @@ def test_error_estimate_includes_variation_of_processes(key, monkeypatch):
     # in full slip wear is linear in friction and depends on its mean only
     scenario = scenario_of(evolution__step=1500, creepage__longitudinal=3e-4, **inputs)
     _, state = end_of(scenario)
-    monkeypatch.setattr("wearsim.evolution.error_estimates.variation_bias", lambda *_: None)
+    monkeypatch.setattr("wearsim.evolution.steppers.step_doubling.variation_bias", lambda *_: None)
     _, without = end_of(scenario)
     # variation within a step changes the error estimate, and not the solution
     assert (without.cylinder_depth == state.cylinder_depth).all()
