@@ -311,8 +311,8 @@ class _OneOrList:
 
 V = TypeVar("V")
 
+#: A value for all rollers, or a list with one value per roller: ``PerRoller[Length]``.
 PerRoller: TypeAlias = Annotated[V | tuple[V, ...], _OneOrList()]
-"""A value for all rollers, or a list with one value per roller: ``PerRoller[Length]``."""
 
 
 @dataclass(frozen=True)

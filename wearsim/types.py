@@ -14,8 +14,8 @@ IntArray: TypeAlias = npt.NDArray[np.int64]
 
 BoolArray: TypeAlias = npt.NDArray[np.bool_]
 
+#: A number for all realisations, or one per realisation, shape (realisations,).
 Number: TypeAlias = float | FloatArray
-"""A number for all realisations, or one per realisation, shape (realisations,)."""
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from tests.benchmarks.table import Effort, Row, part
 from wearsim.scenario import Scenario, load_scenario
 from wearsim.studies.contact.monte_carlo import dissipation
 from wearsim.uq.distributions.maxent import maximum_entropy
-from wearsim.uq.sampling.philox import Stream
+from wearsim.uq.sampling.sobol import Stream
 from wearsim_bench.measure.timing import best
 
 PAPER = Path(__file__).parents[2] / "scenarios" / "paper-monte-carlo.toml"

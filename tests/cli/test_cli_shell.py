@@ -6,7 +6,7 @@ from importlib.metadata import entry_points, version
 import pytest
 from cli_examples import Command
 
-import wearsim.cli.commands.check
+import wearsim.cli.commands.scenarios
 from wearsim.cli.app import BUILT_IN
 from wearsim.errors import CapabilityError, PluginError, ResultsFileError, SolverError
 
@@ -103,7 +103,7 @@ def test_errors_print_one_line_and_set_the_exit_code(
     def fail(*_: object) -> None:
         raise error
 
-    monkeypatch.setattr(wearsim.cli.commands.check, "read_scenario", fail)
+    monkeypatch.setattr(wearsim.cli.commands.scenarios, "read_scenario", fail)
     result = command("check", "a.toml")
     assert result.exit_code == code
     assert result.stderr.startswith(message)
@@ -118,7 +118,7 @@ def test_traceback_is_shown_on_request(
     def fail(*_: object) -> None:
         raise CapabilityError("cannot")
 
-    monkeypatch.setattr(wearsim.cli.commands.check, "read_scenario", fail)
+    monkeypatch.setattr(wearsim.cli.commands.scenarios, "read_scenario", fail)
     monkeypatch.setenv("WEARSIM_TRACEBACK", "1" if by == "environment" else "0")
     result = command(*(["--traceback"] if by == "option" else []), "check", "a.toml")
     assert result.exit_code == 2

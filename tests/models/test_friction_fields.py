@@ -12,7 +12,7 @@ from wearsim.models.random.varying import (
     WhiteOptions,
 )
 from wearsim.plugins import Distribution, RandomInputSpec, registry
-from wearsim.uq.sampling.philox import Stream
+from wearsim.uq.sampling.sobol import Stream
 
 MEAN, STD, LENGTH = 0.1, 0.02, 50e-6
 

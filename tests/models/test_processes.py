@@ -8,7 +8,7 @@ from scipy.special import ndtr
 
 from wearsim.models.random.varying import OrnsteinUhlenbeck, OrnsteinUhlenbeckOptions
 from wearsim.plugins import Distribution, RandomInputSpec, registry
-from wearsim.uq.sampling.philox import Stream
+from wearsim.uq.sampling.sobol import Stream
 
 
 class Gumbel(Distribution):

@@ -6,7 +6,7 @@ import pytest
 from tests.materials import STEEL
 from tests.studies.study_examples import short
 from wearsim.errors import ContactError
-from wearsim.models.contact.semi_hertzian import SPEC, SemiHertzianOptions
+from wearsim.models.contact.strip_model import SPEC, SemiHertzianOptions
 from wearsim.studies.run import run as replay
 from wearsim.types import Creepage, Grid, OperatingPoint
 

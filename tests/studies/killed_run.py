@@ -19,7 +19,7 @@ from tests.faulty_storage import WatchedStorage
 from wearsim.results import DISK, Result, Storage, open_results
 from wearsim.scenario import Scenario
 from wearsim.studies.run import run as studies
-from wearsim.studies.run.events import Event, Started
+from wearsim.studies.run.recorder import Event, Started
 
 OFTEN = {"outputs.checkpoint_every": "1e-9 s"}
 

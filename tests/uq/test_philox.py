@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from wearsim.uq.sampling.philox import Stream
+from wearsim.uq.sampling.sobol import Stream
 
 
 @pytest.mark.parametrize("cuts", [[1, 2, 3, 5, 8, 13, 21, 40], [4, 8, 40], [39]])

@@ -7,8 +7,8 @@ import pytest
 from scipy import stats
 
 from wearsim.uq.sampling import sobol
-from wearsim.uq.sampling.philox import Stream
 from wearsim.uq.sampling.sampler import drawing, latin_hypercube, monte_carlo
+from wearsim.uq.sampling.sobol import Stream
 
 KNOWN = ("load.normal_force", "friction.coefficient", "creepage.longitudinal", "load.stiffness")
 UNKNOWN = ("bearing.preload", "shaft.runout", "creepage.wobble@2")

@@ -40,6 +40,13 @@ BUILT_IN = {
     "schema": "Write the JSON Schema of a scenario, for editors.",
     "new": "Create a new plugin or scenario.",
 }
+#: modules in `wearsim.cli.commands` of the verbs that have not one of their name
+_MODULES = {
+    **dict.fromkeys(("check", "schema", "new", "plugins"), "scenarios"),
+    **dict.fromkeys(("show", "plot", "compare", "export"), "results"),
+    "dissipation": "contact",
+    "resume": "run",
+}
 
 
 class LazyVerb(TyperCommand):
@@ -68,8 +75,8 @@ class LazyVerb(TyperCommand):
 
 
 def _built_in(name: str) -> typer.Typer:
-    """Return the app of a verb of wearsim, in the module of its name in `wearsim.cli.commands`."""
-    verb = getattr(import_module(f"wearsim.cli.commands.{name}"), name)
+    """Return the app of a verb of wearsim."""
+    verb = getattr(import_module(f"wearsim.cli.commands.{_MODULES.get(name, name)}"), name)
     if isinstance(verb, typer.Typer):
         return verb
     app = typer.Typer(rich_markup_mode=None)

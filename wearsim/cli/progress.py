@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from wearsim.cli.shared import console, note
 from wearsim.report.text import count, lapse, shown
-from wearsim.studies.run.events import Event, Finished, Started, Stepped, Warned
+from wearsim.studies.run.recorder import Event, Finished, Started, Stepped, Warned
 
 if TYPE_CHECKING:
     from wearsim.studies.ensemble.driver import EnsembleProgress

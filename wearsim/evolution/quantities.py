@@ -72,11 +72,10 @@ class ContactInputs:
         return self.with_values({item.name: np.where(chosen, value, getattr(self, item.name))})
 
 
+#: Function that draws the inputs of single passes.
+#:
+#: Its arguments are the inputs of each pass's roller and the number of the first pass.
 Redraw: TypeAlias = Callable[[ContactInputs, int], ContactInputs]
-"""Function that draws the inputs of single passes.
-
-Its arguments are the inputs of each pass's roller and the number of the first pass.
-"""
 
 
 @dataclass(frozen=True)

@@ -87,8 +87,8 @@ def _of_contacts(problem: WearProblem, values: FloatArray) -> FloatArray:
 
 
 SIGMAS = 2.0  # standard deviations of the sampling scatter that are counted as error
+#: Depths of cylinder and rollers, shapes as in `WearState` [m].
 Depths: TypeAlias = tuple[FloatArray, FloatArray]
-"""Depths of cylinder and rollers, shapes as in `WearState` [m]."""
 _CONTACT = "contact_"
 _AUXILIARY = ("coarse_step_solution", "half_quadrature_solution")
 #: axis of the realisations in the arrays of a `WearState`

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from wearsim.models import loads, wear
 from wearsim.models.contact import hertz as hertz_model
-from wearsim.models.contact import hertz_fastsim, semi_hertzian, slender
+from wearsim.models.contact import hertz_fastsim, slender, strip_model
 from wearsim.models.random import distributions, varying
 from wearsim.plugins import ContactModelSpec, LoadSpec, RandomInputSpec, WearLawSpec, hookimpl
 
@@ -14,7 +14,7 @@ from wearsim.plugins import ContactModelSpec, LoadSpec, RandomInputSpec, WearLaw
 @hookimpl
 def wearsim_contact_models() -> Iterable[ContactModelSpec]:
     """Yield the built-in contact models."""
-    return (hertz_fastsim.SPEC, hertz_model.SPEC, semi_hertzian.SPEC, slender.SPEC)
+    return (hertz_fastsim.SPEC, hertz_model.SPEC, strip_model.SPEC, slender.SPEC)
 
 
 @hookimpl

@@ -2,7 +2,7 @@
 
 from pydantic import Field
 
-from wearsim.contact_batch import ContactBatch, ContactBatchSolution
+from wearsim.contact_batch import ContactBatch, ContactBatchSolution, SharedWear
 from wearsim.errors import CapabilityError, ContactError
 from wearsim.plugins.contact_model import (
     Capabilities,
@@ -12,7 +12,6 @@ from wearsim.plugins.contact_model import (
     refuse_unclaimed,
 )
 from wearsim.plugins.manager import hookimpl, registry
-from wearsim.plugins.shared_wear import SharedWear
 from wearsim.plugins.specs import (
     BODIES,
     Body,

@@ -6,9 +6,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from wearsim.contact_batch import ContactBatch, ContactBatchSolution
+from wearsim.contact_batch import ContactBatch, ContactBatchSolution, SharedWear
 from wearsim.errors import CapabilityError, ContactError
-from wearsim.plugins.shared_wear import SharedWear
 from wearsim.types import ContactFields, ContactSolution, FloatArray, IntArray, OperatingPoint
 
 

@@ -155,10 +155,10 @@ def axis_lengths(arrays: Arrays, table: Mapping[str, Variable]) -> dict[str, int
 Array: TypeAlias = npt.NDArray[Any]
 Arrays: TypeAlias = dict[str, Array]
 
+#: Groups of a results file.
 CHECKPOINT, INPUTS = "checkpoint", "inputs"
-"""Groups of a results file."""
+#: Texts in the group of the inputs: the attributes, the scenario and its files.
 ABOUT, SCENARIO, FILES = "about", "scenario", "files"
-"""Texts in the group of the inputs: the attributes, the scenario and its files."""
 ERRORS = "surrogatepass"  # so that every Python string can be stored
 
 

@@ -63,6 +63,7 @@ VARIABLES: Mapping[str, Variable] = by_name(
     )
 )
 
+#: Schema without the random inputs, which differ between studies; see `with_random_inputs`.
 DISSIPATION = Schema(
     "wearsim-dissipation",
     2,
@@ -75,7 +76,6 @@ DISSIPATION = Schema(
     ),
     VARIABLES,
 )
-"""Schema without the random inputs, which differ between studies; see `with_random_inputs`."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -122,10 +122,10 @@ class DissipationData(StudyData):
         return with_random_inputs(DISSIPATION, self.inputs)
 
 
+#: Probabilities that bound 95 % of the realisations.
 BAND = (0.025, 0.975)
-"""Probabilities that bound 95 % of the realisations."""
+#: Probabilities of eq. 21 of Chevalier et al. (2005), where the labels P+ and P- are swapped.
 PAPER_BAND = (0.05, 0.95)
-"""Probabilities of eq. 21 of Chevalier et al. (2005), where the labels P+ and P- are swapped."""
 
 SUMMARISED = ("power", "force_x", "force_y", "spin_moment", "normal_force", "peak_pressure")
 

@@ -73,8 +73,7 @@ def _uneven_compliance(fixture: ContactFixture) -> FloatArray:
     """Return an uneven wear compliance that opens the gap by a part of the approach [m/(N/m)]."""
     overlap = fixture.solution.approach - float(fixture.gap.min())
     shape = 1.0 + 0.5 * np.tanh(fixture.grid.y / (0.2 * fixture.case.width))
-    compliance: FloatArray = 0.2 * overlap / float(fixture.solution.line_load.max()) * shape
-    return compliance
+    return np.asarray(0.2 * overlap / float(fixture.solution.line_load.max()) * shape)
 
 
 @CAPABILITIES.specified_in(_CAPABILITIES)

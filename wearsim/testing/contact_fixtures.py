@@ -88,8 +88,7 @@ class ContactCase:
         y = grid.y - centre * self.width
         depth = groove * (0.125 * self.width) ** 2 / (2.0 * self.crown_radius)
         shape = np.exp(-(((y - 0.06 * self.width) / (0.1 * self.width)) ** 2))
-        gap: FloatArray = y * y / (2.0 * self.crown_radius) + depth * shape
-        return gap
+        return np.asarray(y * y / (2.0 * self.crown_radius) + depth * shape)
 
 
 CREEPAGES = {

@@ -27,7 +27,7 @@ from wearsim.testing.checks import (
     spec_checks,
 )
 from wearsim.types import FloatArray
-from wearsim.uq.sampling.philox import Stream
+from wearsim.uq.sampling.sobol import Stream
 
 _CLASSES: dict[str, type] = {
     "scalar": Distribution,

@@ -183,8 +183,7 @@ class LoadFixture(Fixture[LoadSpec]):
     def forces(self, start: float, stop: float) -> FloatArray:
         """Return the load at the midpoints of equal parts of an interval [N]."""
         midpoints = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
-        forces: FloatArray = self.instance.force(start + (stop - start) * midpoints)
-        return forces
+        return np.asarray(self.instance.force(start + (stop - start) * midpoints))
 
     @cached_property
     def term_state(self) -> tuple[FloatArray, FloatArray, float]:

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from wearsim.models.contact.semi_hertzian import SemiHertzian
+from wearsim.models.contact.strip_model import SemiHertzian
 from wearsim.plugins import ContactModelSpec, registry
 from wearsim_bench.contact.methods import Method
 from wearsim_bench.measure.measurement import Effort

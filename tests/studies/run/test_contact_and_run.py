@@ -6,7 +6,7 @@ import pytest
 import wearsim
 from tests.evolution import SCENARIOS
 from wearsim.errors import ScenarioError
-from wearsim.studies.dry_run import plan
+from wearsim.studies.preparation import plan
 from wearsim.studies.run.assemble import assemble_problem
 from wearsim.studies.run.draws import draw
 

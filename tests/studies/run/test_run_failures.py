@@ -24,7 +24,7 @@ from wearsim.results import Result, open_results, read_results, write_results
 from wearsim.scenario import Scenario, parse_scenario
 from wearsim.studies.run import recorder
 from wearsim.studies.run import run as studies
-from wearsim.studies.run.events import Event, Warned
+from wearsim.studies.run.recorder import Event, Warned
 
 pytestmark = pytest.mark.usefixtures("small_chunks", "quick_disk")
 

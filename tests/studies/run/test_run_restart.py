@@ -10,7 +10,7 @@ from study_examples import LOADS, OTHERS, ROLLERS, STEPPERS, run_differences, ru
 
 from wearsim.results import open_results
 from wearsim.studies.run import run as studies
-from wearsim.studies.run.events import Checkpointed, Event
+from wearsim.studies.run.recorder import Checkpointed, Event
 
 pytestmark = pytest.mark.usefixtures("small_chunks")
 

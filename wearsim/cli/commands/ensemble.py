@@ -87,9 +87,9 @@ def ensemble(
     check_figure(figure, force, "--figure")
     from wearsim.cli.progress import EnsembleWatcher, stop_on_signals
     from wearsim.studies.ensemble import api
+    from wearsim.studies.ensemble.compare import path_of
+    from wearsim.studies.ensemble.compare import sweep as run_sweep
     from wearsim.studies.ensemble.designs import parse_plan
-    from wearsim.studies.ensemble.sweep import path_of
-    from wearsim.studies.ensemble.sweep import sweep as run_sweep
 
     options: dict[str, Any] = {"plan": plan, "until": until, "workers": workers, "force": force}
     with checking("--plan"):
@@ -132,7 +132,7 @@ def ensemble(
             results = [api.ensemble(scenarios[""], realisations, path, **options)]
     if not key:
         if figure is not None:
-            from wearsim.cli.commands.plot import draw
+            from wearsim.cli.commands.results import draw
 
             draw(results[0], figure)
         report(results[0], json, figure, watch.workers)

@@ -1,4 +1,4 @@
-"""`wearsim run`: wear test of a scenario."""
+"""Verbs for wear tests: run, and resume, which also continues ensembles."""
 
 from __future__ import annotations
 
@@ -11,8 +11,14 @@ from wearsim.cli.shared import (
     Force,
     Json,
     Quiet,
+    ResultsFile,
     ScenarioFile,
+    Scheduler,
     Settings,
+    Workers,
+    checked_scheduler,
+    checking,
+    note,
     read_scenario,
     results_option,
     write_json,
@@ -21,7 +27,8 @@ from wearsim.cli.shared import (
 )
 
 if TYPE_CHECKING:
-    from wearsim.results import Result
+    from wearsim.results import EnsembleResult, Result
+
 
 Output = Annotated[Path | None, results_option(".h5")]
 
@@ -56,3 +63,105 @@ def report(result: Result, json: bool) -> None:
     rows = [("test", standing(result)), *draws(result), *end_state(result), *effort(result)]
     write_table(result.title, [*rows, ("results file", str(result.path))])
     typer.echo(run_line(result))
+
+
+Until = Annotated[
+    str | None,
+    typer.Option(
+        metavar="TIME",
+        help="New end of a wear test, '600 min'; extends it.",
+        show_default=False,
+    ),
+]
+More = Annotated[
+    int | None,
+    typer.Option(
+        "--realisations",
+        "-n",
+        min=1,
+        help="New number of realisations of an ensemble; extends it.",
+        show_default=False,
+    ),
+]
+Failed = Annotated[
+    bool, typer.Option("--failed", help="Repeat the failed realisations of an ensemble.")
+]
+
+
+def resume(
+    file: ResultsFile,
+    until: Until = None,
+    failed: Failed = False,
+    realisations: More = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Continue a run or an ensemble from its results file."""
+    from wearsim.results import kind_of
+
+    if kind_of(file) == "ensemble":
+        if until is not None:
+            raise typer.BadParameter("only wear tests can be extended", param_hint="--until")
+        if failed and realisations is not None:
+            raise typer.BadParameter("extend the ensemble first", param_hint="--failed")
+        chosen = checked_scheduler(scheduler, workers)
+        from wearsim.cli.commands.ensemble import STOPPING, report
+        from wearsim.cli.progress import EnsembleWatcher, stop_on_signals
+        from wearsim.results import open_ensemble
+        from wearsim.studies.ensemble.api import resume_ensemble
+
+        nothing = _nothing_to_do(open_ensemble(file), failed)
+        if nothing and realisations is None:
+            note(f"note: nothing to do: {nothing}")
+        with stop_on_signals(STOPPING) as stop, EnsembleWatcher(quiet) as watch:
+            result = resume_ensemble(
+                file,
+                failed=failed,
+                realisations=realisations,
+                workers=workers,
+                scheduler=chosen,
+                on_progress=watch,
+                stop_requested=stop.is_set,
+                on_notice=watch.notice,
+            )
+        report(result, json, None, watch.workers)
+        return
+    for option, is_given in (
+        ("--failed", failed),
+        ("--realisations", realisations is not None),
+        ("--workers", workers is not None),
+        ("--scheduler", scheduler is not None),
+    ):
+        if is_given:
+            raise typer.BadParameter("is an option for ensembles only", param_hint=option)
+    _resume_run(file, until, json, quiet)
+
+
+def _resume_run(file: Path, until: str | None, json: bool, quiet: bool) -> None:
+    seconds = None
+    if until is not None:
+        from wearsim.quantities import quantity
+
+        with checking("--until"):
+            seconds = quantity(until, "s")
+            if seconds <= 0.0:
+                raise ValueError(f"must be above zero, got '{until}'")
+    from wearsim.cli.commands.run import report
+    from wearsim.cli.progress import RunWatcher, stop_on_signals
+    from wearsim.studies.run import run as study
+
+    with stop_on_signals() as stop, RunWatcher(quiet) as watch:
+        result = study.resume(file, seconds, on_event=watch, stop_requested=stop.is_set)
+    report(result, json)
+
+
+def _nothing_to_do(before: EnsembleResult, failed: bool) -> str:
+    """Return why there is nothing to do, or an empty text."""
+    if not failed:
+        return "the ensemble is finished" if before.finished else ""
+    if before.failed:
+        return ""
+    rest = "" if before.finished else f"; continue the others with: wearsim resume {before.path}"
+    return f"no realisation has failed{rest}"

@@ -87,8 +87,8 @@ class Trial:
         return False
 
 
+#: Function from a problem, a state and a number of passes to the state after them.
 Step: TypeAlias = Callable[[WearProblem, WearState, FloatArray], WearState]
-"""Function from a problem, a state and a number of passes to the state after them."""
 
 
 @dataclass(frozen=True)

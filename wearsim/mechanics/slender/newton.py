@@ -25,13 +25,6 @@ import numpy as np
 
 from wearsim.mechanics.numerics.jit import kernel, subroutine
 from wearsim.mechanics.numerics.lu import factor_in_place, solve_factored
-from wearsim.mechanics.slender.body_elimination import (
-    add_depths,
-    factor_depths,
-    fill_responses,
-    new_depth_system,
-    solve_depths,
-)
 from wearsim.mechanics.slender.half_length import (
     NEWTON_REACH,
     add_around,
@@ -45,10 +38,15 @@ from wearsim.mechanics.slender.influence import HIGHEST, read_influence
 from wearsim.mechanics.slender.newton_step import (
     NewtonState,
     add_approach,
+    add_depths,
     correct_residual,
+    factor_depths,
+    fill_responses,
+    new_depth_system,
     new_newton_state,
     number_strips,
     predict_surface,
+    solve_depths,
     update_loads,
 )
 from wearsim.types import FloatArray, IntArray

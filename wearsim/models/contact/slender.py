@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 from pydantic import Field
 
-from wearsim.contact_batch import ContactBatch, ContactBatchSolution
+from wearsim.contact_batch import NO_BODY, ContactBatch, ContactBatchSolution
 from wearsim.errors import ContactError
 from wearsim.mechanics.hertz.elasticity import ElasticPair
 from wearsim.mechanics.numerics.jit import own_array
@@ -27,13 +27,12 @@ from wearsim.plugins import (
     refuse_unclaimed,
 )
 from wearsim.plugins.contact_model import naming_contact, solved_one_by_one
-from wearsim.plugins.shared_wear import NO_BODY
 from wearsim.types import FloatArray, Grid, IntArray, Material
 
 _NONE = np.zeros(0, dtype=np.int64)
 
+#: Strip width [m], E* [Pa] and the two tables of `mechanics.slender.newton.solve_slender`.
 Constants: TypeAlias = tuple[float, float, FloatArray, FloatArray]
-"""Strip width [m], E* [Pa] and the two tables of `mechanics.slender.newton.solve_slender`."""
 
 
 class NormalContacts(NamedTuple):

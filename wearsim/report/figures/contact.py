@@ -112,8 +112,7 @@ def _pressure(fields: ContactFields, solution: ContactSolution) -> FloatArray:
         return fields.pressure
     a = np.where(solution.half_length > 0.0, solution.half_length, 1.0)
     peak = 2.0 * solution.line_load / (np.pi * a)
-    elliptic: FloatArray = peak * np.sqrt(np.maximum(0.0, 1.0 - (fields.x / a) ** 2))
-    return elliptic
+    return np.asarray(peak * np.sqrt(np.maximum(0.0, 1.0 - (fields.x / a) ** 2)))
 
 
 def _draw_arrows(

@@ -10,12 +10,12 @@ import numpy as np
 
 from wearsim.results.content import Axis, Schema, Variable, by_name, with_random_inputs
 
+#: Values of the status of a realisation.
 PENDING, DONE, FAILED = 0, 1, 2
-"""Values of the status of a realisation."""
+#: Length of the stored error message of a failed realisation, with its final zero.
 ERROR_BYTES = 400
-"""Length of the stored error message of a failed realisation, with its final zero."""
+#: Probabilities of the quantiles stored in the file.
 QUANTILES = (0.025, 0.05, 0.25, 0.5, 0.75, 0.95, 0.975)
-"""Probabilities of the quantiles stored in the file."""
 MOST_KEPT = 4_000_000  # stored numbers of worn profiles, 32 MB
 
 _DRAW = ("realisation",)
@@ -23,6 +23,7 @@ _HISTORY = ("realisation", "record")
 _RECORDS = ("record",)
 _STRIPS = ("y",)
 
+#: Variables stored for every record of every realisation, by name.
 OBSERVABLES: Mapping[str, Variable] = by_name(
     Variable(name, _HISTORY, unit, long_name, "record")
     for name, unit, long_name in (
@@ -38,8 +39,8 @@ OBSERVABLES: Mapping[str, Variable] = by_name(
         ("peak_pressure", "Pa", "greatest normal pressure, maximum over the rollers"),
     )
 )
-"""Variables stored for every record of every realisation, by name."""
 
+#: Variables common to all realisations.
 STATIC: Mapping[str, Variable] = by_name(
     (
         Variable("y", _STRIPS, "m", "axial position", "static"),
@@ -50,7 +51,6 @@ STATIC: Mapping[str, Variable] = by_name(
         Variable("record_time", _RECORDS, "s", "simulated time at a record", "static"),
     )
 )
-"""Variables common to all realisations."""
 
 _QUANTILE = Variable("quantile", ("quantile",), "1", "probability of a quantile", "static")
 
@@ -88,6 +88,7 @@ _OUTCOMES = by_name(
 
 _CONTROL = Variable("control", _DRAW, "1", "control variate, in the unit of its mean", "record")
 
+#: Estimates over the realisations; nan until the ensemble is finished.
 STATISTICS: Mapping[str, Variable] = by_name(
     [
         Variable(
@@ -120,8 +121,8 @@ STATISTICS: Mapping[str, Variable] = by_name(
         )
     ]
 )
-"""Estimates over the realisations; nan until the ensemble is finished."""
 
+#: Schema without the random inputs, which differ between studies, and the control variate.
 ENSEMBLE = Schema(
     "wearsim-ensemble",
     2,
@@ -136,7 +137,6 @@ ENSEMBLE = Schema(
     ),
     {**STATIC, "quantile": _QUANTILE, **_OUTCOMES, **OBSERVABLES, **STATISTICS},
 )
-"""Schema without the random inputs, which differ between studies, and the control variate."""
 
 
 def ensemble_schema(inputs: Sequence[Mapping[str, str]], control: Mapping[str, Any]) -> Schema:

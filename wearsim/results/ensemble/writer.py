@@ -39,8 +39,8 @@ from wearsim.results.io.atomic_write import (
 if TYPE_CHECKING:
     import h5py
 
+#: Size of a part file, beyond which rows go to the next one.
 PART_BYTES = 1 << 21
-"""Size of a part file, beyond which rows go to the next one."""
 
 Completion: TypeAlias = Callable[[EnsembleData], tuple[Mapping[str, Any], Arrays]]
 
@@ -63,8 +63,8 @@ class EnsembleFile(AbstractContextManager["EnsembleFile"]):
 
     def _load(self) -> None:
         """Read the ensemble, and delete parts that are merged or left by another ensemble."""
+        #: The content of the file and the parts when they were read.
         self.data = read_ensemble(self.path)
-        """The content of the file and the parts when they were read."""
         self._stored = cast("StoredRows", self.data.variables)
         self._status = self.data.status.copy()
         parts = self._stored.parts

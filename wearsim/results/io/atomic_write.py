@@ -15,8 +15,8 @@ from typing import IO
 
 from wearsim.errors import ResultsFileError
 
+#: Added to the name of a file while its new content is written.
 TEMPORARY = ".tmp"
-"""Added to the name of a file while its new content is written."""
 
 _BUFFER = 1 << 18  # bytes
 
@@ -55,8 +55,8 @@ class Storage:
         path.unlink(missing_ok=True)
 
 
+#: The file operations of the operating system.
 DISK = Storage()
-"""The file operations of the operating system."""
 
 
 @contextmanager

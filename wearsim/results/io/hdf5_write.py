@@ -33,8 +33,8 @@ from wearsim.results.content import (
 )
 from wearsim.results.io.atomic_write import DISK, Storage, replacement
 
+#: Most rows of a chunk; who writes as many rows at a time writes each chunk once.
 CHUNK_ROWS = 4096
-"""Most rows of a chunk; who writes as many rows at a time writes each chunk once."""
 _CHUNK_NUMBERS = 1 << 15
 
 _LABEL_LENGTH = 1000  # an attribute holds 64 kB at most
@@ -173,7 +173,11 @@ def put_variables(
         scales[axis.name] = put_array(file, axis.name, numbers)
         put_labels(scales[axis.name], units="1", long_name=axis.long_name)
     for name, variable in schema.variables.items():
-        dataset = (put_array if name in variables else _reserve)(file, name, arrays[name])
+        if name in variables:
+            dataset = put_array(file, name, arrays[name])
+        else:  # described only: values that are not written are the fill value
+            like = arrays[name]
+            dataset = file.create_dataset(name, like.shape, like.dtype, **_stored_as(like))
         put_labels(dataset, units=variable.unit, long_name=variable.long_name)
         (scales if variable.dims == (name,) else datasets)[name] = dataset
     for name, scale in scales.items():
@@ -248,11 +252,6 @@ def put_array(group: h5py.Group, name: str, array: Array) -> h5py.Dataset:
     if array.size == 0:
         return group.create_dataset(name, data=array)
     return group.create_dataset(name, data=array, **_stored_as(array))
-
-
-def _reserve(group: h5py.Group, name: str, array: Array) -> h5py.Dataset:
-    """Describe an array without storing it: what is not written is its fill value."""
-    return group.create_dataset(name, array.shape, array.dtype, **_stored_as(array))
 
 
 def _stored_as(array: Array) -> dict[str, Any]:

@@ -27,7 +27,7 @@ from wearsim.studies.run.inputs import (
     load_range,
 )
 from wearsim.types import FloatArray
-from wearsim.uq.sampling.philox import Stream
+from wearsim.uq.sampling.sobol import Stream
 
 _MAX_POINTS = 2**20  # upper limit of the search for a sufficient number
 

@@ -13,6 +13,7 @@ EnsemblePlan: TypeAlias = Literal[
     "monte-carlo", "latin-hypercube", "sobol", "control-variate", "saltelli"
 ]
 ENSEMBLE_PLANS: tuple[EnsemblePlan, ...] = get_args(EnsemblePlan)
+#: Plan of the underlying random numbers.
 BASE_PLANS: Mapping[EnsemblePlan, PlanName] = {
     "monte-carlo": "monte-carlo",
     "latin-hypercube": "latin-hypercube",
@@ -20,7 +21,6 @@ BASE_PLANS: Mapping[EnsemblePlan, PlanName] = {
     "control-variate": "monte-carlo",
     "saltelli": "monte-carlo",
 }
-"""Plan of the underlying random numbers."""
 
 FIRST_ANALYSIS = 64  # smallest sample size with reliable intervals; a power of two for Sobol
 

@@ -16,8 +16,8 @@ from wearsim.scenario import RandomInput, Scenario, realise, require_run
 from wearsim.scenario.parse.fields import CONTACT_FIELDS
 from wearsim.studies.run.inputs import OFFSET, TILT, YAW, contact_values, origin
 from wearsim.types import FloatArray
-from wearsim.uq.sampling.philox import Stream
 from wearsim.uq.sampling.sampler import REPLICATES, PlanName, Sampler
+from wearsim.uq.sampling.sobol import Stream
 
 LISTED = {OFFSET, YAW, TILT}  # a scenario may give one per roller
 LONGEST_PATH = 5_000_000  # samples of a process

@@ -14,13 +14,13 @@ from wearsim.plugins import Load
 from wearsim.scenario import RandomInput, Scenario
 from wearsim.scenario.parse.fields import CONTACT_FIELDS
 from wearsim.types import FloatArray
-from wearsim.uq.sampling.philox import Stream
 from wearsim.uq.sampling.sampler import GaussianCopula, Sampler
+from wearsim.uq.sampling.sobol import Stream
 
 LOAD, FRICTION, LONGITUDINAL = "load.normal_force", "friction.coefficient", "creepage.longitudinal"
 YAW, TILT, OFFSET = "creepage.yaw", "creepage.tilt", "roller.offset"
+#: Inputs of one contact: name in `contact_inputs`, by scenario key.
 FIELDS = {**CONTACT_FIELDS, OFFSET: "offset"}
-"""Inputs of one contact: name in `contact_inputs`, by scenario key."""
 
 
 def origin(key: str, mean: float) -> float:

@@ -1,4 +1,4 @@
-"""Record schedule, history and recorded profiles of a wear test."""
+"""Events, record schedule, history and recorded profiles of wear tests."""
 
 from __future__ import annotations
 
@@ -17,20 +17,63 @@ from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import mean_along, width, worn_volume
 from wearsim.evolution.state import WearState, joined_states
 from wearsim.evolution.steppers.base import SMALLEST_STEP, Step, Stepper
-from wearsim.evolution.steppers.single_step import (
-    contacts_at,
-    present_loads,
-    solve_present,
-)
+from wearsim.evolution.steppers.single_step import contacts_at, present_loads, solve_present
 from wearsim.results.run import VARIABLES
 from wearsim.scenario import Scenario
 from wearsim.scenario.tables.plain import DEFAULT_RECORDS
 from wearsim.types import FloatArray
 
+
+@dataclass(frozen=True)
+class Started:
+    """Start of a run, or its continuation from `from_passes`."""
+
+    total_passes: float
+    total_time: float
+    from_passes: float
+    stepper: str
+    model: str
+
+
+@dataclass(frozen=True)
+class Stepped:
+    """An accepted step; SI units, `depth` and `depth_error` of the cylinder."""
+
+    passes: float
+    total_passes: float
+    time: float
+    depth: float
+    step_passes: float
+    depth_error: float
+    wall_seconds: float
+
+
+@dataclass(frozen=True)
+class Warned:
+    """A warning for the user."""
+
+    message: str
+
+
+@dataclass(frozen=True)
+class Checkpointed:
+    """A checkpoint in the results file at `passes`."""
+
+    path: str
+    passes: float
+
+
+@dataclass(frozen=True)
+class Finished:
+    """End of the run."""
+
+    wall_seconds: float
+
+
+Event: TypeAlias = Started | Stepped | Warned | Checkpointed | Finished
+Variables = dict[str, FloatArray]
 _ROUND_OFF = 1e-9
 _WITHOUT_REALISATION = {n for n, item in VARIABLES.items() if "realisation" not in item.dims}
-
-Variables = dict[str, FloatArray]
 
 
 @dataclass(frozen=True)
@@ -227,9 +270,9 @@ def take_side_step(
     return take_side_step(step, problem, take_side_step(step, problem, state, half), half)
 
 
+#: A record in or at the end of a step: the last state before or at it, by its number on the path;
+#: the place of its test; its passes.
 Due: TypeAlias = tuple[int, int, float]
-"""A record in or at the end of a step: the last state before or at it, by its number on the path;
-the place of its test; its passes."""
 
 
 def due_records(

@@ -29,9 +29,17 @@ from wearsim.scenario import Scenario, parse_scenario
 from wearsim.studies.preparation import changed_origins, check_plugins, origin_of
 from wearsim.studies.run.assemble import assemble_problem, start_height
 from wearsim.studies.run.draws import Draws, draw, units_of
-from wearsim.studies.run.events import Checkpointed, Event, Finished, Started, Stepped, Warned
 from wearsim.studies.run.grid import strips_of_run
-from wearsim.studies.run.recorder import Recorder, RecordSchedule
+from wearsim.studies.run.recorder import (
+    Checkpointed,
+    Event,
+    Finished,
+    Recorder,
+    RecordSchedule,
+    Started,
+    Stepped,
+    Warned,
+)
 from wearsim.types import Grid
 
 Watcher = Callable[[Event], None]
@@ -56,7 +64,7 @@ def run(
     force : bool
         Overwrite an existing file.
     on_event : callable, optional
-        Called with every event, see `wearsim.studies.run.events`.
+        Called with every event, see `wearsim.studies.run.recorder`.
     stop_requested : callable, optional
         Called after every step; True stops the run after a checkpoint.
     storage : Storage

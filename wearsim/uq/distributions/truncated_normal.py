@@ -20,8 +20,8 @@ _POINTS = _NODES[:-1, None] + np.diff(_NODES)[:, None] * 0.5 * (1.0 + _GAUSS)
 _CHUNK = 1 << 15  # draws per block; the panel data of a block fit into the processor's cache
 
 
+#: Log density at offsets, up to a constant, and its first and second derivative.
 LogDensity: TypeAlias = Callable[[Any], tuple[Any, Any, Any]]
-"""Log density at offsets, up to a constant, and its first and second derivative."""
 
 
 class Piece:

@@ -24,8 +24,8 @@ from wearsim.uq.estimation.standard_errors import (
 Design: TypeAlias = Literal[
     "monte-carlo", "latin-hypercube", "sobol", "saltelli", "control-variate"
 ]
+#: Sampling designs for which estimates are available.
 DESIGNS: tuple[Design, ...] = get_args(Design)
-"""Sampling designs for which estimates are available."""
 
 _MIN_DRAWS = 5  # independent draws below which the error of a std is not estimated
 _STEP = 0.5  # least standard error of an empirical distribution function, in units of 1/n

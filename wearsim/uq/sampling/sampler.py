@@ -11,18 +11,18 @@ import numpy as np
 
 from wearsim.types import FloatArray, IntArray
 from wearsim.uq.sampling import sobol
-from wearsim.uq.sampling.philox import Stream
+from wearsim.uq.sampling.sobol import Stream
 
 PlanName: TypeAlias = Literal["monte-carlo", "latin-hypercube", "sobol"]
 PLANS: tuple[PlanName, ...] = get_args(PlanName)
 
+#: Uniform numbers, shape (count, dimension), by name, dimension, first realisation and count.
 Draw: TypeAlias = Callable[[str, int, int, int], FloatArray]
-"""Uniform numbers, shape (count, dimension), by name, dimension, first realisation and count."""
 
 BELOW_ONE = 1.0 - 2.0**-53
 
+#: Number of independent Sobol sequences for confidence intervals: 7 degrees of freedom.
 REPLICATES = 8
-"""Number of independent Sobol sequences for confidence intervals: 7 degrees of freedom."""
 
 
 def monte_carlo(seed: int, name: str, dimension: int, first: int, count: int) -> FloatArray:
@@ -163,8 +163,8 @@ def drawing(plan: PlanName, seed: int, total: int | None, replicates: int = 1) -
     return lambda *where: latin_hypercube(seed, total, *where)
 
 
+#: Two inputs and Spearman's rank correlation between them.
 Correlation: TypeAlias = tuple[str, str, float]
-"""Two inputs and Spearman's rank correlation between them."""
 
 _SINGULAR = 1e-9  # eigenvalue below which a correlation matrix is singular to rounding
 

@@ -15,8 +15,8 @@ from wearsim.types import FloatArray, IntArray
 from wearsim.uq.estimation.intervals import UNKNOWN, Interval, t_interval
 from wearsim.uq.estimation.moments import are_equal, is_constant
 
+#: Index below which an effect whose interval includes 0 counts as none.
 SMALL = 0.01
-"""Index below which an effect whose interval includes 0 counts as none."""
 
 _NONE = Interval(0.0, 0.0, 0.0)
 _MOST = 65536  # realisations used by a fit, sufficient for errors of 0.5 %

@@ -1,13 +1,43 @@
-"""`wearsim new`: a new plugin or scenario."""
+"""Verbs for scenarios and plugins: check, schema, new and plugins."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from wearsim.cli.shared import Force, checking, note, refuse_existing
+from wearsim.cli.shared import (
+    Force,
+    Json,
+    ScenarioFile,
+    Settings,
+    checking,
+    note,
+    read_scenario,
+    refuse_existing,
+    write_json,
+    write_list,
+    write_notes,
+    write_table,
+)
+
+
+def check(scenario: ScenarioFile, settings: Settings = None) -> None:
+    """Check a scenario: print all mistakes, or what will run."""
+    loaded = read_scenario(scenario, settings)
+    from wearsim.studies.preparation import plan
+
+    write_table(f"ok: {loaded.title}", plan(loaded))
+    write_notes(loaded.notes)
+
+
+def schema() -> None:
+    """Write the JSON Schema of a scenario, for editors."""
+    from wearsim.scenario import scenario_schema
+
+    write_json(scenario_schema())
+
 
 new = typer.Typer(
     name="new",
@@ -77,3 +107,42 @@ def new_scenario(file: NewScenario = Path("scenario.toml"), force: Force = False
 def _unwritable(error: OSError, path: Path, option: str) -> typer.BadParameter:
     message = f"cannot write to {path} ({error.strerror}); choose another name or folder"
     return typer.BadParameter(message, param_hint=option)
+
+
+_HEADS = ("name", "kind", "distribution", "version", "protocol", "capabilities", "summary")
+
+
+def plugins(json: Json = False) -> None:
+    """List contact models, wear laws, loads and random inputs."""
+    from wearsim.plugins import registry
+
+    found = registry()
+    entries: list[dict[str, Any]] = [
+        {
+            "name": item.spec.name,
+            "kind": item.spec.kind,
+            "distribution": item.distribution,
+            "version": item.version,
+            "protocol": item.spec.protocol,
+            "refused": item.refusal,
+            "capabilities": item.spec.describe(),
+            "summary": item.spec.summary,
+            "references": list(item.spec.references),
+        }
+        for item in found.all()
+    ]
+    if json:
+        keys = ("entry_point", "distribution", "version", "cause")
+        broken = [{key: getattr(item, key) for key in keys} for item in found.broken]
+        write_json({"plugins": entries, "broken": broken})
+        return
+    for entry in entries:
+        entry["capabilities"] = ", ".join(word.replace("_", " ") for word in entry["capabilities"])
+    write_list(_HEADS, [[str(entry[head]) for head in _HEADS] for entry in entries])
+    for refusal in filter(None, (entry["refused"] for entry in entries)):
+        note(f"refused: {refusal}")
+    for item in found.broken:
+        note(
+            f"broken: plugin '{item.entry_point}' of {item.distribution} {item.version}"
+            f" failed to load: {item.cause}"
+        )

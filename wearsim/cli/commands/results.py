@@ -1,0 +1,262 @@
+"""Verbs for results files: show, plot, compare and export."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from wearsim.cli.shared import (
+    Figure,
+    Force,
+    Json,
+    ResultsFile,
+    check_figure,
+    note,
+    open_any,
+    read_text,
+    write_json,
+    write_notes,
+    write_table,
+)
+
+if TYPE_CHECKING:
+    from wearsim.report.parts import Measured
+    from wearsim.results import DissipationResult, EnsembleResult, Result
+    from wearsim.results.content import StudyData
+
+
+MeasuredFiles = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--measured",
+        metavar="CSV",
+        help="Measured profile to draw as points: columns 'y [mm]' and 'depth [um]', or 'height"
+        " [um]' with worn material negative. May be repeated.",
+        show_default=False,
+    ),
+]
+
+
+def plot(
+    file: ResultsFile, figure: Figure = None, measured: MeasuredFiles = None, force: Force = False
+) -> None:
+    """Draw the figure of a results file of any kind."""
+    path = figure if figure is not None else Path(f"{file.stem}.png")
+    check_figure(path, force)
+    from wearsim.report.parts import read_measured
+    from wearsim.results import Result, refuse_inputs
+
+    refuse_inputs(path, [file], "the figure")
+    refuse_inputs(path, measured or [], "a measured profile")
+    result = open_any(file)
+    if measured and not isinstance(result, Result):
+        raise typer.BadParameter(
+            f"requires the file of a wear test; {file} is none", param_hint="--measured"
+        )
+    draw(result, path, [read_measured(read_text(csv), str(csv)) for csv in measured or []])
+    note(f"figure: {path}")
+
+
+def draw(
+    result: Result | DissipationResult | EnsembleResult,
+    path: Path,
+    measured: Sequence[Measured] = (),
+) -> None:
+    """Write the figure of a result.
+
+    Parameters
+    ----------
+    result : Result, DissipationResult or EnsembleResult
+    path : Path
+        Name of the figure.
+    measured : sequence of Measured
+        Profiles drawn over those of a run.
+    """
+    from wearsim.report.parts import save_figure
+    from wearsim.results import DissipationResult, EnsembleResult
+
+    if isinstance(result, EnsembleResult):
+        from wearsim.report.figures.ensemble import ensemble_figure
+
+        figure = ensemble_figure(result)
+    elif isinstance(result, DissipationResult):
+        from wearsim.report.figures.contact import dissipation_figure
+
+        figure = dissipation_figure(result)
+    else:
+        from wearsim.report.figures.run import run_figure
+
+        figure = run_figure(result, measured)
+    save_figure(figure, path)
+
+
+def show(file: ResultsFile, json: Json = False) -> None:
+    """Show the content of a results file and the end state."""
+    from wearsim.cli.render import ensemble_table, summary
+    from wearsim.report.text import count
+    from wearsim.results import DissipationResult, EnsembleResult
+
+    result = open_any(file)
+    if json:
+        data: dict[str, Any]
+        if isinstance(result, DissipationResult):
+            data = summary.dissipation_json(result)
+        elif isinstance(result, EnsembleResult):
+            data = ensemble_table.ensemble_json(result)
+        else:
+            data = {
+                **summary.run_json(result),
+                "total_passes": result.raw.total_passes,
+                "tolerance": result.raw.tolerance,
+                "record_passes": result.record_passes,
+            }
+        write_json({**data, **_origin(result.raw)})
+        return
+    if isinstance(result, DissipationResult):
+        summary.write_spread(result, _sources(result.raw))
+    elif isinstance(result, EnsembleResult):
+        groups = [(f"random {item['name']}", item["text"]) for item in result.raw.groups]
+        ensemble_table.write_ensemble(result, [*groups, *_sources(result.raw)])
+    else:
+        first, last = (count(float(result.record_passes[place])) for place in (0, -1))
+        rows = [
+            ("test", summary.standing(result)),
+            ("contact model", result.described_model),
+            ("stepper", f"{result.stepper}, tolerance {result.raw.tolerance:g}"),
+            ("seed", str(result.raw.seed)),
+            *summary.draws(result),
+            ("records", f"{len(result.record_passes)}, at passes {first} to {last}"),
+            ("strips", str(len(result.y))),
+            *summary.effort(result),
+        ]
+        write_table(result.title, [*rows, *_sources(result.raw)])
+        title = "end state" if result.finished else "current state"
+        write_table(title, summary.end_state(result))
+    write_notes(result.notes, result.warnings)
+    if isinstance(result, EnsembleResult):
+        ensemble_table.warn_of_failures(result)
+
+
+def _sources(raw: StudyData) -> list[tuple[str, str]]:
+    """Return rows on scenario, input files, plugins and software of a study."""
+    plugins = [
+        f"{item['kind']} {item['name']} ({item['distribution']} {item['version']})"
+        for item in raw.plugins
+    ]
+    return [
+        ("scenario", raw.scenario_file),
+        ("input files", ", ".join(raw.files) or "none"),
+        ("plugins", "\n".join(plugins)),
+        ("software", ", ".join(f"{name} {number}" for name, number in raw.software.items())),
+        ("written", raw.created),
+    ]
+
+
+def _origin(raw: StudyData) -> dict[str, Any]:
+    """Return scenario, input files, plugins and software of a study."""
+    return {
+        "scenario_file": raw.scenario_file,
+        "scenario_sha256": raw.sha256,
+        "scenario": raw.scenario_text,
+        "files": list(raw.files),
+        "plugins": raw.plugins,
+        "software": raw.software,
+        "seed": raw.seed,
+        "created": raw.created,
+    }
+
+
+Files = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="FILE.h5 FILE.h5...",
+        help="Results files of runs and ensembles; all others are compared with the first.",
+        show_default=False,
+    ),
+]
+Observable = Annotated[
+    str,
+    typer.Option(
+        metavar="NAME",
+        help="Quantity to compare: depth, width, worn_volume, dissipated_energy...",
+    ),
+]
+
+
+def compare(
+    files: Files,
+    observable: Observable = "depth",
+    figure: Figure = None,
+    json: Json = False,
+    force: Force = False,
+) -> None:
+    """Compare runs and ensembles, with confidence intervals."""
+    if len(files) < 2:
+        raise typer.BadParameter(
+            f"there is one file, {files[0]}; give another one to compare", param_hint="FILE.h5"
+        )
+    check_figure(figure, force)
+    from wearsim.results import refuse_inputs
+    from wearsim.studies.ensemble.compare import observables_of
+
+    if figure is not None:
+        refuse_inputs(figure, files, "the comparison")
+    results = [_open(file) for file in files]
+    labels = _labels(files)
+    for label, result in zip(labels, results, strict=True):
+        known = observables_of(result)
+        if observable not in known:
+            raise typer.BadParameter(
+                f"{label} has no '{observable}', expected one of {', '.join(known)}",
+                param_hint="--observable",
+            )
+    from wearsim.cli.render.ensemble_table import report_comparison
+
+    report_comparison(results, labels, observable, "", figure, json)
+
+
+def _open(file: Path) -> Result | EnsembleResult:
+    from wearsim.errors import ResultsFileError
+    from wearsim.results import DissipationResult, EnsembleResult
+
+    result = open_any(file)
+    if isinstance(result, DissipationResult):
+        from wearsim.results.dissipation import DISSIPATION
+
+        raise ResultsFileError(
+            f"{file}: holds {DISSIPATION.holds}; only runs and ensembles can be compared"
+        )
+    if isinstance(result, EnsembleResult) and result.count == 0:
+        raise ResultsFileError(f"{file}: has no completed realisation; nothing to compare")
+    return result
+
+
+def _labels(files: list[Path]) -> list[str]:
+    """Return the names of the files, with their folders where the names are not unique."""
+    stems = [file.stem for file in files]
+    if len(set(stems)) == len(stems):
+        return stems
+    names = [str(file) for file in files]
+    for name in names:
+        if names.count(name) > 1:
+            raise typer.BadParameter(f"{name} is given twice", param_hint="FILE.h5")
+    return names
+
+
+Folder = Annotated[
+    Path,
+    typer.Option(
+        "--output", "-o", metavar="DIR", help="Folder for the CSV files.", show_default=False
+    ),
+]
+
+
+def export(file: ResultsFile, output: Folder) -> None:
+    """Write a results file as CSV, with units in the headers."""
+    from wearsim.results import export_csv
+
+    for path in export_csv(open_any(file), output):
+        typer.echo(str(path))
