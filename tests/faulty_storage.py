@@ -67,7 +67,7 @@ class WatchedStorage(Storage):
 
 
 class _WatchedFile(io.FileIO):
-    """A file of the operating system whose writes and end are stages."""
+    """A file whose writes and closing are stages at which a fault can be injected."""
 
     stage: Callable[[str], Any] = nullcontext
 

@@ -236,7 +236,7 @@ def test_forced_step_beyond_the_limit_is_refused(half_worn):
 
 
 class Overflowing(ExplicitStepper):
-    """Stepper whose steps beyond ten passes dissipate an infinite energy."""
+    """Stepper that returns an infinite energy for steps of more than ten passes."""
 
     def proposed(self, problem, state):
         return np.full(1, self.forced_step or 1e4)

@@ -88,7 +88,7 @@ def finish(file: EnsembleFile, **fields: object) -> None:
 
 
 def contents(path: Path) -> dict[str, bytes]:
-    """Return all that an ensemble holds, except what identifies it and its parts."""
+    """Return the content of an ensemble without its run id and its part files."""
     data = read_ensemble(path)
     arrays = {name: array.tobytes() for name, array in data.variables.items()}
     fields = {name: repr(value).encode() for name, value in data.attributes.items()}
@@ -98,6 +98,6 @@ def contents(path: Path) -> dict[str, bytes]:
 
 
 def differences(one: Path, other: Path) -> list[str]:
-    """Return the names of what differs between two ensembles."""
+    """Return the names of the fields in which two ensembles differ."""
     first, second = contents(one), contents(other)
     return [name for name in first.keys() | second.keys() if first.get(name) != second.get(name)]

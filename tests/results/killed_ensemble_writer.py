@@ -48,7 +48,7 @@ def continue_writing(
 
 
 def finish_writing(path: Path, storage: Storage = DISK) -> None:
-    """Write what is missing, and merge the parts."""
+    """Write the pending realisations, and merge the parts."""
     continue_writing(path, storage=storage)
     with EnsembleFile.open(path, storage) as file:
         finish(file)

@@ -27,12 +27,12 @@ LAYOUTS = {
 
 
 def run_of_file() -> RunData:
-    """Return what the file of a run holds."""
+    """Return the content of the file of a run."""
     return some_run(seed=3, steps=2, records=2, strips=3)
 
 
 def study_of_file() -> DissipationData:
-    """Return what the file of a dissipation study holds."""
+    """Return the content of the file of a dissipation study."""
     return some_study(count=4, kept=3)
 
 

@@ -41,7 +41,7 @@ def _ensemble(path: Path, changed: str) -> object:
 
 UNREAD = {"step", "record", "station", "roller", "realisation", "kept"}
 
-#: the file that is opened, the one whose bytes change, and its content
+#: name to open, suffix of the file in which a byte is changed, and expected content
 CASES: dict[str, tuple[str, str, Content]] = {
     "run": ("run", "", _run),
     "dissipation": ("dissipation", "", _study),

@@ -25,7 +25,7 @@ FIRST_PARTY = {"bench": "wearsim-bench", "reproduce": "wearsim-chevalier2005"}
 
 #: built-in verbs with their help lines, in the order of the help
 BUILT_IN = {
-    "check": "Check a scenario: print all mistakes, or what will run.",
+    "check": "Check a scenario: print all mistakes, or a summary of the run.",
     "contact": "Solve one contact: the first roller at the start of the load.",
     "dissipation": "Solve one contact for many realisations of its random inputs.",
     "run": "Run a wear test and write its results file.",
@@ -50,7 +50,7 @@ _MODULES = {
 
 
 class LazyVerb(TyperCommand):
-    """Help line of a verb whose code is imported when the verb is called.
+    """Verb that is imported when it is called; its help line is known before.
 
     Parameters
     ----------

@@ -209,7 +209,7 @@ def mean_along(values: FloatArray, axis: int) -> FloatArray:
 
 
 def sum_in_order(values: FloatArray, axis: int) -> FloatArray:
-    """Return a sum whose round-off does not depend on the number of realisations in the batch.
+    """Return a sum with the same round-off for every batch size.
 
     The order in which numpy sums along an axis depends on the lengths of the other axes.
     """

@@ -24,7 +24,7 @@ from wearsim.cli.shared import (
 
 
 def check(scenario: ScenarioFile, settings: Settings = None) -> None:
-    """Check a scenario: print all mistakes, or what will run."""
+    """Check a scenario: print all mistakes, or a summary of the run."""
     loaded = read_scenario(scenario, settings)
     from wearsim.studies.preparation import plan
 

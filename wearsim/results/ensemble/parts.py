@@ -324,7 +324,7 @@ def _read(path: Path) -> EnsembleData:
 
 
 def _merged(path: Path, file: h5py.File) -> tuple[EnsembleData, StoredRows]:
-    """Return what the file of an ensemble holds without its parts."""
+    """Return the content of the file of an ensemble without its parts."""
     attributes = read_attributes(path, file, ENSEMBLE, EnsembleData)
     schema = ensemble_schema(attributes["inputs"], attributes["control"])
     check_complete(path, file, schema.variables)

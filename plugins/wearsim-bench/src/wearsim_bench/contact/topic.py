@@ -32,16 +32,17 @@ ERRORS = {
 }
 COUNTS = {"warm_seconds": "warm-started", "prepare_seconds": "first prepared"}
 ABOUT = (
-    "The time is for one solve without a starting solution, on prepared strips, averaged over"
-    " the contacts of a group. A warm start uses the solution at 1 % less load."
-    " Errors are relative to half-space solutions by CONTACT, whose errors are"
+    "The time is that of one solve from a cold start, with a model already built for its strips,"
+    " as the mean over the contacts of a group. A warm start begins with the solution at 1 % less"
+    " load. Errors are relative to half-space solutions by CONTACT, whose own errors are"
     f" {100.0 * POWER_ERRORS[0]:g} to {100.0 * POWER_ERRORS[1]:g} % in power, up to"
     f" {100.0 * PURE_SPIN_ERROR:g} % with pure spin, and {100.0 * STRIPS_ERROR:g} % in P_l(y);"
-    " smaller differences are not ranked. Peak pressure and width of ellipses are compared with"
-    " Hertz. The error of P_l(y) is the median of the L2 error over the strips. The strips span the"
-    " width suggested by the model (1.2 times the patch, or the patch), or 8 mm for worn profiles;"
-    " theories with steps along rolling take as many steps as strips. The two defaults are the"
-    " strips of a run and of a single contact."
+    " models that differ by less than that are not ranked. The peak pressure and the width of"
+    " elliptic contacts are compared with Hertz. The error of P_l(y) is the median over the"
+    " contacts of the L2 error over the strips. The strips cover the width that the model suggests"
+    " (1.2 times the patch, or the patch), or 8 mm for worn profiles; theories that march along"
+    " rolling take as many steps as there are strips. The two default numbers of strips are those"
+    " of a run and of a single contact."
 )
 _NUMBERS = re.compile(r"[-+.\d]+")  # ignored when failures are compared
 _EVERY = 10  # stride of the cases of a quick benchmark
