@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from wearsim.csv_cells import decode
 from wearsim.csv_tables import read_columns
 from wearsim.errors import ScenarioError
 from wearsim.types import FloatArray
@@ -31,6 +32,13 @@ def test_columns_are_in_si_for_every_separator(mark: str) -> None:
     columns = _read(text)
     assert columns["time"].tolist() == [0.0, 90.0]
     assert columns["load"].tolist() == [300.0, -100.0]
+
+
+def test_column_can_have_an_alias() -> None:
+    text = "y [mm],z [um]\n0,1\n1,-2\n"
+    columns = {"y": "m", "height": "m"}
+    found = read_columns(text, "p.csv", columns, aliases={"height": ["z"]})
+    np.testing.assert_allclose(found["height"], [1e-6, -2e-6], rtol=1e-15)
 
 
 def test_plain_numbers_need_no_unit() -> None:
@@ -86,7 +94,7 @@ def test_plain_numbers_need_no_unit() -> None:
             ["line 1: column 'load' appears 2 times"],
         ),
         (
-            "time [s];load [N]\n0;1,5\n1;x\n2;\n3\n4;nan\n5;-inf\n6;1_0\n7;1e999\n",
+            'time [s],load [N]\n0,"1,5"\n1,x\n2,\n3\n4,nan\n5,-inf\n6,1_0\n7,1e999\n',
             [
                 "line 2: column 'load': needs a decimal point, got '1,5', expected a number",
                 "line 3: column 'load': is not a number, got 'x', expected a number",
@@ -181,3 +189,107 @@ def _outcome(text: str) -> object:
         return {name: column.tobytes() for name, column in _read(text).items()}
     except ScenarioError as error:
         return [str(mistake) for mistake in error.mistakes]
+
+
+PROFILE = {"y": "m", "height": "m"}
+
+
+def _profile(text: str) -> list[list[float]]:
+    columns = read_columns(
+        text, "p.csv", PROFILE, opposite={"height": "depth"}, rising="y", either_way=True
+    )
+    return [np.round(1e6 * columns[name], 9).tolist() for name in ("y", "height")]
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        "y [mm],height [um]",
+        "y (mm),height (um)",
+        "y/mm,height/um",
+        "Y [mm],Height [µm]",
+        "y in mm,HEIGHT in um",
+        "y,height\n[mm],[um]",
+        "y,height\nmm,um",
+        "# y [mm],height [um]",
+    ],
+)
+def test_units_are_read_as_laboratories_write_them(head: str) -> None:
+    assert _profile(f"{head}\n0,1\n1,-2\n") == [[0.0, 1000.0], [1.0, -2.0]]
+
+
+def test_lines_before_the_header_are_ignored() -> None:
+    preamble = "Instrument;T 8000\nDate;2024-05-31\nTip radius;2,0;um\n\nheight, after cleaning\n"
+    text = preamble + "No;y [mm];height [um]\n1;0;1\n2;1;-2\n"
+    assert _profile(text) == [[0.0, 1000.0], [1.0, -2.0]]
+
+
+@pytest.mark.parametrize("mark", [";", "\t"])
+def test_decimal_commas_are_read_where_the_separator_is_none(mark: str) -> None:
+    rows = ["y [mm]|height [um]", "-1|2,5", "0|-1,25e1", "1,5|3"]
+    expected = [[-1000.0, 0.0, 1500.0], [2.5, -12.5, 3.0]]
+    assert _profile("\n".join(rows).replace("|", mark)) == expected
+    rows[2] = "0|1.000,5"
+    with pytest.raises(ScenarioError) as caught:
+        _profile("\n".join(rows).replace("|", mark))
+    assert str(caught.value) == (
+        "p.csv: line 3: column 'height': is not a number, got '1.000,5', expected a number with a"
+        " decimal comma, as in other rows"
+    )
+
+
+def test_falling_positions_are_returned_in_rising_order() -> None:
+    assert _profile("y [mm],height [um]\n2,1\n1,2\n0,3\n") == [
+        [0.0, 1000.0, 2000.0],
+        [3.0, 2.0, 1.0],
+    ]
+    with pytest.raises(
+        ScenarioError, match="line 4: column 'y' must decrease, got 1, expected less"
+    ):
+        _profile("y [mm],height [um]\n2,1\n1,2\n1,3\n0,3\n")
+
+
+def test_depth_is_read_as_negative_height() -> None:
+    assert _profile("y [mm],depth [um]\n0,1\n1,2\n")[1] == [-1.0, -2.0]
+    with pytest.raises(ScenarioError, match="column 'height' appears 2 times"):
+        _profile("y [mm],depth [um],height [um]\n0,1,1\n1,2,2\n")
+
+
+@pytest.mark.parametrize(
+    ("times", "seconds"),
+    [
+        (["23:59:50", "23:59:59.5", "00:00:05", "00:00:20"], [0.0, 9.5, 15.0, 30.0]),
+        (["8:05", "8:06", "8:10", "9:00"], [0.0, 60.0, 300.0, 3300.0]),
+        (["0:00:00", "0:59:00", "26:00:00", "26:00:01"], [0.0, 3540.0, 93600.0, 93601.0]),
+        (
+            ["2024-05-31T23:59:00", "2024-06-01 00:00:00.5", "2024-06-01", "2024-06-01T02:00:01Z"],
+            None,
+        ),
+        (
+            [
+                "2024-05-31T23:59:00",
+                "2024-06-01 00:00:00.5",
+                "2024-06-01T00:01",
+                "2024-06-01T00:02",
+            ],
+            [0.0, 60.5, 120.0, 180.0],
+        ),
+    ],
+)
+def test_clock_times_count_from_the_first_row(
+    times: list[str], seconds: list[float] | None
+) -> None:
+    text = "time;load [N]\n" + "".join(f"{time};{k},5\n" for k, time in enumerate(times))
+    if seconds is None:
+        assert "must increase" in _mistakes(text)[0]
+        return
+    assert _read(text)["time"].tolist() == seconds
+    assert _mistakes(text.replace(times[2], "later"))[0].startswith(
+        "line 4: column 'time': is not a time, got 'later', expected a"
+    )
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "cp1252"])
+def test_text_is_decoded_from_every_usual_encoding(encoding: str) -> None:
+    text = "y [mm],height [µm]\n0,1\n1,2\n"
+    assert decode(text.encode(encoding)) == text

@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
+from wearsim.errors import Mistake, ScenarioError
 from wearsim.plugins import Options
 from wearsim.quantities import (
     Angle,
@@ -89,6 +90,7 @@ def test_quantity_becomes_the_nearest_si_float(kind: object, text: str, si: floa
         ("20 mm/mm", f'wrong dimension, got "20 mm/mm" (a plain number), {LENGTH}'),
         ("20 mmm", f"unknown unit 'mmm' (did you mean 'mm'?), got \"20 mmm\", {LENGTH}"),
         ("20 MM", f"unknown unit 'MM' (did you mean 'mm'?), got \"20 MM\", {LENGTH}"),
+        ("20 ml", f"unknown unit 'ml', got \"20 ml\", {LENGTH}"),
         ("20 furlong", f"unknown unit 'furlong', got \"20 furlong\", {LENGTH}"),
         ("20 N/", f"'N/' is not a unit, got \"20 N/\", {LENGTH}"),
         ("20 (mm", f"'(mm' is not a unit, got \"20 (mm\", {LENGTH}"),
@@ -110,6 +112,14 @@ def test_hertz_is_refused_as_ambiguous() -> None:
         "unknown unit 'Hz' (turns or radians? write rpm, turn/s or rad/s), got \"16 Hz\","
         ' expected a rotation speed such as "1000 rpm"'
     )
+
+
+def test_units_of_workshops_are_known() -> None:
+    assert quantity("1000 U/min", "rpm") == 1000.0
+    assert quantity("30 kgf", "N") == pytest.approx(294.1995, rel=1e-15)
+    assert quantity("1 bar", "Pa") == 1e5
+    assert quantity("1 inch", "mm") == 25.4
+    assert quantity("1 psi", "Pa") == pytest.approx(6894.757293168361, rel=1e-15)
 
 
 def test_one_per_second_is_not_a_rotation_speed() -> None:
@@ -234,15 +244,15 @@ def test_unreadable_file_is_reported() -> None:
     def missing(path: str) -> str:
         raise FileNotFoundError(2, "No such file or directory", path)
 
-    def binary(path: str) -> str:
-        return b"\xff".decode()
+    def damaged(path: str) -> str:
+        raise ScenarioError(path, [Mistake("", "", "is no SDF file")])
 
     read = {"read": missing}
     assert _named("a.csv", read) == (
         'the file cannot be read, got "a.csv" (No such file or directory)'
     )
     assert _named("a.csv", {"read": {}.__getitem__}) == 'the file cannot be read, got "a.csv"'
-    assert _named("a.csv", {"read": binary}).startswith('is not text in UTF-8, got "a.csv"')
+    assert _named("a.csv", {"read": damaged}) == 'is no SDF file, got "a.csv"'
     assert _named("a.csv", None) == 'no file can be read here, got "a.csv"'
     assert _named(3, read) == (
         'is not a file name, got 3, expected the name of a text file such as "load.csv"'

@@ -1,4 +1,10 @@
-"""CSV files with units in their headers, such as "time [min]", read as columns in SI units."""
+"""CSV files of numbers with units in their headers, read as columns in SI units.
+
+The forms that instruments and spreadsheets write are accepted: commas, semicolons or tabs between
+the cells; units as ``time [min]``, ``time (min)``, ``time/min``, ``time in min`` or on a line of
+their own; lines before the header; decimal commas where the separator is no comma; clock and ISO
+8601 times.
+"""
 
 from __future__ import annotations
 
@@ -6,35 +12,48 @@ import csv
 import difflib
 import re
 from operator import methodcaller
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+from wearsim.csv_cells import (
+    EXPECTED,
+    Conversion,
+    clock_time,
+    comma_number,
+    conversion_of,
+    in_order,
+    iso_time,
+)
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.quantities import DECIMAL_COMMA, NOT_FINITE, NUMBER
 from wearsim.units import QuantityError, conversion
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping, Sequence
 
     from wearsim.types import FloatArray
 
+
 MAX_MISTAKES = 20  # reported of one file
-_HEADER = re.compile(r"(?P<name>[^\[\]]*?)\s*(?:\[(?P<unit>[^\[\]]*)\])?")
-_Columns: TypeAlias = "dict[str, tuple[int, float]]"
+HEAD_LINES = 100  # the header is one of these
+_HEADER = re.compile(
+    r"(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\)"
+    r"|(?:\s*/|\s+in\s)\s*(?P<bare>[^\s/()\[\]][^/()\[\]]*))?"
+)
 _PLAIN_NUMBER = {"", "-", "1"}  # spellings of the unit of a plain number
 
 
-class _Header(NamedTuple):
-    """The header: number of its line, counted from 1, separator, and cells."""
-
+class _Row(NamedTuple):
     line: int
-    separator: str
     cells: list[str]
 
 
-def column_names(text: str) -> list[str]:
-    """Return the names of the columns of a CSV file, without units; see `read_columns`."""
-    header = _header(text.removeprefix("\ufeff").splitlines())
-    return [_name_and_unit(cell)[0] for cell in header.cells] if header else []
+class _Column(NamedTuple):
+    """A required column: position in the file, factor to SI, and reader of its cells."""
+
+    name: str
+    place: int
+    factor: float
+    conversion: Conversion | None
 
 
 def read_columns(
@@ -42,12 +61,16 @@ def read_columns(
     file: str,
     columns: Mapping[str, str],
     *,
+    aliases: Mapping[str, Sequence[str]] | None = None,
+    opposite: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
     rising: str | None = None,
+    either_way: bool = False,
 ) -> dict[str, FloatArray]:
     """Read columns of numbers from a CSV file with units in its headers.
 
-    The first line that is neither blank nor a ``#`` comment is the header: cells such as
-    ``time [min]``, separated by commas, semicolons or tabs. Other columns are ignored.
+    The header is the first line that names all columns, without regard to case. Other columns
+    are ignored, and so are blank lines and lines that begin with ``#``.
 
     Parameters
     ----------
@@ -56,9 +79,18 @@ def read_columns(
     file : str
         Name of the file, for messages.
     columns : mapping of str to str
-        Unit to return for each column by name; "1" for plain numbers.
+        Unit to return for each column by name; "1" for plain numbers. A column in "s" may hold
+        clock times (14:05:10) or ISO 8601 times, which are counted from the first row.
+    aliases : mapping of str to sequence of str, optional
+        Other accepted names of a column.
+    opposite : mapping of str to str, optional
+        Name of a column that has the values with the opposite sign, accepted instead.
+    units : mapping of str to str, optional
+        Units of columns, instead of those in the header.
     rising : str, optional
         A column whose values must increase from row to row.
+    either_way : bool
+        Whether they may also decrease from row to row; the rows are then returned in reverse.
 
     Returns
     -------
@@ -72,26 +104,57 @@ def read_columns(
     """
     import numpy as np  # noqa: PLC0415  (every command of the shell imports this module)
 
+    names = {
+        name: {name: 1.0, **dict.fromkeys((aliases or {}).get(name, ()), 1.0)} for name in columns
+    }
+    for name, other in (opposite or {}).items():
+        names[name][other] = -1.0
+    mistakes: list[Mistake] = []
     lines = text.removeprefix("\ufeff").splitlines()
-    header = _header(lines)
+    header, separator = _find_header(lines, names)
     if header is None:
         heads = ", ".join(_head(name, unit) for name, unit in columns.items())
         expected = f"a header line such as {heads}"
         raise ScenarioError(file, [Mistake("", "", "the file is empty", None, expected)])
-    mistakes: list[Mistake] = []
-    found = _find_columns(header, columns, mistakes)
-    body = lines[header.line :]
-    values: Mapping[str, FloatArray | list[float]] | None = None
-    if not mistakes:
-        values = _regular_numbers(body, header, found, rising)
-    if values is None:
-        values = _numbers(body, header, found, rising, mistakes)
+    start = header.line
+    sample = list(_rows(lines[start : start + HEAD_LINES], start, separator))
+    below = _unit_line(header, sample)
+    if below is not None:
+        start = sample.pop(0).line
+    wanted = {name: (unit, (units or {}).get(name)) for name, unit in columns.items()}
+    found = _find_columns(header, below, sample, separator, wanted, names, mistakes)
+    body = lines[start:]
+    numbers: Sequence[int] = range(start + 1, start + 1 + len(body))
+    table = None if mistakes else _regular_numbers(body, header, found, separator)
+    if table is None and not mistakes:  # perhaps there are comments between the rows
+        numbers = [number for number, line in zip(numbers, body, strict=True) if _has_cells(line)]
+        table = _regular_numbers(list(filter(_has_cells, body)), header, found, separator)
+    if table is None:
+        rows = list(_rows(body, start, separator))
+        numbers, values = _numbers(rows, header, found, separator, mistakes)
+        table = np.array(values).reshape(len(values), len(found)).T
+        if len(rows) < 2:
+            got = str(len(rows))
+            mistakes.append(Mistake("", "", "too few rows of numbers", got, "at least 2"))
+    data = {}
+    for column, cells in zip(found, table, strict=True) if table.size else ():
+        data[column.name] = in_order(cells, column.conversion)
+        if column.name == rising:
+            _check_order(numbers, data[column.name], rising, either_way, mistakes)
     if len(mistakes) > MAX_MISTAKES:
         rest = Mistake("", "", f"and {len(mistakes) - MAX_MISTAKES} more")
         mistakes = [*mistakes[:MAX_MISTAKES], rest]
     if mistakes:
         raise ScenarioError(file, mistakes)
-    return {name: np.asarray(values[name]) * factor for name, (_, factor) in found.items()}
+    falls = rising is not None and data[rising][0] > data[rising][1]
+    order = slice(None, None, -1 if falls else 1)
+    return {column.name: data[column.name][order] * column.factor for column in found}
+
+
+def column_names(text: str) -> list[str]:
+    """Return the names of the columns of a CSV file, in lower case; see `read_columns`."""
+    header = _find_header(text.removeprefix("\ufeff").splitlines(), {})[0]
+    return [_name_and_unit(cell)[0] for cell in header.cells] if header else []
 
 
 def _mistake(line: int, what: str, got: str | None = None, expected: str | None = None) -> Mistake:
@@ -107,81 +170,110 @@ def _has_cells(line: str) -> bool:
     return bool(line.strip()) and not line.lstrip().startswith("#")
 
 
-def _header(lines: list[str]) -> _Header | None:
-    """Return the header of a file, or None if the file is empty."""
-    for number, line in enumerate(lines, 1):
-        if _has_cells(line):
-            separator = next((mark for mark in "\t;," if mark in line), ",")
-            return _Header(number, separator, _cells(line, separator))
-    return None
-
-
-def _cells(line: str, separator: str) -> list[str]:
+def _cells(line: str, place: int, separator: str) -> _Row:
     cells = next(csv.reader([line], delimiter=separator, skipinitialspace=True))
-    return [cell.strip() for cell in cells]
+    return _Row(place + 1, [cell.strip() for cell in cells])
 
 
-def _name_and_unit(cell: str) -> tuple[str, str]:
-    """Split a cell of the header, such as "time [min]"; the unit may be empty."""
+def _rows(body: list[str], start: int, separator: str) -> Iterator[_Row]:
+    """Iterate over the rows of a body, whose first line has the index `start`."""
+    return (_cells(line, start + k, separator) for k, line in enumerate(body) if _has_cells(line))
+
+
+def _name_and_unit(cell: str) -> tuple[str, str | None]:
+    """Return the name in a cell of the header, without regard to case, and its unit if any."""
     head = _HEADER.fullmatch(cell)
-    return (head["name"], (head["unit"] or "").strip()) if head else (cell, "")
+    if head is None:
+        return cell.casefold(), None
+    units = (head[kind] for kind in ("square", "round", "bare"))
+    return head["name"].casefold(), next((unit for unit in units if unit is not None), None)
 
 
-def _regular_numbers(
-    body: list[str], header: _Header, found: _Columns, rising: str | None
-) -> dict[str, FloatArray] | None:
-    """Read the columns by numpy's parser, or return None if anything in the file is irregular.
+def _find_header(
+    lines: list[str], names: Mapping[str, Mapping[str, float]]
+) -> tuple[_Row | None, str]:
+    """Return the header of a file and its separator.
 
-    A file with a mistake is then read row by row, to report the mistake with its line.
+    The header is the first line that names all columns, or a comment that does. In a file without
+    such a line it is the last line above the first numbers.
     """
-    import numpy as np  # noqa: PLC0415
+    wanted = [{other.casefold() for other in accepted} for accepted in names.values()]
+    complete_comment, above_numbers = None, None
+    for place, line in enumerate(lines[:HEAD_LINES]):
+        text = line.strip().lstrip("#")
+        if not text.strip():
+            continue
+        separator = next((mark for mark in "\t;," if mark in text), ",")
+        row = _cells(text, place, separator)
+        heads = {_name_and_unit(cell)[0] for cell in row.cells}
+        complete = all(heads & accepted for accepted in wanted)
+        if not _has_cells(line):
+            complete_comment = complete_comment or ((row, separator) if complete else None)
+        elif complete:
+            return row, separator
+        elif above_numbers is None or not all(map(_starts_as_number, row.cells)):
+            above_numbers = row, separator
+        else:
+            break
+    return complete_comment or above_numbers or (None, ",")
 
-    if not _is_regular(body, header):
-        body = [line for line in body if _has_cells(line)]
-        if not _is_regular(body, header):
-            return None
-    places = [place for place, _ in found.values()]
-    try:
-        table = np.loadtxt(body, delimiter=header.separator, usecols=places, ndmin=2, unpack=True)
-    except ValueError:
+
+def _unit_line(header: _Row, sample: list[_Row]) -> list[str] | None:
+    """Return the units on the line below a header without units, or None."""
+    cells = sample[0].cells if sample else []
+    if any(_name_and_unit(cell)[1] for cell in header.cells) or not any(cells):
         return None
-    values = dict(zip(found, table, strict=True))
-    order = values.get(rising or "", np.arange(2.0))
-    regular = len(body) > 1 and np.isfinite(table).all() and (order[1:] > order[:-1]).all()
-    return values if regular else None
+    if any(map(_starts_as_number, filter(None, cells))):
+        return None
+    return [cell.strip("[]() ") for cell in cells]
 
 
-def _is_regular(rows: list[str], header: _Header) -> bool:
-    """Return whether rows have as many cells as the header, and no comments or quotes."""
-    joined = "\n".join(rows)
-    marks = set(map(methodcaller("count", header.separator), rows))
-    return marks == {len(header.cells) - 1} and "#" not in joined and '"' not in joined
+def _find_columns(
+    header: _Row,
+    units: list[str] | None,
+    sample: list[_Row],
+    separator: str,
+    wanted: Mapping[str, tuple[str, str | None]],
+    names: Mapping[str, Mapping[str, float]],
+    mistakes: list[Mistake],
+) -> list[_Column]:
+    """Find the required columns in the header, with the readers that the first rows need.
 
-
-def _find_columns(header: _Header, columns: Mapping[str, str], mistakes: list[Mistake]) -> _Columns:
-    """Return the positions of the required columns, and their factors to SI."""
+    `wanted` holds the unit to return and the unit given by the caller, by name.
+    """
     heads = [_name_and_unit(cell) for cell in header.cells]
-    found = {}
-    for name, unit in columns.items():
-        places = [place for place, (other, _) in enumerate(heads) if other == name]
+    found = []
+    for name, (unit, given) in wanted.items():
+        accepted = {other.casefold(): sign for other, sign in names[name].items()}
+        places = [place for place, (other, _) in enumerate(heads) if other in accepted]
         if len(places) == 1:
-            factor = _factor(header.line, name, heads[places[0]][1], unit, mistakes)
-            found[name] = places[0], factor
+            (place,) = places
+            written = units[place] if units and place < len(units) else heads[place][1]
+            written = given or written
+            cells = [row.cells[place] for row in sample if place < len(row.cells)]
+            conversion = conversion_of(cells, separator, unit)
+            factor = accepted[heads[place][0]]
+            if conversion not in {clock_time, iso_time}:
+                factor *= _factor(header.line, heads[place][0], written, unit, mistakes)
+            found.append(_Column(name, place, factor, conversion))
         elif places:
             what = f"column '{name}' appears {len(places)} times"
             mistakes.append(_mistake(header.line, what))
         else:
-            near = difflib.get_close_matches(
-                name, [cell.split("[")[0].strip() for cell in header.cells], n=1
-            )
+            near = difflib.get_close_matches(name, [other for other, _ in heads], n=1)
             what = f"column '{name}' is missing" + (f" (is it '{near[0]}'?)" if near else "")
             got, expected = ", ".join(header.cells), _head(name, unit)
             mistakes.append(_mistake(header.line, what, got, expected))
     return found
 
 
-def _factor(line: int, name: str, written: str, unit: str, mistakes: list[Mistake]) -> float:
+def _starts_as_number(cell: str) -> bool:
+    return cell.lstrip("+-.,")[:1].isdigit() or NOT_FINITE.fullmatch(cell) is not None
+
+
+def _factor(line: int, name: str, written: str | None, unit: str, mistakes: list[Mistake]) -> float:
     """Return the factor from the unit `written` in the header to `unit`; 1 after a mistake."""
+    written = (written or "").strip()
     if unit == "1":
         if written not in _PLAIN_NUMBER:
             what = f"column '{name}': a plain number has no unit"
@@ -197,42 +289,71 @@ def _factor(line: int, name: str, written: str, unit: str, mistakes: list[Mistak
     return 1.0
 
 
+def _regular_numbers(
+    body: list[str], header: _Row, found: list[_Column], separator: str
+) -> FloatArray | None:
+    """Read the columns by numpy's parser, or return None if anything in the file is irregular.
+
+    A file with a mistake is then read row by row, to report the mistake with its line.
+    """
+    import numpy as np  # noqa: PLC0415
+
+    joined = "\n".join(body)
+    marks = set(map(methodcaller("count", separator), body))
+    if marks != {len(header.cells) - 1} or "#" in joined or '"' in joined:
+        return None
+    places = [column.place for column in found]
+    converters: Any = {c.place: c.conversion for c in found if c.conversion}
+    if comma_number in converters.values() and "." not in joined:
+        body = joined.replace(",", ".").split("\n")
+        converters = {k: read for k, read in converters.items() if read is not comma_number}
+    try:
+        table = np.loadtxt(
+            body,
+            delimiter=separator,
+            usecols=places,
+            ndmin=2,
+            unpack=True,
+            converters=converters or None,
+            encoding=None,
+        )
+    except ValueError:
+        return None
+    return table if len(body) > 1 and np.isfinite(table).all() else None
+
+
 def _numbers(
-    body: list[str],
-    header: _Header,
-    found: _Columns,
-    rising: str | None,
-    mistakes: list[Mistake],
-) -> dict[str, list[float]]:
-    """Read every cell of the columns found."""
-    width, rows = len(header.cells), 0
-    values: dict[str, list[float]] = {name: [] for name in found}
-    for line, text in enumerate(body, header.line + 1):
-        if not _has_cells(text):
+    rows: list[_Row], header: _Row, found: list[_Column], separator: str, mistakes: list[Mistake]
+) -> tuple[list[int], list[list[float]]]:
+    """Read every cell of the columns found; return the lines of complete rows and their values."""
+    width, lines, values = len(header.cells), [], []
+    for row in rows:
+        if len(row.cells) > width:
+            comma = " (is a comma meant as decimal point?)" if separator == "," else ""
+            got, expected = f"{len(row.cells)} cells", f"{width}, as in the header"
+            mistakes.append(_mistake(row.line, f"too many cells{comma}", got, expected))
             continue
-        cells, rows = _cells(text, header.separator), rows + 1
-        if len(cells) > width:
-            comma = " (is a comma meant as decimal point?)" if header.separator == "," else ""
-            got, expected = f"{len(cells)} cells", f"{width}, as in the header"
-            mistakes.append(_mistake(line, f"too many cells{comma}", got, expected))
-            continue
-        for name, (place, _) in found.items():
-            cell = cells[place] if place < len(cells) else ""
-            number, above = _number(cell, line, name, mistakes), values[name]
-            if number is None:
-                continue
-            if name == rising and above and number <= above[-1]:
-                what, expected = f"column '{name}' must increase", f"more than {above[-1]:g}"
-                mistakes.append(_mistake(line, what, cell, expected))
-            above.append(number)
-    if rows < 2:
-        mistakes.append(Mistake("", "", "too few rows of numbers", str(rows), "at least 2"))
-    return values
+        cells = [row.cells[c.place] if c.place < len(row.cells) else "" for c in found]
+        numbers = [
+            _number(cell, row.line, column, mistakes)
+            for cell, column in zip(cells, found, strict=True)
+        ]
+        if None not in numbers:
+            lines.append(row.line)
+            values.append([number for number in numbers if number is not None])
+    return lines, values
 
 
-def _number(cell: str, line: int, column: str, mistakes: list[Mistake]) -> float | None:
+def _number(cell: str, line: int, column: _Column, mistakes: list[Mistake]) -> float | None:
     """Return the number in a cell, or None after a mistake."""
-    number = float(cell) if NUMBER.fullmatch(cell) else None
+    number, expected = None, "a number"
+    try:
+        if column.conversion is not None:
+            number = column.conversion(cell)
+        elif NUMBER.fullmatch(cell):
+            number = float(cell)
+    except ValueError:
+        expected = EXPECTED[column.conversion]
     if number is not None and abs(number) != float("inf"):
         return number
     what, got = "is not a number", f"'{cell}'" if cell else None
@@ -240,7 +361,21 @@ def _number(cell: str, line: int, column: str, mistakes: list[Mistake]) -> float
         what = "is missing"
     elif number is not None or NOT_FINITE.fullmatch(cell):
         what, got = "must be finite", cell
+    elif column.conversion in {clock_time, iso_time}:
+        what = "is not a time"
     elif DECIMAL_COMMA.fullmatch(cell):
         what = "needs a decimal point"
-    mistakes.append(_mistake(line, f"column '{column}': {what}", got, "a number"))
+    mistakes.append(_mistake(line, f"column '{column.name}': {what}", got, expected))
     return None
+
+
+def _check_order(
+    lines: Sequence[int], values: FloatArray, name: str, either_way: bool, mistakes: list[Mistake]
+) -> None:
+    """Add a mistake for each row whose value does not increase (or decrease) from the last."""
+    step = values[1:] - values[:-1]
+    falling = either_way and len(step) > 0 and step[0] < 0.0
+    for k in (step >= 0.0 if falling else step <= 0.0).nonzero()[0].tolist():
+        what, limit = ("decrease", "less") if falling else ("increase", "more")
+        got, expected = f"{values[k + 1]:g}", f"{limit} than {values[k]:g}"
+        mistakes.append(_mistake(lines[k + 1], f"column '{name}' must {what}", got, expected))

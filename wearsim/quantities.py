@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, TypeVar, get_args
 
 from pydantic_core import CoreSchema, SchemaValidator, core_schema
 
+from wearsim.errors import ScenarioError
 from wearsim.units import (
     ANGLE,
     DENSITY,
@@ -345,8 +346,8 @@ class InputFile:
             raise QuantityError("no file can be read here", shown(value))
         try:
             return cls(value, read(value))
-        except UnicodeDecodeError as error:
-            raise QuantityError("is not text in UTF-8", shown(value), expected) from error
+        except ScenarioError as error:  # of a file that is converted to text
+            raise QuantityError(str(error.mistakes[0]), shown(value)) from error
         except (OSError, KeyError, ValueError) as error:
             cause = error.strerror if isinstance(error, OSError) else None
             got = shown(value) + (f" ({cause})" if cause else "")

@@ -28,6 +28,8 @@ N = kg * m / s**2; mN = 1/1000 * N; kN = 1000 * N; MN = 1000 * kN
 Pa = N / m**2; kPa = 1000 * Pa; MPa = 1000 * kPa; GPa = 1000 * MPa
 J = N * m; mJ = 1/1000 * J; kJ = 1000 * J; MJ = 1000 * kJ; Nm = N * m; Nmm = N * mm; kNm = kN * m
 W = J / s; mW = 1/1000 * W; uW = 1/1000 * mW; kW = 1000 * W
+inch = 254/10000 * m; U = turn; Upm = rpm; bar = 100000 * Pa
+kgf = 980665/100000 * N; kp = kgf; lbf = 44482216152605/10000000000000 * N; psi = lbf / inch**2
 """
 
 _UNITS = dict(
@@ -150,7 +152,9 @@ def _unknown_name(name: str) -> str:
     if name.lower().endswith(("hz", "hertz")):
         return f"unknown unit '{name}' (turns or radians? write rpm, turn/s or rad/s)"
     by_lower = {known.lower(): known for known in reversed(_UNITS)}
-    near = difflib.get_close_matches(name.lower(), by_lower, n=1)
+    # names of one or two letters are all similar to one another
+    cutoff = 0.6 if len(name) > 2 else 1.0
+    near = difflib.get_close_matches(name.lower(), by_lower, n=1, cutoff=cutoff)
     hint = f" (did you mean '{by_lower[near[0]]}'?)" if near else ""
     return f"unknown unit '{name}'{hint}"
 

@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from cli_examples import SCENARIOS, Command
 
@@ -77,6 +78,34 @@ def test_plot_draws_measurements(command: Command, finished: Path) -> None:
     result = command("plot", finished, "-o", "x.svg", "--measured", "probe.csv")
     assert result.exit_code == 0
     assert "measured: probe" in Path("x.svg").read_text()
+
+
+def test_plot_takes_columns_and_units_of_a_measurement(command: Command, finished: Path) -> None:
+    Path("probe.csv").write_text("position;trace\n1;-0,1\n0;-0,5\n-1;-0,1\n")
+    named = "--measured", "probe.csv", "--columns", "position,trace", "--units", "mm,um"
+    result = command("plot", finished, "-o", "x.svg", *named)
+    assert result.exit_code == 0
+    assert "measured: probe" in Path("x.svg").read_text()
+    for option, value in (("--columns", "y"), ("--mean-rows", "3"), ("--at", "2 kg")):
+        result = command("plot", finished, "-o", "y.svg", *named[:2], option, value)
+        assert result.exit_code == 2
+        assert option in result.stderr
+    result = command("plot", finished, "-o", "y.svg", *named, "--row", 1)
+    assert "row is for the rows of a surface, and this is a CSV file" in result.stderr
+
+
+def test_plot_draws_a_row_of_a_surface(command: Command, finished: Path) -> None:
+    sdfio = pytest.importorskip("sdfio")
+    heights = 1e-6 * np.array([[-0.1, -0.5, -0.1], [-0.2, -0.6, -0.2]])
+    sdfio.write("map.sdf", heights, x_scale=1e-3, y_scale=1e-3)
+    result = command("plot", finished, "-o", "x.svg", "--measured", "map.sdf")
+    assert result.exit_code == 2
+    assert "map.sdf: has several rows, got 2 rows, 0 to 1 mm" in result.stderr
+    for option in (("--row", 1), ("--mean-rows", "0:2"), ("--at", "0.9 mm")):
+        shown = command(
+            "plot", finished, "-o", "x.svg", "--force", "--measured", "map.sdf", *option
+        )
+        assert shown.exit_code == 0
 
 
 def test_bad_measurement_is_bad_input_and_draws_nothing(command: Command, finished: Path) -> None:

@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from wearsim.errors import ScenarioError
-from wearsim.report.parts import patch_edges, read_measured
+from wearsim.report.parts import patch_edges
 from wearsim.report.text import brief, count, lapse, shown
 
 
@@ -53,20 +52,6 @@ def test_edges_of_an_ellipse_are_within_a_fifth_of_a_strip(strips: int) -> None:
 
 def test_no_contact_has_no_edges() -> None:
     assert patch_edges(np.linspace(0.0, 1.0, 5), np.zeros(5)) is None
-
-
-def test_depth_is_positive_downwards_and_height_upwards() -> None:
-    deep = read_measured("# probe\ny [mm]; depth [um]\n-1; 2\n1; 3\n", "a/probe.csv")
-    high = read_measured("y [mm], height [um]\n-1, -2\n1, -3\n", "probe.csv")
-    assert deep.label == "probe"
-    assert deep.y == pytest.approx([-1e-3, 1e-3])
-    assert deep.height == pytest.approx([-2e-6, -3e-6])
-    assert high.height == pytest.approx(deep.height)
-
-
-def test_measurement_without_depth_and_height_is_refused() -> None:
-    with pytest.raises(ScenarioError, match="column 'height' is missing"):
-        read_measured("y [mm], z [um]\n-1, -2\n1, -3\n", "probe.csv")
 
 
 @pytest.mark.parametrize(

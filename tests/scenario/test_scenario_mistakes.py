@@ -314,6 +314,21 @@ def test_unreadable_scenario_file_is_a_mistake(tmp_path: Path) -> None:
     with pytest.raises(ScenarioError) as caught:
         load_scenario(binary)
     assert str(caught.value) == f"{binary}: is not text in UTF-8"
+    binary.write_bytes(b"\x89HDF\r\n\x1a\n")
+    with pytest.raises(
+        ScenarioError, match="is a results file, not a scenario; show it with: wear"
+    ):
+        load_scenario(binary)
+
+
+def test_deep_nesting_is_a_mistake_of_the_file(parse: Parse) -> None:
+    with pytest.raises(ScenarioError, match=r"is nested too deeply"):
+        parse(("seed = 3", "seed = " + "[" * 5000))
+
+
+def test_decimal_comma_of_a_plain_number_gets_the_right_remedy(parse: Parse) -> None:
+    with pytest.raises(ScenarioError, match=r"expected a decimal point, coefficient = 0\.1"):
+        parse(("coefficient = 0.1", "coefficient = 0,1"))
 
 
 def test_files_are_read_from_the_folder_of_the_scenario(

@@ -16,8 +16,10 @@ from wearsim.errors import ResultsFileError
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from wearsim.profiles import ProfileChoice
     from wearsim.results import DissipationResult, EnsembleResult, Result
     from wearsim.scenario import Scenario
+    from wearsim.types import Profile
 
 
 _WIDTH = 110  # columns of a table in a file or a pipe
@@ -164,6 +166,96 @@ Scheduler: TypeAlias = Annotated[
 ]
 
 
+Columns: TypeAlias = Annotated[
+    str | None,
+    typer.Option(
+        "--columns",
+        metavar="Y,Z",
+        help="Names of the columns of position and height in the profile.",
+        show_default=False,
+    ),
+]
+Units: TypeAlias = Annotated[
+    str | None,
+    typer.Option(
+        "--units", metavar="U,V", help="Units of these columns: mm,um.", show_default=False
+    ),
+]
+Row: TypeAlias = Annotated[
+    int | None,
+    typer.Option("--row", min=0, help="Row of a surface, counted from 0.", show_default=False),
+]
+MeanRows: TypeAlias = Annotated[
+    str | None,
+    typer.Option(
+        "--mean-rows",
+        metavar="FROM:TO",
+        help="Mean of the rows of a surface from one up to, not including, another.",
+        show_default=False,
+    ),
+]
+At: TypeAlias = Annotated[
+    str | None,
+    typer.Option(
+        "--at",
+        metavar="POSITION",
+        help="Position of a row across the rows of a surface: '2 mm'.",
+        show_default=False,
+    ),
+]
+
+
+def profile_choice(
+    columns: str | None, units: str | None, row: int | None, mean_rows: str | None, at: str | None
+) -> ProfileChoice:
+    """Return the choice of a profile that the options of these names make.
+
+    Raises
+    ------
+    typer.BadParameter
+        If an option has not its form.
+    """
+    from wearsim.profiles import ProfileChoice
+    from wearsim.quantities import quantity
+
+    pairs = {"--columns": columns, "--units": units}
+    found: list[tuple[str, str] | None] = []
+    for option, text in pairs.items():
+        names = [name.strip() for name in text.split(",")] if text is not None else []
+        if text is not None and (len(names) != 2 or not all(names)):
+            message = f"'{text}' is not two names, expected position and height such as y,z"
+            raise typer.BadParameter(message, param_hint=option)
+        found.append((names[0], names[1]) if names else None)
+    rows = None
+    if mean_rows is not None:
+        first, _, last = mean_rows.partition(":")
+        if not (first.isdigit() and last.isdigit()):
+            message = f"'{mean_rows}' is no range of rows, expected one such as 0:10"
+            raise typer.BadParameter(message, param_hint="--mean-rows")
+        rows = int(first), int(last)
+    with checking("--at"):
+        position = quantity(at, "m") if at is not None else None
+    return ProfileChoice(found[0], found[1], row, rows, position)
+
+
+def read_measured(path: Path, choice: ProfileChoice) -> Profile:
+    """Return the profile in a file named by the user.
+
+    Raises
+    ------
+    ScenarioError
+        With all mistakes of the file.
+    """
+    from wearsim.errors import Mistake, ScenarioError
+    from wearsim.profiles import read_profile
+
+    try:
+        return read_profile(path.read_bytes(), str(path), choice)
+    except OSError as error:
+        why = f"the file cannot be read ({error.strerror})"
+        raise ScenarioError(str(path), [Mistake("", "", why)]) from error
+
+
 def results_option(ending: str) -> Any:
     """Return the option for the name of a results file.
 
@@ -304,22 +396,3 @@ def checked_scheduler(scheduler: str | None, workers: int | None) -> str:
         with checking(option):
             check_scheduler(chosen, count)
     return chosen
-
-
-def read_text(path: Path) -> str:
-    """Return the content of a text file named by the user.
-
-    Raises
-    ------
-    ScenarioError
-        If it cannot be read.
-    """
-    from wearsim.errors import Mistake, ScenarioError
-
-    try:
-        return path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        why = "is not text in UTF-8"
-        if isinstance(error, OSError):
-            why = f"the file cannot be read ({error.strerror})"
-        raise ScenarioError(str(path), [Mistake("", "", why)]) from error

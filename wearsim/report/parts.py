@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path, PurePath
+from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
@@ -14,7 +14,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from wearsim.csv_tables import column_names, read_columns
 from wearsim.report.text import count, pass_unit
 from wearsim.results.io.atomic_write import replacement
 from wearsim.types import BoolArray, FloatArray, IntArray
@@ -256,29 +255,3 @@ class Measured:
     label: str
     y: FloatArray
     height: FloatArray
-
-
-def read_measured(text: str, file: str) -> Measured:
-    """Return the measured profile in a CSV.
-
-    Parameters
-    ----------
-    text : str
-        Content of the file: columns y and either depth (positive downwards) or height.
-    file : str
-        Name of the file, for messages and the label.
-
-    Returns
-    -------
-    Measured
-
-    Raises
-    ------
-    ScenarioError
-        With all mistakes in the file.
-    """
-    names = column_names(text)
-    name = "depth" if "depth" in names and "height" not in names else "height"
-    columns = read_columns(text, file, {"y": "m", name: "m"})
-    height = -columns[name] if name == "depth" else columns[name]
-    return Measured(PurePath(file).stem, columns["y"], height)

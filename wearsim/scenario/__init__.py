@@ -3,15 +3,8 @@
 from wearsim.scenario.examples import scenario_schema
 from wearsim.scenario.parse.fields import Persistence, RandomInput
 from wearsim.scenario.parse.toml import load_scenario, parse_override, parse_scenario
-from wearsim.scenario.scenario import (
-    Cylinder,
-    Drawn,
-    Roller,
-    Scenario,
-    read_profile,
-    realise,
-    require_run,
-)
+from wearsim.scenario.scenario import Drawn, Scenario, realise, require_run
+from wearsim.scenario.tables.bodies import Cylinder, Roller
 from wearsim.scenario.tables.plain import (
     CreepageTable,
     EvolutionTable,
@@ -49,7 +42,6 @@ __all__ = [
     "load_scenario",
     "parse_override",
     "parse_scenario",
-    "read_profile",
     "realise",
     "require_run",
     "scenario_schema",

@@ -8,19 +8,25 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from wearsim.cli.shared import (
+    At,
+    Columns,
     Figure,
     FigureOption,
     Force,
     Json,
+    MeanRows,
     Quiet,
     Realisations,
+    Row,
     ScenarioFile,
     Seed,
     Settings,
+    Units,
     check_figure,
     note,
+    profile_choice,
+    read_measured,
     read_scenario,
-    read_text,
     refuse_same_file,
     results_option,
     write_json,
@@ -31,15 +37,15 @@ from wearsim.cli.shared import (
 if TYPE_CHECKING:
     from wearsim.scenario import Scenario
     from wearsim.studies.contact.single import ContactStudy
-    from wearsim.types import Profile
 
 
 ProfileFile = Annotated[
     Path | None,
     typer.Option(
         "--profile",
-        metavar="CSV",
-        help="Profile of the cylinder: columns 'y [mm]' and 'height [um]', worn is negative.",
+        metavar="FILE",
+        help="Profile of the cylinder: CSV with columns 'y [mm]' and 'height [um]', worn is"
+        " negative, or 'depth [um]'; or a surface, SDF or X3P.",
         show_default=False,
     ),
 ]
@@ -48,6 +54,11 @@ ProfileFile = Annotated[
 def contact(
     scenario: ScenarioFile,
     profile: ProfileFile = None,
+    columns: Columns = None,
+    units: Units = None,
+    row: Row = None,
+    mean_rows: MeanRows = None,
+    at: At = None,
     settings: Settings = None,
     figure: Figure = None,
     json: Json = False,
@@ -62,10 +73,10 @@ def contact(
     if figure is not None:
         refuse_inputs(figure, loaded.paths)
         refuse_inputs(figure, [profile] if profile else [], "the profile")
+    choice = profile_choice(columns, units, row, mean_rows, at)
+    measured = read_measured(profile, choice) if profile is not None else None
     has_fields = loaded.contact.spec.capabilities.fields
-    study = study_contact(
-        loaded, _profile(profile), figure is not None and has_fields, with_error=True
-    )
+    study = study_contact(loaded, measured, figure is not None and has_fields, with_error=True)
     notes = [*study.notes, *_notes_on_means(loaded)]
     if figure is not None and not has_fields:
         notes.append(f"model '{study.model}' gives no fields; the figure shows its strips only")
@@ -94,16 +105,6 @@ def _notes_on_means(scenario: Scenario) -> list[str]:
     if fields:
         notes.append(f"random fields are set to the means of their marginals: {', '.join(fields)}")
     return notes
-
-
-def _profile(path: Path | None) -> Profile | None:
-    """Return the profile in a CSV, or None if no file is given."""
-    if path is None:
-        return None
-    from wearsim.quantities import InputFile
-    from wearsim.scenario import read_profile
-
-    return read_profile(InputFile(str(path), read_text(path)))
 
 
 def _rows(study: ContactStudy) -> list[tuple[str, str]]:

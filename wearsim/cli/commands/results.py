@@ -9,14 +9,20 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from wearsim.cli.shared import (
+    At,
+    Columns,
     Figure,
     Force,
     Json,
+    MeanRows,
     ResultsFile,
+    Row,
+    Units,
     check_figure,
     note,
     open_any,
-    read_text,
+    profile_choice,
+    read_measured,
     write_json,
     write_notes,
     write_table,
@@ -32,21 +38,29 @@ MeasuredFiles = Annotated[
     list[Path] | None,
     typer.Option(
         "--measured",
-        metavar="CSV",
-        help="Measured profile to draw as points: columns 'y [mm]' and 'depth [um]', or 'height"
-        " [um]' with worn material negative. May be repeated.",
+        metavar="FILE",
+        help="Measured profile to draw as points: CSV with columns 'y [mm]' and 'depth [um]', or"
+        " 'height [um]' with worn material negative; or a surface, SDF or X3P. May be repeated.",
         show_default=False,
     ),
 ]
 
 
 def plot(
-    file: ResultsFile, figure: Figure = None, measured: MeasuredFiles = None, force: Force = False
+    file: ResultsFile,
+    figure: Figure = None,
+    measured: MeasuredFiles = None,
+    columns: Columns = None,
+    units: Units = None,
+    row: Row = None,
+    mean_rows: MeanRows = None,
+    at: At = None,
+    force: Force = False,
 ) -> None:
     """Draw the figure of a results file of any kind."""
     path = figure if figure is not None else Path(f"{file.stem}.png")
     check_figure(path, force)
-    from wearsim.report.parts import read_measured
+    from wearsim.report.parts import Measured
     from wearsim.results import Result, refuse_inputs
 
     refuse_inputs(path, [file], "the figure")
@@ -56,7 +70,9 @@ def plot(
         raise typer.BadParameter(
             f"requires the file of a wear test; {file} is none", param_hint="--measured"
         )
-    draw(result, path, [read_measured(read_text(csv), str(csv)) for csv in measured or []])
+    choice = profile_choice(columns, units, row, mean_rows, at)
+    profiles = [(name.stem, read_measured(name, choice)) for name in measured or []]
+    draw(result, path, [Measured(label, one.y, one.height) for label, one in profiles])
     note(f"figure: {path}")
 
 

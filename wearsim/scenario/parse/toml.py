@@ -9,17 +9,20 @@ from pathlib import Path, PurePath
 from typing import Any
 
 from wearsim.errors import Mistake, ScenarioError
+from wearsim.input_files import read_input
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.plugins import LoadSpec, Options, RandomInputSpec
+from wearsim.profiles import split_name
+from wearsim.quantities import DECIMAL_COMMA
 from wearsim.scenario.parse.fields import RandomInput, RandomInputTable
 from wearsim.scenario.parse.mistakes import Mistakes, installed, nearest
 from wearsim.scenario.parse.random_inputs import validate
-from wearsim.scenario.scenario import (
+from wearsim.scenario.scenario import Scenario
+from wearsim.scenario.tables.bodies import (
     Cylinder,
     CylinderTable,
     Roller,
     RollerTable,
-    Scenario,
     read_cylinder,
     read_roller,
 )
@@ -192,12 +195,16 @@ def load_scenario(path: str | Path, overrides: Mapping[str, object] | None = Non
     path = Path(path)
 
     def read(name: str) -> str:
-        return (path.parent / name).read_text(encoding="utf-8-sig")
+        file, choice = split_name(name)
+        return read_input(path.parent / file, choice)
 
     try:
-        text = read(path.name)
+        text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
-        raise ScenarioError(str(path), [Mistake("", "", "is not text in UTF-8")]) from error
+        what = "is not text in UTF-8"
+        if path.read_bytes().startswith(b"\x89HDF"):
+            what = f"is a results file, not a scenario; show it with: wearsim show {path}"
+        raise ScenarioError(str(path), [Mistake("", "", what)]) from error
     except OSError as error:
         raise ScenarioError(
             str(path), [Mistake("", "", f"the file cannot be read ({error.strerror})")]
@@ -273,6 +280,8 @@ def parse_scenario(
 def _parse_toml(text: str, name: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
+    except RecursionError as error:
+        raise ScenarioError(name, [Mistake("", "", "is nested too deeply")]) from error
     except ValueError as error:  # a TOMLDecodeError, or an integer with too many digits
         raise ScenarioError(name, [_syntax_mistake(text, str(error))]) from error
 
@@ -287,6 +296,8 @@ def _syntax_mistake(text: str, message: str) -> Mistake:
     line = text.splitlines()[int(number[1]) - 1].strip() if number else None
     bare = re.match(r"([\w.-]+)\s*=\s*([0-9.+-][^\"'#]*?)\s*(?:#.*)?$", line or "")
     expected = f'quotes around a value with a unit, {bare[1]} = "{bare[2]}"' if bare else None
+    if bare and DECIMAL_COMMA.fullmatch(bare[2]):
+        expected = f"a decimal point, {bare[1]} = {bare[2].replace(',', '.')}"
     return Mistake("", match["place"], f"is not valid TOML: {what}", line, expected)
 
 

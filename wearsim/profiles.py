@@ -1,0 +1,267 @@
+"""Measured profiles: CSV, and lines of SDF (ISO 25178-71) and X3P (ISO 25178-72) surfaces."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+from dataclasses import dataclass
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from wearsim.csv_cells import decode
+from wearsim.csv_tables import read_columns
+from wearsim.errors import Mistake, ScenarioError
+from wearsim.quantities import quantity
+from wearsim.types import Profile
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from wearsim.types import FloatArray
+
+_SDF = (b"aISO-", b"bISO-", b"aBCR-", b"bBCR-")
+_X3P = b"PK\x03\x04"
+MAX_POINTS = 1_000_000  # of a filtered profile
+ROW_CHOICES = ("row", "mean_rows", "at")
+_INSTALL = "pip install 'wearsim[surfaces]'"
+
+
+@dataclass(frozen=True)
+class ProfileChoice:
+    """Choice of one profile from a file that holds more than its columns y and height.
+
+    Parameters
+    ----------
+    columns : tuple of str, optional
+        Names of the columns of position and height in a CSV file.
+    units : tuple of str, optional
+        Units of these columns where the header has none, ("mm", "um").
+    row : int, optional
+        Number of a row of a surface, counted from 0.
+    mean_rows : tuple of int, optional
+        First row of a mean over rows, and the row after the last.
+    at : float, optional
+        Position of a row across the rows [m]; the nearest one is taken.
+    """
+
+    columns: tuple[str, str] | None = None
+    units: tuple[str, str] | None = None
+    row: int | None = None
+    mean_rows: tuple[int, int] | None = None
+    at: float | None = None
+
+    @property
+    def rows(self) -> list[str]:
+        """Names of the given options that choose rows of a surface."""
+        return [name for name in ROW_CHOICES if getattr(self, name) is not None]
+
+
+def name_of_rows(file: str, rows: Mapping[str, object]) -> str:
+    """Return the name of some rows of a surface, "map.x3p#row=3".
+
+    Parameters
+    ----------
+    file : str
+        Name of the file.
+    rows : mapping of str to object
+        Values by `ROW_CHOICES`, as in a scenario.
+    """
+    return "#".join([file, *(f"{key}={json.dumps(value)}" for key, value in rows.items())])
+
+
+def split_name(name: str) -> tuple[str, ProfileChoice]:
+    """Return the file and the rows in a name from `name_of_rows`.
+
+    Raises
+    ------
+    ValueError
+        If the value of a row is not of its form.
+    """
+    file, *parts = name.split("#")
+    choice: dict[str, Any] = {}
+    for part in parts:
+        key, _, text = part.partition("=")
+        value = json.loads(text)
+        if key == "mean_rows":
+            value = tuple(int(row) for row in value)
+        choice[key] = quantity(value, "m") if key == "at" else value
+    return file, ProfileChoice(**choice)
+
+
+def read_profile(content: str | bytes, file: str, choice: ProfileChoice | None = None) -> Profile:
+    """Read a measured profile.
+
+    A CSV file has the columns y and height, or y and depth, which is positive downwards; y may
+    rise or fall. The rows of a surface run along y, whose zero is the middle of a row; points
+    that were not measured are left out.
+
+    Parameters
+    ----------
+    content : str or bytes
+        Content of the file: CSV, SDF or X3P.
+    file : str
+        Name of the file, for messages.
+    choice : ProfileChoice, optional
+        Columns and units, or rows of a surface.
+
+    Returns
+    -------
+    Profile
+
+    Raises
+    ------
+    ScenarioError
+        With all mistakes of the file; if a surface has several rows and none is chosen, with its
+        rows and the options that choose.
+    """
+    choice = choice or ProfileChoice()
+    if isinstance(content, bytes):
+        if is_surface(content):
+            return _chosen_row(_surface(content, file), file, choice)
+        content = decode(content)
+    if choice.rows:
+        what = f"{choice.rows[0]} is for the rows of a surface, and this is a CSV file"
+        raise _error(file, what)
+    y, height = names = choice.columns or ("y", "height")
+    if y == height:
+        raise _error(file, "position and height need two columns", y)
+    columns = read_columns(
+        content,
+        file,
+        dict.fromkeys(names, "m"),
+        aliases={} if choice.columns else {"height": ["z"]},
+        opposite={} if choice.columns else {"height": "depth"},
+        units=dict(zip(names, choice.units or (), strict=False)),
+        rising=y,
+        either_way=True,
+    )
+    return Profile(columns[y], columns[height])
+
+
+def is_surface(content: bytes) -> bool:
+    """Return whether the content of a file is a surface in SDF or X3P."""
+    return content.startswith((*_SDF, _X3P))
+
+
+def _error(
+    file: str, what: str, got: str | None = None, expected: str | None = None
+) -> ScenarioError:
+    return ScenarioError(file, [Mistake("", "", what, got, expected)])
+
+
+class _Surface(NamedTuple):
+    """Heights on a grid [m], shape (rows, points); positions along and across the rows [m]."""
+
+    along: FloatArray
+    across: FloatArray
+    height: FloatArray
+
+
+def _surface(content: bytes, file: str) -> _Surface:
+    """Return the heights in an SDF or X3P file; NaN where the surface was not measured."""
+    import numpy as np  # noqa: PLC0415  (every command of the shell imports this module)
+
+    name = "SDF" if content.startswith(_SDF) else "X3P"
+    try:
+        reader = import_module("sdfio" if name == "SDF" else "x3pio")
+    except ImportError as error:
+        raise _error(file, f"{name} files need another package: {_INSTALL}") from error
+    try:
+        found = reader.read(io.BytesIO(content))
+        if name == "SDF":
+            return _Surface(found.x_axis, found.y_axis, found.data)
+        (layer,) = found.layers
+        height = np.atleast_2d(layer.z)
+        return _Surface(layer.x_values, getattr(layer, "y_values", np.zeros(1)), height)
+    except Exception as error:  # of any kind that the reader raises for a damaged file
+        raise _error(file, f"is no {name} file of one surface or profile: {error}") from error
+
+
+def _chosen_row(surface: _Surface, file: str, choice: ProfileChoice) -> Profile:
+    """Return one row of a surface, or the mean of several."""
+    import numpy as np  # noqa: PLC0415
+
+    if choice.columns or choice.units:
+        raise _error(file, "columns and units are for CSV files; a surface has its own units")
+    count, across = len(surface.height), surface.across
+    rows = f"{count} rows, {1e3 * across[0]:.6g} to {1e3 * across[-1]:.6g} mm"
+    ways = "of row 0, mean_rows 0 to 10 or at '1 mm'"
+    if count > 1 and len(choice.rows) != 1:
+        what = "has several rows" if not choice.rows else f"{' and '.join(choice.rows)} are given"
+        raise _error(file, what, rows, f"one {ways}")
+    first, stop = choice.mean_rows or (choice.row or 0, (choice.row or 0) + 1)
+    if choice.at is not None:
+        first = int(np.abs(across - choice.at).argmin())
+        stop = first + 1
+        half = 0.5 * float(np.diff(across).max()) if count > 1 else 0.0
+        if not across[0] - half <= choice.at <= across[-1] + half:
+            raise _error(file, "at is not on the surface", f"{1e3 * choice.at:.6g} mm", rows)
+    if not 0 <= first < stop <= count:
+        raise _error(file, "there are no such rows", f"{first} to {stop - 1}", f"0 to {count - 1}")
+    chosen = surface.height[first:stop]
+    known = np.isfinite(chosen)
+    measured = known.any(axis=0)
+    if np.count_nonzero(measured) < 2:
+        raise _error(
+            file, "fewer than two points of the rows were measured", f"rows {first} to {stop - 1}"
+        )
+    total = np.where(known, chosen, 0.0).sum(axis=0)[measured]
+    y = surface.along - 0.5 * (surface.along[0] + surface.along[-1])
+    return Profile(y[measured], total / known.sum(axis=0)[measured])
+
+
+_ALPHA = math.sqrt(math.log(2.0) / math.pi)
+
+
+def gaussian_filtered(profile: Profile, cutoff: float) -> Profile:
+    """Return a profile without roughness, by the Gaussian filter of ISO 16610-21.
+
+    A wave as long as the cutoff keeps half of its amplitude. Near the ends, where the weights of
+    the filter are cut off, a straight line is fitted with these weights (ISO 16610-28), so that
+    slopes are kept up to the ends.
+
+    Parameters
+    ----------
+    profile : Profile
+        Any spacing of points; it is interpolated to a uniform spacing.
+    cutoff : float
+        Cutoff wavelength [m].
+
+    Returns
+    -------
+    Profile
+        At equally spaced points, at most as far apart as those of the input.
+
+    Raises
+    ------
+    ValueError
+        If the cutoff is not positive or exceeds the length of the profile.
+    """
+    import numpy as np  # noqa: PLC0415
+
+    length = float(profile.y[-1] - profile.y[0])
+    if not 0.0 < cutoff <= length:
+        raise ValueError(
+            f"the cutoff of {1e3 * cutoff:.4g} mm must be positive and at most the length of the"
+            f" profile, {1e3 * length:.4g} mm"
+        )
+    count = min(math.ceil(length / float(np.diff(profile.y).min()) - 1e-6), MAX_POINTS) + 1
+    y = np.linspace(profile.y[0], profile.y[-1], count)
+    height = np.interp(y, profile.y, profile.height)
+    spacing = length / (count - 1)
+    reach = math.ceil(cutoff / spacing)  # weights beyond are below 1e-6
+    distance = spacing * np.arange(-reach, reach + 1) / (_ALPHA * cutoff)
+    weight = np.exp(-np.pi * distance**2)
+
+    def weighted(values: FloatArray, power: int) -> FloatArray:
+        # the sum over points k of weight(y_k - y) (y_k - y)^power values_k
+        kernel = (weight * distance**power)[::-1]
+        size = count + 2 * reach
+        product = np.fft.rfft(values, size) * np.fft.rfft(kernel, size)
+        return np.fft.irfft(product, size)[reach : reach + count]
+
+    ones = np.ones(count)
+    s0, s1, s2 = (weighted(ones, power) for power in range(3))
+    t0, t1 = weighted(height, 0), weighted(height, 1)
+    return Profile(y, (s2 * t0 - s1 * t1) / (s0 * s2 - s1 * s1))

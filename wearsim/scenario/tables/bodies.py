@@ -1,0 +1,193 @@
+"""Tables [roller] and [cylinder]: geometry, materials and the initial profile."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Literal, TypeAlias
+
+from pydantic import Field, PlainValidator
+
+from wearsim.errors import ScenarioError
+from wearsim.plugins import Options
+from wearsim.profiles import (
+    ROW_CHOICES,
+    ProfileChoice,
+    gaussian_filtered,
+    name_of_rows,
+    read_profile,
+)
+from wearsim.quantities import InputFile, Length, PerRoller, PositiveLength, PositivePressure
+from wearsim.scenario.parse.mistakes import Mistakes
+from wearsim.scenario.parse.random_inputs import validate
+from wearsim.types import Material, Profile
+from wearsim.units import QuantityError, shown
+
+#: Handbook constants: phosphor bronze C51000, ductile iron of EN 1563.
+MATERIALS = {
+    "steel": Material(200e9, 0.3),
+    "aluminium": Material(70e9, 0.33),
+    "bronze": Material(110e9, 0.34),
+    "ductile-iron": Material(169e9, 0.275),
+}
+MaterialName: TypeAlias = Literal["steel", "aluminium", "bronze", "ductile-iron"]
+
+
+class MaterialTable(Options):
+    """Elastic constants of a material."""
+
+    youngs_modulus: PositivePressure = Field(description="Young's modulus.")
+    poisson_ratio: float = Field(ge=0.0, le=0.5, description="Poisson's ratio.")
+    hardness: PositivePressure | None = Field(
+        default=None, description="Indentation hardness, for wear laws that need it."
+    )
+
+
+def _read_material(value: object) -> Material:
+    expected = f"one of {', '.join(shown(name) for name in MATERIALS)} or a table of its constants"
+    if isinstance(value, str) and value in MATERIALS:
+        return MATERIALS[value]
+    if not isinstance(value, dict):
+        raise QuantityError(
+            "unknown material" if isinstance(value, str) else "is not a material",
+            shown(value),
+            expected,
+        )
+    table = MaterialTable.model_validate_json(json.dumps(value, default=str), strict=True)
+    return Material(table.youngs_modulus, table.poisson_ratio, table.hardness)
+
+
+MaterialField: TypeAlias = Annotated[
+    Material,
+    PlainValidator(_read_material, json_schema_input_type=MaterialName | MaterialTable),
+]
+
+
+class RollerTable(Options):
+    """Rollers: crowned, all of the same shape."""
+
+    radius: PositiveLength | None = Field(
+        default=None, description="Rolling radius; either it or the diameter is needed."
+    )
+    diameter: PositiveLength | None = Field(default=None, description="Rolling diameter.")
+    crown_radius: PositiveLength | None = Field(
+        default=None,
+        description="Radius of the crown across the track; or give its diameter.",
+    )
+    crown_diameter: PositiveLength | None = Field(default=None, description="Crown diameter.")
+    offset: PerRoller[Length] = Field(
+        default=0.0,
+        description="Axial position of the apex: one value for all rollers or one per roller.",
+    )
+    material: MaterialField = Field(description="Name of a material, or a table of its constants.")
+
+
+class CylinderTable(Options):
+    """Cylinder on which the rollers run."""
+
+    radius: PositiveLength | None = Field(
+        default=None, description="Radius; either it or the diameter is needed."
+    )
+    diameter: PositiveLength | None = Field(default=None, description="Diameter.")
+    material: MaterialField = Field(description="Name of a material, or a table of its constants.")
+    profile: InputFile | None = Field(
+        default=None,
+        description="Initial surface: a CSV file with columns y and height above the nominal shape,"
+        " negative where material is worn, or depth; or a surface in SDF or X3P.",
+    )
+    profile_columns: tuple[str, str] | None = Field(
+        default=None, description="Names of the columns of position and height."
+    )
+    profile_units: tuple[str, str] | None = Field(
+        default=None, description="Units of these columns where the header has none."
+    )
+    profile_row: int | None = Field(
+        default=None, ge=0, description="Number of a row of a surface, counted from 0."
+    )
+    profile_mean_rows: tuple[int, int] | None = Field(
+        default=None, description="First row of a mean, and the row after the last."
+    )
+    profile_at: Length | None = Field(
+        default=None, description="Position of a row across the rows of a surface."
+    )
+    profile_filter: PositiveLength | None = Field(
+        default=None,
+        description="Cutoff wavelength of the Gaussian filter that removes roughness.",
+    )
+
+
+class Roller(Options):
+    """Geometry and material of the rollers."""
+
+    radius: float = Field(description="Rolling radius [m].")
+    crown_radius: float = Field(description="Radius of the crown across the track [m].")
+    offset: PerRoller[Length] = Field(
+        description="Axial position of the apex, one for all rollers or one per roller [m]."
+    )
+    material: Material = Field(description="Material of the rollers.")
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """Geometry and material of the cylinder.
+
+    Parameters
+    ----------
+    radius : float
+        Radius [m].
+    material : Material
+        Material of the cylinder.
+    profile : Profile, optional
+        Initial height of the surface above its nominal shape.
+    """
+
+    radius: float
+    material: Material
+    profile: Profile | None = None
+
+
+def _radius(radius: float | None, diameter: float | None) -> float:
+    """Return the radius that one of the two gives; without both, a mistake has been added."""
+    return radius or 0.5 * (diameter or 0.0)
+
+
+def read_roller(mistakes: Mistakes, raw: Mapping[str, object]) -> Roller | None:
+    """Return the rollers, or None after adding the mistakes of the table [roller]."""
+    table = validate(mistakes, RollerTable, raw, "roller")
+    if table is None:
+        return None
+    return Roller.model_construct(
+        radius=_radius(table.radius, table.diameter),
+        crown_radius=_radius(table.crown_radius, table.crown_diameter),
+        offset=table.offset,
+        material=table.material,
+    )
+
+
+def read_cylinder(mistakes: Mistakes, raw: Mapping[str, object]) -> Cylinder | None:
+    """Return the cylinder, or None after adding the mistakes of the table [cylinder]."""
+    rows = {key: raw[f"profile_{key}"] for key in ROW_CHOICES if f"profile_{key}" in raw}
+    if rows and isinstance(raw.get("profile"), str):
+        # one name for one profile: results keep the chosen rows as the content of this file
+        raw = {**raw, "profile": name_of_rows(str(raw["profile"]), rows)}
+    table = validate(mistakes, CylinderTable, raw, "cylinder")
+    if table is None:
+        return None
+    if table.profile is None:
+        for key in raw:
+            if key.startswith("profile_"):
+                mistakes.add("cylinder", key, "has no meaning without profile")
+        return Cylinder(_radius(table.radius, table.diameter), table.material)
+    choice = ProfileChoice(table.profile_columns, table.profile_units)
+    try:
+        profile = read_profile(table.profile.text, table.profile.path, choice)
+        if table.profile_filter is not None:
+            profile = gaussian_filtered(profile, table.profile_filter)
+    except ScenarioError as error:
+        mistakes.add_file(error, "cylinder", "profile")
+        return None
+    except ValueError as error:
+        mistakes.add("cylinder", "profile_filter", str(error))
+        return None
+    return Cylinder(_radius(table.radius, table.diameter), table.material, profile)
