@@ -6,6 +6,7 @@ from rich.console import Console
 from wearsim.cli import progress
 from wearsim.cli.progress import RunWatcher
 from wearsim.cli.shared import plain
+from wearsim.mechanics.numerics.jit import kernel
 from wearsim.studies.run.recorder import Event, Finished, Started, Stepped, Warned
 
 STARTED = Started(1000.0, 60.0, 0.0, "implicit", "slender")
@@ -39,7 +40,7 @@ def shown_steps(capsys: pytest.CaptureFixture[str], steps: list[tuple[float, flo
 def test_first_and_last_step_are_always_shown(capsys: pytest.CaptureFixture[str]) -> None:
     found = shown_steps(capsys, [(0.0, 10.0), (0.1, 500.0), (0.2, 1000.0)])
     assert [line.split(",")[0] for line in found] == ["pass 10 (1 %)", "pass 1"]
-    assert found[-1] == "pass 1,000 (100 %), 1.000 min, depth 1.000 um, step 10"
+    assert found[-1] == "pass 1,000 (100 %), 1.000 min, depth 1.000 um, step of 10 passes"
 
 
 def test_lines_are_a_second_apart(capsys: pytest.CaptureFixture[str]) -> None:
@@ -47,17 +48,55 @@ def test_lines_are_a_second_apart(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_time_left_follows_from_the_rate_of_passes(capsys: pytest.CaptureFixture[str]) -> None:
-    (_, line) = shown_steps(capsys, [(0.0, 10.0), (10.0, 260.0)])
-    assert line.endswith(", 30 s left")
+    lines = shown_steps(capsys, [(0.0, 10.0), (5.0, 135.0), (10.0, 260.0)])
+    assert lines[-1].endswith(", 30 s left")
+
+
+def test_first_steps_show_no_time_left(capsys: pytest.CaptureFixture[str]) -> None:
+    lines = shown_steps(capsys, [(0.0, 10.0), (5.0, 135.0), (10.0, 260.0)])
+    assert [" left" in line for line in lines] == [False, False, True]
+
+
+def test_compilation_is_shown_in_lines_without_control_characters(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    time = Time()
+
+    @kernel
+    def first(x: float) -> float:
+        return x + 1.0
+
+    @kernel
+    def second(x: float) -> float:
+        return x + 2.0
+
+    with RunWatcher(quiet=False, now=time, kernels=lambda: {"first", "second"}):
+        first(1.0)
+        time.now = 5.0
+        second(1.0)
+        second(2.0)
+    assert capsys.readouterr().err.splitlines() == [
+        f"compiling kernels, once after installation: {number} of 2" for number in (1, 2)
+    ]
+
+
+def test_quiet_shows_no_compilation(capsys: pytest.CaptureFixture[str]) -> None:
+    @kernel
+    def third(x: float) -> float:
+        return x + 3.0
+
+    with RunWatcher(quiet=True):
+        third(1.0)
+    assert capsys.readouterr() == ("", "")
 
 
 def test_continued_run_starts_at_its_pass(capsys: pytest.CaptureFixture[str]) -> None:
     time = Time()
     watch = RunWatcher(quiet=False, now=time)
     watch(Started(1000.0, 60.0, 500.0, "implicit", "slender"))
-    time.now = 10.0
-    watch(step(600.0))
-    start, line = capsys.readouterr().err.splitlines()
+    for time.now, passes in ((2.0, 520.0), (4.0, 540.0), (10.0, 600.0)):
+        watch(step(passes))
+    start, *_, line = capsys.readouterr().err.splitlines()
     assert start.startswith("continuing from pass 500 of 1,000 passes, 1.000 min, with")
     assert line.endswith(", 40 s left")
 

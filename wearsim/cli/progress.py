@@ -7,12 +7,13 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any, Self
 
 from wearsim.cli.shared import console, note
 from wearsim.report.text import count, lapse, shown
+from wearsim.studies.kernels import compilation_counted
 from wearsim.studies.run.recorder import Event, Finished, Started, Stepped, Warned
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 
 BETWEEN_LINES = 1.0  # s
+_REPORTS = 3  # reports of progress from which the time left is shown
 _BAR, _COLUMNS_FOR_BAR = 24, 115
 
 
@@ -32,6 +34,10 @@ class Display:
         Whether to show nothing.
     now : callable
         Returns a monotonic time [s].
+    kernels : callable
+        Returns the names of the kernels of the study; called if a kernel has to be compiled.
+    transient : bool
+        Whether the line is removed from the terminal at the end.
 
     Attributes
     ----------
@@ -41,7 +47,14 @@ class Display:
         Greatest length of the text.
     """
 
-    def __init__(self, quiet: bool, now: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self,
+        quiet: bool,
+        now: Callable[[], float] = time.monotonic,
+        *,
+        kernels: Callable[[], Iterable[str]] = tuple,
+        transient: bool = False,
+    ) -> None:
         from rich.progress import BarColumn, Progress, TextColumn
 
         screen = console(err=True)
@@ -52,6 +65,7 @@ class Display:
             console=screen,
             speed_estimate_period=3600.0,
             get_time=now,
+            transient=transient,
             disable=quiet or not screen.is_terminal,
         )
         taken = len("100 %  ") + len(bar) * (_BAR + 1)
@@ -59,18 +73,33 @@ class Display:
         self.live.add_task("starting")
         (self._task,) = self.live.tasks
         self._quiet, self._now, self._written = quiet, now, now()
+        self._kernels, self._reports, self._compiling, self._open = kernels, 0, False, ExitStack()
 
     def __enter__(self) -> Self:
-        self.live.start()
+        with ExitStack() as stack:
+            self.live.start()
+            stack.callback(self.live.stop)
+            stack.enter_context(compilation_counted(self._show_compilation, self._kernels))
+            self._open = stack.pop_all()
         return self
 
     def __exit__(self, *failure: object) -> None:
-        self.live.stop()
+        self._open.close()
+
+    def _show_compilation(self, number: int, total: int) -> None:
+        """Show that a kernel is being compiled; without a terminal the first one at once."""
+        text = f"compiling kernels, once after installation: {number} of {total}"
+        self.show(text, always=not self._compiling)
+        self._compiling = True
 
     def advance(self, done: float, total: float) -> str:
-        """Set how much is done, and return the time left in the form ", 12 s left"."""
+        """Set how much is done, and return the time left in the form ", 12 s left".
+
+        The first reports, from which it would be unreliable, return an empty text.
+        """
+        self._reports += done > self._task.completed
         self.live.update(self._task.id, completed=done, total=total)
-        left = self._task.time_remaining
+        left = self._task.time_remaining if self._reports >= _REPORTS else None
         return f", {lapse(left)} left" if left else ""
 
     def show(self, text: str, *, always: bool = False) -> None:
@@ -124,7 +153,7 @@ class RunWatcher(Display):
         text = (
             f"pass {count(step.passes)}{part if self.live.disable else ''},"
             f" {shown(step.time, 'min')}, depth {shown(step.depth, 'um')},"
-            f" step {count(step.step_passes)}{left}"
+            f" step of {count(step.step_passes)} passes{left}"
         )
         is_last = step.passes >= step.total_passes
         self.show(text, always=self._is_first_step or is_last)
@@ -177,7 +206,7 @@ def progress_text(progress: EnsembleProgress, columns: float = math.inf) -> str:
         text += " realisations"
     parts = [
         f"{count(progress.failed)} failed" if progress.failed else "",
-        f"{lapse(progress.left)} left" if progress.left else "",
+        f"{lapse(progress.left)} left" if progress.left > 0.0 else "",
         _estimate(progress),
         f"{progress.rate:.3g}/s" if progress.rate < 1000.0 else f"{count(progress.rate)}/s",
     ]

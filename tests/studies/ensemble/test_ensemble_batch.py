@@ -10,7 +10,9 @@ from tests.studies.random_examples import CREEPAGE, FRICTION, LOAD, SLACK, WANDE
 from wearsim.evolution.integrate import evolve
 from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.step_doubling import StabilisedStepper
+from wearsim.studies.ensemble import realisation
 from wearsim.studies.ensemble.batch import RealisationRun, batch_groups, observe
+from wearsim.studies.ensemble.realisation import shared_grid
 from wearsim.studies.run.assemble import assemble_problem, prepared_model
 from wearsim.studies.run.draws import Drawer
 from wearsim.studies.run.grid import strips_of_run
@@ -129,3 +131,17 @@ def test_plugin_error_fails_one_realisation_only(monkeypatch):
     assert isinstance(found[1], ZeroDivisionError)
     for k in (0, 2):
         assert bits(found[k]) == bits(observe([runs[k]])[0])
+
+
+@pytest.mark.parametrize("missing", [set(), {"solve_slender"}])
+def test_missing_kernels_are_compiled_by_one_step(missing, monkeypatch):
+    taken = []
+    advance = realisation.Evolution._try_steps
+    monkeypatch.setattr(realisation, "not_cached", lambda names: missing)
+    monkeypatch.setattr(
+        realisation.Evolution, "_try_steps", lambda self: taken.append(1) or advance(self)
+    )
+    scenario = scenario_of(1000, load__normal_force=LOAD)
+    runner = realisation.RealisationRunner(scenario, "monte-carlo", 4, shared_grid(scenario))
+    runner.compile_kernels()
+    assert bool(taken) == bool(missing)

@@ -141,6 +141,15 @@ def test_existing_file_is_not_overwritten(twelve):
         ensemble(small(), 12, twelve.path)
 
 
+def test_time_left_is_estimated_from_three_batches_on(tmp_path, monkeypatch):
+    monkeypatch.setattr(ensemble_work.EnsembleWork, "_batch_size", lambda self: 1)
+    left: list[float] = []
+    ensemble(
+        small(), 5, tmp_path / "few.h5", on_progress=lambda now: left.append(now.left), **SERIAL
+    )
+    assert np.isnan(left).tolist() == [True, True, False, False, False]
+
+
 def test_slow_batch_defers_few_outcomes(tmp_path, monkeypatch):
     from wearsim.studies.ensemble.driver import AHEAD, EnsembleWork
 

@@ -67,8 +67,10 @@ def contact(
     """Solve one contact: the first roller at the start of the load."""
     check_figure(figure, force)
     loaded = read_scenario(scenario, settings)
+    from wearsim.cli.progress import Display
     from wearsim.results import refuse_inputs
     from wearsim.studies.contact.single import study_contact
+    from wearsim.studies.kernels import kernels_of
 
     if figure is not None:
         refuse_inputs(figure, loaded.paths)
@@ -76,7 +78,13 @@ def contact(
     choice = profile_choice(columns, units, row, mean_rows, at)
     measured = read_measured(profile, choice) if profile is not None else None
     has_fields = loaded.contact.spec.capabilities.fields
-    study = study_contact(loaded, measured, figure is not None and has_fields, with_error=True)
+    with_fields = figure is not None and has_fields
+
+    def kernels() -> set[str]:
+        return kernels_of(loaded, "contact", with_fields)
+
+    with Display(quiet=False, kernels=kernels, transient=True):
+        study = study_contact(loaded, measured, with_fields, with_error=True)
     notes = [*study.notes, *_notes_on_means(loaded)]
     if figure is not None and not has_fields:
         notes.append(f"model '{study.model}' gives no fields; the figure shows its strips only")
@@ -218,8 +226,10 @@ def dissipation(
     from wearsim.cli.progress import Counter, stop_on_signals
     from wearsim.cli.render.summary import dissipation_json, dissipation_line, write_spread
     from wearsim.studies.contact.monte_carlo import dissipation as study
+    from wearsim.studies.kernels import kernels_of
 
-    with stop_on_signals(_STOPPING) as stop, Counter(quiet) as counter:
+    watcher = Counter(quiet, kernels=lambda: kernels_of(loaded, "contacts"))
+    with stop_on_signals(_STOPPING) as stop, watcher as counter:
         result = study(
             loaded,
             realisations,

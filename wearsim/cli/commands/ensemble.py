@@ -90,6 +90,7 @@ def ensemble(
     from wearsim.studies.ensemble.compare import path_of
     from wearsim.studies.ensemble.compare import sweep as run_sweep
     from wearsim.studies.ensemble.designs import parse_plan
+    from wearsim.studies.kernels import kernels_of
 
     options: dict[str, Any] = {"plan": plan, "until": until, "workers": workers, "force": force}
     with checking("--plan"):
@@ -119,7 +120,9 @@ def ensemble(
         if not quiet:
             note(f"{key} = {value}: {file}")
 
-    with stop_on_signals(STOPPING) as stop, EnsembleWatcher(quiet) as watch:
+    first = scenarios[next(iter(files))]
+    watcher = EnsembleWatcher(quiet, kernels=lambda: kernels_of(first))
+    with stop_on_signals(STOPPING) as stop, watcher as watch:
         options |= {
             "on_progress": watch,
             "stop_requested": stop.is_set,

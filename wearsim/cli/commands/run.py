@@ -45,10 +45,12 @@ def run(
     loaded = read_scenario(scenario, settings)
     path = output if output is not None else Path(f"{scenario.stem}.h5")
     from wearsim.cli.progress import RunWatcher, stop_on_signals
+    from wearsim.studies.kernels import kernels_of
     from wearsim.studies.run import run as study
 
     write_notes(loaded.notes)
-    with stop_on_signals() as stop, RunWatcher(quiet) as watch:
+    watcher = RunWatcher(quiet, kernels=lambda: kernels_of(loaded))
+    with stop_on_signals() as stop, watcher as watch:
         result = study.run(loaded, path, force=force, on_event=watch, stop_requested=stop.is_set)
     report(result, json)
 
@@ -111,11 +113,14 @@ def resume(
         from wearsim.cli.progress import EnsembleWatcher, stop_on_signals
         from wearsim.results import open_ensemble
         from wearsim.studies.ensemble.api import resume_ensemble
+        from wearsim.studies.kernels import kernels_of
 
-        nothing = _nothing_to_do(open_ensemble(file), failed)
+        before = open_ensemble(file)
+        nothing = _nothing_to_do(before, failed)
         if nothing and realisations is None:
             note(f"note: nothing to do: {nothing}")
-        with stop_on_signals(STOPPING) as stop, EnsembleWatcher(quiet) as watch:
+        watcher = EnsembleWatcher(quiet, kernels=lambda: kernels_of(before.scenario))
+        with stop_on_signals(STOPPING) as stop, watcher as watch:
             result = resume_ensemble(
                 file,
                 failed=failed,
@@ -150,9 +155,12 @@ def _resume_run(file: Path, until: str | None, json: bool, quiet: bool) -> None:
                 raise ValueError(f"must be above zero, got '{until}'")
     from wearsim.cli.commands.run import report
     from wearsim.cli.progress import RunWatcher, stop_on_signals
+    from wearsim.results import open_results
+    from wearsim.studies.kernels import kernels_of
     from wearsim.studies.run import run as study
 
-    with stop_on_signals() as stop, RunWatcher(quiet) as watch:
+    watcher = RunWatcher(quiet, kernels=lambda: kernels_of(open_results(file).scenario))
+    with stop_on_signals() as stop, watcher as watch:
         result = study.resume(file, seconds, on_event=watch, stop_requested=stop.is_set)
     report(result, json)
 

@@ -6,8 +6,8 @@ import gc
 import os
 import shutil
 import time
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
@@ -29,6 +29,7 @@ _CONFIG: Any = numba.config
 # kernels are never passed to C code, for which numba would compile a second wrapper
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True}
 KEPT = 86400.0  # seconds for which the compiled kernels of other sources are kept
+_KERNELS: list[Any] = []  # all kernels, as numba's dispatchers
 
 
 class _WithoutCollection(event.Listener):
@@ -62,13 +63,13 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
     that processes that start at the same time write identical cache entries.
     """
     folder, folder_of_user = _cache_folder(), _CONFIG.CACHE_DIR
-    if folder is None:
-        return numba.njit(function, **_OPTIONS)  # type: ignore[no-any-return]
-    _CONFIG.CACHE_DIR = str(folder)
     try:
-        compiled: Any = numba.njit(function, cache=True, **_OPTIONS)
+        if folder is not None:
+            _CONFIG.CACHE_DIR = str(folder)
+        compiled: Any = numba.njit(function, cache=folder is not None, **_OPTIONS)
     finally:
         _CONFIG.CACHE_DIR = folder_of_user
+    _KERNELS.append(compiled)
     return compiled  # type: ignore[no-any-return]
 
 
@@ -79,6 +80,48 @@ def subroutine(function: Callable[P, R]) -> Callable[P, R]:
     compilation time.
     """
     return register_jitable(**_OPTIONS)(function)
+
+
+class _Compilations(event.Listener):
+    """Listener that reports every kernel when its compilation starts."""
+
+    def __init__(self, report: Callable[[str], None]) -> None:
+        self._report = report
+
+    def on_start(self, event: Any) -> None:
+        """Report the kernel; subroutines are compiled as a part of it."""
+        dispatcher = event.data["dispatcher"]
+        if any(dispatcher is compiled for compiled in _KERNELS):
+            self._report(dispatcher.__name__)
+
+    def on_end(self, event: Any) -> None:
+        """Do nothing at the end of a compilation."""
+
+
+@contextmanager
+def compilation_reported(report: Callable[[str], None]) -> Iterator[None]:
+    """Call `report` with the name of every kernel that is compiled in the context, at its start.
+
+    A kernel that is read from the cache is not compiled.
+    """
+    with event.install_listener("numba:compile", _Compilations(report)):
+        yield
+
+
+def ready_kernels() -> set[str]:
+    """Return the names of the kernels that this process has compiled or read from the cache."""
+    return {kernel.__name__ for kernel in _KERNELS if kernel.signatures}
+
+
+def not_cached(names: Iterable[str]) -> set[str]:
+    """Return the kernels, by name, that the disk cache lacks; all if there is no cache.
+
+    The file names are those of numba. If another version names its files differently, the kernels
+    are only considered to be missing.
+    """
+    folder = _cache_folder()
+    found = () if folder is None else folder.glob("*/*.nbi")
+    return set(names) - {path.name.partition(".")[2].partition("-")[0] for path in found}
 
 
 def own_array(array: FloatArray) -> FloatArray:

@@ -25,6 +25,7 @@ SECONDS = 4.0  # duration of a batch; a test costs a third more in batches of 20
 MOST_IN_BATCH = 256
 AHEAD = 3  # batches for each worker that may be beyond the next interim analysis
 BETWEEN_ESTIMATES = 0.5  # s
+BATCHES = 3  # finished batches from which the time left is estimated
 DEFAULT_TARGET = Target.parse("depth.mean 1%")
 
 
@@ -39,7 +40,7 @@ class EnsembleProgress:
     rate : float
         Realisations per second in this process.
     left : float
-        Estimated time until the maximum number is reached [s]; nan where unknown.
+        Estimated time until the maximum number is reached [s]; nan in the first batches.
     what : str
         Name of the estimate, "depth.mean".
     estimate : Interval
@@ -161,7 +162,7 @@ class EnsembleWork:
         self._deferred: dict[int, Outcome] = {}
         self._stopping = self._reached = False
         self._ahead = AHEAD * max(pool.workers, 1)
-        self._run, self._rate = 0, 0.0
+        self._run, self._batches_run, self._rate = 0, 0, 0.0
         self._next_estimate, self._estimate = -math.inf, UNKNOWN
 
     def warn(self, texts: Iterable[str]) -> None:
@@ -263,6 +264,7 @@ class EnsembleWork:
         now = [item for item in outcomes if item.number < self._limit]
         self._deferred |= {item.number: item for item in outcomes if item.number >= self._limit}
         self._run += len(outcomes)
+        self._batches_run += 1
         self._rate = self._run / max(time.monotonic() - self.started, 1e-9)
         if now and not self._reached:
             self.file.put(now)
@@ -320,13 +322,14 @@ class EnsembleWork:
             self._estimate = target.interval(self._result().estimate_for(target))
             # at most 5 % of the time
             self._next_estimate = now + max(BETWEEN_ESTIMATES, 20.0 * (time.monotonic() - now))
+        known = self._rate > 0.0 and self._batches_run >= BATCHES
         self.on_progress(
             EnsembleProgress(
                 done=done,
                 failed=failed,
                 requested=self.total,
                 rate=self._rate,
-                left=(self.total - done - failed) / self._rate if self._rate else math.nan,
+                left=(self.total - done - failed) / self._rate if known else math.nan,
                 what=target.what,
                 estimate=self._estimate,
                 workers=self.pool.describe,

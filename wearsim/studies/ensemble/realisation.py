@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from wearsim.errors import WearsimError
+from wearsim.evolution.integrate import Evolution
+from wearsim.evolution.state import fresh_state
+from wearsim.mechanics.numerics.jit import not_cached
 from wearsim.plugins import ContactModel
 from wearsim.results import Outcome
 from wearsim.scenario import Scenario, parse_scenario
 from wearsim.studies.ensemble.batch import RealisationRun, RunObservations, batch_groups, observe
 from wearsim.studies.ensemble.designs import BASE_PLANS, EnsemblePlan, sources
+from wearsim.studies.kernels import kernels_of
 from wearsim.studies.run.assemble import assemble_problem, prepared_model
 from wearsim.studies.run.draws import Drawer
 from wearsim.studies.run.grid import strips_of_run
@@ -253,6 +258,20 @@ class RealisationRunner:
         model = self._model(draws.scenario, grid)
         problem, stepper, _ = assemble_problem(draws, grid, model)
         return RealisationRun(number, drawn, draws, problem, stepper)
+
+    def compile_kernels(self) -> None:
+        """Compile the kernels in this process if the cache lacks any, by one step of a test.
+
+        Worker processes, each of which would otherwise compile them, then read them from the cache.
+        """
+        if not not_cached(kernels_of(self.scenario)):
+            return
+        with suppress(Exception):  # an error of the realisation is reported when it is run
+            run = self._prepare(0, {})
+            state, steps = fresh_state(run.problem), run.draws.scenario.evolution.max_steps
+            next_record = run.schedule.next_record
+            test = Evolution(run.problem, state, run.stepper, run.stop, steps, next_record)
+            next(iter(test), None)
 
     def _model(self, scenario: Scenario, grid: Grid) -> ContactModel:
         """Return the contact model prepared for the strips, shared by realisations if possible."""

@@ -1,0 +1,99 @@
+"""Compiled kernels of a study, which the display of their compilation counts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from typing import Literal
+
+from wearsim.mechanics.numerics.jit import compilation_reported, ready_kernels
+from wearsim.scenario import Scenario
+
+#: Kernels of the built-in contact models and tangential theories, with the kernels that they call.
+_MODELS = {
+    "slender": {"middle_curvature", "solve_slender"},
+    "hertz": {"hertz_on_profile"},
+    "hertz-fastsim": {"hertz_on_profile"},
+    "semi-hertzian": {"solve_semi_hertzian"},
+}
+_BATCH = {"solve_contacts", "find_patches", "fit_within", "one_flexibility", "prescribed_ellipse"}
+_THEORIES: dict[str, set[str]] = {
+    "strip": set(),
+    "fastsim": {"closed_form"},
+    "fastrip": {"fastrip", "beyond_strip_theory", "one_flexibility"},
+}
+_FIELDS: dict[str, set[str]] = {
+    "strip": set(),
+    "fastsim": {"march_fields"},
+    "fastrip": {"march_fields", "fastrip_fields"},
+}
+
+
+def kernels_of(
+    scenario: Scenario,
+    study: Literal["test", "contacts", "contact"] = "test",
+    fields: bool = False,
+) -> set[str]:
+    """Return the names of the kernels that a study calls, including those called by kernels.
+
+    Kernels of plugins are not included.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    study : {"test", "contacts", "contact"}
+        Wear tests, the same contact for many realisations, or a single contact.
+    fields : bool
+        Whether the study computes the fields of a contact.
+    """
+    steps = study == "test"
+    contact, evolution = scenario.contact, scenario.evolution
+    model, name = contact.model, evolution.stepper
+    found = {"hertz_ellipse", "coefficient", "short_limit"} | _MODELS.get(model, set())
+    theory = getattr(contact.options, "tangential", "strip")
+    if model == "hertz-fastsim":
+        march = getattr(contact.options, "closed_form", "") == "never"
+        found |= _BATCH if study != "contact" else {"march" if march else "closed_form"}
+        found |= {"march_fields"} if fields else set()
+    elif model in _MODELS:
+        found |= _THEORIES[theory] | (_FIELDS[theory] if fields else set())
+        if theory == "strip":
+            batched = model == "slender" and scenario.creepage.drive != "free"
+            found |= {"strip_contacts"} if batched else set()
+            found |= {"solve_strips"} if fields or not batched else set()
+    if steps and model == "slender" and theory == "strip" and name == "per-pass":
+        found |= {"run_passes"}
+    if steps and model in {"slender", "semi-hertzian"} and name in {"auto", "implicit"}:
+        found |= {"ratio_to_load", "estimate_exponents"}
+    roles = {item.role for item in scenario.random}
+    found |= {"filter_noise"} if "process" in roles else set()
+    return found | ({"smooth", "half_lengths"} if "field" in roles else set())
+
+
+@contextmanager
+def compilation_counted(
+    report: Callable[[int, int], None], needed: Callable[[], Iterable[str]]
+) -> Iterator[None]:
+    """Report the number of every kernel that is compiled in the context, and their total.
+
+    Kernels that are read from the cache count as compiled.
+
+    Parameters
+    ----------
+    report : callable
+        Called with number and total when the compilation of a kernel starts.
+    needed : callable
+        Returns the names of the kernels of the study; called at the first compilation only.
+    """
+    names: set[str] = set()
+    started: set[str] = set()
+
+    def count(name: str) -> None:
+        if not names:
+            names.update(needed())
+        started.add(name)
+        names.add(name)
+        report(len(names & (started | ready_kernels())), len(names))
+
+    with compilation_reported(count):
+        yield
