@@ -8,9 +8,30 @@ from typing import Any
 
 
 class WearsimError(Exception):
-    """Base class of the errors raised by wearsim."""
+    """Base class of the errors raised by wearsim.
+
+    Parameters
+    ----------
+    message : str
+        What failed.
+    python, shell : str
+        What to do about it, in terms of the arguments of a function and of the options of a verb,
+        where these differ.
+
+    Attributes
+    ----------
+    message : str
+        The message without remedy.
+    at_shell : str
+        The message with the remedy at the shell; the text of the exception has that in Python.
+    """
 
     exit_code = 1
+
+    def __init__(self, message: str = "", *, python: str = "", shell: str = "") -> None:
+        self.message = message
+        self.at_shell = f"{message}; {shell}" if shell else message
+        super().__init__(f"{message}; {python}" if python else message)
 
 
 @dataclass(frozen=True)

@@ -193,7 +193,7 @@ def test_force_replaces_no_input(command: Command) -> None:
     refused = command("dissipation", scenario, *SMALL, "-o", "u.toml", "--force")
     assert refused.exit_code == 2
     assert refused.stderr == (
-        "error: u.toml: the scenario is read from u.toml, and --force replaces no input; choose"
+        "error: u.toml: the scenario is read from u.toml, and no input is replaced; choose"
         " another name with -o\n"
     )
     assert scenario.read_bytes() == before

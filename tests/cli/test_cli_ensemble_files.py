@@ -179,6 +179,6 @@ def test_export_refuses_a_file_as_its_folder(command: Command, done: Path) -> No
     assert "a.png: is a file; tables are written to a folder" in result.stderr
 
 
-def test_ensemble_opened_as_a_run_names_open_ensemble(done: Path) -> None:
-    with pytest.raises(ResultsFileError, match=r"In Python, wearsim\.open_ensemble opens it"):
-        wearsim.open_results(done)
+def test_ensemble_opened_as_another_kind_names_open_results(done: Path) -> None:
+    with pytest.raises(ResultsFileError, match=r"In Python, wearsim\.open_results opens it"):
+        wearsim.open_dissipation(done)

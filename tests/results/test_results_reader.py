@@ -115,6 +115,21 @@ def test_xarray_opens_run_with_named_dimensions(tmp_path: Path, rollers: int) ->
         assert dataset.attrs["title"] == "a rig"
 
 
+@pytest.mark.parametrize("locking", [None, True, False, "best-effort"])
+@pytest.mark.parametrize("mode", ["r", "r+"])
+def test_file_open_in_another_library_is_read(
+    run_file: Path, mode: str, locking: bool | str | None
+) -> None:
+    with h5py.File(run_file, mode, locking=locking):
+        assert differences(some_run(seed=5), read_results(run_file)) == []
+
+
+def test_file_that_xarray_holds_open_is_read(run_file: Path) -> None:
+    with xarray.open_dataset(run_file, engine="h5netcdf") as dataset:
+        assert differences(some_run(seed=5), read_results(run_file)) == []
+        assert dataset["depth"].size
+
+
 def test_all_dimensions_have_names(run_file: Path) -> None:
     with h5netcdf.File(run_file, "r") as file:  # raises on a dimension with no name
         assert set(file.dimensions) == {*AXES, "y"}

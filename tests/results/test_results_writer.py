@@ -154,7 +154,9 @@ def test_existing_file_is_replaced_only_with_force(tmp_path: Path) -> None:
     path.write_bytes(b"precious")
     with pytest.raises(ResultsFileError) as caught:
         check_output(path, force=False)
-    assert str(caught.value) == f"{path}: already exists; --force replaces it, -o chooses another"
+    start = f"{path}: already exists; "
+    assert str(caught.value) == f"{start}force=True replaces it, output=... chooses another"
+    assert caught.value.at_shell == f"{start}--force replaces it, -o chooses another"
     check_output(path, force=True)
 
 

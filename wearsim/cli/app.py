@@ -222,11 +222,11 @@ def _state(state: dict[str, Any]) -> str:
 
 def _message(error: BaseException) -> str:
     if isinstance(error, SolverError) and error.state:
-        return f"error: {error}\nstate at the failure: {_state(error.state)}"
+        return f"error: {error.at_shell}\nstate at the failure: {_state(error.state)}"
     if isinstance(error, ScenarioError | Interrupted):  # their messages start with file or progress
-        return str(error)
+        return error.at_shell
     if isinstance(error, WearsimError):
-        return f"error: {error}"
+        return f"error: {error.at_shell}"
     if isinstance(error, OSError):
         return f"error: {error.filename or 'a file'}: {error.strerror or error}"
     return (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from wearsim.profiles import ProfileChoice
-    from wearsim.results import DissipationResult, EnsembleResult, Result
     from wearsim.scenario import Scenario
     from wearsim.types import Profile
 
@@ -303,23 +302,6 @@ def read_scenario(path: Path, settings: list[str] | None) -> Scenario:
     with checking("--set"):
         overrides = dict(parse_override(text) for text in settings or [])
     return load_scenario(path, overrides)
-
-
-def open_any(path: Path) -> Result | DissipationResult | EnsembleResult:
-    """Return the results in a file of any kind.
-
-    Raises
-    ------
-    ResultsFileError
-        If it is no results file, or damaged.
-    """
-    from wearsim.results import kind_of, open_dissipation, open_ensemble, open_results
-
-    openers: dict[str, Callable[[Path], DissipationResult | EnsembleResult]] = {
-        "dissipation": open_dissipation,
-        "ensemble": open_ensemble,
-    }
-    return openers.get(kind_of(path), open_results)(path)
 
 
 def check_figure(path: Path | None, force: bool, option: str = "-o") -> None:

@@ -4,17 +4,11 @@ from wearsim.results.csv_export import export_csv
 from wearsim.results.dissipation import DissipationData, DissipationResult
 from wearsim.results.ensemble.data import EnsembleData, Outcome
 from wearsim.results.ensemble.parts import read_ensemble
-from wearsim.results.ensemble.result import EnsembleResult, open_ensemble
+from wearsim.results.ensemble.result import EnsembleResult
 from wearsim.results.ensemble.writer import EnsembleFile
 from wearsim.results.io.atomic_write import DISK, Storage, check_output, refuse_inputs, same_file
-from wearsim.results.io.files import (
-    kind_of,
-    open_dissipation,
-    open_results,
-    read_dissipation,
-    read_results,
-    write_results,
-)
+from wearsim.results.io.files import kind_of, read_dissipation, read_results, write_results
+from wearsim.results.opening import open_dissipation, open_ensemble, open_results
 from wearsim.results.run import Result, RunData
 
 __all__ = [

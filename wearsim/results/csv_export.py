@@ -92,8 +92,9 @@ def export_csv(
     folder = Path(folder)
     if folder.exists() and not folder.is_dir():
         raise ResultsFileError(
-            f"{folder}: is a file; tables are written to a folder: name one with -o, which is"
-            " created if it does not exist"
+            f"{folder}: is a file; tables are written to a folder, which is created if it does not"
+            " exist",
+            shell="name one with -o",
         )
     contents: dict[str, Iterable[str]]
     if isinstance(result, EnsembleResult):
@@ -108,7 +109,9 @@ def export_csv(
     existing = [str(folder / name) for name in contents if (folder / name).exists()]
     if existing:
         raise ResultsFileError(
-            f"{', '.join(existing)}: already exists; remove it, or choose another folder with -o"
+            f"{', '.join(existing)}: already exists",
+            python="remove it, or choose another folder",
+            shell="remove it, or choose another folder with -o",
         )
     for name, content in contents.items():
         parent = (folder / name).parent

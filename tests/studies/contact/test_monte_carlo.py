@@ -323,7 +323,7 @@ def test_strip_statistics_are_those_of_the_realisations():
 def test_existing_file_is_refused_before_the_study(tmp_path: Path):
     path = tmp_path / "a.h5"
     path.write_text("content")
-    with pytest.raises(Exception, match="--force replaces it"):
+    with pytest.raises(Exception, match="force=True replaces it"):
         dissipation(contact(), 2, path)
     assert dissipation(contact(), 2, path, force=True).path == path
 

@@ -206,7 +206,7 @@ def test_existing_file_is_overwritten_by_force_only(
 
     with monkeypatch.context() as patch:
         patch.setattr(studies, "assemble_problem", work)
-        with pytest.raises(ResultsFileError, match="already exists; --force replaces it"):
+        with pytest.raises(ResultsFileError, match="already exists; force=True replaces it"):
             studies.run(short(), path)
     assert path.read_bytes() == content
     assert studies.run(short(), path, force=True).finished

@@ -73,10 +73,10 @@ def test_run_in_memory_equals_its_file(stepper: str, path: Path) -> None:
 
 def test_stopped_run_reports_its_progress(path: Path) -> None:
     scenario = short()
-    with pytest.raises(
-        studies.Interrupted, match=rf"of 6000; continue with: wearsim resume {path}"
-    ):
+    with pytest.raises(studies.Interrupted) as stop:
         studies.run(scenario, path, stop_requested=lambda: True)
+    assert str(stop.value).endswith(f'of 6000; continue with wearsim.resume("{path}")')
+    assert stop.value.at_shell.endswith(f"of 6000; continue with: wearsim resume {path}")
     stopped = open_results(path)
     assert not stopped.finished
     assert stopped.steps == 1

@@ -20,7 +20,6 @@ from wearsim.cli.shared import (
     Units,
     check_figure,
     note,
-    open_any,
     profile_choice,
     read_measured,
     write_json,
@@ -61,11 +60,11 @@ def plot(
     path = figure if figure is not None else Path(f"{file.stem}.png")
     check_figure(path, force)
     from wearsim.report.parts import Measured
-    from wearsim.results import Result, refuse_inputs
+    from wearsim.results import Result, open_results, refuse_inputs
 
     refuse_inputs(path, [file], "the figure")
     refuse_inputs(path, measured or [], "a measured profile")
-    result = open_any(file)
+    result = open_results(file)
     if measured and not isinstance(result, Result):
         raise typer.BadParameter(
             f"requires the file of a wear test; {file} is none", param_hint="--measured"
@@ -113,9 +112,9 @@ def show(file: ResultsFile, json: Json = False) -> None:
     """Show the content of a results file and the end state."""
     from wearsim.cli.render import ensemble_table, summary
     from wearsim.report.text import count
-    from wearsim.results import DissipationResult, EnsembleResult
+    from wearsim.results import DissipationResult, EnsembleResult, open_results
 
-    result = open_any(file)
+    result = open_results(file)
     if json:
         data: dict[str, Any]
         if isinstance(result, DissipationResult):
@@ -236,9 +235,9 @@ def compare(
 
 def _open(file: Path) -> Result | EnsembleResult:
     from wearsim.errors import ResultsFileError
-    from wearsim.results import DissipationResult, EnsembleResult
+    from wearsim.results import DissipationResult, EnsembleResult, open_results
 
-    result = open_any(file)
+    result = open_results(file)
     if isinstance(result, DissipationResult):
         from wearsim.results.dissipation import DISSIPATION
 
@@ -272,7 +271,7 @@ Folder = Annotated[
 
 def export(file: ResultsFile, output: Folder) -> None:
     """Write a results file as CSV, with units in the headers."""
-    from wearsim.results import export_csv
+    from wearsim.results import export_csv, open_results
 
-    for path in export_csv(open_any(file), output):
+    for path in export_csv(open_results(file), output):
         typer.echo(str(path))

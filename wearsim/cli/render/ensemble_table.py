@@ -59,6 +59,8 @@ def write_ensemble(result: EnsembleResult, more: Rows, workers: str = "") -> Non
         ("contact model", result.described_model),
         ("stepper", f"{raw.stepper}, tolerance {raw.tolerance:g}"),
     ]
+    if result.count and result.plan != "monte-carlo":
+        rows.append(("95 % intervals", result.estimate("depth", -1, ()).method))
     rows += [("workers", workers)] if workers else []
     write_table(result.title, rows)
     if result.count:

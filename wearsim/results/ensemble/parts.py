@@ -133,8 +133,9 @@ def read_parts(path: Path, data: EnsembleData) -> list[Part]:
 
 def _missing(path: Path, missing: Path) -> ResultsFileError:
     return ResultsFileError(
-        f"{path}: is unfinished, and part of it is missing: there is no {missing}; move it there,"
-        " or repeat the ensemble with --force"
+        f"{path}: is unfinished, and part of it is missing: there is no {missing}",
+        python="move it there, or repeat the ensemble with force=True",
+        shell="move it there, or repeat the ensemble with --force",
     )
 
 
@@ -145,8 +146,9 @@ def _read_part(part: Path, path: Path, data: EnsembleData) -> Part:
         check_layout(part, file, PART)
         if file.attrs[RUN_ID] != data.run_id.encode():
             raise ResultsFileError(
-                f"{part}: belongs to another ensemble than {path}; move the parts of this one"
-                " there, or repeat the ensemble with --force"
+                f"{part}: belongs to another ensemble than {path}",
+                python="move the parts of this one there, or repeat it with force=True",
+                shell="move the parts of this one there, or repeat the ensemble with --force",
             )
         rows = [name for name, item in data.schema.variables.items() if is_row(item)]
         check_complete(part, file, [NUMBER, STATE, *rows])

@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 
 from wearsim.results.content import StudyResult
 from wearsim.results.ensemble.data import EnsembleData
-from wearsim.results.ensemble.parts import read_ensemble
 from wearsim.results.ensemble.schema import DONE, OBSERVABLES, QUANTILES, kept_profiles
 from wearsim.types import FloatArray, IntArray
 from wearsim.uq.estimation.estimates import Design, Estimate, Target, estimate
@@ -372,23 +370,3 @@ class EnsembleResult(StudyResult[EnsembleData]):
     def is_constant(self, name: str) -> bool:
         """Return whether an observable is equal in all realisations, within rounding."""
         return bool(self.count) and summarise(self.at_end(name)).is_constant
-
-
-def open_ensemble(path: str | Path) -> EnsembleResult:
-    """Open the file of an ensemble.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file.
-
-    Returns
-    -------
-    EnsembleResult
-
-    Raises
-    ------
-    ResultsFileError
-        If it is missing, of another kind, truncated, damaged, or of another layout.
-    """
-    return EnsembleResult(read_ensemble(path), Path(path))

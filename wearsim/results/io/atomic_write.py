@@ -204,8 +204,9 @@ def refuse_inputs(
     for source in inputs:
         if same_file(path, source):
             raise ResultsFileError(
-                f"{path}: {what} is read from {source}, and --force replaces no input; choose"
-                f" another name with {option}"
+                f"{path}: {what} is read from {source}, and no input is replaced",
+                python="choose another name",
+                shell=f"choose another name with {option}",
             )
 
 
@@ -250,21 +251,28 @@ def check_output(path: str | Path, force: bool, inputs: Iterable[Path] = ()) -> 
     target, suffix = Path(path).resolve(), Path(path).suffix
     folder = target.parent
     if suffix.lower() in _OTHER_KINDS:
-        raise ResultsFileError(
-            f"{path}: no results file ends in {suffix}; choose another name with -o, such as"
-            f" {Path(path).with_suffix('.h5').name}"
-        )
+        name = Path(path).with_suffix(".h5").name
+        raise _refused(path, f"no results file ends in {suffix}", f"choose another, such as {name}")
     if target.is_dir():
-        raise ResultsFileError(f"{path}: is a folder; name a file in it with -o")
+        raise _refused(path, "is a folder", "name a file in it")
     if not folder.is_dir():
-        raise ResultsFileError(f"{path}: there is no folder {folder}; make it, or choose with -o")
+        raise _refused(path, f"there is no folder {folder}", "make it, or choose another")
     if target.exists():
         if not target.is_file():
-            raise ResultsFileError(f"{path}: is not a regular file; choose another with -o")
+            raise _refused(path, "is not a regular file", "choose another")
         if not force:
             raise ResultsFileError(
-                f"{path}: already exists; --force replaces it, -o chooses another"
+                f"{path}: already exists",
+                python="force=True replaces it, output=... chooses another",
+                shell="--force replaces it, -o chooses another",
             )
         refuse_if_locked(path)
     if not os.access(folder, os.W_OK | os.X_OK):
-        raise ResultsFileError(f"{path}: the folder {folder} is not writable; choose with -o")
+        raise _refused(path, f"the folder {folder} is not writable", "choose another")
+
+
+def _refused(path: str | Path, what: str, remedy: str) -> ResultsFileError:
+    """Return the error of an output, with the argument and the option that set its name."""
+    return ResultsFileError(
+        f"{path}: {what}", python=f"{remedy} as output", shell=f"{remedy} with -o"
+    )

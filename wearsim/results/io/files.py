@@ -26,11 +26,10 @@ from wearsim.results.content import (
 from wearsim.results.dissipation import (
     DISSIPATION,
     DissipationData,
-    DissipationResult,
 )
 from wearsim.results.ensemble.schema import ENSEMBLE
 from wearsim.results.io.atomic_write import DISK, Storage
-from wearsim.results.run import RUN, Result, RunData
+from wearsim.results.run import RUN, RunData
 
 if TYPE_CHECKING:
     import h5py
@@ -41,11 +40,11 @@ _SMALLEST = 96  # bytes: no HDF5 file is shorter
 # exceptions of h5py, json and numpy on damaged content
 _DAMAGE = (OSError, RuntimeError, ValueError, TypeError, KeyError, AttributeError, OverflowError)
 FileKind: TypeAlias = Literal["run", "dissipation", "ensemble"]
-# kind, schema and Python function for opening, by format
-_KINDS: dict[str, tuple[FileKind, Schema, str]] = {
-    RUN.format: ("run", RUN, "open_results"),
-    DISSIPATION.format: ("dissipation", DISSIPATION, "open_dissipation"),
-    ENSEMBLE.format: ("ensemble", ENSEMBLE, "open_ensemble"),
+# kind and schema by format
+_KINDS: dict[str, tuple[FileKind, Schema]] = {
+    RUN.format: ("run", RUN),
+    DISSIPATION.format: ("dissipation", DISSIPATION),
+    ENSEMBLE.format: ("ensemble", ENSEMBLE),
 }
 
 Stored = TypeVar("Stored")
@@ -111,12 +110,9 @@ def read_file(path: str | Path, take: Callable[[h5py.File], Stored]) -> Stored:
     ResultsFileError
         As `read_results`.
     """
-    import h5py  # noqa: PLC0415  (takes 0.2 s to import)
-
     _check_signature(path)
     try:
-        # no lock is needed: a file is replaced whole
-        with h5py.File(path, "r", locking=False) as file:
+        with _opened(path) as file:
             return take(file)
     except _DAMAGE as error:
         if "truncated" in str(error):
@@ -124,6 +120,21 @@ def read_file(path: str | Path, take: Callable[[h5py.File], Stored]) -> Stored:
         text = str(error.args[0]) if isinstance(error, KeyError) and error.args else str(error)
         reason = next(iter(text.splitlines()), type(error).__name__)
         raise ResultsFileError(f"{path}: is damaged ({reason})") from error
+
+
+def _opened(path: str | Path) -> h5py.File:
+    """Open a file for reading, also one that another library has opened in this process."""
+    import h5py  # noqa: PLC0415  (takes 0.2 s to import)
+
+    # no lock is needed, since a file is replaced whole, but HDF5 requires the flags of locking
+    # with which the file is open already, such as those of xarray
+    for locking in (False, "best-effort"):
+        try:
+            return h5py.File(path, "r", locking=locking)
+        except OSError as error:
+            if "file locking" not in str(error):
+                raise
+    return h5py.File(path, "r", locking=True)
 
 
 def _check_signature(path: str | Path) -> None:
@@ -146,7 +157,7 @@ def _truncated(path: str | Path) -> str:
     return f"{path}: is truncated: its end is missing, as after a copy that was cut short"
 
 
-def _kind(path: str | Path, file: h5py.File) -> tuple[FileKind, Schema, str]:
+def _kind(path: str | Path, file: h5py.File) -> tuple[FileKind, Schema]:
     found = _KINDS.get(format_of(file))
     if found is None:
         raise ResultsFileError(f"{path}: is HDF5, but not a results file of wearsim")
@@ -207,11 +218,11 @@ def read_attributes(
     ResultsFileError
         If the file is of another kind or layout, or incomplete.
     """
-    _, found, opener = _kind(path, file)
+    _, found = _kind(path, file)
     if found is not schema:
         raise ResultsFileError(
             f"{path}: holds {found.holds}; what is needed is {schema.holds}. In Python,"
-            f" wearsim.{opener} opens it"
+            " wearsim.open_results opens it"
         )
     check_layout(path, file, schema)
     about, scenario, files = (f"{INPUTS}/{name}" for name in (ABOUT, SCENARIO, FILES))
@@ -250,31 +261,6 @@ def check_complete(path: str | Path, present: Container[str], names: Iterable[st
     missing = [name for name in names if name not in present]
     if missing:
         raise ResultsFileError(f"{path}: is damaged (lacks {', '.join(missing)})")
-
-
-def open_results(path: str | Path) -> Result:
-    """Open a results file.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file.
-
-    Returns
-    -------
-    Result
-
-    Raises
-    ------
-    ResultsFileError
-        If it is missing, foreign, truncated, damaged, or of another layout.
-    """
-    return Result(read_results(path), Path(path))
-
-
-def open_dissipation(path: str | Path) -> DissipationResult:
-    """Open the file of a dissipation study; see `open_results`."""
-    return DissipationResult(read_dissipation(path), Path(path))
 
 
 def write_results(

@@ -130,10 +130,13 @@ class _Study:
     def interrupted(self) -> Interrupted:
         """Write the completed realisations and return the error of an interrupted study."""
         self.close()
-        stored = f"they are in {self.path}; plot them with: wearsim plot {self.path}"
+        what = f"stopped after {self.done} of {self.contacts.count} realisations"
+        if self.path is None:
+            return Interrupted(f"{what}; nothing was written")
         return Interrupted(
-            f"stopped after {self.done} of {self.contacts.count} realisations;"
-            f" {stored if self.path else 'nothing was written'}"
+            f"{what}; they are in {self.path}",
+            python=f'open them with wearsim.open_results("{self.path}")',
+            shell=f"plot them with: wearsim plot {self.path}",
         )
 
     def close(self) -> DissipationData:

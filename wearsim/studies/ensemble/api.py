@@ -157,7 +157,7 @@ def checked_request(
     require_run(scenario)
     chosen = parse_plan(plan or scenario.sampling.plan)
     target = None if until is None else parse_target(until)
-    check_plan(scenario, chosen, "--until" if until else "")
+    check_plan(scenario, chosen, "a target" if until else "")
     drawer = Drawer(scenario, "monte-carlo")
     by_pass = any(item.persistence == "per-pass" for item in scenario.random)
     if not drawer.groups and not (by_pass and scenario.evolution.stepper == "per-pass"):
@@ -238,10 +238,12 @@ def resume_ensemble(
     plan, total = parse_plan(data.plan), data.requested
     if realisations is not None:
         checked_count(scenario, realisations)
-        check_plan(scenario, plan, "-n")
+        check_plan(scenario, plan, "more realisations")
         if realisations < total or (data.finished and realisations == total):
             raise ResultsFileError(
-                f"{path}: has {total} realisations; give a larger number with -n to extend it"
+                f"{path}: has {total} realisations",
+                python="give a larger number of realisations to extend it",
+                shell="give a larger number with -n to extend it",
             )
         total = realisations
     target = Target.parse(data.until) if data.until else None

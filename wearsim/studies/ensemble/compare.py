@@ -336,7 +336,11 @@ def sweep(
         except Interrupted as stop:
             left = values[len(results) + 1 :]
             rest = f"; not started: {', '.join(left)}" if left else ""
-            raise Interrupted(f"{stop}{rest}; repeat the command to continue the sweep") from stop
+            raise Interrupted(
+                f"{stop.message}{rest}",
+                python="call sweep again to continue it",
+                shell="repeat the command to continue the sweep",
+            ) from stop
     return results
 
 

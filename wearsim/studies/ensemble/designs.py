@@ -87,15 +87,15 @@ def whole_count(plan: EnsemblePlan, groups: Sequence[str], realisations: int) ->
     return size * max(-(-realisations // size), 1)
 
 
-def check_plan(scenario: Scenario, plan: EnsemblePlan, option: str = "") -> None:
-    """Check that a plan supports an option and the correlations of an ensemble.
+def check_plan(scenario: Scenario, plan: EnsemblePlan, growth: str = "") -> None:
+    """Check that a plan can grow if it has to, and the correlations of an ensemble.
 
     Parameters
     ----------
     scenario : Scenario
     plan : str
-    option : str
-        An option of the command line for which the ensemble must be able to grow, "--until".
+    growth : str
+        What the ensemble must be able to grow for, "a target".
 
     Raises
     ------
@@ -103,14 +103,14 @@ def check_plan(scenario: Scenario, plan: EnsemblePlan, option: str = "") -> None
         If a plan of fixed size would have to grow, or inputs of Saltelli's plan are correlated.
     """
     mistakes = []
-    if option and plan in {"latin-hypercube", "saltelli"}:
+    if growth and plan in {"latin-hypercube", "saltelli"}:
         what = {
             "latin-hypercube": "a Latin hypercube cannot grow: the number of its strata is that of"
             " its realisations",
             "saltelli": "Saltelli's plan is for sensitivity, and its size is chosen beforehand",
         }[plan]
-        expected = f"monte-carlo, sobol or control-variate; or no {option}"
-        mistakes.append(Mistake("sampling", "plan", what, f'"{plan}" with {option}', expected))
+        expected = f"monte-carlo, sobol or control-variate; or not {growth}"
+        mistakes.append(Mistake("sampling", "plan", what, f'"{plan}" with {growth}', expected))
     if plan == "saltelli" and scenario.sampling.correlation:
         what = "Saltelli's plan draws the inputs independently, and these are correlated"
         expected = "no correlation, or another plan"

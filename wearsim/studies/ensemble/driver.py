@@ -311,8 +311,9 @@ class EnsembleWork:
     def _interrupted(self) -> Interrupted:
         done = int((self.file.status != PENDING).sum())
         return Interrupted(
-            f"stopped after {done} of {self.total} realisations; continue with: wearsim resume"
-            f" {self.file.path}"
+            f"stopped after {done} of {self.total} realisations",
+            python=f'continue with wearsim.resume_ensemble("{self.file.path}")',
+            shell=f"continue with: wearsim resume {self.file.path}",
         )
 
     def _report_progress(self) -> None:

@@ -140,7 +140,9 @@ def resume(
         raise ResultsFileError(
             f"{path}: the test has already reached"
             f" {done / scenario.pass_rate / 60.0:.6g} min, which is past"
-            f" {(until or 0.0) / 60.0:.6g} min; give a later --until"
+            f" {(until or 0.0) / 60.0:.6g} min",
+            python="give a later until",
+            shell="give a later --until",
         )
     if data.finished and scenario.total_passes == done:
         return Result(data, path)
@@ -317,9 +319,14 @@ class _RunInProgress:
         """Write a checkpoint and raise Interrupted."""
         self.recorder.drop_unfinished()
         self._write()
-        rest = f"continue with: wearsim resume {self.path}" if self.path else "nothing was written"
-        where = f"pass {self._passes:.0f} of {self.stop:.0f}"
-        raise Interrupted(f"stopped at {where}; {rest}") from None
+        what = f"stopped at pass {self._passes:.0f} of {self.stop:.0f}"
+        if self.path is None:
+            raise Interrupted(f"{what}; nothing was written") from None
+        raise Interrupted(
+            what,
+            python=f'continue with wearsim.resume("{self.path}")',
+            shell=f"continue with: wearsim resume {self.path}",
+        ) from None
 
     @property
     def _passes(self) -> float:

@@ -1,0 +1,45 @@
+"""Opening of results files of every kind."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from wearsim.results.dissipation import DissipationResult
+from wearsim.results.ensemble.parts import read_ensemble
+from wearsim.results.ensemble.result import EnsembleResult
+from wearsim.results.io.files import kind_of, read_dissipation, read_results
+from wearsim.results.run import Result
+
+
+def open_results(path: str | Path) -> Result | DissipationResult | EnsembleResult:
+    """Open a results file of any kind.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+
+    Returns
+    -------
+    Result, DissipationResult or EnsembleResult
+        Of a wear test, of a dissipation study, or of an ensemble.
+
+    Raises
+    ------
+    ResultsFileError
+        If it is missing, foreign, truncated, damaged, or of another layout.
+    """
+    kind = kind_of(path)
+    if kind == "run":
+        return Result(read_results(path), Path(path))
+    return open_ensemble(path) if kind == "ensemble" else open_dissipation(path)
+
+
+def open_dissipation(path: str | Path) -> DissipationResult:
+    """Open the file of a dissipation study; see `open_results`."""
+    return DissipationResult(read_dissipation(path), Path(path))
+
+
+def open_ensemble(path: str | Path) -> EnsembleResult:
+    """Open the file of an ensemble; see `open_results`."""
+    return EnsembleResult(read_ensemble(path), Path(path))
