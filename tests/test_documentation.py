@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
@@ -10,6 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 from wearsim.cli.app import app
+from wearsim.results import open_results
 from wearsim.results.dissipation import DISSIPATION
 from wearsim.results.ensemble.schema import ENSEMBLE
 from wearsim.results.run import RUN
@@ -39,8 +42,22 @@ def test_readme_scenario_gives_the_printed_output(tmp_path: Path, monkeypatch: p
     for line in printed.splitlines()[1:]:
         if "wall time" not in line and "tolerance" not in line:
             assert " ".join(line.split()) in " ".join(done.output.split()), line
+    for verb, file in re.findall(r"`wearsim (plot|resume) (rig\.h5)`", README):
+        done = CliRunner().invoke(app, [verb, file])
+        assert done.exit_code == 0, done.output
     (code,) = blocks(README, "python")
-    exec(compile(code, "README.md", "exec"), {})
+    (tmp_path / "example.py").write_text(code)
+    script = [sys.executable, "example.py"]  # next to the files of the run at the shell
+    done = subprocess.run(script, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert float(done.stdout.split()[0]) == open_results("rig.h5").final["depth_m"]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_bits_that_are_claimed_are_those_of_numbers(page: Path):
+    text = " ".join(page.read_text(encoding="utf-8").split())
+    claims = re.findall(r"[^.|]*(?:resum|continues)[^.|]*(?:bit for bit|same bits)[^.|]*", text)
+    assert not [claim for claim in claims if "numbers" not in claim]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)

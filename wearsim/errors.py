@@ -60,16 +60,21 @@ class ScenarioError(WearsimError):
         File with the mistakes.
     mistakes : list of Mistake
         All mistakes of the file.
+    python, shell : str
+        As in `WearsimError`.
     """
 
     exit_code = 2
 
-    def __init__(self, file: str, mistakes: list[Mistake]) -> None:
+    def __init__(
+        self, file: str, mistakes: list[Mistake], *, python: str = "", shell: str = ""
+    ) -> None:
         self.file, self.mistakes = file, mistakes
-        super().__init__("\n".join(f"{file}: {mistake}" for mistake in mistakes))
+        message = "\n".join(f"{file}: {mistake}" for mistake in mistakes)
+        super().__init__(message, python=python, shell=shell)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self.file, self.mistakes)
+        return type(self), (self.file, self.mistakes), {**self.__dict__, "args": self.args}
 
 
 class PluginError(WearsimError):

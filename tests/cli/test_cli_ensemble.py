@@ -128,6 +128,13 @@ def test_plan_that_cannot_grow_has_no_target(command: Command, tests: Path) -> N
     assert "cannot grow" in result.stderr
 
 
+def test_intervals_of_a_latin_hypercube_are_called_too_wide(command: Command, tests: Path) -> None:
+    result = command("ensemble", tests, "-n", 4, "--plan", "latin-hypercube", *HERE)
+    assert result.exit_code == 0, result.output
+    words = "95 % intervals as for independent realisations, and therefore too wide"
+    assert words in " ".join(result.stdout.split())
+
+
 def test_target_is_reached_with_a_control_variate(command: Command, tests: Path) -> None:
     options = ("--plan", "control-variate", "--until", "depth.mean 20%")
     result = command("ensemble", tests, "-n", 200, *options, *HERE)

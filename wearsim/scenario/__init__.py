@@ -2,8 +2,16 @@
 
 from wearsim.scenario.examples import scenario_schema
 from wearsim.scenario.parse.fields import Persistence, RandomInput
-from wearsim.scenario.parse.toml import load_scenario, parse_override, parse_scenario
-from wearsim.scenario.scenario import Drawn, Scenario, realise, require_run
+from wearsim.scenario.parse.toml import parse_override
+from wearsim.scenario.realise import realise
+from wearsim.scenario.scenario import (
+    Drawn,
+    Scenario,
+    as_scenario,
+    load_scenario,
+    parse_scenario,
+    require_run,
+)
 from wearsim.scenario.tables.bodies import Cylinder, Roller
 from wearsim.scenario.tables.plain import (
     CreepageTable,
@@ -38,6 +46,7 @@ __all__ = [
     "Scenario",
     "TermChoice",
     "WearChoice",
+    "as_scenario",
     "described_model",
     "load_scenario",
     "parse_override",

@@ -19,8 +19,8 @@ from wearsim.scenario.parse.fields import (
     target_of,
 )
 from wearsim.scenario.parse.mistakes import installed
-from wearsim.scenario.parse.toml import REQUIRED, TABLES, load_scenario
-from wearsim.scenario.scenario import Scenario
+from wearsim.scenario.parse.toml import REQUIRED, TABLES
+from wearsim.scenario.scenario import Scenario, load_scenario
 from wearsim.scenario.tables.plain import TopTable
 from wearsim.scenario.tables.plugin import PLUGIN_TABLES
 

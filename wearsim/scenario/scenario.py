@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path, PurePath
-from typing import Any, TypeAlias
-
-from pydantic import BaseModel
+from typing import TypeAlias
 
 from wearsim.errors import Mistake, ScenarioError
+from wearsim.input_files import read_input
 from wearsim.profiles import split_name
 from wearsim.scenario.parse.fields import RandomInput
-from wearsim.scenario.parse.mistakes import Mistakes, replace_numbers
+from wearsim.scenario.parse.toml import parse_fields
 from wearsim.scenario.tables.bodies import Cylinder, Roller
 from wearsim.scenario.tables.plain import (
     CreepageTable,
@@ -23,10 +22,8 @@ from wearsim.scenario.tables.plain import (
     OperationTable,
     OutputsTable,
     SamplingTable,
-    check_angles,
-    check_lists,
 )
-from wearsim.scenario.tables.plugin import ContactChoice, LoadChoice, WearChoice, check_load
+from wearsim.scenario.tables.plugin import ContactChoice, LoadChoice, WearChoice
 
 Drawn: TypeAlias = float | tuple[float, ...]
 
@@ -93,6 +90,74 @@ class Scenario:
     notes: tuple[str, ...] = ()
     random: tuple[RandomInput, ...] = ()
     drawn: Mapping[str, Drawn] = field(default_factory=dict)
+
+    @classmethod
+    def from_toml(
+        cls,
+        text: str,
+        overrides: Mapping[str, object] | None = None,
+        *,
+        folder: str | Path = ".",
+        name: str = "scenario",
+    ) -> Scenario:
+        """Read a scenario from a text.
+
+        Parameters
+        ----------
+        text : str
+            TOML, as in a scenario file.
+        overrides : mapping of str to object, optional
+            Values by dotted key, {"load.normal_force": "350 N"}.
+        folder : str or Path
+            Folder of the files that the scenario names.
+        name : str
+            Name of the scenario in messages, and its title if it has none.
+
+        Returns
+        -------
+        Scenario
+
+        Raises
+        ------
+        ScenarioError, PluginError
+            As `load_scenario`.
+        """
+        return parse_scenario(text, str(Path(folder) / name), _reader(Path(folder)), overrides)
+
+    @classmethod
+    def from_dict(
+        cls, tables: Mapping[str, object], *, folder: str | Path = ".", name: str = "scenario"
+    ) -> Scenario:
+        """Make a scenario from tables.
+
+        Parameters
+        ----------
+        tables : mapping of str to object
+            Values by table and key, as in a scenario file; a dotted key leads into inner tables.
+        folder, name
+            As in `from_toml`.
+
+        Returns
+        -------
+        Scenario
+
+        Raises
+        ------
+        ScenarioError, PluginError
+            As `load_scenario`.
+        """
+        return cls.from_toml("", dict(_flat(tables)), folder=folder, name=name)
+
+    def __repr__(self) -> str:
+        rollers = self.operation.rollers
+        length = "one contact"
+        if self.operation.passes or self.operation.duration:
+            length = f"{self.total_passes} passes"
+        random = f", {len(self.random)} random" if self.random else ""
+        return (
+            f"<Scenario '{self.title}': {rollers} roller{'s' if rollers > 1 else ''},"
+            f" {self.load.kind} load, {length}, {self.contact.model}{random}>"
+        )
 
     @property
     def name(self) -> str:
@@ -169,76 +234,116 @@ def require_run(scenario: Scenario) -> None:
         raise ScenarioError(scenario.file, mistakes)
 
 
-def realise(scenario: Scenario, values: Mapping[str, Drawn]) -> Scenario:
-    """Return a scenario with values instead of random inputs.
+def _flat(tables: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, object]]:
+    """Yield the values of nested tables by dotted key."""
+    for key, value in tables.items():
+        if isinstance(value, Mapping) and value:
+            yield from _flat(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value
 
-    The values are recorded in `drawn`, and pass the checks that a value in the file would.
+
+def _reader(folder: Path) -> Callable[[str], str]:
+    """Return a function that reads the input files in a folder."""
+
+    def read(name: str) -> str:
+        file, choice = split_name(name)
+        return read_input(folder / file, choice)
+
+    return read
+
+
+def load_scenario(path: str | Path, overrides: Mapping[str, object] | None = None) -> Scenario:
+    """Read a scenario from a TOML file.
 
     Parameters
     ----------
-    scenario : Scenario
-        With random inputs.
-    values : mapping of str to float or tuple of float
-        In SI, by the dotted keys that the inputs set (`RandomInput.keys`); where a scenario may
-        hold a list, a tuple is one value per roller.
+    path : str or Path
+        The file; paths of files that it names are relative to its folder.
+    overrides : mapping of str to object, optional
+        Values by dotted key, {"load.normal_force": "350 N"}.
 
     Returns
     -------
     Scenario
-        Text, files and digest are those of the scenario given.
 
     Raises
     ------
-    ValueError
-        If a key is not set by any random input, or a joint input would be set in part.
     ScenarioError
-        If a value is out of its bounds.
+        With all mistakes of the scenario.
+    PluginError
+        If two plugins have the same name.
     """
-    owners = {key: item for item in scenario.random for key in item.keys}
-    unknown = [key for key in values if key not in owners]
-    if unknown:
-        raise ValueError(f"no random input sets {unknown[0]}; known: {', '.join(owners) or 'none'}")
-    numbers: dict[str, dict[str, Any]] = {}
-    for key, value in values.items():
-        missing = [other for other in owners[key].keys if other not in values]
-        if missing:
-            raise ValueError(f"{owners[key].name} sets {missing[0]} too, which is not given")
-        *tables, last = key.split(".")
-        place: dict[str, Any] = numbers
-        for table in tables:
-            place = place.setdefault(table, {})
-        place[last] = tuple(map(float, value)) if isinstance(value, tuple) else float(value)
-    mistakes = Mistakes(scenario.file, scenario.files.__getitem__)
-    sections = {
-        table: _replaced(mistakes, getattr(scenario, table), keys, table)
-        for table, keys in sorted(numbers.items())
-    }
-    check_lists(mistakes, {**numbers, "operation": {"rollers": scenario.operation.rollers}})
-    mistakes.raise_any()
-    if "creepage" in sections:
-        check_angles(mistakes, sections["creepage"])
-    if "load" in sections:
-        check_load(mistakes, sections["load"])
-    mistakes.raise_any()
-    return replace(
-        scenario,
-        **sections,
-        random=tuple(item for item in scenario.random if item.keys[0] not in values),
-        drawn={**scenario.drawn, **values},
+    if "\n" in str(path):
+        what = "is a text, not the name of a file; Scenario.from_toml reads it"
+        raise ScenarioError("scenario", [Mistake("", "", what)])
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        what, shell, python = "is not text in UTF-8", "", ""
+        if path.read_bytes().startswith(b"\x89HDF"):
+            what = "is a results file, not a scenario"
+            shell, python = (
+                f"show it with: wearsim show {path}",
+                f'open it with wearsim.open_results("{path}")',
+            )
+        mistake = Mistake("", "", what)
+        raise ScenarioError(str(path), [mistake], python=python, shell=shell) from error
+    except OSError as error:
+        raise ScenarioError(
+            str(path), [Mistake("", "", f"the file cannot be read ({error.strerror})")]
+        ) from error
+    return parse_scenario(text, str(path), _reader(path.parent), overrides)
+
+
+def parse_scenario(
+    text: str,
+    name: str,
+    read: Callable[[str], str],
+    overrides: Mapping[str, object] | None = None,
+) -> Scenario:
+    """Return the scenario that a text holds.
+
+    Parameters
+    ----------
+    text : str
+        TOML.
+    name : str
+        The scenario's file, for messages.
+    read : callable
+        Returns the content of a file that the scenario names; for a stored scenario,
+        ``scenario.files.__getitem__``.
+    overrides : mapping of str to object, optional
+        Values by dotted key.
+
+    Returns
+    -------
+    Scenario
+
+    Raises
+    ------
+    ScenarioError
+        With all mistakes of the scenario.
+    PluginError
+        If two plugins have the same name.
+    """
+    return Scenario(**parse_fields(text, name, read, overrides))
+
+
+def as_scenario(scenario: Scenario | str | Path) -> Scenario:
+    """Return a scenario, read from its file if a path is given; errors as `load_scenario`.
+
+    Raises
+    ------
+    TypeError
+        If it is something else.
+    """
+    if isinstance(scenario, Scenario):
+        return scenario
+    if isinstance(scenario, str | Path):
+        return load_scenario(scenario)
+    raise TypeError(
+        f"a {type(scenario).__name__} is no scenario, expected a Scenario or the path of its file;"
+        " Scenario.from_dict makes one from tables"
     )
-
-
-def _replaced(mistakes: Mistakes, section: Any, numbers: dict[str, Any], table: str) -> Any:
-    """Return a table's model, or the choice of a plugin, with numbers replaced."""
-    if isinstance(section, BaseModel):
-        return replace_numbers(mistakes, section, numbers, table)
-    if isinstance(section, LoadChoice):
-        inner = {term.name: numbers.pop(term.name, {}) for term in section.terms}
-        terms = [
-            _replaced(mistakes, term, inner[term.name], f"{table}.{term.name}")
-            for term in section.terms
-        ]
-        section = replace(section, terms=tuple(terms))
-    if not numbers:
-        return section
-    return replace(section, options=replace_numbers(mistakes, section.options, numbers, table))

@@ -1,23 +1,22 @@
-"""Parsing of TOML into a `Scenario`, changed by dotted keys; mistakes are reported together."""
+"""Parsing of TOML, changed by dotted keys; all mistakes are reported together."""
 
 from __future__ import annotations
 
 import re
 import tomllib
 from collections.abc import Callable, Mapping, MutableMapping
-from pathlib import Path, PurePath
+from pathlib import PurePath
 from typing import Any
 
+import numpy as np
+
 from wearsim.errors import Mistake, ScenarioError
-from wearsim.input_files import read_input
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.plugins import LoadSpec, Options, RandomInputSpec
-from wearsim.profiles import split_name
 from wearsim.quantities import DECIMAL_COMMA
 from wearsim.scenario.parse.fields import RandomInput, RandomInputTable
 from wearsim.scenario.parse.mistakes import Mistakes, installed, nearest
 from wearsim.scenario.parse.random_inputs import validate
-from wearsim.scenario.scenario import Scenario
 from wearsim.scenario.tables.bodies import (
     Cylinder,
     CylinderTable,
@@ -114,7 +113,7 @@ def apply_overrides(text: str, file: str, overrides: Mapping[str, object]) -> st
         *names, key = dotted.split(".")
         try:
             table = _descend(document, names, key)
-            table[key] = value
+            table[key] = as_toml(value)
         except ValueError as error:
             unfit = isinstance(error, tomlkit.exceptions.ConvertError)
             what = "has a value that TOML cannot hold" if unfit else str(error)
@@ -128,6 +127,17 @@ def apply_overrides(text: str, file: str, overrides: Mapping[str, object]) -> st
     if mistakes:
         raise ScenarioError(file, mistakes)
     return tomlkit.dumps(document)
+
+
+def as_toml(value: object) -> object:
+    """Return a Python value as TOML can hold it: numbers of numpy, arrays, tuples and paths."""
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    if isinstance(value, PurePath):
+        return value.as_posix()
+    if isinstance(value, Mapping):
+        return {str(key): as_toml(item) for key, item in value.items()}
+    return [as_toml(item) for item in value] if isinstance(value, list | tuple) else value
 
 
 def _descend(document: Any, tables: list[str], key: str) -> MutableMapping[str, Any]:
@@ -171,78 +181,13 @@ READERS: dict[str, Callable[[Mistakes, Mapping[str, object]], Any]] = {
 }
 
 
-def load_scenario(path: str | Path, overrides: Mapping[str, object] | None = None) -> Scenario:
-    """Read a scenario from a TOML file.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file; paths of files that it names are relative to its folder.
-    overrides : mapping of str to object, optional
-        Values by dotted key, {"load.normal_force": "350 N"}.
-
-    Returns
-    -------
-    Scenario
-
-    Raises
-    ------
-    ScenarioError
-        With all mistakes of the scenario.
-    PluginError
-        If two plugins have the same name.
-    """
-    path = Path(path)
-
-    def read(name: str) -> str:
-        file, choice = split_name(name)
-        return read_input(path.parent / file, choice)
-
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        what = "is not text in UTF-8"
-        if path.read_bytes().startswith(b"\x89HDF"):
-            what = f"is a results file, not a scenario; show it with: wearsim show {path}"
-        raise ScenarioError(str(path), [Mistake("", "", what)]) from error
-    except OSError as error:
-        raise ScenarioError(
-            str(path), [Mistake("", "", f"the file cannot be read ({error.strerror})")]
-        ) from error
-    return parse_scenario(text, str(path), read, overrides)
-
-
-def parse_scenario(
+def parse_fields(
     text: str,
     name: str,
     read: Callable[[str], str],
     overrides: Mapping[str, object] | None = None,
-) -> Scenario:
-    """Return the scenario that a text holds.
-
-    Parameters
-    ----------
-    text : str
-        TOML.
-    name : str
-        The scenario's file, for messages.
-    read : callable
-        Returns the content of a file that the scenario names; for a stored scenario,
-        ``scenario.files.__getitem__``.
-    overrides : mapping of str to object, optional
-        Values by dotted key.
-
-    Returns
-    -------
-    Scenario
-
-    Raises
-    ------
-    ScenarioError
-        With all mistakes of the scenario.
-    PluginError
-        If two plugins have the same name.
-    """
+) -> dict[str, Any]:
+    """Return the fields of a `Scenario`; parameters and errors as in `parse_scenario`."""
     data = _parse_toml(text, name)
     if overrides:
         text = apply_overrides(text, name, overrides)
@@ -260,21 +205,22 @@ def parse_scenario(
     check_correlation(mistakes, sections["sampling"])
     mistakes.raise_any()
     random = tuple(mistakes.random_inputs)
-    return Scenario(
-        file=name,
-        title=top.title or PurePath(name).stem,
-        seed=top.seed,
-        text=text,
-        files=files,
-        notes=(
-            *_dundurs_note(sections["roller"], sections["cylinder"]),
-            *(f"{item.name}: {warning}" for item in random for warning in item.warnings),
-            *_unused_sampling_note(data, random),
-            *mistakes.notes,
-        ),
-        random=random,
-        **sections,
+    notes = (
+        *_dundurs_note(sections["roller"], sections["cylinder"]),
+        *(f"{item.name}: {warning}" for item in random for warning in item.warnings),
+        *_unused_sampling_note(data, random),
+        *mistakes.notes,
     )
+    return {
+        "file": name,
+        "title": top.title or PurePath(name).stem,
+        "seed": top.seed,
+        "text": text,
+        "files": files,
+        "notes": notes,
+        "random": random,
+        **sections,
+    }
 
 
 def _parse_toml(text: str, name: str) -> dict[str, Any]:

@@ -12,7 +12,7 @@ import numpy as np
 from wearsim.errors import Interrupted, ScenarioError, SolverError
 from wearsim.results import DissipationData, DissipationResult, check_output, write_results
 from wearsim.results.dissipation import BAND, as_numbers, summaries
-from wearsim.scenario import Scenario
+from wearsim.scenario import Scenario, as_scenario
 from wearsim.studies.contact.batch import Realisations
 from wearsim.studies.preparation import checked_count, nothing_random, origin_of
 from wearsim.uq.estimation.moments import RowMoments
@@ -32,7 +32,7 @@ SCALARS = (
 
 
 def dissipation(
-    scenario: Scenario,
+    scenario: Scenario | str | Path,
     realisations: int = 1000,
     output: str | Path | None = None,
     *,
@@ -47,8 +47,9 @@ def dissipation(
 
     Parameters
     ----------
-    scenario : Scenario
-        A scenario of a run or of a single contact; `sampling.plan` is the sampling design.
+    scenario : Scenario or path
+        A scenario of a run or of a single contact, or its file; `sampling.plan` is the sampling
+        design.
     realisations : int
         Number of realisations, at least 1.
     output : path, optional
@@ -75,6 +76,7 @@ def dissipation(
     Interrupted
         If it was stopped; the file holds the completed realisations, marked as unfinished.
     """
+    scenario = as_scenario(scenario)
     realisations = checked_count(scenario, realisations)
     path = Path(output) if output is not None else None
     if path is not None:

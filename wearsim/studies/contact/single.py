@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 from time import perf_counter
 
 from wearsim.errors import WearsimError
 from wearsim.evolution.state import unworn_contacts
 from wearsim.plugins import ContactModel
-from wearsim.scenario import Scenario, described_model
+from wearsim.scenario import Scenario, as_scenario, described_model
 from wearsim.studies.run.assemble import build_problem, prepared_model
 from wearsim.studies.run.grid import contact_grid
 from wearsim.studies.run.inputs import load_range
@@ -63,7 +64,7 @@ class ContactStudy:
 
 
 def study_contact(
-    scenario: Scenario,
+    scenario: Scenario | str | Path,
     profile: Profile | None = None,
     with_fields: bool = False,
     with_error: bool = False,
@@ -72,8 +73,8 @@ def study_contact(
 
     Parameters
     ----------
-    scenario : Scenario
-        A scenario of a run or of a single contact.
+    scenario : Scenario or path
+        A scenario of a run or of a single contact, or its file.
     profile : Profile, optional
         The cylinder's profile, instead of the scenario's.
     with_fields : bool
@@ -92,6 +93,7 @@ def study_contact(
     CapabilityError
         If the model does not support the scenario.
     """
+    scenario = as_scenario(scenario)
     if profile is not None:
         scenario = replace(scenario, cylinder=replace(scenario.cylinder, profile=profile))
     force = load_range(scenario, scenario.load.build(), 0.0)[0]
@@ -141,6 +143,8 @@ def _grid_error(scenario: Scenario, grid: Grid, power: float) -> float | None:
     return abs(solution.power / power - 1.0)
 
 
-def solve_contact(scenario: Scenario, profile: Profile | None = None) -> ContactSolution:
+def solve_contact(
+    scenario: Scenario | str | Path, profile: Profile | None = None
+) -> ContactSolution:
     """Solve the contact of the scenario's first roller; see `study_contact`."""
     return study_contact(scenario, profile).solution

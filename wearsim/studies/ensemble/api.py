@@ -22,7 +22,7 @@ from wearsim.results import (
     read_ensemble,
 )
 from wearsim.results.ensemble.schema import OBSERVABLES
-from wearsim.scenario import Scenario, parse_scenario, require_run
+from wearsim.scenario import Scenario, as_scenario, parse_scenario, require_run
 from wearsim.studies.ensemble.designs import (
     BASE_PLANS,
     EnsemblePlan,
@@ -50,7 +50,7 @@ Watcher = Callable[[EnsembleProgress], None]
 
 
 def ensemble(
-    scenario: Scenario,
+    scenario: Scenario | str | Path,
     realisations: int,
     output: str | Path,
     *,
@@ -68,7 +68,8 @@ def ensemble(
 
     Parameters
     ----------
-    scenario : Scenario
+    scenario : Scenario or path
+        The scenario, or its file.
     realisations : int
         Maximum number of realisations.
     output : path
@@ -111,6 +112,7 @@ def ensemble(
     Interrupted
         If it was stopped; `resume_ensemble` continues from the file.
     """
+    scenario = as_scenario(scenario)
     request = checked_request(scenario, realisations, plan, until)
     path = Path(output)
     check_output(path, force, scenario.paths)

@@ -25,7 +25,7 @@ from wearsim.results import (
     write_results,
 )
 from wearsim.results.run import VARIABLES
-from wearsim.scenario import Scenario, parse_scenario
+from wearsim.scenario import Scenario, as_scenario, parse_scenario
 from wearsim.studies.preparation import changed_origins, check_plugins, origin_of
 from wearsim.studies.run.assemble import assemble_problem, start_height
 from wearsim.studies.run.draws import Draws, draw, units_of
@@ -46,7 +46,7 @@ Watcher = Callable[[Event], None]
 
 
 def run(
-    scenario: Scenario,
+    scenario: Scenario | str | Path,
     output: str | Path | None = None,
     *,
     force: bool = False,
@@ -58,7 +58,8 @@ def run(
 
     Parameters
     ----------
-    scenario : Scenario
+    scenario : Scenario or path
+        The scenario, or its file.
     output : path, optional
         Results file; without it the result is kept in memory only.
     force : bool
@@ -83,6 +84,7 @@ def run(
     Interrupted
         If it was stopped; `resume` continues from the file.
     """
+    scenario = as_scenario(scenario)
     path = Path(output) if output is not None else None
     if path is not None:
         check_output(path, force, scenario.paths)

@@ -1,0 +1,89 @@
+"""Replacement of random inputs of a scenario by drawn values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from pydantic import BaseModel
+
+from wearsim.scenario.parse.mistakes import Mistakes, replace_numbers
+from wearsim.scenario.scenario import Drawn, Scenario
+from wearsim.scenario.tables.plain import check_angles, check_lists
+from wearsim.scenario.tables.plugin import LoadChoice, check_load
+
+
+def realise(scenario: Scenario, values: Mapping[str, Drawn]) -> Scenario:
+    """Return a scenario with values instead of random inputs.
+
+    The values are recorded in `drawn`, and pass the checks that a value in the file would.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        With random inputs.
+    values : mapping of str to float or tuple of float
+        In SI, by the dotted keys that the inputs set (`RandomInput.keys`); where a scenario may
+        hold a list, a tuple is one value per roller.
+
+    Returns
+    -------
+    Scenario
+        Text, files and digest are those of the scenario given.
+
+    Raises
+    ------
+    ValueError
+        If a key is not set by any random input, or a joint input would be set in part.
+    ScenarioError
+        If a value is out of its bounds.
+    """
+    owners = {key: item for item in scenario.random for key in item.keys}
+    unknown = [key for key in values if key not in owners]
+    if unknown:
+        raise ValueError(f"no random input sets {unknown[0]}; known: {', '.join(owners) or 'none'}")
+    numbers: dict[str, dict[str, Any]] = {}
+    for key, value in values.items():
+        missing = [other for other in owners[key].keys if other not in values]
+        if missing:
+            raise ValueError(f"{owners[key].name} sets {missing[0]} too, which is not given")
+        *tables, last = key.split(".")
+        place: dict[str, Any] = numbers
+        for table in tables:
+            place = place.setdefault(table, {})
+        place[last] = tuple(map(float, value)) if isinstance(value, tuple) else float(value)
+    mistakes = Mistakes(scenario.file, scenario.files.__getitem__)
+    sections = {
+        table: _replaced(mistakes, getattr(scenario, table), keys, table)
+        for table, keys in sorted(numbers.items())
+    }
+    check_lists(mistakes, {**numbers, "operation": {"rollers": scenario.operation.rollers}})
+    mistakes.raise_any()
+    if "creepage" in sections:
+        check_angles(mistakes, sections["creepage"])
+    if "load" in sections:
+        check_load(mistakes, sections["load"])
+    mistakes.raise_any()
+    return replace(
+        scenario,
+        **sections,
+        random=tuple(item for item in scenario.random if item.keys[0] not in values),
+        drawn={**scenario.drawn, **values},
+    )
+
+
+def _replaced(mistakes: Mistakes, section: Any, numbers: dict[str, Any], table: str) -> Any:
+    """Return a table's model, or the choice of a plugin, with numbers replaced."""
+    if isinstance(section, BaseModel):
+        return replace_numbers(mistakes, section, numbers, table)
+    if isinstance(section, LoadChoice):
+        inner = {term.name: numbers.pop(term.name, {}) for term in section.terms}
+        terms = [
+            _replaced(mistakes, term, inner[term.name], f"{table}.{term.name}")
+            for term in section.terms
+        ]
+        section = replace(section, terms=tuple(terms))
+    if not numbers:
+        return section
+    return replace(section, options=replace_numbers(mistakes, section.options, numbers, table))
