@@ -101,7 +101,9 @@ def test_paths_are_accepted_as_scenarios(rig: Path, kind: type) -> None:
 
 
 def test_something_else_than_a_scenario_is_refused(rig: Path) -> None:
-    with pytest.raises(TypeError, match="a dict is no scenario, expected a Scenario or the path"):
+    with pytest.raises(
+        TypeError, match="scenario must be a Scenario or the path of its file, got a dict"
+    ):
         wearsim.run({})  # type: ignore[arg-type]
     with pytest.raises(ScenarioError, match=r"is a text.*Scenario\.from_toml reads it"):
         wearsim.run(rig.read_text())

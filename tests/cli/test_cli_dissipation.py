@@ -139,7 +139,7 @@ def test_resume_refuses_a_study(command: Command, studied: Path) -> None:
     assert result.exit_code == 2
     assert result.stderr == (
         f"error: {studied}: holds realisations of one contact, from `wearsim dissipation`; what is"
-        " needed is a wear test, from `wearsim run`. In Python, wearsim.open_dissipation opens it\n"
+        " needed is a wear test, from `wearsim run`. In Python, wearsim.open_results opens it\n"
     )
 
 

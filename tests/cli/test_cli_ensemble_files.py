@@ -122,7 +122,7 @@ def test_plan_of_fixed_size_is_not_extended(command: Command, plan: str) -> None
     before = Path("fixed.h5").read_bytes()
     result = command("resume", "fixed.h5", "-n", "500", "-q")
     assert result.exit_code == 2
-    assert f'got "{plan}" with -n' in " ".join(result.stderr.split())
+    assert f'got "{plan}" with more realisations' in " ".join(result.stderr.split())
     assert Path("fixed.h5").read_bytes() == before
 
 

@@ -19,8 +19,8 @@ from wearsim.results import (
     DissipationResult,
     kind_of,
     open_dissipation,
-    open_results,
     read_dissipation,
+    read_results,
     write_results,
 )
 from wearsim.results.content import with_random_inputs
@@ -119,10 +119,10 @@ def test_wrong_kind_of_file_raises_one_line_error(study_file, tmp_path):
     write_results(run_file, some_run())
     assert kind_of(run_file) == "run"
     with pytest.raises(ResultsFileError) as caught:
-        open_results(study_file)
+        read_results(study_file)
     assert str(caught.value) == (
         f"{study_file}: holds realisations of one contact, from `wearsim dissipation`; what is"
-        " needed is a wear test, from `wearsim run`. In Python, wearsim.open_dissipation opens it"
+        " needed is a wear test, from `wearsim run`. In Python, wearsim.open_results opens it"
     )
     with pytest.raises(ResultsFileError, match="holds a wear test, from `wearsim run`; what is"):
         open_dissipation(run_file)

@@ -315,10 +315,9 @@ def test_unreadable_scenario_file_is_a_mistake(tmp_path: Path) -> None:
         load_scenario(binary)
     assert str(caught.value) == f"{binary}: is not text in UTF-8"
     binary.write_bytes(b"\x89HDF\r\n\x1a\n")
-    with pytest.raises(
-        ScenarioError, match="is a results file, not a scenario; show it with: wear"
-    ):
+    with pytest.raises(ScenarioError, match="results file, not a scenario; open it") as caught:
         load_scenario(binary)
+    assert "not a scenario; show it with: wearsim show" in caught.value.at_shell
 
 
 def test_deep_nesting_is_a_mistake_of_the_file(parse: Parse) -> None:

@@ -344,6 +344,6 @@ def as_scenario(scenario: Scenario | str | Path) -> Scenario:
     if isinstance(scenario, str | Path):
         return load_scenario(scenario)
     raise TypeError(
-        f"a {type(scenario).__name__} is no scenario, expected a Scenario or the path of its file;"
+        f"scenario must be a Scenario or the path of its file, got a {type(scenario).__name__};"
         " Scenario.from_dict makes one from tables"
     )

@@ -355,7 +355,7 @@ def test_excessive_shift_by_tilt_is_reported(changes, text):
     assert Realisations(free, 50).grid.strips < 100
 
 
-@pytest.mark.parametrize(("scenario", "count"), [("u.toml", 3), (contact(), 2.5), (contact(), "3")])
+@pytest.mark.parametrize(("scenario", "count"), [({}, 3), (contact(), 2.5), (contact(), "3")])
 def test_invalid_arguments_raise_type_error(scenario, count):
     with pytest.raises(TypeError, match=r"^(scenario|realisations) must be a .*, got "):
         dissipation(scenario, count)

@@ -93,7 +93,7 @@ def test_sweep_continues_where_it_was_stopped(tmp_path):
 
     values, path = ["8e-4", "1e-3", "1.2e-3"], tmp_path / "creep.h5"
     answers = iter([False] * 4 + [True])
-    with pytest.raises(Interrupted, match=r"not started: 1.2e-3; repeat the command"):
+    with pytest.raises(Interrupted, match=r"not started: 1.2e-3; call sweep again"):
         sweep(
             scenario_of_value, values, 3, path, stop_requested=lambda: next(answers, True), **SERIAL
         )
