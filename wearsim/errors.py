@@ -7,6 +7,18 @@ from dataclasses import dataclass
 from typing import Any
 
 
+def described(error: BaseException) -> str:
+    """Return the message of an error; of one of pydantic, place and message of each mistake."""
+    if type(error).__name__ != "ValidationError" or not isinstance(error, ValueError):
+        return str(error)
+    lines = []
+    for item in error.errors():  # type: ignore[attr-defined]
+        place = ".".join(map(str, item["loc"]))
+        message = item["msg"].removeprefix("Value error, ").removeprefix("Assertion failed, ")
+        lines.append(f"{place}: {message}" if place else message)
+    return "; ".join(lines)
+
+
 class WearsimError(Exception):
     """Base class of the errors raised by wearsim.
 
@@ -32,6 +44,12 @@ class WearsimError(Exception):
         self.message = message
         self.at_shell = f"{message}; {shell}" if shell else message
         super().__init__(f"{message}; {python}" if python else message)
+
+
+def failure_text(error: Exception) -> str:
+    """Return the message of an error, after its type if wearsim did not raise it deliberately."""
+    kind = type(error).__name__
+    return str(error) or kind if isinstance(error, WearsimError) else f"{kind}: {described(error)}"
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from rich.console import Console
 from wearsim.cli import progress
 from wearsim.cli.progress import RunWatcher
 from wearsim.cli.shared import plain
+from wearsim.mechanics.numerics import jit
 from wearsim.mechanics.numerics.jit import kernel
 from wearsim.studies.run.recorder import Event, Finished, Started, Stepped, Warned
 
@@ -58,8 +59,9 @@ def test_first_steps_show_no_time_left(capsys: pytest.CaptureFixture[str]) -> No
 
 
 def test_compilation_is_shown_in_lines_without_control_characters(
-    capsys: pytest.CaptureFixture[str],
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(jit, "_cache_folder", lambda: None)
     time = Time()
 
     @kernel
@@ -80,7 +82,11 @@ def test_compilation_is_shown_in_lines_without_control_characters(
     ]
 
 
-def test_quiet_shows_no_compilation(capsys: pytest.CaptureFixture[str]) -> None:
+def test_quiet_shows_no_compilation(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(jit, "_cache_folder", lambda: None)
+
     @kernel
     def third(x: float) -> float:
         return x + 3.0

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from cli_examples import SCENARIOS, Command
 
+import wearsim
+from wearsim.errors import Interrupted
 from wearsim.results import open_results
 
 
@@ -27,11 +29,27 @@ def test_show_prints_the_content_of_a_file(command: Command, finished: Path) -> 
 
 
 def test_show_prints_the_progress_of_an_unfinished_run(command: Command, scenario: Path) -> None:
-    command("run", scenario, "-q", "--set", "evolution.max_steps=2")
+    with pytest.raises(Interrupted):
+        wearsim.run(wearsim.load_scenario(scenario), "short.h5", stop_requested=lambda: True)
     passes = open_results("short.h5").passes[-1]
     result = command("show", "short.h5")
     assert f"unfinished: pass {passes:,.0f} of 6,000" in result.stdout
     assert "current state" in result.stdout
+
+
+def test_show_prints_why_and_when_a_run_failed(command: Command, scenario: Path) -> None:
+    command("run", scenario, "-q", "--set", "evolution.max_steps=2")
+    left = open_results("short.h5")
+    result = command("show", "short.h5")
+    assert f"failed after pass {left.passes[-1]:,.0f} of 6,000" in result.stdout
+    shown = " ".join(result.stdout.split())
+    assert "failure 2 steps have reached pass" in shown
+    assert "raise evolution.max_steps" in shown
+    assert f"failed at {left.raw.failed_at}" in shown
+    assert "state before the failure" in result.stdout
+    data = json.loads(command("show", "short.h5", "--json").stdout)
+    assert data["failure"] == left.failure
+    assert data["failed_at"] == left.raw.failed_at
 
 
 def test_show_json_has_scenario_and_software(command: Command, finished: Path) -> None:

@@ -2,12 +2,16 @@ import os
 import subprocess
 import sys
 from importlib.metadata import entry_points, version
+from typing import Annotated
 
+import numpy as np
 import pytest
 from cli_examples import Command
+from pydantic import AfterValidator, BaseModel
 
 import wearsim.cli.commands.scenarios
 from wearsim.cli.app import BUILT_IN
+from wearsim.cli.render.summary import solver_state
 from wearsim.errors import CapabilityError, PluginError, ResultsFileError, SolverError
 
 VERBS = [
@@ -86,7 +90,7 @@ def test_wrong_usage_is_bad_input(command: Command, arguments: list[str]) -> Non
         (
             SolverError("lost contact", {"gap": 1, "load": 2}),
             1,
-            "error: lost contact\nstate at the failure: gap 1, load 2\n",
+            "error: lost contact\nstate at the failure: gap 1e+06 um, load 2\n",
         ),
         (FileNotFoundError(2, "No such file or directory", "x"), 1, "error: x: No such file"),
         (ZeroDivisionError("oh"), 1, "internal error: ZeroDivisionError: oh\n"),
@@ -111,7 +115,14 @@ def test_errors_print_one_line_and_set_the_exit_code(
     assert result.stdout == ""
 
 
-@pytest.mark.parametrize("by", ["option", "environment"])
+OPTIONS = ("option", "option of the verb")
+
+
+def test_verbs_of_a_group_take_the_traceback_option(command: Command) -> None:
+    assert "--traceback" in command("new", "scenario", "--help").output
+
+
+@pytest.mark.parametrize("by", [*OPTIONS, "environment"])
 def test_traceback_is_shown_on_request(
     command: Command, monkeypatch: pytest.MonkeyPatch, by: str
 ) -> None:
@@ -120,7 +131,8 @@ def test_traceback_is_shown_on_request(
 
     monkeypatch.setattr(wearsim.cli.commands.scenarios, "read_scenario", fail)
     monkeypatch.setenv("WEARSIM_TRACEBACK", "1" if by == "environment" else "0")
-    result = command(*(["--traceback"] if by == "option" else []), "check", "a.toml")
+    before, after = (["--traceback"] if by == where else [] for where in OPTIONS)
+    result = command(*before, "check", "a.toml", *after)
     assert result.exit_code == 2
     assert result.stderr.startswith("Traceback")
     assert "CapabilityError: cannot" in result.stderr
@@ -130,3 +142,59 @@ def test_traceback_is_shown_on_request(
 def test_help_line_of_a_verb_is_its_own_summary(command: Command, verb: str) -> None:
     shown = " ".join(command(verb, "--help").output.split())
     assert BUILT_IN[verb] in shown
+
+
+def _refuse(value: int) -> int:
+    raise ValueError("must be even")
+
+
+class _Outer(BaseModel):
+    values: list[Annotated[int, AfterValidator(_refuse)]]
+
+
+def test_error_of_pydantic_is_shown_without_its_prefix(
+    command: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        wearsim.cli.commands.scenarios, "read_scenario", lambda *_: _Outer(values=[3])
+    )
+    message = command("check", "a.toml").stderr
+    assert message.startswith("internal error: ValidationError: values.0: must be even\n")
+
+
+def test_state_at_a_failure_has_engineering_units() -> None:
+    state = {
+        "line_load": np.array([0.0, 2.5e4]),
+        "steps": np.array([3]),
+        "half_length": 1e-4,
+        "contact_y": np.zeros(3),
+        "fill_level": 0.25,
+        "names": "text",
+    }
+    assert solver_state(state) == (
+        "line load 0 to 25 N/mm, steps 3, half-length 0.1 mm, fill level 0.25"
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ("wearsim ens", "ensemble"),
+        ("wearsim run --fo", "--force"),
+        ("wearsim new ", "plugin"),
+    ],
+)
+def test_shell_completes_verbs_and_options(words: str, expected: str) -> None:
+    completed = subprocess.run(
+        [sys.executable, "-m", "wearsim"],
+        env=os.environ
+        | {
+            "_WEARSIM_COMPLETE": "complete_bash",
+            "COMP_WORDS": words,
+            "COMP_CWORD": str(words.count(" ")),
+        },
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert completed.stdout.split()[0] == expected

@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from wearsim.mechanics.numerics import jit
 from wearsim.mechanics.numerics.jit import kernel, subroutine
 from wearsim.studies.kernels import compilation_counted
 
@@ -20,6 +21,7 @@ SCENARIOS = Path(__file__).parents[2] / "scenarios"
 CODE = """
 import json, sys
 import wearsim
+from wearsim.mechanics.numerics import jit
 from wearsim.mechanics.numerics.jit import compilation_reported, ready_kernels
 from wearsim.studies.kernels import kernels_of
 file, study, fields, overrides = json.loads(sys.argv[1])
@@ -85,6 +87,12 @@ def test_kernels_that_a_run_calls_are_expected():
     assert set(ready) == set(expected)
 
 
+@pytest.fixture
+def without_cache(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(jit, "_cache_folder", lambda: None)
+
+
+@pytest.mark.usefixtures("without_cache")
 def test_kernels_are_counted_as_they_are_compiled():
     @subroutine
     def part(x: float) -> float:
@@ -107,6 +115,7 @@ def test_kernels_are_counted_as_they_are_compiled():
     assert len(reports) == 2
 
 
+@pytest.mark.usefixtures("without_cache")
 def test_kernels_that_are_not_expected_raise_the_total():
     @kernel
     def other(x: float) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import traceback
 from collections.abc import Callable
+from copy import copy
 from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Annotated, Any
@@ -12,7 +13,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from wearsim.errors import Interrupted, PluginError, ScenarioError, SolverError, WearsimError
+from wearsim.errors import (
+    Interrupted,
+    PluginError,
+    ScenarioError,
+    SolverError,
+    WearsimError,
+    described,
+)
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint  # slow to import
@@ -71,7 +79,19 @@ class LazyVerb(TyperCommand):
         # Typer adds them to every app; they would install the completion of `wearsim`
         completion = ("install_completion", "show_completion")
         command.params = [item for item in command.params if item.name not in completion]
+        shared = kwargs["parent"].find_root().command.params
+        _add_option(command, next(item for item in shared if item.name == "traceback"))
         return command.make_context(*args, **kwargs)
+
+
+def _add_option(command: Any, option: Any) -> None:
+    """Add a global option to a command and to those of a group; only its callback is called."""
+    if not any(item.name == option.name for item in command.params):
+        added = copy(option)
+        added.expose_value = False
+        command.params.append(added)
+    for inner in getattr(command, "commands", {}).values():
+        _add_option(inner, option)
 
 
 def _built_in(name: str) -> typer.Typer:
@@ -144,7 +164,6 @@ def _summary(point: EntryPoint) -> str:
 FAILED = 1
 INTERRUPTED = 130
 TRACEBACK = "WEARSIM_TRACEBACK"
-_INTERNAL = ("contact_", "coarse_step_", "half_quadrature_", "loop_")
 
 
 class Shell(TyperGroup):
@@ -208,21 +227,11 @@ class Shell(TyperGroup):
             raise typer.Exit(code) from error
 
 
-def _state(state: dict[str, Any]) -> str:
-    """Return the numbers of a solver state on one line, an array as its range."""
-    parts = []
-    for name, value in state.items():
-        numeric = isinstance(value, int | float) or (hasattr(value, "min") and value.size)
-        if not numeric or name.startswith(_INTERNAL):
-            continue
-        low, high = (value, value) if not hasattr(value, "min") else (value.min(), value.max())
-        parts.append(f"{name} {low:.6g}" if low == high else f"{name} {low:.6g} to {high:.6g}")
-    return ", ".join(parts)
-
-
 def _message(error: BaseException) -> str:
     if isinstance(error, SolverError) and error.state:
-        return f"error: {error.at_shell}\nstate at the failure: {_state(error.state)}"
+        from wearsim.cli.render.summary import solver_state
+
+        return f"error: {error.at_shell}\nstate at the failure: {solver_state(error.state)}"
     if isinstance(error, ScenarioError | Interrupted):  # their messages start with file or progress
         return error.at_shell
     if isinstance(error, WearsimError):
@@ -230,7 +239,7 @@ def _message(error: BaseException) -> str:
     if isinstance(error, OSError):
         return f"error: {error.filename or 'a file'}: {error.strerror or error}"
     return (
-        f"internal error: {type(error).__name__}: {error}\n"
+        f"internal error: {type(error).__name__}: {described(error)}\n"
         "this is a defect of wearsim or of a plugin; --traceback shows where"
     )
 
@@ -241,7 +250,6 @@ app = typer.Typer(
     help="Simulate wear of rolling contacts over millions of roller passes.",
     epilog="Exit codes: 0 success, 1 the computation failed, 2 bad input, 130 interrupted.",
     no_args_is_help=True,
-    add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -256,6 +264,11 @@ def _show_version(requested: bool) -> None:
         raise typer.Exit
 
 
+def _show_tracebacks(requested: bool) -> None:
+    if requested:
+        os.environ[TRACEBACK] = "1"
+
+
 @app.callback()
 def options(
     version: Annotated[
@@ -264,12 +277,15 @@ def options(
     ] = False,
     traceback: Annotated[
         bool,
-        typer.Option("--traceback", help=f"Show tracebacks of errors; also {TRACEBACK}=1."),
+        typer.Option(
+            "--traceback",
+            help=f"Show tracebacks of errors; also {TRACEBACK}=1.",
+            callback=_show_tracebacks,
+            is_eager=True,
+        ),
     ] = False,
 ) -> None:
     """Simulate wear of rolling contacts over millions of roller passes."""
-    if traceback:
-        os.environ[TRACEBACK] = "1"
 
 
 def main() -> None:

@@ -11,7 +11,7 @@ from typing import TypeVar
 
 import pluggy
 
-from wearsim.errors import PluginError
+from wearsim.errors import PluginError, described
 from wearsim.plugins.specs import (
     PROTOCOL,
     ContactModelSpec,
@@ -283,7 +283,7 @@ class Registry:
             ) from error
         except (Exception, SystemExit) as error:  # scenarios without this plugin must work
             self.broken.append(
-                Broken(point.name, name, version, f"{type(error).__name__}: {error}")
+                Broken(point.name, name, version, f"{type(error).__name__}: {described(error)}")
             )
             return
         for kind, yielded in specs.items():

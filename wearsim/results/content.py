@@ -193,6 +193,8 @@ class StudyData:
     """
 
     separately_stored: ClassVar[frozenset[str]] = frozenset({"scenario_text", "files"})
+    #: fields that files of earlier versions lack
+    optional: ClassVar[frozenset[str]] = frozenset()
 
     scenario_text: str
     scenario_file: str

@@ -156,9 +156,12 @@ class RunData(StudyData):
     drawn : dict of str to dict
         Drawn values of the random inputs by scenario key: `values`, one for the test or one per
         roller, and their SI `unit`.
+    failure, failed_at : str
+        Error that ended the run, and the time when it did, ISO 8601; empty if it did not fail.
     """
 
     separately_stored: ClassVar[frozenset[str]] = StudyData.separately_stored.union(_ARRAYS)
+    optional: ClassVar[frozenset[str]] = frozenset({"failure", "failed_at"})
     schema: ClassVar[Schema] = RUN
 
     stepper: str
@@ -171,6 +174,8 @@ class RunData(StudyData):
     records: Arrays
     checkpoint: Arrays
     drawn: dict[str, dict[str, Any]] = field(default_factory=dict)
+    failure: str = ""
+    failed_at: str = ""
 
     @property
     def variables(self) -> Arrays:
@@ -278,6 +283,11 @@ class Result(StudyResult[RunData]):
     def stepper(self) -> str:
         """Name of the stepper."""
         return self.raw.stepper
+
+    @property
+    def failure(self) -> str:
+        """Error that ended the run; empty if it did not fail."""
+        return self.raw.failure
 
     @property
     def depth_below_nominal(self) -> FloatArray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -154,6 +155,8 @@ def test_lost_contact_keeps_the_last_accepted_state(stepper: str, path: Path) ->
     assert (left.normal_force > 0.0).all()
     assert left.record_passes[-1] <= left.passes[-1] == left.raw.checkpoint["passes"]
     assert np.isfinite(left.depth).all()
+    assert left.failure == str(caught.value)
+    assert datetime.fromisoformat(left.raw.failed_at) >= datetime.fromisoformat(left.raw.created)
     # a second attempt fails in the same way and leaves the file unchanged
     with pytest.raises(SolverError, match="contact is lost at pass"):
         studies.resume(path)
@@ -189,7 +192,29 @@ def test_failure_after_resume_keeps_the_steps(path: Path, monkeypatch: pytest.Mo
         with pytest.raises(StepError, match="no step"):
             studies.resume(path)
     assert open_results(path).steps == 5
-    assert run_differences(studies.resume(path), unbroken) == []
+    assert open_results(path).failure == "no step"
+    resumed = studies.resume(path)
+    assert run_differences(resumed, unbroken) == []
+    assert (resumed.failure, open_results(path).failure) == ("", "")
+
+
+def test_error_of_a_plugin_is_stored_with_the_last_step(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls = iter(range(100))
+    record = recorder.history_row
+
+    def fail(*args: object) -> object:
+        if next(calls) == 3:
+            raise ZeroDivisionError("by zero")
+        return record(*args)
+
+    monkeypatch.setattr(recorder, "history_row", fail)
+    with pytest.raises(ZeroDivisionError):
+        studies.run(short(), path)
+    left = open_results(path)
+    assert left.failure == "ZeroDivisionError: by zero"
+    assert (left.steps, len(left.passes)) == (2, 3)
 
 
 @pytest.mark.parametrize("content", [b"content", None])

@@ -139,6 +139,7 @@ def show(file: ResultsFile, json: Json = False) -> None:
         first, last = (count(float(result.record_passes[place])) for place in (0, -1))
         rows = [
             ("test", summary.standing(result)),
+            *summary.failure(result),
             ("contact model", result.described_model),
             ("stepper", f"{result.stepper}, tolerance {result.raw.tolerance:g}"),
             ("seed", str(result.raw.seed)),
@@ -149,6 +150,7 @@ def show(file: ResultsFile, json: Json = False) -> None:
         ]
         write_table(result.title, [*rows, *_sources(result.raw)])
         title = "end state" if result.finished else "current state"
+        title = "state before the failure" if result.failure else title
         write_table(title, summary.end_state(result))
     write_notes(result.notes, result.warnings)
     if isinstance(result, EnsembleResult):

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from wearsim.cli.shared import write_list, write_table
 from wearsim.errors import PluginError, ScenarioError
-from wearsim.report.text import NOTHING, Named, brief, count, in_unit, lapse, shown
+from wearsim.report.text import NOTHING, PER_SI, Named, brief, count, in_unit, lapse, shown
 from wearsim.results import DissipationResult, EnsembleResult, Result
 from wearsim.types import FloatArray
 from wearsim.units import engineers_unit, in_engineers_unit
@@ -138,7 +139,50 @@ def standing(result: Result) -> str:
     if result.finished:
         return f"finished: {count(passes)} passes, {time}"
     part = f"{100.0 * passes / total:.1f} %"
-    return f"unfinished: pass {count(passes)} of {count(total)} ({part}), {time}"
+    word = "failed after" if result.failure else "unfinished:"
+    return f"{word} pass {count(passes)} of {count(total)} ({part}), {time}"
+
+
+def failure(result: Result) -> Rows:
+    """Return rows on the error that ended a run, and on when it did."""
+    if not result.failure:
+        return []
+    return [("failure", result.failure), ("failed at", result.raw.failed_at)]
+
+
+# name and unit of the quantities in the state of a solver
+_STATE = {
+    "gap": ("gap", "um"),
+    "line_load": ("line load", "N/mm"),
+    "half_length": ("half-length", "mm"),
+    "half_width": ("half-width", "mm"),
+    "approach": ("approach", "um"),
+    "normal_force": ("normal force", "N"),
+    "cylinder_depth": ("cylinder depth", "um"),
+    "roller_depth": ("roller depth", "um"),
+    "depth_error": ("error of depth", "um"),
+    "volume_error": ("error of volume", "mm^3"),
+    "energy": ("dissipated energy", "J"),
+    "step": ("step in passes", "1"),
+}
+_INTERNAL = ("contact_", "coarse_step_", "half_quadrature_", "loop_", "quadrature", "scatter")
+
+
+def solver_state(state: Mapping[str, Any]) -> str:
+    """Return the numbers of a solver's state on one line, an array as its range.
+
+    Quantities that only a plugin knows are in SI units, without a unit.
+    """
+    parts = []
+    for name, value in state.items():
+        numeric = isinstance(value, int | float) or (hasattr(value, "min") and value.size)
+        if not numeric or name.startswith(_INTERNAL):
+            continue
+        words, unit = _STATE.get(name, (name.replace("_", " "), "1"))
+        ends = [f"{float(end) * PER_SI[unit]:.6g}" for end in (np.min(value), np.max(value))]
+        size = " to ".join(dict.fromkeys(ends))
+        parts.append(f"{words} {size}" if unit == "1" else f"{words} {size} {unit}")
+    return ", ".join(parts)
 
 
 def _last(value: Any) -> int:
@@ -156,6 +200,8 @@ def run_json(result: Result) -> dict[str, Any]:
         "tolerance": result.raw.tolerance,
         "strips": len(result.y),
         "finished": bool(result.finished),
+        "failure": result.failure or None,
+        "failed_at": result.raw.failed_at or None,
         "steps": _last(result.steps),
         "rejected": _last(result.rejected),
         "solves": _last(result.solves),

@@ -72,7 +72,7 @@ def _caption(result: Result) -> str:
     if result.start_height.any():
         below = shown(float(np.max(result.depth_below_nominal[-1])), "um")
         depth = f"{depth} worn since the start, depth below nominal {below}"
-    unfinished = "" if result.finished else ", unfinished"
+    unfinished = "" if result.finished else ", failed" if result.failure else ", unfinished"
     return (
         f"{count(float(result.passes[-1]))} roller passes in"
         f" {shown(float(result.time[-1]), 'min')}"

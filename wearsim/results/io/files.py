@@ -229,8 +229,8 @@ def read_attributes(
     check_complete(path, file, [*schema.variables, about, scenario, files, CHECKPOINT])
     attributes: dict[str, Any] = json.loads(read_text(file[about]))
     names = data.attribute_names()
-    check_complete(path, attributes, names)
-    return {name: attributes[name] for name in names} | {
+    check_complete(path, attributes, [name for name in names if name not in data.optional])
+    return {name: attributes[name] for name in names if name in attributes} | {
         "scenario_text": read_text(file[scenario]),
         "files": json.loads(read_text(file[files])),
     }

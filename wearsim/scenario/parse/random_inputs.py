@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from wearsim.errors import ScenarioError
+from wearsim.errors import ScenarioError, described
 from wearsim.plugins import Distribution, JointDistribution, RandomInputSpec
 from wearsim.quantities import Quantity
 from wearsim.scenario.parse.fields import (
@@ -298,5 +298,5 @@ def _build(
     except QuantityError as error:
         mistakes.add(place, "", error.what, error.got, error.expected)
     except ValueError as error:
-        mistakes.add(place, "", str(error))
+        mistakes.add(place, "", described(error))
     return None

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from wearsim.errors import WearsimError
+from wearsim.errors import WearsimError, failure_text
 from wearsim.evolution.integrate import Evolution
 from wearsim.evolution.state import fresh_state
 from wearsim.mechanics.numerics.jit import not_cached
@@ -240,7 +240,7 @@ class RealisationRunner:
             try:
                 runs.append(self._prepare(number, drawn))
             except Exception as error:  # an error fails this realisation only
-                outcomes[number] = Outcome(number=number, values=drawn, error=_error_text(error))
+                outcomes[number] = Outcome(number=number, values=drawn, error=failure_text(error))
         for group in batch_groups(runs):
             for run, observations in zip(group, observe(group), strict=True):
                 outcomes[run.number] = self._outcome(run, observations)
@@ -285,7 +285,7 @@ class RealisationRunner:
     def _outcome(self, run: RealisationRun, observations: RunObservations | Exception) -> Outcome:
         drawn = dict(run.drawn)
         if isinstance(observations, Exception):
-            return Outcome(number=run.number, values=drawn, error=_error_text(observations))
+            return Outcome(number=run.number, values=drawn, error=failure_text(observations))
         rows, scalars = observations.rows, dict(observations.scalars)
         unusable = [
             f"{name} is not finite at record {number}"
@@ -304,9 +304,3 @@ class RealisationRunner:
         courses = {name: np.array([row[name] for row in rows]) for name in rows[0]}
         values = {**drawn, **courses, **scalars, "depth_profile": profile}
         return Outcome(number=run.number, values=values)
-
-
-def _error_text(error: Exception) -> str:
-    """Return the message of an error, after its type if wearsim did not raise it deliberately."""
-    kind = type(error).__name__
-    return str(error) or kind if isinstance(error, WearsimError) else f"{kind}: {error}"

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wearsim.errors import Interrupted, ResultsFileError, SolverError
+from wearsim.errors import Interrupted, ResultsFileError, failure_text
 from wearsim.evolution.error_estimates import greatest_depth, volume_of
 from wearsim.evolution.integrate import evolve
 from wearsim.evolution.state import SIGMAS, WearState, fresh_state, widened, widened_state
@@ -184,6 +184,7 @@ class _RunInProgress:
     """
 
     _last_write = 0.0  # duration [s]
+    failure = failed_at = ""
 
     def __init__(
         self,
@@ -247,9 +248,13 @@ class _RunInProgress:
             self._write(finished=True)
         except KeyboardInterrupt:
             self._interrupt()
-        except SolverError:
-            # the file keeps the last accepted step and the history before the failure
+        except (Interrupted, ResultsFileError):
+            raise
+        except Exception as error:
+            # the file keeps the last accepted step, the history before the failure, and its cause
             self.recorder.drop_unfinished()
+            self.failure = failure_text(error)
+            self.failed_at = datetime.now(UTC).isoformat(timespec="seconds")
             self._write()
             raise
         self.on_event(Finished(self._wall()))
@@ -383,4 +388,6 @@ class _RunInProgress:
             finished=finished,
             wall_seconds=self._wall(),
             created=self.created,
+            failure=self.failure,
+            failed_at=self.failed_at,
         )
