@@ -9,10 +9,11 @@ from typing import TypeVar
 import numpy as np
 
 from wearsim.errors import ContactError, SolverError, StepError
+from wearsim.evolution.pauses import at_rest, next_boundaries
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, joined_states
 from wearsim.evolution.steppers.base import Attempt, Step, Stepper, Trial
-from wearsim.types import FloatArray, IntArray
+from wearsim.types import BoolArray, FloatArray, IntArray
 
 T = TypeVar("T")
 
@@ -27,7 +28,7 @@ def bisect_failures(
     work : callable
         Processes a part of the batch. Its result for a place must not depend on the others.
     places : ndarray of int, shape (places,)
-        The batch, not empty.
+        The batch.
 
     Returns
     -------
@@ -36,6 +37,8 @@ def bisect_failures(
     failed : dict of int to Exception
         Exception of each place that fails when processed individually.
     """
+    if not len(places):
+        return [], {}
     try:
         return [(places, work(places))], {}
     except Exception as error:  # any exception ends the test that raised it and no other
@@ -153,9 +156,14 @@ class Evolution:
             some = problem.at(places), state.at(places), lengths[places]
             return _finite(self.stepper.attempt(*some, self.stop, scheme))
 
-        done, failed = bisect_failures(attempt, np.arange(len(lengths)))
+        resting = self._resting()
+        done, failed = bisect_failures(attempt, np.flatnonzero(~resting))
         failures = self._rejected(failed, lengths)
         accepted: list[tuple[IntArray, list[WearState]]] = []
+        if resting.any():
+            places = np.flatnonzero(resting)
+            some = problem.at(places), state.at(places), lengths[places]
+            accepted.append((places, list(self.stepper.rest(*some, self.stop))))
         for places, tried in done:
             columns = self.numbers[places], tried.excess, lengths[places]
             each = zip(*(column.tolist() for column in columns), strict=True)
@@ -176,10 +184,17 @@ class Evolution:
             for number, length in zip(numbers, proposed, strict=True):
                 self._trials.setdefault(number, self.stepper.trial(length))
         failures: dict[int, Exception] = {}
-        done = self.state.passes.tolist(), self.state.steps.tolist()
-        for place, (number, passes, steps) in enumerate(zip(numbers, *done, strict=True)):
+        stops = np.full(len(numbers), self.stop)
+        if self.problem.pauses and not self.stepper.pass_by_pass:
+            stops = np.minimum(stops, next_boundaries(self.problem, self.state.passes))
+        resting = self._resting().tolist()
+        done = self.state.passes.tolist(), self.state.steps.tolist(), stops.tolist(), resting
+        for place, (number, passes, steps, stop, rests) in enumerate(
+            zip(numbers, *done, strict=True)
+        ):
             try:
-                lengths.append(self._length(self._trials[number], passes, steps))
+                length = self._length(self._trials[number], passes, steps, stop)
+                lengths.append(stop - passes if rests else length)
             except SolverError as error:
                 error.state = error.state or self.state.at(np.array([place])).to_arrays()
                 failures[number] = error
@@ -187,8 +202,14 @@ class Evolution:
             self.fail(failures)
         return np.array(lengths)
 
-    def _length(self, trial: Trial, passes: float, steps: int) -> float:
-        """Return the length of the next trial step of a test [passes]."""
+    def _resting(self) -> BoolArray:
+        """Return which tests are in a pause; a pass-by-pass stepper passes over it itself."""
+        if self.problem.pauses and not self.stepper.pass_by_pass:
+            return at_rest(self.problem, self.state.passes)
+        return np.zeros(len(self.numbers), dtype=np.bool_)
+
+    def _length(self, trial: Trial, passes: float, steps: int, stop: float) -> float:
+        """Return the length of the next trial step of a test, up to `stop` [passes]."""
         if self.stepper.pass_by_pass:
             return trial.step(passes, min(self.stop, self._next_record(passes)))
         if steps >= self.max_steps:
@@ -196,7 +217,7 @@ class Evolution:
                 f"{steps} steps have reached pass {passes:.0f} of {self.stop:.0f};"
                 " raise evolution.max_steps or evolution.tolerance"
             )
-        return trial.step(passes, self.stop)
+        return trial.step(passes, stop)
 
     def _rejected(self, failed: dict[int, Exception], lengths: FloatArray) -> dict[int, Exception]:
         """Shorten the steps that failed, by place; return errors of tests that cannot continue."""
@@ -212,9 +233,13 @@ class Evolution:
     def _continued(
         self, accepted: list[tuple[IntArray, list[WearState]]], warning: str | None
     ) -> Advance:
-        """Continue from accepted steps, given by the increasing places of their tests and path."""
+        """Continue from accepted steps, given by the places of their tests and their path."""
         places = np.concatenate([part for part, _ in accepted])
         *middle, end = map(joined_states, zip(*(path for _, path in accepted), strict=True))
+        if (np.diff(places) < 0).any():  # pauses come first
+            order = np.argsort(places)
+            places, end = places[order], end.at(order)
+            middle = [part.at(order) for part in middle]
         numbers, start = self.numbers[places], self.state.at(places)
         trials = [self._trials.pop(number) for number in numbers.tolist()]
         end = end.replaced(

@@ -206,6 +206,21 @@ class WearProblem:
         """Whether a load falls as its roller descends."""
         return bool(self.stiffness.any())
 
+    @cached_property
+    def pauses(self) -> list[FloatArray]:
+        """Start and end of the pauses of each realisation, shape (pauses, 2) [passes]."""
+        pauses = [load.pauses * self.kinematics.pass_rate for load in self.loads]
+        return pauses if any(map(len, pauses)) else []
+
+    @cached_property
+    def greatest_load(self) -> FloatArray:
+        """Greatest load of a test with pauses, otherwise -inf, shape (realisations,) [N]."""
+        found = [-np.inf] * len(self.loads)
+        for place, load in enumerate(self.loads):
+            if len(load.pauses):
+                found[place] = load.extremes(*(load.span or (0.0, float(load.pauses.max()))))[1]
+        return np.array(found)
+
     def force(self, time: FloatArray) -> FloatArray:
         """Return the load before feedback at a time [s] of each realisation, shape (N,) [N]."""
         each = zip(self.loads, time[:, None], strict=True)

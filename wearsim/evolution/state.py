@@ -14,6 +14,8 @@ from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import is_every
 from wearsim.types import FloatArray, IntArray
 
+LEAST_LOAD = 1e-3  # next to a pause, of the greatest load
+
 
 def contact_batch(
     problem: WearProblem,
@@ -48,6 +50,8 @@ def contact_batch(
 def unworn_contacts(problem: WearProblem) -> ContactBatch:
     """Return the contacts of the unworn bodies under the loads at the start of the test."""
     force = problem.force(np.zeros(len(problem.loads)))
+    if problem.pauses:
+        force = np.maximum(force, LEAST_LOAD * problem.greatest_load)
     loads = np.broadcast_to(force + problem.inputs.normal_force_offset, problem.shape)
     cylinder, roller = np.zeros((1, 1, 1, 1)), np.zeros((1, problem.rollers, 1, 1))
     return contact_batch(problem, problem.nominal_gap, loads, cylinder, roller)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
+from typing import Literal
 
 import numpy as np
 from pydantic import Field
 
 from wearsim.csv_tables import read_columns
+from wearsim.errors import Mistake, ScenarioError
 from wearsim.mechanics.numerics.piecewise_linear import PiecewiseLinear
 from wearsim.plugins import Load, LoadSpec, LoadTerm, Options
 from wearsim.quantities import (
@@ -39,6 +41,11 @@ class RecordedOptions(Options):
     """Options of the load `recorded`."""
 
     file: InputFile = Field(description="CSV with columns such as 'time [min]', 'load [N]'")
+    gaps: Literal["error", "hold", "interpolate"] = Field(
+        "interpolate",
+        description="load in a gap, an interval of more than ten times the usual one: an error, the"
+        " last value before it, or a straight line across it",
+    )
     stiffness: NonNegativeStiffness = Field(
         0.0, description="decrease of the load per worn depth, if the log does not include it"
     )
@@ -69,18 +76,59 @@ class ConstantLoad(Load):
         return self._force
 
 
+GAP = 10.0  # usual intervals between samples
+FEWEST_SAMPLES = 10  # with fewer, a file is a schedule without a usual interval
+ZERO_DRIFT = 0.01  # part of the greatest load by which a log may be below zero in a pause
+
+
 @lru_cache(maxsize=4)  # a log may have millions of rows, and a study builds its load several times
-def _read_log(text: str, path: str) -> PiecewiseLinear:
+def _read_log(text: str, path: str, gaps: str) -> tuple[PiecewiseLinear, FloatArray, FloatArray]:
+    """Return the log, its pauses and its gaps [s]."""
     columns = read_columns(text, path, {"time": "s", "load": "N"}, rising="time")
-    return PiecewiseLinear(columns["time"], columns["load"])
+    time, load = columns["time"], columns["load"]
+    load = np.where((load < 0.0) & (load >= -ZERO_DRIFT * load.max()), 0.0, load)
+    steps = np.diff(time)
+    before = np.flatnonzero(steps > GAP * np.median(steps))
+    if len(time) < FEWEST_SAMPLES:
+        before = before[:0]
+    missing = np.stack([time[before], time[before + 1]], axis=1)
+    if len(before) and gaps == "error":
+        raise ScenarioError(path, [Mistake("", "", gap_text(missing, float(np.median(steps))))])
+    if gaps == "hold":
+        time = np.insert(time, before + 1, missing[:, 1])
+        load = np.insert(load, before + 1, load[before])
+    zero = np.concatenate([[0], (load == 0.0).astype(np.int8), [0]])
+    starts, stops = (np.flatnonzero(np.diff(zero) == sign) for sign in (1, -1))
+    pauses = np.stack([time[starts], time[stops - 1]], axis=1)
+    return PiecewiseLinear(time, load), pauses, missing
+
+
+def gap_text(gaps: FloatArray, interval: float | None = None) -> str:
+    """Return a sentence on the gaps of a log [s], and on its usual interval [s] if it is given."""
+    start, stop = gaps[np.diff(gaps, axis=1).argmax()]
+    several = f"{len(gaps)} gaps, the longest" if len(gaps) > 1 else "a gap"
+    usual = f", {(stop - start) / interval:.4g} times the usual interval" if interval else ""
+    return f"has {several} from {start / 60.0:.6g} to {stop / 60.0:.6g} min{usual}"
 
 
 class RecordedLoad(Load):
-    """Logged load, linear between its samples and integrated exactly."""
+    """Logged load, linear between its samples and integrated exactly; zero in a pause."""
 
     def __init__(self, options: RecordedOptions) -> None:
         self.stiffness = options.stiffness
-        self._log = _read_log(options.file.text, options.file.path)
+        self._log, self._pauses, self._gaps = _read_log(
+            options.file.text, options.file.path, options.gaps
+        )
+
+    @property
+    def pauses(self) -> FloatArray:
+        """Start and end of times at zero load, shape (pauses, 2) [s]."""
+        return self._pauses
+
+    @property
+    def gaps(self) -> FloatArray:
+        """Start and end of gaps in the log, shape (gaps, 2) [s]."""
+        return self._gaps
 
     @property
     def span(self) -> tuple[float, float]:

@@ -100,6 +100,8 @@ class PassLoop:
         *State*: approach after the last pass, and at the current factorisation [m].
     energy : ndarray, shape (contacts,)
         *State*: dissipated power summed over the passes [W].
+    rests : bool
+        Whether the load has pauses: a pass without load wears nothing, instead of being an error.
     """
 
     order: IntArray
@@ -129,6 +131,7 @@ class PassLoop:
     approach: FloatArray
     anchor_approach: FloatArray
     energy: FloatArray
+    rests: bool = False
 
 
 class ContactModel(ABC):

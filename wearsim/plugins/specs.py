@@ -63,6 +63,20 @@ class Load(ABC):
         """Return the exact standard deviation of the load between two times [s] [N]."""
         return 0.0
 
+    @property
+    def pauses(self) -> FloatArray:
+        """Start and end of times at zero load, in order, shape (pauses, 2) [s].
+
+        The bodies do not touch in a pause, and nothing wears. Elsewhere a load that falls to zero
+        is an error.
+        """
+        return np.zeros((0, 2))
+
+    @property
+    def gaps(self) -> FloatArray:
+        """Start and end of gaps in a log, in order, shape (gaps, 2) [s]."""
+        return np.zeros((0, 2))
+
 
 class LoadTerm(ABC):
     """Term added to a load; its state is one force per roller [N] that follows the power."""

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from wearsim.errors import ContactError, StepError
+from wearsim.evolution.pauses import rest, step_or_rest
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
 from wearsim.types import FloatArray
@@ -176,7 +177,13 @@ class Stepper(ABC):
 
         The integration does not continue from the state returned.
         """
-        return self.scheme(problem, state)(problem, state, passes)
+        return step_or_rest(self.scheme(problem, state), problem, state, passes)
+
+    def rest(
+        self, problem: WearProblem, state: WearState, step: FloatArray, stop: float
+    ) -> tuple[WearState, ...]:
+        """Return the path of a step in a pause; parameters as of `attempt`."""
+        return (rest(problem, state, step, stop),)
 
     def recorded(self, problem: WearProblem) -> WearProblem:
         """Return the problem whose contacts are recorded."""

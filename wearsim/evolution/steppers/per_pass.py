@@ -195,6 +195,7 @@ def run_compiled(
         approach=approach,
         anchor_approach=anchor_approach,
         energy=energy,
+        rests=bool(problem.pauses),
     )
     full_solves = problem.model.pass_loop(loop)
     # every physical roller dissipates all the time, one pass per turn of the cylinder
@@ -233,6 +234,10 @@ def run_in_python(
             gap = unworn + cylinder[s, 0, 0] + roller[0, r, 0]
             force_of_pass = float(force[number, 0]) + float(terms[:, r, 0].sum())
             force_of_pass -= load.stiffness * float(gap.min() - unworn.min())
+            if problem.pauses and min(force_of_pass, float(force[number, 0])) <= 0.0:
+                for t, term in enumerate(problem.terms.values()):
+                    terms[t, r] = term.advance(terms[t, r], np.zeros(1), turn / multiplicity)
+                continue
             loads = np.full(one.shape, force_of_pass)
             point = contact_batch(one, one.nominal_gap, loads, cylinder, roller).point(s)
             place = s * problem.rollers + r

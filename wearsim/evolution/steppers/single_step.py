@@ -11,7 +11,7 @@ from wearsim.contact_batch import ContactBatchSolution
 from wearsim.errors import StepError
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import values_between
-from wearsim.evolution.state import Depths, WearState, contact_batch
+from wearsim.evolution.state import LEAST_LOAD, Depths, WearState, contact_batch
 from wearsim.mechanics.numerics.wear_exponent import estimate_exponents, ratio_to_load
 from wearsim.plugins import SharedWear
 from wearsim.types import FloatArray
@@ -163,6 +163,9 @@ def _with_feedback(
         loads -= problem.stiffness * np.mean(descents, axis=0)
     for term in terms:
         loads += term[problem.roller]
+    if problem.pauses:
+        # a spring that has descended lifts the roller while the load rises from a pause
+        loads = np.maximum(loads, LEAST_LOAD * problem.greatest_load)
     if np.count_nonzero(loads > 0.0) < loads.size:
         raise StepError(
             f"contact is lost at pass {state.passes[0]:.0f}: the load has fallen to"

@@ -22,6 +22,7 @@ from wearsim.evolution.error_estimates import (
     volume_of,
     with_pass_errors,
 )
+from wearsim.evolution.pauses import rest
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, contact_batch
 from wearsim.evolution.steppers.base import Attempt, Step, Stepper
@@ -94,6 +95,12 @@ class StepDoublingStepper(Stepper):
         reached = np.array([end.depth_error, end.volume_error]) - fixed
         over = excess(self.tolerance, problem, state, end, added, stop, reached)
         return Attempt((half, end), over)
+
+    def rest(
+        self, problem: WearProblem, state: WearState, step: FloatArray, stop: float
+    ) -> tuple[WearState, ...]:
+        """Return the states in the middle and at the end of a step in a pause."""
+        return rest(problem, state, 0.5 * step, stop), rest(problem, state, step, stop)
 
 
 def first_steps(problem: WearProblem, state: WearState) -> FloatArray:

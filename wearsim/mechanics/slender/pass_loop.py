@@ -114,6 +114,7 @@ def run_passes(
     first: int,
     passes: Passes,
     stiffness: float,
+    rests: bool,
     terms: FloatArray,
     term_rates: FloatArray,
     nominal_gap: FloatArray,
@@ -139,6 +140,8 @@ def run_passes(
         its mean longitudinal and lateral creepage (passes, 2).
     stiffness : float
         Decrease of the load per descent of a roller [N/m].
+    rests : bool
+        Whether a pass without load wears nothing, instead of being an error.
     terms : ndarray, shape (terms, contacts)
         State of linear load terms [N].
     term_rates : ndarray, shape (terms, 1 + contacts)
@@ -183,8 +186,12 @@ def run_passes(
         load = passes.base_load[p] - stiffness * (lowest - lowest_unworn)
         for t in range(terms.shape[0]):
             load += terms[t, g]
-        if not load > 0.0:
-            return UNLOADED, p, full_solves
+        if not load > 0.0 or (rests and passes.base_load[p] <= 0.0):
+            if not rests:
+                return UNLOADED, p, full_solves
+            for t in range(terms.shape[0]):
+                terms[t, g] -= term_rates[t, 1 + g] * terms[t, g]
+            continue
         if not (similar and solve_from_anchor(g, load, lowest, loads, constants, state)):
             full_solves += 1
             status = solve_fully(g, load, similar, loads, constants, state)

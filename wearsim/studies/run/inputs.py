@@ -89,7 +89,7 @@ def load_range(scenario: Scenario, load: Load, stop: float) -> tuple[float, floa
     Raises
     ------
     ScenarioError
-        If the load is not defined for the whole time, or is not positive.
+        If the load is not defined for the whole time, or is not positive outside of pauses.
     """
     kind = scenario.load.kind
     if load.span is not None and (load.span[0] > 0.0 or load.span[1] < stop * (1.0 - 1e-9)):
@@ -106,19 +106,22 @@ def load_range(scenario: Scenario, load: Load, stop: float) -> tuple[float, floa
             ],
         )
     low, high = load.extremes(0.0, stop)
-    if low <= 0.0 and not scenario.load.terms:
-        raise ScenarioError(
-            scenario.file,
-            [
-                Mistake(
-                    "load",
-                    kind,
-                    "the load falls to zero or below, and contact is lost",
-                    f"{low:.6g} N",
-                    "a load above zero at all times",
-                )
-            ],
+    if scenario.load.terms:
+        return low, high
+    mistake = None
+    if high <= 0.0:
+        what = f"the load is never above zero up to {stop / 60.0:.6g} min, and there is no contact"
+        mistake = Mistake("load", kind, what, f"{high:.6g} N", "a load above zero")
+    elif low < 0.0 or (low == 0.0 and not len(load.pauses)):
+        mistake = Mistake(
+            "load",
+            kind,
+            "the load falls to zero or below, and contact is lost",
+            f"{low:.6g} N",
+            "a load above zero at all times, or zero for a pause in a log",
         )
+    if mistake is not None:
+        raise ScenarioError(scenario.file, [mistake])
     return low, high
 
 
@@ -197,7 +200,8 @@ def with_nodes(
         uniforms = copula.correlate(sampler.uniforms(0, points))
         return _with_values(problem.inputs.at(np.repeat(rollers, points)), items, uniforms)
 
-    force = float(problem.loads[0].force(np.zeros(1))[0])
+    (load,) = problem.loads
+    force = float(load.force(np.zeros(1))[0]) or float(problem.greatest_load[0])  # 0 in a pause
     inputs, reference = inputs_of(count), inputs_of(REFERENCE_POINTS)
     weights = []
     for number in range(problem.rollers):

@@ -13,6 +13,7 @@ import numpy as np
 
 from wearsim.errors import ContactError, StepError
 from wearsim.evolution.integrate import Advance
+from wearsim.evolution.pauses import opened
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import mean_along, width, worn_volume
 from wearsim.evolution.state import WearState, joined_states
@@ -96,8 +97,7 @@ class RecordSchedule:
     def of(cls, scenario: Scenario, base: float) -> RecordSchedule:
         """Return the schedule of a scenario; `base` is the length of the test [passes].
 
-        When a test is extended, the base remains the length of the first run, so that the sequence
-        of records continues unchanged.
+        When a test is extended, the base remains the length of the first run.
         """
         outputs = scenario.outputs
         count = outputs.records if outputs.records is not None else DEFAULT_RECORDS
@@ -170,8 +170,7 @@ def present_contacts(
 ) -> tuple[WearProblem, WearState, FloatArray]:
     """Return `state` with its contacts at the present loads, their problem, and the loads.
 
-    If inputs are drawn at every pass, the contacts are those of the quadrature over passes, so that
-    a record does not depend on the stepper.
+    If inputs are drawn at every pass, the contacts are those of the quadrature over passes.
     """
     recorded = stepper.recorded(problem)
     loads = present_loads(recorded, state)
@@ -179,6 +178,7 @@ def present_contacts(
         contacts = solve_present(recorded, state, loads, cold=recorded is not problem)
     else:
         contacts = contacts_at(recorded, state, loads)
+    contacts, loads = opened(problem, state.passes, contacts, loads)
     return recorded, state.replaced(contacts=contacts), loads
 
 
@@ -244,8 +244,8 @@ def take_side_step(
 ) -> WearState:
     """Return the state `passes` later by one side step, or by halves if that step fails.
 
-    A profile interpolated between two steps would not fit its contact, since line loads change
-    noticeably with a tenth of a micrometre. The run does not continue from a side step.
+    A profile interpolated between two steps would not fit its contact. The run does not continue
+    from a side step.
 
     Parameters
     ----------

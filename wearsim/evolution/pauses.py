@@ -1,0 +1,135 @@
+"""Pauses: times at zero load, in which there is no contact and nothing wears.
+
+Steps end where a pause begins or ends. A pause is then one step without wear, so that the contacts
+are never solved without load.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+
+from wearsim.contact_batch import ContactBatchSolution
+from wearsim.evolution.problem import WearProblem
+from wearsim.evolution.state import WearState
+from wearsim.types import BoolArray, FloatArray, IntArray
+
+_MARGIN = 1e-6, 1e-7  # passes, and part of the passes done, by which a state may miss a boundary
+_SHORTEST = 1.0  # passes; during a shorter pause the mean load over a step is sufficient
+
+
+def _margin(passes: float) -> float:
+    return max(_MARGIN[0], _MARGIN[1] * passes)
+
+
+def at_rest(problem: WearProblem, passes: FloatArray) -> BoolArray:
+    """Return whether the next step of each realisation is a pause.
+
+    Parameters
+    ----------
+    problem : WearProblem
+    passes : ndarray, shape (realisations,)
+        Roller passes done.
+
+    Returns
+    -------
+    ndarray of bool, shape (realisations,)
+    """
+    found = np.zeros(len(passes), dtype=np.bool_)
+    for place, (pauses, done) in enumerate(zip(_long(problem), passes.tolist(), strict=True)):
+        margin = _margin(done)
+        begun = int(np.searchsorted(pauses[:, 0], done + margin, side="right")) - 1
+        found[place] = begun >= 0 and done < pauses[begun, 1] - margin
+    return found
+
+
+def next_boundaries(problem: WearProblem, passes: FloatArray) -> FloatArray:
+    """Return the start or end of a pause that follows, shape (realisations,) [passes].
+
+    It is infinite if there is none; parameters as of `at_rest`.
+    """
+    found = np.full(len(passes), np.inf)
+    for place, (pauses, done) in enumerate(zip(_long(problem), passes.tolist(), strict=True)):
+        boundaries = pauses.ravel()
+        number = int(np.searchsorted(boundaries, done + _margin(done), side="right"))
+        if number < len(boundaries):
+            found[place] = boundaries[number]
+    return found
+
+
+def _long(problem: WearProblem) -> list[FloatArray]:
+    """Return the pauses that steps do not pass over, of each realisation [passes]."""
+    return [pauses[np.ptp(pauses, axis=1) > _SHORTEST] for pauses in problem.pauses]
+
+
+def rest(problem: WearProblem, state: WearState, passes: FloatArray, stop: float) -> WearState:
+    """Return the state after a pause of `passes` passes: load terms relax, and nothing wears.
+
+    Parameters
+    ----------
+    problem : WearProblem
+    state : WearState
+    passes : ndarray, shape (realisations,)
+        Length of the step.
+    stop : float
+        Passes at the end of the test, which a step may reach.
+    """
+    done = np.where(passes == stop - state.passes, stop, state.passes + passes)
+    terms = state.terms
+    if problem.terms:
+        duration = float((problem.time(done) - problem.time(state.passes))[0])
+        each = zip(problem.terms.values(), terms, strict=True)
+        terms = np.array([term.advance(value, 0.0 * value, duration) for term, value in each])
+    return state.replaced(
+        passes=done,
+        terms=terms,
+        **{n: rest(problem, part, passes, stop) for n, part in state.auxiliary.items()},
+    )
+
+
+def step_or_rest(
+    step: Callable[[WearProblem, WearState, FloatArray], WearState],
+    problem: WearProblem,
+    state: WearState,
+    passes: FloatArray,
+) -> WearState:
+    """Return the state after a step, which is a rest for realisations in a pause."""
+    resting = at_rest(problem, state.passes) if problem.pauses else np.zeros(len(passes), np.bool_)
+    if not resting.any():
+        return step(problem, state, passes)
+    for chosen, action in ((resting, partial(rest, stop=np.inf)), (~resting, step)):
+        places: IntArray = np.flatnonzero(chosen)
+        if places.size:
+            end = action(problem.at(places), state.at(places), passes[places])
+            state = state.with_others(places, end)
+    return state
+
+
+def opened(
+    problem: WearProblem, passes: FloatArray, contacts: ContactBatchSolution, loads: FloatArray
+) -> tuple[ContactBatchSolution, FloatArray]:
+    """Return contacts and their loads [N], all zero for realisations without load at this instant.
+
+    Parameters
+    ----------
+    problem : WearProblem
+    passes : ndarray, shape (realisations,)
+        Roller passes done.
+    contacts : ContactBatchSolution
+        In the problem's order.
+    loads : ndarray, shape (stations, contacts, realisations)
+    """
+    found = np.zeros(len(passes), dtype=np.bool_)
+    for place, (pauses, done) in enumerate(zip(problem.pauses, passes.tolist(), strict=False)):
+        margin = _margin(done)
+        begun = int(np.searchsorted(pauses[:, 0], done + margin, side="right")) - 1
+        found[place] = begun >= 0 and done <= pauses[begun, 1] + margin
+    if not found.any():
+        return contacts, loads
+    numbers: IntArray = np.flatnonzero(np.broadcast_to(found, loads.shape))
+    some = contacts.at(numbers)
+    zeros = {n: np.zeros_like(column) for n, column in vars(some).items() if n != "y"}
+    empty = ContactBatchSolution(some.y, **zeros)
+    return contacts.with_others(numbers, empty), np.where(found, 0.0, loads)
