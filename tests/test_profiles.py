@@ -203,6 +203,18 @@ def test_impossible_cutoff_is_refused(cutoff: float) -> None:
         gaussian_filtered(Profile(Y, HEIGHT[0]), cutoff + (1e-3 if cutoff == 3e-3 else 0.0))
 
 
+def test_cutoff_below_the_distance_of_points_is_refused() -> None:
+    y = np.array([-6e-3, -2e-3, 2e-3, 6e-3])
+    with pytest.raises(ValueError, match="at least twice the distance of points, 4 mm"):
+        gaussian_filtered(Profile(y, 0.0 * y), 5e-3)
+
+
+def test_column_chosen_as_depth_is_positive_downwards() -> None:
+    choice = ProfileChoice(columns=("x", "Depth"), units=("mm", "um"))
+    profile = read_profile("x,Depth\n0,1\n1,2\n", "p.csv", choice)
+    np.testing.assert_allclose(profile.height, [-1e-6, -2e-6], rtol=1e-15)
+
+
 def _rig(tmp_path: Path, cylinder: str) -> Path:
     path = tmp_path / "rig.toml"
     path.write_text(starter_scenario().replace("[operation]", f"{cylinder}\n\n[operation]", 1))

@@ -34,7 +34,8 @@ class ProfileChoice:
     Parameters
     ----------
     columns : tuple of str, optional
-        Names of the columns of position and height in a CSV file.
+        Names of the columns of position and height in a CSV file; a column "depth" is positive
+        downwards.
     units : tuple of str, optional
         Units of these columns where the header has none, ("mm", "um").
     row : int, optional
@@ -136,7 +137,9 @@ def read_profile(content: str | bytes, file: str, choice: ProfileChoice | None =
         rising=y,
         either_way=True,
     )
-    return Profile(columns[y], columns[height])
+    # a column chosen by the name "depth" has the sign of one found by that name
+    sign = -1.0 if choice.columns and height.casefold() == "depth" else 1.0
+    return Profile(columns[y], sign * columns[height])
 
 
 def is_surface(content: bytes) -> bool:
@@ -236,7 +239,8 @@ def gaussian_filtered(profile: Profile, cutoff: float) -> Profile:
     Raises
     ------
     ValueError
-        If the cutoff is not positive or exceeds the length of the profile.
+        If the cutoff is not positive, exceeds the length of the profile or is less than twice the
+        distance of its points.
     """
     import numpy as np  # noqa: PLC0415
 
@@ -250,6 +254,11 @@ def gaussian_filtered(profile: Profile, cutoff: float) -> Profile:
     y = np.linspace(profile.y[0], profile.y[-1], count)
     height = np.interp(y, profile.y, profile.height)
     spacing = length / (count - 1)
+    if spacing > 0.5 * cutoff:
+        raise ValueError(
+            f"the cutoff of {1e3 * cutoff:.4g} mm must be at least twice the distance of points,"
+            f" {1e3 * spacing:.4g} mm"
+        )
     reach = math.ceil(cutoff / spacing)  # weights beyond are below 1e-6
     distance = spacing * np.arange(-reach, reach + 1) / (_ALPHA * cutoff)
     weight = np.exp(-np.pi * distance**2)

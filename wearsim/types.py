@@ -29,12 +29,15 @@ class Material:
     poisson_ratio : float
         Poisson's ratio, 0 to 0.5.
     hardness : float, optional
-        Indentation hardness [Pa], for wear laws that need it.
+        Indentation hardness [Pa], for wear laws and warnings.
+    yield_stress : float, optional
+        Yield stress [Pa], for warnings.
     """
 
     youngs_modulus: float
     poisson_ratio: float
     hardness: float | None = None
+    yield_stress: float | None = None
 
 
 @dataclass(frozen=True)

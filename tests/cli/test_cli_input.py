@@ -4,6 +4,7 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from cli_examples import SCENARIOS, SHORT, Command
 
@@ -52,14 +53,153 @@ def test_check_describes_random_inputs(command: Command, scenario: Path) -> None
     )
     rows = " ".join(result.stdout.split())
     assert "random load.normal_force maxent, mean 307 N, std 30 N, on [0, inf), per-test" in rows
+    assert "per-test; 90 % in 257." in rows
+    assert "load constant, 3" not in rows
+    assert "creepage longitudinal 0.001 random" in rows
     assert "random creepage.misalignment disc, yaw up to 2 mrad, tilt up to 2 mrad" in rows
     assert "sampling sobol, realisation 0" in rows
+
+
+def test_check_shows_profile_and_log(command: Command, scenario: Path) -> None:
+    Path("worn.csv").write_text("y/mm;depth (um)\n6;0\n2;1,5\n-2;20,5\n-6;0\n")
+    rows = [f"{10 * k},{(0 if k < 3 else 300) + k}\n" for k in range(10) if k != 4]
+    Path("log.csv").write_text("time [s],load [N]\n0,0\n5,0\n" + "".join(rows[1:]) + "300,250\n")
+    settings = [
+        *("--set", "cylinder.profile='worn.csv'", "--set", "cylinder.profile_filter='9 mm'"),
+        *("--set", 'load={kind="recorded", file="log.csv", gaps="hold"}'),
+    ]
+    result = command("check", scenario, *settings)
+    assert result.exit_code == 0, result.stderr
+    text = " ".join(result.stdout.split())
+    assert "profile worn.csv: 4 points, y -6 to 6 mm, height -" in text
+    assert "um (worn is negative; read from the column depth), filtered with 9 mm" in text
+    assert "log log.csv: 0 to 5 min, 0 to 309 N, mean 2" in text
+    assert "1 gap of 3.5 min, 1 pause of 0.08333 min" in text
+    assert (
+        "warning: log.csv: has a gap from 1.5 to 5 min; the last value is held"
+        ' (load.gaps = "hold")' in result.stderr
+    )
+    data = json.loads(command("check", scenario, *settings, "--json").stdout)
+    assert data["profile"]["y_m"] == [-0.006, 0.006]
+    assert data["profile"]["column"] == "depth"
+    assert data["log"]["gaps_s"] == [[90.0, 300.0]]
+    assert data["log"]["pauses_s"] == [[0.0, 5.0]]
+    assert data["log"]["span_s"] == [0.0, 300.0]
+    assert data["test"]["passes"] == 6000
+    assert data["warnings"][0].startswith("log.csv: has a gap")
+
+
+def test_check_writes_random_inputs_as_json(command: Command, scenario: Path) -> None:
+    friction = 'friction.coefficient={distribution="uniform", low=0.1, high=0.2}'
+    data = json.loads(command("check", scenario, "--set", friction, "--json").stdout)
+    assert "friction" not in data
+    (item,) = data["random"]
+    assert item["name"] == "friction.coefficient"
+    (value,) = item["values"]
+    assert value["mean"] == pytest.approx(0.15)
+    assert value["range_90"] == pytest.approx([0.105, 0.195])
+
+
+SOFT = '{youngs_modulus="200 GPa", poisson_ratio=0.3, yield_stress="100 MPa"}'
+
+
+@pytest.mark.parametrize(
+    ("setting", "warning"),
+    [
+        (f"roller.material={SOFT}", "roller.material: the peak pressure of 680.2 MPa at 300 N"),
+        (
+            f"cylinder.material={SOFT}".replace("yield_stress", "hardness"),
+            "exceeds its hardness of 100 MPa",
+        ),
+        ("load.normal_force='300 kN'", "load: the peak pressure of 6802 MPa"),
+        ("creepage.longitudinal=0.06", "creepage.longitudinal: a creepage of 0.06 exceeds 5%"),
+        ("creepage.yaw='4 deg'", "creepage.yaw: a creepage of 0.0698 exceeds 5%"),
+        (
+            'friction.coefficient={distribution="uniform", low=0.5, high=1.2}',
+            "friction.coefficient: 1.17 exceeds 1",
+        ),
+        ("roller.crown_radius='1e9 mm'", "and nothing ends it; set roller.width"),
+    ],
+)
+def test_check_warns_of_implausible_inputs(
+    command: Command, scenario: Path, setting: str, warning: str
+) -> None:
+    assert "warning" not in command("check", scenario).stderr
+    result = command("check", scenario, "--set", setting)
+    assert result.exit_code == 0, result.stderr
+    assert "warning: " in result.stderr
+    assert warning in result.stderr
+
+
+def test_run_and_ensemble_keep_warnings_of_implausible_inputs(
+    command: Command, scenario: Path
+) -> None:
+    creepage = ("--set", "creepage.longitudinal=0.06", "--set", "operation.passes=60")
+    result = command("run", scenario, *creepage, "-o", "one.h5")
+    assert "creepage.longitudinal: a creepage of 0.06 exceeds 5%" in result.stderr
+    assert "0.06 exceeds 5%" in command("show", "one.h5").stderr
+    friction = ("--set", 'friction.coefficient={distribution="uniform", low=0.1, high=0.2}')
+    options = ("-n", 3, "-o", "many.h5", "--scheduler", "serial")
+    result = command("ensemble", scenario, *creepage, *friction, *options)
+    assert result.exit_code == 0, result.stderr
+    assert "0.06 exceeds 5%" in result.stderr
 
 
 def test_setting_without_a_value_is_bad_input(command: Command, scenario: Path) -> None:
     result = command("check", scenario, "--set", "seed")
     assert result.exit_code == 2
     assert "'seed' is not an override" in result.stderr
+
+
+def _write_groove(name: str, half: float, roughness: float = 0.0) -> None:
+    """Write a groove that fits the roller, measured from -half to half [mm]."""
+    y = np.linspace(-half, half, 1601)
+    height = -np.maximum(0.0, 48.0 - y**2) + roughness * np.random.default_rng(1).normal(size=1601)
+    rows = "".join(f"{a:.5f},{b:.5f}\n" for a, b in zip(y, height, strict=True))
+    Path(name).write_text(f"y [mm],height [um]\n{rows}")
+
+
+def test_contact_is_wider_than_a_measured_conformal_groove(
+    command: Command, scenario: Path
+) -> None:
+    for name, half in (("narrow.csv", 6.5), ("wide.csv", 12.0)):
+        _write_groove(name, half)
+    narrow, wide = (
+        command("contact", scenario, "--profile", name) for name in ("narrow.csv", "wide.csv")
+    )
+    assert narrow.exit_code == wide.exit_code == 0, narrow.stderr
+    assert "the contact is wider than the profile: the strips span -9." in narrow.stderr
+    assert "wider" not in wide.stderr
+    fixed = ("--set", "contact.width='12 mm'")
+    assert command("contact", scenario, "--profile", "narrow.csv", *fixed).exit_code == 1
+
+
+def test_contact_warns_where_peak_pressure_depends_on_strips(
+    command: Command, scenario: Path
+) -> None:
+    assert "warning" not in command("contact", scenario).stderr
+    _write_groove("rough.csv", 8.0, roughness=0.4)
+    profile = ("contact", scenario, "--profile", "rough.csv", "--json")
+    rough = json.loads(command(*profile).stdout)
+    assert rough["warnings"][0].startswith("peak pressure: ")
+    assert 'profile_filter = "0.8 mm"' in rough["warnings"][0]
+    assert rough["peak_pressure_error_Pa"] > 0.1 * rough["peak_pressure_Pa"]
+    smooth = json.loads(command(*profile, "--filter", "0.8 mm").stdout)
+    assert smooth["peak_pressure_Pa"] < 0.5 * rough["peak_pressure_Pa"]
+    own = ("--set", "cylinder.profile='rough.csv'", "--set", "cylinder.profile_filter='0.8 mm'")
+    same = json.loads(command("contact", scenario, *own, "--json").stdout)
+    assert same["peak_pressure_Pa"] == smooth["peak_pressure_Pa"]
+
+
+def test_options_of_a_profile_need_one(command: Command, scenario: Path) -> None:
+    for option in (("--filter", "0.8 mm"), ("--columns", "y,z"), ("--row", 2)):
+        result = command("contact", scenario, *option)
+        assert result.exit_code == 2
+        assert "Invalid value for --profile: is needed for" in result.stderr
+    _write_groove("groove.csv", 8.0)
+    result = command("contact", scenario, "--profile", "groove.csv", "--filter", "0.8")
+    assert result.exit_code == 2
+    assert "Invalid value for --filter: needs a unit" in result.stderr
 
 
 def test_contact_prints_engineering_units(command: Command) -> None:

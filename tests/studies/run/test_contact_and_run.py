@@ -6,7 +6,7 @@ import pytest
 import wearsim
 from tests.evolution import SCENARIOS
 from wearsim.errors import ScenarioError
-from wearsim.studies.preparation import plan
+from wearsim.studies.dry_run import dry_run
 from wearsim.studies.run.assemble import assemble_problem
 from wearsim.studies.run.draws import draw
 
@@ -61,7 +61,7 @@ def test_log_falling_to_zero_is_refused_before_the_run(tmp_path):
         SCENARIOS / "rig-450min.toml", overrides={"load": {"kind": "recorded", "file": str(log)}}
     )
     with pytest.raises(ScenarioError, match="the load falls to zero"):
-        plan(scenario)
+        dry_run(scenario)
 
 
 def test_options_without_meaning_are_refused():

@@ -23,6 +23,7 @@ from wearsim.cli.shared import (
     Settings,
     Units,
     check_figure,
+    checking,
     note,
     profile_choice,
     read_measured,
@@ -49,6 +50,16 @@ ProfileFile = Annotated[
         show_default=False,
     ),
 ]
+Cutoff = Annotated[
+    str | None,
+    typer.Option(
+        "--filter",
+        metavar="CUTOFF",
+        help="Cutoff wavelength of a Gaussian filter that removes roughness from the profile"
+        " (ISO 16610-21): '0.8 mm'.",
+        show_default=False,
+    ),
+]
 
 
 def contact(
@@ -59,6 +70,7 @@ def contact(
     row: Row = None,
     mean_rows: MeanRows = None,
     at: At = None,
+    cutoff: Cutoff = None,
     settings: Settings = None,
     figure: Figure = None,
     json: Json = False,
@@ -68,6 +80,8 @@ def contact(
     check_figure(figure, force)
     loaded = read_scenario(scenario, settings)
     from wearsim.cli.progress import Display
+    from wearsim.profiles import ProfileChoice, gaussian_filtered
+    from wearsim.quantities import quantity
     from wearsim.results import refuse_inputs
     from wearsim.studies.contact.single import study_contact
     from wearsim.studies.kernels import kernels_of
@@ -76,7 +90,13 @@ def contact(
         refuse_inputs(figure, loaded.paths)
         refuse_inputs(figure, [profile] if profile else [], "the profile")
     choice = profile_choice(columns, units, row, mean_rows, at)
+    if profile is None and (cutoff is not None or choice != ProfileChoice()):
+        message = "is needed for --columns, --units, --row, --mean-rows, --at and --filter"
+        raise typer.BadParameter(message, param_hint="--profile")
     measured = read_measured(profile, choice) if profile is not None else None
+    if measured is not None and cutoff is not None:
+        with checking("--filter"):
+            measured = gaussian_filtered(measured, quantity(cutoff, "m"))
     has_fields = loaded.contact.spec.capabilities.fields
     with_fields = figure is not None and has_fields
 
@@ -101,6 +121,7 @@ def contact(
 
         save_figure(contact_figure(study, loaded.title), figure)
     if not json:
+        write_notes((), study.warnings)
         for text in [*notes, *([f"figure: {figure}"] if figure else [])]:
             note(text)
 
@@ -147,6 +168,11 @@ def _rows(study: ContactStudy) -> list[tuple[str, str]]:
     ]
 
 
+def _times(error: float | None, value: float) -> float | None:
+    """Return an error from a relative one, if there is any."""
+    return None if error is None else error * value
+
+
 def _data(
     scenario: Scenario, study: ContactStudy, notes: list[str], figure: Path | None
 ) -> dict[str, Any]:
@@ -175,7 +201,8 @@ def _data(
         "power_W": solution.power,
         "adhesion_fraction": solution.adhesion_fraction,
         "iterations": solution.iterations,
-        "power_error_W": None if study.grid_error is None else study.grid_error * solution.power,
+        "power_error_W": _times(study.grid_error, solution.power),
+        "peak_pressure_error_Pa": _times(study.pressure_error, solution.peak_pressure),
         "solve_seconds": study.seconds,
         "strips": {
             "y_m": solution.y,
@@ -184,6 +211,7 @@ def _data(
             "dissipation_W_per_m": solution.dissipation,
         },
         "notes": notes,
+        "warnings": study.warnings,
         "figure": figure,
     }
 

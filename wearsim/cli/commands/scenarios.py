@@ -23,13 +23,17 @@ from wearsim.cli.shared import (
 )
 
 
-def check(scenario: ScenarioFile, settings: Settings = None) -> None:
-    """Check a scenario: print all mistakes, or a summary of the run."""
+def check(scenario: ScenarioFile, settings: Settings = None, json: Json = False) -> None:
+    """Check a scenario: print all mistakes, or the inputs and a summary of the run."""
     loaded = read_scenario(scenario, settings)
-    from wearsim.studies.preparation import plan
+    from wearsim.studies.dry_run import dry_run, plan
 
-    write_table(f"ok: {loaded.title}", plan(loaded))
-    write_notes(loaded.notes)
+    data = dry_run(loaded)
+    if json:
+        write_json(data)
+        return
+    write_table(f"ok: {loaded.title}", plan(data))
+    write_notes(data["notes"], data["warnings"])
 
 
 def schema() -> None:

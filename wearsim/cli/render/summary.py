@@ -228,7 +228,9 @@ def run_line(result: Result) -> str:
         volume = np.max(result.worn_volume[-1])
         depth = _within("depth", np.max(result.depth_error[-1]), depth)
         volume = _within("worn volume", np.max(result.volume_error[-1]), volume)
-        error = f"{depth}, {volume} (estimated stepping error)"
+        error = (
+            f"{depth}, {volume} (estimated numerical error of the steps, not of model or inputs)"
+        )
     return _line(used, error, lapse(result.raw.wall_seconds))
 
 
@@ -236,7 +238,8 @@ def contact_line(study: ContactStudy) -> str:
     """Return the footer of one contact, with the error estimated from half as many strips."""
     error = ""
     if study.grid_error is not None:
-        error = f"dissipated power within {_percent(study.grid_error)} (estimated strip error)"
+        percent = _percent(study.grid_error)
+        error = f"dissipated power within {percent} (estimated numerical error of the strips)"
     time = NOTHING if study.seconds is None else brief(study.seconds)
     return _line([study.described_model, f"{study.grid.strips} strips"], error, time)
 

@@ -40,7 +40,10 @@ class MaterialTable(Options):
     youngs_modulus: PositivePressure = Field(description="Young's modulus.")
     poisson_ratio: float = Field(ge=0.0, le=0.5, description="Poisson's ratio.")
     hardness: PositivePressure | None = Field(
-        default=None, description="Indentation hardness, for wear laws that need it."
+        default=None, description="Indentation hardness, for wear laws and warnings."
+    )
+    yield_stress: PositivePressure | None = Field(
+        default=None, description="Yield stress, for a warning of plastic deformation."
     )
 
 
@@ -55,7 +58,7 @@ def _read_material(value: object) -> Material:
             expected,
         )
     table = MaterialTable.model_validate_json(json.dumps(value, default=str), strict=True)
-    return Material(table.youngs_modulus, table.poisson_ratio, table.hardness)
+    return Material(table.youngs_modulus, table.poisson_ratio, table.hardness, table.yield_stress)
 
 
 MaterialField: TypeAlias = Annotated[
@@ -140,11 +143,17 @@ class Cylinder:
         Material of the cylinder.
     profile : Profile, optional
         Initial height of the surface above its nominal shape.
+    profile_file : str
+        Name of the file that it was read from, as in `Scenario.files`.
+    profile_filter : float, optional
+        Cutoff wavelength of the filter that has been applied to it [m].
     """
 
     radius: float
     material: Material
     profile: Profile | None = None
+    profile_file: str = ""
+    profile_filter: float | None = None
 
 
 def _radius(radius: float | None, diameter: float | None) -> float:
@@ -190,4 +199,10 @@ def read_cylinder(mistakes: Mistakes, raw: Mapping[str, object]) -> Cylinder | N
     except ValueError as error:
         mistakes.add("cylinder", "profile_filter", str(error))
         return None
-    return Cylinder(_radius(table.radius, table.diameter), table.material, profile)
+    return Cylinder(
+        _radius(table.radius, table.diameter),
+        table.material,
+        profile,
+        table.profile.path,
+        table.profile_filter,
+    )

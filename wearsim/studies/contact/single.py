@@ -6,12 +6,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
 
-from wearsim.errors import WearsimError
+from wearsim.errors import ContactError, WearsimError
 from wearsim.evolution.state import unworn_contacts
 from wearsim.plugins import ContactModel
 from wearsim.scenario import Scenario, as_scenario, described_model
+from wearsim.studies.plausibility import plausibility_warnings
 from wearsim.studies.run.assemble import build_problem, prepared_model
-from wearsim.studies.run.grid import contact_grid
+from wearsim.studies.run.grid import contact_grid, wider_grid
 from wearsim.studies.run.inputs import load_range
 from wearsim.types import (
     ContactFields,
@@ -22,6 +23,7 @@ from wearsim.types import (
     Profile,
 )
 
+GRID_DEPENDENT = 0.1  # relative change of the peak pressure with half as many strips
 _FEWEST = 5  # minimum number of strips for an error estimate
 
 
@@ -45,10 +47,14 @@ class ContactStudy:
     grid_error : float, optional
         Relative change of the power with half as many strips, an upper estimate of the error. None
         where it was not requested, or the coarse grid has no solution.
+    pressure_error : float, optional
+        The same of the peak pressure.
     seconds : float, optional
         Time of a solution without compilation [s]; None where it was not requested.
     notes : tuple of str
         Notes for the user.
+    warnings : tuple of str
+        Warnings of implausible inputs, and of a peak pressure that depends on the strips.
     """
 
     solution: ContactSolution
@@ -59,8 +65,10 @@ class ContactStudy:
     model: str
     described_model: str
     grid_error: float | None
+    pressure_error: float | None
     seconds: float | None
     notes: tuple[str, ...]
+    warnings: tuple[str, ...]
 
 
 def study_contact(
@@ -97,13 +105,26 @@ def study_contact(
     if profile is not None:
         scenario = replace(scenario, cylinder=replace(scenario.cylinder, profile=profile))
     force = load_range(scenario, scenario.load.build(), 0.0)[0]
-    grid = contact_grid(scenario, force)
+    grid, notes = contact_grid(scenario, force), scenario.notes
     model, gap, curvature, point = _contact(scenario, grid)
-    solution = model.solve_one(gap, curvature, point)
+    try:
+        solution = model.solve_one(gap, curvature, point)
+    except ContactError:
+        wider = wider_grid(scenario, grid, force)
+        if wider is None:
+            raise
+        model, gap, curvature, point = _contact(scenario, wider)
+        solution, grid = model.solve_one(gap, curvature, point), wider
+        span = f"{1e3 * grid.edges[0]:.4g} to {1e3 * grid.edges[1]:.4g} mm"
+        text = f"the contact is wider than the profile: the strips span {span}, and it is"
+        notes = (*notes, f"{text} level beyond the profile")
     fields = model.fields(solution, gap, curvature, point) if with_fields else None
-    error, seconds = None, None
+    errors: tuple[float | None, float | None] = (None, None)
+    seconds, warnings = None, plausibility_warnings(scenario)
     if with_error:
-        error = _grid_error(scenario, grid, solution.power)
+        errors = _grid_errors(scenario, grid, solution)
+        if errors[1] is not None and errors[1] > GRID_DEPENDENT:
+            warnings.append(_grid_dependence(scenario, grid, solution, errors[1]))
         start = perf_counter()
         model.solve_one(gap, curvature, point)
         seconds = perf_counter() - start
@@ -115,9 +136,10 @@ def study_contact(
         point,
         scenario.contact.model,
         described_model(scenario.contact.model, scenario.text),
-        error,
+        *errors,
         seconds,
-        scenario.notes,
+        notes,
+        tuple(warnings),
     )
 
 
@@ -130,17 +152,36 @@ def _contact(
     return model, batch.gap[0], float(batch.longitudinal_curvature[0]), batch.point(0)
 
 
-def _grid_error(scenario: Scenario, grid: Grid, power: float) -> float | None:
-    """Return the relative change of the power with half as many strips."""
-    if grid.strips < 2 * _FEWEST or power == 0.0:
-        return None
+def _grid_errors(
+    scenario: Scenario, grid: Grid, solution: ContactSolution
+) -> tuple[float | None, float | None]:
+    """Return the relative changes of power and peak pressure with half as many strips."""
+    if grid.strips < 2 * _FEWEST:
+        return None, None
     try:
         coarse = Grid.spanning(*grid.edges, (grid.strips + 1) // 2)
         model, gap, curvature, point = _contact(scenario, coarse)
-        solution = model.solve_one(gap, curvature, point)
+        other = model.solve_one(gap, curvature, point)
     except WearsimError:
-        return None
-    return abs(solution.power / power - 1.0)
+        return None, None
+    power = abs(other.power / solution.power - 1.0) if solution.power else None
+    return power, abs(other.peak_pressure / solution.peak_pressure - 1.0)
+
+
+def _grid_dependence(
+    scenario: Scenario, grid: Grid, solution: ContactSolution, change: float
+) -> str:
+    """Return the warning of a peak pressure that depends on the strips."""
+    text = (
+        f"peak pressure: {solution.peak_pressure / 1e6:.4g} MPa depends on the strips; with half of"
+        f" the {grid.strips} strips it changes by {change:.0%}"
+    )
+    if scenario.cylinder.profile is None:
+        return f"{text}; raise contact.strips"
+    return (
+        f'{text}; filter roughness that the strips do not resolve, profile_filter = "0.8 mm"'
+        " (ISO 16610-21), or set contact.strips"
+    )
 
 
 def solve_contact(

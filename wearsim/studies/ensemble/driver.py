@@ -17,6 +17,7 @@ from wearsim.results.ensemble.schema import DONE, FAILED, PENDING
 from wearsim.studies.ensemble.designs import interim_sizes
 from wearsim.studies.ensemble.realisation import RealisationRunner
 from wearsim.studies.execution.processes import Executor
+from wearsim.studies.plausibility import plausibility_warnings
 from wearsim.types import FloatArray
 from wearsim.uq.estimation.estimates import Target
 from wearsim.uq.estimation.intervals import UNKNOWN, Interval
@@ -119,7 +120,8 @@ def ensemble_warnings(result: EnsembleResult, target: Target | None, reached: bo
             f"{target} was not reached by {result.requested} realisations",
         ),
     )
-    return [text for applies, text in warnings if applies]
+    found = [text for applies, text in warnings if applies]
+    return [*plausibility_warnings(result.scenario), *found]
 
 
 class EnsembleWork:

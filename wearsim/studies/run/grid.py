@@ -93,6 +93,29 @@ def profile_grid(profile: Profile, half_width: float, strips: int | None) -> Gri
     return Grid.spanning(start, stop, chosen)
 
 
+def wider_grid(scenario: Scenario, grid: Grid, load: float) -> Grid | None:
+    """Return the strips of a profile and further ones for a groove as wide as the profile is deep.
+
+    Returns
+    -------
+    Grid or None
+        None if the scenario sets a width, has no profile, or the groove is not wider than it.
+    """
+    profile, crown = scenario.cylinder.profile, scenario.roller.crown_radius
+    if scenario.contact.width is not None or profile is None:
+        return None
+    groove = math.sqrt(2.0 * crown * float(np.ptp(profile.height)))  # of a conformal roller
+    half = 1.1 * groove + 1.3 * fresh_patch(scenario, load).b
+    centre = contact_centre(scenario, [0])
+    lacking = max(grid.edges[0] - centre + half, centre + half - grid.edges[1])
+    added = math.ceil(lacking / grid.spacing)
+    if added <= 0:
+        return None
+    margin = added * grid.spacing
+    edges = grid.edges[0] - margin, grid.edges[1] + margin
+    return Grid.spanning(*edges, grid.strips + 2 * added)
+
+
 def fresh_patch(scenario: Scenario, load: float) -> HertzContact:
     """Return the Hertzian patch of the unworn bodies under `load` [N]."""
     modulus = combine(scenario.cylinder.material, scenario.roller.material).contact_modulus

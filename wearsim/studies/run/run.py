@@ -26,6 +26,7 @@ from wearsim.results import (
 )
 from wearsim.results.run import VARIABLES
 from wearsim.scenario import Scenario, as_scenario, parse_scenario
+from wearsim.studies.plausibility import plausibility_warnings
 from wearsim.studies.preparation import changed_origins, check_plugins, origin_of
 from wearsim.studies.run.assemble import assemble_problem, start_height
 from wearsim.studies.run.draws import Draws, draw, units_of
@@ -226,6 +227,8 @@ class _RunInProgress:
             None if data is None else data.records,
         )
         if data is None:
+            for text in plausibility_warnings(scenario):
+                self._warn(text)
             self._write()
         else:
             for text in changed_origins(data, scenario):

@@ -1,0 +1,137 @@
+"""Warnings of inputs that are valid but hardly meant, such as a load in the wrong unit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from wearsim.mechanics.hertz.elasticity import combine
+from wearsim.models.loads import gap_text
+from wearsim.plugins import Load
+from wearsim.quantities import InputFile
+from wearsim.scenario import RandomInput, Scenario
+from wearsim.studies.run.grid import fresh_patch
+from wearsim.types import FloatArray
+
+YIELD_FACTOR = 4.0  # peak pressure over yield stress, beyond which a surface never shakes down
+GREATEST_CREEPAGE = 0.05
+GREATEST_FRICTION = 1.0
+ELASTIC_PART = 0.04  # of the contact modulus; 4.4 GPa with steel, which hardened steel just bears
+WIDEST = 2.0  # half-width of a patch over the radius of the roller
+_PROBABILITIES = np.array([0.05, 0.95])
+
+
+def range_90(item: RandomInput) -> list[tuple[float, float]]:
+    """Return the 5 % and 95 % quantile of each value that a random input sets [SI]."""
+    if item.role == "joint":
+        draws = item.values(np.random.default_rng(0).random((2**16, item.dimension)))
+        low, high = np.quantile(draws, _PROBABILITIES, axis=0).tolist()
+        return list(zip(low, high, strict=True))
+    low, high = item.scalar.quantile(_PROBABILITIES).tolist()
+    return [(low, high)]
+
+
+def plausibility_warnings(scenario: Scenario) -> list[str]:
+    """Return warnings of implausible pressures, creepages, friction, logs and contact widths.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Of a run or of a single contact.
+
+    Returns
+    -------
+    list of str
+        Each begins with a different name of what is implausible, and a colon.
+    """
+    load = scenario.load.build()
+    return [
+        *_of_pressure(scenario, load),
+        *_of_slip(scenario),
+        *_of_width(scenario, load),
+        *_of_log(scenario, load),
+    ]
+
+
+def log_file(scenario: Scenario) -> str | None:
+    """Return the name of the file that the load reads, if any."""
+    files = (value for _, value in scenario.load.options if isinstance(value, InputFile))
+    return next((file.path for file in files), None)
+
+
+def greatest_load(scenario: Scenario, load: Load) -> float:
+    """Return the greatest load of the test, or of the start of a single contact [N]."""
+    ends = scenario.operation.duration is not None or scenario.operation.passes is not None
+    return load.extremes(0.0, scenario.total_time if ends else 0.0)[1]
+
+
+def _greatest(scenario: Scenario, key: str, value: float | tuple[float, ...]) -> float:
+    """Return the greatest magnitude of an input, with 90 % probability where it is random."""
+    for item in scenario.random:
+        ranges = dict(zip(item.keys, range_90(item), strict=True))
+        if key in ranges:
+            return max(map(abs, ranges[key]))
+    return float(np.abs(value).max())
+
+
+def _of_pressure(scenario: Scenario, load: Load) -> Iterator[str]:
+    force = greatest_load(scenario, load)
+    if force <= 0.0:
+        return
+    pressure = fresh_patch(scenario, force).peak_pressure
+    text = f"the peak pressure of {pressure / 1e6:.4g} MPa at {force:.6g} N"
+    for name, body in (("roller", scenario.roller), ("cylinder", scenario.cylinder)):
+        strength, factor, what = body.material.yield_stress, YIELD_FACTOR, "yield stress"
+        if strength is None:
+            strength, factor, what = body.material.hardness, 1.0, "hardness"
+        if strength is not None and pressure > factor * strength:
+            times = f"{factor:g} times " if factor > 1.0 else ""
+            yield (
+                f"{name}.material: {text} exceeds {times}its {what} of {strength / 1e6:.4g} MPa;"
+                " the model is elastic"
+            )
+    modulus = combine(scenario.cylinder.material, scenario.roller.material).contact_modulus
+    if pressure > ELASTIC_PART * modulus:
+        file = log_file(scenario)
+        remedy = f"is the unit of the load in {file} right?" if file else "is the load right?"
+        yield (
+            f"load: {text} exceeds {ELASTIC_PART:.0%} of the contact modulus, more than hardened"
+            f" steel bears; {remedy} A thousandth of it gives {pressure / 1e7:.4g} MPa"
+        )
+
+
+def _of_slip(scenario: Scenario) -> Iterator[str]:
+    creepage = scenario.creepage
+    for key in ("longitudinal", "yaw"):
+        value = getattr(creepage, key)
+        size = _greatest(scenario, f"creepage.{key}", value or 0.0)
+        if size > GREATEST_CREEPAGE:
+            yield (
+                f"creepage.{key}: a creepage of {size:.3g} exceeds {GREATEST_CREEPAGE:.0%}; it is"
+                " assumed to be small, and 0.1 % is written 0.001"
+            )
+    friction = _greatest(scenario, "friction.coefficient", scenario.friction.coefficient)
+    if friction > GREATEST_FRICTION:
+        yield f"friction.coefficient: {friction:.3g} exceeds {GREATEST_FRICTION:g}"
+
+
+def _of_width(scenario: Scenario, load: Load) -> Iterator[str]:
+    force, radius = greatest_load(scenario, load), scenario.roller.radius
+    ends = scenario.contact.width is not None or getattr(scenario.roller, "width", None) is not None
+    if ends or force <= 0.0:
+        return
+    half_width = fresh_patch(scenario, force).b
+    if half_width > WIDEST * radius:
+        yield (
+            f"roller.crown_radius: a crown of {scenario.roller.crown_radius * 1e3:.4g} mm makes a"
+            f" contact {2e3 * half_width:.4g} mm wide, and nothing ends it; set roller.width"
+        )
+
+
+def _of_log(scenario: Scenario, load: Load) -> Iterator[str]:
+    gaps: FloatArray = load.gaps
+    if len(gaps):
+        how = getattr(scenario.load.options, "gaps", "interpolate")
+        done = "the last value is held" if how == "hold" else "the load is interpolated"
+        yield (f'{log_file(scenario)}: {gap_text(gaps)}; {done} (load.gaps = "{how}")')
