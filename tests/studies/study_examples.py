@@ -101,7 +101,8 @@ def short(**overrides: object) -> Scenario:
 def run_differences(one: Result | RunData, other: Result | RunData) -> list[str]:
     """Return the names of values that differ between two runs, except times of day."""
     first, second = (item.raw if isinstance(item, Result) else item for item in (one, other))
-    return [name for name in differences(first, second) if name not in {"wall_seconds", "created"}]
+    times = {"wall_seconds", "created", "failed_at"}
+    return [name for name in differences(first, second) if name not in times]
 
 
 def after(steps: int) -> Callable[[], bool]:
