@@ -74,7 +74,7 @@ def test_failed_run_ends_with_1_and_keeps_its_file(command: Command, scenario: P
     result = command("run", scenario, "-q", "--set", "evolution.max_steps=2")
     assert result.exit_code == 1
     assert result.stderr.startswith("error: 2 steps have reached pass")
-    assert "cylinder_depth" in result.stderr.splitlines()[-1]
+    assert "cylinder depth" in result.stderr.splitlines()[-1]
     assert not open_results("short.h5").finished
 
 
