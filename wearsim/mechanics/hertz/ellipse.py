@@ -120,7 +120,7 @@ def axis_ratio(curvature_ratio: float) -> float:
     return math.exp(new)
 
 
-@kernel
+@subroutine
 def hertz_ellipse(
     curvature_x: float, curvature_y: float, normal_force: float, contact_modulus: float
 ) -> tuple[float, float, float, float]:

@@ -182,9 +182,9 @@ def set_anchor(
         j = state.active[g, c]
         q = line_load[g, j]
         tau = log_half_length(g, j, line_load, state.lengths)
-        read_influence(constants.table, tau, n, work[0], work[1])
-        read_influence(constants.table, tau + small, reach, work[2], work[3])
-        read_influence(constants.table, tau - small, reach, work[4], work[5])
+        read_influence(constants.table, tau, n, True, work[0], work[1])
+        read_influence(constants.table, tau + small, reach, True, work[2], work[3])
+        read_influence(constants.table, tau - small, reach, True, work[4], work[5])
         for r in range(count):
             matrix[c, r] = constants.unit * work[1, abs(state.active[g, r] - j)]
         for k in range(reach):
@@ -228,7 +228,7 @@ def fill_remainder(g: int, loads: Loads, constants: ContactConstants, state: Cho
                 work[0, k] = state.near[g, c, 2, k] * x * x
         else:
             tau = log_half_length(g, j, loads.line_load, state.lengths)
-            read_influence(constants.table, tau, reach, work[2], work[3])
+            read_influence(constants.table, tau, reach, True, work[2], work[3])
             for k in range(reach):
                 phi = constants.unit * q * work[2, k]
                 work[0, k] = phi - state.near[g, c, 0, k] - state.near[g, c, 1, k] * x

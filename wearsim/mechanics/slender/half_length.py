@@ -56,18 +56,23 @@ class HalfLengths(NamedTuple):
 
 @subroutine
 def new_half_lengths(table: FloatArray, log_scale: FloatArray, reach: int) -> HalfLengths:
-    """Return the `HalfLengths` of contacts with s = 1; `reach` is `REACH` or `NEWTON_REACH`."""
+    """Return the `HalfLengths` of contacts, to be filled; `reach` is `REACH` or `NEWTON_REACH`."""
     contacts, n = log_scale.shape[0], table.shape[2]
-    return HalfLengths(
+    lengths = HalfLengths(
         table,
         log_scale,
-        np.ones((contacts, n)),
-        np.zeros((contacts, n)),
-        np.zeros((contacts, n, 2 * reach + 1)),
-        np.zeros((n, 4 * reach + 1)),
-        np.zeros((n, 4 * reach + 1)),
+        np.empty((contacts, n)),
+        np.empty((contacts, n)),
+        np.empty((contacts, n, 2 * reach + 1)),
+        np.empty((n, 4 * reach + 1)),
+        np.empty((n, 4 * reach + 1)),
         np.empty((3, n)),
     )
+    # numba compiles a loop faster than np.zeros
+    for i in range(n):
+        for c in range(4 * reach + 1):
+            lengths.slope_part[i, c] = lengths.gathered[i, c] = 0.0
+    return lengths
 
 
 @subroutine
@@ -125,26 +130,6 @@ def _add_slope(
 
 
 @subroutine
-def _update_slope(
-    k: int,
-    first: int,
-    last: int,
-    line_load: FloatArray,
-    total: FloatArray,
-    slope: FloatArray,
-    slope_part: FloatArray,
-) -> None:
-    """Add the slope of ln K to that of ln s, truncated to the reach, and clear `slope_part`."""
-    wide = slope.shape[1]
-    for j in range(max(0, first - wide // 2), min(slope.shape[0], last + wide // 2 + 1)):
-        if line_load[k, j] > 0.0:
-            scale = 1.0 / total[j]
-            for c in range(wide):
-                slope[j, c] += slope_part[j, c + wide // 2] * scale
-        slope_part[j] = 0.0
-
-
-@subroutine
 def _find_span(k: int, line_load: FloatArray) -> tuple[int, int]:
     """Return the first and the last loaded strip; last < first if no strip is loaded."""
     first, last = 0, line_load.shape[1] - 1
@@ -157,10 +142,22 @@ def _find_span(k: int, line_load: FloatArray) -> tuple[int, int]:
 
 @subroutine
 def _update_factors(
-    k: int, first: int, last: int, line_load: FloatArray, total: FloatArray, lengths: HalfLengths
+    k: int,
+    first: int,
+    last: int,
+    line_load: FloatArray,
+    total: FloatArray,
+    sloped: bool,
+    lengths: HalfLengths,
 ) -> float:
-    """Multiply s by the curvature `total` within its bounds; return the greatest ln(a/dy)."""
+    """Multiply s by the curvature `total` within its bounds; return the greatest ln(a/dy).
+
+    If `sloped`, the slope of ln K is added to that of ln s, truncated to the reach, and
+    `slope_part` is cleared.
+    """
     widest, factor = -np.inf, lengths.factor
+    slope, slope_part = lengths.slope[k], lengths.slope_part
+    wide = slope.shape[1]
     for j in range(first, last + 1):
         if line_load[k, j] > 0.0:
             before = factor[k, j]
@@ -168,6 +165,13 @@ def _update_factors(
             factor[k, j] = after
             lengths.log_ratio[k, j] += 0.5 * np.log(after / before)
             widest = max(widest, lengths.log_ratio[k, j])
+            if sloped:
+                scale = 1.0 / total[j]
+                for c in range(wide):
+                    slope[j, c] += slope_part[j, c + wide // 2] * scale
+    if sloped:
+        for j in range(max(0, first - wide // 2), min(slope.shape[0], last + wide // 2 + 1)):
+            slope_part[j] = 0.0
     return widest
 
 
@@ -210,17 +214,15 @@ def find_factors(k: int, line_load: FloatArray, sloped: bool, lengths: HalfLengt
         for j in range(first, last + 1):
             if not line_load[k, j] > 0.0:
                 continue
-            far, weight = max(last - j, j - first) + 1, 0.25 / lengths.factor[k, j]
+            count, weight = max(last - j, j - first) + 1, 0.25 / lengths.factor[k, j]
             if sloped:
-                count = min(n, max(far, slope.shape[1]))
-                read_influence(lengths.table, lengths.log_ratio[k, j], count, value, tangent)
+                count = min(n, max(count, slope.shape[1]))
+            read_influence(lengths.table, lengths.log_ratio[k, j], count, sloped, value, tangent)
+            if sloped:
                 _add_slope(j, weight, value, tangent, sweep > 0, slope, lengths.slope_part)
-            else:
-                read_influence(lengths.table, lengths.log_ratio[k, j], far, value, None)
             add_around(j, first, last, weight, value, total)
-        widest = max(widest, _update_factors(k, first, last, line_load, total, lengths))
-        if sloped:
-            _update_slope(k, first, last, line_load, total, slope, lengths.slope_part)
+        reached = _update_factors(k, first, last, line_load, total, sloped, lengths)
+        widest = max(widest, reached)
     return widest
 
 

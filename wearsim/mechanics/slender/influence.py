@@ -21,7 +21,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cache
 from math import comb
-from typing import Any
 
 import numpy as np
 
@@ -196,11 +195,14 @@ def read_value(table: FloatArray, tau: float, distance: int) -> float:
 
 @subroutine
 def read_influence(
-    table: FloatArray, tau: float, count: int, value: FloatArray, tangent: Any
+    table: FloatArray,
+    tau: float,
+    count: int,
+    sloped: bool,
+    value: FloatArray,
+    tangent: FloatArray,
 ) -> None:
     """Interpolate F_k or C_k of one strip, and its derivative for Newton's method.
-
-    Compiled separately without the derivative (`tangent` None).
 
     Parameters
     ----------
@@ -210,10 +212,13 @@ def read_influence(
         ln(a/dy) of the loaded strip, up to HIGHEST; values below LOWEST are replaced by LOWEST.
     count : int
         Number of distances k to fill.
+    sloped : bool
+        Whether the derivative is computed.
     value : ndarray, shape (>= count,)
         Filled: F_k (or C_k).
-    tangent : ndarray, shape (>= count,), or None
-        Filled: d(q F_k)/dq = F_k + (dF_k/dtau)/2, as a is proportional to the square root of q.
+    tangent : ndarray, shape (>= count,)
+        Filled if `sloped`: d(q F_k)/dq = F_k + (dF_k/dtau)/2, as a is proportional to the square
+        root of q.
     """
     node, s, (v0, v1, w0, w1) = _weights(table, tau)
     half = 0.5 / STEP if tau > LOWEST else 0.0
@@ -226,5 +231,5 @@ def read_influence(
     for k in range(count):
         a, b, c, d = low[k], low_slope[k], high[k], high_slope[k]
         value[k] = v0 * a + v1 * b + w0 * c + w1 * d
-        if tangent is not None:
+        if sloped:
             tangent[k] = d0 * a + d1 * b + e0 * c + e1 * d

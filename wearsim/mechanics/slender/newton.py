@@ -115,42 +115,6 @@ def start_contact(
 
 
 @subroutine
-def _add_penetrated_strips(
-    surface: FloatArray,
-    line_load: FloatArray,
-    state: NewtonState,
-    approach: FloatArray,
-    unit: float,
-    tolerance: float,
-    cautious: bool,
-) -> bool:
-    """Add strips that penetrate the other body to the active set; return whether any was added.
-
-    A strip starts with about the load of its penetration; a much greater one would be removed by
-    the next step.
-    """
-    contacts, n = line_load.shape
-    entered = False
-    for k in range(contacts):
-        lowest, deepest = surface[k, 0], 0.0
-        for i in range(n):
-            lowest = min(lowest, surface[k, i])
-            if state.rows[k, i] < 0:
-                deepest = max(deepest, approach[k] - surface[k, i])
-        scale = tolerance * max(abs(approach[k]), approach[k] - lowest)
-        if deepest <= scale:
-            continue
-        limit = max(scale, 0.999 * deepest) if cautious else scale
-        for i in range(n):
-            inside = approach[k] - surface[k, i]
-            if state.rows[k, i] < 0 and inside > limit:
-                line_load[k, i] = 0.1 * inside / unit
-                entered = True
-                state.fresh[k] = True
-    return entered
-
-
-@subroutine
 def check_convergence(
     iteration: int,
     unit: float,
@@ -164,8 +128,9 @@ def check_convergence(
 ) -> tuple[int, float]:
     """Add penetrated strips, mark contacts that need a new Jacobian and test for convergence.
 
-    After `CAUTIOUS` iterations few strips are added at a time, and the tolerance for penetration
-    grows, so that a strip at the edge cannot alternate between in and out of contact.
+    A strip starts with about the load of its penetration; a much greater one would be removed by
+    the next step. After `CAUTIOUS` iterations few strips are added at a time, and the tolerance for
+    penetration grows, so that a strip at the edge cannot alternate between in and out of contact.
 
     Parameters
     ----------
@@ -188,12 +153,26 @@ def check_convergence(
     cautious = iteration > CAUTIOUS
     ready = not cautious or (change < 1e-3 and not left)
     tolerance = GAP_TOLERANCE * 10.0 ** max(0, iteration // 20 - 1)
-    entered = ready and _add_penetrated_strips(
-        surface, line_load, state, approach, unit, tolerance, cautious
-    )
+    contacts, n, entered = line_load.shape[0], line_load.shape[1], False
+    for k in range(contacts if ready else 0):
+        lowest, deepest = surface[k, 0], 0.0
+        for i in range(n):
+            lowest = min(lowest, surface[k, i])
+            if state.rows[k, i] < 0:
+                deepest = max(deepest, approach[k] - surface[k, i])
+        scale = tolerance * max(abs(approach[k]), approach[k] - lowest)
+        if deepest <= scale:
+            continue
+        limit = max(scale, 0.999 * deepest) if cautious else scale
+        for i in range(n):
+            inside = approach[k] - surface[k, i]
+            if state.rows[k, i] < 0 and inside > limit:
+                line_load[k, i] = 0.1 * inside / unit
+                entered = True
+                state.fresh[k] = True
     shrinking = min(max(change / before, AT_BEST), 1.0) if before > 0.0 else FIRST
     if not (change < REUSED and shrinking < SHRINKING):
-        for k in range(line_load.shape[0]):
+        for k in range(contacts):
             state.fresh[k] = True
     if left or entered:
         return CONTINUE, 0.0
@@ -267,11 +246,16 @@ def solve_slender(
     for number in range(gap.shape[0]):
         load, total, delta = loads[number], line_load[number], approach[number]
         own = compliance[number]
-        for attempt in range(2 if np.any(total) else 1):
+        started = False
+        for k in range(contacts):
+            for i in range(n):
+                started = started or total[k, i] > 0.0
+        for attempt in range(2 if started else 1):
             if attempt > 0:
                 total[:] = 0.0
-            surface, value, tangent = np.empty((contacts, n)), np.empty(n), np.empty(n)
-            state, lowest = new_newton_state(contacts, n), np.empty(contacts)
+            state = new_newton_state(contacts, n)
+            surface, lowest = state.surface, state.lowest
+            value, tangent = state.value, state.tangent
             log_scale = log_scales_of(contact_modulus, longitudinal_curvature[number], spacing)
             lengths = new_half_lengths(curvature_influence, log_scale, NEWTON_REACH)
             for k in range(contacts):
@@ -314,8 +298,8 @@ def solve_slender(
                         j = state.place[k, column]
                         push, tau = unit * total[k, j], lengths.log_ratio[k, j]
                         reach = max(j + 1, n - j)
+                        read_influence(table, tau, reach, fresh, value, tangent)
                         if fresh:
-                            read_influence(table, tau, reach, value, tangent)
                             state.diagonal[k, column] = unit * tangent[0]
                             outer = state.outer[k, column]
                             outer[:] = 0.0
@@ -324,8 +308,6 @@ def solve_slender(
                                 matrix[column, row] = outer[state.place[k, row]]
                             if curvature_influence.shape[0] > 0:
                                 gather_length_slopes(k, j, push, value, tangent, lengths)
-                        else:
-                            read_influence(table, tau, reach, value, None)
                         state.pressed[k, column] = push * value[0]
                         add_around(j, 0, n - 1, push, value, pressed)
                     if fresh and curvature_influence.shape[0] > 0:

@@ -25,7 +25,8 @@ class NewtonState(NamedTuple):
     Jacobian by columns and `order` the order of its equations. `unit_load` are the loads per unit
     of approach [N/m^2] and `unit_load_sum` is their sum. `pressed` is the displacement of each
     strip under its own load [m], `diagonal` its derivative, `missing` the residual [m], `step` the
-    step by row [N/m] and `change` the applied change of load by strip [N/m].
+    step by row [N/m] and `change` the applied change of load by strip [N/m]. `surface` is the sum
+    of gap and displacement above the least gap `lowest` [m]; `value` and `tangent` are work space.
     """
 
     fresh: BoolArray
@@ -42,14 +43,18 @@ class NewtonState(NamedTuple):
     missing: FloatArray
     step: FloatArray
     change: FloatArray
+    surface: FloatArray
+    lowest: FloatArray
+    value: FloatArray
+    tangent: FloatArray
 
 
 @subroutine
 def new_newton_state(contacts: int, n: int) -> NewtonState:
     """Return the `NewtonState` of contacts without a Jacobian."""
-    return NewtonState(
-        np.ones(contacts, np.bool_),
-        np.zeros(contacts, np.int64),
+    state = NewtonState(
+        np.empty(contacts, np.bool_),
+        np.empty(contacts, np.int64),
         np.empty((contacts, n), np.int64),
         np.empty((contacts, n), np.int64),
         np.empty((contacts, n, n)),
@@ -62,7 +67,14 @@ def new_newton_state(contacts: int, n: int) -> NewtonState:
         np.empty((contacts, n)),
         np.empty((contacts, n)),
         np.empty((contacts, n)),
+        np.empty((contacts, n)),
+        np.empty(contacts),
+        np.empty(n),
+        np.empty(n),
     )
+    for k in range(contacts):  # numba compiles a loop faster than np.ones
+        state.fresh[k] = True
+    return state
 
 
 @subroutine
