@@ -86,16 +86,22 @@ def test_error_of_the_work_is_raised_unchanged(address: str) -> None:
 
 
 def test_batches_of_a_killed_worker_are_repeated(tmp_path: Path) -> None:
+    messages: list[str] = []
     with (
         scheduler(tmp_path) as (where, _),
         worker(where, tmp_path),
         worker(where, tmp_path),
-        executor(where) as cluster,
+        executor(where, on_notice=messages.append) as cluster,
     ):
         _wait_for(cluster, 2)
         work = Deadly(tmp_path, at=13, times=1)
         found = dict(cluster.results(work, iter([(number,) for number in range(40)])))
         _wait_for(cluster, 1)
+    (message,) = [item for item in messages if not item.startswith("waiting")]
+    assert re.fullmatch(
+        r"lost worker tcp://127\.0\.0\.1:\d+, and 1 is left; unfinished batches are done again",
+        message,
+    )
     assert (tmp_path / "killed 0").exists()
     assert found == {(number,): [number * number] for number in range(40)}
 
@@ -161,7 +167,9 @@ def test_stop_ends_a_study_whose_workers_were_lost(tmp_path: Path) -> None:
             list(found)
 
 
-def test_killed_scheduler_is_reported(tmp_path: Path) -> None:
+def test_killed_scheduler_is_reported(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
+) -> None:
     with (
         dask.config.set({"distributed.comm.timeouts.connect": "0.5s"}),
         scheduler(tmp_path) as (where, process),
@@ -173,6 +181,8 @@ def test_killed_scheduler_is_reported(tmp_path: Path) -> None:
         process.kill()
         with pytest.raises(WorkerError, match=f"the scheduler at {where} is gone"):
             list(found)
+    assert "Traceback" not in capfd.readouterr().err
+    assert "Traceback" not in caplog.text
 
 
 def test_other_version_on_a_worker_is_reported(tmp_path: Path) -> None:

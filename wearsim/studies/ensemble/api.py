@@ -32,7 +32,7 @@ from wearsim.studies.ensemble.designs import (
 )
 from wearsim.studies.ensemble.driver import EnsembleProgress, EnsembleWork
 from wearsim.studies.ensemble.realisation import RealisationRunner, control_of, shared_grid
-from wearsim.studies.execution.factory import LOCAL, executor
+from wearsim.studies.execution.factory import executor
 from wearsim.studies.preparation import (
     changed_origins,
     check_plugins,
@@ -128,8 +128,7 @@ def ensemble(
         content = _content(scenario, request, grid)
         with EnsembleFile.create(path, *content, storage) as file:
             runner = RealisationRunner(scenario, request.plan, request.realisations, grid)
-            if scheduler in LOCAL:
-                runner.compile_kernels()
+            runner.compile_kernels()
             EnsembleWork(file, runner, request.target, pool, on_progress, stop_requested).finish()
     return open_ensemble(path)
 
@@ -251,8 +250,7 @@ def resume_ensemble(
     target = Target.parse(data.until) if data.until else None
     grid = Grid(data.variables["y"], data.strip_width)
     runner = RealisationRunner(scenario, plan, total, grid)
-    if scheduler in LOCAL:
-        runner.compile_kernels()
+    runner.compile_kernels()
     with (
         executor(
             scheduler,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
@@ -26,7 +27,8 @@ SECONDS = 4.0  # duration of a batch; a test costs a third more in batches of 20
 MOST_IN_BATCH = 256
 AHEAD = 3  # batches for each worker that may be beyond the next interim analysis
 BETWEEN_ESTIMATES = 0.5  # s
-BATCHES = 3  # finished batches from which the time left is estimated
+BATCHES = 3  # finished batches from which the time left is estimated,
+RECENT = 8  # and the greatest number of them
 DEFAULT_TARGET = Target.parse("depth.mean 1%")
 
 
@@ -164,7 +166,9 @@ class EnsembleWork:
         self._deferred: dict[int, Outcome] = {}
         self._stopping = self._reached = False
         self._ahead = AHEAD * max(pool.workers, 1)
-        self._run, self._batches_run, self._rate = 0, 0, 0.0
+        self._run, self._rate = 0, 0.0
+        # time and number of realisations after each of the last batches
+        self._recent: deque[tuple[float, int]] = deque(maxlen=RECENT)
         self._next_estimate, self._estimate = -math.inf, UNKNOWN
 
     def warn(self, texts: Iterable[str]) -> None:
@@ -266,7 +270,7 @@ class EnsembleWork:
         now = [item for item in outcomes if item.number < self._limit]
         self._deferred |= {item.number: item for item in outcomes if item.number >= self._limit}
         self._run += len(outcomes)
-        self._batches_run += 1
+        self._recent.append((time.monotonic(), self._run))
         self._rate = self._run / max(time.monotonic() - self.started, 1e-9)
         if now and not self._reached:
             self.file.put(now)
@@ -325,14 +329,17 @@ class EnsembleWork:
             self._estimate = target.interval(self._result().estimate_for(target))
             # at most 5 % of the time
             self._next_estimate = now + max(BETWEEN_ESTIMATES, 20.0 * (time.monotonic() - now))
-        known = self._rate > 0.0 and self._batches_run >= BATCHES
+        left = math.nan
+        if len(self._recent) >= BATCHES:  # without the first one, which loads the kernels
+            (start, before), (end, run) = self._recent[0], self._recent[-1]
+            left = (self.total - done - failed) * (end - start) / (run - before)
         self.on_progress(
             EnsembleProgress(
                 done=done,
                 failed=failed,
                 requested=self.total,
                 rate=self._rate,
-                left=(self.total - done - failed) / self._rate if known else math.nan,
+                left=left,
                 what=target.what,
                 estimate=self._estimate,
                 workers=self.pool.describe,

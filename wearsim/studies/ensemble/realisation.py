@@ -262,7 +262,8 @@ class RealisationRunner:
     def compile_kernels(self) -> None:
         """Compile the kernels in this process if the cache lacks any, by one step of a test.
 
-        Worker processes, each of which would otherwise compile them, then read them from the cache.
+        Workers, each of which would otherwise compile them, then read them from the cache if they
+        share it.
         """
         if not not_cached(kernels_of(self.scenario)):
             return

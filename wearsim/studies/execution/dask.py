@@ -40,7 +40,7 @@ CONNECTING = 10.0  # s, time limit for the connection to a scheduler
 class Cluster:
     """Execution by the current workers of a Dask cluster.
 
-    Dask repeats the batches of a lost worker, by default three times.
+    Dask repeats the batches of a lost worker, by default three times; a notice names the worker.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class Cluster:
     address : str
         Address of the scheduler.
     on_notice : callable, optional
-        Called with a message when the cluster has no workers.
+        Called with a message when a worker was lost, or the cluster has no workers.
     stop_requested : callable
         Called while the cluster has no workers; True stops the study.
     """
@@ -63,6 +63,7 @@ class Cluster:
         self._client, self._address = client, address
         self._on_notice, self._stop_requested = on_notice, stop_requested
         self._threads, self._checked_at = 1, -LOOKING
+        self._present: set[str] = set()
         self._had_workers_at = time.monotonic()
 
     @property
@@ -142,10 +143,13 @@ class Cluster:
         )
 
     def _unreachable(self) -> WorkerError:
-        return WorkerError(f"the scheduler at {self._address} is gone")
+        return WorkerError(
+            f"the scheduler at {self._address} is gone; the finished realisations are stored:"
+            " start a scheduler and resume the study"
+        )
 
     def _count_workers(self) -> None:
-        """Count the workers; give a notice if there are none.
+        """Count the workers; give a notice of those that were lost, and if there are none.
 
         Raises
         ------
@@ -154,15 +158,23 @@ class Cluster:
         """
         before = self._threads
         try:
-            self._threads = sum(self._client.nthreads().values())
+            found = self._client.nthreads()
         except Exception as error:
             # the client tries to reconnect for some time, then it closes
             if self._client.status not in {"running", "connecting"}:
                 raise self._unreachable() from error
             return
         self._checked_at = now = time.monotonic()
+        self._threads, lost = sum(found.values()), sorted(self._present - set(found))
+        self._present = set(found)
         if self._threads:
             self._had_workers_at = now
+            if lost and self._on_notice is not None:
+                self._on_notice(
+                    f"lost {'workers' if len(lost) > 1 else 'worker'} {', '.join(lost)}, and"
+                    f" {len(found)} {'are' if len(found) > 1 else 'is'} left; unfinished batches"
+                    " are done again"
+                )
         elif self._on_notice is not None and before:
             self._on_notice(f"waiting for workers: there are none at {self._address}")
         elif self._on_notice is None and now - self._had_workers_at > PATIENCE:
@@ -218,10 +230,23 @@ def cluster(
             folder = stack.enter_context(TemporaryDirectory(prefix="wearsim-dask-"))
             stack.enter_context(dask.config.set({"temporary-directory": folder}))
             address = stack.enter_context(_local_cluster(count)).scheduler_address
+        stack.enter_context(_without_log())
         client = stack.enter_context(_connected(address))
         found = Cluster(client, address, on_notice, stop_requested)
         found.check_versions()
         yield found
+
+
+@contextmanager
+def _without_log() -> Iterator[None]:
+    """Silence the client's log, which repeats with tracebacks what is raised as an error here."""
+    log = logging.getLogger("distributed.client")
+    level = log.level
+    log.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        log.setLevel(level)
 
 
 def _local_cluster(count: int) -> LocalCluster:
