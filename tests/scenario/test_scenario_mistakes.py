@@ -10,7 +10,7 @@ import pytest
 from scenario_examples import GOOD, RIG, Parse
 
 from wearsim.errors import ScenarioError
-from wearsim.scenario import load_scenario
+from wearsim.scenario import load_scenario, parse_override
 
 LOAD = '[load]\nnormal_force = "300 N"\n'
 SLIP = "longitudinal = 1e-3"
@@ -323,6 +323,36 @@ def test_unreadable_scenario_file_is_a_mistake(tmp_path: Path) -> None:
 def test_deep_nesting_is_a_mistake_of_the_file(parse: Parse) -> None:
     with pytest.raises(ScenarioError, match=r"is nested too deeply"):
         parse(("seed = 3", "seed = " + "[" * 5000))
+
+
+@pytest.mark.parametrize("levels", [25, 150, 300, 900, 5000])
+@pytest.mark.parametrize("marks", ["[]", ("{a=", "}")])
+def test_nesting_of_any_depth_is_one_mistake(parse: Parse, levels: int, marks: str) -> None:
+    nested = marks[0] * levels + "1" + marks[1] * levels
+    with pytest.raises(ScenarioError) as caught:
+        parse(("coefficient = 0.1", f"coefficient = {nested}"))
+    (mistake,) = caught.value.mistakes
+    assert mistake.what == "is nested too deeply"
+    assert mistake.expected == "at most 20 levels of tables and lists"
+    for override in ({"friction.coefficient": nested}, {".".join("a" * levels): 1}):
+        with pytest.raises(ScenarioError):
+            parse(overrides=override)
+    deep: list[object] = []
+    deep.append(deep)
+    with pytest.raises(ScenarioError, match="seed: is nested too deeply"):
+        parse(overrides={"seed": deep})
+
+
+def test_deep_setting_is_a_mistake_of_its_value() -> None:
+    key, value = parse_override("friction.coefficient=" + "[" * 5000)
+    assert (key, value) == ("friction.coefficient", "[" * 5000)
+
+
+@pytest.mark.parametrize("text", ["0,1", "-12,5"])
+def test_decimal_comma_of_a_setting_is_named(parse: Parse, text: str) -> None:
+    key, value = parse_override(f"friction.coefficient={text}")
+    with pytest.raises(ScenarioError, match="coefficient: needs a decimal point, got"):
+        parse(overrides={key: value})
 
 
 def test_decimal_comma_of_a_plain_number_gets_the_right_remedy(parse: Parse) -> None:

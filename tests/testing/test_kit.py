@@ -9,7 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from wearsim.errors import PluginError
+from wearsim.plugins import LoadSpec, registry
 from wearsim.testing import contact_model_tests, load_tests, random_inputs
+from wearsim.testing.checks import ConfiguredSpec
 from wearsim.testing.kit import CONTACT_MODEL
 from wearsim.testing.wear_and_loads import LOADS, WEAR_LAW
 
@@ -78,3 +81,12 @@ def test_requirements_are_specified_where_stated(check):
         place = getattr(place, name)
     assert place.__doc__
     assert check.requirement.endswith(".")
+
+
+def test_invalid_options_of_a_plugin_are_named() -> None:
+    options = ConfiguredSpec(registry().get(LoadSpec, "constant"), {"normal_force": "300"})
+    with pytest.raises(PluginError) as caught:
+        _ = options.options
+    message = str(caught.value)
+    assert 'normal_force: needs a unit, got "300", expected a force' in message
+    assert "Value error" not in message

@@ -12,10 +12,14 @@ from wearsim.testing.checks import ConfiguredSpec
 from wearsim.testing.wear_and_loads import LOADS, LoadFixture
 
 LOG = "time [min], load [N]\n0, 300\n5, 320\n7, 280\n60, 305\n"
+PAUSED = "time [min], load [N]\n0, 0\n5, 0\n7, 280\n20, 290\n21, 0\n30, 0\n40, 10\n60, 305\n"
 TESTED = {
     "constant": [({"normal_force": "300 N"}, {})],
     "spring": [({"normal_force": "300 N", "stiffness": "690 N/mm"}, {})],
-    "recorded": [({"file": "log.csv", "stiffness": "5 N/mm"}, {"files": {"log.csv": LOG}})],
+    "recorded": [
+        ({"file": "log.csv", "stiffness": "5 N/mm"}, {"files": {"log.csv": LOG}}),
+        ({"file": "log.csv"}, {"files": {"log.csv": PAUSED}}),
+    ],
     "thermal": [
         ({"gain": "50 N/W", "time_constant": "20 min"}, {}),
         ({"gain": "50 N/W", "time_constant": "1 s"}, {}),
@@ -94,6 +98,11 @@ MUTANTS = {
         "extremes-bound-force": [
             ramp(extremes=lambda self, start, stop: (300.0, 301.0)),
             ramp(extremes=lambda self, start, stop: (0.0, 1e6)),
+        ],
+        "pauses-are-without-load": [
+            ramp(pauses=np.array([[10.0, 20.0]])),
+            ramp(pauses=np.array([[20.0, 10.0]])),
+            ramp(pauses=np.array([10.0, 20.0])),
         ],
     },
     "term": {

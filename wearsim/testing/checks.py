@@ -11,8 +11,9 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 import numpy.typing as npt
+from pydantic import ValidationError
 
-from wearsim.errors import WearsimError
+from wearsim.errors import PluginError, WearsimError
 from wearsim.plugins import (
     ContactModelSpec,
     LoadSpec,
@@ -205,11 +206,18 @@ class ConfiguredSpec(Generic[S]):
 
     @property
     def options(self) -> Options:
-        """The validated options."""
+        """The validated options; raises PluginError if they are not valid."""
         context: dict[str, Any] = {"read": self.files.__getitem__}
         if self.kind is not None:
             context["quantity"] = Quantity(self.kind)
-        return self.spec.options.model_validate(dict(self.raw), context=context)
+        try:
+            return self.spec.options.model_validate(dict(self.raw), context=context)
+        except ValidationError as error:
+            mistakes = (
+                f"{'.'.join(map(str, item['loc']))}: {item['msg'].removeprefix('Value error, ')}"
+                for item in error.errors(include_url=False)
+            )
+            raise PluginError(f"{self}: {'; '.join(mistakes)}") from error
 
     def __str__(self) -> str:
         options = ", ".join(f"{key} = {value!r}" for key, value in self.raw.items())

@@ -280,6 +280,19 @@ def extremes_bound_force(fixture: LoadFixture) -> None:
         )
 
 
+@BASE.specified_in("wearsim.plugins.Load.pauses")
+def pauses_are_without_load(fixture: LoadFixture) -> None:
+    """The pauses are intervals in order, and the force in them is zero."""
+    pauses = np.asarray(fixture.instance.pauses)
+    require(
+        pauses.ndim == 2 and pauses.shape[1] == 2 and bool((np.diff(pauses.ravel()) >= 0.0).all()),
+        f"the pauses, shape {pauses.shape}, are not starts and ends of intervals in order",
+    )
+    for start, stop in pauses.tolist():
+        force = float(np.abs(fixture.instance.force(np.linspace(start, stop, 11))).max())
+        require(force == 0.0, f"the force in the pause from {start:g} to {stop:g} s is {force:g} N")
+
+
 @TERM.specified_in("wearsim.plugins.LoadTerm.advance")
 def two_half_steps_equal_one(fixture: LoadFixture) -> None:
     """Two half steps of a term equal one step, and a step of zero duration changes nothing."""

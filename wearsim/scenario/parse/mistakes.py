@@ -14,7 +14,7 @@ from pydantic_core import ErrorDetails
 
 from wearsim.errors import Mistake, PluginError, ScenarioError
 from wearsim.plugins import Spec, registry
-from wearsim.quantities import Quantity
+from wearsim.quantities import DECIMAL_COMMA, Quantity
 from wearsim.scenario.parse.fields import RandomInput, choices, field_at, form, model_at
 from wearsim.units import QuantityError, shown
 
@@ -245,6 +245,8 @@ def _translate(
         what = _WHAT.get(kind, "is out of range" if kind in _BOUNDS else "cannot be used")
         if kind == "literal_error" and isinstance(value, str) and field:
             what += nearest(value, choices(field))
+        if isinstance(value, str) and DECIMAL_COMMA.fullmatch(value):
+            what = "needs a decimal point"
         message = details["msg"].removeprefix("Input should be ")
         expected = expected or message[:1].lower() + message[1:]
         mistakes.add(place, key, what, shown(value), expected)

@@ -78,7 +78,7 @@ def parse_override(text: str) -> tuple[str, object]:
         raise ValueError(f"'{text}' is not an override, expected key=value")
     try:
         return key.strip(), tomllib.loads(f"value = {value.strip()}")["value"]
-    except tomllib.TOMLDecodeError:
+    except (tomllib.TOMLDecodeError, RecursionError):
         return key.strip(), value.strip()
 
 
@@ -111,6 +111,9 @@ def apply_overrides(text: str, file: str, overrides: Mapping[str, object]) -> st
     mistakes = []
     for dotted, value in overrides.items():
         *names, key = dotted.split(".")
+        if len(names) > MAX_NESTING or is_deep(value):
+            mistakes.append(Mistake("", f"{dotted:.60}", *TOO_DEEP))
+            continue
         try:
             table = _descend(document, names, key)
             table[key] = as_toml(value)
@@ -127,6 +130,23 @@ def apply_overrides(text: str, file: str, overrides: Mapping[str, object]) -> st
     if mistakes:
         raise ScenarioError(file, mistakes)
     return tomlkit.dumps(document)
+
+
+MAX_NESTING = 20  # a scenario has at most five levels
+TOO_DEEP = "is nested too deeply", None, f"at most {MAX_NESTING} levels of tables and lists"
+
+
+def is_deep(value: object) -> bool:
+    """Return whether tables and lists are nested in more than `MAX_NESTING` levels."""
+    layer = [value]
+    for _ in range(MAX_NESTING + 1):
+        layer = [
+            item
+            for part in layer
+            if isinstance(part, Mapping | list | tuple)
+            for item in (part.values() if isinstance(part, Mapping) else part)
+        ]
+    return bool(layer)
 
 
 def as_toml(value: object) -> object:
@@ -225,11 +245,15 @@ def parse_fields(
 
 def _parse_toml(text: str, name: str) -> dict[str, Any]:
     try:
-        return tomllib.loads(text)
+        data = tomllib.loads(text)
     except RecursionError as error:
-        raise ScenarioError(name, [Mistake("", "", "is nested too deeply")]) from error
+        raise ScenarioError(name, [Mistake("", "", *TOO_DEEP)]) from error
     except ValueError as error:  # a TOMLDecodeError, or an integer with too many digits
         raise ScenarioError(name, [_syntax_mistake(text, str(error))]) from error
+    deep = [Mistake("", key, *TOO_DEEP) for key, value in data.items() if is_deep(value)]
+    if deep:
+        raise ScenarioError(name, deep)
+    return data
 
 
 def _syntax_mistake(text: str, message: str) -> Mistake:
