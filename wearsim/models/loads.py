@@ -93,7 +93,9 @@ def _read_log(text: str, path: str, gaps: str) -> tuple[PiecewiseLinear, FloatAr
         before = before[:0]
     missing = np.stack([time[before], time[before + 1]], axis=1)
     if len(before) and gaps == "error":
-        raise ScenarioError(path, [Mistake("", "", gap_text(missing, float(np.median(steps))))])
+        text = gap_text(missing, float(np.median(steps)))
+        expected = 'a log without gaps, or load.gaps = "hold" or "interpolate"'
+        raise ScenarioError(path, [Mistake("", "", text, None, expected)])
     if gaps == "hold":
         time = np.insert(time, before + 1, missing[:, 1])
         load = np.insert(load, before + 1, load[before])

@@ -10,6 +10,7 @@ import pytest
 from tests.studies.study_examples import RIG, STEPPERS, after, run_differences, run_in_parts
 from wearsim.errors import Interrupted, ScenarioError
 from wearsim.scenario import Scenario, parse_scenario
+from wearsim.studies.contact.single import study_contact
 from wearsim.studies.ensemble.api import ensemble
 from wearsim.studies.run import run as studies
 
@@ -134,6 +135,11 @@ def test_ensemble_passes_over_pauses(tmp_path: Path) -> None:
 def test_log_without_sense_is_refused(forces: dict[float, float], message: str) -> None:
     with pytest.raises(ScenarioError, match=message):
         studies.run(paused(forces))
+
+
+def test_contact_before_the_first_load_is_refused() -> None:
+    with pytest.raises(ScenarioError, match="the load is zero at the start, and there is no"):
+        study_contact(paused())
 
 
 GAP = {float(k): 300.0 - k for k in [*range(11), *range(70, 131)]}

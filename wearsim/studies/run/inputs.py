@@ -110,7 +110,8 @@ def load_range(scenario: Scenario, load: Load, stop: float) -> tuple[float, floa
         return low, high
     mistake = None
     if high <= 0.0:
-        what = f"the load is never above zero up to {stop / 60.0:.6g} min, and there is no contact"
+        when = f"never above zero up to {stop / 60.0:.6g} min" if stop else "zero at the start"
+        what = f"the load is {when}, and there is no contact"
         mistake = Mistake("load", kind, what, f"{high:.6g} N", "a load above zero")
     elif low < 0.0 or (low == 0.0 and not len(load.pauses)):
         mistake = Mistake(
