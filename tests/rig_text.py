@@ -18,3 +18,23 @@ coefficient = 0.1
 [creepage]
 longitudinal = 1e-3
 """
+
+
+def short_rig() -> str:
+    """Return the TOML of a test of half a minute."""
+    return f"""{BODIES}
+[operation]
+speed = "1000 rpm"
+duration = "30 s"
+rollers = 3
+
+[load]
+kind = "constant"
+normal_force = "300 N"
+
+{RUBBING}
+[wear]
+law = "archard-dissipation"
+cylinder.k_over_h = "1.1e-11 1/Pa"
+roller.k_over_h = "0 1/Pa"
+"""

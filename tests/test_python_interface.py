@@ -8,28 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rig_text import BODIES, RUBBING
+from rig_text import short_rig
 
 import wearsim
 from wearsim import Scenario
 from wearsim.errors import Interrupted, ResultsFileError, ScenarioError
 
-RIG = f"""{BODIES}
-[operation]
-speed = "1000 rpm"
-duration = "1 min"
-rollers = 3
-
-[load]
-kind = "constant"
-normal_force = "300 N"
-
-{RUBBING}
-[wear]
-law = "archard-dissipation"
-cylinder.k_over_h = "1.1e-11 1/Pa"
-roller.k_over_h = "0 1/Pa"
-"""
 RANDOM = {"friction.coefficient": {"distribution": "uniform", "low": 0.08, "high": 0.12}}
 
 
@@ -38,7 +22,7 @@ def rig(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Return a scenario file in the current folder."""
     monkeypatch.chdir(tmp_path)
     path = tmp_path / "rig.toml"
-    path.write_text(RIG)
+    path.write_text(short_rig())
     return path
 
 
@@ -84,7 +68,7 @@ def test_overrides_take_numbers_of_numpy(rig: Path, number: object) -> None:
 def test_scenario_has_a_short_repr(rig: Path) -> None:
     text = repr(wearsim.load_scenario(rig, RANDOM))
     assert text.startswith("<Scenario '")
-    assert "3000 passes" in text
+    assert "1500 passes" in text
     assert "1 random" in text
     assert len(text) < 120
 

@@ -9,6 +9,19 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from wearsim.errors import (
+        CapabilityError,
+        ContactError,
+        Interrupted,
+        PluginError,
+        ResultsFileError,
+        ScenarioError,
+        SolverError,
+        StepError,
+        UnknownNameError,
+        WearsimError,
+        WorkerError,
+    )
     from wearsim.results import (
         DissipationResult,
         EnsembleResult,
@@ -22,17 +35,63 @@ if TYPE_CHECKING:
     from wearsim.studies.contact.single import ContactStudy, solve_contact, study_contact
     from wearsim.studies.ensemble.api import ensemble, resume_ensemble
     from wearsim.studies.ensemble.compare import compare
+    from wearsim.studies.ensemble.sweep import sweep
     from wearsim.studies.run.run import resume, run
     from wearsim.types import ContactSolution, Profile
 
+# names by the module that defines them
+_NAMES = {
+    "wearsim.errors": [
+        "CapabilityError",
+        "ContactError",
+        "Interrupted",
+        "PluginError",
+        "ResultsFileError",
+        "ScenarioError",
+        "SolverError",
+        "StepError",
+        "UnknownNameError",
+        "WearsimError",
+        "WorkerError",
+    ],
+    "wearsim.results": [
+        "DissipationResult",
+        "EnsembleResult",
+        "Result",
+        "open_dissipation",
+        "open_ensemble",
+        "open_results",
+    ],
+    "wearsim.scenario": ["Scenario", "load_scenario"],
+    "wearsim.studies.contact.monte_carlo": ["dissipation"],
+    "wearsim.studies.contact.single": ["ContactStudy", "solve_contact", "study_contact"],
+    "wearsim.studies.ensemble.api": ["ensemble", "resume_ensemble"],
+    "wearsim.studies.ensemble.compare": ["compare"],
+    "wearsim.studies.ensemble.sweep": ["sweep"],
+    "wearsim.studies.run.run": ["resume", "run"],
+    "wearsim.types": ["ContactSolution", "Profile"],
+}
+_MODULES = {name: module for module, names in _NAMES.items() for name in names}
+
 __all__ = [
+    "CapabilityError",
+    "ContactError",
     "ContactSolution",
     "ContactStudy",
     "DissipationResult",
     "EnsembleResult",
+    "Interrupted",
+    "PluginError",
     "Profile",
     "Result",
+    "ResultsFileError",
     "Scenario",
+    "ScenarioError",
+    "SolverError",
+    "StepError",
+    "UnknownNameError",
+    "WearsimError",
+    "WorkerError",
     "compare",
     "dissipation",
     "ensemble",
@@ -45,29 +104,8 @@ __all__ = [
     "run",
     "solve_contact",
     "study_contact",
+    "sweep",
 ]
-
-_MODULES = {
-    "ContactSolution": "wearsim.types",
-    "ContactStudy": "wearsim.studies.contact.single",
-    "DissipationResult": "wearsim.results",
-    "EnsembleResult": "wearsim.results",
-    "Profile": "wearsim.types",
-    "Result": "wearsim.results",
-    "Scenario": "wearsim.scenario",
-    "compare": "wearsim.studies.ensemble.compare",
-    "dissipation": "wearsim.studies.contact.monte_carlo",
-    "ensemble": "wearsim.studies.ensemble.api",
-    "load_scenario": "wearsim.scenario",
-    "open_dissipation": "wearsim.results",
-    "open_ensemble": "wearsim.results",
-    "open_results": "wearsim.results",
-    "resume": "wearsim.studies.run.run",
-    "resume_ensemble": "wearsim.studies.ensemble.api",
-    "run": "wearsim.studies.run.run",
-    "solve_contact": "wearsim.studies.contact.single",
-    "study_contact": "wearsim.studies.contact.single",
-}
 
 
 def __getattr__(name: str) -> object:
@@ -76,7 +114,8 @@ def __getattr__(name: str) -> object:
 
         return version("wearsim")
     if name not in _MODULES:
-        raise AttributeError(f"module 'wearsim' has no attribute '{name}'")
+        known = "" if name.startswith("_") else f"; it has {', '.join(__all__)}"
+        raise AttributeError(f"module 'wearsim' has no attribute '{name}'{known}")
     return getattr(import_module(_MODULES[name]), name)
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import difflib
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -111,6 +112,36 @@ class ResultsFileError(WearsimError):
     """A results file that cannot be read, or exists and must not be overwritten."""
 
     exit_code = 2
+
+
+class UnknownNameError(WearsimError, ValueError):
+    """A name that does not exist, with those that do.
+
+    Parameters
+    ----------
+    message : str
+        As from `unknown_name`.
+    """
+
+    exit_code = 2
+
+
+def unknown_name(name: str, kind: str, known: Iterable[str]) -> UnknownNameError:
+    """Return the error of an unknown name, with the most similar one and all known ones.
+
+    Parameters
+    ----------
+    name : str
+        The name.
+    kind : str
+        What it should be the name of, "a variable of this run".
+    known : iterable of str
+        All names of that kind.
+    """
+    names = list(known)
+    similar = difflib.get_close_matches(name, names, n=1)
+    hint = f" (did you mean '{similar[0]}'?)" if similar else ""
+    return UnknownNameError(f"'{name}' is not {kind}{hint}; known: {', '.join(names)}")
 
 
 class SolverError(WearsimError):

@@ -8,6 +8,8 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from wearsim.errors import Mistake, ScenarioError
+
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
 IntArray: TypeAlias = npt.NDArray[np.int64]
@@ -40,7 +42,7 @@ class Material:
     yield_stress: float | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Grid:
     """Strips of equal width across the track.
 
@@ -75,7 +77,7 @@ class Grid:
         return float(self.y[0]) - 0.5 * self.spacing, float(self.y[-1]) + 0.5 * self.spacing
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Profile:
     """A measured or computed surface height across the track.
 
@@ -85,13 +87,56 @@ class Profile:
         Axial position [m], increasing.
     height : ndarray, shape (points,)
         Height of the surface above its nominal shape [m]; worn material is negative.
+
+    Raises
+    ------
+    ScenarioError
+        If these are not two sequences of as many finite numbers, y does not increase, or the
+        numbers cannot be metres.
     """
 
     y: FloatArray
     height: FloatArray
 
+    def __post_init__(self) -> None:
+        for name in ("y", "height"):
+            try:
+                values = np.array(getattr(self, name), dtype=np.float64)
+            except (TypeError, ValueError) as error:
+                raise _profile_error(name, "is not a sequence of numbers") from error
+            object.__setattr__(self, name, values)
+            if values.ndim != 1 or len(values) < 2:
+                shape = f"shape {values.shape}"
+                raise _profile_error(name, "is not a sequence of points", shape, "two or more")
+            if not np.isfinite(values).all():
+                place = int(np.flatnonzero(~np.isfinite(values))[0])
+                raise _profile_error(name, f"is not finite at point {place}", f"{values[place]}")
+        if len(self.y) != len(self.height):
+            counts = f"{len(self.y)} values of y and {len(self.height)} of height"
+            raise _profile_error("", "y and height have different lengths", counts)
+        steps = np.diff(self.y)
+        if not (steps > 0.0).all():
+            remedy = "increasing y; reverse both arrays" if (steps < 0.0).all() else "increasing y"
+            place = int(np.flatnonzero(steps <= 0.0)[0])
+            got = f"{self.y[place]:g} m, then {self.y[place + 1]:g} m"
+            raise _profile_error("y", "does not increase", got, remedy)
+        for name, most in (("y", _MOST_Y), ("height", 0.5 * np.ptp(self.y))):
+            span = float(np.ptp(getattr(self, name)))
+            if span > most:
+                expected = "metres: multiply mm by 1e-3, um by 1e-6"
+                raise _profile_error(name, "has a range that cannot be", f"{span:g} m", expected)
 
-@dataclass(frozen=True)
+
+_MOST_Y = 4.0  # m: a wider profile is in other units
+
+
+def _profile_error(
+    key: str, what: str, got: str | None = None, expected: str | None = None
+) -> ScenarioError:
+    return ScenarioError("profile", [Mistake("", key, what, got, expected)])
+
+
+@dataclass(frozen=True, eq=False)
 class Creepage:
     """Rigid slip of body 1 (the cylinder) on body 2 (the roller), per unit of rolling velocity.
 
@@ -118,7 +163,7 @@ class Creepage:
     variation: FloatArray | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class OperatingPoint:
     """Load, speed, creepage and friction of one contact.
 
@@ -153,7 +198,7 @@ class OperatingPoint:
     friction_carried: bool = False
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ContactSolution:
     """Solution of one contact; tractions act on body 1 and oppose positive creepage.
 
@@ -200,7 +245,7 @@ class ContactSolution:
     iterations: int
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ContactFields:
     """Fields within one contact, at points along each strip from trailing to leading edge.
 

@@ -5,13 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
+from wearsim.errors import unknown_name
+from wearsim.results.tables import as_dataset
+
 if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+
     from wearsim.scenario import Scenario
 
 
@@ -217,6 +224,19 @@ class StudyData:
         return tuple(item.name for item in fields(cls) if item.name not in cls.separately_stored)
 
     @property
+    def schema(self) -> Schema:
+        """Schema of the results file."""
+        raise NotImplementedError
+
+    @property
+    def labels(self) -> dict[str, Any]:
+        """Format and short attributes, which other programs can read in the file."""
+        named = {"format": self.schema.format, "format_version": self.schema.version}
+        short = (str, int, float, np.number, np.bool_)
+        every = {**named, **self.attributes}
+        return {name: value for name, value in every.items() if isinstance(value, short)}
+
+    @property
     def attributes(self) -> dict[str, Any]:
         """Fields by name, without those stored separately."""
         return {name: getattr(self, name) for name in self.attribute_names()}
@@ -246,6 +266,46 @@ class StudyResult(Generic[Data]):
 
     raw: Data
     path: Path | None = None
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_") or hasattr(type(self), name):
+            return object.__getattribute__(self, name)  # raises the error of the attribute
+        known = [known for known in dir(self) if not known.startswith("_")]
+        kind = f"an attribute of {type(self).__name__}"
+        raise AttributeError(str(unknown_name(name, kind, known)), name=name, obj=self)
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return all variables of the results file as a dataset of xarray.
+
+        Returns
+        -------
+        xarray.Dataset
+            In SI, with the axes, units and attributes of `xarray.open_dataset` on the file.
+
+        Raises
+        ------
+        ModuleNotFoundError
+            If xarray is not installed, which is part of the extra ``wearsim[data]``.
+        """
+        raw: Any = self.raw
+        return as_dataset(raw.schema, raw.variables, raw.labels)
+
+    def plot(self, ax: Axes | None = None) -> Any:
+        """Draw the result.
+
+        Parameters
+        ----------
+        ax : matplotlib Axes, optional
+            For one panel: the worn profiles of a run, the depth of an ensemble against the roller
+            passes, the density of the dissipated power. By default a figure with all panels.
+
+        Returns
+        -------
+        Axes or Figure
+            A notebook shows the figure; ``savefig("rig.png")`` writes it.
+        """
+        # by name, since the figures belong to a layer above
+        return import_module("wearsim.report.figures.result").plot(self, ax)
 
     @cached_property
     def scenario(self) -> Scenario:

@@ -6,10 +6,11 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from wearsim.errors import unknown_name
 from wearsim.results.content import (
     Arrays,
     Axis,
@@ -21,8 +22,12 @@ from wearsim.results.content import (
     by_name,
     with_random_inputs,
 )
+from wearsim.results.tables import as_frame
 from wearsim.types import FloatArray
 from wearsim.uq.estimation.moments import Convergence, Summary, converge, summarise
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _DRAW = ("realisation",)
 _STRIPS = ("y",)
@@ -155,8 +160,35 @@ class DissipationResult(StudyResult[DissipationData]):
         ----------
         name : str
             Name or dotted key, such as "peak_pressure" or "load.normal_force".
+
+        Raises
+        ------
+        UnknownNameError
+            If there is none; it lists the known ones.
         """
+        if name not in self.raw.variables:
+            raise unknown_name(name, "a variable of this study", self.raw.variables)
         return self.raw.variables[name]
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the realisations as a table of pandas, one row each.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Results and drawn values in SI; ``attrs["units"]`` has the unit of each column.
+
+        Raises
+        ------
+        ModuleNotFoundError
+            If pandas is not installed, which is part of the extra ``wearsim[data]``.
+        """
+        columns = [
+            (name, item.unit, self.values(name))
+            for name, item in self.raw.schema.variables.items()
+            if item.dims[0] == "realisation"
+        ]
+        return as_frame(columns, "realisation", range(self.count))
 
     @property
     def count(self) -> int:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
 
+from wearsim.errors import unknown_name
 from wearsim.results.content import (
     Array,
     Arrays,
@@ -19,7 +20,11 @@ from wearsim.results.content import (
     Variable,
     by_name,
 )
+from wearsim.results.tables import as_frame
 from wearsim.types import FloatArray
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 # every axis except y, whose coordinate is a variable
 AXES: Mapping[str, Axis] = by_name(
@@ -162,7 +167,6 @@ class RunData(StudyData):
 
     separately_stored: ClassVar[frozenset[str]] = StudyData.separately_stored.union(_ARRAYS)
     optional: ClassVar[frozenset[str]] = frozenset({"failure", "failed_at"})
-    schema: ClassVar[Schema] = RUN
 
     stepper: str
     tolerance: float
@@ -176,6 +180,11 @@ class RunData(StudyData):
     drawn: dict[str, dict[str, Any]] = field(default_factory=dict)
     failure: str = ""
     failed_at: str = ""
+
+    @property
+    def schema(self) -> Schema:
+        """Schema of the results file."""
+        return RUN
 
     @property
     def variables(self) -> Arrays:
@@ -266,10 +275,38 @@ class Result(StudyResult[RunData]):
         ----------
         name : str
             Name of the variable, such as "half_length".
+
+        Raises
+        ------
+        UnknownNameError
+            If there is none; it lists the known ones.
         """
+        if name not in VARIABLES:
+            raise unknown_name(name, "a variable of a run", VARIABLES)
         array = self.raw.variables[name]
         dims = zip(VARIABLES[name].dims, array.shape, strict=True)
         return array.reshape([n for dim, n in dims if n != 1 or dim not in _DROPPED])
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the history as a table of pandas, one row per step.
+
+        Returns
+        -------
+        pandas.DataFrame
+            In SI; ``attrs["units"]`` has the unit of each column. Values of several rollers are in
+            columns "normal_force.1", "normal_force.2".
+
+        Raises
+        ------
+        ModuleNotFoundError
+            If pandas is not installed, which is part of the extra ``wearsim[data]``.
+        """
+        columns = [
+            (name, item.unit, self.values(name))
+            for name, item in VARIABLES.items()
+            if item.kind == "history"
+        ]
+        return as_frame(columns, "step", range(len(self.passes)))
 
     @property
     def drawn(self) -> dict[str, tuple[float, ...]]:

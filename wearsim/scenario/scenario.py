@@ -148,6 +148,30 @@ class Scenario:
         """
         return cls.from_toml("", dict(_flat(tables)), folder=folder, name=name)
 
+    def changed(self, overrides: Mapping[str, object]) -> Scenario:
+        """Return a scenario with other values.
+
+        Parameters
+        ----------
+        overrides : mapping of str to object
+            Values by dotted key, {"load.normal_force": "350 N"}.
+
+        Returns
+        -------
+        Scenario
+
+        Raises
+        ------
+        ScenarioError, PluginError
+            As `load_scenario`.
+        """
+        read = _reader(Path(self.file).parent)
+
+        def read_again(name: str) -> str:
+            return self.files[name] if name in self.files else read(name)
+
+        return parse_scenario(self.text, self.file, read_again, overrides)
+
     def __repr__(self) -> str:
         rollers = self.operation.rollers
         length = "one contact"

@@ -9,8 +9,9 @@ import wearsim
 from tests.studies.ensemble_cases import small
 from wearsim.errors import Interrupted
 from wearsim.studies.ensemble.api import ensemble
-from wearsim.studies.ensemble.compare import compare, have_same_draws, path_of, sweep
+from wearsim.studies.ensemble.compare import compare, have_same_draws
 from wearsim.studies.ensemble.designs import interim_sizes, parse_plan, sources, whole_count
+from wearsim.studies.ensemble.sweep import path_of, run_sweep
 from wearsim.studies.run.draws import Drawer
 
 SERIAL = {"scheduler": "serial"}
@@ -63,13 +64,16 @@ def test_each_sobol_replicate_is_stratified():
         np.testing.assert_array_equal(cells, np.arange(16))
 
 
+def creepages(values):
+    """Return a scenario for each value of the creepage."""
+    return [small(creepage__longitudinal=float(value)) for value in values]
+
+
 @pytest.fixture(scope="module")
 def swept(tmp_path_factory):
-    def scenario_of_value(text):
-        return small(creepage__longitudinal=float(text))
-
     path = tmp_path_factory.mktemp("sweep") / "creep.h5"
-    return sweep(scenario_of_value, ["8e-4", "1.2e-3"], 8, path, **SERIAL)
+    values = ["8e-4", "1.2e-3"]
+    return run_sweep(creepages(values), values, 8, path, **SERIAL)
 
 
 def test_sweep_has_common_random_numbers(swept):
@@ -83,26 +87,21 @@ def test_sweep_has_common_random_numbers(swept):
 def test_sweep_refuses_existing_file_before_it_runs(swept, tmp_path):
     (tmp_path / "creep-2.h5").write_text("mine")
     with pytest.raises(wearsim.errors.ResultsFileError, match="already exists"):
-        sweep(lambda text: small(), ["1", "2"], 3, tmp_path / "creep.h5", **SERIAL)
+        run_sweep([small(), small()], ["1", "2"], 3, tmp_path / "creep.h5", **SERIAL)
     assert not (tmp_path / "creep-1.h5").exists()
 
 
 def test_sweep_continues_where_it_was_stopped(tmp_path):
-    def scenario_of_value(text):
-        return small(creepage__longitudinal=float(text))
-
     values, path = ["8e-4", "1e-3", "1.2e-3"], tmp_path / "creep.h5"
-    answers = iter([False] * 4 + [True])
+    scenarios, answers = creepages(values), iter([False] * 4 + [True])
     with pytest.raises(Interrupted, match=r"not started: 1.2e-3; call sweep again"):
-        sweep(
-            scenario_of_value, values, 3, path, stop_requested=lambda: next(answers, True), **SERIAL
-        )
+        run_sweep(scenarios, values, 3, path, stop_requested=lambda: next(answers, True), **SERIAL)
     kept = (tmp_path / "creep-8e-4.h5").read_bytes()
-    results = sweep(scenario_of_value, values, 3, path, **SERIAL)
+    results = run_sweep(scenarios, values, 3, path, **SERIAL)
     assert [result.count for result in results] == [3, 3, 3]
     assert (tmp_path / "creep-8e-4.h5").read_bytes() == kept
     with pytest.raises(wearsim.errors.ResultsFileError, match="already exists"):
-        sweep(scenario_of_value, values, 4, path, **SERIAL)  # a different ensemble
+        run_sweep(scenarios, values, 4, path, **SERIAL)  # a different ensemble
 
 
 def test_sweep_file_names_contain_the_values():

@@ -87,9 +87,8 @@ def ensemble(
     check_figure(figure, force, "--figure")
     from wearsim.cli.progress import EnsembleWatcher, stop_on_signals
     from wearsim.studies.ensemble import api
-    from wearsim.studies.ensemble.compare import path_of
-    from wearsim.studies.ensemble.compare import sweep as run_sweep
     from wearsim.studies.ensemble.designs import parse_plan
+    from wearsim.studies.ensemble.sweep import path_of, run_sweep
     from wearsim.studies.kernels import kernels_of
 
     options: dict[str, Any] = {"plan": plan, "until": until, "workers": workers, "force": force}
@@ -130,7 +129,9 @@ def ensemble(
         }
         if key:
             options["on_value"] = announce
-            results = run_sweep(scenarios.__getitem__, list(files), realisations, path, **options)
+            results = run_sweep(
+                list(scenarios.values()), list(files), realisations, path, **options
+            )
         else:
             results = [api.ensemble(scenarios[""], realisations, path, **options)]
     if not key:

@@ -90,22 +90,10 @@ def draw(
     measured : sequence of Measured
         Profiles drawn over those of a run.
     """
+    from wearsim.report.figures.result import figure_of
     from wearsim.report.parts import save_figure
-    from wearsim.results import DissipationResult, EnsembleResult
 
-    if isinstance(result, EnsembleResult):
-        from wearsim.report.figures.ensemble import ensemble_figure
-
-        figure = ensemble_figure(result)
-    elif isinstance(result, DissipationResult):
-        from wearsim.report.figures.contact import dissipation_figure
-
-        figure = dissipation_figure(result)
-    else:
-        from wearsim.report.figures.run import run_figure
-
-        figure = run_figure(result, measured)
-    save_figure(figure, path)
+    save_figure(figure_of(result, measured), path)
 
 
 def show(file: ResultsFile, json: Json = False) -> None:

@@ -28,7 +28,7 @@ from wearsim.report.text import (
     too_few,
 )
 from wearsim.results import EnsembleResult, Result
-from wearsim.results.ensemble.result import Effect
+from wearsim.results.ensemble.data import Effect
 from wearsim.studies.ensemble.compare import Compared, Comparison, compare
 from wearsim.uq.estimation.estimates import Estimate, Target
 

@@ -223,7 +223,7 @@ def dissipation_figure(result: DissipationResult) -> Figure:
             "realisations",
             "std of $P_d$ [W]",
         )
-        _draw_density(panels["density"], result)
+        draw_density(panels["density"], result)
         _draw_realisations(panels["realisations"], result)
         _draw_band(panels["band"], result)
     return figure
@@ -244,7 +244,8 @@ def _caption(result: DissipationResult) -> str:
     return f"{text}, std {shown(power.std, 'W')}, 95 % range {band} W"
 
 
-def _draw_density(axes: Axes, result: DissipationResult) -> None:
+def draw_density(axes: Axes, result: DissipationResult) -> None:
+    """Draw the density of the dissipated power."""
     power, summary, title = result.power, result.summaries["power"], "Density of dissipated power"
     at_means = f"inputs at their means: {shown(result.mean_problem_power, 'W')}"
     if result.count == 1 or summary.is_constant:

@@ -42,7 +42,7 @@ from wearsim.report.text import (
     too_few,
 )
 from wearsim.results import EnsembleResult
-from wearsim.results.ensemble.result import Effect
+from wearsim.results.ensemble.data import Effect
 from wearsim.results.ensemble.schema import PENDING
 from wearsim.studies.ensemble.compare import Compared, Comparison
 from wearsim.types import FloatArray, IntArray
@@ -82,7 +82,7 @@ def ensemble_figure(result: EnsembleResult) -> Figure:
         upper, lower = np.ravel(np.array(figure.subfigures(2, 1)))
         course, density, convergence = upper.subplots(1, 3)
         profile, effects = lower.subplots(1, 2)
-        _draw_course(course, result)
+        draw_course(course, result)
         _draw_density(density, result)
         _draw_convergence(convergence, result)
         _draw_profile(profile, result)
@@ -115,7 +115,7 @@ def _caption(result: EnsembleResult) -> str:
     return f"{text}, 90 % range {' to '.join(in_unit(end.value, 'um', 3) for end in ends)} um"
 
 
-def _draw_course(axes: Axes, result: EnsembleResult) -> None:
+def draw_course(axes: Axes, result: EnsembleResult) -> None:
     """Draw depth against roller passes: median, mean, 90 % range and some realisations."""
     course = result.course("depth")
     drawn, unit, name = set_depth_axes(axes, course.passes, course.quantiles[0.5])

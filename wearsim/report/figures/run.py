@@ -81,6 +81,12 @@ def _caption(result: Result) -> str:
     )
 
 
+def draw_worn_profiles(axes: Axes, result: Result) -> None:
+    """Draw the profiles of the cylinder at the records, from black at the start to the end."""
+    _draw_profiles(axes, result, _Colours(result.record_passes), ())
+    axes.set_xlim(*_extent(result, []))
+
+
 class _Colours:
     """Drawn records and their colours, by roller passes; the start of the run is black."""
 

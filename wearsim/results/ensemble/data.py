@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from wearsim.errors import unknown_name
 from wearsim.results.content import Array, Arrays, Schema, StudyData
 from wearsim.results.ensemble.schema import (
     DONE,
@@ -20,6 +21,7 @@ from wearsim.results.ensemble.schema import (
     type_of,
 )
 from wearsim.types import FloatArray, IntArray
+from wearsim.uq.estimation.intervals import Interval
 
 if TYPE_CHECKING:
     import h5py
@@ -205,7 +207,14 @@ class EnsembleData(StudyData):
             The first realisation, and the one after the last; None for all that follow.
         *rest : slice
             The entries of each row along further axes, by default all.
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no such variable; it lists the known ones.
         """
+        if name not in self.variables:
+            raise unknown_name(name, "a variable of this ensemble", self.variables)
         if isinstance(self.variables, StoredRows):
             return self.variables.rows(name, start, stop, *rest)  # reads nothing else
         return self.variables[name][(slice(start, stop), *rest)]
@@ -242,3 +251,73 @@ class EnsembleData(StudyData):
             for name, variable in self.schema.variables.items()
             if variable.kind != "static"
         }
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """Estimates of an observable against the roller passes.
+
+    Parameters
+    ----------
+    passes, time : ndarray, shape (records,)
+        Roller passes, and simulated time [s].
+    mean, mean_low, mean_high, std : ndarray, shape (records,)
+        Mean with its confidence interval, and standard deviation.
+    quantiles : mapping of float to ndarray, shape (records,)
+        Quantiles by probability.
+    """
+
+    passes: FloatArray
+    time: FloatArray
+    mean: FloatArray
+    mean_low: FloatArray
+    mean_high: FloatArray
+    std: FloatArray
+    quantiles: Mapping[float, FloatArray]
+
+
+@dataclass(frozen=True, eq=False)
+class Band:
+    """Worn profile at the end of the test, over the realisations with a stored profile.
+
+    Parameters
+    ----------
+    y : ndarray, shape (strips,)
+        Axial position [m].
+    mean, std, low, high : ndarray, shape (strips,)
+        Mean and standard deviation of the worn depth, and its 2.5 and 97.5 % quantiles [m].
+    kept : int
+        Number of profiles.
+    """
+
+    y: FloatArray
+    mean: FloatArray
+    std: FloatArray
+    low: FloatArray
+    high: FloatArray
+    kept: int
+
+
+@dataclass(frozen=True)
+class Effect:
+    """Sensitivity of an observable to a random input.
+
+    Parameters
+    ----------
+    name : str
+        Name of the input, such as "creepage.misalignment".
+    text : str
+        Description of the input.
+    first : Interval
+        First-order Sobol index: share of the variance due to this input alone.
+    total : Interval, optional
+        Total Sobol index, interactions with other inputs included; only with Saltelli's plan.
+    without_effect : bool
+        Whether no effect is detectable.
+    """
+
+    name: str
+    text: str
+    first: Interval
+    total: Interval | None
+    without_effect: bool

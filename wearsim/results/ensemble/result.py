@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from wearsim.errors import unknown_name
 from wearsim.results.content import StudyResult
-from wearsim.results.ensemble.data import EnsembleData
+from wearsim.results.ensemble.data import Band, Course, Effect, EnsembleData
 from wearsim.results.ensemble.schema import DONE, OBSERVABLES, QUANTILES, kept_profiles
+from wearsim.results.tables import as_frame
 from wearsim.types import FloatArray, IntArray
 from wearsim.uq.estimation.estimates import Design, Estimate, Target, estimate
 from wearsim.uq.estimation.intervals import Interval
@@ -19,78 +21,12 @@ from wearsim.uq.estimation.moments import summarise
 from wearsim.uq.estimation.standard_errors import Control
 from wearsim.uq.sampling.sampler import REPLICATES
 
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
 _READ_SIZE = 4_000_000  # numbers read at once
 PROBABILITIES = (0.025, 0.05, 0.5, 0.95, 0.975)
-
-
-@dataclass(frozen=True)
-class Course:
-    """Estimates of an observable against the roller passes.
-
-    Parameters
-    ----------
-    passes, time : ndarray, shape (records,)
-        Roller passes, and simulated time [s].
-    mean, mean_low, mean_high, std : ndarray, shape (records,)
-        Mean with its confidence interval, and standard deviation.
-    quantiles : mapping of float to ndarray, shape (records,)
-        Quantiles by probability.
-    """
-
-    passes: FloatArray
-    time: FloatArray
-    mean: FloatArray
-    mean_low: FloatArray
-    mean_high: FloatArray
-    std: FloatArray
-    quantiles: Mapping[float, FloatArray]
-
-
-@dataclass(frozen=True)
-class Band:
-    """Worn profile at the end of the test, over the realisations with a stored profile.
-
-    Parameters
-    ----------
-    y : ndarray, shape (strips,)
-        Axial position [m].
-    mean, std, low, high : ndarray, shape (strips,)
-        Mean and standard deviation of the worn depth, and its 2.5 and 97.5 % quantiles [m].
-    kept : int
-        Number of profiles.
-    """
-
-    y: FloatArray
-    mean: FloatArray
-    std: FloatArray
-    low: FloatArray
-    high: FloatArray
-    kept: int
-
-
-@dataclass(frozen=True)
-class Effect:
-    """Sensitivity of an observable to a random input.
-
-    Parameters
-    ----------
-    name : str
-        Name of the input, such as "creepage.misalignment".
-    text : str
-        Description of the input.
-    first : Interval
-        First-order Sobol index: share of the variance due to this input alone.
-    total : Interval, optional
-        Total Sobol index, interactions with other inputs included; only with Saltelli's plan.
-    without_effect : bool
-        Whether no effect is detectable.
-    """
-
-    name: str
-    text: str
-    first: Interval
-    total: Interval | None
-    without_effect: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,11 +104,53 @@ class EnsembleResult(StudyResult[EnsembleData]):
         Returns
         -------
         ndarray, shape (count, records) for an observable
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no such variable; it lists the known ones.
         """
-        return np.asarray(self.raw.variables[name][self.numbers])
+        return np.asarray(self.raw.rows(name, 0, None)[self.numbers])
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return all variables of the results file as a dataset of xarray.
+
+        As for other results, but of the successful realisations only.
+        """
+        kept = np.flatnonzero(self.raw.status[: self.kept] == DONE)
+        return super().to_xarray().isel(realisation=self.numbers, kept=kept)
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the successful realisations as a table of pandas, one row each.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Drawn values and results at the end of the test in SI; ``attrs["units"]`` has the unit
+            of each column. Values of several rollers are in columns "load.normal_force.1", ...
+
+        Raises
+        ------
+        ModuleNotFoundError
+            If pandas is not installed, which is part of the extra ``wearsim[data]``.
+        """
+        columns = [
+            (name, item.unit, self.at_end(name) if name in OBSERVABLES else self.values(name))
+            for name, item in self.raw.schema.variables.items()
+            if item.dims[0] == "realisation" and name not in {"status", "error"}
+        ]
+        return as_frame(columns, "realisation", self.numbers)
 
     def at_end(self, name: str, record: int = -1) -> FloatArray:
-        """Return an observable at the end of the test, or at another record, shape (count,)."""
+        """Return an observable at the end of the test, or at another record, shape (count,).
+
+        Raises
+        ------
+        UnknownNameError
+            If there is no such observable; it lists the known ones.
+        """
+        if name not in OBSERVABLES:
+            raise unknown_name(name, "an observable", OBSERVABLES)
         return self.raw.column(name, record)[self.numbers]
 
     def independent(self, name: str, record: int = -1) -> tuple[IntArray, FloatArray]:
@@ -289,6 +267,8 @@ class EnsembleResult(StudyResult[EnsembleData]):
 
     def _by_record(self, name: str) -> Iterator[FloatArray]:
         """Yield an observable of the independent realisations, record by record."""
+        if name not in OBSERVABLES:
+            raise unknown_name(name, "an observable", OBSERVABLES)
         records, block = len(self.record_passes), max(_READ_SIZE // max(self.requested, 1), 1)
         for first in range(0, records, block):
             some = self.raw.rows(name, 0, None, slice(first, min(first + block, records)))

@@ -205,10 +205,7 @@ def put_texts(
     checkpoint : dict of str to ndarray, optional
         State for resuming.
     """
-    named = {"format": schema.format, "format_version": schema.version}
-    for name, value in {**named, **data.attributes}.items():
-        if isinstance(value, str | int | float | np.number | np.bool_):
-            put_labels(file, **{name: value})
+    put_labels(file, **data.labels)
     inputs = _put_group(file, INPUTS)
     put_text(inputs, SCENARIO, data.scenario_text)
     put_text(inputs, ABOUT, json.dumps(data.attributes, default=as_plain))

@@ -276,7 +276,8 @@ def _read_top(mistakes: Mistakes, data: Mapping[str, object]) -> TopTable:
     own = {key: data[key] for key in TopTable.model_fields if key in data}
     for key in [key for key in data if key not in TABLES and key not in own]:
         if isinstance(data[key], dict):
-            mistakes.add(key, "", f"unknown table{nearest(key, TABLES)}")
+            hint = nearest(key, TABLES) or f" (known: {', '.join(TABLES)})"
+            mistakes.add(key, "", f"unknown table{hint}")
         else:
             mistakes.add("", key, f"unknown key{mistakes.hint(key, TopTable.model_fields)}")
     return validate(mistakes, TopTable, own, "") or TopTable()

@@ -15,6 +15,7 @@ from wearsim.results.dissipation import BAND, as_numbers, summaries
 from wearsim.scenario import Scenario, as_scenario
 from wearsim.studies.contact.batch import Realisations
 from wearsim.studies.preparation import checked_count, nothing_random, origin_of
+from wearsim.studies.progress import shown_progress
 from wearsim.uq.estimation.moments import RowMoments
 
 BATCH = 1024  # realisations of a batch
@@ -37,6 +38,7 @@ def dissipation(
     output: str | Path | None = None,
     *,
     force: bool = False,
+    progress: bool = False,
     on_progress: Callable[[int, int], None] | None = None,
     stop_requested: Callable[[], bool] | None = None,
 ) -> DissipationResult:
@@ -56,6 +58,8 @@ def dissipation(
         Results file; without it the result is kept in memory only.
     force : bool
         Overwrite an existing file.
+    progress : bool
+        Whether to show the progress, on a terminal or in a notebook.
     on_progress : callable, optional
         Called with the numbers of completed and of all realisations.
     stop_requested : callable, optional
@@ -81,18 +85,19 @@ def dissipation(
     path = Path(output) if output is not None else None
     if path is not None:
         check_output(path, force, scenario.paths)
-    study = _Study(scenario, realisations, path)
-    try:
-        while study.done < realisations:
-            study.step()
-            if on_progress is not None:
-                on_progress(study.done, realisations)
-            if stop_requested is not None and stop_requested() and study.done < realisations:
-                raise study.interrupted()
-    except SolverError:
-        if study.done:
-            study.close()
-        raise
+    with shown_progress(progress, "Counter", on_progress, scenario) as watch:
+        study = _Study(scenario, realisations, path)
+        try:
+            while study.done < realisations:
+                study.step()
+                if watch is not None:
+                    watch(study.done, realisations)
+                if stop_requested is not None and stop_requested() and study.done < realisations:
+                    raise study.interrupted()
+        except SolverError:
+            if study.done:
+                study.close()
+            raise
     return DissipationResult(study.close(), path)
 
 

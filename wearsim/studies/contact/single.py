@@ -27,7 +27,7 @@ GRID_DEPENDENT = 0.1  # relative change of the peak pressure with half as many s
 _FEWEST = 5  # minimum number of strips for an error estimate
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ContactStudy:
     """A solved contact and its problem.
 

@@ -40,6 +40,7 @@ from wearsim.studies.preparation import (
     nothing_random,
     origin_of,
 )
+from wearsim.studies.progress import shown_progress
 from wearsim.studies.run.assemble import assemble_problem
 from wearsim.studies.run.draws import Drawer, draw, units_of
 from wearsim.studies.run.recorder import RecordSchedule
@@ -59,6 +60,7 @@ def ensemble(
     workers: int | None = None,
     scheduler: str = "processes",
     force: bool = False,
+    progress: bool = False,
     on_progress: Watcher | None = None,
     stop_requested: Callable[[], bool] | None = None,
     on_notice: Callable[[str], None] | None = None,
@@ -87,6 +89,8 @@ def ensemble(
         "processes", "threads", "serial", "dask", or the address of a Dask scheduler.
     force : bool
         Overwrite an existing file.
+    progress : bool
+        Whether to show the progress, on a terminal or in a notebook.
     on_progress : callable, optional
         Called with the progress after every batch.
     stop_requested : callable, optional
@@ -116,20 +120,23 @@ def ensemble(
     request = checked_request(scenario, realisations, plan, until)
     path = Path(output)
     check_output(path, force, scenario.paths)
-    with executor(
-        scheduler,
-        workers,
-        on_notice=on_notice,
-        stop_requested=stop_requested,
-        preload=RealisationRunner.__module__,
-        realisations=request.realisations,
-    ) as pool:
+    with (
+        shown_progress(progress, "EnsembleWatcher", on_progress, scenario) as watch,
+        executor(
+            scheduler,
+            workers,
+            on_notice=on_notice or getattr(watch, "notice", None),
+            stop_requested=stop_requested,
+            preload=RealisationRunner.__module__,
+            realisations=request.realisations,
+        ) as pool,
+    ):
         grid = shared_grid(scenario)
         content = _content(scenario, request, grid)
         with EnsembleFile.create(path, *content, storage) as file:
             runner = RealisationRunner(scenario, request.plan, request.realisations, grid)
             runner.compile_kernels()
-            EnsembleWork(file, runner, request.target, pool, on_progress, stop_requested).finish()
+            EnsembleWork(file, runner, request.target, pool, watch, stop_requested).finish()
     return open_ensemble(path)
 
 
@@ -198,6 +205,7 @@ def resume_ensemble(
     realisations: int | None = None,
     workers: int | None = None,
     scheduler: str = "processes",
+    progress: bool = False,
     on_progress: Watcher | None = None,
     stop_requested: Callable[[], bool] | None = None,
     on_notice: Callable[[str], None] | None = None,
@@ -213,7 +221,7 @@ def resume_ensemble(
         Run the failed realisations again, and no others.
     realisations : int, optional
         New maximum number of realisations, to extend the ensemble.
-    workers, scheduler, on_progress, stop_requested, on_notice, storage
+    workers, scheduler, progress, on_progress, stop_requested, on_notice, storage
         As in `ensemble`.
 
     Returns
@@ -250,21 +258,22 @@ def resume_ensemble(
     target = Target.parse(data.until) if data.until else None
     grid = Grid(data.variables["y"], data.strip_width)
     runner = RealisationRunner(scenario, plan, total, grid)
-    runner.compile_kernels()
     with (
+        shown_progress(progress, "EnsembleWatcher", on_progress, scenario) as watch,
         executor(
             scheduler,
             workers,
-            on_notice=on_notice,
+            on_notice=on_notice or getattr(watch, "notice", None),
             stop_requested=stop_requested,
             preload=RealisationRunner.__module__,
             realisations=data.requested,
         ) as pool,
         EnsembleFile.open(path, storage) as opened,
     ):
+        runner.compile_kernels()
         if total > data.requested:
             opened.grow(total)
-        work = EnsembleWork(opened, runner, target, pool, on_progress, stop_requested)
+        work = EnsembleWork(opened, runner, target, pool, watch, stop_requested)
         work.warn(changed_origins(data, scenario))
         if failed:
             work.run_failed_again()

@@ -28,6 +28,7 @@ from wearsim.results.run import VARIABLES
 from wearsim.scenario import Scenario, as_scenario, parse_scenario
 from wearsim.studies.plausibility import plausibility_warnings
 from wearsim.studies.preparation import changed_origins, check_plugins, origin_of
+from wearsim.studies.progress import shown_progress
 from wearsim.studies.run.assemble import assemble_problem, start_height
 from wearsim.studies.run.draws import Draws, draw, units_of
 from wearsim.studies.run.grid import strips_of_run
@@ -51,6 +52,7 @@ def run(
     output: str | Path | None = None,
     *,
     force: bool = False,
+    progress: bool = False,
     on_event: Watcher | None = None,
     stop_requested: Callable[[], bool] | None = None,
     storage: Storage = DISK,
@@ -65,6 +67,8 @@ def run(
         Results file; without it the result is kept in memory only.
     force : bool
         Overwrite an existing file.
+    progress : bool
+        Whether to show the progress, on a terminal or in a notebook.
     on_event : callable, optional
         Called with every event, see `wearsim.studies.run.recorder`.
     stop_requested : callable, optional
@@ -89,15 +93,17 @@ def run(
     path = Path(output) if output is not None else None
     if path is not None:
         check_output(path, force, scenario.paths)
-    return _RunInProgress(
-        scenario, draw(scenario), path, storage, on_event, stop_requested
-    ).finish()
+    with shown_progress(progress, "RunWatcher", on_event, scenario) as watch:
+        return _RunInProgress(
+            scenario, draw(scenario), path, storage, watch, stop_requested
+        ).finish()
 
 
 def resume(
     file: str | Path,
     until: float | None = None,
     *,
+    progress: bool = False,
     on_event: Watcher | None = None,
     stop_requested: Callable[[], bool] | None = None,
     storage: Storage = DISK,
@@ -110,7 +116,7 @@ def resume(
         Results file of a run that was stopped, or finished.
     until : float, optional
         New simulated end of the test [s], to extend it.
-    on_event, stop_requested, storage
+    progress, on_event, stop_requested, storage
         As in `run`.
 
     Returns
@@ -151,9 +157,10 @@ def resume(
         return Result(data, path)
     draws = draw(scenario)
     data, state = _widened(draws, data, state)
-    return _RunInProgress(
-        scenario, draws, path, storage, on_event, stop_requested, data, state
-    ).finish()
+    with shown_progress(progress, "RunWatcher", on_event, scenario) as watch:
+        return _RunInProgress(
+            scenario, draws, path, storage, watch, stop_requested, data, state
+        ).finish()
 
 
 def _widened(draws: Draws, data: RunData, state: WearState) -> tuple[RunData, WearState]:

@@ -1,0 +1,55 @@
+"""Figure of a result of any kind."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from wearsim.report.figures.contact import dissipation_figure, draw_density
+from wearsim.report.figures.ensemble import draw_course, ensemble_figure
+from wearsim.report.figures.run import draw_worn_profiles, run_figure
+from wearsim.report.parts import Measured
+from wearsim.results import DissipationResult, EnsembleResult, Result
+
+
+def figure_of(
+    result: Result | DissipationResult | EnsembleResult, measured: Sequence[Measured] = ()
+) -> Figure:
+    """Return the figure of a result.
+
+    Parameters
+    ----------
+    result : Result, DissipationResult or EnsembleResult
+    measured : sequence of Measured
+        Profiles drawn over those of a run.
+    """
+    if isinstance(result, EnsembleResult):
+        return ensemble_figure(result)
+    if isinstance(result, DissipationResult):
+        return dissipation_figure(result)
+    return run_figure(result, measured)
+
+
+def plot(
+    result: Result | DissipationResult | EnsembleResult, axes: Axes | None = None
+) -> Axes | Figure:
+    """Draw one panel of the figure of a result on axes, or return the whole figure.
+
+    Parameters
+    ----------
+    result : Result, DissipationResult or EnsembleResult
+    axes : Axes, optional
+    """
+    if axes is None:
+        import matplotlib.pyplot  # noqa: F401, PLC0415  (lets notebooks show the figure)
+
+        return figure_of(result)
+    if isinstance(result, EnsembleResult):
+        draw_course(axes, result)
+    elif isinstance(result, DissipationResult):
+        draw_density(axes, result)
+    else:
+        draw_worn_profiles(axes, result)
+    return axes

@@ -1,0 +1,90 @@
+"""Results as datasets of xarray and tables of pandas, in SI."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+    from wearsim.results.content import Array, Schema
+
+
+def as_dataset(
+    schema: Schema, variables: Mapping[str, Array], labels: Mapping[str, Any]
+) -> xr.Dataset:
+    """Return variables with their axes, as xarray reads them from a results file.
+
+    Parameters
+    ----------
+    schema : Schema
+        Axes and variables of the file.
+    variables : mapping of str to ndarray
+        Variables by name.
+    labels : mapping of str to object
+        Attributes of the dataset.
+    """
+    data = {
+        name: (
+            item.dims,
+            np.asarray(variables[name]),
+            {"units": item.unit, "long_name": item.long_name},
+        )
+        for name, item in schema.variables.items()
+    }
+    lengths = {
+        dim: n for dims, array, _ in data.values() for dim, n in zip(dims, array.shape, strict=True)
+    }
+    axes = {
+        axis.name: (
+            axis.name,
+            np.arange(axis.first, axis.first + lengths[axis.name]),
+            {"units": "1", "long_name": axis.long_name},
+        )
+        for axis in schema.axes.values()
+    }
+    dataset: xr.Dataset = _library("xarray").Dataset({**axes, **data}, attrs=dict(labels))
+    return dataset
+
+
+def as_frame(
+    columns: Iterable[tuple[str, str, Array]], axis: str, numbers: Iterable[int]
+) -> pd.DataFrame:
+    """Return columns as a table.
+
+    Parameters
+    ----------
+    columns : iterable of (str, str, ndarray)
+        Name, unit and values; an array with one column per roller becomes as many columns, "name.1"
+        for the first one.
+    axis : str
+        Name of the rows.
+    numbers : iterable of int
+        Number of each row.
+    """
+    found: dict[str, Array] = {}
+    units: dict[str, str] = {}
+    for name, unit, values in columns:
+        parts = {name: values}
+        if values.ndim > 1:
+            parts = {f"{name}.{number}": part for number, part in enumerate(values.T, 1)}
+        found |= parts
+        units |= dict.fromkeys(parts, unit)
+    pandas = _library("pandas")
+    frame: pd.DataFrame = pandas.DataFrame(found, index=pandas.Index(list(numbers), name=axis))
+    frame.attrs["units"] = units
+    return frame
+
+
+def _library(name: str) -> Any:
+    try:
+        return import_module(name)
+    except ImportError as error:
+        raise ModuleNotFoundError(
+            f"{name} is not installed; install it with: pip install 'wearsim[data]'", name=name
+        ) from error

@@ -1,0 +1,149 @@
+"""Runs and ensembles for several values of one key of a scenario."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from wearsim.errors import Interrupted, ResultsFileError
+from wearsim.results import (
+    EnsembleResult,
+    Result,
+    check_output,
+    kind_of,
+    read_ensemble,
+    read_results,
+)
+from wearsim.scenario import Scenario, as_scenario
+from wearsim.studies.ensemble.api import checked_request, ensemble, resume_ensemble
+from wearsim.studies.run.run import resume, run
+
+
+def sweep(
+    scenario: Scenario | str | Path,
+    key: str,
+    values: Sequence[object],
+    output: str | Path | None = None,
+    *,
+    realisations: int | None = None,
+    on_value: Callable[[str, Path | None], None] | None = None,
+    **options: Any,
+) -> list[Any]:
+    """Run a wear test, or an ensemble, for each of several values of one key.
+
+    The random numbers of an ensemble are addressed by the names of the inputs, so that a
+    realisation differs between the ensembles in the value only: differences are not affected by
+    sampling. What an earlier call left unfinished in files is continued.
+
+    Parameters
+    ----------
+    scenario : Scenario or path
+        The scenario, or its file.
+    key : str
+        Dotted key, "load.normal_force".
+    values : sequence
+        Values of the key, as in a scenario: "300 N", 0.1.
+    output : path, optional
+        ``FILE.h5``, for files ``FILE-VALUE.h5``; needed for ensembles.
+    realisations : int, optional
+        Number of realisations of each ensemble; by default each value is one test.
+    on_value : callable, optional
+        Called with value and file before each test or ensemble.
+    **options
+        Options of `run` or `ensemble`, such as ``progress=True``.
+
+    Returns
+    -------
+    list of Result or EnsembleResult
+        In the order of the values.
+
+    Raises
+    ------
+    ResultsFileError
+        If a file exists, or is that of two values.
+    ScenarioError, CapabilityError, TypeError, ValueError
+        As in `run` or `ensemble`; those known from the arguments before the first one runs.
+    Interrupted
+        If it was stopped, with the values that are left.
+    """
+    base, names = as_scenario(scenario), [str(value) for value in values]
+    if not names:
+        raise ValueError("a sweep needs one or more values")
+    if realisations is not None and output is None:
+        raise TypeError("ensembles are written to files: name one with output")
+    scenarios = [base.changed({key: value}) for value in values]
+    return run_sweep(scenarios, names, realisations, output, on_value=on_value, **options)
+
+
+def run_sweep(
+    scenarios: Sequence[Scenario],
+    values: Sequence[str],
+    realisations: int | None,
+    output: str | Path | None,
+    *,
+    on_value: Callable[[str, Path | None], None] | None = None,
+    **options: Any,
+) -> list[Any]:
+    """Run the scenarios of a sweep, one per value; the other parameters are those of `sweep`."""
+    paths = [None if output is None else path_of(output, value) for value in values]
+    same = [path for path in paths if path is not None and paths.count(path) > 1]
+    if same:
+        raise ResultsFileError(
+            f"{same[0]}: would be the file of two values; write them differently"
+        )
+    force, resumed = options.get("force", False), []
+    for scenario, path in zip(scenarios, paths, strict=True):
+        request: tuple[object, ...] = (scenario.sha256,)
+        if realisations is not None:
+            found = checked_request(
+                scenario, realisations, options.get("plan"), options.get("until")
+            )
+            until = "" if found.target is None else str(found.target)
+            request += (found.plan, found.realisations, until)
+        resumed.append(not force and path is not None and _requested(path) == request)
+        if path is not None and not resumed[-1]:
+            check_output(path, force, scenario.paths)
+    continued = {name: options[name] for name in options.keys() - {"plan", "until", "force"}}
+    results: list[Result | EnsembleResult] = []
+    for value, scenario, path, is_resumed in zip(values, scenarios, paths, resumed, strict=True):
+        if on_value is not None:
+            on_value(value, path)
+        try:
+            if path is not None and is_resumed:
+                again = resume if realisations is None else resume_ensemble
+                results.append(again(path, **continued))
+            elif realisations is None or path is None:
+                results.append(run(scenario, path, **options))
+            else:
+                results.append(ensemble(scenario, realisations, path, **options))
+        except Interrupted as stop:
+            left = values[len(results) + 1 :]
+            rest = f"; not started: {', '.join(left)}" if left else ""
+            raise Interrupted(
+                f"{stop.message}{rest}",
+                python="call sweep again to continue it",
+                shell="repeat the command to continue the sweep",
+            ) from stop
+    return results
+
+
+def _requested(path: Path) -> tuple[object, ...] | None:
+    """Return what identifies the run or ensemble in a file, None for anything else."""
+    try:
+        if kind_of(path) == "run":
+            return (read_results(path).sha256,)
+        data = read_ensemble(path)
+    except ResultsFileError:  # another kind of file, which is not overwritten
+        return None
+    return data.sha256, data.plan, data.requested, data.until
+
+
+def path_of(output: str | Path, value: str) -> Path:
+    """Return the file of one value: 'out/test.h5' and '250 N' give 'out/test-250N.h5'."""
+    path = Path(output)
+    joined = re.sub(r"\s+(?=[A-Za-z])", "", value.strip())  # a number and its unit
+    plain = re.sub(r"\s+", "_", joined.replace("/", "_per_").replace("%", "percent"))
+    plain = re.sub(r"[^\w.+-]+", "", plain)
+    return path.with_name(f"{path.stem}-{plain}{path.suffix}")
