@@ -80,7 +80,7 @@ def test_missing_folder_of_parts_is_an_error(in_parts, tmp_path):
     shutil.copy(in_parts, copy)
     assert _error_of(copy) == (
         f"{copy}: is unfinished, and part of it is missing: there is no {copy}.parts; move it"
-        " there, or repeat the ensemble with --force"
+        " there, or repeat the ensemble with force=True"
     )
 
 
@@ -100,7 +100,7 @@ def test_part_of_another_ensemble_is_an_error(in_parts, tmp_path):
     shutil.copy(Path(f"{in_parts}.parts") / "000002.h5", part)
     assert _error_of(other) == (
         f"{part}: belongs to another ensemble than {other}; move the parts of this one there, or"
-        " repeat the ensemble with --force"
+        " repeat the ensemble with force=True"
     )
 
 

@@ -165,7 +165,7 @@ def test_ensembles_of_different_seeds_are_not_paired(swept, tmp_path):
 
 
 def test_invalid_comparison_raises_value_error(swept):
-    with pytest.raises(ValueError, match="a has no 'colour'; it has depth"):
+    with pytest.raises(ValueError, match="'colour' is not an observable of a; known: depth"):
         compare(swept, ["a", "b"], "colour")
     with pytest.raises(ValueError, match="two or more"):
         compare(swept[:1], ["a"])

@@ -147,7 +147,7 @@ def _read_part(part: Path, path: Path, data: EnsembleData) -> Part:
         if file.attrs[RUN_ID] != data.run_id.encode():
             raise ResultsFileError(
                 f"{part}: belongs to another ensemble than {path}",
-                python="move the parts of this one there, or repeat it with force=True",
+                python="move the parts of this one there, or repeat the ensemble with force=True",
                 shell="move the parts of this one there, or repeat the ensemble with --force",
             )
         rows = [name for name, item in data.schema.variables.items() if is_row(item)]
