@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -13,7 +12,7 @@ import numpy as np
 from wearsim.errors import Interrupted, ResultsFileError, failure_text
 from wearsim.evolution.error_estimates import greatest_depth, volume_of
 from wearsim.evolution.integrate import evolve
-from wearsim.evolution.state import SIGMAS, WearState, fresh_state, widened, widened_state
+from wearsim.evolution.state import SIGMAS, WearState, fresh_state
 from wearsim.results import (
     DISK,
     Result,
@@ -24,14 +23,12 @@ from wearsim.results import (
     read_results,
     write_results,
 )
-from wearsim.results.run import VARIABLES
 from wearsim.scenario import Scenario, as_scenario, parse_scenario
 from wearsim.studies.plausibility import plausibility_warnings
 from wearsim.studies.preparation import changed_origins, check_plugins, origin_of
 from wearsim.studies.progress import shown_progress
 from wearsim.studies.run.assemble import assemble_problem, start_height
 from wearsim.studies.run.draws import Draws, draw, units_of
-from wearsim.studies.run.grid import strips_of_run
 from wearsim.studies.run.recorder import (
     Checkpointed,
     Event,
@@ -42,6 +39,7 @@ from wearsim.studies.run.recorder import (
     Stepped,
     Warned,
 )
+from wearsim.studies.run.widening import widened_run
 from wearsim.types import Grid
 
 Watcher = Callable[[Event], None]
@@ -156,33 +154,11 @@ def resume(
     if data.finished and scenario.total_passes == done:
         return Result(data, path)
     draws = draw(scenario)
-    data, state = _widened(draws, data, state)
+    data, state = widened_run(draws, data, state)
     with shown_progress(progress, "RunWatcher", on_event, scenario) as watch:
         return _RunInProgress(
             scenario, draws, path, storage, watch, stop_requested, data, state
         ).finish()
-
-
-def _widened(draws: Draws, data: RunData, state: WearState) -> tuple[RunData, WearState]:
-    """Return data and state with additional strips if an extended test needs them.
-
-    The present strips are unchanged, so that nothing is interpolated.
-    """
-    y, spacing = data.static["y"], float(data.checkpoint["spacing"])
-    needed = strips_of_run(draws)
-    lacking = 0.5 * (needed.spacing * needed.strips - spacing * len(y))
-    # a surplus strip costs less than a contact that reaches the edge
-    strips = int(np.ceil(lacking / spacing)) if lacking > 1e-6 * spacing else 0
-    if strips == 0 or draws.scenario.total_passes == data.total_passes:
-        return data, state
-    margin = spacing * np.arange(1, strips + 1)
-    wider = np.concatenate([y[0] - margin[::-1], y, y[-1] + margin])
-    records = {
-        name: widened(array, strips) if VARIABLES[name].dims[-1] == "y" else array
-        for name, array in data.records.items()
-    }
-    data = replace(data, static={**data.static, "y": wider}, records=records)
-    return data, widened_state(state, wider, strips)
 
 
 class _RunInProgress:
