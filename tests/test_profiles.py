@@ -65,8 +65,9 @@ def test_single_row_needs_no_choice(content: bytes) -> None:
         (
             ProfileChoice(),
             (
-                "map: has several rows, got 3 rows, 0 to 4 mm, expected one of row 0,"
-                " mean_rows 0 to 10 or at '1 mm'"
+                "map: has several rows, got 3 rows, 0 to 4 mm, expected one of --row 0,"
+                " --mean-rows 0:10 or --at '1 mm'; in a scenario, profile_row, profile_mean_rows"
+                " or profile_at"
             ),
         ),
         (ProfileChoice(row=1, at=0.0), "map: row and at are given, got 3 rows"),

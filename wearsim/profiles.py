@@ -189,10 +189,13 @@ def _chosen_row(surface: _Surface, file: str, choice: ProfileChoice) -> Profile:
         raise _error(file, "columns and units are for CSV files; a surface has its own units")
     count, across = len(surface.height), surface.across
     rows = f"{count} rows, {1e3 * across[0]:.6g} to {1e3 * across[-1]:.6g} mm"
-    ways = "of row 0, mean_rows 0 to 10 or at '1 mm'"
+    ways = (
+        "--row 0, --mean-rows 0:10 or --at '1 mm'; in a scenario, profile_row, profile_mean_rows"
+        " or profile_at"
+    )
     if count > 1 and len(choice.rows) != 1:
         what = "has several rows" if not choice.rows else f"{' and '.join(choice.rows)} are given"
-        raise _error(file, what, rows, f"one {ways}")
+        raise _error(file, what, rows, f"one of {ways}")
     first, stop = choice.mean_rows or (choice.row or 0, (choice.row or 0) + 1)
     if choice.at is not None:
         first = int(np.abs(across - choice.at).argmin())

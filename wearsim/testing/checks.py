@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import ValidationError
 
-from wearsim.errors import PluginError, WearsimError
+from wearsim.errors import PluginError, WearsimError, described
 from wearsim.plugins import (
     ContactModelSpec,
     LoadSpec,
@@ -213,11 +213,7 @@ class ConfiguredSpec(Generic[S]):
         try:
             return self.spec.options.model_validate(dict(self.raw), context=context)
         except ValidationError as error:
-            mistakes = (
-                f"{'.'.join(map(str, item['loc']))}: {item['msg'].removeprefix('Value error, ')}"
-                for item in error.errors(include_url=False)
-            )
-            raise PluginError(f"{self}: {'; '.join(mistakes)}") from error
+            raise PluginError(f"{self}: {described(error)}") from error
 
     def __str__(self) -> str:
         options = ", ".join(f"{key} = {value!r}" for key, value in self.raw.items())
