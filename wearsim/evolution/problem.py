@@ -209,8 +209,9 @@ class WearProblem:
     @cached_property
     def pauses(self) -> list[FloatArray]:
         """Start and end of the pauses of each realisation, shape (pauses, 2) [passes]."""
-        pauses = [load.pauses * self.kinematics.pass_rate for load in self.loads]
-        return pauses if any(map(len, pauses)) else []
+        pauses = [load.pauses for load in self.loads]
+        rate = self.kinematics.pass_rate
+        return [times * rate for times in pauses] if any(map(len, pauses)) else []
 
     @cached_property
     def greatest_load(self) -> FloatArray:

@@ -19,6 +19,10 @@ Body: TypeAlias = Literal["cylinder", "roller"]
 BODIES: tuple[Body, ...] = ("cylinder", "roller")
 
 
+_NO_TIMES: FloatArray = np.zeros((0, 2))
+_NO_TIMES.flags.writeable = False
+
+
 class WearLaw(ABC):
     """Wear of both bodies as a function of a solved contact."""
 
@@ -70,12 +74,12 @@ class Load(ABC):
         The bodies do not touch in a pause, and nothing wears. Elsewhere a load that falls to zero
         is an error.
         """
-        return np.zeros((0, 2))
+        return _NO_TIMES
 
     @property
     def gaps(self) -> FloatArray:
         """Start and end of gaps in a log, in order, shape (gaps, 2) [s]."""
-        return np.zeros((0, 2))
+        return _NO_TIMES
 
 
 class LoadTerm(ABC):
