@@ -1,8 +1,57 @@
 """Wear of rolling contacts over millions of roller passes.
 
-The public names are imported at their first use, so that importing wearsim is quick.
+Scenarios
+    load_scenario       read a scenario from a TOML file
+    Scenario            all inputs of a run; from_toml, from_dict, changed
+
+One contact
+    solve_contact       solve the contact of the first roller
+    study_contact       the same, with its problem, fields and error estimate
+    dissipation         solve it for many realisations of the random inputs
+
+Wear tests
+    run                 run a wear test from start to end
+    resume              continue or extend a run from its file
+    sweep               run tests or ensembles for several values of one key
+    compare             compare runs and ensembles at their ends
+
+Ensembles
+    ensemble            run a wear test for each realisation of the random inputs
+    resume_ensemble     continue or extend an ensemble from its file
+
+Results
+    open_results        open a results file of any kind
+    Result              of a wear test: depth, profiles, to_dataframe, to_xarray, plot
+    DissipationResult   of a dissipation study: power, summaries
+    EnsembleResult      of an ensemble: estimate, course, band, sensitivity
+
+A scenario is a `Scenario` or the path of its file. All numbers are in SI. Functions that take
+``output`` write a results file, which is replaced only with ``force=True``; without it the result
+is kept in memory. ``progress=True`` shows the progress on a terminal or in a notebook. Errors are
+subclasses of `WearsimError`.
+
+Examples
+--------
+The examples of this package use a file ``rig.toml``, written by ``wearsim new scenario rig.toml``,
+and an ensemble of 16 tests with random friction, ``rig-ensemble.h5``.
+
+>>> import wearsim
+>>> result = wearsim.run("rig.toml", "rig.h5")
+>>> print(f"{result.depth[-1] * 1e6:.1f} um deep, {result.width[-1] * 1e3:.1f} mm wide")
+48.1 um deep, 13.8 mm wide
+>>> wearsim.open_results("rig.h5")
+<Result 'a wear test': 1350000 roller passes, depth 48.1 um>
+>>> random = wearsim.load_scenario(
+...     "rig.toml",
+...     {"friction.coefficient": {"distribution": "uniform", "low": 0.08, "high": 0.12}},
+... )
+>>> tests = wearsim.ensemble(random, 4, "tests.h5", scheduler="serial")
+>>> print(f"{tests.at_end('depth').min() * 1e6:.0f} to {tests.at_end('depth').max() * 1e6:.0f} um")
+... # doctest: +ELLIPSIS
+4... to 5... um
 """
 
+# the public names are imported at their first use, so that importing wearsim is quick
 from __future__ import annotations
 
 from importlib import import_module

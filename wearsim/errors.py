@@ -37,6 +37,14 @@ class WearsimError(Exception):
         The message without remedy.
     at_shell : str
         The message with the remedy at the shell; the text of the exception has that in Python.
+
+    Examples
+    --------
+    >>> try:
+    ...     wearsim.open_results("missing.h5")
+    ... except wearsim.WearsimError as error:
+    ...     print(error)
+    missing.h5: there is no such file
     """
 
     exit_code = 1
@@ -81,6 +89,14 @@ class ScenarioError(WearsimError):
         All mistakes of the file.
     python, shell : str
         As in `WearsimError`.
+
+    Examples
+    --------
+    >>> try:
+    ...     wearsim.load_scenario("rig.toml", {"friction.coefficient": -0.1})
+    ... except wearsim.ScenarioError as error:
+    ...     print(error)
+    rig.toml: [friction] coefficient: is out of range, got -0.1, expected a number above 0
     """
 
     exit_code = 2
@@ -97,19 +113,44 @@ class ScenarioError(WearsimError):
 
 
 class PluginError(WearsimError):
-    """A plugin that is missing or broken, or has the name of another."""
+    """A plugin that is missing or broken, or has the name of another.
+
+    Examples
+    --------
+    >>> issubclass(wearsim.PluginError, wearsim.WearsimError)
+    True
+    """
 
     exit_code = 2
 
 
 class CapabilityError(WearsimError):
-    """A contact model without a required capability."""
+    """A contact model without a required capability.
+
+    Examples
+    --------
+    >>> model = {"contact.model": "hertz", "evolution.stepper": "implicit"}
+    >>> try:
+    ...     wearsim.run(wearsim.load_scenario("rig.toml", model))
+    ... except wearsim.CapabilityError as error:
+    ...     print(error)
+    rig.toml: contact model 'hertz' takes no wear compliance; set evolution.stepper = ...
+    """
 
     exit_code = 2
 
 
 class ResultsFileError(WearsimError):
-    """A results file that cannot be read, or exists and must not be overwritten."""
+    """A results file that cannot be read, or exists and must not be overwritten.
+
+    Examples
+    --------
+    >>> try:
+    ...     wearsim.run("rig.toml", "rig.png")
+    ... except wearsim.ResultsFileError as error:
+    ...     print(error)
+    rig.png: no results file ends in .png; choose another, such as rig.h5 as output
+    """
 
     exit_code = 2
 
@@ -121,6 +162,14 @@ class UnknownNameError(WearsimError, ValueError):
     ----------
     message : str
         As from `unknown_name`.
+
+    Examples
+    --------
+    >>> try:
+    ...     wearsim.run("rig.toml").values("dpth")
+    ... except wearsim.UnknownNameError as error:
+    ...     print(error)
+    'dpth' is not a variable of a run (did you mean 'depth'?); known: y, ...
     """
 
     exit_code = 2
@@ -153,6 +202,15 @@ class SolverError(WearsimError):
         Failure, where it happened, and possible remedies.
     state : dict
         State before the failure: numbers and arrays by name.
+
+    Examples
+    --------
+    >>> few = wearsim.load_scenario("rig.toml", {"evolution.max_steps": 3})
+    >>> try:
+    ...     wearsim.run(few)
+    ... except wearsim.SolverError as error:
+    ...     print(error)
+    3 steps have reached pass ...; raise evolution.max_steps or evolution.tolerance
     """
 
     def __init__(self, message: str, state: dict[str, Any] | None = None) -> None:
@@ -161,11 +219,31 @@ class SolverError(WearsimError):
 
 
 class ContactError(SolverError):
-    """A contact problem without solution, or whose solver did not converge."""
+    """A contact problem without solution, or whose solver did not converge.
+
+    Examples
+    --------
+    >>> narrow = wearsim.load_scenario("rig.toml", {"contact.width": "0.2 mm"})
+    >>> try:
+    ...     wearsim.solve_contact(narrow)
+    ... except wearsim.ContactError as error:
+    ...     print(error)
+    the slender contact ...
+    """
 
 
 class StepError(SolverError):
-    """A step of the evolution that did not converge or would be unstable."""
+    """A step of the evolution that did not converge or would be unstable.
+
+    Examples
+    --------
+    >>> few = wearsim.load_scenario("rig.toml", {"evolution.max_steps": 3})
+    >>> try:
+    ...     wearsim.run(few)
+    ... except wearsim.StepError as error:
+    ...     print(error)
+    3 steps have reached pass ...; raise evolution.max_steps or evolution.tolerance
+    """
 
 
 class WorkerError(WearsimError):
@@ -177,6 +255,11 @@ class WorkerError(WearsimError):
         Failure and possible remedies.
     realisations : sequence of int
         Realisations at which workers crashed.
+
+    Examples
+    --------
+    >>> wearsim.WorkerError("workers end at realisation 3", [3]).realisations
+    (3,)
     """
 
     def __init__(self, message: str, realisations: Sequence[int] = ()) -> None:
@@ -185,6 +268,17 @@ class WorkerError(WearsimError):
 
 
 class Interrupted(WearsimError):  # noqa: N818  (the end of a run, not an error)
-    """A run stopped by the user; its checkpoint holds the state."""
+    """A run stopped by the user; its checkpoint holds the state.
+
+    Examples
+    --------
+    >>> try:
+    ...     wearsim.run("rig.toml", "rig.h5", stop_requested=lambda: True)
+    ... except wearsim.Interrupted as error:
+    ...     print(error)
+    stopped at pass ... of 1350000; continue with wearsim.resume("rig.h5")
+    >>> wearsim.resume("rig.h5").finished
+    True
+    """
 
     exit_code = 130

@@ -93,6 +93,15 @@ class Profile:
     ScenarioError
         If these are not two sequences of as many finite numbers, y does not increase, or the
         numbers cannot be metres.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> y = np.linspace(-8e-3, 8e-3, 101)
+    >>> worn = wearsim.Profile(y, -20e-6 * np.exp(-((y / 3e-3) ** 2)))
+    >>> solution = wearsim.solve_contact("rig.toml", worn)
+    >>> bool(solution.peak_pressure < wearsim.solve_contact("rig.toml").peak_pressure)
+    True
     """
 
     y: FloatArray
@@ -228,6 +237,13 @@ class ContactSolution:
         Mean longitudinal creepage; result of the torque balance if a bearing torque is given.
     iterations : int
         Iterations of the normal problem.
+
+    Examples
+    --------
+    >>> solution = wearsim.solve_contact("rig.toml")
+    >>> spacing = solution.y[1] - solution.y[0]
+    >>> print(f"{solution.line_load.sum() * spacing:.1f} N")
+    300.0 N
     """
 
     y: FloatArray

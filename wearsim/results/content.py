@@ -286,6 +286,12 @@ class StudyResult(Generic[Data]):
         ------
         ModuleNotFoundError
             If xarray is not installed, which is part of the extra ``wearsim[data]``.
+
+        Examples
+        --------
+        >>> dataset = wearsim.run("rig.toml").to_xarray()
+        >>> dataset["cylinder_depth_profile"].dims
+        ('record', 'station', 'realisation', 'y')
         """
         raw: Any = self.raw
         return as_dataset(raw.schema, raw.variables, raw.labels)
@@ -303,6 +309,14 @@ class StudyResult(Generic[Data]):
         -------
         Axes or Figure
             A notebook shows the figure; ``savefig("rig.png")`` writes it.
+
+        Examples
+        --------
+        >>> result = wearsim.run("rig.toml")
+        >>> result.plot().savefig("rig.png")
+        >>> from matplotlib.figure import Figure
+        >>> result.plot(ax=Figure().subplots()).get_xlabel()
+        'y [mm]'
         """
         # by name, since the figures belong to a layer above
         return import_module("wearsim.report.figures.result").plot(self, ax)

@@ -137,7 +137,18 @@ SUMMARISED = ("power", "force_x", "force_y", "spin_moment", "normal_force", "pea
 
 @dataclass(frozen=True, eq=False)
 class DissipationResult(StudyResult[DissipationData]):
-    """Realisations of one contact, finished or not."""
+    """Realisations of one contact, finished or not.
+
+    Examples
+    --------
+    >>> friction = {"distribution": "uniform", "low": 0.08, "high": 0.12}
+    >>> scenario = wearsim.load_scenario("rig.toml", {"friction.coefficient": friction})
+    >>> study = wearsim.dissipation(scenario, 100)
+    >>> study.power.shape, list(study.inputs)
+    ((100,), ['friction.coefficient'])
+    >>> print(f"{study.summaries['power'].std:.4f} W")
+    0.0074 W
+    """
 
     power = Stored("power", "Dissipated power P_d, shape (realisations,) [W].")
     y = Stored("y", "Axial position of the strips [m].")
@@ -165,6 +176,13 @@ class DissipationResult(StudyResult[DissipationData]):
         ------
         UnknownNameError
             If there is none; it lists the known ones.
+
+        Examples
+        --------
+        >>> friction = {"distribution": "uniform", "low": 0.08, "high": 0.12}
+        >>> scenario = wearsim.load_scenario("rig.toml", {"friction.coefficient": friction})
+        >>> wearsim.dissipation(scenario, 10).values("friction.coefficient").shape
+        (10,)
         """
         if name not in self.raw.variables:
             raise unknown_name(name, "a variable of this study", self.raw.variables)
@@ -182,6 +200,14 @@ class DissipationResult(StudyResult[DissipationData]):
         ------
         ModuleNotFoundError
             If pandas is not installed, which is part of the extra ``wearsim[data]``.
+
+        Examples
+        --------
+        >>> friction = {"distribution": "uniform", "low": 0.08, "high": 0.12}
+        >>> scenario = wearsim.load_scenario("rig.toml", {"friction.coefficient": friction})
+        >>> table = wearsim.dissipation(scenario, 10).to_dataframe()
+        >>> table[["friction.coefficient", "power"]].shape
+        (10, 2)
         """
         columns = [
             (name, item.unit, self.values(name))
@@ -217,6 +243,14 @@ class DissipationResult(StudyResult[DissipationData]):
         ----------
         points : int
             Approximate number of points, evenly spaced in the logarithm of the sample size.
+
+        Examples
+        --------
+        >>> friction = {"distribution": "uniform", "low": 0.08, "high": 0.12}
+        >>> scenario = wearsim.load_scenario("rig.toml", {"friction.coefficient": friction})
+        >>> found = wearsim.dissipation(scenario, 100).convergence()
+        >>> int(found.count[-1]), bool(found.mean_error[-1] < found.mean_error[5])
+        (100, True)
         """
         counts = np.geomspace(1, self.count, min(points, self.count)).round()
         return converge(self.power, np.unique(counts.astype(np.int64)))

@@ -28,6 +28,11 @@ def open_results(path: str | Path) -> Result | DissipationResult | EnsembleResul
     ------
     ResultsFileError
         If it is missing, foreign, truncated, damaged, or of another layout.
+
+    Examples
+    --------
+    >>> wearsim.open_results("rig-ensemble.h5")
+    <EnsembleResult 'a wear test': 16 realisations, depth 47.82 um>
     """
     kind = kind_of(path)
     if kind == "run":
@@ -36,10 +41,25 @@ def open_results(path: str | Path) -> Result | DissipationResult | EnsembleResul
 
 
 def open_dissipation(path: str | Path) -> DissipationResult:
-    """Open the file of a dissipation study; see `open_results`."""
+    """Open the file of a dissipation study; see `open_results`.
+
+    Examples
+    --------
+    >>> friction = {"distribution": "uniform", "low": 0.08, "high": 0.12}
+    >>> scenario = wearsim.load_scenario("rig.toml", {"friction.coefficient": friction})
+    >>> study = wearsim.dissipation(scenario, 10, "powers.h5")
+    >>> wearsim.open_dissipation("powers.h5").count
+    10
+    """
     return DissipationResult(read_dissipation(path), Path(path))
 
 
 def open_ensemble(path: str | Path) -> EnsembleResult:
-    """Open the file of an ensemble; see `open_results`."""
+    """Open the file of an ensemble; see `open_results`.
+
+    Examples
+    --------
+    >>> wearsim.open_ensemble("rig-ensemble.h5").plan
+    'sobol'
+    """
     return EnsembleResult(read_ensemble(path), Path(path))

@@ -202,6 +202,16 @@ class Result(StudyResult[RunData]):
     """Result of a run, finished or not.
 
     The axes station, roller and realisation are dropped where their length is one.
+
+    Examples
+    --------
+    >>> result = wearsim.run("rig.toml")
+    >>> result
+    <Result 'a wear test': 1350000 roller passes, depth 48.1 um>
+    >>> result.y.shape == result.profiles[-1].shape  # the groove at the end
+    True
+    >>> f"{result.final['relative_depth_error']:.1%}"
+    '0.0%'
     """
 
     passes = Stored(
@@ -280,6 +290,12 @@ class Result(StudyResult[RunData]):
         ------
         UnknownNameError
             If there is none; it lists the known ones.
+
+        Examples
+        --------
+        >>> result = wearsim.run("rig.toml")
+        >>> print(f"{result.values('half_length').max() * 1e3:.2f} mm")
+        0.14 mm
         """
         if name not in VARIABLES:
             raise unknown_name(name, "a variable of a run", VARIABLES)
@@ -300,6 +316,12 @@ class Result(StudyResult[RunData]):
         ------
         ModuleNotFoundError
             If pandas is not installed, which is part of the extra ``wearsim[data]``.
+
+        Examples
+        --------
+        >>> table = wearsim.run("rig.toml").to_dataframe()
+        >>> table.attrs["units"]["depth"], bool(table["depth"].is_monotonic_increasing)
+        ('m', True)
         """
         columns = [
             (name, item.unit, self.values(name))

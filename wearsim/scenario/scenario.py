@@ -69,6 +69,14 @@ class Scenario:
         The random inputs, in the order of their names.
     drawn : mapping of str to float or tuple of float
         Values that replace random inputs, by dotted key, in SI; a tuple has one value per roller.
+
+    Examples
+    --------
+    >>> scenario = wearsim.load_scenario("rig.toml")
+    >>> scenario
+    <Scenario 'a wear test': 3 rollers, constant load, 1350000 passes, slender>
+    >>> scenario.friction.coefficient, scenario.total_time
+    (0.1, 27000.0)
     """
 
     file: str
@@ -121,6 +129,13 @@ class Scenario:
         ------
         ScenarioError, PluginError
             As `load_scenario`.
+
+        Examples
+        --------
+        >>> from pathlib import Path
+        >>> text = Path("rig.toml").read_text()
+        >>> wearsim.Scenario.from_toml(text, {"operation.rollers": 1}).total_passes
+        450000
         """
         return parse_scenario(text, str(Path(folder) / name), _reader(Path(folder)), overrides)
 
@@ -145,6 +160,22 @@ class Scenario:
         ------
         ScenarioError, PluginError
             As `load_scenario`.
+
+        Examples
+        --------
+        >>> steel = {"radius": "20 mm", "material": "steel"}
+        >>> scenario = wearsim.Scenario.from_dict(
+        ...     {
+        ...         "roller": {**steel, "crown_radius": "500 mm"},
+        ...         "cylinder": steel,
+        ...         "operation": {"speed": "1000 rpm", "rollers": 1},
+        ...         "load": {"kind": "constant", "normal_force": "300 N"},
+        ...         "friction": {"coefficient": 0.1},
+        ...         "creepage": {"longitudinal": 1e-3},
+        ...     }
+        ... )
+        >>> print(f"{wearsim.solve_contact(scenario).power:.3f} W")
+        0.061 W
         """
         return cls.from_toml("", dict(_flat(tables)), folder=folder, name=name)
 
@@ -164,6 +195,12 @@ class Scenario:
         ------
         ScenarioError, PluginError
             As `load_scenario`.
+
+        Examples
+        --------
+        >>> scenario = wearsim.load_scenario("rig.toml").changed({"operation.duration": "30 min"})
+        >>> scenario.total_passes
+        90000
         """
         read = _reader(Path(self.file).parent)
 
@@ -235,6 +272,12 @@ class Scenario:
         ----------
         value : float or tuple of float
             One value for all rollers, or one per roller.
+
+        Examples
+        --------
+        >>> scenario = wearsim.load_scenario("rig.toml")
+        >>> scenario.per_roller(scenario.roller.offset)
+        (0.0, 0.0, 0.0)
         """
         return value if isinstance(value, tuple) else (value,) * self.operation.rollers
 
@@ -297,6 +340,11 @@ def load_scenario(path: str | Path, overrides: Mapping[str, object] | None = Non
         With all mistakes of the scenario.
     PluginError
         If two plugins have the same name.
+
+    Examples
+    --------
+    >>> wearsim.load_scenario("rig.toml", {"load.normal_force": "350 N", "operation.rollers": 1})
+    <Scenario 'a wear test': 1 roller, constant load, 450000 passes, slender>
     """
     if "\n" in str(path):
         what = "is a text, not the name of a file; Scenario.from_toml reads it"

@@ -31,7 +31,17 @@ PROBABILITIES = (0.025, 0.05, 0.5, 0.95, 0.975)
 
 @dataclass(frozen=True, eq=False)
 class EnsembleResult(StudyResult[EnsembleData]):
-    """Result of an ensemble of wear tests, from its successful realisations."""
+    """Result of an ensemble of wear tests, from its successful realisations.
+
+    Examples
+    --------
+    >>> tests = wearsim.open_results("rig-ensemble.h5")
+    >>> tests.count, list(tests.inputs)
+    (16, ['friction.coefficient'])
+    >>> depth = tests.estimate("depth").mean
+    >>> print(f"{depth.value * 1e6:.0f} um, 95 % interval from {depth.low * 1e6:.0f} um")
+    48 um, 95 % interval from 47 um
+    """
 
     def __repr__(self) -> str:
         done = f"{self.count}" if self.finished else f"{self.count} of {self.requested}"
@@ -109,6 +119,12 @@ class EnsembleResult(StudyResult[EnsembleData]):
         ------
         UnknownNameError
             If there is no such variable; it lists the known ones.
+
+        Examples
+        --------
+        >>> tests = wearsim.open_results("rig-ensemble.h5")
+        >>> tests.values("depth").shape == (16, len(tests.record_passes))
+        True
         """
         return np.asarray(self.raw.rows(name, 0, None)[self.numbers])
 
@@ -116,6 +132,12 @@ class EnsembleResult(StudyResult[EnsembleData]):
         """Return all variables of the results file as a dataset of xarray.
 
         As for other results, but of the successful realisations only.
+
+        Examples
+        --------
+        >>> tests = wearsim.open_results("rig-ensemble.h5")
+        >>> tests.to_xarray().sizes["realisation"]
+        16
         """
         kept = np.flatnonzero(self.raw.status[: self.kept] == DONE)
         return super().to_xarray().isel(realisation=self.numbers, kept=kept)
@@ -133,6 +155,13 @@ class EnsembleResult(StudyResult[EnsembleData]):
         ------
         ModuleNotFoundError
             If pandas is not installed, which is part of the extra ``wearsim[data]``.
+
+        Examples
+        --------
+        >>> tests = wearsim.open_results("rig-ensemble.h5")
+        >>> table = tests.to_dataframe()
+        >>> bool(table["friction.coefficient"].corr(table["depth"]) > 0.99)
+        True
         """
         columns = [
             (name, item.unit, self.at_end(name) if name in OBSERVABLES else self.values(name))
@@ -148,6 +177,12 @@ class EnsembleResult(StudyResult[EnsembleData]):
         ------
         UnknownNameError
             If there is no such observable; it lists the known ones.
+
+        Examples
+        --------
+        >>> tests = wearsim.open_results("rig-ensemble.h5")
+        >>> print(f"{tests.at_end('depth').max() * 1e6:.0f} um")
+        54 um
         """
         if name not in OBSERVABLES:
             raise unknown_name(name, "an observable", OBSERVABLES)
@@ -169,6 +204,13 @@ class EnsembleResult(StudyResult[EnsembleData]):
         -------
         numbers : ndarray of int, shape (draws,)
         values : ndarray, shape (draws,)
+
+        Examples
+        --------
+        >>> tests = wearsim.open_results("rig-ensemble.h5")
+        >>> numbers, values = tests.independent("depth")
+        >>> numbers.shape == values.shape == (16,)
+        True
         """
         chosen = self._independent
         return self.numbers[chosen], self.at_end(name, record)[chosen]
@@ -198,6 +240,13 @@ class EnsembleResult(StudyResult[EnsembleData]):
         Returns
         -------
         Estimate
+
+        Examples
+        --------
+        >>> tests = wearsim.open_results("rig-ensemble.h5")
+        >>> median = tests.estimate("depth", probabilities=(0.5,)).quantile(0.5)
+        >>> bool(median.low < median.value < median.high)
+        True
         """
         return self._estimate(self.independent(name, record)[1], probabilities)
 
@@ -227,11 +276,27 @@ class EnsembleResult(StudyResult[EnsembleData]):
         return Control(self.values("control"), known["mean"], mean_error)
 
     def estimate_for(self, target: Target) -> Estimate:
-        """Return the estimate to which a target applies."""
+        """Return the estimate to which a target applies.
+
+        Examples
+        --------
+        >>> tests = wearsim.open_results("rig-ensemble.h5")
+        >>> from wearsim.uq.estimation.estimates import Target
+        >>> target = Target.parse("depth.mean 1%")
+        >>> tests.estimate_for(target).mean == tests.estimate("depth").mean
+        True
+        """
         return self.estimate(target.observable, probabilities=target.probabilities)
 
     def final_estimates(self) -> dict[str, Any]:
-        """Return the estimates at the end of the test by observable, as plain values."""
+        """Return the estimates at the end of the test by observable, as plain values.
+
+        Examples
+        --------
+        >>> tests = wearsim.open_results("rig-ensemble.h5")
+        >>> tests.final_estimates()["depth"]["count"]
+        16
+        """
         return {name: asdict(self.estimate(name)) for name in self.observables if self.count}
 
     @cached_property
@@ -253,6 +318,13 @@ class EnsembleResult(StudyResult[EnsembleData]):
         -------
         Course
             Mean with its interval, standard deviation, and the quantiles `QUANTILES` [SI].
+
+        Examples
+        --------
+        >>> tests = wearsim.open_results("rig-ensemble.h5")
+        >>> course = tests.course("depth")
+        >>> course.mean.shape == course.passes.shape
+        True
         """
         found = [self._estimate(values, QUANTILES) for values in self._by_record(name)]
         return Course(
@@ -286,7 +358,15 @@ class EnsembleResult(StudyResult[EnsembleData]):
         return np.asarray(kept[self.raw.status[: len(kept)] == DONE])
 
     def band(self) -> Band:
-        """Return mean and 95 % band of the worn profiles at the end."""
+        """Return mean and 95 % band of the worn profiles at the end.
+
+        Examples
+        --------
+        >>> tests = wearsim.open_results("rig-ensemble.h5")
+        >>> band = tests.band()
+        >>> band.kept, bool((band.low <= band.high).all())
+        (16, True)
+        """
         kept, unknown = self.profiles, np.full_like(self.y, np.nan)
         if len(kept) == 0:
             return Band(self.y, unknown, unknown, unknown, unknown, 0)
@@ -306,6 +386,13 @@ class EnsembleResult(StudyResult[EnsembleData]):
         -------
         list of Effect
             Yaw and tilt of one misalignment are one input.
+
+        Examples
+        --------
+        >>> tests = wearsim.open_results("rig-ensemble.h5")
+        >>> effects = tests.sensitivity("depth")
+        >>> effects[0].name
+        'friction.coefficient'
         """
         from wearsim.uq.sensitivity.sobol_indices import without_effect  # noqa: PLC0415  (rarely needed)
 
@@ -337,7 +424,14 @@ class EnsembleResult(StudyResult[EnsembleData]):
         }
 
     def statistics(self) -> dict[str, FloatArray]:
-        """Return the variables of the file that are estimates, by name."""
+        """Return the variables of the file that are estimates, by name.
+
+        Examples
+        --------
+        >>> tests = wearsim.open_results("rig-ensemble.h5")
+        >>> sorted(tests.statistics())[:2]
+        ['depth_mean', 'depth_profile_high']
+        """
         found: dict[str, FloatArray] = {}
         for name in self.observables:
             course = self.course(name)
@@ -348,5 +442,12 @@ class EnsembleResult(StudyResult[EnsembleData]):
         return found | {f"depth_profile_{part}": getattr(band, part) for part in parts}
 
     def is_constant(self, name: str) -> bool:
-        """Return whether an observable is equal in all realisations, within rounding."""
+        """Return whether an observable is equal in all realisations, within rounding.
+
+        Examples
+        --------
+        >>> tests = wearsim.open_results("rig-ensemble.h5")
+        >>> tests.is_constant("depth"), tests.is_constant("normal_force")
+        (False, True)
+        """
         return bool(self.count) and summarise(self.at_end(name)).is_constant

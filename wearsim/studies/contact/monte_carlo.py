@@ -79,6 +79,13 @@ def dissipation(
         If a realisation has no solution, with its number; those before it are in the file.
     Interrupted
         If it was stopped; the file holds the completed realisations, marked as unfinished.
+
+    Examples
+    --------
+    >>> friction = {"distribution": "uniform", "low": 0.08, "high": 0.12}
+    >>> scenario = wearsim.load_scenario("rig.toml", {"friction.coefficient": friction})
+    >>> wearsim.dissipation(scenario, 100)
+    <DissipationResult 'a wear test': 100 realisations, power 0.07657 W, std 0.007357 W>
     """
     scenario = as_scenario(scenario)
     realisations = checked_count(scenario, realisations)

@@ -55,6 +55,12 @@ class ContactStudy:
         Notes for the user.
     warnings : tuple of str
         Warnings of implausible inputs, and of a peak pressure that depends on the strips.
+
+    Examples
+    --------
+    >>> study = wearsim.study_contact("rig.toml")
+    >>> study.model, study.grid.strips == len(study.solution.y)
+    ('slender', True)
     """
 
     solution: ContactSolution
@@ -100,6 +106,14 @@ def study_contact(
         If the contact has no solution.
     CapabilityError
         If the model does not support the scenario.
+
+    Examples
+    --------
+    >>> study = wearsim.study_contact("rig.toml", with_fields=True, with_error=True)
+    >>> print(f"{study.solution.power:.4f} W within {study.grid_error:.2%}")
+    0.0772 W within 0.0...%
+    >>> study.fields.pressure.shape[1] == study.grid.strips
+    True
     """
     scenario = as_scenario(scenario)
     if profile is not None:
@@ -187,5 +201,12 @@ def _grid_dependence(
 def solve_contact(
     scenario: Scenario | str | Path, profile: Profile | None = None
 ) -> ContactSolution:
-    """Solve the contact of the scenario's first roller; see `study_contact`."""
+    """Solve the contact of the scenario's first roller; see `study_contact`.
+
+    Examples
+    --------
+    >>> solution = wearsim.solve_contact("rig.toml")
+    >>> print(f"{solution.peak_pressure / 1e6:.0f} MPa")
+    680 MPa
+    """
     return study_contact(scenario, profile).solution

@@ -115,6 +115,14 @@ def ensemble(
         If workers fail repeatedly.
     Interrupted
         If it was stopped; `resume_ensemble` continues from the file.
+
+    Examples
+    --------
+    >>> friction = {"distribution": "uniform", "low": 0.08, "high": 0.12}
+    >>> scenario = wearsim.load_scenario("rig.toml", {"friction.coefficient": friction})
+    >>> tests = wearsim.ensemble(scenario, 8, "tests.h5", scheduler="serial")
+    >>> tests.count
+    8
     """
     scenario = as_scenario(scenario)
     request = checked_request(scenario, realisations, plan, until)
@@ -237,6 +245,11 @@ def resume_ensemble(
         If the size of the plan is fixed, so that it cannot be extended.
     WorkerError, Interrupted
         As in `ensemble`.
+
+    Examples
+    --------
+    >>> wearsim.resume_ensemble("rig-ensemble.h5", realisations=20, scheduler="serial").count
+    20
     """
     path = Path(file)
     data = read_ensemble(path)

@@ -121,6 +121,13 @@ def compare(
         If one lacks the observable; it lists the known ones.
     ValueError
         If there are fewer than two results, or one has no realisations.
+
+    Examples
+    --------
+    >>> results = wearsim.sweep("rig.toml", "friction.coefficient", [0.1, 0.2])
+    >>> comparison = wearsim.compare(results, ["mild", "severe"])
+    >>> print(f"{comparison.rows[1].difference.value * 1e6:.1f} um deeper")
+    27.6 um deeper
     """
     if len(results) < 2:
         raise ValueError("there must be two or more to compare")

@@ -67,6 +67,12 @@ def sweep(
         As in `run` or `ensemble`; those known from the arguments before the first one runs.
     Interrupted
         If it was stopped, with the values that are left.
+
+    Examples
+    --------
+    >>> results = wearsim.sweep("rig.toml", "load.normal_force", ["250 N", "300 N"])
+    >>> [f"{result.depth[-1] * 1e6:.1f} um" for result in results]
+    ['42.6 um', '48.1 um']
     """
     base, names = as_scenario(scenario), [str(value) for value in values]
     if not names:

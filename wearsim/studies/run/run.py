@@ -86,6 +86,13 @@ def run(
         If it fails; the file then holds everything up to the last accepted step.
     Interrupted
         If it was stopped; `resume` continues from the file.
+
+    Examples
+    --------
+    >>> result = wearsim.run("rig.toml")
+    >>> print(f"{result.depth[-1] * 1e6:.1f} um")
+    48.1 um
+    >>> kept = wearsim.run("rig.toml", "rig.h5")  # writes the file as well
     """
     scenario = as_scenario(scenario)
     path = Path(output) if output is not None else None
@@ -128,6 +135,13 @@ def resume(
         already past `until`.
     SolverError, Interrupted
         As in `run`.
+
+    Examples
+    --------
+    >>> result = wearsim.run("rig.toml", "rig.h5")
+    >>> longer = wearsim.resume("rig.h5", until=500 * 60)
+    >>> print(f"{longer.time[-1] / 60:.0f} min")
+    500 min
     """
     path = Path(file)
     if kind_of(path) == "ensemble":
