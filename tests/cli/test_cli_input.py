@@ -53,7 +53,7 @@ def test_check_describes_random_inputs(command: Command, scenario: Path) -> None
     )
     rows = " ".join(result.stdout.split())
     assert "random load.normal_force maxent, mean 307 N, std 30 N, on [0, inf), per-test" in rows
-    assert "per-test; 90 % in 257." in rows
+    assert "per-test; 90 % range 257." in rows
     assert "load constant, 3" not in rows
     assert "creepage longitudinal 0.001 random" in rows
     assert "random creepage.misalignment disc, yaw up to 2 mrad, tilt up to 2 mrad" in rows
@@ -87,6 +87,12 @@ def test_check_shows_profile_and_log(command: Command, scenario: Path) -> None:
     assert data["log"]["span_s"] == [0.0, 300.0]
     assert data["test"]["passes"] == 6000
     assert data["warnings"][0].startswith("log.csv: has a gap")
+
+
+def test_check_shows_offsets_of_rollers(command: Command) -> None:
+    result = command("check", SCENARIOS / "rig-three-rollers.toml")
+    rows = " ".join(result.stdout.split())
+    assert "crown radius 500 mm, offset -1 / 0.3 / 1 mm cylinder" in rows
 
 
 def test_check_writes_random_inputs_as_json(command: Command, scenario: Path) -> None:

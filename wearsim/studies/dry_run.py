@@ -61,7 +61,11 @@ def dry_run(scenario: Scenario) -> Data:
     data: Data = {
         "title": scenario.title,
         "file": scenario.file,
-        "roller": {"radius_m": roller.radius, "crown_radius_m": roller.crown_radius},
+        "roller": {
+            "radius_m": roller.radius,
+            "crown_radius_m": roller.crown_radius,
+            "offset_m": None if "roller.offset" in random else scenario.per_roller(roller.offset),
+        },
         "cylinder": {"radius_m": cylinder.radius},
         "profile": _profile(scenario),
         "contact_modulus_Pa": pair.contact_modulus,
@@ -195,6 +199,8 @@ def plan(data: Data) -> TableRows:
         f"radius {roller['radius_m'] * 1e3:.6g} mm,"
         f" crown radius {roller['crown_radius_m'] * 1e3:.6g} mm"
     )
+    if any(roller["offset_m"] or ()):
+        radii += ", offset " + " / ".join(f"{y * 1e3:.4g}" for y in roller["offset_m"]) + " mm"
     moduli = (
         f"contact modulus {data['contact_modulus_Pa'] / 1e9:.4g} GPa,"
         f" shear modulus {data['shear_modulus_Pa'] / 1e9:.4g} GPa"
@@ -290,7 +296,7 @@ def _random_rows(data: Data) -> TableRows:
             for value in item["values"]
         ]
         rows.append(
-            (f"random {item['name']}", f"{item['description']}; 90 % in {', '.join(ranges)}")
+            (f"random {item['name']}", f"{item['description']}; 90 % range {', '.join(ranges)}")
         )
     table = data["sampling"]
     if table is None:
