@@ -45,6 +45,8 @@ def test_run_is_exported_in_engineering_units(tmp_path: Path) -> None:
         "normal_force [N]",
         "peak_pressure [MPa]",
         "approach [um]",
+        "descent [um]",
+        "elastic_approach [um]",
         "longitudinal_creepage",
         "adhesion_fraction",
         "depth_error [um]",

@@ -55,15 +55,17 @@ def test_ensemble_of_this_layout_opens(name):
             assert data.variables[variable][number].tobytes() == np.asarray(value).tobytes()
 
 
-@pytest.mark.parametrize("name", ["run", "dissipation", "ensemble"])
-def test_file_of_an_earlier_layout_is_refused_with_a_remedy(name):
-    path = FOLDER / f"{name}-1.h5"
+@pytest.mark.parametrize(
+    ("name", "layout"), [("run", 1), ("run", 2), ("dissipation", 1), ("ensemble", 1)]
+)
+def test_file_of_an_earlier_layout_is_refused_with_a_remedy(name, layout):
+    path = FOLDER / f"{name}-{layout}.h5"
     assert kind_of(path) == name
     with pytest.raises(ResultsFileError) as caught:
         READERS[name](path)
     assert str(caught.value) == (
-        f"{path}: has layout 1 of wearsim-{name}, and this wearsim reads layout {LAYOUTS[name]};"
-        " repeat the computation, or read it with the version of wearsim that wrote it"
+        f"{path}: has layout {layout} of wearsim-{name}, and this wearsim reads layout"
+        f" {LAYOUTS[name]}; repeat the computation, or read it with the version of wearsim that wrote it"
     )
 
 

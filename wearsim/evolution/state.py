@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wearsim.contact_batch import ContactBatch, ContactBatchSolution
+from wearsim.errors import CapabilityError
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import is_every
 from wearsim.types import FloatArray, IntArray
@@ -114,6 +115,7 @@ _AXES = {
     "loop_strips": 3,
     "loop_contacts": 3,
     "decay": 0,
+    "fresh_approach": 2,
 }
 
 
@@ -167,6 +169,8 @@ class WearState:
         The coarse-step solution with half the quadrature nodes per roller.
     decay : ndarray, shape (realisations,), optional
         Greatest decay rate of a profile by wear, last measurement [1/pass].
+    fresh_approach : ndarray, shape (stations, rollers, realisations), optional
+        Elastic approach of each roller at the start of the test [m], where a load has a spring.
     """
 
     passes: FloatArray
@@ -189,6 +193,7 @@ class WearState:
     coarse_step_solution: WearState | None = None
     half_quadrature_solution: WearState | None = None
     decay: FloatArray | None = None
+    fresh_approach: FloatArray | None = None
 
     @property
     def depths(self) -> Depths:
@@ -326,13 +331,13 @@ def fresh_state(problem: WearProblem) -> WearState:
     stations, contacts, realisations = problem.shape
     zeros, counts = np.zeros(realisations), np.zeros(realisations, dtype=np.int64)
     problem = problem.at_time(zeros, zeros)
-    n = problem.grid.strips
+    n, solved = problem.grid.strips, problem.model.solve(unworn_contacts(problem))
     return WearState(
         passes=zeros,
         cylinder_depth=np.zeros((stations, 1, realisations, n)),
         roller_depth=np.zeros((1, problem.rollers, realisations, n)),
         terms=np.zeros((len(problem.terms), problem.rollers, realisations)),
-        contacts=problem.model.solve(unworn_contacts(problem)),
+        contacts=solved,
         energy=zeros,
         depth_error=zeros,
         volume_error=zeros,
@@ -343,4 +348,26 @@ def fresh_state(problem: WearProblem) -> WearState:
         rejected=counts,
         solves=counts + stations * contacts,
         full_solves=counts,
+        fresh_approach=_fresh_approach(problem, solved) if problem.has_spring else None,
     )
+
+
+def _fresh_approach(problem: WearProblem, contacts: ContactBatchSolution) -> FloatArray:
+    """Return the elastic approach of each roller on unworn bodies, shape (S, R, N) [m].
+
+    A test that starts in a pause has that under its greatest load.
+    """
+    if problem.pauses:
+        force = problem.force(np.zeros(len(problem.loads)))
+        force = np.where(force > 0.0, force, problem.greatest_load)
+        loads = np.broadcast_to(force + problem.inputs.normal_force_offset, problem.shape)
+        batch = replace(unworn_contacts(problem), normal_force=loads.ravel())
+        contacts = problem.model.solve(batch, warm=contacts)
+    approach = problem.values_of(contacts, "approach") - problem.nominal_gap.min(axis=-1)
+    if not np.isfinite(approach).all():
+        raise CapabilityError(
+            f"{type(problem.model).__name__} returns an approach that is not finite, and a load"
+            " with a stiffness depends on it; choose another contact.model, or a load without"
+            " stiffness"
+        )
+    return problem.per_roller(approach)

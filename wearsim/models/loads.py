@@ -33,7 +33,7 @@ class SpringOptions(ConstantOptions):
     """Options of the load `spring`."""
 
     stiffness: NonNegativeStiffness = Field(
-        description="decrease of the load per worn depth, e.g. '690 N/mm'"
+        description="decrease of the load per displacement of the roller, e.g. '690 N/mm'"
     )
 
 
@@ -47,7 +47,9 @@ class RecordedOptions(Options):
         " last value before it, or a straight line across it",
     )
     stiffness: NonNegativeStiffness = Field(
-        0.0, description="decrease of the load per worn depth, if the log does not include it"
+        0.0,
+        description="decrease of the load per displacement of the roller, if the log does not"
+        " include it",
     )
 
 
@@ -195,7 +197,8 @@ SPECS = (
         name="spring",
         factory=ConstantLoad,
         options=SpringOptions,
-        summary="a preload that decreases with worn depth by the stiffness of the mounting spring",
+        summary="a preload that decreases by the stiffness of the mounting spring as the roller"
+        " descends",
         references=_PAPER,
         protocol=2,
     ),

@@ -72,7 +72,11 @@ class PassLoop:
     friction, tilt, spin : ndarray, shape (passes,)
         Friction coefficient, tilt of the roller that shifts the contact [rad], spin [1/m].
     stiffness : float
-        Load lost per displacement of a roller towards the cylinder [N/m].
+        Load lost per displacement of a roller towards the cylinder [N/m]. The load and the contact
+        of a pass are solved together: the displacement is the approach of the pass, less the least
+        gap of the unworn bodies, less `fresh_approach`.
+    fresh_approach : ndarray, shape (contacts,)
+        Elastic approach at which a roller on unworn bodies is not displaced [m].
     nominal_gap, from_apex : ndarray, shape (contacts, strips)
         Gap before wear and axial distance from the roller's apex [m].
     longitudinal_curvature, rolling_speed : ndarray, shape (contacts,)
@@ -97,7 +101,8 @@ class PassLoop:
         *State*: line load after the last pass; line load [N/m] and gap [m] at which the current
         factorisation was computed, zero if there is none.
     approach, anchor_approach : ndarray, shape (contacts,)
-        *State*: approach after the last pass, and at the current factorisation [m].
+        *State*: approach after the last pass, before the first one that of fresh bodies if there is
+        a stiffness; approach at the current factorisation [m].
     energy : ndarray, shape (contacts,)
         *State*: dissipated power summed over the passes [W].
     rests : bool
@@ -112,6 +117,7 @@ class PassLoop:
     tilt: FloatArray
     spin: FloatArray
     stiffness: float
+    fresh_approach: FloatArray
     nominal_gap: FloatArray
     from_apex: FloatArray
     longitudinal_curvature: FloatArray

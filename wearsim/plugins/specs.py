@@ -40,7 +40,8 @@ class WearLaw(ABC):
 class Load(ABC):
     """Load on a roller as a function of time, before any feedback.
 
-    `stiffness` [N/m] is the decrease of the load per displacement of the roller into worn material.
+    `stiffness` [N/m] is the decrease of the load per displacement of the roller: its worn descent,
+    less the fall of the elastic approach since the start of the test.
     """
 
     stiffness: float = 0.0

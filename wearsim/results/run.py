@@ -92,6 +92,10 @@ VARIABLES: Mapping[str, Variable] = by_name(
         Variable("normal_force", _ROLLER, "N", "normal force of a roller", "history"),
         Variable("peak_pressure", _ROLLER, "Pa", "greatest normal pressure", "history"),
         Variable("approach", _ROLLER, "m", "approach of the bodies", "history"),
+        Variable("descent", _ROLLER, "m", "worn descent of a roller", "history"),
+        Variable(
+            "elastic_approach", _ROLLER, "m", "elastic part of the approach of a roller", "history"
+        ),
         Variable("longitudinal_creepage", _ROLLER, "1", "mean longitudinal creepage", "history"),
         Variable(
             "adhesion_fraction", _ROLLER, "1", "part of the contact area that adheres", "history"
@@ -131,7 +135,7 @@ VARIABLES: Mapping[str, Variable] = by_name(
     )
 )
 
-RUN = Schema("wearsim-run", 2, "a wear test, from `wearsim run`", AXES, VARIABLES)
+RUN = Schema("wearsim-run", 3, "a wear test, from `wearsim run`", AXES, VARIABLES)
 
 
 _ARRAYS = ("static", "history", "records", "checkpoint")
@@ -237,6 +241,10 @@ class Result(StudyResult[RunData]):
     normal_force = Stored("normal_force", "Normal force of each roller after each step [N].")
     peak_pressure = Stored(
         "peak_pressure", "Greatest normal pressure of each roller after each step [Pa]."
+    )
+    descent = Stored("descent", "Worn descent of each roller since the start, after each step [m].")
+    elastic_approach = Stored(
+        "elastic_approach", "Elastic approach of each roller and the cylinder after each step [m]."
     )
     longitudinal_creepage = Stored(
         "longitudinal_creepage", "Mean longitudinal creepage of each roller after each step."
@@ -371,7 +379,10 @@ class Result(StudyResult[RunData]):
         realisations each value is a list. A relative error is 0 if nothing is worn.
         """
         last = {name: array[-1] for name, array in self.raw.history.items()}
-        per_roller = ("roller_depth", "roller_worn_volume", "normal_force", "peak_pressure")
+        per_roller = (
+            *("roller_depth", "roller_worn_volume", "normal_force", "peak_pressure"),
+            *("descent", "elastic_approach"),
+        )
         last.update({name: last[name].max(axis=0) for name in per_roller})
         # the estimated errors apply to the deeper body and to the volume of both bodies
         deepest = np.maximum(last["depth"], last["roller_depth"])
@@ -394,6 +405,8 @@ class Result(StudyResult[RunData]):
             "power_W": _number(last["power"]),
             "normal_force_N": _number(last["normal_force"]),
             "peak_pressure_Pa": _number(last["peak_pressure"]),
+            "descent_m": _number(last["descent"]),
+            "elastic_approach_m": _number(last["elastic_approach"]),
             "depth_error_m": _number(last["depth_error"]),
             "volume_error_m3": _number(last["volume_error"]),
             "relative_depth_error": _number(_relative(last["depth_error"], deepest)),

@@ -17,6 +17,7 @@ from wearsim.types import ContactSolution, Creepage, FloatArray, OperatingPoint
 CAPABILITIES: Checks[ContactFixture] = Checks()
 _CAPABILITIES = "wearsim.plugins.Capabilities"
 _PASSES = 12
+_LOAD_ITERATIONS = 10  # each divides the change of a spring force by ten or more
 
 
 def _is_refused(fixture: ContactFixture, capability: str, call: Callable[[], Any]) -> bool:
@@ -283,6 +284,8 @@ def _pass_loop(fixture: ContactFixture) -> PassLoop:
     """Return two alternating rollers with a spring, a lagging term, tilt and spin."""
     case, y, shape = fixture.case, fixture.grid.y, (2, fixture.grid.strips)
     overlap = fixture.solution.approach - float(fixture.gap.min())
+    gaps = np.array([fixture.gaps["fresh"], fixture.gaps["off centre"]])
+    fresh = np.array([1.0, 0.9]) * overlap
     # the largest wear of a pass is 1e-4 of the approach
     factor = 1e-4 * overlap * case.rolling_speed / float(fixture.solution.dissipation.max())
     ramp = np.linspace(-1.0, 1.0, _PASSES)
@@ -295,7 +298,8 @@ def _pass_loop(fixture: ContactFixture) -> PassLoop:
         tilt=1e-5 * ramp,
         spin=0.05 * ramp,
         stiffness=0.1 * case.normal_force / overlap,
-        nominal_gap=np.array([fixture.gaps["fresh"], fixture.gaps["off centre"]]),
+        fresh_approach=fresh,
+        nominal_gap=gaps,
         from_apex=np.array([y, y - 0.05 * case.width]),
         longitudinal_curvature=case.curvature * np.array([1.0, 1.1]),
         rolling_speed=case.rolling_speed * np.array([1.0, 0.9]),
@@ -311,7 +315,7 @@ def _pass_loop(fixture: ContactFixture) -> PassLoop:
         line_load=np.zeros(shape),
         anchor=np.zeros(shape),
         anchor_gap=np.zeros(shape),
-        approach=np.zeros(2),
+        approach=gaps.min(axis=1) + fresh,
         anchor_approach=np.zeros(2),
         energy=np.zeros(2),
     )
@@ -323,16 +327,19 @@ def _run_single_solves(fixture: ContactFixture, loop: PassLoop) -> None:
         g = int(loop.order[(loop.first_pass + p) % len(loop.order)])
         unworn = loop.nominal_gap[g] + loop.tilt[p] * loop.from_apex[g]
         gap = unworn + loop.cylinder_depth + loop.roller_depth[g]
-        descent = float(gap.min() - unworn.min())
-        load = float(loop.base_load[p] + loop.terms[:, g].sum() - loop.stiffness * descent)
         longitudinal, lateral = loop.creepage[p].tolist()
         point = fixture.point(
             Creepage(longitudinal, lateral, float(loop.spin[p])),
-            normal_force=load,
             friction=float(loop.friction[p]),
         )
         point = replace(point, rolling_speed=float(loop.rolling_speed[g]))
-        solution = fixture.model.solve_one(gap, float(loop.longitudinal_curvature[g]), point)
+        approach = float(gap.min() + loop.fresh_approach[g])
+        for _ in range(_LOAD_ITERATIONS):
+            displacement = approach - float(unworn.min() + loop.fresh_approach[g])
+            load = loop.base_load[p] + loop.terms[:, g].sum() - loop.stiffness * displacement
+            point = replace(point, normal_force=float(load))
+            solution = fixture.model.solve_one(gap, float(loop.longitudinal_curvature[g]), point)
+            approach = solution.approach
         energy_per_area = solution.dissipation / point.rolling_speed
         loop.cylinder_depth += loop.wear[0] * energy_per_area
         loop.roller_depth[g] += loop.wear[1 + g] * energy_per_area

@@ -47,6 +47,8 @@ def end_state(result: Result) -> Rows:
         ("dissipated power", _by_roller(result.power[-1], "W")),
         ("normal force", _by_roller(result.normal_force[-1], "N")),
         ("peak pressure", _by_roller(result.peak_pressure[-1], "MPa")),
+        ("worn descent", _by_roller(result.descent[-1], "um")),
+        ("elastic approach", _by_roller(result.elastic_approach[-1], "um")),
     ]
     if result.stepper == "per-pass":
         return [*rows, ("error of depth", "no stepping error: every roller pass is solved")]

@@ -20,8 +20,11 @@ from wearsim.evolution.steppers.base import Attempt, Step, Stepper
 from wearsim.evolution.steppers.single_step import (
     WearIncrement,
     carried_loads,
+    checked_loads,
     contacts_at,
+    displacement_at,
     elastic_approach,
+    elastic_approaches,
     explicit_step,
     mean_loads,
     present_problem,
@@ -189,7 +192,11 @@ def _errors(problem: WearProblem, start: WearState, end: WearState, step: FloatA
     """
     # processes at their means over the step, as in the step
     here = problem.at_time(problem.time(start.passes), problem.time(start.passes + step))
-    loads = mean_loads(here, start, step, (start.depths, end.depths), end.contacts)
+    elastic = None
+    if problem.has_spring:
+        elastic = elastic_approaches(present_problem(problem, end), end)
+    displacement = displacement_at(here, start, (start.depths, end.depths), elastic)
+    loads = checked_loads(start, mean_loads(here, start, step, displacement, end.contacts))
     solve = solve_present if problem.varying else contacts_at
     wear = WearIncrement(here, solve(here, end, loads), step)
     errors = COVER * 0.5 * state_difference(problem, end, start.with_added(wear.depths))

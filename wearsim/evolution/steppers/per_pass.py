@@ -9,16 +9,22 @@ from functools import partial
 import numpy as np
 
 from wearsim.contact_batch import ContactBatchSolution
+from wearsim.errors import StepError
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import Redraw
 from wearsim.evolution.state import WearState, contact_batch, joined_states
 from wearsim.evolution.steppers.base import Attempt, Step, Stepper
-from wearsim.evolution.steppers.single_step import present_loads, solve_present
+from wearsim.evolution.steppers.single_step import (
+    APPROACH_EXPONENT,
+    MAX_LOAD_ITERATIONS,
+    solve_at_record,
+)
 from wearsim.plugins import BODIES, PassLoop
-from wearsim.types import FloatArray, IntArray
+from wearsim.types import ContactSolution, FloatArray, IntArray, OperatingPoint
 
 CHUNK = 20_000  # passes between checks for records, progress and interruption
 SLOW_CHUNK = 200  # the same where the loop is not compiled
+LOAD_TOLERANCE = 1e-6  # relative change of the load of a spring by the approach it causes
 
 
 class PerPassStepper(Stepper):
@@ -62,7 +68,8 @@ class PerPassStepper(Stepper):
         end = scheme(problem, state, step)
         if is_compiled(problem):
             # for output only: the compiled loop continues from its own memory
-            end = end.replaced(contacts=solve_present(problem, end, present_loads(problem, end)))
+            contacts, _ = solve_at_record(problem, end, on_profile=False)
+            end = end.replaced(contacts=contacts)
         return Attempt((end,), np.zeros(step.shape))
 
 
@@ -160,6 +167,11 @@ def run_compiled(
     )
     line_load, anchor, anchor_gap = loop_strips.reshape(3, rollers, strips)
     approach, anchor_approach, energy = loop_contacts.reshape(3, rollers)
+    fresh = np.zeros(rollers)
+    if state.fresh_approach is not None:
+        fresh = state.fresh_approach[0, :, 0].copy()
+        if state.loop_contacts is None:
+            approach[:] = fresh + problem.nominal_gap.min(axis=-1)[0, :, 0]
     slip_base, spin_arm, slip_rates = _slip_base(problem)
     kinematics, speed = problem.kinematics, problem.kinematics.rolling_speed
     (load,), (law,) = problem.loads, problem.laws
@@ -176,6 +188,7 @@ def run_compiled(
         tilt=inputs.tilt.ravel() * (1.0 if problem.tilt_shifts else 0.0),
         spin=passes.spin.ravel(),
         stiffness=load.stiffness,
+        fresh_approach=fresh,
         nominal_gap=np.array(problem.flat_gap[0, :, 0]),
         from_apex=np.array(problem.from_apex[:, 0]),
         longitudinal_curvature=np.full(rollers, kinematics.longitudinal_curvature),
@@ -222,7 +235,7 @@ def run_in_python(
     cylinder, roller = state.cylinder_depth.copy(), state.roller_depth.copy()
     terms, energy = state.terms.copy(), state.energy.copy()
     contacts, stations = list(state.contacts), problem.shape[0]
-    (load,), (law,) = problem.loads, problem.laws
+    (law,) = problem.laws
     turn = kinematics.physical_rollers / kinematics.pass_rate
     for number, r in enumerate(passes.roller):
         one = passes.with_contacts(np.array([number]))
@@ -232,18 +245,19 @@ def run_in_python(
         for s in range(stations):
             unworn = one.nominal_gap[s, 0, 0]
             gap = unworn + cylinder[s, 0, 0] + roller[0, r, 0]
-            force_of_pass = float(force[number, 0]) + float(terms[:, r, 0].sum())
-            force_of_pass -= load.stiffness * float(gap.min() - unworn.min())
-            if problem.pauses and min(force_of_pass, float(force[number, 0])) <= 0.0:
+            free = float(force[number, 0]) + float(terms[:, r, 0].sum())
+            zero = float(unworn.min())
+            if state.fresh_approach is not None:
+                zero += float(state.fresh_approach[s, r, 0])
+            most = free - problem.loads[0].stiffness * (float(gap.min()) - zero)
+            if problem.pauses and min(most, float(force[number, 0])) <= 0.0:
                 for t, term in enumerate(problem.terms.values()):
                     terms[t, r] = term.advance(terms[t, r], np.zeros(1), turn / multiplicity)
                 continue
-            loads = np.full(one.shape, force_of_pass)
-            point = contact_batch(one, one.nominal_gap, loads, cylinder, roller).point(s)
             place = s * problem.rollers + r
-            contacts[place] = contact = problem.model.solve_one(
-                gap, kinematics.longitudinal_curvature, point, None, contacts[place]
-            )
+            batch = contact_batch(one, one.nominal_gap, np.zeros(one.shape), cylinder, roller)
+            contact = _solve_pass(problem, gap, batch.point(s), free, zero, contacts[place])
+            contacts[place] = contact
             cylinder[s, 0, 0] += law.depth_per_pass("cylinder", contact, speed)
             roller[0, r, 0] += ratio * law.depth_per_pass("roller", contact, speed)
             energy += contact.power * turn / stations
@@ -261,3 +275,52 @@ def run_in_python(
         full_solves=state.full_solves + count * stations,
         solves=state.solves + count * stations,
     )
+
+
+def _solve_pass(
+    problem: WearProblem,
+    gap: FloatArray,
+    point: OperatingPoint,
+    free: float,
+    zero: float,
+    warm: ContactSolution,
+) -> ContactSolution:
+    """Solve the contact of one pass together with the load of a spring.
+
+    Parameters
+    ----------
+    problem : WearProblem
+    gap : ndarray, shape (strips,)
+        Present gap [m].
+    point : OperatingPoint
+        Operating point, except for its load.
+    free : float
+        Load without displacement of the roller [N].
+    zero : float
+        Approach without displacement of the roller [m].
+    warm : ContactSolution
+        Solution of the roller's previous pass.
+
+    Raises
+    ------
+    StepError
+        If the load is not positive, or does not converge.
+    """
+    stiffness, lowest = problem.loads[0].stiffness, float(gap.min())
+    curvature, solution = problem.kinematics.longitudinal_curvature, warm
+    most = free - stiffness * (lowest - zero)  # without elastic approach
+    if not most > 0.0:
+        raise StepError(f"contact is lost: the load of a pass has fallen to {most:.4g} N")
+    load = free - stiffness * (warm.approach - zero)
+    load = load if load > 0.0 else 0.1 * most
+    for _ in range(MAX_LOAD_ITERATIONS):
+        now = replace(point, normal_force=load)
+        solution = problem.model.solve_one(gap, curvature, now, None, solution)
+        if not stiffness:
+            return solution
+        change = free - stiffness * (solution.approach - zero) - load
+        if abs(change) <= LOAD_TOLERANCE * load:
+            return solution
+        slope = APPROACH_EXPONENT * (solution.approach - lowest) / load
+        load = max(load + change / (1.0 + stiffness * slope), 0.1 * load)
+    raise StepError("the load of a spring and its contact did not converge in a pass")

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from functools import cached_property
+from collections.abc import Callable, Iterable, Sequence
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -120,20 +120,22 @@ class WearIncrement:
 
 REALISATION = 2  # axis of the realisations
 SAME_LOAD = 1e-9  # relative change of a load below which a contact is not solved again
+APPROACH_EXPONENT = 0.75  # approach as a power of the load: 2/3 in a Hertzian contact, 1 in a flat
+MAX_LOAD_ITERATIONS = 40
 
 
 def mean_loads(
     problem: WearProblem,
     state: WearState,
     passes: FloatArray,
-    depths: Sequence[Depths],
+    displacement: FloatArray,
     contacts: ContactBatchSolution,
 ) -> FloatArray:
     """Return the mean load of each contact over a step, shape (S, C, N) [N].
 
     Processes are at their means over the step in `problem`. The load before feedback is integrated
-    exactly. The spring takes the mean of the descents at the worn depths `depths`, usually those at
-    the ends of the step, and each load term its exact mean at the constant power of `contacts`.
+    exactly. The spring force is that at `displacement`, see `displacement_at`, and each load term
+    has its exact mean at the constant power of `contacts`.
     """
     start, stop = problem.time(state.passes), problem.time(state.passes + passes)
     terms = []
@@ -143,29 +145,30 @@ def mean_loads(
         each = zip(problem.terms.values(), state.terms, strict=True)
         terms = [term.mean_force(value, mean_power, duration) for term, value in each]
     force = values_between([load.mean for load in problem.loads], start, stop)
-    return _with_feedback(problem, state, force, depths, terms)
+    return _with_feedback(problem, force, displacement, terms)
 
 
 def _with_feedback(
     problem: WearProblem,
-    state: WearState,
     force: FloatArray,
-    depths: Sequence[Depths],
+    displacement: FloatArray,
     terms: Iterable[FloatArray],
 ) -> FloatArray:
-    """Return the loads for a load `force` before feedback; raise StepError unless positive."""
+    """Return the loads for a load `force` before feedback."""
     loads = np.empty(problem.shape)
     loads[:] = force + problem.inputs.normal_force_offset
     if problem.has_spring:
-        # the rise of the least gap, by which rigid bodies would approach; the depth on one track
-        unworn = problem.nominal_gap.min(axis=-1)
-        descents = [problem.gap(*worn).min(axis=-1) - unworn for worn in depths]
-        loads -= problem.stiffness * np.mean(descents, axis=0)
+        loads -= problem.stiffness * displacement
     for term in terms:
         loads += term[problem.roller]
     if problem.pauses:
         # a spring that has descended lifts the roller while the load rises from a pause
         loads = np.maximum(loads, LEAST_LOAD * problem.greatest_load)
+    return loads
+
+
+def checked_loads(state: WearState, loads: FloatArray) -> FloatArray:
+    """Return the loads of all contacts; raise StepError unless they are positive."""
     if np.count_nonzero(loads > 0.0) < loads.size:
         raise StepError(
             f"contact is lost at pass {state.passes[0]:.0f}: the load has fallen to"
@@ -176,31 +179,195 @@ def _with_feedback(
     return loads
 
 
+def descents(problem: WearProblem, depths: Depths) -> FloatArray:
+    """Return the worn descent of each contact's roller, shape (S, C, N) [m].
+
+    It is the rise of the least gap, by which rigid bodies would approach; on one track it equals
+    the worn depth.
+    """
+    return np.asarray(problem.gap(*depths).min(axis=-1) - problem.nominal_gap.min(axis=-1))
+
+
+def elastic_approaches(problem: WearProblem, state: WearState) -> FloatArray:
+    """Return the elastic approach of each contact, shape (S, C, N) [m].
+
+    It is the approach of the bodies from first contact of their present profiles. The processes of
+    `problem` are at the values with which the contacts were solved.
+    """
+    least_gap = problem.gap(*state.depths).min(axis=-1)
+    return np.asarray(problem.values_of(state.contacts, "approach") - least_gap)
+
+
+def displacement_at(
+    problem: WearProblem, state: WearState, depths: Sequence[Depths], elastic: FloatArray | None
+) -> FloatArray:
+    """Return the displacement of each contact's roller since the start, shape (S, C, N) [m].
+
+    A mounting spring extends by it: the mean of the worn descents at `depths`, less the fall of the
+    elastic approach from the fresh bodies to `elastic` (None: no fall). It is 0 without a spring.
+    """
+    if not problem.has_spring:
+        return np.zeros(())
+    worn = np.mean([descents(problem, one) for one in depths], axis=0)
+    if elastic is None or state.fresh_approach is None:
+        return np.asarray(worn)
+    return np.asarray(worn + (elastic - problem.at_contacts(state.fresh_approach)))
+
+
+def corrected_loads(
+    problem: WearProblem, loads: FloatArray, target: FloatArray, approach: FloatArray, part: float
+) -> FloatArray:
+    """Return loads closer to those at which a spring and the contact are in equilibrium.
+
+    One step of Newton's method for each contact, with the slope of the displacement estimated as
+    that of a power of the load.
+
+    Parameters
+    ----------
+    problem : WearProblem
+    loads : ndarray, shape (stations, contacts, realisations)
+        Loads of a solution [N].
+    target : ndarray
+        Loads by the spring at the displacement of that solution [N].
+    approach : ndarray
+        Part of the displacement that depends on the load [m].
+    part : float
+        Fraction of that displacement by which the spring extends in the mean over the step.
+    """
+    slope = part * APPROACH_EXPONENT * np.maximum(approach, 0.0) / loads
+    return np.asarray(loads + (target - loads) / (1.0 + problem.stiffness * slope))
+
+
+def solve_loaded(
+    problem: WearProblem,
+    state: WearState,
+    loads_at: Callable[[FloatArray], FloatArray],
+    elastic: FloatArray | None,
+    solve: Callable[[WearProblem, WearState, FloatArray], ContactBatchSolution],
+) -> tuple[ContactBatchSolution, FloatArray, int]:
+    """Solve every contact on the present profiles together with its load.
+
+    A load with a spring depends on the elastic approach of the contact that it causes.
+
+    Parameters
+    ----------
+    problem : WearProblem
+        Problem with every process at the value for the solution.
+    state : WearState
+        Profiles, and contacts for the solver to start from.
+    loads_at : callable
+        Function from the displacement of the rollers [m] to the loads [N], (S, C, N) both.
+    elastic : ndarray, shape (stations, contacts, realisations), optional
+        First guess of the elastic approach, by default that of fresh bodies.
+    solve : callable
+        Solves the contacts of a state the first time, `solve_present` or `contacts_at`.
+
+    Returns
+    -------
+    contacts : ContactBatchSolution
+    loads : ndarray, shape (stations, contacts, realisations)
+    solves : int
+        Number of solutions of all contacts.
+
+    Raises
+    ------
+    StepError
+        If a load is not positive, or the iteration does not converge.
+    """
+    loads = loads_at(displacement_at(problem, state, [state.depths], elastic))
+    contacts = solve(problem, state, checked_loads(state, loads))
+    solves = int(contacts is not state.contacts)
+    if not problem.has_spring:
+        return contacts, loads, solves
+    for _ in range(MAX_LOAD_ITERATIONS):
+        state = state.replaced(contacts=contacts)
+        elastic = elastic_approaches(problem, state)
+        target = loads_at(displacement_at(problem, state, [state.depths], elastic))
+        open_ = np.abs(target - loads) > problem.iteration_tolerance * loads
+        if not np.count_nonzero(open_):
+            return contacts, loads, solves
+        loads = np.where(open_, corrected_loads(problem, loads, target, elastic, 1.0), loads)
+        contacts = contacts_at(problem, state, checked_loads(state, loads))
+        solves += 1
+    raise StepError(
+        f"the load of a spring and its contact did not converge at pass {state.passes[0]:.0f}",
+        state.to_arrays(),
+    )
+
+
+def solve_at_present_loads(
+    problem: WearProblem, state: WearState, elastic: FloatArray | None
+) -> tuple[ContactBatchSolution, FloatArray, int]:
+    """Solve every contact at the time of the state with its load; results as `solve_loaded`."""
+    return _solve_now(problem, state, elastic, solve_present)
+
+
+def solve_at_record(
+    problem: WearProblem, state: WearState, *, on_profile: bool, cold: bool = False
+) -> tuple[ContactBatchSolution, FloatArray]:
+    """Return the contacts at the time of the state, and their loads [N].
+
+    Parameters
+    ----------
+    problem : WearProblem
+    state : WearState
+    on_profile : bool
+        Whether the contacts of the state are solutions on its profiles: those that carry their
+        loads already are not solved again.
+    cold : bool
+        Whether the solver starts without the contacts of the state.
+    """
+    solve = contacts_at if on_profile else partial(solve_present, cold=cold)
+    elastic = None
+    if problem.has_spring and not cold:
+        elastic = elastic_approaches(present_problem(problem, state), state)
+    return _solve_now(problem, state, elastic, solve)[:2]
+
+
+def _solve_now(
+    problem: WearProblem,
+    state: WearState,
+    elastic: FloatArray | None,
+    solve: Callable[[WearProblem, WearState, FloatArray], ContactBatchSolution],
+) -> tuple[ContactBatchSolution, FloatArray, int]:
+    """Solve the contacts with their loads at the time of the state; results as `solve_loaded`."""
+    present = present_problem(problem, state)
+    force = present.force(present.time(state.passes))
+
+    def loads_at(displacement: FloatArray) -> FloatArray:
+        return _with_feedback(present, force, displacement, state.terms)
+
+    if problem.varying and solve is contacts_at:
+        solve = solve_present  # the contacts were solved with other values of the processes
+    return solve_loaded(present, state, loads_at, elastic, solve)
+
+
 def explicit_step(problem: WearProblem, state: WearState, passes: FloatArray) -> WearState:
-    """Step over `passes` passes on the profiles of the step's start, under its mean load."""
+    """Step over `passes` passes on the profiles of the step's start, under its mean load.
+
+    The elastic approach of the start applies to the mean load of the step.
+    """
     here = problem.at_time(problem.time(state.passes), problem.time(state.passes + passes))
     predicted = state.with_added(WearIncrement(here, state.contacts, passes).depths)
-    mean = mean_loads(here, state, passes, (state.depths, predicted.depths), state.contacts)
+    elastic = None
+    if problem.has_spring:
+        elastic = elastic_approaches(present_problem(problem, state), state)
+    displacement = displacement_at(here, state, (state.depths, predicted.depths), elastic)
+    mean = mean_loads(here, state, passes, displacement, state.contacts)
     solve = solve_present if problem.varying else contacts_at
-    contacts = solve(here, state, mean)
-    solves = problem.contacts_each * (1 if contacts is state.contacts else 2)
-    begun = state.replaced(contacts=contacts, solves=state.solves + solves)
+    contacts = solve(here, state, checked_loads(state, mean))
+    begun = state.replaced(contacts=contacts)
     ends = begun.with_added(WearIncrement(here, contacts, passes).depths)
     worn = worn_state(here, ends, passes, here.values_of(contacts, "power"))
-    return worn.replaced(contacts=solve_present(problem, worn, present_loads(problem, worn)))
+    ended, _, solves = solve_at_present_loads(problem, worn, elastic)
+    solves = problem.contacts_each * (solves + (contacts is not state.contacts))
+    return worn.replaced(contacts=ended, solves=state.solves + solves)
 
 
 def present_problem(problem: WearProblem, state: WearState) -> WearProblem:
     """Return the problem with every process at its value at the time of the state."""
     now = problem.time(state.passes)
     return problem.at_time(now, now)
-
-
-def present_loads(problem: WearProblem, state: WearState) -> FloatArray:
-    """Return the load of each contact at the time of the state, shape (S, C, N) [N]."""
-    problem = present_problem(problem, state)
-    force = problem.force(problem.time(state.passes))
-    return _with_feedback(problem, state, force, [state.depths], state.terms)
 
 
 def contacts_at(problem: WearProblem, state: WearState, loads: FloatArray) -> ContactBatchSolution:
@@ -230,9 +397,7 @@ def carried_loads(problem: WearProblem, contacts: ContactBatchSolution) -> Float
 
 def elastic_approach(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the least elastic approach of the contacts, shape (realisations,) [m]."""
-    least_gap = problem.gap(*state.depths).min(axis=-1)
-    approach = problem.values_of(state.contacts, "approach") - least_gap
-    return np.asarray(approach.min(axis=(0, 1)))
+    return np.asarray(elastic_approaches(problem, state).min(axis=(0, 1)))
 
 
 def solve_present(

@@ -30,10 +30,16 @@ from wearsim.evolution.steppers.forward_euler import decay_rates
 from wearsim.evolution.steppers.single_step import (
     REALISATION,
     WearIncrement,
+    checked_loads,
     contacts_at,
+    corrected_loads,
+    displacement_at,
     elastic_approach,
+    elastic_approaches,
     mean_loads,
-    present_loads,
+    present_problem,
+    solve_at_present_loads,
+    solve_loaded,
     solve_present,
     worn_state,
 )
@@ -139,7 +145,8 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
     """Step over `passes` passes with the contacts solved on the profiles at the step's end.
 
     The wear of the step enters the contact problem as a compliance, so that the step is stable for
-    any length. Compliance, loads and creepage depend on the solution and are iterated. Where wear
+    any length. Compliance, loads and creepage depend on the solution and are iterated; the force of
+    a spring is that at the mean of the displacements at start and end. Where wear
     is not proportional to the line load, its exponent is estimated from successive iterates.
     Realisations that have converged are not solved again while others continue.
 
@@ -148,13 +155,15 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
     StepError
         If the iteration does not converge.
     """
-    begin = state.passes
+    begin, varying = state.passes, bool(problem.varying)
     problem = problem.at_time(problem.time(begin), problem.time(begin + passes))
     gap = problem.gap(state.cylinder_depth, state.roller_depth)
     contacts = state.contacts
     wear = WearIncrement(problem, contacts, passes)
     ends = state.with_added(wear.depths)
-    loads = mean_loads(problem, state, passes, (state.depths, ends.depths), contacts)
+    elastic = start = elastic_approaches(problem, state) if problem.has_spring else None
+    displacement = displacement_at(problem, state, (state.depths, ends.depths), elastic)
+    loads = checked_loads(state, mean_loads(problem, state, passes, displacement, contacts))
     active = np.ones(problem.shape[REALISATION], dtype=np.bool_)
     iterations = np.zeros(len(active), dtype=np.int64)
     for iteration in range(1, MAX_FIXED_POINT + 1):
@@ -166,8 +175,17 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
         predicted = wear.predicted_opening(problem.values_of(solved, "line_load"))
         change, new_loads = _relative_change(new.opening, predicted), loads
         if problem.has_spring or problem.terms:
-            new_loads = mean_loads(problem, state, passes, (state.depths, ends.depths), solved)
+            if start is not None:
+                elastic = elastic_approaches(problem, ends.replaced(contacts=solved))
+                # a process may have changed the tilt since the contacts of the start were solved
+                elastic = elastic if varying else 0.5 * (start + elastic)
+            displacement = displacement_at(problem, state, (state.depths, ends.depths), elastic)
+            new_loads = mean_loads(problem, state, passes, displacement, solved)
             change = np.maximum(change, _relative_change(new_loads, loads))
+            if problem.has_spring:
+                rise = problem.values_of(solved, "approach") - gap.min(axis=-1)
+                new_loads = corrected_loads(problem, loads, new_loads, rise, 0.5)
+            new_loads = checked_loads(state, new_loads)
         if problem.slip_profile is not None:
             change = np.maximum(change, _relative_change(new.cylinder, wear.cylinder))
         # strips at an edge may enter and leave the contact in turn: relax the tolerance slowly
@@ -322,16 +340,22 @@ def stabilised_step(
         np.zeros(problem.shape),
     )
     solve = solve_present if problem.varying else contacts_at
-    contacts, first = _rate(here, state, passes, before, solve)
-    solves = (len(stages) + (contacts is not state.contacts)) * problem.contacts_each
+    elastic = None
+    if problem.has_spring:
+        elastic = elastic_approaches(present_problem(problem, state), state)
+    contacts, first, elastic, solves = _rate(here, state, passes, before, elastic, solve)
     change = _sum((stages[0][3], first))
     for weights in stages[1:]:
-        contacts, rate = _rate(here, state.replaced(contacts=contacts), passes, change)
+        stage = state.replaced(contacts=contacts)
+        contacts, rate, elastic, more = _rate(here, stage, passes, change, elastic)
+        solves += more
         changes = zip(weights, (change, before, rate, first), strict=True)
         before, change = change, _sum(*changes)
-    begun = state.replaced(contacts=contacts, solves=state.solves + solves, decay=decay)
+    begun = state.replaced(contacts=contacts, decay=decay)
     worn = worn_state(here, begun.with_added(change[:2]), passes, change[2])
-    return worn.replaced(contacts=solve_present(problem, worn, present_loads(problem, worn)))
+    contacts, _, more = solve_at_present_loads(problem, worn, elastic)
+    done = state.solves + (solves + more) * problem.contacts_each
+    return worn.replaced(contacts=contacts, solves=done)
 
 
 def _rate(
@@ -339,11 +363,12 @@ def _rate(
     state: WearState,
     passes: FloatArray,
     change: Change,
+    elastic: FloatArray | None,
     solve: Callable[[WearProblem, WearState, FloatArray], ContactBatchSolution] = solve_present,
-) -> tuple[ContactBatchSolution, Change]:
+) -> tuple[ContactBatchSolution, Change, FloatArray | None, int]:
     """Return the contacts on the profiles of a stage, and the change in a whole step with them.
 
-    The load is the mean over the step, with the spring force at the descent of the stage.
+    The load is the mean over the step, with the spring force at the displacement of the stage.
 
     Parameters
     ----------
@@ -355,14 +380,30 @@ def _rate(
         Length of the step.
     change : Change
         Change from the start to the stage.
+    elastic : ndarray, optional
+        Elastic approach of the previous stage [m], where a load has a spring.
     solve : callable
         Solves the contacts on the profiles of a state under given loads.
+
+    Returns
+    -------
+    contacts : ContactBatchSolution
+    change : Change
+    elastic : ndarray, optional
+        Elastic approach of the stage [m].
+    solves : int
+        Number of solutions of all contacts.
     """
     stage = state.with_added(change[:2])
-    loads = mean_loads(here, state, passes, (stage.depths,), state.contacts)
-    contacts = solve(here, stage, loads)
+
+    def loads_at(displacement: FloatArray) -> FloatArray:
+        return mean_loads(here, state, passes, displacement, state.contacts)
+
+    contacts, _, solves = solve_loaded(here, stage, loads_at, elastic, solve)
+    if here.has_spring:
+        elastic = elastic_approaches(here, stage.replaced(contacts=contacts))
     wear = WearIncrement(here, contacts, passes)
-    return contacts, (*wear.depths, here.values_of(contacts, "power"))
+    return contacts, (*wear.depths, here.values_of(contacts, "power")), elastic, solves
 
 
 def _sum(*terms: tuple[float, Change]) -> Change:

@@ -20,11 +20,14 @@ from wearsim.mechanics.slender.chord_method import (
     solve_fully,
 )
 from wearsim.mechanics.slender.half_length import log_half_length
-from wearsim.mechanics.slender.newton import CONVERGED, SINGULAR
+from wearsim.mechanics.slender.newton import CONVERGED, NO_CONVERGENCE, SINGULAR
 from wearsim.mechanics.tangential.strip_theory import solve_strips
 from wearsim.types import FloatArray, IntArray
 
 UNLOADED = 10  # status: the load is not positive
+LOAD_TOLERANCE = 1e-6  # relative change of the load of a spring by the approach it causes
+MAX_LOAD_ITERATIONS = 40
+APPROACH_EXPONENT = 0.75  # approach as a power of the load: 2/3 in a Hertzian contact, 1 in a flat
 
 
 class Passes(NamedTuple):
@@ -114,6 +117,7 @@ def run_passes(
     first: int,
     passes: Passes,
     stiffness: float,
+    fresh_approach: FloatArray,
     rests: bool,
     terms: FloatArray,
     term_rates: FloatArray,
@@ -139,7 +143,9 @@ def run_passes(
         Load before feedback [N], friction, tilt [rad] and spin [1/m] of every pass, (passes,), and
         its mean longitudinal and lateral creepage (passes, 2).
     stiffness : float
-        Decrease of the load per descent of a roller [N/m].
+        Decrease of the load per displacement of a roller [N/m].
+    fresh_approach : ndarray, shape (contacts,)
+        Elastic approach at which a roller on unworn bodies is not displaced [m].
     rests : bool
         Whether a pass without load wears nothing, instead of being an error.
     terms : ndarray, shape (terms, contacts)
@@ -183,20 +189,34 @@ def run_passes(
             unworn = nominal_gap[g, i] + passes.tilt[p] * from_apex[g, i]
             state.gap[i] = unworn + wear.cylinder_depth[i] + wear.roller_depth[g, i]
             lowest, lowest_unworn = min(lowest, state.gap[i]), min(lowest_unworn, unworn)
-        load = passes.base_load[p] - stiffness * (lowest - lowest_unworn)
+        free, zero, fully = passes.base_load[p], lowest_unworn + fresh_approach[g], False
         for t in range(terms.shape[0]):
-            load += terms[t, g]
-        if not load > 0.0 or (rests and passes.base_load[p] <= 0.0):
+            free += terms[t, g]
+        most = free - stiffness * (lowest - zero)  # without elastic approach
+        if not most > 0.0 or (rests and passes.base_load[p] <= 0.0):
             if not rests:
                 return UNLOADED, p, full_solves
             for t in range(terms.shape[0]):
                 terms[t, g] -= term_rates[t, 1 + g] * terms[t, g]
             continue
-        if not (similar and solve_from_anchor(g, load, lowest, loads, constants, state)):
-            full_solves += 1
-            status = solve_fully(g, load, similar, loads, constants, state)
-            if status != CONVERGED:
-                return status, p, full_solves
+        # a spring extends by the approach that the load causes, at first that of the last pass
+        load = free - stiffness * (loads.approach[g] - zero)
+        if not load > 0.0:
+            load = 0.1 * most
+        for iteration in range(MAX_LOAD_ITERATIONS):
+            if not (similar and solve_from_anchor(g, load, lowest, loads, constants, state)):
+                fully = True
+                status = solve_fully(g, load, similar, loads, constants, state)
+                if status != CONVERGED:
+                    return status, p, full_solves
+            change = free - stiffness * (loads.approach[g] - zero) - load
+            if stiffness == 0.0 or abs(change) <= LOAD_TOLERANCE * load:
+                break
+            if iteration == MAX_LOAD_ITERATIONS - 1:
+                return NO_CONVERGENCE, p, full_solves
+            slope = APPROACH_EXPONENT * (loads.approach[g] - lowest) / load
+            load = max(load + change / (1.0 + stiffness * slope), 0.1 * load)
+        full_solves += int(fully)
         power = (rolling_speed[g] * constants.spacing) * _wear_strips(
             g, p, loads.line_load, passes, constants, state, wear
         )

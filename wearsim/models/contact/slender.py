@@ -349,6 +349,7 @@ class Slender(StripModel):
             loop.first_pass,
             pass_loop.Passes(loop.base_load, loop.creepage, loop.friction, loop.tilt, loop.spin),
             float(loop.stiffness),
+            loop.fresh_approach,
             loop.rests,
             loop.terms,
             loop.term_rates,

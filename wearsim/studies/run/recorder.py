@@ -18,7 +18,12 @@ from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import mean_along, width, worn_volume
 from wearsim.evolution.state import WearState, joined_states
 from wearsim.evolution.steppers.base import SMALLEST_STEP, Step, Stepper
-from wearsim.evolution.steppers.single_step import contacts_at, present_loads, solve_present
+from wearsim.evolution.steppers.single_step import (
+    descents,
+    elastic_approaches,
+    present_problem,
+    solve_at_record,
+)
 from wearsim.results.run import VARIABLES
 from wearsim.scenario import Scenario
 from wearsim.scenario.tables.plain import DEFAULT_RECORDS
@@ -173,11 +178,12 @@ def present_contacts(
     If inputs are drawn at every pass, the contacts are those of the quadrature over passes.
     """
     recorded = stepper.recorded(problem)
-    loads = present_loads(recorded, state)
-    if stepper.pass_by_pass:
-        contacts = solve_present(recorded, state, loads, cold=recorded is not problem)
-    else:
-        contacts = contacts_at(recorded, state, loads)
+    contacts, loads = solve_at_record(
+        recorded,
+        state,
+        on_profile=not stepper.pass_by_pass,
+        cold=recorded is not problem,
+    )
     contacts, loads = opened(problem, state.passes, contacts, loads)
     return recorded, state.replaced(contacts=contacts), loads
 
@@ -191,6 +197,11 @@ def history_row(
 ) -> Variables:
     """Return the observables of every realisation; `threshold` [m] bounds the groove's width."""
     problem, state, loads = present_contacts(stepper, problem, state)
+    present = present_problem(problem, state)
+    approach = {
+        "descent": descents(present, state.depths),
+        "elastic_approach": np.where(loads > 0.0, elastic_approaches(present, state), 0.0),
+    }
     worn = state.cylinder_depth[:, 0].max(axis=0)
     kinematics, spacing = problem.kinematics, problem.grid.spacing
 
@@ -221,6 +232,7 @@ def history_row(
             name: mean_along(per_roller(name), axis=0)[0]
             for name in ("approach", "longitudinal_creepage", "adhesion_fraction")
         },
+        **{n: mean_along(problem.per_roller(v), axis=0)[0] for n, v in approach.items()},
     }
 
 

@@ -13,9 +13,9 @@ from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, fresh_state
 from wearsim.evolution.steppers.single_step import (
     WearIncrement,
-    present_loads,
+    elastic_approaches,
     present_problem,
-    solve_present,
+    solve_at_present_loads,
 )
 from wearsim.types import FloatArray
 
@@ -41,6 +41,7 @@ class _Rates:
     def __init__(self, problem: WearProblem, most: int) -> None:
         self.problem, self.state, self.most = problem, fresh_state(problem), most
         self.solves = int(self.state.solves[0])
+        self.elastic: FloatArray | None = None
         self.length = float(problem.values_of(self.state.contacts, "approach").max())
         rates = self._wear()
         self.bodies = [name for name in DEPTHS if rates[name].any()]
@@ -77,9 +78,11 @@ class _Rates:
                 f"the solver requires more than {self.most} contact solves", {"passes": passes}
             )
         state = self.state_at(passes, depths)
-        contacts = solve_present(self.problem, state, present_loads(self.problem, state))
+        contacts, _, solves = solve_at_present_loads(self.problem, state, self.elastic)
         self.state = replace(state, contacts=contacts)
-        self.solves += len(contacts)
+        if self.problem.has_spring:
+            self.elastic = elastic_approaches(present_problem(self.problem, state), self.state)
+        self.solves += solves * len(contacts)
         return self._joined(self._wear())
 
     def jacobian(self, passes: float, depths: FloatArray) -> FloatArray:
