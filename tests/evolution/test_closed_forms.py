@@ -5,7 +5,7 @@ import pytest
 
 from tests.evolution import built, cylinder_depth_of, cylinder_volume_of, stepped, worn
 from wearsim.evolution.quantities import width, worn_volume
-from wearsim.evolution.steppers.single_step import elastic_approaches
+from wearsim.evolution.steppers.loads import elastic_approaches
 
 K_OVER_H = 1.1e-11
 PER_LOAD = K_OVER_H * 0.1 * 1e-3  # depth per pass and line load in full slip [m/(N/m)]

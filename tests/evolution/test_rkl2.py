@@ -21,7 +21,7 @@ from wearsim.evolution.error_estimates import greatest_depth, volume_of
 from wearsim.evolution.quantities import oscillation, worn_volume
 from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.forward_euler import decay_rates, stability_limit
-from wearsim.evolution.steppers.step_doubling import StabilisedStepper, stabilised_step
+from wearsim.evolution.steppers.stabilised import StabilisedStepper, stabilised_step
 
 SPRING = {"load__kind": "spring", "load__stiffness": "20 kN/mm"}
 THERMAL = {"load.thermal": {"gain": "300 N/W", "time_constant": "3 min"}}

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wearsim.evolution.steppers.step_doubling import MIN_STAGES, legendre_stages, reach, stages_for
+from wearsim.evolution.steppers.stabilised import MIN_STAGES, legendre_stages, reach, stages_for
 
 COUNTS = (2, 3, 4, 5, 8, 17, 60)
 

@@ -6,12 +6,8 @@ import pytest
 from tests.evolution import built, cylinder_depth_of, stepped
 from wearsim.errors import CapabilityError
 from wearsim.evolution.state import fresh_state
-from wearsim.evolution.steppers.single_step import (
-    carried_loads,
-    descents,
-    elastic_approaches,
-    solve_at_record,
-)
+from wearsim.evolution.steppers.loads import descents, elastic_approaches
+from wearsim.evolution.steppers.single_step import carried_loads, solve_at_record
 
 PASSES = 20_000
 SOFT, STIFF = "690 N/mm", "40 kN/mm"

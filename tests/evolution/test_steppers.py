@@ -12,8 +12,8 @@ from wearsim.evolution.quantities import centroid, oscillation
 from wearsim.evolution.state import fresh_state, unworn_contacts
 from wearsim.evolution.steppers.base import Attempt
 from wearsim.evolution.steppers.forward_euler import ExplicitStepper, stability_limit
+from wearsim.evolution.steppers.loads import elastic_approaches
 from wearsim.evolution.steppers.per_pass import PerPassStepper, run_compiled, run_in_python
-from wearsim.evolution.steppers.single_step import elastic_approaches
 from wearsim.evolution.steppers.step_doubling import ImplicitStepper
 from wearsim.studies.ensemble.batch import joined_problem
 

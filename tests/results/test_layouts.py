@@ -65,7 +65,8 @@ def test_file_of_an_earlier_layout_is_refused_with_a_remedy(name, layout):
         READERS[name](path)
     assert str(caught.value) == (
         f"{path}: has layout {layout} of wearsim-{name}, and this wearsim reads layout"
-        f" {LAYOUTS[name]}; repeat the computation, or read it with the version of wearsim that wrote it"
+        f" {LAYOUTS[name]}; repeat the computation, or read it with the version of wearsim that"
+        " wrote it"
     )
 
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from study_examples import short
 
-from wearsim.studies.run.recorder import RecordSchedule
+from wearsim.studies.run.schedule import RecordSchedule
 
 
 def _all(schedule: RecordSchedule, stop: float) -> list[float]:

@@ -17,16 +17,18 @@ from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import oscillation
 from wearsim.evolution.state import Depths, WearState
 from wearsim.evolution.steppers.base import Attempt, Step, Stepper
-from wearsim.evolution.steppers.single_step import (
-    WearIncrement,
-    carried_loads,
+from wearsim.evolution.steppers.loads import (
     checked_loads,
-    contacts_at,
     displacement_at,
     elastic_approach,
     elastic_approaches,
-    explicit_step,
     mean_loads,
+)
+from wearsim.evolution.steppers.single_step import (
+    WearIncrement,
+    carried_loads,
+    contacts_at,
+    explicit_step,
     present_problem,
     solve_present,
 )

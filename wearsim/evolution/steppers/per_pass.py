@@ -14,11 +14,8 @@ from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import Redraw
 from wearsim.evolution.state import WearState, contact_batch, joined_states
 from wearsim.evolution.steppers.base import Attempt, Step, Stepper
-from wearsim.evolution.steppers.single_step import (
-    APPROACH_EXPONENT,
-    MAX_LOAD_ITERATIONS,
-    solve_at_record,
-)
+from wearsim.evolution.steppers.loads import APPROACH_EXPONENT
+from wearsim.evolution.steppers.single_step import MAX_LOAD_ITERATIONS, solve_at_record
 from wearsim.plugins import BODIES, PassLoop
 from wearsim.types import ContactSolution, FloatArray, IntArray, OperatingPoint
 

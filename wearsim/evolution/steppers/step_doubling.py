@@ -1,11 +1,6 @@
-"""Steppers with step doubling: implicit, and stabilised explicit."""
+"""Step doubling, and the implicit stepper."""
 
 from __future__ import annotations
-
-import math
-from collections.abc import Callable
-from functools import lru_cache, partial
-from typing import TypeAlias
 
 import numpy as np
 
@@ -26,21 +21,17 @@ from wearsim.evolution.pauses import rest
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, contact_batch
 from wearsim.evolution.steppers.base import Attempt, Step, Stepper
-from wearsim.evolution.steppers.forward_euler import decay_rates
-from wearsim.evolution.steppers.single_step import (
-    REALISATION,
-    WearIncrement,
+from wearsim.evolution.steppers.loads import (
     checked_loads,
-    contacts_at,
     corrected_loads,
     displacement_at,
     elastic_approach,
     elastic_approaches,
     mean_loads,
-    present_problem,
-    solve_at_present_loads,
-    solve_loaded,
-    solve_present,
+)
+from wearsim.evolution.steppers.single_step import (
+    REALISATION,
+    WearIncrement,
     worn_state,
 )
 from wearsim.plugins import SharedWear
@@ -245,170 +236,3 @@ def solve_compliant(
     else:
         solved = model.solve(some, None, part, near)
     return warm.with_others(order, solved)
-
-
-MIN_STAGES = 3  # with two, profiles that decay within a step are inaccurate
-SAFETY = 1.2  # on the greatest decay rate, which is estimated and may grow within the step
-
-#: change of the state in a step or in a part of it: depth of cylinder and rollers [m], and the
-#: power of every contact times the part of the step it lasted [W]
-Change: TypeAlias = tuple[FloatArray, FloatArray, FloatArray]
-
-
-def reach(count: int) -> float:
-    """Return the longest stable step of `count` stages, times the greatest decay rate.
-
-    It grows with the square of the number of stages; steps of Euler's method reach 2 each.
-    """
-    return 0.5 * (count * count + count - 2)
-
-
-def stages_for(decay: float) -> int:
-    """Return the least number of stages whose `reach` is `decay`, `MIN_STAGES` at least."""
-    return max(MIN_STAGES, math.ceil(0.5 * (math.sqrt(9.0 + 8.0 * decay) - 1.0)))
-
-
-@lru_cache(maxsize=256)
-def legendre_stages(count: int) -> tuple[tuple[float, float, float, float], ...]:
-    """Return the weights of `count` stages, two at least; the last stage is the step's end.
-
-    They are the weights of the last stage and of the one before it, and the parts of the step taken
-    at the rate of the last stage and at that of the step's start. The start has the weight that is
-    left of 1.
-
-    The stability polynomial of the scheme is a shifted Legendre polynomial: profiles that decay
-    fast are halved in a step, without change of sign. Chebyshev's polynomial reaches 1.3 times as
-    far but damps them much less, and the kink at a contact's edge then causes ripples on the
-    profile.
-
-    References
-    ----------
-    .. [1] C.D. Meyer, D.S. Balsara, T.D. Aslam, A stabilized Runge-Kutta-Legendre method for
-       explicit super-time-stepping of parabolic and mixed equations, J. Comput. Phys. 257 (2014)
-       594-626, DOI 10.1016/j.jcp.2013.08.021.
-    """
-    b = [1.0 / 3.0] * 2 + [(j * j + j - 2) / (2.0 * j * (j + 1)) for j in range(2, count + 1)]
-    scale = 2.0 / reach(count)
-    stages = [(0.0, 0.0, 0.0, b[1] * scale)]
-    for j in range(2, count + 1):
-        last = (2 * j - 1) / j * b[j] / b[j - 1]
-        before_last = -(j - 1) / j * b[j] / b[j - 2]
-        stages.append((last, before_last, scale * last, (b[j - 1] - 1.0) * scale * last))
-    return tuple(stages)
-
-
-class StabilisedStepper(StepDoublingStepper):
-    """Stepper of second order for any contact model: Runge-Kutta-Legendre method.
-
-    A step of s stages is stable up to s^2/4 times the stability limit of Euler's method. The
-    number of stages follows from the greatest decay rate at the start of each step.
-
-    For a scheme of second order the difference to the coarse-step solution is three times the
-    error of the test. It is not divided by three: strips that enter the contact cause kinks in
-    time, which reduce the order towards one, and then the difference equals the error.
-    """
-
-    order = 2
-
-    def scheme(self, problem: WearProblem, state: WearState) -> Step:
-        """Return a step for the decay rates at `state`."""
-        return partial(stabilised_step, decay=decay_rates(problem, state))
-
-
-def stabilised_step(
-    problem: WearProblem, state: WearState, passes: FloatArray, decay: FloatArray
-) -> WearState:
-    """Step over `passes` passes with the number of stages that the decay rate requires.
-
-    Every stage is an explicit step on the profiles of the previous one, combined with earlier
-    stages. Wear and energy have the same weights, so that Archard's wear law holds to round-off.
-
-    Parameters
-    ----------
-    problem : WearProblem
-    state : WearState
-    passes : ndarray, shape (realisations,)
-        Length of the step.
-    decay : ndarray, shape (realisations,)
-        Greatest decay rate [1/pass].
-    """
-    here = problem.at_time(problem.time(state.passes), problem.time(state.passes + passes))
-    stages = legendre_stages(stages_for(float((SAFETY * decay * passes).max())))
-    before = (
-        np.zeros_like(state.cylinder_depth),
-        np.zeros_like(state.roller_depth),
-        np.zeros(problem.shape),
-    )
-    solve = solve_present if problem.varying else contacts_at
-    elastic = None
-    if problem.has_spring:
-        elastic = elastic_approaches(present_problem(problem, state), state)
-    contacts, first, elastic, solves = _rate(here, state, passes, before, elastic, solve)
-    change = _sum((stages[0][3], first))
-    for weights in stages[1:]:
-        stage = state.replaced(contacts=contacts)
-        contacts, rate, elastic, more = _rate(here, stage, passes, change, elastic)
-        solves += more
-        changes = zip(weights, (change, before, rate, first), strict=True)
-        before, change = change, _sum(*changes)
-    begun = state.replaced(contacts=contacts, decay=decay)
-    worn = worn_state(here, begun.with_added(change[:2]), passes, change[2])
-    contacts, _, more = solve_at_present_loads(problem, worn, elastic)
-    done = state.solves + (solves + more) * problem.contacts_each
-    return worn.replaced(contacts=contacts, solves=done)
-
-
-def _rate(
-    here: WearProblem,
-    state: WearState,
-    passes: FloatArray,
-    change: Change,
-    elastic: FloatArray | None,
-    solve: Callable[[WearProblem, WearState, FloatArray], ContactBatchSolution] = solve_present,
-) -> tuple[ContactBatchSolution, Change, FloatArray | None, int]:
-    """Return the contacts on the profiles of a stage, and the change in a whole step with them.
-
-    The load is the mean over the step, with the spring force at the displacement of the stage.
-
-    Parameters
-    ----------
-    here : WearProblem
-        Problem with every process at its mean over the step.
-    state : WearState
-        State at the step's start, with contacts for the solver to start from.
-    passes : ndarray, shape (realisations,)
-        Length of the step.
-    change : Change
-        Change from the start to the stage.
-    elastic : ndarray, optional
-        Elastic approach of the previous stage [m], where a load has a spring.
-    solve : callable
-        Solves the contacts on the profiles of a state under given loads.
-
-    Returns
-    -------
-    contacts : ContactBatchSolution
-    change : Change
-    elastic : ndarray, optional
-        Elastic approach of the stage [m].
-    solves : int
-        Number of solutions of all contacts.
-    """
-    stage = state.with_added(change[:2])
-
-    def loads_at(displacement: FloatArray) -> FloatArray:
-        return mean_loads(here, state, passes, displacement, state.contacts)
-
-    contacts, _, solves = solve_loaded(here, stage, loads_at, elastic, solve)
-    if here.has_spring:
-        elastic = elastic_approaches(here, stage.replaced(contacts=contacts))
-    wear = WearIncrement(here, contacts, passes)
-    return contacts, (*wear.depths, here.values_of(contacts, "power")), elastic, solves
-
-
-def _sum(*terms: tuple[float, Change]) -> Change:
-    """Return the weighted sum of changes."""
-    cylinder, roller, power = (
-        np.sum([weight * change[part] for weight, change in terms], axis=0) for part in range(3)
-    )
-    return cylinder, roller, power

@@ -15,7 +15,8 @@ from wearsim.evolution.steppers.base import Stepper
 from wearsim.evolution.steppers.step_doubling import ImplicitStepper
 from wearsim.plugins import BODIES
 from wearsim.studies.run.draws import Draws
-from wearsim.studies.run.recorder import Due, RecordSchedule, due_records, history_row, states_at
+from wearsim.studies.run.recorder import Due, due_records, history_row, states_at
+from wearsim.studies.run.schedule import RecordSchedule
 from wearsim.types import FloatArray, IntArray
 
 _RADII = ("cylinder_radius", "roller_radius", "crown_radius", "rolling_speed")

@@ -16,7 +16,8 @@ from wearsim.evolution.steppers.base import Stepper
 from wearsim.evolution.steppers.forward_euler import ExplicitStepper
 from wearsim.evolution.steppers.per_pass import PerPassStepper
 from wearsim.evolution.steppers.single_step import explicit_step
-from wearsim.evolution.steppers.step_doubling import ImplicitStepper, StabilisedStepper
+from wearsim.evolution.steppers.stabilised import StabilisedStepper
+from wearsim.evolution.steppers.step_doubling import ImplicitStepper
 from wearsim.plugins import ContactModel
 from wearsim.scenario import Scenario
 from wearsim.studies.run.draws import Draws

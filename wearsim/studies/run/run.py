@@ -34,11 +34,11 @@ from wearsim.studies.run.recorder import (
     Event,
     Finished,
     Recorder,
-    RecordSchedule,
     Started,
     Stepped,
     Warned,
 )
+from wearsim.studies.run.schedule import RecordSchedule
 from wearsim.studies.run.widening import widened_run
 from wearsim.types import Grid
 

@@ -11,9 +11,9 @@ from wearsim.errors import StepError
 from wearsim.evolution.error_estimates import DEPTHS
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, fresh_state
+from wearsim.evolution.steppers.loads import elastic_approaches
 from wearsim.evolution.steppers.single_step import (
     WearIncrement,
-    elastic_approaches,
     present_problem,
     solve_at_present_loads,
 )

@@ -1,0 +1,135 @@
+"""Loads of the contacts, with their feedback by springs and load terms."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from wearsim.contact_batch import ContactBatchSolution
+from wearsim.errors import StepError
+from wearsim.evolution.problem import WearProblem
+from wearsim.evolution.quantities import values_between
+from wearsim.evolution.state import LEAST_LOAD, Depths, WearState
+from wearsim.types import FloatArray
+
+APPROACH_EXPONENT = 0.75  # approach as a power of the load: 2/3 in a Hertzian contact, 1 in a flat
+
+
+def mean_loads(
+    problem: WearProblem,
+    state: WearState,
+    passes: FloatArray,
+    displacement: FloatArray,
+    contacts: ContactBatchSolution,
+) -> FloatArray:
+    """Return the mean load of each contact over a step, shape (S, C, N) [N].
+
+    Processes are at their means over the step in `problem`. The load before feedback is integrated
+    exactly. The spring force is that at `displacement`, see `displacement_at`, and each load term
+    has its exact mean at the constant power of `contacts`.
+    """
+    start, stop = problem.time(state.passes), problem.time(state.passes + passes)
+    terms = []
+    if problem.terms:
+        power = problem.per_roller(problem.values_of(contacts, "power"))
+        mean_power, duration = power.mean(axis=0), float((stop - start)[0])
+        each = zip(problem.terms.values(), state.terms, strict=True)
+        terms = [term.mean_force(value, mean_power, duration) for term, value in each]
+    force = values_between([load.mean for load in problem.loads], start, stop)
+    return with_feedback(problem, force, displacement, terms)
+
+
+def with_feedback(
+    problem: WearProblem,
+    force: FloatArray,
+    displacement: FloatArray,
+    terms: Iterable[FloatArray],
+) -> FloatArray:
+    """Return the loads for a load `force` before feedback."""
+    loads = np.empty(problem.shape)
+    loads[:] = force + problem.inputs.normal_force_offset
+    if problem.has_spring:
+        loads -= problem.stiffness * displacement
+    for term in terms:
+        loads += term[problem.roller]
+    if problem.pauses:
+        # a spring that has descended lifts the roller while the load rises from a pause
+        loads = np.maximum(loads, LEAST_LOAD * problem.greatest_load)
+    return loads
+
+
+def checked_loads(state: WearState, loads: FloatArray) -> FloatArray:
+    """Return the loads of all contacts; raise StepError unless they are positive."""
+    if np.count_nonzero(loads > 0.0) < loads.size:
+        raise StepError(
+            f"contact is lost at pass {state.passes[0]:.0f}: the load has fallen to"
+            f" {loads.min():.4g} N; the spring has run out of travel, or the recorded load or a"
+            " random input falls to zero",
+            {"normal_force": loads, "passes": state.passes},
+        )
+    return loads
+
+
+def descents(problem: WearProblem, depths: Depths) -> FloatArray:
+    """Return the worn descent of each contact's roller, shape (S, C, N) [m].
+
+    It is the rise of the least gap, by which rigid bodies would approach; on one track it equals
+    the worn depth.
+    """
+    return np.asarray(problem.gap(*depths).min(axis=-1) - problem.nominal_gap.min(axis=-1))
+
+
+def elastic_approaches(problem: WearProblem, state: WearState) -> FloatArray:
+    """Return the elastic approach of each contact, shape (S, C, N) [m].
+
+    It is the approach of the bodies from first contact of their present profiles. The processes of
+    `problem` are at the values with which the contacts were solved.
+    """
+    least_gap = problem.gap(*state.depths).min(axis=-1)
+    return np.asarray(problem.values_of(state.contacts, "approach") - least_gap)
+
+
+def displacement_at(
+    problem: WearProblem, state: WearState, depths: Sequence[Depths], elastic: FloatArray | None
+) -> FloatArray:
+    """Return the displacement of each contact's roller since the start, shape (S, C, N) [m].
+
+    A mounting spring extends by it: the mean of the worn descents at `depths`, less the fall of the
+    elastic approach from the fresh bodies to `elastic` (None: no fall). It is 0 without a spring.
+    """
+    if not problem.has_spring:
+        return np.zeros(())
+    worn = np.mean([descents(problem, one) for one in depths], axis=0)
+    if elastic is None or state.fresh_approach is None:
+        return np.asarray(worn)
+    return np.asarray(worn + (elastic - problem.at_contacts(state.fresh_approach)))
+
+
+def corrected_loads(
+    problem: WearProblem, loads: FloatArray, target: FloatArray, approach: FloatArray, part: float
+) -> FloatArray:
+    """Return loads closer to those at which a spring and the contact are in equilibrium.
+
+    One step of Newton's method for each contact, with the slope of the displacement estimated as
+    that of a power of the load.
+
+    Parameters
+    ----------
+    problem : WearProblem
+    loads : ndarray, shape (stations, contacts, realisations)
+        Loads of a solution [N].
+    target : ndarray
+        Loads by the spring at the displacement of that solution [N].
+    approach : ndarray
+        Part of the displacement that depends on the load [m].
+    part : float
+        Fraction of that displacement by which the spring extends in the mean over the step.
+    """
+    slope = part * APPROACH_EXPONENT * np.maximum(approach, 0.0) / loads
+    return np.asarray(loads + (target - loads) / (1.0 + problem.stiffness * slope))
+
+
+def elastic_approach(problem: WearProblem, state: WearState) -> FloatArray:
+    """Return the least elastic approach of the contacts, shape (realisations,) [m]."""
+    return np.asarray(elastic_approaches(problem, state).min(axis=(0, 1)))

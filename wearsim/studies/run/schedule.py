@@ -1,0 +1,102 @@
+"""Passes at which profiles and contacts are recorded."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from wearsim.scenario import Scenario
+from wearsim.scenario.tables.plain import DEFAULT_RECORDS
+from wearsim.types import FloatArray
+
+_ROUND_OFF = 1e-9
+
+
+@dataclass(frozen=True)
+class RecordSchedule:
+    """Passes of the records, at equal intervals or in a geometric sequence.
+
+    Parameters
+    ----------
+    interval : float
+        Passes between records, or 0 for a geometric sequence.
+    base, count : float
+        In a geometric sequence record k is at base^(k/count) passes.
+    """
+
+    interval: float
+    base: float
+    count: float
+
+    @classmethod
+    def of(cls, scenario: Scenario, base: float) -> RecordSchedule:
+        """Return the schedule of a scenario; `base` is the length of the test [passes].
+
+        When a test is extended, the base remains the length of the first run.
+        """
+        outputs = scenario.outputs
+        count = outputs.records if outputs.records is not None else DEFAULT_RECORDS
+        if outputs.every_passes is not None:
+            return cls(float(outputs.every_passes), base, count)
+        if outputs.every is not None:
+            return cls(outputs.every * scenario.pass_rate, base, count)
+        even = outputs.spacing == "even" or base <= 1.0
+        return cls(base / count if even else 0.0, base, count)
+
+    def next_record(self, passes: float) -> float:
+        """Return the passes of the first record after `passes`."""
+        if self.interval > 0.0:
+            due = (math.floor(passes / self.interval + _ROUND_OFF) + 1) * self.interval
+        else:
+            number = self.count * math.log(max(passes, 1.0)) / math.log(self.base)
+            due = float(self.base ** ((math.floor(number + _ROUND_OFF) + 1) / self.count))
+        # round-off must not move a record at the end of the test to just before it
+        whole = float(round(due))
+        return whole if abs(due - whole) <= 1e-15 * whole and whole > passes else due
+
+    def all_records(self, stop: float, pass_by_pass: bool) -> FloatArray:
+        """Return the passes of all records of a test, from the initial state to the end.
+
+        Parameters
+        ----------
+        stop : float
+            Passes at the end of the test.
+        pass_by_pass : bool
+            Whether every step is one pass, so that records are at whole numbers of passes.
+        """
+        found = [0.0]
+        while found[-1] < stop:
+            found.append(min(self.due_after(found[-1], pass_by_pass), stop))
+        return np.array(found)
+
+    def due_between(
+        self, first: float, last: float, stop: float, pass_by_pass: bool = False
+    ) -> list[tuple[float, bool]]:
+        """Return the records after one state of a test, up to and including the next state.
+
+        Parameters
+        ----------
+        first, last : float
+            Passes of the two states.
+        stop : float
+            Passes at the end of the test, which is always recorded.
+        pass_by_pass : bool
+            As in `all_records`.
+
+        Returns
+        -------
+        list of (float, bool)
+            Passes, and whether the record is at the second state.
+        """
+        found, passes = [], self.due_after(first, pass_by_pass)
+        while passes < last:
+            found.append((passes, False))
+            passes = self.due_after(passes, pass_by_pass)
+        return found + [(last, True)] * (passes == last or last >= stop)
+
+    def due_after(self, passes: float, pass_by_pass: bool) -> float:
+        """Return the passes of the first record after `passes`, whole if `pass_by_pass`."""
+        due = self.next_record(passes)
+        return float(math.ceil(due)) if pass_by_pass else due
