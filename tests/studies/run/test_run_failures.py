@@ -128,8 +128,10 @@ def test_interrupt_of_first_write_leaves_initial_file_or_none(path: Path) -> Non
     assert run_differences(studies.resume(path), studies.run(scenario)) == []
 
 
-# with a falling log, contact is lost in a groove that has unloaded the spring
+# with a falling log, contact is lost in a groove that is deeper than the elastic approach
 LOST = {
+    "wear.cylinder.k_over_h": "1.1e-10 1/Pa",
+    "contact.width": "8 mm",
     "load": {"kind": "recorded", "file": "load.csv", "stiffness": "20000 N/mm"},
     "operation.passes": 20_000,
 }
