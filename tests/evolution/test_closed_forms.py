@@ -5,7 +5,7 @@ import pytest
 
 from tests.evolution import built, cylinder_depth_of, cylinder_volume_of, stepped, worn
 from wearsim.evolution.quantities import width, worn_volume
-from wearsim.evolution.steppers.loads import elastic_approaches
+from wearsim.evolution.steppers.single_step import recovery_at
 
 K_OVER_H = 1.1e-11
 PER_LOAD = K_OVER_H * 0.1 * 1e-3  # depth per pass and line load in full slip [m/(N/m)]
@@ -34,7 +34,7 @@ def closed_depth_with_spring(passes, stiffness, recovered):
 
 def recovery_of(problem, state):
     """Return the fall of the elastic approach since the start [m]."""
-    return float((state.fresh_approach - elastic_approaches(problem, state)).max())
+    return float(recovery_at(problem, state)[1].max())
 
 
 @pytest.fixture(scope="module")

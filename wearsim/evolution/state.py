@@ -16,6 +16,7 @@ from wearsim.evolution.quantities import is_every
 from wearsim.types import FloatArray, IntArray
 
 LEAST_LOAD = 1e-3  # next to a pause, of the greatest load
+HERTZ = 2.0 / 3.0  # approach of unworn bodies as a power of the load
 
 
 def contact_batch(
@@ -115,7 +116,7 @@ _AXES = {
     "loop_strips": 3,
     "loop_contacts": 3,
     "decay": 0,
-    "fresh_approach": 2,
+    "approach_factor": 2,
 }
 
 
@@ -169,8 +170,9 @@ class WearState:
         The coarse-step solution with half the quadrature nodes per roller.
     decay : ndarray, shape (realisations,), optional
         Greatest decay rate of a profile by wear, last measurement [1/pass].
-    fresh_approach : ndarray, shape (stations, rollers, realisations), optional
-        Elastic approach of each roller at the start of the test [m], where a load has a spring.
+    approach_factor : ndarray, shape (stations, rollers, realisations), optional
+        Elastic approach of each roller on unworn bodies over the power 2/3 of its load
+        [m/N^(2/3)], where a load has a spring.
     """
 
     passes: FloatArray
@@ -193,7 +195,7 @@ class WearState:
     coarse_step_solution: WearState | None = None
     half_quadrature_solution: WearState | None = None
     decay: FloatArray | None = None
-    fresh_approach: FloatArray | None = None
+    approach_factor: FloatArray | None = None
 
     @property
     def depths(self) -> Depths:
@@ -348,20 +350,18 @@ def fresh_state(problem: WearProblem) -> WearState:
         rejected=counts,
         solves=counts + stations * contacts,
         full_solves=counts,
-        fresh_approach=_fresh_approach(problem, solved) if problem.has_spring else None,
+        approach_factor=_approach_factor(problem, solved) if problem.has_spring else None,
     )
 
 
-def _fresh_approach(problem: WearProblem, contacts: ContactBatchSolution) -> FloatArray:
-    """Return the elastic approach of each roller on unworn bodies, shape (S, R, N) [m].
-
-    A test that starts in a pause has that under its greatest load.
-    """
+def _approach_factor(problem: WearProblem, contacts: ContactBatchSolution) -> FloatArray:
+    """Return `approach_factor` of a state, from the contacts of the unworn bodies at the start."""
+    force = problem.force(np.zeros(len(problem.loads)))
+    batch = unworn_contacts(problem)
     if problem.pauses:
-        force = problem.force(np.zeros(len(problem.loads)))
-        force = np.where(force > 0.0, force, problem.greatest_load)
-        loads = np.broadcast_to(force + problem.inputs.normal_force_offset, problem.shape)
-        batch = replace(unworn_contacts(problem), normal_force=loads.ravel())
+        # a test may start in a pause; a small contact would be resolved by too few strips
+        force = np.maximum(force, problem.greatest_load) + problem.inputs.normal_force_offset
+        batch = replace(batch, normal_force=np.broadcast_to(force, problem.shape).ravel())
         contacts = problem.model.solve(batch, warm=contacts)
     approach = problem.values_of(contacts, "approach") - problem.nominal_gap.min(axis=-1)
     if not np.isfinite(approach).all():
@@ -370,4 +370,4 @@ def _fresh_approach(problem: WearProblem, contacts: ContactBatchSolution) -> Flo
             " with a stiffness depends on it; choose another contact.model, or a load without"
             " stiffness"
         )
-    return problem.per_roller(approach)
+    return problem.per_roller(approach / batch.normal_force.reshape(problem.shape) ** HERTZ)

@@ -75,8 +75,8 @@ class PassLoop:
         Load lost per displacement of a roller towards the cylinder [N/m]. The load and the contact
         of a pass are solved together: the displacement is the approach of the pass, less the least
         gap of the unworn bodies, less `fresh_approach`.
-    fresh_approach : ndarray, shape (contacts,)
-        Elastic approach at which a roller on unworn bodies is not displaced [m].
+    fresh_approach : ndarray, shape (passes,)
+        Elastic approach of unworn bodies in each pass, which does not displace the roller [m].
     nominal_gap, from_apex : ndarray, shape (contacts, strips)
         Gap before wear and axial distance from the roller's apex [m].
     longitudinal_curvature, rolling_speed : ndarray, shape (contacts,)

@@ -285,7 +285,6 @@ def _pass_loop(fixture: ContactFixture) -> PassLoop:
     case, y, shape = fixture.case, fixture.grid.y, (2, fixture.grid.strips)
     overlap = fixture.solution.approach - float(fixture.gap.min())
     gaps = np.array([fixture.gaps["fresh"], fixture.gaps["off centre"]])
-    fresh = np.array([1.0, 0.9]) * overlap
     # the largest wear of a pass is 1e-4 of the approach
     factor = 1e-4 * overlap * case.rolling_speed / float(fixture.solution.dissipation.max())
     ramp = np.linspace(-1.0, 1.0, _PASSES)
@@ -298,7 +297,7 @@ def _pass_loop(fixture: ContactFixture) -> PassLoop:
         tilt=1e-5 * ramp,
         spin=0.05 * ramp,
         stiffness=0.1 * case.normal_force / overlap,
-        fresh_approach=fresh,
+        fresh_approach=overlap * (1.0 - 0.05 * ramp),
         nominal_gap=gaps,
         from_apex=np.array([y, y - 0.05 * case.width]),
         longitudinal_curvature=case.curvature * np.array([1.0, 1.1]),
@@ -315,7 +314,7 @@ def _pass_loop(fixture: ContactFixture) -> PassLoop:
         line_load=np.zeros(shape),
         anchor=np.zeros(shape),
         anchor_gap=np.zeros(shape),
-        approach=gaps.min(axis=1) + fresh,
+        approach=gaps.min(axis=1) + overlap,
         anchor_approach=np.zeros(2),
         energy=np.zeros(2),
     )
@@ -333,9 +332,9 @@ def _run_single_solves(fixture: ContactFixture, loop: PassLoop) -> None:
             friction=float(loop.friction[p]),
         )
         point = replace(point, rolling_speed=float(loop.rolling_speed[g]))
-        approach = float(gap.min() + loop.fresh_approach[g])
+        approach = float(gap.min() + loop.fresh_approach[p])
         for _ in range(_LOAD_ITERATIONS):
-            displacement = approach - float(unworn.min() + loop.fresh_approach[g])
+            displacement = approach - float(unworn.min() + loop.fresh_approach[p])
             load = loop.base_load[p] + loop.terms[:, g].sum() - loop.stiffness * displacement
             point = replace(point, normal_force=float(load))
             solution = fixture.model.solve_one(gap, float(loop.longitudinal_curvature[g]), point)

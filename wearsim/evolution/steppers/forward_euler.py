@@ -21,7 +21,6 @@ from wearsim.evolution.steppers.loads import (
     checked_loads,
     displacement_at,
     elastic_approach,
-    elastic_approaches,
     mean_loads,
 )
 from wearsim.evolution.steppers.single_step import (
@@ -30,6 +29,7 @@ from wearsim.evolution.steppers.single_step import (
     contacts_at,
     explicit_step,
     present_problem,
+    recovery_at,
     solve_present,
 )
 from wearsim.types import FloatArray
@@ -194,10 +194,7 @@ def _errors(problem: WearProblem, start: WearState, end: WearState, step: FloatA
     """
     # processes at their means over the step, as in the step
     here = problem.at_time(problem.time(start.passes), problem.time(start.passes + step))
-    elastic = None
-    if problem.has_spring:
-        elastic = elastic_approaches(present_problem(problem, end), end)
-    displacement = displacement_at(here, start, (start.depths, end.depths), elastic)
+    displacement = displacement_at(here, (start.depths, end.depths), recovery_at(problem, end)[1])
     loads = checked_loads(start, mean_loads(here, start, step, displacement, end.contacts))
     solve = solve_present if problem.varying else contacts_at
     wear = WearIncrement(here, solve(here, end, loads), step)

@@ -10,7 +10,7 @@ from wearsim.contact_batch import ContactBatchSolution
 from wearsim.errors import StepError
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import values_between
-from wearsim.evolution.state import LEAST_LOAD, Depths, WearState
+from wearsim.evolution.state import HERTZ, LEAST_LOAD, Depths, WearState
 from wearsim.types import FloatArray
 
 APPROACH_EXPONENT = 0.75  # approach as a power of the load: 2/3 in a Hertzian contact, 1 in a flat
@@ -36,8 +36,7 @@ def mean_loads(
         mean_power, duration = power.mean(axis=0), float((stop - start)[0])
         each = zip(problem.terms.values(), state.terms, strict=True)
         terms = [term.mean_force(value, mean_power, duration) for term, value in each]
-    force = values_between([load.mean for load in problem.loads], start, stop)
-    return with_feedback(problem, force, displacement, terms)
+    return with_feedback(problem, mean_force(problem, state, passes), displacement, terms)
 
 
 def with_feedback(
@@ -90,20 +89,35 @@ def elastic_approaches(problem: WearProblem, state: WearState) -> FloatArray:
     return np.asarray(problem.values_of(state.contacts, "approach") - least_gap)
 
 
-def displacement_at(
-    problem: WearProblem, state: WearState, depths: Sequence[Depths], elastic: FloatArray | None
-) -> FloatArray:
-    """Return the displacement of each contact's roller since the start, shape (S, C, N) [m].
+def fresh_approach(problem: WearProblem, state: WearState, force: FloatArray) -> FloatArray:
+    """Return the elastic approach of unworn bodies under a load before feedback, (S, C, N) [m].
 
-    A mounting spring extends by it: the mean of the worn descents at `depths`, less the fall of the
-    elastic approach from the fresh bodies to `elastic` (None: no fall). It is 0 without a spring.
+    It is zero without a spring.
+    """
+    if state.approach_factor is None:
+        return np.zeros(())
+    loads = np.maximum(force + problem.inputs.normal_force_offset, 0.0)
+    return np.asarray(problem.at_contacts(state.approach_factor) * loads**HERTZ)
+
+
+def displacement_at(
+    problem: WearProblem, depths: Sequence[Depths], recovered: FloatArray
+) -> FloatArray:
+    """Return the displacement of each contact's roller, shape (S, C, N) [m].
+
+    A mounting spring extends by it: the mean of the worn descents at `depths`, less the elastic
+    recovery, by which the elastic approach is below that of unworn bodies under the load before
+    feedback. It is zero without a spring.
     """
     if not problem.has_spring:
         return np.zeros(())
-    worn = np.mean([descents(problem, one) for one in depths], axis=0)
-    if elastic is None or state.fresh_approach is None:
-        return np.asarray(worn)
-    return np.asarray(worn + (elastic - problem.at_contacts(state.fresh_approach)))
+    return np.asarray(np.mean([descents(problem, one) for one in depths], axis=0) - recovered)
+
+
+def mean_force(problem: WearProblem, state: WearState, passes: FloatArray) -> FloatArray:
+    """Return the exact mean over a step of the load before feedback, shape (N,) [N]."""
+    start, stop = problem.time(state.passes), problem.time(state.passes + passes)
+    return values_between([load.mean for load in problem.loads], start, stop)
 
 
 def corrected_loads(

@@ -12,7 +12,7 @@ from wearsim.contact_batch import ContactBatchSolution
 from wearsim.errors import StepError
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import Redraw
-from wearsim.evolution.state import WearState, contact_batch, joined_states
+from wearsim.evolution.state import HERTZ, WearState, contact_batch, joined_states
 from wearsim.evolution.steppers.base import Attempt, Step, Stepper
 from wearsim.evolution.steppers.loads import APPROACH_EXPONENT
 from wearsim.evolution.steppers.single_step import MAX_LOAD_ITERATIONS, solve_at_record
@@ -125,6 +125,14 @@ def _passes(
     return force + inputs.normal_force_offset, passes
 
 
+def _fresh_approaches(state: WearState, force: FloatArray, passes: WearProblem) -> FloatArray:
+    """Return the elastic approach of unworn bodies in each pass, shape (stations, passes) [m]."""
+    if state.approach_factor is None:
+        return np.zeros((passes.shape[0], len(force)))
+    factor = state.approach_factor[:, passes.roller, 0]
+    return np.asarray(factor * np.maximum(force[:, 0], 0.0) ** HERTZ)
+
+
 def _term_rates(problem: WearProblem) -> FloatArray:
     """Return each term's gain [N/W] and, per roller, its relaxation per pass.
 
@@ -164,18 +172,16 @@ def run_compiled(
     )
     line_load, anchor, anchor_gap = loop_strips.reshape(3, rollers, strips)
     approach, anchor_approach, energy = loop_contacts.reshape(3, rollers)
-    fresh = np.zeros(rollers)
-    if state.fresh_approach is not None:
-        fresh = state.fresh_approach[0, :, 0].copy()
-        if state.loop_contacts is None:
-            approach[:] = fresh + problem.nominal_gap.min(axis=-1)[0, :, 0]
     slip_base, spin_arm, slip_rates = _slip_base(problem)
     kinematics, speed = problem.kinematics, problem.kinematics.rolling_speed
     (load,), (law,) = problem.loads, problem.laws
     per_power = [law.depth_per_dissipation(body, speed) or 0.0 for body in BODIES]
     ratio = kinematics.cylinder_radius / kinematics.roller_radius
     force, passes = _passes(problem, state, count, redraw)
-    inputs = passes.inputs
+    inputs, fresh = passes.inputs, _fresh_approaches(state, force, passes)
+    if state.loop_contacts is None and state.approach_factor is not None:
+        first = fresh.max() * state.approach_factor[0, :, 0] / state.approach_factor.max()
+        approach[:] = first + problem.nominal_gap.min(axis=-1)[0, :, 0]
     loop = PassLoop(
         order=turn_order(problem),
         first_pass=int(state.passes[0]),
@@ -185,7 +191,7 @@ def run_compiled(
         tilt=inputs.tilt.ravel() * (1.0 if problem.tilt_shifts else 0.0),
         spin=passes.spin.ravel(),
         stiffness=load.stiffness,
-        fresh_approach=fresh,
+        fresh_approach=fresh[0],
         nominal_gap=np.array(problem.flat_gap[0, :, 0]),
         from_apex=np.array(problem.from_apex[:, 0]),
         longitudinal_curvature=np.full(rollers, kinematics.longitudinal_curvature),
@@ -229,6 +235,7 @@ def run_in_python(
     """Run `count` passes of a single realisation by full solves: slow, but for any plugin."""
     kinematics, speed = problem.kinematics, problem.kinematics.rolling_speed
     force, passes = _passes(problem, state, count, redraw)
+    fresh = _fresh_approaches(state, force, passes)
     cylinder, roller = state.cylinder_depth.copy(), state.roller_depth.copy()
     terms, energy = state.terms.copy(), state.energy.copy()
     contacts, stations = list(state.contacts), problem.shape[0]
@@ -243,9 +250,7 @@ def run_in_python(
             unworn = one.nominal_gap[s, 0, 0]
             gap = unworn + cylinder[s, 0, 0] + roller[0, r, 0]
             free = float(force[number, 0]) + float(terms[:, r, 0].sum())
-            zero = float(unworn.min())
-            if state.fresh_approach is not None:
-                zero += float(state.fresh_approach[s, r, 0])
+            zero = float(unworn.min() + fresh[s, number])
             most = free - problem.loads[0].stiffness * (float(gap.min()) - zero)
             if problem.pauses and min(most, float(force[number, 0])) <= 0.0:
                 for t, term in enumerate(problem.terms.values()):

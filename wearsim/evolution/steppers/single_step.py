@@ -16,6 +16,7 @@ from wearsim.evolution.steppers.loads import (
     corrected_loads,
     displacement_at,
     elastic_approaches,
+    fresh_approach,
     mean_loads,
     with_feedback,
 )
@@ -134,6 +135,7 @@ def solve_loaded(
     problem: WearProblem,
     state: WearState,
     loads_at: Callable[[FloatArray], FloatArray],
+    fresh: FloatArray,
     elastic: FloatArray | None,
     solve: Callable[[WearProblem, WearState, FloatArray], ContactBatchSolution],
 ) -> tuple[ContactBatchSolution, FloatArray, int]:
@@ -149,8 +151,10 @@ def solve_loaded(
         Profiles, and contacts for the solver to start from.
     loads_at : callable
         Function from the displacement of the rollers [m] to the loads [N], (S, C, N) both.
+    fresh : ndarray, shape (stations, contacts, realisations)
+        Elastic approach of unworn bodies under the load before feedback, see `fresh_approach` [m].
     elastic : ndarray, shape (stations, contacts, realisations), optional
-        First guess of the elastic approach, by default that of fresh bodies.
+        First guess of the elastic approach, by default `fresh` [m].
     solve : callable
         Solves the contacts of a state the first time, `solve_present` or `contacts_at`.
 
@@ -166,7 +170,8 @@ def solve_loaded(
     StepError
         If a load is not positive, or the iteration does not converge.
     """
-    loads = loads_at(displacement_at(problem, state, [state.depths], elastic))
+    first = fresh if elastic is None else elastic
+    loads = loads_at(displacement_at(problem, [state.depths], fresh - first))
     contacts = solve(problem, state, checked_loads(state, loads))
     solves = int(contacts is not state.contacts)
     if not problem.has_spring:
@@ -174,7 +179,7 @@ def solve_loaded(
     for _ in range(MAX_LOAD_ITERATIONS):
         state = state.replaced(contacts=contacts)
         elastic = elastic_approaches(problem, state)
-        target = loads_at(displacement_at(problem, state, [state.depths], elastic))
+        target = loads_at(displacement_at(problem, [state.depths], fresh - elastic))
         open_ = np.abs(target - loads) > problem.iteration_tolerance * loads
         if not np.count_nonzero(open_):
             return contacts, loads, solves
@@ -231,20 +236,33 @@ def _solve_now(
 
     if problem.varying and solve is contacts_at:
         solve = solve_present  # the contacts were solved with other values of the processes
-    return solve_loaded(present, state, loads_at, elastic, solve)
+    fresh = fresh_approach(present, state, force)
+    return solve_loaded(present, state, loads_at, fresh, elastic, solve)
+
+
+def recovery_at(problem: WearProblem, state: WearState) -> tuple[FloatArray, FloatArray]:
+    """Return elastic approach and elastic recovery of contacts at the present loads [m].
+
+    Both have the shape (S, C, N), and are zero without a spring.
+    """
+    if not problem.has_spring:
+        return np.zeros(()), np.zeros(())
+    present = present_problem(problem, state)
+    elastic = elastic_approaches(present, state)
+    return elastic, fresh_approach(
+        present, state, present.force(present.time(state.passes))
+    ) - elastic
 
 
 def explicit_step(problem: WearProblem, state: WearState, passes: FloatArray) -> WearState:
     """Step over `passes` passes on the profiles of the step's start, under its mean load.
 
-    The elastic approach of the start applies to the mean load of the step.
+    The elastic recovery of the start applies to the mean load of the step.
     """
     here = problem.at_time(problem.time(state.passes), problem.time(state.passes + passes))
     predicted = state.with_added(WearIncrement(here, state.contacts, passes).depths)
-    elastic = None
-    if problem.has_spring:
-        elastic = elastic_approaches(present_problem(problem, state), state)
-    displacement = displacement_at(here, state, (state.depths, predicted.depths), elastic)
+    elastic, recovered = recovery_at(problem, state)
+    displacement = displacement_at(here, (state.depths, predicted.depths), recovered)
     mean = mean_loads(here, state, passes, displacement, state.contacts)
     solve = solve_present if problem.varying else contacts_at
     contacts = solve(here, state, checked_loads(state, mean))

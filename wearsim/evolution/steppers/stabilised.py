@@ -14,11 +14,16 @@ from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.base import Step
 from wearsim.evolution.steppers.forward_euler import decay_rates
-from wearsim.evolution.steppers.loads import elastic_approaches, mean_loads
+from wearsim.evolution.steppers.loads import (
+    elastic_approaches,
+    fresh_approach,
+    mean_force,
+    mean_loads,
+)
 from wearsim.evolution.steppers.single_step import (
     WearIncrement,
     contacts_at,
-    present_problem,
+    recovery_at,
     solve_at_present_loads,
     solve_loaded,
     solve_present,
@@ -120,9 +125,7 @@ def stabilised_step(
         np.zeros(problem.shape),
     )
     solve = solve_present if problem.varying else contacts_at
-    elastic = None
-    if problem.has_spring:
-        elastic = elastic_approaches(present_problem(problem, state), state)
+    elastic, _ = recovery_at(problem, state)
     contacts, first, elastic, solves = _rate(here, state, passes, before, elastic, solve)
     change = _sum((stages[0][3], first))
     for weights in stages[1:]:
@@ -143,9 +146,9 @@ def _rate(
     state: WearState,
     passes: FloatArray,
     change: Change,
-    elastic: FloatArray | None,
+    elastic: FloatArray,
     solve: Callable[[WearProblem, WearState, FloatArray], ContactBatchSolution] = solve_present,
-) -> tuple[ContactBatchSolution, Change, FloatArray | None, int]:
+) -> tuple[ContactBatchSolution, Change, FloatArray, int]:
     """Return the contacts on the profiles of a stage, and the change in a whole step with them.
 
     The load is the mean over the step, with the spring force at the displacement of the stage.
@@ -160,8 +163,8 @@ def _rate(
         Length of the step.
     change : Change
         Change from the start to the stage.
-    elastic : ndarray, optional
-        Elastic approach of the previous stage [m], where a load has a spring.
+    elastic : ndarray, shape (stations, contacts, realisations)
+        Elastic approach of the previous stage [m], zero without a spring.
     solve : callable
         Solves the contacts on the profiles of a state under given loads.
 
@@ -169,7 +172,7 @@ def _rate(
     -------
     contacts : ContactBatchSolution
     change : Change
-    elastic : ndarray, optional
+    elastic : ndarray
         Elastic approach of the stage [m].
     solves : int
         Number of solutions of all contacts.
@@ -179,7 +182,8 @@ def _rate(
     def loads_at(displacement: FloatArray) -> FloatArray:
         return mean_loads(here, state, passes, displacement, state.contacts)
 
-    contacts, _, solves = solve_loaded(here, stage, loads_at, elastic, solve)
+    fresh = fresh_approach(here, state, mean_force(here, state, passes))
+    contacts, _, solves = solve_loaded(here, stage, loads_at, fresh, elastic, solve)
     if here.has_spring:
         elastic = elastic_approaches(here, stage.replaced(contacts=contacts))
     wear = WearIncrement(here, contacts, passes)

@@ -27,6 +27,8 @@ from wearsim.evolution.steppers.loads import (
     displacement_at,
     elastic_approach,
     elastic_approaches,
+    fresh_approach,
+    mean_force,
     mean_loads,
 )
 from wearsim.evolution.steppers.single_step import (
@@ -152,8 +154,8 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
     contacts = state.contacts
     wear = WearIncrement(problem, contacts, passes)
     ends = state.with_added(wear.depths)
-    elastic = start = elastic_approaches(problem, state) if problem.has_spring else None
-    displacement = displacement_at(problem, state, (state.depths, ends.depths), elastic)
+    fresh, start, steady = _start_of_spring(problem, state, passes)
+    displacement = displacement_at(problem, (state.depths, ends.depths), start)
     loads = checked_loads(state, mean_loads(problem, state, passes, displacement, contacts))
     active = np.ones(problem.shape[REALISATION], dtype=np.bool_)
     iterations = np.zeros(len(active), dtype=np.int64)
@@ -166,11 +168,13 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
         predicted = wear.predicted_opening(problem.values_of(solved, "line_load"))
         change, new_loads = _relative_change(new.opening, predicted), loads
         if problem.has_spring or problem.terms:
-            if start is not None:
-                elastic = elastic_approaches(problem, ends.replaced(contacts=solved))
-                # a process may have changed the tilt since the contacts of the start were solved
-                elastic = elastic if varying else 0.5 * (start + elastic)
-            displacement = displacement_at(problem, state, (state.depths, ends.depths), elastic)
+            recovered = start
+            if problem.has_spring:
+                recovered = fresh - elastic_approaches(problem, ends.replaced(contacts=solved))
+                # a process may have changed the tilt, and a log the load, of the contacts at start
+                both = steady & (not varying)
+                recovered = np.where(both, 0.5 * (start + recovered), recovered)
+            displacement = displacement_at(problem, (state.depths, ends.depths), recovered)
             new_loads = mean_loads(problem, state, passes, displacement, solved)
             change = np.maximum(change, _relative_change(new_loads, loads))
             if problem.has_spring:
@@ -193,6 +197,28 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
         f" converge (last relative change {change.max():.1e})",
         state.to_arrays(),
     )
+
+
+def _start_of_spring(
+    problem: WearProblem, state: WearState, passes: FloatArray
+) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Return the elastic approach of unworn bodies and the recovery at the start of a step [m].
+
+    Returns
+    -------
+    fresh : ndarray, shape (stations, contacts, realisations)
+        See `fresh_approach`, under the mean load before feedback.
+    recovered : ndarray, shape (stations, contacts, realisations)
+        From the contacts of the state.
+    steady : ndarray of bool, shape (realisations,)
+        Whether the load before feedback is constant, so that the recovery is that of the start.
+    """
+    if not problem.has_spring:
+        return np.zeros(()), np.zeros(()), np.zeros((), dtype=np.bool_)
+    force = mean_force(problem, state, passes)
+    fresh = fresh_approach(problem, state, force)
+    steady = force == problem.force(problem.time(state.passes))
+    return fresh, fresh - elastic_approaches(problem, state), steady
 
 
 def solve_compliant(

@@ -144,8 +144,8 @@ def run_passes(
         its mean longitudinal and lateral creepage (passes, 2).
     stiffness : float
         Decrease of the load per displacement of a roller [N/m].
-    fresh_approach : ndarray, shape (contacts,)
-        Elastic approach at which a roller on unworn bodies is not displaced [m].
+    fresh_approach : ndarray, shape (passes,)
+        Elastic approach of unworn bodies in each pass, which does not displace the roller [m].
     rests : bool
         Whether a pass without load wears nothing, instead of being an error.
     terms : ndarray, shape (terms, contacts)
@@ -189,7 +189,7 @@ def run_passes(
             unworn = nominal_gap[g, i] + passes.tilt[p] * from_apex[g, i]
             state.gap[i] = unworn + wear.cylinder_depth[i] + wear.roller_depth[g, i]
             lowest, lowest_unworn = min(lowest, state.gap[i]), min(lowest_unworn, unworn)
-        free, zero, fully = passes.base_load[p], lowest_unworn + fresh_approach[g], False
+        free, zero, fully = passes.base_load[p], lowest_unworn + fresh_approach[p], False
         for t in range(terms.shape[0]):
             free += terms[t, g]
         most = free - stiffness * (lowest - zero)  # without elastic approach

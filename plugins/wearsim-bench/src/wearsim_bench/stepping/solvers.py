@@ -11,10 +11,10 @@ from wearsim.errors import StepError
 from wearsim.evolution.error_estimates import DEPTHS
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState, fresh_state
-from wearsim.evolution.steppers.loads import elastic_approaches
 from wearsim.evolution.steppers.single_step import (
     WearIncrement,
     present_problem,
+    recovery_at,
     solve_at_present_loads,
 )
 from wearsim.types import FloatArray
@@ -80,8 +80,7 @@ class _Rates:
         state = self.state_at(passes, depths)
         contacts, _, solves = solve_at_present_loads(self.problem, state, self.elastic)
         self.state = replace(state, contacts=contacts)
-        if self.problem.has_spring:
-            self.elastic = elastic_approaches(present_problem(self.problem, state), self.state)
+        self.elastic, _ = recovery_at(self.problem, self.state)
         self.solves += solves * len(contacts)
         return self._joined(self._wear())
 
