@@ -15,7 +15,7 @@ from wearsim.cli.app import app
 from wearsim.results import open_results
 from wearsim.results.dissipation import DISSIPATION
 from wearsim.results.ensemble.schema import ENSEMBLE
-from wearsim.results.run import RUN
+from wearsim.results.run_schema import RUN
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]

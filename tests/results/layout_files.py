@@ -14,7 +14,7 @@ from test_dissipation_files import some_study
 from wearsim.results import DissipationData, EnsembleFile, RunData, write_results
 from wearsim.results.dissipation import DISSIPATION
 from wearsim.results.ensemble.schema import ENSEMBLE
-from wearsim.results.run import RUN
+from wearsim.results.run_schema import RUN
 
 FOLDER = Path(__file__).parent / "data"
 LAYOUTS = {

@@ -6,7 +6,7 @@ import numpy as np
 
 from wearsim.results import RunData
 from wearsim.results.content import Arrays
-from wearsim.results.run import AXES, VARIABLES
+from wearsim.results.run_schema import AXES, VARIABLES
 
 SCENARIO = 'title = "a rig"\n# µ = 0.1\n[load]\nfile = "load.csv"\n'
 LOG = "time [s],load [N]\n0,300\n60,310\n"

@@ -10,7 +10,7 @@ import pytest
 from run_examples import some_run
 
 from wearsim.results import Result, open_results, write_results
-from wearsim.results.run import VARIABLES
+from wearsim.results.run_schema import VARIABLES
 from wearsim.scenario import load_scenario
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"

@@ -18,7 +18,8 @@ from wearsim.results.ensemble.data import EnsembleData
 from wearsim.results.ensemble.result import EnsembleResult
 from wearsim.results.ensemble.schema import FAILED, OBSERVABLES, PENDING
 from wearsim.results.io.atomic_write import replacement
-from wearsim.results.run import AXES, VARIABLES, Result, RunData
+from wearsim.results.run import Result, RunData
+from wearsim.results.run_schema import AXES, VARIABLES
 from wearsim.types import FloatArray
 from wearsim.units import engineers_unit
 

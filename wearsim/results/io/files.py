@@ -29,7 +29,8 @@ from wearsim.results.dissipation import (
 )
 from wearsim.results.ensemble.schema import ENSEMBLE
 from wearsim.results.io.atomic_write import DISK, Storage
-from wearsim.results.run import RUN, RunData
+from wearsim.results.run import RunData
+from wearsim.results.run_schema import RUN
 
 if TYPE_CHECKING:
     import h5py

@@ -19,7 +19,7 @@ from wearsim.evolution.state import WearState, joined_states
 from wearsim.evolution.steppers.base import SMALLEST_STEP, Step, Stepper
 from wearsim.evolution.steppers.loads import descents, elastic_approaches
 from wearsim.evolution.steppers.single_step import present_problem, solve_at_record
-from wearsim.results.run import VARIABLES
+from wearsim.results.run_schema import VARIABLES
 from wearsim.studies.run.schedule import RecordSchedule
 from wearsim.types import FloatArray
 

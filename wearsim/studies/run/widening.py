@@ -8,7 +8,7 @@ import numpy as np
 
 from wearsim.evolution.state import WearState, widened, widened_state
 from wearsim.results import RunData
-from wearsim.results.run import VARIABLES
+from wearsim.results.run_schema import VARIABLES
 from wearsim.studies.run.draws import Draws
 from wearsim.studies.run.grid import strips_of_run
 

@@ -1,0 +1,118 @@
+"""Axes and variables in the results file of one wear test."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from wearsim.results.content import Axis, Schema, Variable, by_name
+
+# every axis except y, whose coordinate is a variable
+AXES: Mapping[str, Axis] = by_name(
+    (
+        Axis("step", "row of the history; row 0 is the start of the run", 0),
+        Axis("record", "record of profiles and contacts"),
+        Axis("station", "station around the cylinder"),
+        Axis("roller", "roller; identical rollers are merged"),
+        Axis("realisation", "realisation of the random inputs"),
+    )
+)
+
+_UNWORN = ("station", "roller", "realisation", "y")
+_STEP = ("step",)
+_TEST = ("step", "realisation")
+_ROLLER = ("step", "roller", "realisation")
+_CYLINDER_PROFILE = ("record", "station", "realisation", "y")
+_ROLLER_PROFILE = ("record", "roller", "realisation", "y")
+_CONTACT = ("record", "station", "roller", "realisation", "y")
+
+VARIABLES: Mapping[str, Variable] = by_name(
+    (
+        Variable("y", ("y",), "m", "axial position", "static"),
+        Variable("nominal_gap", _UNWORN, "m", "gap before wear", "static"),
+        Variable(
+            "start_height",
+            ("y",),
+            "m",
+            "height of the cylinder above its nominal shape at the start of the run",
+            "static",
+        ),
+        Variable(
+            "multiplicity", ("roller",), "1", "physical rollers per computed roller", "static"
+        ),
+        Variable("passes", _STEP, "1", "roller passes, all rollers together", "history"),
+        Variable("time", _STEP, "s", "simulated time", "history"),
+        Variable("step_passes", _STEP, "1", "roller passes of the step", "history"),
+        Variable(
+            "depth",
+            _TEST,
+            "m",
+            "greatest depth of the cylinder worn since the start of the run",
+            "history",
+        ),
+        Variable("width", _TEST, "m", "width of the groove in the cylinder", "history"),
+        Variable("worn_volume", _TEST, "m^3", "worn volume of the cylinder", "history"),
+        Variable(
+            "roller_depth",
+            _ROLLER,
+            "m",
+            "greatest depth of a roller worn since the start of the run",
+            "history",
+        ),
+        Variable(
+            "roller_worn_volume", _ROLLER, "m^3", "worn volume of one physical roller", "history"
+        ),
+        Variable(
+            "dissipated_energy",
+            _TEST,
+            "J",
+            "energy dissipated by all rollers since the start of the run",
+            "history",
+        ),
+        Variable("power", _TEST, "W", "dissipated power of all rollers", "history"),
+        Variable("normal_force", _ROLLER, "N", "normal force of a roller", "history"),
+        Variable("peak_pressure", _ROLLER, "Pa", "greatest normal pressure", "history"),
+        Variable("approach", _ROLLER, "m", "approach of the bodies", "history"),
+        Variable("descent", _ROLLER, "m", "worn descent of a roller", "history"),
+        Variable(
+            "elastic_approach", _ROLLER, "m", "elastic part of the approach of a roller", "history"
+        ),
+        Variable("longitudinal_creepage", _ROLLER, "1", "mean longitudinal creepage", "history"),
+        Variable(
+            "adhesion_fraction", _ROLLER, "1", "part of the contact area that adheres", "history"
+        ),
+        Variable(
+            "depth_error", _TEST, "m", "estimated error of the depth of either body", "history"
+        ),
+        Variable(
+            "volume_error",
+            _TEST,
+            "m^3",
+            "estimated error of the volume worn off both bodies",
+            "history",
+        ),
+        Variable("rejected", _STEP, "1", "rejected steps so far", "history"),
+        Variable("solves", _STEP, "1", "contact solves of accepted steps so far", "history"),
+        Variable("full_solves", _STEP, "1", "roller passes solved in full so far", "history"),
+        Variable("record_passes", ("record",), "1", "roller passes at a record", "record"),
+        Variable("record_time", ("record",), "s", "simulated time at a record", "record"),
+        Variable(
+            "cylinder_depth_profile",
+            _CYLINDER_PROFILE,
+            "m",
+            "worn depth of the cylinder, positive down",
+            "record",
+        ),
+        Variable(
+            "roller_depth_profile",
+            _ROLLER_PROFILE,
+            "m",
+            "worn depth of a roller, positive into the roller",
+            "record",
+        ),
+        Variable("line_load", _CONTACT, "N/m", "normal force per axial length", "record"),
+        Variable("half_length", _CONTACT, "m", "half-length of the contact", "record"),
+        Variable("dissipation", _CONTACT, "W/m", "dissipated power per axial length", "record"),
+    )
+)
+
+RUN = Schema("wearsim-run", 3, "a wear test, from `wearsim run`", AXES, VARIABLES)
