@@ -1,4 +1,4 @@
-"""Results of one wear test: schema of the file, its content, and the result in SI."""
+"""Results of one wear test: content of the file, and the result in SI."""
 
 from __future__ import annotations
 

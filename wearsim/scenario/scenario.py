@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 from typing import TypeAlias
 
 from wearsim.errors import Mistake, ScenarioError
-from wearsim.input_files import read_input
 from wearsim.profiles import split_name
 from wearsim.scenario.parse.fields import RandomInput
-from wearsim.scenario.parse.toml import parse_fields
+from wearsim.scenario.parse.toml import flat, parse_fields, reader_in
 from wearsim.scenario.tables.bodies import Cylinder, Roller
 from wearsim.scenario.tables.plain import (
     CreepageTable,
@@ -137,7 +136,7 @@ class Scenario:
         >>> wearsim.Scenario.from_toml(text, {"operation.rollers": 1}).total_passes
         450000
         """
-        return parse_scenario(text, str(Path(folder) / name), _reader(Path(folder)), overrides)
+        return parse_scenario(text, str(Path(folder) / name), reader_in(Path(folder)), overrides)
 
     @classmethod
     def from_dict(
@@ -177,7 +176,7 @@ class Scenario:
         >>> print(f"{wearsim.solve_contact(scenario).power:.3f} W")
         0.061 W
         """
-        return cls.from_toml("", dict(_flat(tables)), folder=folder, name=name)
+        return cls.from_toml("", dict(flat(tables)), folder=folder, name=name)
 
     def changed(self, overrides: Mapping[str, object]) -> Scenario:
         """Return a scenario with other values.
@@ -202,7 +201,7 @@ class Scenario:
         >>> scenario.total_passes
         90000
         """
-        read = _reader(Path(self.file).parent)
+        read = reader_in(Path(self.file).parent)
 
         def read_again(name: str) -> str:
             return self.files[name] if name in self.files else read(name)
@@ -301,25 +300,6 @@ def require_run(scenario: Scenario) -> None:
         raise ScenarioError(scenario.file, mistakes)
 
 
-def _flat(tables: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, object]]:
-    """Yield the values of nested tables by dotted key."""
-    for key, value in tables.items():
-        if isinstance(value, Mapping) and value:
-            yield from _flat(value, f"{prefix}{key}.")
-        else:
-            yield f"{prefix}{key}", value
-
-
-def _reader(folder: Path) -> Callable[[str], str]:
-    """Return a function that reads the input files in a folder."""
-
-    def read(name: str) -> str:
-        file, choice = split_name(name)
-        return read_input(folder / file, choice)
-
-    return read
-
-
 def load_scenario(path: str | Path, overrides: Mapping[str, object] | None = None) -> Scenario:
     """Read a scenario from a TOML file.
 
@@ -356,17 +336,15 @@ def load_scenario(path: str | Path, overrides: Mapping[str, object] | None = Non
         what, shell, python = "is not text in UTF-8", "", ""
         if path.read_bytes().startswith(b"\x89HDF"):
             what = "is a results file, not a scenario"
-            shell, python = (
-                f"show it with: wearsim show {path}",
-                f'open it with wearsim.open_results("{path}")',
-            )
+            shell = f"show it with: wearsim show {path}"
+            python = f'open it with wearsim.open_results("{path}")'
         mistake = Mistake("", "", what)
         raise ScenarioError(str(path), [mistake], python=python, shell=shell) from error
     except OSError as error:
         raise ScenarioError(
             str(path), [Mistake("", "", f"the file cannot be read ({error.strerror})")]
         ) from error
-    return parse_scenario(text, str(path), _reader(path.parent), overrides)
+    return parse_scenario(text, str(path), reader_in(path.parent), overrides)
 
 
 def parse_scenario(

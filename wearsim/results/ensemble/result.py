@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from wearsim.errors import unknown_name
-from wearsim.results.content import StudyResult
-from wearsim.results.ensemble.data import Band, Course, Effect, EnsembleData
-from wearsim.results.ensemble.schema import DONE, OBSERVABLES, QUANTILES, kept_profiles
-from wearsim.results.tables import as_frame
-from wearsim.types import FloatArray, IntArray
+from wearsim.results.ensemble.data import Band, Course, Effect
+from wearsim.results.ensemble.schema import DONE, OBSERVABLES, QUANTILES
+from wearsim.results.ensemble.values import EnsembleValues
+from wearsim.types import FloatArray
 from wearsim.uq.estimation.estimates import Design, Estimate, Target, estimate
 from wearsim.uq.estimation.intervals import Interval
 from wearsim.uq.estimation.moments import summarise
@@ -22,15 +21,14 @@ from wearsim.uq.estimation.standard_errors import Control
 from wearsim.uq.sampling.sampler import REPLICATES
 
 if TYPE_CHECKING:
-    import pandas as pd
-    import xarray as xr
+    pass
 
 _READ_SIZE = 4_000_000  # numbers read at once
 PROBABILITIES = (0.025, 0.05, 0.5, 0.95, 0.975)
 
 
 @dataclass(frozen=True, eq=False)
-class EnsembleResult(StudyResult[EnsembleData]):
+class EnsembleResult(EnsembleValues):
     """Result of an ensemble of wear tests, from its successful realisations.
 
     Examples
@@ -47,181 +45,6 @@ class EnsembleResult(StudyResult[EnsembleData]):
         done = f"{self.count}" if self.finished else f"{self.count} of {self.requested}"
         depth = f", depth {self.estimate('depth').mean.value * 1e6:.4g} um" if self.count else ""
         return f"<EnsembleResult '{self.title}': {done} realisations{depth}>"
-
-    @property
-    def plan(self) -> Design:
-        """Name of the sampling design."""
-        return cast("Design", self.raw.plan)
-
-    @property
-    def until(self) -> str:
-        """Stopping criterion, such as "depth.mean 1%"; empty if there is none."""
-        return self.raw.until
-
-    @property
-    def requested(self) -> int:
-        """Requested number of realisations."""
-        return self.raw.requested
-
-    @property
-    def count(self) -> int:
-        """Number of successful realisations."""
-        return len(self.numbers)
-
-    @property
-    def failed(self) -> int:
-        """Number of failed realisations."""
-        return len(self.raw.failed)
-
-    @property
-    def errors(self) -> Mapping[int, str]:
-        """Error messages of failed realisations by their number."""
-        return self.raw.errors
-
-    @cached_property
-    def numbers(self) -> IntArray:
-        """Numbers of the successful realisations, shape (count,)."""
-        return self.raw.done
-
-    @property
-    def observables(self) -> tuple[str, ...]:
-        """Names of the observables."""
-        return tuple(OBSERVABLES)
-
-    @property
-    def y(self) -> FloatArray:
-        """Axial position of the strips [m]."""
-        return self.raw.variables["y"]
-
-    @property
-    def record_passes(self) -> FloatArray:
-        """Roller passes at each record; the first record is the start of the run."""
-        return self.raw.variables["record_passes"]
-
-    @property
-    def record_time(self) -> FloatArray:
-        """Simulated time at each record [s]."""
-        return self.raw.variables["record_time"]
-
-    def values(self, name: str) -> FloatArray:
-        """Return a variable of the successful realisations.
-
-        Parameters
-        ----------
-        name : str
-            An observable, such as "depth", or the dotted key of a drawn value.
-
-        Returns
-        -------
-        ndarray, shape (count, records) for an observable
-
-        Raises
-        ------
-        UnknownNameError
-            If there is no such variable; it lists the known ones.
-
-        Examples
-        --------
-        >>> tests = wearsim.open_results("rig-ensemble.h5")
-        >>> tests.values("depth").shape == (16, len(tests.record_passes))
-        True
-        """
-        return np.asarray(self.raw.rows(name, 0, None)[self.numbers])
-
-    def to_xarray(self) -> xr.Dataset:
-        """Return all variables of the results file as a dataset of xarray.
-
-        As for other results, but of the successful realisations only.
-
-        Examples
-        --------
-        >>> tests = wearsim.open_results("rig-ensemble.h5")
-        >>> tests.to_xarray().sizes["realisation"]
-        16
-        """
-        kept = np.flatnonzero(self.raw.status[: self.kept] == DONE)
-        return super().to_xarray().isel(realisation=self.numbers, kept=kept)
-
-    def to_dataframe(self) -> pd.DataFrame:
-        """Return the successful realisations as a table of pandas, one row each.
-
-        Returns
-        -------
-        pandas.DataFrame
-            Drawn values and results at the end of the test in SI; ``attrs["units"]`` has the unit
-            of each column. Values of several rollers are in columns "load.normal_force.1", ...
-
-        Raises
-        ------
-        ModuleNotFoundError
-            If pandas is not installed, which is part of the extra ``wearsim[data]``.
-
-        Examples
-        --------
-        >>> tests = wearsim.open_results("rig-ensemble.h5")
-        >>> table = tests.to_dataframe()
-        >>> bool(table["friction.coefficient"].corr(table["depth"]) > 0.99)
-        True
-        """
-        columns = [
-            (name, item.unit, self.at_end(name) if name in OBSERVABLES else self.values(name))
-            for name, item in self.raw.schema.variables.items()
-            if item.dims[0] == "realisation" and name not in {"status", "error"}
-        ]
-        return as_frame(columns, "realisation", self.numbers)
-
-    def at_end(self, name: str, record: int = -1) -> FloatArray:
-        """Return an observable at the end of the test, or at another record, shape (count,).
-
-        Raises
-        ------
-        UnknownNameError
-            If there is no such observable; it lists the known ones.
-
-        Examples
-        --------
-        >>> tests = wearsim.open_results("rig-ensemble.h5")
-        >>> print(f"{tests.at_end('depth').max() * 1e6:.0f} um")
-        54 um
-        """
-        if name not in OBSERVABLES:
-            raise unknown_name(name, "an observable", OBSERVABLES)
-        return self.raw.column(name, record)[self.numbers]
-
-    def independent(self, name: str, record: int = -1) -> tuple[IntArray, FloatArray]:
-        """Return numbers and values of the independent realisations.
-
-        These are all successful realisations, except with Saltelli's plan, which reuses draws.
-
-        Parameters
-        ----------
-        name : str
-            The observable.
-        record : int
-            The record; by default the end of the test.
-
-        Returns
-        -------
-        numbers : ndarray of int, shape (draws,)
-        values : ndarray, shape (draws,)
-
-        Examples
-        --------
-        >>> tests = wearsim.open_results("rig-ensemble.h5")
-        >>> numbers, values = tests.independent("depth")
-        >>> numbers.shape == values.shape == (16,)
-        True
-        """
-        chosen = self._independent
-        return self.numbers[chosen], self.at_end(name, record)[chosen]
-
-    @property
-    def inputs(self) -> dict[str, FloatArray]:
-        """Drawn values by scenario key, shape (count,) or (count, rollers) [SI].
-
-        The value of a random process is its mean over the test.
-        """
-        return {item["key"]: self.values(item["key"]) for item in self.raw.inputs}
 
     def estimate(
         self, name: str, record: int = -1, probabilities: tuple[float, ...] = PROBABILITIES
@@ -299,13 +122,6 @@ class EnsembleResult(StudyResult[EnsembleData]):
         """
         return {name: asdict(self.estimate(name)) for name in self.observables if self.count}
 
-    @cached_property
-    def _independent(self) -> slice | IntArray:
-        """Independent realisations: with Saltelli's plan, those of the blocks A and B."""
-        if self.plan != "saltelli":
-            return slice(None)
-        return np.flatnonzero(self.numbers % (len(self.raw.groups) + 2) < 2)
-
     def course(self, name: str) -> Course:
         """Return estimates of an observable at all records.
 
@@ -345,17 +161,6 @@ class EnsembleResult(StudyResult[EnsembleData]):
         for first in range(0, records, block):
             some = self.raw.rows(name, 0, None, slice(first, min(first + block, records)))
             yield from map(np.ascontiguousarray, some[self.numbers][self._independent].T)
-
-    @property
-    def kept(self) -> int:
-        """Number of realisations, starting with the first, whose profile is stored."""
-        return kept_profiles(self.requested, len(self.y))
-
-    @cached_property
-    def profiles(self) -> FloatArray:
-        """Worn depth of the cylinder at the end, shape (kept, strips) [m], without failed ones."""
-        kept = self.raw.variables["depth_profile"]
-        return np.asarray(kept[self.raw.status[: len(kept)] == DONE])
 
     def band(self) -> Band:
         """Return mean and 95 % band of the worn profiles at the end.

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable, Mapping, MutableMapping
-from pathlib import PurePath
+from collections.abc import Callable, Iterator, Mapping, MutableMapping
+from pathlib import Path, PurePath
 from typing import Any
 
 import numpy as np
 
 from wearsim.errors import Mistake, ScenarioError
+from wearsim.input_files import read_input
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.plugins import LoadSpec, Options, RandomInputSpec
+from wearsim.profiles import split_name
 from wearsim.quantities import DECIMAL_COMMA
 from wearsim.scenario.parse.fields import RandomInput, RandomInputTable
 from wearsim.scenario.parse.mistakes import Mistakes, installed, nearest
@@ -199,6 +201,25 @@ READERS: dict[str, Callable[[Mistakes, Mapping[str, object]], Any]] = {
     "wear": read_wear,
     "outputs": read_outputs,
 }
+
+
+def flat(tables: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, object]]:
+    """Yield the values of nested tables by dotted key."""
+    for key, value in tables.items():
+        if isinstance(value, Mapping) and value:
+            yield from flat(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value
+
+
+def reader_in(folder: Path) -> Callable[[str], str]:
+    """Return a function that reads the input files in a folder."""
+
+    def read(name: str) -> str:
+        file, choice = split_name(name)
+        return read_input(folder / file, choice)
+
+    return read
 
 
 def parse_fields(
