@@ -176,6 +176,11 @@ def test_contact_is_wider_than_a_measured_conformal_groove(
     assert narrow.exit_code == wide.exit_code == 0, narrow.stderr
     assert "the contact is wider than the profile: the strips span -9." in narrow.stderr
     assert "wider" not in wide.stderr
+    tilt = 'creepage.tilt={distribution="uniform", low="-0.5 mrad", high="0.5 mrad"}'
+    profile = ("--set", "cylinder.profile='narrow.csv'", "--set", tilt)
+    many = command("dissipation", scenario, *profile, "-n", 8, "--json")
+    assert many.exit_code == 0, many.stderr
+    assert json.loads(many.stdout)["realisations"] == 8
     fixed = ("--set", "contact.width='12 mm'")
     assert command("contact", scenario, "--profile", "narrow.csv", *fixed).exit_code == 1
 

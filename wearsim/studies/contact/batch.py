@@ -10,16 +10,21 @@ from functools import partial
 import numpy as np
 
 from wearsim.contact_batch import ContactBatch, ContactBatchSolution
-from wearsim.errors import CapabilityError, ContactError, Mistake, ScenarioError, SolverError
+from wearsim.errors import (
+    CapabilityError,
+    ContactError,
+    Mistake,
+    ScenarioError,
+    SolverError,
+    WearsimError,
+)
 from wearsim.evolution.state import unworn_contacts
 from wearsim.plugins import ContactModel, ContactModelSpec, FrictionField, registry
 from wearsim.scenario import RandomInput, Scenario, realise
+from wearsim.studies.contact.single import study_contact
 from wearsim.studies.run.assemble import build_problem, prepared_model
 from wearsim.studies.run.draws import Drawer, units_of
-from wearsim.studies.run.grid import (
-    contact_positions,
-    realisation_grid,
-)
+from wearsim.studies.run.grid import contact_positions, realisation_grid, wider_grid
 from wearsim.studies.run.inputs import (
     FIELDS,
     contact_inputs,
@@ -162,6 +167,14 @@ def _least(count: int, unresolved: Callable[[int], str | None]) -> int:
 _BETWEEN = np.array([0.01, 0.1, 0.25, 0.5, 0.75, 0.9, 0.99])
 
 
+def _is_wider_than_profile(scenario: Scenario) -> bool:
+    """Return whether the contact with every input at its mean is wider than the profile."""
+    try:
+        return study_contact(scenario).widened
+    except WearsimError:
+        return False
+
+
 class Realisations:
     """One contact of a scenario for every realisation of its random inputs.
 
@@ -192,6 +205,9 @@ class Realisations:
         self.loads = np.full(count, mean_load) + drawn.get("normal_force_offset", 0.0)
         centres = contact_positions(scenario, contact_inputs(scenario, [0], drawn))
         self.grid = realisation_grid(scenario, mean_load, self.loads, centres)
+        if scenario.cylinder.profile is not None and _is_wider_than_profile(scenario):
+            shift = float(np.ptp(centres))
+            self.grid = wider_grid(scenario, self.grid, float(self.loads.max()), shift) or self.grid
         self.model = prepared_model(scenario, self.grid)
         self._field = LocalFriction(scenario, self.model, field) if field is not None else None
         self.friction_points = 0 if self._field is None else self._checked_points(self._field)

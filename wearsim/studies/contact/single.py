@@ -55,6 +55,8 @@ class ContactStudy:
         Notes for the user.
     warnings : tuple of str
         Warnings of implausible inputs, and of a peak pressure that depends on the strips.
+    widened : bool
+        Whether the contact is wider than the profile, and strips were added.
 
     Examples
     --------
@@ -75,6 +77,7 @@ class ContactStudy:
     seconds: float | None
     notes: tuple[str, ...]
     warnings: tuple[str, ...]
+    widened: bool = False
 
 
 def study_contact(
@@ -154,6 +157,7 @@ def study_contact(
         seconds,
         notes,
         tuple(warnings),
+        len(notes) > len(scenario.notes),
     )
 
 

@@ -93,8 +93,18 @@ def profile_grid(profile: Profile, half_width: float, strips: int | None) -> Gri
     return Grid.spanning(start, stop, chosen)
 
 
-def wider_grid(scenario: Scenario, grid: Grid, load: float) -> Grid | None:
+def wider_grid(scenario: Scenario, grid: Grid, load: float, shift: float = 0.0) -> Grid | None:
     """Return the strips of a profile and further ones for a groove as wide as the profile is deep.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    grid : Grid
+        Strips of the profile.
+    load : float
+        Normal force [N].
+    shift : float
+        Distance by which contacts may be away from the middle [m].
 
     Returns
     -------
@@ -105,7 +115,7 @@ def wider_grid(scenario: Scenario, grid: Grid, load: float) -> Grid | None:
     if scenario.contact.width is not None or profile is None:
         return None
     groove = math.sqrt(2.0 * crown * float(np.ptp(profile.height)))  # of a conformal roller
-    half = 1.1 * groove + 1.3 * fresh_patch(scenario, load).b
+    half = 1.1 * groove + 1.3 * fresh_patch(scenario, load).b + shift
     centre = contact_centre(scenario, [0])
     lacking = max(grid.edges[0] - centre + half, centre + half - grid.edges[1])
     added = math.ceil(lacking / grid.spacing)
