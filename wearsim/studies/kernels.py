@@ -49,7 +49,7 @@ def kernels_of(
     steps = study == "test"
     contact, evolution = scenario.contact, scenario.evolution
     model, name = contact.model, evolution.stepper
-    found = {"hertz_ellipse", "coefficient", "short_limit"} | _MODELS.get(model, set())
+    found = {"coefficient", "short_limit"} | _MODELS.get(model, set())
     theory = getattr(contact.options, "tangential", "strip")
     if model == "hertz-fastsim":
         march = getattr(contact.options, "closed_form", "") == "never"
