@@ -46,9 +46,18 @@ def test_show_prints_the_content_of_the_file(command: Command, done: Path) -> No
 def test_plot_draws_an_ensemble(command: Command, done: Path) -> None:
     assert command("plot", done).exit_code == 0
     assert Path("e.png").read_bytes().startswith(b"\x89PNG")
-    refused = command("plot", done, "-o", "b.png", "--measured", "m.csv")
-    assert refused.exit_code == 2
-    assert "requires the file of a wear test" in refused.stderr
+
+
+def test_plot_draws_measurements_over_the_band_of_an_ensemble(command: Command, done: Path) -> None:
+    band = open_ensemble(done).band()
+    offset = -np.interp(0.0, band.y, band.mean) * 1e6 + 0.5
+    Path("probe.csv").write_text(f"y [mm], height [um]\n0, {offset:.9f}\n1e-9, {offset:.9f}\n")
+    result = command("plot", done, "-o", "b.svg", "--measured", "probe.csv")
+    assert result.exit_code == 0, result.output
+    assert "measured: probe" in Path("b.svg").read_text()
+    assert "probe: residual rms 0.500 um, mean 0.500 um, 2 points, 100 % in the band" in (
+        result.stderr
+    )
 
 
 def test_export_writes_realisations_courses_and_profile(command: Command, done: Path) -> None:

@@ -8,6 +8,7 @@ import pytest
 from cli_examples import SCENARIOS, Command
 
 import wearsim
+from wearsim.csv_tables import read_columns
 from wearsim.errors import Interrupted
 from wearsim.results import open_results
 
@@ -96,6 +97,35 @@ def test_plot_draws_measurements(command: Command, finished: Path) -> None:
     result = command("plot", finished, "-o", "x.svg", "--measured", "probe.csv")
     assert result.exit_code == 0
     assert "measured: probe" in Path("x.svg").read_text()
+
+
+def test_plot_prints_the_residual_of_measurements(command: Command, finished: Path) -> None:
+    found = open_results(finished)
+    height = -np.interp([0.0, 0.5e-3], found.y, found.profiles[-1]) * 1e6 + [0.3, -0.4]
+    rows = "".join(f"{y}, {value:.9f}\n" for y, value in zip((0.0, 0.5), height, strict=True))
+    Path("probe.csv").write_text(f"y [mm], height [um]\n{rows}90, 5\n")
+    result = command("plot", finished, "-o", "x.svg", "--measured", "probe.csv")
+    assert "probe: residual rms 0.354 um, mean -0.0500 um, 2 points" in result.stderr
+    Path("far.csv").write_text("y [mm], height [um]\n80, 5\n90, 5\n")
+    result = command("plot", finished, "-o", "y.svg", "--measured", "far.csv")
+    assert "far: no point on the strips, no residual" in result.stderr
+
+
+def test_export_overwrites_and_writes_decimal_commas(command: Command, finished: Path) -> None:
+    assert command("export", finished, "-o", "out").exit_code == 0
+    again = command("export", finished, "-o", "out")
+    assert again.exit_code == 2
+    assert "or --force" in again.stderr
+    forced = command("export", finished, "-o", "out", "--force", "--decimal", ",")
+    assert forced.exit_code == 0
+    found = read_columns(Path("out/history.csv").read_text(), "history.csv", {"depth": "m"})
+    np.testing.assert_allclose(found["depth"], open_results(finished).depth, rtol=1e-11)
+    assert ";" in Path("out/history.csv").read_text().splitlines()[0]
+    assert "." not in Path("out/history.csv").read_text()
+    assert Path("out/scenario.toml").read_text() == open_results(finished).raw.scenario_text
+    refused = command("export", finished, "-o", "out", "--decimal", "x")
+    assert refused.exit_code == 2
+    assert "--decimal" in refused.stderr
 
 
 def test_plot_takes_columns_and_units_of_a_measurement(command: Command, finished: Path) -> None:

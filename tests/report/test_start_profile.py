@@ -5,8 +5,11 @@ import pytest
 
 import wearsim
 from tests.evolution import SCENARIOS
+from wearsim.report.figures.ensemble import ensemble_figure
 from wearsim.report.figures.run import _draw_profiles, run_figure
+from wearsim.report.parts import Measured
 from wearsim.report.text import shown
+from wearsim.scenario import parse_scenario
 
 
 class Lines:
@@ -59,3 +62,24 @@ def test_caption_names_both_depths(result):
     assert expected in figure.get_suptitle()
     titles = [axes.get_title(loc="left") for axes in figure.axes]
     assert "Depth worn since the start" in titles
+    labels = {axes.get_title(loc="left"): axes.get_ylabel() for axes in figure.axes}
+    assert labels["Depth worn since the start"] == "depth worn since the start [um]"
+
+
+def test_figure_of_an_ensemble_starts_from_the_start_profile(result, tmp_path):
+    random = {"distribution": "lognormal", "median": "2e-11 1/Pa", "factor": 1.5}
+    text = result.scenario.text.replace('k_over_h = "1.1e-11 1/Pa"', "")
+    overrides = {"wear.cylinder.k_over_h": random, "contact.strips": 41}
+    scenario = parse_scenario(text, "a.toml", result.scenario.files.__getitem__, overrides)
+    found = wearsim.ensemble(scenario, 3, tmp_path / "e.h5", scheduler="serial")
+    figure = ensemble_figure(found, [Measured("probe", np.zeros(1), np.full(1, -8e-6))])
+    (axes,) = [a for a in figure.axes if a.get_title(loc="left").startswith("Worn profile")]
+    lines = {line.get_label(): line.get_ydata() for line in axes.get_lines()}
+    y = found.raw.variables["y"]
+    start = np.interp(y, [-3e-3, 0.0, 3e-3], [0.0, -9.0, 0.0])
+    np.testing.assert_allclose(lines["start of the tests"], start, atol=1e-9)
+    np.testing.assert_allclose(lines["mean"], start - found.band().mean * 1e6, atol=1e-9)
+    np.testing.assert_allclose(lines["measured: probe"], [-8.0])
+    assert axes.get_ylabel() == "height above nominal [um]"
+    lowest = shown(-float(lines["mean"].min()) * 1e-6, "um")
+    assert f"worn since the start, mean profile {lowest} below nominal" in figure.get_suptitle()

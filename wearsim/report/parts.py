@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import matplotlib as mpl
 import numpy as np
@@ -14,11 +14,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from wearsim.report.text import count, pass_unit
+from wearsim.errors import WearsimError
+from wearsim.report.text import PER_SI, count, pass_unit, shown, sufficient_for
+from wearsim.results import EnsembleResult, Result
 from wearsim.results.io.atomic_write import replacement
 from wearsim.types import BoolArray, FloatArray, IntArray
 
 RECORDS = "viridis"
+MARKS = ("o", "s", "^", "D", "v")
 PRESSURE = "magma"
 BLUE, ORANGE, GREEN, RED, GREY = "#2066a8", "#d1701c", "#3a8a5c", "#b3282d", "#8a8a8a"
 
@@ -255,3 +258,97 @@ class Measured:
     label: str
     y: FloatArray
     height: FloatArray
+
+
+class ComputedProfile(NamedTuple):
+    """Profile of the cylinder at the end of a run or an ensemble.
+
+    Parameters
+    ----------
+    y : ndarray, shape (strips,)
+        Axial position [m].
+    height : ndarray, shape (strips,)
+        Height above the nominal surface, of an ensemble that of the mean [m].
+    low, high : ndarray, shape (strips,)
+        Ends of the band of an ensemble, which are equal for a run [m].
+    start : ndarray, shape (strips,)
+        Height at the start of the test [m].
+    label : str
+        Description of the band; empty if there is none.
+    kept : int
+        Number of profiles.
+    """
+
+    y: FloatArray
+    height: FloatArray
+    low: FloatArray
+    high: FloatArray
+    start: FloatArray
+    label: str = ""
+    kept: int = 1
+
+
+_BAND = 0.025  # probability below the band of an ensemble
+
+
+def computed_profile(result: Result | EnsembleResult) -> ComputedProfile:
+    """Return the profile at the end of a run or an ensemble."""
+    if isinstance(result, Result):
+        start = result.start_height
+        height = start - np.asarray(result.profiles[-1])
+        return ComputedProfile(result.y, height, height, height, start)
+    band, start = result.band(), _start_height(result)
+    low, high, label = band.low, band.high, ""
+    if band.kept > 1:
+        label = "2.5 % to 97.5 %"
+        if not sufficient_for(band.kept, _BAND):
+            kept = result.profiles
+            low, high, label = kept.min(axis=0), kept.max(axis=0), "least to greatest"
+    height = start - band.mean
+    return ComputedProfile(band.y, height, start - high, start - low, start, label, band.kept)
+
+
+def _start_height(result: EnsembleResult) -> FloatArray:
+    """Return the height at the start of the tests, which the scenario gives [m]."""
+    y = result.raw.variables["y"]
+    try:
+        profile = result.scenario.cylinder.profile
+    except WearsimError:  # a plugin of the scenario is not installed
+        profile = None
+    return np.zeros_like(y) if profile is None else np.interp(y, profile.y, profile.height)
+
+
+def residual_text(measured: Measured, computed: ComputedProfile) -> str:
+    """Return the root mean square of measured minus computed heights, and their mean.
+
+    Points beyond the strips are not compared. With a band, the part of the points within it is
+    added.
+
+    Parameters
+    ----------
+    measured : Measured
+    computed : ComputedProfile
+    """
+    y = measured.y
+    inside = (y >= computed.y[0]) & (y <= computed.y[-1])
+    if not inside.any():
+        return "no point on the strips, no residual"
+    y, height = y[inside], measured.height[inside]
+    residual = height - np.interp(y, computed.y, computed.height)
+    rms, mean = float(np.sqrt(np.mean(residual**2))), float(residual.mean())
+    text = (
+        f"residual rms {shown(rms, 'um', 3)}, mean {shown(mean, 'um', 3)}, {count(len(y))} points"
+    )
+    if computed.label:
+        low, high = (np.interp(y, computed.y, end) for end in (computed.low, computed.high))
+        text += f", {shown(float(((height >= low) & (height <= high)).mean()), '%', 3)} in the band"
+    return text
+
+
+def draw_measured(axes: Axes, measured: Sequence[Measured]) -> None:
+    """Draw measured profiles as points."""
+    for number, profile in enumerate(measured):
+        axes.plot(
+            profile.y * PER_SI["mm"], profile.height * PER_SI["um"], MARKS[number % len(MARKS)],
+            ms=3.2, mew=0.7, mfc="white", mec=RED, label=f"measured: {profile.label}", zorder=5,
+        )  # fmt: skip

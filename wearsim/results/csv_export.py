@@ -5,9 +5,10 @@ from __future__ import annotations
 import csv
 import io
 import itertools
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path, PurePosixPath
-from typing import TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -32,6 +33,7 @@ _UNITS = {"m": ("um", 1e-6), "m^3": ("mm^3", 1e-9), "s": ("min", 60.0), "Pa": ("
 }
 _IN_MM = {"y", "width", "half_length"}  # other lengths are written in um
 _SCALARS = ("steps", "solves", "depth_error", "volume_error", "control")
+_NUMBER = re.compile(r"-?\d+(\.\d+)?(e[+-]\d+)?")
 _BLOCK = 16384  # realisations in memory at a time
 
 
@@ -65,8 +67,22 @@ def _csv(cells: Iterable[Sequence[str]]) -> str:
     return text.getvalue()
 
 
+def _with_decimal_comma(pieces: Iterable[str]) -> Iterator[str]:
+    """Yield a table with decimal commas, and semicolons between the cells."""
+    for piece in pieces:
+        text = io.StringIO()
+        writer = csv.writer(text, delimiter=";", lineterminator="\n")
+        for cells in csv.reader(io.StringIO(piece)):
+            writer.writerow([c.replace(".", ",") if _NUMBER.fullmatch(c) else c for c in cells])
+        yield text.getvalue()
+
+
 def export_csv(
-    result: Result | DissipationResult | EnsembleResult, folder: str | Path
+    result: Result | DissipationResult | EnsembleResult,
+    folder: str | Path,
+    *,
+    force: bool = False,
+    decimal: Literal[".", ","] = ".",
 ) -> list[Path]:
     """Write a run, a study or an ensemble as CSV, and the scenario with its files.
 
@@ -78,6 +94,10 @@ def export_csv(
         at the end.
     folder : str or Path
         Target folder, which is created if it does not exist.
+    force : bool
+        Overwrite existing files.
+    decimal : {".", ","}
+        Decimal sign of the tables. With a comma, semicolons separate the cells.
 
     Returns
     -------
@@ -87,9 +107,13 @@ def export_csv(
     Raises
     ------
     ResultsFileError
-        If the folder is a file or cannot be written, or if one of the files exists; then no file
-        is written.
+        If the folder is a file or cannot be written, or if one of the files exists and `force` is
+        false; then no file is written.
+    ValueError
+        If the decimal sign is neither a point nor a comma.
     """
+    if decimal not in {".", ","}:
+        raise ValueError(f"the decimal sign is {decimal!r}, expected '.' or ','")
     folder = Path(folder)
     if folder.exists() and not folder.is_dir():
         raise ResultsFileError(
@@ -104,15 +128,17 @@ def export_csv(
         contents = _run_tables(result.raw)
     else:
         contents = _study_tables(result.raw)
+    if decimal == ",":
+        contents = {name: _with_decimal_comma(pieces) for name, pieces in contents.items()}
     contents["scenario.toml"] = [result.raw.scenario_text]
     for name, text in result.raw.files.items():
         contents[_path_in_folder(name, contents)] = [text]
     existing = [str(folder / name) for name in contents if (folder / name).exists()]
-    if existing:
+    if existing and not force:
         raise ResultsFileError(
             f"{', '.join(existing)}: already exists",
-            python="remove it, or choose another folder",
-            shell="remove it, or choose another folder with -o",
+            python="choose another folder, or force=True",
+            shell="choose another folder with -o, or --force",
         )
     for name, content in contents.items():
         parent = (folder / name).parent

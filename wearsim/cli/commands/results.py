@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -60,18 +60,24 @@ def plot(
     path = figure if figure is not None else Path(f"{file.stem}.png")
     check_figure(path, force)
     from wearsim.report.parts import Measured
-    from wearsim.results import Result, open_results, refuse_inputs
+    from wearsim.results import DissipationResult, open_results, refuse_inputs
 
     refuse_inputs(path, [file], "the figure")
     refuse_inputs(path, measured or [], "a measured profile")
     result = open_results(file)
-    if measured and not isinstance(result, Result):
+    if measured and isinstance(result, DissipationResult):
         raise typer.BadParameter(
-            f"requires the file of a wear test; {file} is none", param_hint="--measured"
+            f"requires wear tests; {file} holds one contact without wear", param_hint="--measured"
         )
     choice = profile_choice(columns, units, row, mean_rows, at)
-    profiles = [(name.stem, read_measured(name, choice)) for name in measured or []]
-    draw(result, path, [Measured(label, one.y, one.height) for label, one in profiles])
+    read = [(name.stem, read_measured(name, choice)) for name in measured or []]
+    profiles = [Measured(label, one.y, one.height) for label, one in read]
+    draw(result, path, profiles)
+    for profile in profiles:
+        from wearsim.report.parts import computed_profile, residual_text
+
+        assert not isinstance(result, DissipationResult)
+        note(f"{profile.label}: {residual_text(profile, computed_profile(result))}")
     note(f"figure: {path}")
 
 
@@ -88,7 +94,7 @@ def draw(
     path : Path
         Name of the figure.
     measured : sequence of Measured
-        Profiles drawn over those of a run.
+        Profiles drawn over those of a run or an ensemble.
     """
     from wearsim.report.figures.result import figure_of
     from wearsim.report.parts import save_figure
@@ -259,9 +265,20 @@ Folder = Annotated[
 ]
 
 
-def export(file: ResultsFile, output: Folder) -> None:
+Decimal = Annotated[
+    str,
+    typer.Option(
+        "--decimal", metavar="SIGN", help="Decimal sign: '.', or ',' with semicolons between cells."
+    ),
+]
+
+
+def export(file: ResultsFile, output: Folder, decimal: Decimal = ".", force: Force = False) -> None:
     """Write a results file as CSV, with units in the headers."""
+    if decimal not in {".", ","}:
+        raise typer.BadParameter(f"'{decimal}' is neither '.' nor ','", param_hint="--decimal")
     from wearsim.results import export_csv, open_results
 
-    for path in export_csv(open_results(file), output):
+    sign: Literal[".", ","] = "," if decimal == "," else "."
+    for path in export_csv(open_results(file), output, force=force, decimal=sign):
         typer.echo(str(path))

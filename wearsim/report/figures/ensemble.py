@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from textwrap import fill
 
@@ -18,7 +19,11 @@ from wearsim.report.parts import (
     ORANGE,
     RECORDS,
     RED,
+    ComputedProfile,
+    Measured,
+    computed_profile,
     draw_convergence,
+    draw_measured,
     evenly_spaced,
     name_axes,
     set_depth_axes,
@@ -59,13 +64,15 @@ _HEADROOM = 1.3  # height of the density's panel relative to its highest class, 
 _DEFAULT = "depth.mean 1%"
 
 
-def ensemble_figure(result: EnsembleResult) -> Figure:
+def ensemble_figure(result: EnsembleResult, measured: Sequence[Measured] = ()) -> Figure:
     """Return the figure of an ensemble.
 
     Parameters
     ----------
     result : EnsembleResult
         Finished or not.
+    measured : sequence of Measured
+        Profiles drawn over the worn profile.
 
     Returns
     -------
@@ -74,7 +81,8 @@ def ensemble_figure(result: EnsembleResult) -> Figure:
         the estimate, mean worn profile, and Sobol indices of the depth; a message if no realisation
         is completed.
     """
-    with titled_figure(13.0, 7.5, f"{result.title}\n{_caption(result)}") as figure:
+    found = computed_profile(result)
+    with titled_figure(13.0, 7.5, f"{result.title}\n{_caption(result, found)}") as figure:
         if result.count == 0:
             write_message(figure.subplots(), "", ["no realisation is completed: nothing to draw"])
             return figure
@@ -85,12 +93,12 @@ def ensemble_figure(result: EnsembleResult) -> Figure:
         draw_course(course, result)
         _draw_density(density, result)
         _draw_convergence(convergence, result)
-        _draw_profile(profile, result)
+        _draw_profile(profile, result, found, measured)
         _draw_effects(effects, result)
     return figure
 
 
-def _caption(result: EnsembleResult) -> str:
+def _caption(result: EnsembleResult, found: ComputedProfile) -> str:
     requested, unfinished = f" of {count(result.requested)}", ", unfinished"
     if result.finished:
         requested = unfinished = ""
@@ -106,6 +114,9 @@ def _caption(result: EnsembleResult) -> str:
     if result.count == 1:
         return f"{text}\ndepth {shown(depth.mean.value, 'um')}"
     text += f"\nmean depth {shown(depth.mean.value, 'um')}"
+    if found.start.any():
+        lowest = shown(-float(found.height.min()), "um")
+        text += f" worn since the start, mean profile {lowest} below nominal"
     if result.is_constant("depth"):
         return f"{text}, equal in all realisations"
     text += f", std {shown(depth.std.value, 'um', 3)}"
@@ -213,24 +224,30 @@ def _draw_convergence(axes: Axes, result: EnsembleResult) -> None:
     name_axes(axes, title, "realisations", named.label)
 
 
-def _draw_profile(axes: Axes, result: EnsembleResult) -> None:
-    """Draw the mean worn profile downwards, with its 95 % range."""
-    band = result.band()
-    y = band.y * MM
-    if band.kept > 1:
-        low, high, label = band.low, band.high, "2.5 % to 97.5 %"
-        if not sufficient_for(band.kept, 0.025):
-            kept = result.profiles
-            low, high, label = kept.min(axis=0), kept.max(axis=0), "least to greatest"
-        axes.fill_between(y, -high * UM, -low * UM, color=BLUE, alpha=0.25, lw=0, label=label)
-    axes.plot(y, -band.mean * UM, color="black", label="mean")
-    worn = y[band.high > _WORN * max(float(band.high.max()), 0.0)]
+def _draw_profile(
+    axes: Axes, result: EnsembleResult, found: ComputedProfile, measured: Sequence[Measured]
+) -> None:
+    """Draw the mean worn profile with its 95 % range, and measured profiles over it."""
+    y = found.y * MM
+    if found.label:
+        low, high = found.low * UM, found.high * UM
+        axes.fill_between(y, low, high, color=BLUE, alpha=0.25, lw=0, label=found.label)
+    axes.plot(y, found.height * UM, color="black", label="mean")
+    if found.start.any():
+        axes.plot(y, found.start * UM, color=GREY, lw=1.0, ls="--", label="start of the tests")
+    draw_measured(axes, measured)
+    depth = found.start - found.low
+    worn = y[depth > _WORN * max(float(depth.max()), 0.0)]
     if len(worn) > 1:
         margin = _MARGIN * (worn[-1] - worn[0])
-        axes.set_xlim(worn[0] - margin, worn[-1] + margin)
+        points = [profile.y * MM for profile in measured]
+        axes.set_xlim(
+            min([worn[0] - margin, *(float(ends.min()) for ends in points)]),
+            max([worn[-1] + margin, *(float(ends.max()) for ends in points)]),
+        )
     title = "Worn profile of the cylinder at the end"
-    title += "" if band.kept == result.count else f", of the first {count(band.kept)}"
-    name_axes(axes, title, "y [mm]", "height above the start [um]")
+    title += "" if found.kept == result.count else f", of the first {count(found.kept)}"
+    name_axes(axes, title, "y [mm]", "height above nominal [um]")
     axes.legend(loc="lower right")
 
 

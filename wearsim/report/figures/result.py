@@ -23,10 +23,10 @@ def figure_of(
     ----------
     result : Result, DissipationResult or EnsembleResult
     measured : sequence of Measured
-        Profiles drawn over those of a run.
+        Profiles drawn over those of a run or an ensemble.
     """
     if isinstance(result, EnsembleResult):
-        return ensemble_figure(result)
+        return ensemble_figure(result, measured)
     if isinstance(result, DissipationResult):
         return dissipation_figure(result)
     return run_figure(result, measured)

@@ -20,6 +20,7 @@ from wearsim.report.parts import (
     RECORDS,
     RED,
     Measured,
+    draw_measured,
     evenly_spaced,
     name_axes,
     set_depth_axes,
@@ -33,7 +34,6 @@ UM, MM, MIN, W_MM = PER_SI["um"], PER_SI["mm"], PER_SI["min"], PER_SI["W/mm"]
 MOST_RECORDS = 24
 ROLLERS = (BLUE, ORANGE, GREEN, RED)
 STYLES = ("-", "--", ":", "-.")
-MARKS = ("o", "s", "^", "D", "v")
 
 
 def run_figure(result: Result, measured: Sequence[Measured] = ()) -> Figure:
@@ -124,11 +124,7 @@ def _draw_profiles(
                 y, -roller * UM, color="black", ls=(0, (4 + 2 * number, 2)), lw=1.0,
                 label=f"{label}, at the end",
             )  # fmt: skip
-    for number, profile in enumerate(measured):
-        axes.plot(
-            profile.y * MM, profile.height * UM, MARKS[number % len(MARKS)], ms=3.2, mew=0.7,
-            mfc="white", mec=RED, label=f"measured: {profile.label}", zorder=5,
-        )  # fmt: skip
+    draw_measured(axes, measured)
     name_axes(
         axes,
         "Worn profile of the cylinder (black: start of the run)",
@@ -166,7 +162,7 @@ def _draw_depth(axes: Axes, result: Result) -> None:
     label += "" if visible else f"\n({estimate})"
     axes.plot(passes / unit, depth * UM, style, color=BLUE, ms=2.6, label=label)
     title = "Depth worn since the start" if result.start_height.any() else "Depth"
-    name_axes(axes, title, name, "depth [um]")
+    name_axes(axes, title, name, f"{title.lower()} [um]")
     axes.legend(loc="upper left")
 
 
