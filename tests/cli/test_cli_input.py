@@ -193,13 +193,24 @@ def test_contact_warns_where_peak_pressure_depends_on_strips(
     profile = ("contact", scenario, "--profile", "rough.csv", "--json")
     rough = json.loads(command(*profile).stdout)
     assert rough["warnings"][0].startswith("peak pressure: ")
+    assert (rough["profile"]["file"], rough["profile"]["points"]) == ("rough.csv", 1601)
     assert 'profile_filter = "0.8 mm"' in rough["warnings"][0]
     assert rough["peak_pressure_error_Pa"] > 0.1 * rough["peak_pressure_Pa"]
     smooth = json.loads(command(*profile, "--filter", "0.8 mm").stdout)
     assert smooth["peak_pressure_Pa"] < 0.5 * rough["peak_pressure_Pa"]
+    assert smooth["profile"]["filter_m"] == 0.8e-3
     own = ("--set", "cylinder.profile='rough.csv'", "--set", "cylinder.profile_filter='0.8 mm'")
     same = json.loads(command("contact", scenario, *own, "--json").stdout)
     assert same["peak_pressure_Pa"] == smooth["peak_pressure_Pa"]
+
+
+def test_contact_states_profile_and_sign(command: Command, scenario: Path) -> None:
+    Path("worn.csv").write_text("Position;Depth\n-3;0\n0;2,5\n3;0\n")
+    options = ("--columns", "Position,Depth", "--units", "mm,um")
+    result = command("contact", scenario, "--profile", "worn.csv", *options)
+    rows = " ".join(result.stdout.split())
+    assert "profile worn.csv: 3 points, y -3 to 3 mm, height -2.5 to 0 um" in rows
+    assert "(worn is negative; read from the column depth)" in rows
 
 
 def test_options_of_a_profile_need_one(command: Command, scenario: Path) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from wearsim.csv_tables import column_names
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.plugins import Load
-from wearsim.scenario import RandomInput, Scenario, described_model
+from wearsim.scenario import Cylinder, RandomInput, Scenario, described_model
 from wearsim.studies.contact.single import study_contact
 from wearsim.studies.plausibility import log_file, plausibility_warnings, range_90
 from wearsim.studies.run.assemble import assemble_problem
@@ -67,7 +67,7 @@ def dry_run(scenario: Scenario) -> Data:
             "offset_m": None if "roller.offset" in random else scenario.per_roller(roller.offset),
         },
         "cylinder": {"radius_m": cylinder.radius},
-        "profile": _profile(scenario),
+        "profile": profile_data(cylinder, scenario.files),
         "contact_modulus_Pa": pair.contact_modulus,
         "shear_modulus_Pa": pair.shear_modulus,
         "rolling_speed_m_per_s": scenario.rolling_speed,
@@ -106,19 +106,26 @@ def dry_run(scenario: Scenario) -> Data:
     return data | {"notes": scenario.notes, "warnings": plausibility_warnings(scenario)}
 
 
-def _profile(scenario: Scenario) -> Data | None:
-    """Return file, size and sign of the initial profile."""
-    profile, file = scenario.cylinder.profile, scenario.cylinder.profile_file
+def profile_data(cylinder: Cylinder, files: Mapping[str, str]) -> Data | None:
+    """Return file, size and sign of the initial profile, if there is any.
+
+    Parameters
+    ----------
+    cylinder : Cylinder
+    files : mapping of str to str
+        Content of CSV files by name.
+    """
+    profile = cylinder.profile
     if profile is None:
         return None
-    names = column_names(scenario.files[file]) if file in scenario.files else []
+    names = set(column_names(files.get(cylinder.profile_file, "")))
     return {
-        "file": file,
+        "file": cylinder.profile_file,
         "points": len(profile.y),
         "y_m": [profile.y[0], profile.y[-1]],
         "height_m": [profile.height.min(), profile.height.max()],
-        "column": "depth" if "depth" in names and not {"height", "z"} & set(names) else "height",
-        "filter_m": scenario.cylinder.profile_filter,
+        "column": "depth" if "depth" in names and not names & {"height", "z"} else "height",
+        "filter_m": cylinder.profile_filter,
     }
 
 
@@ -212,7 +219,7 @@ def plan(data: Data) -> TableRows:
     return [
         ("roller", radii),
         ("cylinder", f"radius {data['cylinder']['radius_m'] * 1e3:.6g} mm"),
-        *_profile_rows(data["profile"]),
+        *profile_rows(data["profile"]),
         ("elasticity", moduli),
         ("rolling speed", f"{data['rolling_speed_m_per_s']:.4g} m/s"),
         ("load", _load_text(data["load"])),
@@ -228,11 +235,12 @@ def plan(data: Data) -> TableRows:
 
 def _range(bounds: Sequence[float], unit: str, size: float) -> str:
     """Return the text of two values in a unit of `size` in SI."""
-    low, high = bounds
+    low, high = (value + 0.0 for value in bounds)  # no -0
     return f"{low / size:.4g} to {high / size:.4g} {unit}"
 
 
-def _profile_rows(profile: Data | None) -> TableRows:
+def profile_rows(profile: Data | None) -> TableRows:
+    """Return a row on a profile, from `profile_data`."""
     if profile is None:
         return []
     text = (

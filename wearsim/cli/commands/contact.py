@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -80,10 +81,12 @@ def contact(
     check_figure(figure, force)
     loaded = read_scenario(scenario, settings)
     from wearsim.cli.progress import Display
+    from wearsim.input_files import read_input
     from wearsim.profiles import ProfileChoice, gaussian_filtered
     from wearsim.quantities import quantity
     from wearsim.results import refuse_inputs
     from wearsim.studies.contact.single import study_contact
+    from wearsim.studies.dry_run import profile_data, profile_rows
     from wearsim.studies.kernels import kernels_of
 
     if figure is not None:
@@ -93,10 +96,18 @@ def contact(
     if profile is None and (cutoff is not None or choice != ProfileChoice()):
         message = "is needed for --columns, --units, --row, --mean-rows, --at and --filter"
         raise typer.BadParameter(message, param_hint="--profile")
-    measured = read_measured(profile, choice) if profile is not None else None
-    if measured is not None and cutoff is not None:
-        with checking("--filter"):
-            measured = gaussian_filtered(measured, quantity(cutoff, "m"))
+    cylinder, files = loaded.cylinder, dict(loaded.files)
+    if profile is not None:
+        measured, wavelength = read_measured(profile, choice), None
+        if cutoff is not None:
+            with checking("--filter"):
+                wavelength = quantity(cutoff, "m")
+                measured = gaussian_filtered(measured, wavelength)
+        files[str(profile)] = read_input(profile, choice)
+        cylinder = replace(
+            cylinder, profile=measured, profile_file=str(profile), profile_filter=wavelength
+        )
+    start = profile_data(cylinder, files)
     has_fields = loaded.contact.spec.capabilities.fields
     with_fields = figure is not None and has_fields
 
@@ -104,16 +115,16 @@ def contact(
         return kernels_of(loaded, "contact", with_fields)
 
     with Display(quiet=False, kernels=kernels, transient=True):
-        study = study_contact(loaded, measured, with_fields, with_error=True)
+        study = study_contact(loaded, cylinder.profile, with_fields, with_error=True)
     notes = [*study.notes, *_notes_on_means(loaded)]
     if figure is not None and not has_fields:
         notes.append(f"model '{study.model}' gives no fields; the figure shows its strips only")
     if json:
-        write_json(_data(loaded, study, notes, figure))
+        write_json({**_data(loaded, study, notes, figure), "profile": start})
     else:
         from wearsim.cli.render.summary import contact_line
 
-        write_table(loaded.title, _rows(study))
+        write_table(loaded.title, [*profile_rows(start), *_rows(study)])
         typer.echo(contact_line(study))
     if figure is not None:
         from wearsim.report.figures.contact import contact_figure
