@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -55,11 +56,20 @@ def figure_style() -> Iterator[None]:
         yield
 
 
+class _Figure(Figure):
+    """Figure that notebooks show; those of pyplot are shown without this."""
+
+    def _repr_png_(self) -> bytes:
+        content = io.BytesIO()
+        self.savefig(content, format="png", dpi=DPI)
+        return content.getvalue()
+
+
 @contextmanager
 def titled_figure(width: float, height: float, title: str | None = None) -> Iterator[Figure]:
     """Return a figure of a width and height in inches, drawn with the settings of wearsim."""
     with figure_style():
-        figure = Figure(figsize=(width, height), layout="constrained")
+        figure = _Figure(figsize=(width, height), layout="constrained")
         if title is not None:
             figure.suptitle(title, fontsize=10.5)
         yield figure

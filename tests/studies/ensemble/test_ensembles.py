@@ -120,7 +120,7 @@ def test_resumed_ensemble_equals_unbroken_ensemble(twelve, tmp_path, monkeypatch
     monkeypatch.setattr(ensemble_work.EnsembleWork, "_batch_size", lambda self: 2)
     path = tmp_path / "part.h5"
     answers = iter([True])
-    with pytest.raises(Interrupted, match=r"wearsim resume .*part\.h5"):
+    with pytest.raises(Interrupted, match=r"wearsim\.resume_ensemble.*part\.h5"):
         ensemble(small(), 12, path, scheduler=scheduler, stop_requested=lambda: next(answers, True))
     part = open_ensemble(path)
     assert 0 < part.count < 12

@@ -43,8 +43,6 @@ def plot(
     axes : Axes, optional
     """
     if axes is None:
-        import matplotlib.pyplot  # noqa: F401, PLC0415  (lets notebooks show the figure)
-
         return figure_of(result)
     if isinstance(result, EnsembleResult):
         draw_course(axes, result)
