@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from tests.report.made_up_ensembles import made_up
 from tests.studies.study_examples import short
-from wearsim.report.figures.ensemble import MOST_POINTS, comparison_figure
+from wearsim.report.figures.comparison import MOST_POINTS, comparison_figure
 from wearsim.report.parts import save_figure
 from wearsim.report.text import cells, part_with_interval, with_interval
 from wearsim.studies.ensemble.compare import compare
@@ -54,17 +56,38 @@ def test_ranges_are_drawn_with_means_and_intervals(comparison):
     ):
         wanted = 1e6 * np.array(ends)
         assert any(len(x) == len(wanted) and np.allclose(x, wanted) for x in lines)
-    labels = [label.get_text().splitlines() for label in axes.get_yticklabels()]
-    assert [label[0] for label in labels] == ["light", "heavy", "one"]
+    labels = [text.get_text() for text in axes.texts]
+    assert labels[0] == "light (ensemble of 300)"
     share = part_with_interval(comparison.rows[1].deeper)
-    assert labels[1][2] == f"in {share} of pairs of tests"
+    assert labels[1:3] == [
+        f"deeper than light in {share} of pairs of tests",
+        "heavy (ensemble of 300)",
+    ]
+    assert labels[-1] == "one (run)"
+
+
+def test_labels_and_titles_are_within_the_figure(comparison):
+    names = [f"a long name of a file with many words {number}" for number in range(3)]
+    rows = [replace(row, label=name) for row, name in zip(comparison.rows, names, strict=True)]
+    figure = comparison_figure(replace(comparison, rows=tuple(rows)), "a long title " * 20)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    width = figure.bbox.width
+    left, right = figure.axes
+    texts = [*figure.texts, right.xaxis.label, *right.texts]
+    for text in texts:
+        box = text.get_window_extent()
+        assert box.x0 >= 0.0
+        assert box.x1 <= width
+    sizes = [axes.get_window_extent().width for axes in (left, right)]
+    assert min(sizes) > 0.45 * width
 
 
 def test_few_realisations_have_no_range():
     rows = [made_up(12, failed=[1, 2]), made_up(12)]
-    left, right = comparison_figure(compare(rows, ["few", "more"])).axes
-    assert "few (10 of 12, 2 failed)" in [line.get_label() for line in left.get_lines()]
-    assert "5 % to 95 %" not in right.get_title(loc="left")
+    _, right = comparison_figure(compare(rows, ["few", "more"])).axes
+    assert "few (ensemble of 10 of 12, 2 failed)" in [text.get_text() for text in right.texts]
+    assert "5 % to 95 %" not in right.get_xlabel()
 
 
 def test_runs_are_drawn_with_their_difference(comparison):
@@ -72,8 +95,7 @@ def test_runs_are_drawn_with_their_difference(comparison):
     other = study.run(short())
     axes = comparison_figure(compare([other, other], ["a", "b"])).axes[1]
     assert axes.get_title(loc="left") == "Value and estimated error"
-    (_, text) = axes.get_yticklabels()[1].get_text().split("\n", 1)
-    assert text.startswith("equal (estimated errors")
+    assert any(text.get_text().startswith("equal (estimated errors") for text in axes.texts)
     assert one.difference is None  # for a run against an ensemble
 
 

@@ -240,7 +240,7 @@ def report_comparison(
     files = [str(result.path) for result in results]
     suffix = f"for values of {key}" if key else ""
     if figure is not None:
-        from wearsim.report.figures.ensemble import comparison_figure
+        from wearsim.report.figures.comparison import comparison_figure
         from wearsim.report.parts import save_figure
 
         titles = {result.title for result in results}
