@@ -107,6 +107,16 @@ def step_or_rest(
     return state
 
 
+def without_load(problem: WearProblem, passes: FloatArray) -> BoolArray:
+    """Return whether there is no load at this instant; parameters and result as of `at_rest`."""
+    found = np.zeros(len(passes), dtype=np.bool_)
+    for place, (pauses, done) in enumerate(zip(problem.pauses, passes.tolist(), strict=False)):
+        margin = _margin(done)
+        begun = int(np.searchsorted(pauses[:, 0], done + margin, side="right")) - 1
+        found[place] = begun >= 0 and done <= pauses[begun, 1] + margin
+    return found
+
+
 def opened(
     problem: WearProblem, passes: FloatArray, contacts: ContactBatchSolution, loads: FloatArray
 ) -> tuple[ContactBatchSolution, FloatArray]:
@@ -121,11 +131,7 @@ def opened(
         In the problem's order.
     loads : ndarray, shape (stations, contacts, realisations)
     """
-    found = np.zeros(len(passes), dtype=np.bool_)
-    for place, (pauses, done) in enumerate(zip(problem.pauses, passes.tolist(), strict=False)):
-        margin = _margin(done)
-        begun = int(np.searchsorted(pauses[:, 0], done + margin, side="right")) - 1
-        found[place] = begun >= 0 and done <= pauses[begun, 1] + margin
+    found = without_load(problem, passes)
     if not found.any():
         return contacts, loads
     numbers: IntArray = np.flatnonzero(np.broadcast_to(found, loads.shape))

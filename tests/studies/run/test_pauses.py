@@ -52,6 +52,14 @@ def test_nothing_wears_in_a_pause(name: str) -> None:
     assert result.time[-1] == pytest.approx(120.0)
 
 
+def test_explicit_step_to_a_pause_is_not_called_unstable() -> None:
+    # next to a pause few strips of a conformal groove are in contact
+    groove = {"wear.cylinder.k_over_h": "5e-10 1/Pa", "contact.width": "14 mm"}
+    result = studies.run(paused(**STEPPERS["explicit"], **groove, contact__strips=51))
+    assert PAUSE[0] in result.passes
+    assert not any(text.startswith("unstable") for text in result.warnings)
+
+
 def test_steppers_agree_on_a_log_with_pauses() -> None:
     exact = studies.run(paused(**STEPPERS["compiled passes"]))
     for name in ("implicit", "stabilised", "explicit"):
