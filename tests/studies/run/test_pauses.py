@@ -56,7 +56,7 @@ def test_explicit_step_to_a_pause_is_not_called_unstable() -> None:
     # next to a pause few strips of a conformal groove are in contact
     groove = {"wear.cylinder.k_over_h": "5e-10 1/Pa", "contact.width": "14 mm"}
     result = studies.run(paused(**STEPPERS["explicit"], **groove, contact__strips=51))
-    assert PAUSE[0] in result.passes
+    assert np.abs(result.passes - PAUSE[0]).min() < 1e-6
     assert not any(text.startswith("unstable") for text in result.warnings)
 
 
