@@ -22,7 +22,7 @@ FRICTION = {"distribution": "uniform", "low": 0.08, "high": 0.12}
 def _documented() -> Iterator[tuple[str, object]]:
     """Yield the public functions, classes and their own and inherited methods by name."""
     yield "wearsim", wearsim
-    for name in wearsim.__all__:
+    for name in sorted(set(dir(wearsim)) - {"__version__"}):
         item = getattr(wearsim, name)
         yield name, item
         if inspect.isclass(item) and item.__module__.startswith("wearsim"):

@@ -53,6 +53,28 @@ def test_readme_scenario_gives_the_printed_output(tmp_path: Path, monkeypatch: p
     assert float(done.stdout.split()[0]) == open_results("rig.h5").final["depth_m"]
 
 
+GUIDE = (ROOT / "docs" / "guide.md").read_text(encoding="utf-8")
+
+
+def test_scenario_of_the_guide_runs(tmp_path: Path):
+    (scenario,) = blocks(GUIDE, "toml")
+    (tmp_path / "rig.toml").write_text(scenario)
+    assert CliRunner().invoke(app, ["check", str(tmp_path / "rig.toml")]).exit_code == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", range(2))
+def test_examples_of_the_guide_run_as_scripts(number: int, tmp_path: Path):
+    assert CliRunner().invoke(app, ["new", "scenario", str(tmp_path / "rig.toml")]).exit_code == 0
+    code = blocks(GUIDE, "python")
+    assert len(code) == 2
+    (tmp_path / "example.py").write_text(code[number])
+    for _ in range(2):  # also where files of the first time exist
+        script = [sys.executable, "example.py"]
+        done = subprocess.run(script, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_bits_that_are_claimed_are_those_of_numbers(page: Path):
     text = " ".join(page.read_text(encoding="utf-8").split())

@@ -1,29 +1,40 @@
 """Wear of rolling contacts over millions of roller passes.
 
 Scenarios
-    load_scenario       read a scenario from a TOML file
-    Scenario            all inputs of a run; from_toml, from_dict, changed
+    load_scenario(path, overrides)      read a scenario from a TOML file
+    Scenario                            all inputs of a test: from_toml, from_dict, changed
+    Profile(y, height)                  a measured profile of the cylinder
 
 One contact
-    solve_contact       solve the contact of the first roller
-    study_contact       the same, with its problem, fields and error estimate
-    dissipation         solve it for many realisations of the random inputs
+    solve_contact(scenario)             solve the contact of the first roller
+    study_contact(scenario)             the same, with its problem, fields and error estimate
+    dissipation(scenario, n)            solve it for n realisations of the random inputs
 
 Wear tests
-    run                 run a wear test from start to end
-    resume              continue or extend a run from its file
-    sweep               run tests or ensembles for several values of one key
-    compare             compare runs and ensembles at their ends
+    run(scenario, output)               run a wear test from start to end
+    resume(file, until)                 continue or extend a run from its file
+    sweep(scenario, key, values)        run tests or ensembles for several values of one key
+    compare(results, labels)            compare runs and ensembles at their ends
 
 Ensembles
-    ensemble            run a wear test for each realisation of the random inputs
-    resume_ensemble     continue or extend an ensemble from its file
+    ensemble(scenario, n, output)       run a wear test for each of n realisations
+    resume_ensemble(file)               continue or extend an ensemble from its file
 
 Results
-    open_results        open a results file of any kind
-    Result              of a wear test: depth, profiles, to_dataframe, to_xarray, plot
-    DissipationResult   of a dissipation study: power, summaries
-    EnsembleResult      of an ensemble: estimate, course, band, sensitivity
+    open_results(file)                  open a results file of any kind
+    Result                              of a wear test: depth, profiles, normal_force, ...
+    DissipationResult                   of a dissipation study: power, summaries, convergence
+    EnsembleResult                      of an ensemble: estimate, course, band, sensitivity
+    ContactSolution, ContactStudy       of one contact: dissipation, line_load, approach, ...
+    to_dataframe(), to_xarray(), plot() of every result of a test or a study
+
+Errors
+    WearsimError                        base class of all others
+    ScenarioError, CapabilityError      a scenario, or a model for it, that cannot be used
+    ResultsFileError                    a file that cannot be read, or must not be replaced
+    SolverError                         a failed computation: ContactError, StepError
+    Interrupted, WorkerError            a study that was stopped, or lost its workers
+    PluginError, UnknownNameError       a plugin that is missing or broken; an unknown name
 
 A scenario is a `Scenario` or the path of its file. All numbers are in SI. Functions that take
 ``output`` write a results file, which is replaced only with ``force=True``; without it the result
@@ -59,17 +70,37 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from wearsim.errors import (
-        CapabilityError,
-        ContactError,
-        Interrupted,
-        PluginError,
-        ResultsFileError,
-        ScenarioError,
-        SolverError,
-        StepError,
-        UnknownNameError,
-        WearsimError,
-        WorkerError,
+        CapabilityError as CapabilityError,
+    )
+    from wearsim.errors import (
+        ContactError as ContactError,
+    )
+    from wearsim.errors import (
+        Interrupted as Interrupted,
+    )
+    from wearsim.errors import (
+        PluginError as PluginError,
+    )
+    from wearsim.errors import (
+        ResultsFileError as ResultsFileError,
+    )
+    from wearsim.errors import (
+        ScenarioError as ScenarioError,
+    )
+    from wearsim.errors import (
+        SolverError as SolverError,
+    )
+    from wearsim.errors import (
+        StepError as StepError,
+    )
+    from wearsim.errors import (
+        UnknownNameError as UnknownNameError,
+    )
+    from wearsim.errors import (
+        WearsimError as WearsimError,
+    )
+    from wearsim.errors import (
+        WorkerError as WorkerError,
     )
     from wearsim.results import (
         DissipationResult,
@@ -122,25 +153,15 @@ _NAMES = {
 }
 _MODULES = {name: module for module, names in _NAMES.items() for name in names}
 
+# without the errors, which fill pages of `help(wearsim)`
 __all__ = [
-    "CapabilityError",
-    "ContactError",
     "ContactSolution",
     "ContactStudy",
     "DissipationResult",
     "EnsembleResult",
-    "Interrupted",
-    "PluginError",
     "Profile",
     "Result",
-    "ResultsFileError",
     "Scenario",
-    "ScenarioError",
-    "SolverError",
-    "StepError",
-    "UnknownNameError",
-    "WearsimError",
-    "WorkerError",
     "compare",
     "dissipation",
     "ensemble",
@@ -163,10 +184,10 @@ def __getattr__(name: str) -> object:
 
         return version("wearsim")
     if name not in _MODULES:
-        known = "" if name.startswith("_") else f"; it has {', '.join(__all__)}"
+        known = "" if name.startswith("_") else f"; it has {', '.join(sorted(_MODULES))}"
         raise AttributeError(f"module 'wearsim' has no attribute '{name}'{known}")
     return getattr(import_module(_MODULES[name]), name)
 
 
 def __dir__() -> list[str]:
-    return [*__all__, "__version__"]
+    return [*_MODULES, "__version__"]

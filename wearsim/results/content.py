@@ -16,7 +16,7 @@ from wearsim.errors import unknown_name
 from wearsim.results.tables import as_dataset
 
 if TYPE_CHECKING:
-    import xarray as xr
+    import xarray
     from matplotlib.axes import Axes
 
     from wearsim.scenario import Scenario
@@ -274,7 +274,7 @@ class StudyResult(Generic[Data]):
         kind = f"an attribute of {type(self).__name__}"
         raise AttributeError(str(unknown_name(name, kind, known)), name=name, obj=self)
 
-    def to_xarray(self) -> xr.Dataset:
+    def to_xarray(self) -> xarray.Dataset:
         """Return all variables of the results file as a dataset of xarray.
 
         Returns

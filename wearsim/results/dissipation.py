@@ -27,7 +27,7 @@ from wearsim.types import FloatArray
 from wearsim.uq.estimation.moments import Convergence, Summary, converge, summarise
 
 if TYPE_CHECKING:
-    import pandas as pd
+    import pandas
 
 _DRAW = ("realisation",)
 _STRIPS = ("y",)
@@ -188,7 +188,7 @@ class DissipationResult(StudyResult[DissipationData]):
             raise unknown_name(name, "a variable of this study", self.raw.variables)
         return self.raw.variables[name]
 
-    def to_dataframe(self) -> pd.DataFrame:
+    def to_dataframe(self) -> pandas.DataFrame:
         """Return the realisations as a table of pandas, one row each.
 
         Returns

@@ -21,7 +21,7 @@ from wearsim.results.tables import as_frame
 from wearsim.types import FloatArray
 
 if TYPE_CHECKING:
-    import pandas as pd
+    import pandas
 
 _ARRAYS = ("static", "history", "records", "checkpoint")
 
@@ -196,7 +196,7 @@ class Result(StudyResult[RunData]):
         dims = zip(VARIABLES[name].dims, array.shape, strict=True)
         return array.reshape([n for dim, n in dims if n != 1 or dim not in _DROPPED])
 
-    def to_dataframe(self) -> pd.DataFrame:
+    def to_dataframe(self) -> pandas.DataFrame:
         """Return the history as a table of pandas, one row per step.
 
         Returns

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    import pandas as pd
-    import xarray as xr
+    import pandas
+    import xarray
 
     from wearsim.results.content import Array, Schema
 
 
 def as_dataset(
     schema: Schema, variables: Mapping[str, Array], labels: Mapping[str, Any]
-) -> xr.Dataset:
+) -> xarray.Dataset:
     """Return variables with their axes, as xarray reads them from a results file.
 
     Parameters
@@ -48,13 +48,13 @@ def as_dataset(
         )
         for axis in schema.axes.values()
     }
-    dataset: xr.Dataset = _library("xarray").Dataset({**axes, **data}, attrs=dict(labels))
+    dataset: xarray.Dataset = _library("xarray").Dataset({**axes, **data}, attrs=dict(labels))
     return dataset
 
 
 def as_frame(
     columns: Iterable[tuple[str, str, Array]], axis: str, numbers: Iterable[int]
-) -> pd.DataFrame:
+) -> pandas.DataFrame:
     """Return columns as a table.
 
     Parameters
@@ -75,8 +75,10 @@ def as_frame(
             parts = {f"{name}.{number}": part for number, part in enumerate(values.T, 1)}
         found |= parts
         units |= dict.fromkeys(parts, unit)
-    pandas = _library("pandas")
-    frame: pd.DataFrame = pandas.DataFrame(found, index=pandas.Index(list(numbers), name=axis))
+    library = _library("pandas")
+    frame: pandas.DataFrame = library.DataFrame(
+        found, index=library.Index(list(numbers), name=axis)
+    )
     frame.attrs["units"] = units
     return frame
 

@@ -18,8 +18,8 @@ from wearsim.types import FloatArray, IntArray
 from wearsim.uq.estimation.estimates import Design
 
 if TYPE_CHECKING:
-    import pandas as pd
-    import xarray as xr
+    import pandas
+    import xarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +106,7 @@ class EnsembleValues(StudyResult[EnsembleData]):
         """
         return np.asarray(self.raw.rows(name, 0, None)[self.numbers])
 
-    def to_xarray(self) -> xr.Dataset:
+    def to_xarray(self) -> xarray.Dataset:
         """Return all variables of the results file as a dataset of xarray.
 
         As for other results, but of the successful realisations only.
@@ -120,7 +120,7 @@ class EnsembleValues(StudyResult[EnsembleData]):
         kept = np.flatnonzero(self.raw.status[: self.kept] == DONE)
         return super().to_xarray().isel(realisation=self.numbers, kept=kept)
 
-    def to_dataframe(self) -> pd.DataFrame:
+    def to_dataframe(self) -> pandas.DataFrame:
         """Return the successful realisations as a table of pandas, one row each.
 
         Returns

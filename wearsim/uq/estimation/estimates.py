@@ -10,6 +10,7 @@ from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
+from wearsim.errors import unknown_name
 from wearsim.types import FloatArray, IntArray
 from wearsim.uq.estimation.intervals import UNKNOWN, Interval, t_interval, t_quantile
 from wearsim.uq.estimation.moments import are_equal, fractional_ranks
@@ -64,7 +65,11 @@ class Estimate:
 
     def quantile(self, probability: float) -> Interval:
         """Return the quantile of one of the requested probabilities."""
-        return dict(self.quantiles)[probability]
+        found = dict(self.quantiles)
+        if probability not in found:
+            kind = "a probability of this estimate, see the argument probabilities"
+            raise unknown_name(f"{probability:g}", kind, (f"{known:g}" for known in found))
+        return found[probability]
 
 
 def estimate(
