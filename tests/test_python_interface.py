@@ -117,7 +117,9 @@ def test_remedies_name_arguments_and_not_options(rig: Path) -> None:
         lambda: wearsim.ensemble(
             random, 9, "d.h5", scheduler="serial", stop_requested=lambda: True
         ),
-        lambda: wearsim.ensemble(random, 9, "e.h5", plan="latin-hypercube", until="depth.mean 1%"),
+        lambda: wearsim.ensemble(
+            random, 9, "e.h5", plan="latin-hypercube", precision="depth.mean 1%"
+        ),
     ):
         with pytest.raises((ResultsFileError, ScenarioError, Interrupted)) as caught:
             call()

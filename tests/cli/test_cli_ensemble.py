@@ -98,8 +98,11 @@ def test_plan_and_seed_reach_the_file(command: Command, tests: Path) -> None:
     ("arguments", "message"),
     [
         (["--plan", "sobo"], "unknown plan 'sobo', expected one of monte-carlo"),
-        (["--until", "depth"], 'cannot read the target "depth"'),
-        (["--until", "dept.mean 1%"], "'dept', which is not an observable, expected one of depth"),
+        (["--precision", "depth"], 'cannot read the target "depth"'),
+        (
+            ["--precision", "dept.mean 1%"],
+            "'dept', which is not an observable, expected one of depth",
+        ),
         (["--scheduler", "cloud"], "no scheduler 'cloud', expected processes"),
         (["--scheduler", "serial", "--workers", "3"], "there is one worker"),
         (["--workers", "0"], "--workers"),
@@ -121,8 +124,19 @@ def test_invalid_options_are_refused_before_the_study(
     assert not list(tests.parent.glob("*.h5"))
 
 
+def test_former_name_of_precision_is_accepted_with_a_warning(command: Command, tests: Path) -> None:
+    result = command("ensemble", tests, "-n", 3, "--until", "depth.mean 1%", *HERE)
+    assert result.exit_code == 0, result.output
+    assert "warning: --until of ensembles is now --precision" in result.stderr
+    assert open_ensemble("tests-ensemble.h5").until == "depth.mean 1%"
+    both = command("ensemble", tests, "--until", "depth.mean 1%", "--precision", "depth.mean 2%")
+    assert both.exit_code == 2
+    assert "former name of --precision" in both.stderr
+    assert "--until" not in command("ensemble", "--help").stdout
+
+
 def test_plan_that_cannot_grow_has_no_target(command: Command, tests: Path) -> None:
-    options = ("--plan", "latin-hypercube", "--until", "depth.mean 1%")
+    options = ("--plan", "latin-hypercube", "--precision", "depth.mean 1%")
     result = command("ensemble", tests, *options)
     assert result.exit_code == 2
     assert "cannot grow" in result.stderr
@@ -136,7 +150,7 @@ def test_intervals_of_a_latin_hypercube_are_called_too_wide(command: Command, te
 
 
 def test_target_is_reached_with_a_control_variate(command: Command, tests: Path) -> None:
-    options = ("--plan", "control-variate", "--until", "depth.mean 20%")
+    options = ("--plan", "control-variate", "--precision", "depth.mean 20%")
     result = command("ensemble", tests, "-n", 200, *options, *HERE)
     assert result.exit_code == 0, result.output
     found = open_ensemble("tests-ensemble.h5")
@@ -148,7 +162,7 @@ def test_target_is_reached_with_a_control_variate(command: Command, tests: Path)
 
 
 def test_missed_target_is_reported(command: Command, tests: Path) -> None:
-    result = command("ensemble", tests, "-n", 10, "--until", "depth.mean 1%", *HERE)
+    result = command("ensemble", tests, "-n", 10, "--precision", "depth.mean 1%", *HERE)
     assert result.exit_code == 0
     found = open_ensemble("tests-ensemble.h5")
     target = Target.parse(found.until)
@@ -287,7 +301,7 @@ def test_scenario_without_random_inputs_is_bad_input(command: Command) -> None:
     assert "no random input" in result.stderr
 
 
-def test_help_of_until_has_the_first_interim_analysis(command: Command) -> None:
+def test_help_of_precision_has_the_first_interim_analysis(command: Command) -> None:
     output = " ".join(command("ensemble", "--help").stdout.split())
     first = interim_sizes("monte-carlo", 1000)[0]
     assert f"First checked after {first} realisations" in output

@@ -144,6 +144,29 @@ def test_resume_extends_a_finished_run(command: Command, finished: Path) -> None
     assert result.stderr.startswith("continuing from pass 6,000 of 9,000")
 
 
+def test_run_stops_at_a_limit_and_resumes(command: Command, scenario: Path) -> None:
+    result = command("run", scenario, "-q", "--until", "depth 0.5 um")
+    assert result.exit_code == 0, result.output
+    assert "stopped at depth 0.5 um: pass" in result.stdout
+    file = Path(f"{scenario.stem}.h5")
+    data = json.loads(command("resume", file, "-q", "--until", "depth 0.7 um", "--json").stdout)
+    assert data["until"] == "depth 0.7 um"
+    assert data["depth_m"] == pytest.approx(0.7e-6, rel=1e-6)
+    data = json.loads(command("resume", file, "-q", "--json").stdout)
+    assert (data["until"], data["passes"]) == (None, open_results(file).raw.total_passes)
+
+
+@pytest.mark.parametrize("verb", ["run", "resume"])
+def test_limit_that_cannot_be_read_is_a_usage_error(
+    verb: str, command: Command, scenario: Path, finished: Path
+) -> None:
+    result = command(verb, finished if verb == "resume" else scenario, "--until", "depth 5 N")
+    assert result.exit_code == 2
+    message = " ".join(result.stderr.split())
+    assert "--until" in message
+    assert "expected a length" in message
+
+
 @pytest.mark.parametrize("until", ["3", "3 mm", "-3 min"])
 def test_until_must_be_a_time(command: Command, finished: Path, until: str) -> None:
     result = command("resume", finished, f"--until={until}")

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from wearsim.evolution.steppers import per_pass
-from wearsim.studies.run.run import _RunInProgress
+from wearsim.studies.run.in_progress import RunInProgress
 
 
 @pytest.fixture
@@ -21,7 +21,7 @@ def small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
 def quick_disk(monkeypatch: pytest.MonkeyPatch) -> None:
     """Set the measured duration of writing to zero, so that it does not limit the checkpoints."""
     monkeypatch.setattr(
-        _RunInProgress, "_last_write", property(lambda _: 0.0, lambda _, seconds: None)
+        RunInProgress, "_last_write", property(lambda _: 0.0, lambda _, seconds: None)
     )
 
 

@@ -166,7 +166,7 @@ def write_line(**row: object) -> None:
 
 
 if __name__ == "__main__":
-    studies._RunInProgress._last_write = property(lambda _: 0.0, lambda _, seconds: None)
+    studies.RunInProgress._last_write = property(lambda _: 0.0, lambda _, seconds: None)
     mode, where = sys.argv[1], Path(sys.argv[2])
     if mode == "stages":
         kill_at_stages(short(**OFTEN, evolution__step=3000), where, sys.argv[3])

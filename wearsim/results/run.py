@@ -50,12 +50,15 @@ class RunData(StudyData):
     drawn : dict of str to dict
         Drawn values of the random inputs by scenario key: `values`, one for the test or one per
         roller, and their SI `unit`.
+    until : str
+        Limit at which the run stops, or has stopped if it is finished, "depth 50 um"; empty
+        without one.
     failure, failed_at : str
         Error that ended the run, and the time when it did, ISO 8601; empty if it did not fail.
     """
 
     separately_stored: ClassVar[frozenset[str]] = StudyData.separately_stored.union(_ARRAYS)
-    optional: ClassVar[frozenset[str]] = frozenset({"failure", "failed_at"})
+    optional: ClassVar[frozenset[str]] = frozenset({"until", "failure", "failed_at"})
 
     stepper: str
     tolerance: float
@@ -67,6 +70,7 @@ class RunData(StudyData):
     records: Arrays
     checkpoint: Arrays
     drawn: dict[str, dict[str, Any]] = field(default_factory=dict)
+    until: str = ""
     failure: str = ""
     failed_at: str = ""
 
@@ -230,6 +234,11 @@ class Result(StudyResult[RunData]):
         Inputs that vary during the run (processes, draws at every pass) are not included.
         """
         return {key: tuple(item["values"]) for key, item in self.raw.drawn.items()}
+
+    @property
+    def until(self) -> str:
+        """Limit at which the run has stopped, "depth 50 um"; empty at the end of the test."""
+        return self.raw.until if self.finished else ""
 
     @property
     def stepper(self) -> str:

@@ -83,7 +83,7 @@ def test_repeated_realisations_count_for_the_target(tmp_path, monkeypatch):
     from wearsim.studies.ensemble.realisation import RealisationRunner
 
     monkeypatch.setattr("wearsim.studies.ensemble.designs.FIRST_ANALYSIS", 32)
-    whole = ensemble(small(), 90, tmp_path / "whole.h5", until="depth.mean 8%", **SERIAL)
+    whole = ensemble(small(), 90, tmp_path / "whole.h5", precision="depth.mean 8%", **SERIAL)
     run = RealisationRunner._prepare
 
     def failing(self, number, *rest):
@@ -93,7 +93,7 @@ def test_repeated_realisations_count_for_the_target(tmp_path, monkeypatch):
 
     monkeypatch.setattr(RealisationRunner, "_prepare", failing)
     path = tmp_path / "failing.h5"
-    ensemble(small(), 90, path, until="depth.mean 8%", **SERIAL)
+    ensemble(small(), 90, path, precision="depth.mean 8%", **SERIAL)
     monkeypatch.setattr(RealisationRunner, "_prepare", run)
     again = resume_ensemble(path, failed=True, **SERIAL)
     estimate = again.estimate("depth").mean

@@ -175,13 +175,13 @@ def test_slow_batch_defers_few_outcomes(tmp_path, monkeypatch):
     monkeypatch.setattr(
         "wearsim.studies.ensemble.api.executor", lambda *_, **__: nullcontext(Late())
     )
-    result = ensemble(small(), 20, tmp_path / "e.h5", until="depth.mean 0.01%")
+    result = ensemble(small(), 20, tmp_path / "e.h5", precision="depth.mean 0.01%")
     assert result.count == 20
     assert max(greatest) <= AHEAD
 
 
 def test_ensemble_stops_where_target_is_reached(tmp_path):
-    options = {"until": "depth.mean 8%", **SERIAL}
+    options = {"precision": "depth.mean 8%", **SERIAL}
     result = ensemble(small(), 1000, tmp_path / "until.h5", **options)
     estimate = result.estimate("depth").mean
     assert result.finished
@@ -192,13 +192,18 @@ def test_ensemble_stops_where_target_is_reached(tmp_path):
     if result.count > 64:
         assert 1.96 * before.std() / np.sqrt(len(before)) > 0.08 * before.mean()
     several = ensemble(
-        small(), 1000, tmp_path / "two.h5", until="depth.mean 8%", scheduler="threads", workers=3
+        small(),
+        1000,
+        tmp_path / "two.h5",
+        precision="depth.mean 8%",
+        scheduler="threads",
+        workers=3,
     )
     assert differences(result, several) == []
 
 
 def test_unreached_target_is_reported(tmp_path):
-    result = ensemble(small(), 6, tmp_path / "e.h5", until="depth.q95 1%", **SERIAL)
+    result = ensemble(small(), 6, tmp_path / "e.h5", precision="depth.q95 1%", **SERIAL)
     assert result.count == 6
     assert any("depth.q95 1%" in text for text in result.warnings)
 
@@ -208,7 +213,7 @@ def test_unreached_target_is_reported(tmp_path):
 )
 def test_plan_of_fixed_size_refuses_a_target(tmp_path, plan, words):
     with pytest.raises(ScenarioError, match=words):
-        ensemble(small(), 6, tmp_path / "e.h5", plan=plan, until="depth.mean 1%")
+        ensemble(small(), 6, tmp_path / "e.h5", plan=plan, precision="depth.mean 1%")
     assert not (tmp_path / "e.h5").exists()
 
 

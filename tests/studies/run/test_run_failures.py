@@ -232,7 +232,7 @@ def test_existing_file_is_overwritten_by_force_only(
         raise AssertionError("the run was assembled before the output was checked")
 
     with monkeypatch.context() as patch:
-        patch.setattr(studies, "assemble_problem", work)
+        patch.setattr("wearsim.studies.run.in_progress.assemble_problem", work)
         with pytest.raises(ResultsFileError, match="already exists; force=True replaces it"):
             studies.run(short(), path)
     assert path.read_bytes() == content

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from study_examples import LOADS, OTHERS, ROLLERS, STEPPERS, run_differences, run_in_parts, short
 
+from wearsim.errors import Interrupted
 from wearsim.results import open_results
 from wearsim.studies.run import run as studies
 from wearsim.studies.run.recorder import Checkpointed, Event
@@ -73,7 +74,7 @@ def test_run_in_memory_equals_its_file(stepper: str, path: Path) -> None:
 
 def test_stopped_run_reports_its_progress(path: Path) -> None:
     scenario = short()
-    with pytest.raises(studies.Interrupted) as stop:
+    with pytest.raises(Interrupted) as stop:
         studies.run(scenario, path, stop_requested=lambda: True)
     assert str(stop.value).endswith(f'of 6000; continue with wearsim.resume("{path}")')
     assert stop.value.at_shell.endswith(f"of 6000; continue with: wearsim resume {path}")
@@ -81,7 +82,7 @@ def test_stopped_run_reports_its_progress(path: Path) -> None:
     assert not stopped.finished
     assert stopped.steps == 1
     assert 0.0 < stopped.passes[-1] < 6000
-    with pytest.raises(studies.Interrupted, match="nothing was written"):
+    with pytest.raises(Interrupted, match="nothing was written"):
         studies.run(scenario, stop_requested=lambda: True)
 
 
@@ -113,7 +114,7 @@ def test_slow_disk_limits_the_checkpoints(path: Path, monkeypatch: pytest.Monkey
     scenario = short(outputs__checkpoint_every="1e-9 s")
     for seconds in (1e-9, 1e9):
         written = property(lambda _, held=seconds: held, lambda _, found: None)
-        monkeypatch.setattr(studies._RunInProgress, "_last_write", written)
+        monkeypatch.setattr(studies.RunInProgress, "_last_write", written)
         events: list[Event] = []
         result = studies.run(scenario, path, force=True, on_event=events.append)
         assert len(_checkpoints(events)) == (2 if seconds > 1.0 else len(result.passes) + 1)
@@ -177,7 +178,7 @@ def test_resumed_extension_equals_unbroken_extension(
     other = tmp_path / "other.h5"
     other.write_bytes(path.read_bytes())
     unbroken = studies.resume(path, until=300.0)
-    with pytest.raises(studies.Interrupted):
+    with pytest.raises(Interrupted):
         studies.resume(other, until=300.0, stop_requested=lambda: True)
     assert 6000.0 < open_results(other).passes[-1] < 15_000.0
     assert run_differences(studies.resume(other), unbroken) == []
@@ -192,7 +193,7 @@ def test_test_cannot_end_before_its_present_state(path: Path) -> None:
 
 
 def test_stopped_test_can_be_shortened(path: Path) -> None:
-    with pytest.raises(studies.Interrupted):
+    with pytest.raises(Interrupted):
         studies.run(short(), path, stop_requested=lambda: True)
     result = studies.resume(path, until=60.0)
     assert (result.passes[-1], result.finished) == (3000.0, True)
@@ -213,14 +214,14 @@ def test_resuming_finished_test_changes_nothing(until: float | None, path: Path)
 def test_kill_before_last_write_is_completed_by_resume(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fail(self: studies._RunInProgress, finished: bool = False) -> None:
+    def fail(self: studies.RunInProgress, finished: bool = False) -> None:
         write(self, False)
         if finished:
             raise OSError
 
-    write = studies._RunInProgress._write
+    write = studies.RunInProgress._write
     with monkeypatch.context() as patch:
-        patch.setattr(studies._RunInProgress, "_write", fail)
+        patch.setattr(studies.RunInProgress, "_write", fail)
         with pytest.raises(OSError):  # noqa: PT011  (it has no text)
             studies.run(short(), path)
     standing = open_results(path)

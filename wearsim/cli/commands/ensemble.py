@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from wearsim.results import EnsembleResult
 
 Output = Annotated[Path | None, results_option("-ensemble.h5")]
-Until = Annotated[
+Precision = Annotated[
     str | None,
     typer.Option(
         metavar="TARGET",
@@ -43,6 +43,7 @@ Until = Annotated[
         show_default=False,
     ),
 ]
+Until = Annotated[str | None, typer.Option(metavar="TARGET", hidden=True)]
 Plan = Annotated[
     str | None,
     typer.Option(
@@ -74,6 +75,7 @@ def ensemble(
     figure: FigureOption = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
+    precision: Precision = None,
     until: Until = None,
     plan: Plan = None,
     sweep: Sweep = None,
@@ -91,12 +93,18 @@ def ensemble(
     from wearsim.studies.ensemble.sweep import path_of, run_sweep
     from wearsim.studies.kernels import kernels_of
 
-    options: dict[str, Any] = {"plan": plan, "until": until, "workers": workers, "force": force}
+    options: dict[str, Any] = {"plan": plan, "workers": workers, "force": force}
     with checking("--plan"):
         options["plan"] = plan if plan is None else parse_plan(plan)
-    with checking("--until"):
-        if until is not None:
-            api.parse_target(until)
+    if until is not None:
+        if precision is not None:
+            raise typer.BadParameter("is the former name of --precision", param_hint="--until")
+        note("warning: --until of ensembles is now --precision; the old name will be removed")
+        precision = until
+    with checking("--precision"):
+        options["precision"] = precision
+        if precision is not None:
+            api.parse_target(precision)
     options["scheduler"] = checked_scheduler(scheduler, workers)
     texts = [*(settings or []), *([f"seed={seed}"] if seed is not None else [])]
     path = output if output is not None else Path(f"{scenario.stem}-ensemble.h5")

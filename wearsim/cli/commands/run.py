@@ -33,15 +33,28 @@ if TYPE_CHECKING:
 Output = Annotated[Path | None, results_option(".h5")]
 
 
+Until = Annotated[
+    str | None,
+    typer.Option(
+        metavar="LIMIT",
+        help="Stop a wear test where it first reaches a limit: 'depth 50 um', 'roller depth 5 um',"
+        " 'volume 12 mm^3', '12 h' or '2e6 passes'. A shorter test is extended.",
+        show_default=False,
+    ),
+]
+
+
 def run(
     scenario: ScenarioFile,
     output: Output = None,
+    until: Until = None,
     settings: Settings = None,
     force: Force = False,
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
     """Run a wear test and write its results file."""
+    check_limit(until)
     loaded = read_scenario(scenario, settings)
     path = output if output is not None else Path(f"{scenario.stem}.h5")
     from wearsim.cli.progress import RunWatcher, stop_on_signals
@@ -51,7 +64,9 @@ def run(
     write_notes(loaded.notes)
     watcher = RunWatcher(quiet, kernels=lambda: kernels_of(loaded))
     with stop_on_signals() as stop, watcher as watch:
-        result = study.run(loaded, path, force=force, on_event=watch, stop_requested=stop.is_set)
+        result = study.run(
+            loaded, path, until=until, force=force, on_event=watch, stop_requested=stop.is_set
+        )
     report(result, json)
 
 
@@ -67,14 +82,6 @@ def report(result: Result, json: bool) -> None:
     typer.echo(run_line(result))
 
 
-Until = Annotated[
-    str | None,
-    typer.Option(
-        metavar="TIME",
-        help="New end of a wear test, '600 min'; extends it.",
-        show_default=False,
-    ),
-]
 More = Annotated[
     int | None,
     typer.Option(
@@ -144,15 +151,23 @@ def resume(
     _resume_run(file, until, json, quiet)
 
 
-def _resume_run(file: Path, until: str | None, json: bool, quiet: bool) -> None:
-    seconds = None
+def check_limit(until: str | None) -> None:
+    """Check the limit of a run, if one is given.
+
+    Raises
+    ------
+    typer.BadParameter
+        If it cannot be read.
+    """
     if until is not None:
-        from wearsim.quantities import quantity
+        from wearsim.evolution.limits import Limit
 
         with checking("--until"):
-            seconds = quantity(until, "s")
-            if seconds <= 0.0:
-                raise ValueError(f"must be above zero, got '{until}'")
+            Limit.parse(until)
+
+
+def _resume_run(file: Path, until: str | None, json: bool, quiet: bool) -> None:
+    check_limit(until)
     from wearsim.cli.commands.run import report
     from wearsim.cli.progress import RunWatcher, stop_on_signals
     from wearsim.results import open_results
@@ -161,7 +176,7 @@ def _resume_run(file: Path, until: str | None, json: bool, quiet: bool) -> None:
 
     watcher = RunWatcher(quiet, kernels=lambda: kernels_of(open_results(file).scenario))
     with stop_on_signals() as stop, watcher as watch:
-        result = study.resume(file, seconds, on_event=watch, stop_requested=stop.is_set)
+        result = study.resume(file, until, on_event=watch, stop_requested=stop.is_set)
     report(result, json)
 
 

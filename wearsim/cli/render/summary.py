@@ -138,6 +138,8 @@ def standing(result: Result) -> str:
     """Return the passes and the simulated time that a run has reached."""
     passes, total = float(result.passes[-1]), float(result.raw.total_passes)
     time = shown(float(result.time[-1]), "min")
+    if result.until:
+        return f"stopped at {result.until}: pass {count(passes)} of {count(total)}, {time}"
     if result.finished:
         return f"finished: {count(passes)} passes, {time}"
     part = f"{100.0 * passes / total:.1f} %"
@@ -147,9 +149,8 @@ def standing(result: Result) -> str:
 
 def failure(result: Result) -> Rows:
     """Return rows on the error that ended a run, and on when it did."""
-    if not result.failure:
-        return []
-    return [("failure", result.failure), ("failed at", result.raw.failed_at)]
+    rows = [("failure", result.failure), ("failed at", result.raw.failed_at)]
+    return rows if result.failure else []
 
 
 # name and unit of the quantities in the state of a solver
@@ -202,6 +203,7 @@ def run_json(result: Result) -> dict[str, Any]:
         "tolerance": result.raw.tolerance,
         "strips": len(result.y),
         "finished": bool(result.finished),
+        "until": result.until or None,
         "failure": result.failure or None,
         "failed_at": result.raw.failed_at or None,
         "steps": _last(result.steps),

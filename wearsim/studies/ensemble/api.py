@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -56,6 +57,7 @@ def ensemble(
     output: str | Path,
     *,
     plan: str | None = None,
+    precision: str | None = None,
     until: str | None = None,
     workers: int | None = None,
     scheduler: str = "processes",
@@ -80,9 +82,11 @@ def ensemble(
     plan : str, optional
         "monte-carlo", "latin-hypercube", "sobol", "control-variate" or "saltelli"; by default the
         scenario's.
-    until : str, optional
+    precision : str, optional
         Target that ends the ensemble early, such as "depth.mean 1%": the relative half-width of the
         95 % confidence interval of an estimate.
+    until : str, optional
+        Former name of `precision`.
     workers : int, optional
         Number of realisations run at the same time; by default the number of processors.
     scheduler : str
@@ -125,7 +129,8 @@ def ensemble(
     8
     """
     scenario = as_scenario(scenario)
-    request = checked_request(scenario, realisations, plan, until)
+    precision = named_precision(precision, until)
+    request = checked_request(scenario, realisations, plan, precision)
     path = Path(output)
     check_output(path, force, scenario.paths)
     with (
@@ -166,14 +171,14 @@ class EnsembleRequest(NamedTuple):
 
 
 def checked_request(
-    scenario: Scenario, realisations: int, plan: str | None, until: str | None
+    scenario: Scenario, realisations: int, plan: str | None, precision: str | None
 ) -> EnsembleRequest:
     """Check the arguments of an ensemble; parameters and errors as in `ensemble`."""
     checked_count(scenario, realisations)
     require_run(scenario)
     chosen = parse_plan(plan or scenario.sampling.plan)
-    target = None if until is None else parse_target(until)
-    check_plan(scenario, chosen, "a target" if until else "")
+    target = None if precision is None else parse_target(precision)
+    check_plan(scenario, chosen, "a target" if precision else "")
     drawer = Drawer(scenario, "monte-carlo")
     by_pass = any(item.persistence == "per-pass" for item in scenario.random)
     if not drawer.groups and not (by_pass and scenario.evolution.stepper == "per-pass"):
@@ -182,6 +187,26 @@ def checked_request(
             what += ': inputs drawn at every pass are averaged unless stepper = "per-pass"'
         raise ScenarioError(scenario.file, [nothing_random(what)])
     return EnsembleRequest(chosen, whole_count(chosen, drawer.groups, realisations), target)
+
+
+def named_precision(precision: str | None, until: str | None) -> str | None:
+    """Return the precision of a study, from its present or its former name.
+
+    Raises
+    ------
+    TypeError
+        If both are given.
+    """
+    if until is None:
+        return precision
+    if precision is not None:
+        raise TypeError("until is the former name of precision; give precision only")
+    warnings.warn(
+        "until of an ensemble is now precision; the old name will be removed",
+        DeprecationWarning,
+        stacklevel=3,
+    )
+    return until
 
 
 def parse_target(text: str) -> Target:

@@ -17,7 +17,7 @@ from wearsim.results import (
     read_results,
 )
 from wearsim.scenario import Scenario, as_scenario
-from wearsim.studies.ensemble.api import checked_request, ensemble, resume_ensemble
+from wearsim.studies.ensemble.api import checked_request, ensemble, named_precision, resume_ensemble
 from wearsim.studies.run.run import resume, run
 
 
@@ -103,15 +103,16 @@ def run_sweep(
     for scenario, path in zip(scenarios, paths, strict=True):
         request: tuple[object, ...] = (scenario.sha256,)
         if realisations is not None:
-            found = checked_request(
-                scenario, realisations, options.get("plan"), options.get("until")
-            )
+            precision = named_precision(options.get("precision"), options.get("until"))
+            found = checked_request(scenario, realisations, options.get("plan"), precision)
             until = "" if found.target is None else str(found.target)
             request += (found.plan, found.realisations, until)
         resumed.append(not force and path is not None and _requested(path) == request)
         if path is not None and not resumed[-1]:
             check_output(path, force, scenario.paths)
-    continued = {name: options[name] for name in options.keys() - {"plan", "until", "force"}}
+    # a run continues to its limit; the target of an ensemble is in its file
+    dropped = {"force"} if realisations is None else {"force", "plan", "precision", "until"}
+    continued = {name: options[name] for name in options.keys() - dropped}
     results: list[Result | EnsembleResult] = []
     for value, scenario, path, is_resumed in zip(values, scenarios, paths, resumed, strict=True):
         if on_value is not None:

@@ -10,13 +10,13 @@ from typing import TypeAlias
 
 import numpy as np
 
-from wearsim.errors import ContactError, StepError
 from wearsim.evolution.integrate import Advance
+from wearsim.evolution.limits import take_side_step
 from wearsim.evolution.pauses import opened
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import mean_along, width, worn_volume
 from wearsim.evolution.state import WearState, joined_states
-from wearsim.evolution.steppers.base import SMALLEST_STEP, Step, Stepper
+from wearsim.evolution.steppers.base import Stepper
 from wearsim.evolution.steppers.loads import descents, elastic_approaches
 from wearsim.evolution.steppers.single_step import present_problem, solve_at_record
 from wearsim.results.run_schema import VARIABLES
@@ -156,37 +156,6 @@ def record_row(stepper: Stepper, problem: WearProblem, state: WearState) -> Vari
     }
 
 
-def take_side_step(
-    step: Step, problem: WearProblem, state: WearState, passes: FloatArray
-) -> WearState:
-    """Return the state `passes` later by one side step, or by halves if that step fails.
-
-    A profile interpolated between two steps would not fit its contact. The run does not continue
-    from a side step.
-
-    Parameters
-    ----------
-    step : callable
-        Takes a problem, a state and a number of passes to the state after them.
-    problem : WearProblem
-    state : WearState
-    passes : ndarray, shape (realisations,)
-        Halved only for a single test, whose result must not depend on others in its batch.
-
-    Raises
-    ------
-    StepError, ContactError
-        If halves would be too short.
-    """
-    try:
-        return step(problem, state, passes)
-    except (StepError, ContactError):
-        half = 0.5 * passes
-        if len(half) > 1 or half[0] < SMALLEST_STEP:
-            raise
-    return take_side_step(step, problem, take_side_step(step, problem, state, half), half)
-
-
 #: A record in or at the end of a step: the last state before or at it, by its number on the path;
 #: the place of its test; its passes.
 Due: TypeAlias = tuple[int, int, float]
@@ -282,6 +251,28 @@ class Recorder:
         self._history.append(_single(row))
         # a single assignment: an interrupt before it leaves the previous step current
         self._kept = len(self._history), len(self._records), end
+
+    def end_at(self, advance: Advance, state: WearState, stop: float) -> None:
+        """Record a state within a step as the end of the run, which resumes from the step's start.
+
+        Parameters
+        ----------
+        advance : Advance
+            The step, of a single test.
+        state : WearState
+            State of the test at its end.
+        stop : float
+            Passes at the end of the test without this stop.
+        """
+        stepper, start = self.stepper, advance.path[0]
+        for one in due_records(advance, self.schedule, stop, stepper.pass_by_pass):
+            if one[2] < state.passes[0]:
+                row = record_row(stepper, *states_at(stepper, advance, [one]))
+                self._records.append(_single(row))
+        self._records.append(_single(record_row(stepper, self.problem, state)))
+        row = history_row(stepper, self.problem, state, start, self.threshold)
+        self._history.append(_single(row))
+        self._kept = len(self._history), len(self._records), start
 
     def drop_unfinished(self) -> None:
         """Remove the rows of an interrupted `add`."""

@@ -2,60 +2,50 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
-from datetime import UTC, datetime
 from pathlib import Path
 
-import numpy as np
-
-from wearsim.errors import Interrupted, ResultsFileError, failure_text
-from wearsim.evolution.error_estimates import greatest_depth, volume_of
-from wearsim.evolution.integrate import evolve
-from wearsim.evolution.state import SIGMAS, WearState, fresh_state
+from wearsim.errors import ResultsFileError, ScenarioError
+from wearsim.evolution.limits import Limit
+from wearsim.evolution.state import WearState
 from wearsim.results import (
     DISK,
     Result,
-    RunData,
     Storage,
     check_output,
     kind_of,
     read_results,
-    write_results,
 )
-from wearsim.scenario import Scenario, as_scenario, parse_scenario
-from wearsim.studies.plausibility import plausibility_warnings
-from wearsim.studies.preparation import changed_origins, check_plugins, origin_of
+from wearsim.scenario import Scenario, as_scenario
+from wearsim.studies.preparation import check_plugins
 from wearsim.studies.progress import shown_progress
-from wearsim.studies.run.assemble import assemble_problem, start_height
-from wearsim.studies.run.draws import Draws, draw, units_of
-from wearsim.studies.run.recorder import (
-    Checkpointed,
-    Event,
-    Finished,
-    Recorder,
-    Started,
-    Stepped,
-    Warned,
+from wearsim.studies.run.continuation import (
+    is_at_limit,
+    last_value,
+    stored_scenario,
+    widened_run,
+    with_end,
+    without_limit_rows,
+    written_value,
 )
-from wearsim.studies.run.schedule import RecordSchedule
-from wearsim.studies.run.widening import widened_run
-from wearsim.types import Grid
+from wearsim.studies.run.draws import draw
+from wearsim.studies.run.in_progress import RunInProgress, Watcher
 
-Watcher = Callable[[Event], None]
+EXTENSIONS = 10  # of a test that ends before its limit, each to twice its length
 
 
 def run(
     scenario: Scenario | str | Path,
     output: str | Path | None = None,
     *,
+    until: str | float | None = None,
     force: bool = False,
     progress: bool = False,
     on_event: Watcher | None = None,
     stop_requested: Callable[[], bool] | None = None,
     storage: Storage = DISK,
 ) -> Result:
-    """Run a wear test from unworn bodies to its end.
+    """Run a wear test from unworn bodies to its end, or to a limit.
 
     Parameters
     ----------
@@ -63,6 +53,9 @@ def run(
         The scenario, or its file.
     output : path, optional
         Results file; without it the result is kept in memory only.
+    until : str or float, optional
+        Limit at which the run stops: "depth 50 um", "roller depth 5 um", "volume 12 mm^3", "12 h"
+        or "2e6 passes"; a number is a time [s]. A test that ends before its limit is extended.
     force : bool
         Overwrite an existing file.
     progress : bool
@@ -82,6 +75,8 @@ def run(
     ------
     ScenarioError, CapabilityError, ResultsFileError
         If the run cannot start.
+    ValueError
+        If `until` is not a limit.
     SolverError
         If it fails; the file then holds everything up to the last accepted step.
     Interrupted
@@ -95,18 +90,22 @@ def run(
     >>> kept = wearsim.run("rig.toml", "rig.h5")  # writes the file as well
     """
     scenario = as_scenario(scenario)
+    limit = None if until is None else Limit.parse(until)
     path = Path(output) if output is not None else None
     if path is not None:
         check_output(path, force, scenario.paths)
+    scenario, limit = with_end(scenario, limit)
     with shown_progress(progress, "RunWatcher", on_event, scenario) as watch:
-        return _RunInProgress(
-            scenario, draw(scenario), path, storage, watch, stop_requested
-        ).finish()
+        return _run_to_limit(
+            RunInProgress(
+                scenario, draw(scenario), path, storage, watch, stop_requested, limit=limit
+            )
+        )
 
 
 def resume(
     file: str | Path,
-    until: float | None = None,
+    until: str | float | None = None,
     *,
     progress: bool = False,
     on_event: Watcher | None = None,
@@ -119,8 +118,9 @@ def resume(
     ----------
     file : path
         Results file of a run that was stopped, or finished.
-    until : float, optional
-        New simulated end of the test [s], to extend it.
+    until : str or float, optional
+        Limit at which the run stops, as in `run`. By default an interrupted run continues to its
+        limit, and a run that has reached its limit to the end of the scenario.
     progress, on_event, stop_requested, storage
         As in `run`.
 
@@ -133,13 +133,15 @@ def resume(
     ResultsFileError
         If the file cannot be read, needs a plugin that is not installed, or holds a test that is
         already past `until`.
+    ValueError
+        If `until` is not a limit.
     SolverError, Interrupted
         As in `run`.
 
     Examples
     --------
     >>> result = wearsim.run("rig.toml", "rig.h5")
-    >>> longer = wearsim.resume("rig.h5", until=500 * 60)
+    >>> longer = wearsim.resume("rig.h5", until="500 min")
     >>> print(f"{longer.time[-1] / 60:.0f} min")
     500 min
     """
@@ -151,243 +153,47 @@ def resume(
         )
     data = read_results(path)
     check_plugins(path, data)
-    overrides = {"operation.duration": f"{until!r} s"} if until is not None else None
-    scenario = parse_scenario(
-        data.scenario_text, data.scenario_file, data.files.__getitem__, overrides
-    )
+    limit = None if until is None else Limit.parse(until)
+    if limit is None and data.until and not data.finished:
+        limit = Limit.parse(data.until)
+    reached = is_at_limit(path, data, limit)
     state = WearState.from_arrays(data.checkpoint)
-    done = float(state.passes[0])
-    if scenario.total_passes < done:
-        raise ResultsFileError(
-            f"{path}: the test has already reached"
-            f" {done / scenario.pass_rate / 60.0:.6g} min, which is past"
-            f" {(until or 0.0) / 60.0:.6g} min",
-            python="give a later until",
-            shell="give a later --until",
-        )
-    if data.finished and scenario.total_passes == done:
+    scenario, limit = with_end(stored_scenario(data), limit)
+    at_end = not data.until and scenario.total_passes == float(state.passes[0])
+    if data.finished and (reached or (at_end and limit is None)):
         return Result(data, path)
     draws = draw(scenario)
-    data, state = widened_run(draws, data, state)
+    data, state = widened_run(draws, without_limit_rows(data, state), state)
     with shown_progress(progress, "RunWatcher", on_event, scenario) as watch:
-        return _RunInProgress(
-            scenario, draws, path, storage, watch, stop_requested, data, state
-        ).finish()
+        return _run_to_limit(
+            RunInProgress(scenario, draws, path, storage, watch, stop_requested, data, state, limit)
+        )
 
 
-class _RunInProgress:
-    """A run in this process, with its recorder, clock and file.
+def _run_to_limit(run: RunInProgress) -> Result:
+    """Finish a run; extend the test as long as it ends before its limit.
 
-    It starts from unworn bodies, or continues from the data and the state of a file.
+    Each extension doubles the test. A run without wear, with a log that ends, or after `EXTENSIONS`
+    ends before its limit, with a warning.
     """
-
-    _last_write = 0.0  # duration [s]
-    failure = failed_at = ""
-
-    def __init__(
-        self,
-        scenario: Scenario,
-        draws: Draws,
-        path: Path | None,
-        storage: Storage,
-        on_event: Watcher | None,
-        stop_requested: Callable[[], bool] | None,
-        data: RunData | None = None,
-        state: WearState | None = None,
-    ) -> None:
-        grid = None if data is None else Grid(data.static["y"], float(data.checkpoint["spacing"]))
-        self.scenario, self.path, self.storage = scenario, path, storage
-        self.problem, self.stepper, self.stepper_name = assemble_problem(draws, grid)
-        self.on_event: Watcher = on_event or (lambda event: None)
-        self.stop_requested = stop_requested or (lambda: False)
-        self.stop = float(scenario.total_passes)
-        self.origin = origin_of(scenario)
-        units = units_of(scenario)
-        self.drawn: dict[str, dict[str, object]] = {
-            key: {"values": np.atleast_1d(value).tolist(), "unit": units[key]}
-            for key, value in draws.values.items()
-        }
-        self.warnings: list[str] = [] if data is None else list(data.warnings)
-        self.created = (
-            datetime.now(UTC).isoformat(timespec="seconds") if data is None else data.created
-        )
-        self.wall_before = 0.0 if data is None else data.wall_seconds
-        self.started = time.monotonic()
-        self.record_base = self.stop if data is None else float(data.checkpoint["record_base"])
-        self.recorder = Recorder(
-            self.problem,
-            self.stepper,
-            RecordSchedule.of(scenario, self.record_base),
-            scenario.outputs.width_threshold,
-            fresh_state(self.problem) if state is None else state,
-            None if data is None else data.history,
-            None if data is None else data.records,
-        )
-        if data is None:
-            for text in plausibility_warnings(scenario):
-                self._warn(text)
-            self._write()
+    result, extensions = run.finish(), 0
+    while run.limit is not None and not run.reached:
+        data, state, reason = run.data(finished=True), run.recorder.state, ""
+        last = last_value(data, run.limit)
+        if last <= 0.0:
+            reason = "nothing is worn"
+        elif extensions == EXTENSIONS:
+            reason = f"the test has been extended {2**EXTENSIONS}-fold"
         else:
-            for text in changed_origins(data, scenario):
-                self._warn(text)
-
-    def finish(self) -> Result:
-        """Step to the end of the test and return the result."""
-        self.on_event(
-            Started(
-                self.stop,
-                self.stop / self.problem.kinematics.pass_rate,
-                self._passes,
-                self.stepper_name,
-                self.scenario.contact.model,
-            )
-        )
-        try:
-            self._step_to_end()
-            self._check_errors()
-            self._write(finished=True)
-        except KeyboardInterrupt:
-            self._interrupt()
-        except (Interrupted, ResultsFileError):
-            raise
-        except Exception as error:
-            # the file keeps the last accepted step, the history before the failure, and its cause
-            self.recorder.drop_unfinished()
-            self.failure = failure_text(error)
-            self.failed_at = datetime.now(UTC).isoformat(timespec="seconds")
-            self._write()
-            raise
-        self.on_event(Finished(self._wall()))
-        return Result(self._data(finished=True), self.path)
-
-    def _check_errors(self) -> None:
-        """Warn if an estimated error exceeds the tolerance."""
-        state, tolerance = self.recorder.state, self.scenario.evolution.tolerance
-        sizes = greatest_depth(state.depths), volume_of(self.problem, state.depths)
-        errors = state.depth_error, state.volume_error
-        for kind, name in enumerate(("depth", "worn volume")):
-            parts = [errors[kind], state.quadrature[kind], SIGMAS * np.sqrt(state.scatter[kind])]
-            size = np.where(sizes[kind] > 0.0, sizes[kind], np.inf)
-            relative, quadrature, scatter = (float((part / size).max()) for part in parts)
-            if relative <= tolerance:
-                continue
-            remedy = "lower evolution.tolerance or evolution.step"
-            if max(quadrature, scatter) > 0.5 * relative:
-                remedy = "raise evolution.nodes"
-                if scatter > quadrature:
-                    part = scatter / relative
-                    remedy = f"{part:.0%} of it is sampling scatter of the small number of passes"
-            self._warn(
-                f"estimated error of {name}: {100.0 * relative:.2g} % exceeds the tolerance"
-                f" of {100.0 * tolerance:.2g} %; {remedy}"
-            )
-
-    def _step_to_end(self) -> None:
-        written = time.monotonic()
-        for advance in evolve(
-            self.problem,
-            self.recorder.state,
-            self.stepper,
-            self.stop,
-            self.recorder.schedule.next_record,
-            self.scenario.evolution.max_steps,
-        ):
-            self.recorder.add(advance, self.stop)
-            state = advance.end
-            if advance.warning is not None:
-                self._warn(advance.warning)
-            self.on_event(
-                Stepped(
-                    passes=self._passes,
-                    total_passes=self.stop,
-                    time=self._passes / self.problem.kinematics.pass_rate,
-                    depth=float(state.cylinder_depth.max()),
-                    step_passes=self._passes - float(advance.path[0].passes[0]),
-                    depth_error=float(state.depth_error.max()),
-                    wall_seconds=self._wall(),
-                )
-            )
-            if self.stop_requested() and self._passes < self.stop:
-                self._interrupt()
-            # with a slow disk, at most 2 % of the time is spent on writing
-            every = max(self.scenario.outputs.checkpoint_every, 50.0 * self._last_write)
-            if time.monotonic() - written > every:
-                self._write()
-                written = time.monotonic()
-
-    def _warn(self, message: str) -> None:
-        """Report and store a warning, the first of each kind only."""
-        kind = message.split(":", maxsplit=1)[0]
-        if not any(known.split(":")[0] == kind for known in self.warnings):
-            self.warnings.append(message)
-            self.on_event(Warned(message))
-
-    def _interrupt(self) -> None:
-        """Write a checkpoint and raise Interrupted."""
-        self.recorder.drop_unfinished()
-        self._write()
-        what = f"stopped at pass {self._passes:.0f} of {self.stop:.0f}"
-        if self.path is None:
-            raise Interrupted(f"{what}; nothing was written") from None
-        raise Interrupted(
-            what,
-            python=f'continue with wearsim.resume("{self.path}")',
-            shell=f"continue with: wearsim resume {self.path}",
-        ) from None
-
-    @property
-    def _passes(self) -> float:
-        """Roller passes done."""
-        return float(self.recorder.state.passes[0])
-
-    def _wall(self) -> float:
-        return self.wall_before + time.monotonic() - self.started
-
-    def _write(self, finished: bool = False) -> None:
-        if self.path is None:
-            return
-        begin = time.monotonic()
-        write_results(self.path, self._data(finished), self.storage)
-        self._last_write = time.monotonic() - begin
-        self.on_event(Checkpointed(str(self.path), self._passes))
-
-    def _data(self, finished: bool) -> RunData:
-        scenario, problem = self.scenario, self.problem
-        kinematics = problem.kinematics
-        checkpoint = self.recorder.state.to_arrays()
-        checkpoint["record_base"] = np.asarray(self.record_base)
-        checkpoint["spacing"] = np.asarray(problem.grid.spacing)
-        return RunData(
-            **self.origin,
-            drawn=self.drawn,
-            stepper=self.stepper_name,
-            tolerance=scenario.evolution.tolerance,
-            width_threshold=scenario.outputs.width_threshold,
-            total_passes=self.stop,
-            notes=list(scenario.notes),
-            warnings=self.warnings,
-            kinematics={
-                "rolling_speed": kinematics.rolling_speed,
-                "cylinder_radius": kinematics.cylinder_radius,
-                "roller_radius": kinematics.roller_radius,
-                "crown_radius": kinematics.crown_radius,
-                "pass_rate": kinematics.pass_rate,
-                "physical_rollers": kinematics.physical_rollers,
-            },
-            static={
-                "y": problem.grid.y,
-                "nominal_gap": problem.per_roller(
-                    problem.at_time(np.zeros(1), np.zeros(1)).nominal_gap
-                ),
-                "start_height": start_height(scenario, problem.grid),
-                "multiplicity": kinematics.multiplicity,
-            },
-            history=self.recorder.history,
-            records=self.recorder.records,
-            checkpoint=checkpoint,
-            finished=finished,
-            wall_seconds=self._wall(),
-            created=self.created,
-            failure=self.failure,
-            failed_at=self.failed_at,
-        )
+            try:
+                scenario = stored_scenario(data, 2.0 * data.total_passes)
+                draws = draw(scenario)
+                longer = run.extended(scenario, draws, *widened_run(draws, data, state))
+            except ScenarioError as error:
+                reason = "it cannot be extended: " + "; ".join(map(str, error.mistakes))
+        if reason:
+            value = written_value(run.limit, last)
+            return run.end_before_limit(f"{value} at the end of the test; {reason}")
+        run, extensions = longer, extensions + 1
+        result = run.finish()
+    return result

@@ -1,0 +1,282 @@
+"""A run in this process, with its recorder, clock and file."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+
+from wearsim.errors import Interrupted, ResultsFileError, failure_text
+from wearsim.evolution.error_estimates import greatest_depth, volume_of
+from wearsim.evolution.integrate import evolve
+from wearsim.evolution.limits import Limit
+from wearsim.evolution.state import SIGMAS, WearState, fresh_state
+from wearsim.results import (
+    Result,
+    RunData,
+    Storage,
+    write_results,
+)
+from wearsim.scenario import Scenario
+from wearsim.studies.plausibility import plausibility_warnings
+from wearsim.studies.preparation import changed_origins, origin_of
+from wearsim.studies.run.assemble import assemble_problem, start_height
+from wearsim.studies.run.continuation import earlier_warnings
+from wearsim.studies.run.draws import Draws, units_of
+from wearsim.studies.run.recorder import (
+    Checkpointed,
+    Event,
+    Finished,
+    Recorder,
+    Started,
+    Stepped,
+    Warned,
+)
+from wearsim.studies.run.schedule import RecordSchedule
+from wearsim.types import Grid
+
+Watcher = Callable[[Event], None]
+
+
+class RunInProgress:
+    """A run in this process, with its recorder, clock and file.
+
+    It starts from unworn bodies, or continues from the data and the state of a file.
+    """
+
+    _last_write = 0.0  # duration [s]
+    failure = failed_at = ""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        draws: Draws,
+        path: Path | None,
+        storage: Storage,
+        on_event: Watcher | None,
+        stop_requested: Callable[[], bool] | None,
+        data: RunData | None = None,
+        state: WearState | None = None,
+        limit: Limit | None = None,
+    ) -> None:
+        self.limit, self.reached = limit, False
+        grid = None if data is None else Grid(data.static["y"], float(data.checkpoint["spacing"]))
+        self.scenario, self.path, self.storage = scenario, path, storage
+        self.problem, self.stepper, self.stepper_name = assemble_problem(draws, grid)
+        self.on_event: Watcher = on_event or (lambda event: None)
+        self.stop_requested = stop_requested or (lambda: False)
+        self.stop = float(scenario.total_passes)
+        self.origin = origin_of(scenario)
+        units = units_of(scenario)
+        self.drawn: dict[str, dict[str, object]] = {
+            key: {"values": np.atleast_1d(value).tolist(), "unit": units[key]}
+            for key, value in draws.values.items()
+        }
+        self.warnings: list[str] = [] if data is None else earlier_warnings(data)
+        self.created = (
+            datetime.now(UTC).isoformat(timespec="seconds") if data is None else data.created
+        )
+        self.wall_before = 0.0 if data is None else data.wall_seconds
+        self.started = time.monotonic()
+        self.record_base = self.stop if data is None else float(data.checkpoint["record_base"])
+        self.recorder = Recorder(
+            self.problem,
+            self.stepper,
+            RecordSchedule.of(scenario, self.record_base),
+            scenario.outputs.width_threshold,
+            fresh_state(self.problem) if state is None else state,
+            None if data is None else data.history,
+            None if data is None else data.records,
+        )
+        if data is None:
+            for text in plausibility_warnings(scenario):
+                self._warn(text)
+            self._write()
+        else:
+            for text in changed_origins(data, scenario):
+                self._warn(text)
+
+    def finish(self) -> Result:
+        """Step to the end of the test and return the result."""
+        self.on_event(
+            Started(
+                self.stop,
+                self.stop / self.problem.kinematics.pass_rate,
+                self._passes,
+                self.stepper_name,
+                self.scenario.contact.model,
+            )
+        )
+        try:
+            self._step_to_end()
+            self._check_errors()
+            self._write(finished=True)
+        except KeyboardInterrupt:
+            self._interrupt()
+        except (Interrupted, ResultsFileError):
+            raise
+        except Exception as error:
+            # the file keeps the last accepted step, the history before the failure, and its cause
+            self.recorder.drop_unfinished()
+            self.failure = failure_text(error)
+            self.failed_at = datetime.now(UTC).isoformat(timespec="seconds")
+            self._write()
+            raise
+        self.on_event(Finished(self._wall()))
+        return Result(self.data(finished=True), self.path)
+
+    def extended(
+        self, scenario: Scenario, draws: Draws, data: RunData, state: WearState
+    ) -> RunInProgress:
+        """Return the same run with a longer test."""
+        settings = self.path, self.storage, self.on_event, self.stop_requested
+        return RunInProgress(scenario, draws, *settings, data, state, self.limit)
+
+    def end_before_limit(self, reason: str) -> Result:
+        """Return the result of a run that does not reach its limit, with a warning."""
+        text = "" if self.limit is None else self.limit.text
+        self._warn(f"limit {text} is not reached: {reason}")
+        self._write(finished=True)
+        return Result(self.data(finished=True), self.path)
+
+    def _check_errors(self) -> None:
+        """Warn if an estimated error exceeds the tolerance."""
+        state, tolerance = self.recorder.state, self.scenario.evolution.tolerance
+        sizes = greatest_depth(state.depths), volume_of(self.problem, state.depths)
+        errors = state.depth_error, state.volume_error
+        for kind, name in enumerate(("depth", "worn volume")):
+            parts = [errors[kind], state.quadrature[kind], SIGMAS * np.sqrt(state.scatter[kind])]
+            size = np.where(sizes[kind] > 0.0, sizes[kind], np.inf)
+            relative, quadrature, scatter = (float((part / size).max()) for part in parts)
+            if relative <= tolerance:
+                continue
+            remedy = "lower evolution.tolerance or evolution.step"
+            if max(quadrature, scatter) > 0.5 * relative:
+                remedy = "raise evolution.nodes"
+                if scatter > quadrature:
+                    part = scatter / relative
+                    remedy = f"{part:.0%} of it is sampling scatter of the small number of passes"
+            self._warn(
+                f"estimated error of {name}: {100.0 * relative:.2g} % exceeds the tolerance"
+                f" of {100.0 * tolerance:.2g} %; {remedy}"
+            )
+
+    def _step_to_end(self) -> None:
+        written = time.monotonic()
+        for advance in evolve(
+            self.problem,
+            self.recorder.state,
+            self.stepper,
+            self.stop,
+            self.recorder.schedule.next_record,
+            self.scenario.evolution.max_steps,
+        ):
+            at_limit = self.limit and self.limit.crossing(self.stepper, advance, 0)
+            if at_limit:
+                self.recorder.end_at(advance, at_limit, self.stop)
+                self.reached = True
+                return
+            self.recorder.add(advance, self.stop)
+            state = advance.end
+            if advance.warning is not None:
+                self._warn(advance.warning)
+            self.on_event(
+                Stepped(
+                    passes=self._passes,
+                    total_passes=self.stop,
+                    time=self._passes / self.problem.kinematics.pass_rate,
+                    depth=float(state.cylinder_depth.max()),
+                    step_passes=self._passes - float(advance.path[0].passes[0]),
+                    depth_error=float(state.depth_error.max()),
+                    wall_seconds=self._wall(),
+                )
+            )
+            if self.stop_requested() and self._passes < self.stop:
+                self._interrupt()
+            # with a slow disk, at most 2 % of the time is spent on writing
+            every = max(self.scenario.outputs.checkpoint_every, 50.0 * self._last_write)
+            if time.monotonic() - written > every:
+                self._write()
+                written = time.monotonic()
+
+    def _warn(self, message: str) -> None:
+        """Report and store a warning, the first of each kind only."""
+        kind = message.split(":", maxsplit=1)[0]
+        if not any(known.split(":")[0] == kind for known in self.warnings):
+            self.warnings.append(message)
+            self.on_event(Warned(message))
+
+    def _interrupt(self) -> None:
+        """Write a checkpoint and raise Interrupted."""
+        self.recorder.drop_unfinished()
+        self._write()
+        what = f"stopped at pass {self._passes:.0f} of {self.stop:.0f}"
+        if self.path is None:
+            raise Interrupted(f"{what}; nothing was written") from None
+        raise Interrupted(
+            what,
+            python=f'continue with wearsim.resume("{self.path}")',
+            shell=f"continue with: wearsim resume {self.path}",
+        ) from None
+
+    @property
+    def _passes(self) -> float:
+        """Roller passes done."""
+        return float(self.recorder.state.passes[0])
+
+    def _wall(self) -> float:
+        return self.wall_before + time.monotonic() - self.started
+
+    def _write(self, finished: bool = False) -> None:
+        if self.path is None:
+            return
+        begin = time.monotonic()
+        write_results(self.path, self.data(finished), self.storage)
+        self._last_write = time.monotonic() - begin
+        self.on_event(Checkpointed(str(self.path), self._passes))
+
+    def data(self, finished: bool) -> RunData:
+        """Return the content of the results file."""
+        scenario, problem = self.scenario, self.problem
+        kinematics = problem.kinematics
+        checkpoint = self.recorder.state.to_arrays()
+        checkpoint["record_base"] = np.asarray(self.record_base)
+        checkpoint["spacing"] = np.asarray(problem.grid.spacing)
+        return RunData(
+            **self.origin,
+            drawn=self.drawn,
+            stepper=self.stepper_name,
+            tolerance=scenario.evolution.tolerance,
+            width_threshold=scenario.outputs.width_threshold,
+            total_passes=self.stop,
+            until=self.limit.text if self.limit and (self.reached or not finished) else "",
+            notes=list(scenario.notes),
+            warnings=self.warnings,
+            kinematics={
+                "rolling_speed": kinematics.rolling_speed,
+                "cylinder_radius": kinematics.cylinder_radius,
+                "roller_radius": kinematics.roller_radius,
+                "crown_radius": kinematics.crown_radius,
+                "pass_rate": kinematics.pass_rate,
+                "physical_rollers": kinematics.physical_rollers,
+            },
+            static={
+                "y": problem.grid.y,
+                "nominal_gap": problem.per_roller(
+                    problem.at_time(np.zeros(1), np.zeros(1)).nominal_gap
+                ),
+                "start_height": start_height(scenario, problem.grid),
+                "multiplicity": kinematics.multiplicity,
+            },
+            history=self.recorder.history,
+            records=self.recorder.records,
+            checkpoint=checkpoint,
+            finished=finished,
+            wall_seconds=self._wall(),
+            created=self.created,
+            failure=self.failure,
+            failed_at=self.failed_at,
+        )
