@@ -121,7 +121,11 @@ def mean_force(problem: WearProblem, state: WearState, passes: FloatArray) -> Fl
 
 
 def corrected_loads(
-    problem: WearProblem, loads: FloatArray, target: FloatArray, approach: FloatArray, part: float
+    problem: WearProblem,
+    loads: FloatArray,
+    target: FloatArray,
+    approach: FloatArray,
+    part: FloatArray | float,
 ) -> FloatArray:
     """Return loads closer to those at which a spring and the contact are in equilibrium.
 
@@ -137,7 +141,7 @@ def corrected_loads(
         Loads by the spring at the displacement of that solution [N].
     approach : ndarray
         Part of the displacement that depends on the load [m].
-    part : float
+    part : float or ndarray, shape (realisations,)
         Fraction of that displacement by which the spring extends in the mean over the step.
     """
     slope = part * APPROACH_EXPONENT * np.maximum(approach, 0.0) / loads

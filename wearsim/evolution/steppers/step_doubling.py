@@ -168,18 +168,18 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
         predicted = wear.predicted_opening(problem.values_of(solved, "line_load"))
         change, new_loads = _relative_change(new.opening, predicted), loads
         if problem.has_spring or problem.terms:
-            recovered = start
+            recovered, part = start, np.ones(())
             if problem.has_spring:
                 recovered = fresh - elastic_approaches(problem, ends.replaced(contacts=solved))
                 # a process may have changed the tilt, and a log the load, of the contacts at start
-                both = steady & (not varying)
-                recovered = np.where(both, 0.5 * (start + recovered), recovered)
+                part = np.where(steady & (not varying), 0.5, 1.0)
+                recovered = (1.0 - part) * start + part * recovered
             displacement = displacement_at(problem, (state.depths, ends.depths), recovered)
             new_loads = mean_loads(problem, state, passes, displacement, solved)
             change = np.maximum(change, _relative_change(new_loads, loads))
             if problem.has_spring:
                 rise = problem.values_of(solved, "approach") - gap.min(axis=-1)
-                new_loads = corrected_loads(problem, loads, new_loads, rise, 0.5)
+                new_loads = corrected_loads(problem, loads, new_loads, rise, part)
             new_loads = checked_loads(state, new_loads)
         if problem.slip_profile is not None:
             change = np.maximum(change, _relative_change(new.cylinder, wear.cylinder))
