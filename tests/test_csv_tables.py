@@ -123,6 +123,24 @@ def test_plain_numbers_need_no_unit() -> None:
             ],
         ),
         ("time [s],load [N]\n0,1\n", ["too few rows of numbers, got 1, expected at least 2"]),
+        (
+            "0,300\n1,310\n",
+            [
+                (
+                    "line 1: there is no header, got 0,300,"
+                    " expected a header line such as time [s], load [N]"
+                )
+            ],
+        ),
+        (
+            "time/s load/N\n0 1\n1 2\n",
+            [
+                (
+                    "line 1: the header is one column, got time/s load/N,"
+                    " expected commas, semicolons or tabs between columns"
+                )
+            ],
+        ),
     ],
 )
 def test_every_mistake_is_reported_with_its_line(text: str, mistakes: list[str]) -> None:

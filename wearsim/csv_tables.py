@@ -112,10 +112,16 @@ def read_columns(
     mistakes: list[Mistake] = []
     lines = text.removeprefix("\ufeff").splitlines()
     header, separator = _find_header(lines, names)
+    heads = ", ".join(_head(name, unit) for name, unit in columns.items())
+    expected = f"a header line such as {heads}"
     if header is None:
-        heads = ", ".join(_head(name, unit) for name, unit in columns.items())
-        expected = f"a header line such as {heads}"
         raise ScenarioError(file, [Mistake("", "", "the file is empty", None, expected)])
+    if all(map(_starts_as_number, header.cells)):
+        got = separator.join(header.cells)
+        raise ScenarioError(file, [_mistake(header.line, "there is no header", got, expected)])
+    if len(header.cells) == 1 < len(columns):
+        what, expected = "the header is one column", "commas, semicolons or tabs between columns"
+        raise ScenarioError(file, [_mistake(header.line, what, header.cells[0], expected)])
     start = header.line
     sample = list(_rows(lines[start : start + HEAD_LINES], start, separator))
     below = _unit_line(header, sample)
