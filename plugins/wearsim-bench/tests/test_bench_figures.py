@@ -2,9 +2,12 @@
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.text import Text
 
 from wearsim.report.parts import save_figure
 from wearsim_bench.figures import table as bench_table
+from wearsim_bench.figures.lines import spread
 from wearsim_bench.figures.table import (
     column_heads,
     count_text,
@@ -94,8 +97,13 @@ def test_errors_are_percentages():
 
 def test_figure_shows_all_timed_methods(topic, tmp_path):
     figure = bench_figure(topic, MACHINE, Effort())
-    labels = figure.axes[0].get_legend_handles_labels()[1]
-    assert labels == ["strip", "march", "Pareto front", "default"]
+    axes = figure.axes[0]
+    assert axes.get_legend_handles_labels()[1] == ["strip", "march", "Pareto front", "default"]
+    assert [text.get_text() for text in axes.texts] == ["strip", "march"]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == [
+        "Pareto front",
+        "default",
+    ]
     x, y = figure.axes[0].lines[0].get_data()
     np.testing.assert_allclose(x, [1e-5, 1e-4])
     np.testing.assert_allclose(y, [1.0, 0.1])
@@ -120,6 +128,7 @@ def test_growth_is_drawn_against_size():
     axes = bench_figure(topic, MACHINE, Effort()).axes[0]
     np.testing.assert_allclose(axes.lines[0].get_data(), [[41, 81, 161], [0.041, 0.081, 0.161]])
     assert axes.lines[1].get_ydata()[0] == pytest.approx(0.1)
+    assert {text.get_text() for text in axes.texts} == {"time [s]", "memory [GB]"}
     assert "*" not in table_rows(topic, "strips", 1e-4)[0].cells
 
 
@@ -131,5 +140,72 @@ def test_savings_are_bars():
     heads = {"times": "speed-up"}
     topic = Topic("savings", "S", "", "one call", "result", {"result": "result"}, heads, items)
     axes = bench_figure(topic, MACHINE, Effort()).axes[0]
-    assert [bar.get_width() for bar in axes.patches] == [2.5]
+    (bar,) = axes.patches
+    assert (bar.get_x(), bar.get_x() + bar.get_width()) == (1.0, 2.5)
+    assert axes.texts[0].get_text() == "2.5"
     assert axes.get_yticklabels()[0].get_text() == "full slip: strip, full slip"
+
+
+def crowded(families, each, times=(1e-4, 3e-4, 5e-4)):
+    """Return a topic of one group with several methods of each family, whose lines coincide."""
+    items = tuple(
+        measured(f"family {family}, option {option}", f"{n} strips", times[n], 1e-2 / (1 + family))
+        for family in range(families)
+        for option in range(each)
+        for n in range(len(times))
+    )
+    heads = {"power": "power, rms"}
+    return Topic("contact", "One contact", "About.", "one contact", "power", heads, {}, items)
+
+
+def overlap(boxes):
+    """Return whether any two boxes overlap."""
+    return any(
+        one.overlaps(other) for place, one in enumerate(boxes) for other in boxes[place + 1 :]
+    )
+
+
+@pytest.mark.parametrize(
+    ("families", "each", "panels"),
+    [(4, 6, 4), (1, 5, 1), (2, 3, 1), (1, 2, 1)],
+)
+def test_many_methods_have_a_panel_for_each_family(families, each, panels):
+    figure = bench_figure(crowded(families, each), MACHINE, Effort())
+    assert len(figure.axes) == panels
+    labels = [text.get_text() for axes in figure.axes for text in axes.texts]
+    assert len(labels) == families * each
+    if panels > 1:
+        assert [axes.get_title(loc="left") for axes in figure.axes] == [
+            f"family {number}" for number in range(families)
+        ]
+        assert labels[:each] == [f"option {number}" for number in range(each)]
+        thin = [line for line in figure.axes[0].lines if line.get_linewidth() < 0.7]
+        assert len(thin) == (families - 1) * each  # the other families
+    colours = {line.get_color() for line in figure.axes[0].lines if line.get_marker() != "None"}
+    assert len(colours) == each * families / panels
+
+
+@pytest.mark.parametrize("times", [(2e-5, 3e-4, 7e-4), (1e-4, 2e-4, 3e-4), (1e-6, 1e-3, 1.0)])
+def test_ticks_and_labels_do_not_overlap(times):
+    figure = bench_figure(crowded(4, 7, times), MACHINE, Effort())
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    for axes in figure.axes:
+        ticks = [
+            tick.label1.get_window_extent()
+            for tick in axes.xaxis.get_major_ticks()
+            if tick.label1.get_text() and axes.bbox.x0 - 1 <= tick.label1.get_window_extent().x1
+        ]
+        shown = [box for box in ticks if axes.bbox.x0 <= 0.5 * (box.x0 + box.x1) <= axes.bbox.x1]
+        assert len(shown) >= 2
+        assert not overlap(shown)
+        assert not overlap([Text.get_window_extent(text) for text in axes.texts])
+    ends = [text.get_window_extent().x1 for axes in figure.axes for text in axes.texts]
+    assert max(ends) <= figure.bbox.width
+
+
+def test_labels_are_spread_within_the_panel():
+    assert spread([0.1, 0.5], 0.1) == [0.1, 0.5]
+    np.testing.assert_allclose(spread([0.5, 0.5, 0.5], 0.1), [0.5, 0.6, 0.7])
+    np.testing.assert_allclose(spread([0.95, 0.97, 1.2], 0.1), [0.8, 0.9, 1.0])
+    np.testing.assert_allclose(spread([-0.5, 0.0], 0.1), [0.0, 0.1])

@@ -2,26 +2,30 @@
 
 from __future__ import annotations
 
-from math import ceil
+from collections.abc import Iterator, Sequence
 from textwrap import fill
 
 from matplotlib import colormaps
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 
 from wearsim.report.parts import GREY, figure_style, name_axes, write_message
+from wearsim.report.text import brief
+from wearsim_bench.figures.lines import EndLabel, label_ends, set_log_axis
 from wearsim_bench.figures.sizes import growth_figure, savings_figure
 from wearsim_bench.figures.table import measured_on
 from wearsim_bench.measure.machine import Machine
 from wearsim_bench.measure.measurement import Effort, Measurement, Topic
 
-ACROSS = 2  # panels per row
-_LETTERS = 120  # characters per line under the title
+MOST = 6  # methods in one panel; a group of more has a panel for each family of methods
+ACROSS = 3  # panels in a row of groups with few methods
+_LETTERS = 160  # characters per line under the title
 _FRONT, _DEFAULT = "Pareto front", "default"
-_LEGEND = 2.6  # in
-_PANEL = (4.9, 3.9)  # in
+_WIDTH, _HEIGHT, _SMALL_HEIGHT = 13.0, 3.1, 2.7  # of the figure and of rows of panels [in]
+_PANEL = 0.7  # height of a panel without title and labels, as a part of its row
+_TITLE = 0.9  # height of titles and legend [in]
 _MARKERS = "osD^vP*X<>ph"
 _SMALLEST = 1e-8  # lower bound of the errors drawn
 
@@ -41,86 +45,181 @@ def bench_figure(topic: Topic, machine: Machine, effort: Effort) -> Figure:
     Returns
     -------
     Figure
-        A panel for each group of problems: a line for each method, a point for each setting, the
-        Pareto front, a ring around the default; or time and memory against size, or speed-ups.
+        A panel for each group of problems: a labelled line for each method, a point for each
+        setting, the Pareto front, a ring around the default. A group of many methods has a panel
+        for each family, with the other families in grey. Or time and memory against size, or
+        speed-ups.
     """
     under = fill(measured_on(machine, effort), _LETTERS)
     if "peak_bytes" in topic.counts:
         return growth_figure(topic, under)
     if "times" in topic.counts:
         return savings_figure(topic, under)
-    groups = topic.groups
-    across = min(ACROSS, len(groups))
-    down = ceil(len(groups) / across)
+    rows = list(_rows(topic))
+    heights = [_SMALL_HEIGHT if len(_methods(topic.of(row[0]))) > MOST else _HEIGHT for row in rows]
     with figure_style():
-        size = (_PANEL[0] * across + _LEGEND, 0.8 + _PANEL[1] * down)
+        size = _WIDTH, _TITLE + sum(heights)
         figure = Figure(figsize=size, layout="constrained")
-        panels = figure.subplots(down, across, squeeze=False).ravel()
-        colours = _colours(topic)
-        for axes, group in zip(panels, groups, strict=False):
-            _draw(axes, topic, group, colours)
-        for axes in panels[len(groups) :]:
-            axes.set_axis_off()
+        parts = figure.subfigures(len(rows), 1, squeeze=False, height_ratios=heights).ravel()
+        looks = _looks(topic)
+        for part, row, height in zip(parts, rows, heights, strict=True):
+            if height == _SMALL_HEIGHT:
+                _draw_families(part, topic, row[0], looks)
+            else:
+                _draw_groups(part, topic, row, looks)
         _write_legend(figure)
-        figure.suptitle(f"{topic.title}\n{under}")
+        figure.suptitle(f"{topic.title}\n{under}", fontsize=10.0)
     return figure
 
 
-def _colours(topic: Topic) -> dict[str, tuple[str, str]]:
-    """Return a colour and a marker for every method, the same in all panels."""
+def _rows(topic: Topic) -> Iterator[list[str]]:
+    """Yield the groups of each row of panels: one of many methods, or several of few."""
+    row: list[str] = []
+    few = [group for group in topic.groups if len(_methods(topic.of(group))) <= MOST]
+    across = min(ACROSS, len(few)) or 1
+    for group in topic.groups:
+        if group in few:
+            row.append(group)
+        if row and (group not in few or len(row) == across):
+            yield row
+            row = []
+        if group not in few:
+            yield [group]
+    if row:
+        yield row
+
+
+def _methods(items: Sequence[Measurement]) -> list[str]:
+    return list(dict.fromkeys(item.method for item in items))
+
+
+def _family(method: str) -> str:
+    """Return the family of a method: "slender" of "slender, strip"."""
+    return method.partition(",")[0]
+
+
+def _looks(topic: Topic) -> dict[str, tuple[str, str]]:
+    """Return a colour and a marker for every method, different within a family or a group."""
+    wheel = [to_hex(colour) for colour in colormaps["tab10"].colors]  # type: ignore[attr-defined]
+    # grey is the colour of the other families
+    wheel = [colour for number, colour in enumerate(wheel) if number != 7]
+    looks: dict[str, tuple[str, str]] = {}
     # defaults first, so that they get the strongest colours
-    items = sorted(topic.measurements, key=lambda item: not item.default)
-    methods = list(dict.fromkeys(item.method for item in items))
-    wheel = colormaps["tab20" if len(methods) > 10 else "tab10"].colors  # type: ignore[attr-defined]
-    return {
-        method: (to_hex(wheel[number % len(wheel)]), _MARKERS[number % len(_MARKERS)])
-        for number, method in enumerate(methods)
-    }
+    methods = _methods(sorted(topic.measurements, key=lambda item: not item.default))
+    for group in sorted(topic.groups, key=lambda name: len(_methods(topic.of(name)))):
+        items = topic.of(group)
+        present = [method for method in methods if method in _methods(items)]
+        split = len(present) > MOST
+        for method in present:
+            others = [m for m in present if not split or _family(m) == _family(method)]
+            used = {looks[m][0] for m in others if m in looks}
+            free = [colour for colour in wheel if colour not in used] or wheel
+            looks.setdefault(method, (free[0], _MARKERS[wheel.index(free[0])]))
+    return looks
 
 
-def _draw(axes: Axes, topic: Topic, group: str, colours: dict[str, tuple[str, str]]) -> None:
-    """Draw one group of problems."""
-    items = [i for i in topic.of(group) if i.seconds is not None and topic.error in i.errors]
+def _timed(topic: Topic, group: str) -> list[Measurement]:
+    items = topic.of(group)
+    return [item for item in items if item.seconds is not None and topic.error in item.errors]
+
+
+def _draw_groups(
+    part: SubFigure, topic: Topic, groups: Sequence[str], looks: dict[str, tuple[str, str]]
+) -> None:
+    """Draw groups of few methods side by side."""
+    for axes, group in zip(part.subplots(1, len(groups), squeeze=False)[0], groups, strict=True):
+        items = _timed(topic, group)
+        if not items:
+            write_message(axes, group, ["no measurements"])
+            continue
+        name_axes(axes, group, f"time of {topic.seconds}", f"{topic.errors[topic.error]} [%]")
+        names = {method: method for method in _methods(items)}
+        _draw_lines(axes, topic, group, items, looks)
+        _label_lines(axes, topic, items, names, looks, _HEIGHT)
+
+
+def _draw_families(
+    part: SubFigure, topic: Topic, group: str, looks: dict[str, tuple[str, str]]
+) -> None:
+    """Draw a group of many methods, a panel for each family, with the others in grey."""
+    items = _timed(topic, group)
+    families = list(dict.fromkeys(_family(method) for method in _methods(items)))
+    row = part.subplots(1, len(families) or 1, squeeze=False, sharex=True, sharey=True)[0]
     if not items:
-        write_message(axes, group, ["no measurements"])
+        write_message(row[0], group, ["no measurements"])
         return
-    for method in dict.fromkeys(item.method for item in items):
-        of_method = [item for item in items if item.method == method]
-        colour, marker = colours[method]
-        axes.plot(
-            *_coordinates(of_method, topic.error),
-            color=colour,
-            marker=marker,
-            ms=4,
-            lw=0.8,
-            label=method,
-        )
+    part.suptitle(group, x=0.01, ha="left", weight="bold", fontsize=9.5)
+    for axes, family in zip(row, families, strict=True):
+        for method in _methods(items):
+            if _family(method) != family:
+                drawn = [item for item in items if item.method == method]
+                axes.plot(*_coordinates(drawn, topic.error), color=GREY, lw=0.6, alpha=0.35)
+    for axes, family in zip(row, families, strict=True):
+        own = [item for item in items if _family(item.method) == family]
+        _draw_lines(axes, topic, group, own, looks)
+        name_axes(axes, family, f"time of {topic.seconds}", "")
+    row[0].set_ylabel(f"{topic.errors[topic.error]} [%]")
+    for axes, family in zip(row, families, strict=True):
+        own = [item for item in items if _family(item.method) == family]
+        names = {m: m.removeprefix(family).lstrip(", ") or "no option" for m in _methods(own)}
+        _label_lines(axes, topic, own, names, looks, _SMALL_HEIGHT)
+
+
+def _draw_lines(
+    axes: Axes,
+    topic: Topic,
+    group: str,
+    items: Sequence[Measurement],
+    looks: dict[str, tuple[str, str]],
+) -> None:
+    """Draw the line of each method, the Pareto front of the group, and rings around defaults."""
+    for method in _methods(items):
+        colour, marker = looks[method]
+        drawn = [item for item in items if item.method == method]
+        place = _coordinates(drawn, topic.error)
+        axes.plot(*place, color=colour, marker=marker, ms=3.5, lw=0.8, label=method)
     front = _coordinates(topic.front(group), topic.error)
     axes.plot(*front, color="k", lw=2.2, alpha=0.25, zorder=1, label=_FRONT)
     default = [item for item in items if item.default]
     if default:
-        axes.plot(
-            *_coordinates(default, topic.error), "o", ms=11, mfc="none", mec=GREY, label=_DEFAULT
-        )
+        place = _coordinates(default, topic.error)
+        axes.plot(*place, "o", ms=10, mfc="none", mec=GREY, label=_DEFAULT)
     axes.set_xscale("log")
     axes.set_yscale("log")
-    name_axes(axes, group, f"{topic.seconds} [s]", f"{topic.errors[topic.error]} [%]")
+
+
+def _label_lines(
+    axes: Axes,
+    topic: Topic,
+    items: Sequence[Measurement],
+    names: dict[str, str],
+    looks: dict[str, tuple[str, str]],
+    height: float,
+) -> None:
+    """Set the ticks, and label every line at its slowest setting."""
+    set_log_axis(axes.xaxis, brief)
+    set_log_axis(axes.yaxis, lambda value: f"{value:g}")
+    labels = []
+    for method, name in names.items():
+        points = zip(
+            *_coordinates([i for i in items if i.method == method], topic.error), strict=True
+        )
+        labels.append(EndLabel(name, looks[method][0], *max(points)))
+    label_ends(axes, labels, _PANEL * height)
 
 
 def _write_legend(figure: Figure) -> None:
-    """Write one legend next to the panels, with the entries common to all panels last."""
+    """Write a legend of the front and the default under the panels."""
     named: dict[str, Artist] = {}
     for axes in figure.axes:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-            named.setdefault(label, handle)
-    for label in (_FRONT, _DEFAULT):
-        if label in named:
-            named[label] = named.pop(label)
+            if label in {_FRONT, _DEFAULT}:
+                named.setdefault(label, handle)
     if named:
-        figure.legend(named.values(), named.keys(), loc="outside right center", fontsize=8.0)
+        figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=2)
 
 
-def _coordinates(items: list[Measurement], error: str) -> tuple[list[float], list[float]]:
+def _coordinates(items: Sequence[Measurement], error: str) -> tuple[list[float], list[float]]:
     """Return times [s] and errors [%]."""
     times = [item.seconds for item in items if item.seconds is not None]
     return times, [100.0 * max(item.errors[error], _SMALLEST) for item in items]
