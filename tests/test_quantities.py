@@ -6,12 +6,14 @@ import math
 import subprocess
 import sys
 from fractions import Fraction
+from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
+from wearsim import units
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.plugins import Options
 from wearsim.quantities import (
@@ -262,6 +264,29 @@ def test_unreadable_file_is_reported() -> None:
 def test_long_values_are_abbreviated_in_messages() -> None:
     assert shown("x" * 100) == f'"{"x" * 56}...'
     assert shown([True, "a", 1.5]) == '[true, "a", 1.5]'
+
+
+_NAMES = st.sampled_from(sorted(units._UNITS))
+_FACTORS = st.one_of(
+    st.just("1"), _NAMES, st.builds("{}^{}".format, _NAMES, st.sampled_from([-2, -1, 2, 3]))
+)
+
+
+@given(st.lists(_FACTORS, min_size=1, max_size=4), st.data())
+def test_products_of_units_are_measured_as_by_pint(factors: list[str], data: st.DataObject) -> None:
+    text = factors[0]
+    for factor in factors[1:]:
+        text += data.draw(st.sampled_from([" ", "*", "/", " / "])) + factor
+    assert units.measure(text) == units._measured_by_pint(text, text)
+
+
+def test_usual_scenario_does_not_load_pint() -> None:
+    file = Path(__file__).parents[1] / "scenarios" / "rig-450min.toml"
+    code = f"import sys, wearsim; wearsim.load_scenario(r'{file}'); print('pint' in sys.modules)"
+    output = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    assert output.stdout.strip() == "False"
 
 
 def test_importing_quantities_does_not_load_pint() -> None:

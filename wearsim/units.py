@@ -162,6 +162,40 @@ def _unknown_name(name: str) -> str:
 Dimensions: TypeAlias = frozenset[tuple[str, str]]
 
 
+_FACTOR = re.compile(
+    r"(?P<operator>\s*[*/]\s*|\s+|^)"
+    r"(?:(?P<number>[0-9.]+)|\[(?P<base>[a-z]+)\]|(?P<name>[A-Za-z]+)(?:\^(?P<power>[+-]?[0-9]))?)"
+)
+
+
+@cache
+def _product(text: str) -> tuple[Fraction, dict[str, int]] | None:
+    """Return the size in SI of a product or quotient of units, and its powers of the dimensions.
+
+    It spares most commands the import of pint. None if the text is anything else.
+    """
+    size, powers, place = Fraction(1), dict[str, int](), 0
+    while place < len(text):
+        factor = _FACTOR.match(text, place)
+        if factor is None or (place == 0 and factor["operator"]):
+            return None
+        place, power = factor.end(), int(factor["power"] or 1)
+        if "/" in factor["operator"]:
+            power = -power
+        if factor["number"]:
+            size *= Fraction(factor["number"]) ** power
+        elif factor["base"]:
+            powers[factor["base"]] = powers.get(factor["base"], 0) + power
+        else:
+            unit = _product(_UNITS[factor["name"]].replace("**", "^"))
+            if unit is None:
+                return None
+            size *= unit[0] ** power
+            for base, own in unit[1].items():
+                powers[base] = powers.get(base, 0) + power * own
+    return size, powers
+
+
 @lru_cache(maxsize=1024)
 def measure(unit: str) -> tuple[Fraction, Dimensions]:
     """Return the size of `unit` in SI and its dimensions; raise ValueError if it is unknown."""
@@ -171,6 +205,15 @@ def measure(unit: str) -> tuple[Fraction, Dimensions]:
     for name in re.findall(r"[A-Za-z]+", text):
         if name not in _UNITS:
             raise ValueError(_unknown_name(name))
+    product = _product(text)
+    if product is not None:
+        size, powers = product
+        return size, frozenset((f"[{base}]", str(own)) for base, own in powers.items() if own)
+    return _measured_by_pint(unit, text)
+
+
+def _measured_by_pint(unit: str, text: str) -> tuple[Fraction, Dimensions]:
+    """Return size and dimensions of any unit, with brackets; errors as `measure`."""
     units = _registry()
     try:
         one = units.Quantity(Fraction(1), units.parse_units(text)).to_root_units()
