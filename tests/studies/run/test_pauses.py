@@ -60,6 +60,16 @@ def test_explicit_step_to_a_pause_is_not_called_unstable() -> None:
     assert not any(text.startswith("unstable") for text in result.warnings)
 
 
+@pytest.mark.parametrize("name", ["implicit", "compiled passes"])
+def test_limit_after_a_pause_is_reached_by_the_same_wear(name: str) -> None:
+    # the last record before the limit is in the pause
+    stopped = studies.run(paused(**STEPPERS[name]), until="4200 passes")
+    whole = studies.run(paused(**STEPPERS[name], outputs__every_passes=4200))
+    assert stopped.passes[-1] == 4200.0
+    depth = whole.profiles[list(whole.record_passes).index(4200.0)].max()
+    assert stopped.depth[-1] == pytest.approx(depth, rel=1e-5)
+
+
 def test_steppers_agree_on_a_log_with_pauses() -> None:
     exact = studies.run(paused(**STEPPERS["compiled passes"]))
     for name in ("implicit", "stabilised", "explicit"):

@@ -177,7 +177,10 @@ class Stepper(ABC):
 
         The integration does not continue from the state returned.
         """
-        return step_or_rest(self.scheme(problem, state), problem, state, passes)
+        step = self.scheme(problem, state)
+        if self.pass_by_pass:  # it passes over pauses itself, also within a step
+            return step(problem, state, passes)
+        return step_or_rest(step, problem, state, passes)
 
     def rest(
         self, problem: WearProblem, state: WearState, step: FloatArray, stop: float
