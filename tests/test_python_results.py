@@ -177,7 +177,7 @@ def test_results_compare_and_hash_by_identity(scenario: Scenario, results: dict)
     for item in (
         *results.values(), solution, solution.solution, solution.fields, solution.grid,
         solution.point, profile, tests.course("depth"), tests.band(), scenario,
-        compare([tests, tests], ["a", "b"]),
+        compare([tests, tests]),
     ):  # fmt: skip
         other = pickle.loads(pickle.dumps(item))
         assert item == item  # noqa: PLR0124
@@ -215,6 +215,29 @@ def test_profile_takes_lists_and_whole_numbers(scenario: Scenario) -> None:
     assert flat.y.dtype == float
     power = wearsim.solve_contact(scenario, flat).power
     assert power == pytest.approx(wearsim.solve_contact(scenario).power, rel=1e-3)
+
+
+def test_profile_is_read_from_its_file(scenario: Scenario, tmp_path: Path) -> None:
+    file = tmp_path / "worn.csv"
+    file.write_text("y [mm],height [um]\n-9,0\n0,-2\n9,0\n")
+    profile = Profile([-9e-3, 0, 9e-3], [0, -2e-6, 0])
+    for path in (file, str(file)):
+        assert wearsim.solve_contact(scenario, path).power == pytest.approx(
+            wearsim.solve_contact(scenario, profile).power
+        )
+    with pytest.raises(wearsim.ScenarioError, match=r"gone\.csv: the file cannot be read"):
+        wearsim.solve_contact(scenario, tmp_path / "gone.csv")
+    with pytest.raises(TypeError, match="profile must be a Profile or the path of a file"):
+        wearsim.solve_contact(scenario, ([0, 1e-3], [0, 0]))  # type: ignore[arg-type]
+
+
+def test_arguments_of_another_kind_are_named(scenario: Scenario) -> None:
+    with pytest.raises(TypeError, match="values must be a list, got the text '300 N'"):
+        wearsim.sweep(scenario, "load.normal_force", "300 N")
+    with pytest.raises(
+        TypeError, match="overrides must be a mapping of values by dotted key, got a list"
+    ):
+        scenario.changed(["seed=3"])  # type: ignore[arg-type]
 
 
 def test_messages_hold_no_text_of_pydantic(scenario: Scenario) -> None:

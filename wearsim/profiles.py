@@ -7,6 +7,7 @@ import json
 import math
 from dataclasses import dataclass
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from wearsim.csv_cells import decode
@@ -88,6 +89,20 @@ def split_name(name: str) -> tuple[str, ProfileChoice]:
             value = tuple(int(row) for row in value)
         choice[key] = quantity(value, "m") if key == "at" else value
     return file, ProfileChoice(**choice)
+
+
+def load_profile(path: str | Path, choice: ProfileChoice | None = None) -> Profile:
+    """Read a measured profile from a file; see `read_profile`.
+
+    Raises
+    ------
+    ScenarioError
+        With all mistakes of the file.
+    """
+    try:
+        return read_profile(Path(path).read_bytes(), str(path), choice)
+    except OSError as error:
+        raise _error(str(path), f"the file cannot be read ({error.strerror})") from error
 
 
 def read_profile(content: str | bytes, file: str, choice: ProfileChoice | None = None) -> Profile:

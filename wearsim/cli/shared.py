@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
     from wearsim.profiles import ProfileChoice
     from wearsim.scenario import Scenario
-    from wearsim.types import Profile
 
 
 _WIDTH = 110  # columns of a table in a file or a pipe
@@ -235,24 +234,6 @@ def profile_choice(
     with checking("--at"):
         position = quantity(at, "m") if at is not None else None
     return ProfileChoice(found[0], found[1], row, rows, position)
-
-
-def read_measured(path: Path, choice: ProfileChoice) -> Profile:
-    """Return the profile in a file named by the user.
-
-    Raises
-    ------
-    ScenarioError
-        With all mistakes of the file.
-    """
-    from wearsim.errors import Mistake, ScenarioError
-    from wearsim.profiles import read_profile
-
-    try:
-        return read_profile(path.read_bytes(), str(path), choice)
-    except OSError as error:
-        why = f"the file cannot be read ({error.strerror})"
-        raise ScenarioError(str(path), [Mistake("", "", why)]) from error
 
 
 def results_option(ending: str) -> Any:

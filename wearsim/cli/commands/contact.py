@@ -27,7 +27,6 @@ from wearsim.cli.shared import (
     checking,
     note,
     profile_choice,
-    read_measured,
     read_scenario,
     refuse_same_file,
     results_option,
@@ -82,7 +81,7 @@ def contact(
     loaded = read_scenario(scenario, settings)
     from wearsim.cli.progress import Display
     from wearsim.input_files import read_input
-    from wearsim.profiles import ProfileChoice, gaussian_filtered
+    from wearsim.profiles import ProfileChoice, gaussian_filtered, load_profile
     from wearsim.quantities import quantity
     from wearsim.results import refuse_inputs
     from wearsim.studies.contact.single import study_contact
@@ -98,7 +97,7 @@ def contact(
         raise typer.BadParameter(message, param_hint="--profile")
     cylinder, files = loaded.cylinder, dict(loaded.files)
     if profile is not None:
-        measured, wavelength = read_measured(profile, choice), None
+        measured, wavelength = load_profile(profile, choice), None
         if cutoff is not None:
             with checking("--filter"):
                 wavelength = quantity(cutoff, "m")

@@ -21,7 +21,6 @@ from wearsim.cli.shared import (
     check_figure,
     note,
     profile_choice,
-    read_measured,
     write_json,
     write_notes,
     write_table,
@@ -59,6 +58,7 @@ def plot(
     """Draw the figure of a results file of any kind."""
     path = figure if figure is not None else Path(f"{file.stem}.png")
     check_figure(path, force)
+    from wearsim.profiles import load_profile
     from wearsim.report.parts import Measured
     from wearsim.results import DissipationResult, open_results, refuse_inputs
 
@@ -70,7 +70,7 @@ def plot(
             f"requires wear tests; {file} holds one contact without wear", param_hint="--measured"
         )
     choice = profile_choice(columns, units, row, mean_rows, at)
-    read = [(name.stem, read_measured(name, choice)) for name in measured or []]
+    read = [(name.stem, load_profile(name, choice)) for name in measured or []]
     profiles = [Measured(label, one.y, one.height) for label, one in read]
     draw(result, path, profiles)
     for profile in profiles:

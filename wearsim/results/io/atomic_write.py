@@ -27,6 +27,9 @@ class Storage:
     A subclass may replace single operations, for example to let a test fail at one of them.
     """
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}()"
+
     def open(self, path: Path) -> IO[bytes]:
         """Open a file for new content, which can be read back."""
         return path.open("w+b", buffering=_BUFFER)

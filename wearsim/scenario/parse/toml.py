@@ -229,6 +229,9 @@ def parse_fields(
     overrides: Mapping[str, object] | None = None,
 ) -> dict[str, Any]:
     """Return the fields of a `Scenario`; parameters and errors as in `parse_scenario`."""
+    if not isinstance(overrides, Mapping | None):
+        kind = type(overrides).__name__
+        raise TypeError(f"overrides must be a mapping of values by dotted key, got a {kind}")
     data = _parse_toml(text, name)
     if overrides:
         text = apply_overrides(text, name, overrides)

@@ -9,6 +9,7 @@ from time import perf_counter
 from wearsim.errors import ContactError, WearsimError
 from wearsim.evolution.state import unworn_contacts
 from wearsim.plugins import ContactModel
+from wearsim.profiles import load_profile
 from wearsim.scenario import Scenario, as_scenario, described_model
 from wearsim.studies.plausibility import plausibility_warnings
 from wearsim.studies.run.assemble import build_problem, prepared_model
@@ -82,7 +83,7 @@ class ContactStudy:
 
 def study_contact(
     scenario: Scenario | str | Path,
-    profile: Profile | None = None,
+    profile: Profile | str | Path | None = None,
     with_fields: bool = False,
     with_error: bool = False,
 ) -> ContactStudy:
@@ -92,8 +93,8 @@ def study_contact(
     ----------
     scenario : Scenario or path
         A scenario of a run or of a single contact, or its file.
-    profile : Profile, optional
-        The cylinder's profile, instead of the scenario's.
+    profile : Profile or path, optional
+        The cylinder's profile, or its file, instead of the scenario's.
     with_fields : bool
         Also return tractions and slip inside the contact.
     with_error : bool
@@ -119,7 +120,12 @@ def study_contact(
     True
     """
     scenario = as_scenario(scenario)
+    if isinstance(profile, str | Path):
+        profile = load_profile(profile)
     if profile is not None:
+        if not isinstance(profile, Profile):
+            kind = type(profile).__name__
+            raise TypeError(f"profile must be a Profile or the path of a file, got a {kind}")
         scenario = replace(scenario, cylinder=replace(scenario.cylinder, profile=profile))
     force = load_range(scenario, scenario.load.build(), 0.0)[0]
     grid, notes = contact_grid(scenario, force), scenario.notes
@@ -203,7 +209,7 @@ def _grid_dependence(
 
 
 def solve_contact(
-    scenario: Scenario | str | Path, profile: Profile | None = None
+    scenario: Scenario | str | Path, profile: Profile | str | Path | None = None
 ) -> ContactSolution:
     """Solve the contact of the scenario's first roller; see `study_contact`.
 

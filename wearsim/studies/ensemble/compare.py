@@ -98,7 +98,9 @@ class Comparison:
 
 
 def compare(
-    results: Sequence[Comparable], labels: Sequence[str], observable: str = "depth"
+    results: Sequence[Comparable],
+    labels: Sequence[str] | None = None,
+    observable: str = "depth",
 ) -> Comparison:
     """Compare runs and ensembles at the ends of their tests.
 
@@ -106,8 +108,8 @@ def compare(
     ----------
     results : sequence of Result or EnsembleResult
         Two or more.
-    labels : sequence of str
-        One for each result.
+    labels : sequence of str, optional
+        One for each result; by default "1", "2" and so on.
     observable : str
         "depth", "width", "worn_volume", "dissipated_energy" or another that all have.
 
@@ -131,6 +133,7 @@ def compare(
     """
     if len(results) < 2:
         raise ValueError("there must be two or more to compare")
+    labels = labels or [str(number) for number in range(1, len(results) + 1)]
     for label, result in zip(labels, results, strict=True):
         if observable not in observables_of(result):
             raise unknown_name(observable, f"an observable of {label}", observables_of(result))
