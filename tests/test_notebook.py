@@ -36,11 +36,13 @@ def test_notebook_runs(tmp_path: Path) -> None:
 
     progress = shown("result = wearsim.run")
     assert "done in" in progress
-    assert "install" not in progress
+    assert "90,000 (100 %)" not in progress  # the line is updated
     assert "<Result 'a short test': 90000 roller passes" in progress
     assert "image/png" in shown("result.plot()")
     assert "text/html" in shown("result.to_dataframe()")
     assert "cylinder_depth_profile" in shown("result.to_xarray()")
-    assert "95 % interval" in shown("ensemble = ")
+    ensemble = shown("ensemble = ")
+    assert "40 of 40 realisations" in ensemble
+    assert "95 % interval" in ensemble
     assert "image/png" in shown("from matplotlib")
     assert "did you mean 'coefficient'?" in shown("try:")

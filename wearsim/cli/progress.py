@@ -26,7 +26,9 @@ _BAR, _COLUMNS_FOR_BAR = 24, 115
 
 
 class Display:
-    """One line that is updated on a terminal, and written at most once a second elsewhere.
+    """One line that is updated on a terminal or in a notebook, at most once a second.
+
+    Elsewhere it is written again.
 
     Parameters
     ----------
@@ -73,6 +75,7 @@ class Display:
         self.live.add_task("starting")
         (self._task,) = self.live.tasks
         self._quiet, self._now, self._written = quiet, now, now()
+        self._notebook: Any = None  # output of a notebook
         self._kernels, self._reports, self._compiling, self._open = kernels, 0, False, ExitStack()
 
     def __enter__(self) -> Self:
@@ -85,6 +88,8 @@ class Display:
 
     def __exit__(self, *failure: object) -> None:
         self._open.close()
+        if self._notebook is not None:
+            self._show_in_notebook(self._task.description)
 
     def _show_compilation(self, number: int, total: int) -> None:
         """Show that a kernel is being compiled; without a terminal the first one at once."""
@@ -106,9 +111,23 @@ class Display:
         """Show a text on the line, or write it if a second has passed since the last one."""
         self.live.update(self._task.id, description=text)
         now = self._now()
-        if self.live.disable and (always or now - self._written >= BETWEEN_LINES):
-            self._written = now
+        if not self.live.disable or not (always or now - self._written >= BETWEEN_LINES):
+            return
+        self._written = now
+        if self.live.console.is_jupyter and not self._quiet:
+            self._show_in_notebook(text)
+        else:
             self.write(text)
+
+    def _show_in_notebook(self, text: str) -> None:
+        """Show a text in place of the last one, below the cell."""
+        from IPython.display import display
+
+        content = {"text/plain": text}
+        if self._notebook is None:
+            self._notebook = display(content, raw=True, display_id=True)
+        else:
+            self._notebook.update(content, raw=True)
 
     def write(self, text: str, *, also_quiet: bool = False) -> None:
         """Write a line, on a terminal above the live one."""
