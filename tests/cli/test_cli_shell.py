@@ -1,7 +1,9 @@
 import os
+import re
 import subprocess
 import sys
 from importlib.metadata import entry_points, version
+from pathlib import Path
 from typing import Annotated
 
 import numpy as np
@@ -198,3 +200,20 @@ def test_shell_completes_verbs_and_options(words: str, expected: str) -> None:
         check=False,
     )
     assert completed.stdout.split()[0] == expected
+
+
+@pytest.mark.slow
+def test_check_and_contact_count_the_kernels_that_they_compile(tmp_path: Path) -> None:
+    scenario = Path(__file__).parents[2] / "scenarios" / "mean-contact.toml"
+    for verb in ("check", "contact"):
+        cache = {"NUMBA_CACHE_DIR": str(tmp_path / verb)}
+        completed = subprocess.run(
+            [sys.executable, "-m", "wearsim", verb, str(scenario)],
+            env=os.environ | cache,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        first = completed.stderr.splitlines()[0]
+        assert re.fullmatch(r"compiling kernels, once after installation: 1 of \d", first)
+        assert "\x1b" not in completed.stderr

@@ -26,9 +26,15 @@ from wearsim.cli.shared import (
 def check(scenario: ScenarioFile, settings: Settings = None, json: Json = False) -> None:
     """Check a scenario: print all mistakes, or the inputs and a summary of the run."""
     loaded = read_scenario(scenario, settings)
+    from wearsim.cli.progress import Display
     from wearsim.studies.dry_run import dry_run, plan
+    from wearsim.studies.kernels import kernels_of
 
-    data = dry_run(loaded)
+    def kernels() -> set[str]:
+        return kernels_of(loaded, "contacts" if loaded.wear else "contact")
+
+    with Display(quiet=False, kernels=kernels, transient=True):
+        data = dry_run(loaded)
     if json:
         write_json(data)
         return
