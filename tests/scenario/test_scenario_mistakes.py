@@ -25,7 +25,7 @@ rig.toml: [roller] radius: needs a unit, got 20, expected a length above zero su
 rig.toml: [roller] diameter: wrong dimension, got "20 MPa" (a pressure), expected a length above zero such as "20 mm"
 rig.toml: [roller] radus: unknown key (did you mean 'radius'?)
 rig.toml: [roller] speed: unknown key (it belongs in [operation])
-rig.toml: [roller] foo: unknown key (known here: crown_diameter, crown_radius, diameter, material, offset, radius)""",
+rig.toml: [roller] foo: unknown key (known here: chamfer, chamfer_angle, crown_diameter, crown_radius, diameter, edge_radius, material, offset, radius, width)""",
     ),
     "no radius": (
         'radius = "20 mm"\ncrown_radius = "500 mm"\n',

@@ -64,6 +64,9 @@ def dry_run(scenario: Scenario) -> Data:
         "roller": {
             "radius_m": roller.radius,
             "crown_radius_m": roller.crown_radius,
+            "width_m": roller.width,
+            "edge_radius_m": roller.edge_radius,
+            "chamfer_m": roller.chamfer,
             "offset_m": None if "roller.offset" in random else scenario.per_roller(roller.offset),
         },
         "cylinder": {"radius_m": cylinder.radius},
@@ -206,6 +209,11 @@ def plan(data: Data) -> TableRows:
         f"radius {roller['radius_m'] * 1e3:.6g} mm,"
         f" crown radius {roller['crown_radius_m'] * 1e3:.6g} mm"
     )
+    if roller["width_m"] is not None:
+        radii += f", width {roller['width_m'] * 1e3:.6g} mm"
+    for key, name in (("edge_radius_m", "edge radius"), ("chamfer_m", "chamfer")):
+        if roller[key]:
+            radii += f", {name} {roller[key] * 1e3:.6g} mm"
     if any(roller["offset_m"] or ()):
         radii += ", offset " + " / ".join(f"{y * 1e3:.4g}" for y in roller["offset_m"]) + " mm"
     moduli = (

@@ -12,6 +12,12 @@ from wearsim.plugins import Load
 from wearsim.quantities import InputFile
 from wearsim.scenario import RandomInput, Scenario
 from wearsim.studies.run.grid import fresh_patch
+from wearsim.studies.run.roller_ends import (
+    LEAST_PER_EDGE,
+    STRIPS_BEYOND,
+    edge_in_contact,
+    strips_of_roller,
+)
 from wearsim.types import FloatArray
 
 YIELD_FACTOR = 4.0  # peak pressure over yield stress, beyond which a surface never shakes down
@@ -118,8 +124,9 @@ def _of_slip(scenario: Scenario) -> Iterator[str]:
 
 def _of_width(scenario: Scenario, load: Load) -> Iterator[str]:
     force, radius = greatest_load(scenario, load), scenario.roller.radius
-    ends = scenario.contact.width is not None or getattr(scenario.roller, "width", None) is not None
-    if ends or force <= 0.0:
+    if scenario.roller.width is not None:
+        yield from _of_edge(scenario, force)
+    if scenario.contact.width or scenario.roller.width or force <= 0.0:
         return
     half_width = fresh_patch(scenario, force).b
     if half_width > WIDEST * radius:
@@ -127,6 +134,21 @@ def _of_width(scenario: Scenario, load: Load) -> Iterator[str]:
             f"roller.crown_radius: a crown of {scenario.roller.crown_radius * 1e3:.4g} mm makes a"
             f" contact {2e3 * half_width:.4g} mm wide, and nothing ends it; set roller.width"
         )
+
+
+def _of_edge(scenario: Scenario, force: float) -> Iterator[str]:
+    roller, choice = scenario.roller, scenario.contact
+    width, edge = roller.width or 0.0, edge_in_contact(scenario, force)
+    strips = choice.strips or strips_of_roller(scenario, 0, force)
+    spacing = (choice.width / strips) if choice.width else width / (strips - 2 * STRIPS_BEYOND)
+    if edge >= LEAST_PER_EDGE * spacing or fresh_patch(scenario, force).b < 0.5 * width:
+        return
+    key = "edge_radius" if roller.edge_radius else "chamfer" if roller.chamfer else "width"
+    shape = f"the edge is in contact over about {edge * 1e3:.2g} mm" if edge else "a sharp edge"
+    yield (
+        f"roller.{key}: {shape}, which the strips do not resolve: the peak pressure at the ends of"
+        " the roller depends on their number"
+    )
 
 
 def _of_log(scenario: Scenario, load: Load) -> Iterator[str]:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Literal, TypeAlias
 
+import numpy as np
 from pydantic import Field, PlainValidator
 
 from wearsim.errors import ScenarioError
@@ -18,11 +20,20 @@ from wearsim.profiles import (
     name_of_rows,
     read_profile,
 )
-from wearsim.quantities import InputFile, Length, PerRoller, PositiveLength, PositivePressure
+from wearsim.quantities import (
+    InputFile,
+    Length,
+    PerRoller,
+    PositiveLength,
+    PositivePressure,
+    Quantity,
+)
 from wearsim.scenario.parse.mistakes import Mistakes
 from wearsim.scenario.parse.random_inputs import validate
-from wearsim.types import Material, Profile
-from wearsim.units import QuantityError, shown
+from wearsim.types import FloatArray, Material, Profile
+from wearsim.units import ANGLE, QuantityError, shown
+
+_ROUNDING = 1e-9
 
 #: Handbook constants: phosphor bronze C51000, ductile iron of EN 1563.
 MATERIALS = {
@@ -67,6 +78,9 @@ MaterialField: TypeAlias = Annotated[
 ]
 
 
+ChamferAngle: TypeAlias = Annotated[float, Quantity(ANGLE, "positive")]
+
+
 class RollerTable(Options):
     """Rollers: crowned, all of the same shape."""
 
@@ -82,6 +96,20 @@ class RollerTable(Options):
     offset: PerRoller[Length] = Field(
         default=0.0,
         description="Axial position of the apex: one value for all rollers or one per roller.",
+    )
+    width: PositiveLength | None = Field(
+        default=None,
+        description="Width across the track, where contact ends; by default the contact ends by the"
+        " crown alone.",
+    )
+    edge_radius: PositiveLength | None = Field(
+        default=None, description="Radius of the rounded edges; needs width."
+    )
+    chamfer: PositiveLength | None = Field(
+        default=None, description="Width of the chamfers at both edges; needs width."
+    )
+    chamfer_angle: ChamferAngle = Field(
+        default=math.radians(45.0), description="Angle of the chamfers to the axis, up to 90 deg."
     )
     material: MaterialField = Field(description="Name of a material, or a table of its constants.")
 
@@ -129,6 +157,39 @@ class Roller(Options):
         description="Axial position of the apex, one for all rollers or one per roller [m]."
     )
     material: Material = Field(description="Material of the rollers.")
+    width: float | None = Field(None, description="Width across the track [m].")
+    edge_radius: float = Field(0.0, description="Radius of the rounded edges, or 0 [m].")
+    chamfer: float = Field(0.0, description="Width of the chamfers, or 0 [m].")
+    chamfer_angle: float = Field(0.0, description="Angle of the chamfers to the axis [rad].")
+
+    @property
+    def edge(self) -> float:
+        """Width of the edges, of their rounding or chamfer [m]."""
+        return max(self.edge_radius, self.chamfer)
+
+    def edge_drop(self, from_apex: FloatArray) -> FloatArray | float:
+        """Return the distance of the surface below the crown at the edges [m].
+
+        Parameters
+        ----------
+        from_apex : ndarray
+            Axial distance from the apex [m].
+
+        Returns
+        -------
+        ndarray or float
+            Same shape; the roller's radius beyond its ends, and 0 for a roller without width.
+        """
+        if self.width is None:
+            return 0.0
+        into = np.abs(from_apex) - (0.5 * self.width - self.edge)
+        inside = np.clip(into, 0.0, self.edge)
+        if self.edge_radius:
+            drop = self.edge_radius - np.sqrt(self.edge_radius**2 - inside**2)
+        else:
+            drop = inside * math.tan(self.chamfer_angle)
+        ended = into > self.edge * (1.0 + _ROUNDING) + _ROUNDING * self.width
+        return np.where(ended, self.radius, drop)
 
 
 @dataclass(frozen=True)
@@ -166,12 +227,39 @@ def read_roller(mistakes: Mistakes, raw: Mapping[str, object]) -> Roller | None:
     table = validate(mistakes, RollerTable, raw, "roller")
     if table is None:
         return None
+    radius = _radius(table.radius, table.diameter)
+    _check_edges(mistakes, table, radius)
     return Roller.model_construct(
-        radius=_radius(table.radius, table.diameter),
+        radius=radius,
         crown_radius=_radius(table.crown_radius, table.crown_diameter),
         offset=table.offset,
         material=table.material,
+        width=table.width,
+        edge_radius=table.edge_radius or 0.0,
+        chamfer=table.chamfer or 0.0,
+        chamfer_angle=table.chamfer_angle if table.chamfer else 0.0,
     )
+
+
+def _check_edges(mistakes: Mistakes, table: RollerTable, radius: float) -> None:
+    """Add the mistakes of width, edge radius and chamfer."""
+    edges = {"edge_radius": table.edge_radius, "chamfer": table.chamfer}
+    given = {key: size for key, size in edges.items() if size is not None}
+    for key, size in given.items():
+        text = f"{size * 1e3:.6g} mm"
+        if table.width is None:
+            mistakes.add("roller", key, "needs the width of the roller", text, 'width = "10 mm"')
+        elif size > 0.5 * table.width:
+            most = f"at most {0.5e3 * table.width:.6g} mm, half the width"
+            mistakes.add("roller", key, "the edges meet", text, most)
+        elif size > radius:
+            most = f"at most {1e3 * radius:.6g} mm, the radius of the roller"
+            mistakes.add("roller", key, "is too great", text, most)
+    if len(given) > 1:
+        mistakes.add("roller", "chamfer", "an edge is rounded or chamfered", None, "one of them")
+    if table.chamfer_angle >= 0.5 * math.pi:
+        angle = f"{math.degrees(table.chamfer_angle):.6g} deg"
+        mistakes.add("roller", "chamfer_angle", "is too great", angle, "less than 90 deg")
 
 
 def read_cylinder(mistakes: Mistakes, raw: Mapping[str, object]) -> Cylinder | None:

@@ -177,6 +177,11 @@ def shared_grid(scenario: Scenario) -> Grid:
             error = error or failure
     if not grids:
         raise error or AssertionError
+    if (
+        scenario.roller.width is not None
+        and len({(grid.edges, grid.strips) for grid in grids}) == 1
+    ):
+        return grids[0]  # its strips end with the roller
     spacing = float(np.median([grid.spacing for grid in grids]))
     edges = np.array([grid.edges for grid in grids])
     low, high = float(edges[:, 0].min()), float(edges[:, 1].max())

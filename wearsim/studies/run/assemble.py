@@ -34,6 +34,8 @@ from wearsim.types import FloatArray, Grid
 ITERATION_FRACTION = 1e-3  # convergence criterion of a step's iterations, over the tolerance
 ITERATION_RANGE = 1e-8, 1e-5
 
+PARABOLA = {"hertz", "hertz-fastsim", "semi-hertzian"}  # models that fit one to the gap
+
 
 def chosen_stepper(scenario: Scenario, model: ContactModel, contacts: int) -> str:
     """Return the name of a scenario's stepper; "auto" depends on the contact model.
@@ -172,6 +174,11 @@ def prepared_model(scenario: Scenario, grid: Grid) -> ContactModel:
         "bearing_torque": ("creepage.drive = 'free'", creepage.drive == "free"),
         "creepage_variation": ("creepage.differential_slip = true", creepage.differential_slip),
     }
+    if scenario.roller.width is not None and scenario.contact.model in PARABOLA:
+        raise CapabilityError(
+            f"{scenario.file}: contact model '{scenario.contact.model}' approximates the gap by a"
+            " parabola, which does not end with roller.width; use contact.model = 'slender'"
+        )
     for capability, (setting, needed) in needs.items():
         if needed and not getattr(model.capabilities, capability):
             raise CapabilityError(
@@ -233,6 +240,8 @@ def build_problem(
     count, values = len(rollers), contact_inputs(scenario, rollers, drawn)
     s, height = grid.y - values.pop("offset")[..., None], start_height(scenario, grid)
     gap = s * s / (2.0 * roller.crown_radius) - height
+    if roller.width is not None:
+        gap = gap + roller.edge_drop(s)
     slip = s * s / (2.0 * roller.crown_radius * roller.radius) + height / cylinder.radius
     tolerance = np.clip(ITERATION_FRACTION * scenario.evolution.tolerance, *ITERATION_RANGE)
     return WearProblem(

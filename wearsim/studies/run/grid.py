@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from wearsim.scenario import Scenario
 from wearsim.scenario.tables.plain import DEFAULT_TOLERANCE
 from wearsim.studies.run.draws import Draws
 from wearsim.studies.run.inputs import OFFSET, TILT, contact_inputs, load_range
+from wearsim.studies.run.roller_ends import ends_roller, roller_grid, strips_of_roller
 from wearsim.types import ContactSolution, FloatArray, Grid, Profile
 
 STRIPS_PER_HALF_WIDTH = 12  # of the initial patch; the discretisation error is then below 1e-3
@@ -57,6 +59,9 @@ def contact_grid(scenario: Scenario, load: float) -> Grid:
     centre, half_width = contact_centre(scenario, [0]), fresh_patch(scenario, load).b
     if choice.width is None and profile is not None:
         return profile_grid(profile, half_width, choice.strips)
+    half = 1.2 * half_width
+    if choice.width is None and ends_roller(scenario, centre - half, centre + half):
+        return roller_grid(scenario, choice.strips or strips_of_roller(scenario, 121, load))
     if choice.width is None and choice.strips is None:
         grid = suggested_grid(scenario, load)
         if grid is not None:
@@ -127,10 +132,20 @@ def wider_grid(scenario: Scenario, grid: Grid, load: float, shift: float = 0.0) 
 
 
 def fresh_patch(scenario: Scenario, load: float) -> HertzContact:
-    """Return the Hertzian patch of the unworn bodies under `load` [N]."""
+    """Return the patch of the unworn bodies under `load` [N], that of Hertz.
+
+    Where a roller ends within it, the patch is that of a line contact as wide as the roller.
+    """
     modulus = combine(scenario.cylinder.material, scenario.roller.material).contact_modulus
     along = 0.5 * (1.0 / scenario.cylinder.radius + 1.0 / scenario.roller.radius)
-    return hertz(along, 0.5 / scenario.roller.crown_radius, load, modulus)
+    patch = hertz(along, 0.5 / scenario.roller.crown_radius, load, modulus)
+    half = 0.5 * (scenario.roller.width or math.inf)
+    if patch.b <= half:
+        return patch
+    line_load = load / (2.0 * half)
+    half_length = math.sqrt(2.0 * line_load / (math.pi * modulus * along))
+    pressure = 2.0 * line_load / (math.pi * half_length)
+    return replace(patch, a=half_length, b=half, peak_pressure=max(pressure, patch.peak_pressure))
 
 
 def predicted_half_width(draws: Draws, load: float) -> float:
@@ -241,6 +256,9 @@ def strips_of_run(draws: Draws) -> Grid:
         tilt = max(abs(angle) for angle in draws.range_of("tilt"))
         shift += scenario.roller.crown_radius * tilt
     half = shift + 1.1 * predicted_half_width(draws, load) + 1.3 * patch.b
+    if choice.width is None and ends_roller(scenario, centre - half, centre + half):
+        least = strips_over(scenario.roller.width or 0.0, patch.b, scenario.evolution.tolerance)
+        return roller_grid(scenario, choice.strips or strips_of_roller(scenario, least, load))
     width = choice.width if choice.width is not None else 2.0 * half
     strips = choice.strips or strips_over(width, patch.b, scenario.evolution.tolerance)
     if width < 2.0 * (shift + patch.b):
@@ -307,6 +325,10 @@ def realisation_grid(
             )
     if choice.width is not None or scenario.cylinder.profile is not None:
         return contact_grid(scenario, load)
+    half = 1.2 * float((away + half_widths).max())
+    if ends_roller(scenario, centre - half, centre + half):
+        strips = choice.strips or strips_of_roller(scenario, 121, load)
+        return roller_grid(scenario, strips, float(away.max()))
     grid = suggested_grid(scenario, load)
     if grid is None:
         grid = Grid.spanning(-1.2 * mean_b, 1.2 * mean_b, 121)
