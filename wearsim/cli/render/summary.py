@@ -168,7 +168,10 @@ _STATE = {
     "energy": ("dissipated energy", "J"),
     "step": ("step in passes", "1"),
 }
-_INTERNAL = ("contact_", "coarse_step_", "half_quadrature_", "loop_", "quadrature", "scatter")
+_INTERNAL = (
+    *("contact_", "coarse_step_", "half_quadrature_", "loop_", "quadrature", "scatter"),
+    *("approach_factor", "decay"),
+)
 
 
 def solver_state(state: Mapping[str, Any]) -> str:
