@@ -16,8 +16,12 @@ from wearsim.scenario.examples import starter_scenario
 from wearsim.scenario.parse.toml import TABLES
 
 ROOT = Path(__file__).parents[2]
+PROFILE = "y [mm], height [um]\n" + "".join(
+    f"{k / 5}, {abs(k) / 100 - 1}\n" for k in range(-100, 101)
+)
 FILES = {
-    "profile.csv": "y [mm], height [um]\n-20, 0\n0, -1\n20, 0\n",
+    "profile.csv": PROFILE,
+    **{f"map.sdf#{rows}": PROFILE for rows in ("row=3", "mean_rows=[0, 10]", 'at="2 mm"')},
     "log.csv": "time [min], load [N]\n0, 300\n450, 310\n",
 }
 

@@ -33,7 +33,7 @@ FIRST_PARTY = {"bench": "wearsim-bench", "reproduce": "wearsim-chevalier2005"}
 
 #: built-in verbs with their help lines, in the order of the help
 BUILT_IN = {
-    "check": "Check a scenario: print all mistakes, or a summary of the run.",
+    "check": "Check a scenario: print all mistakes, or the inputs and a summary of the run.",
     "contact": "Solve one contact: the first roller at the start of the load.",
     "dissipation": "Solve one contact for many realisations of its random inputs.",
     "run": "Run a wear test and write its results file.",
