@@ -12,8 +12,8 @@ from wearsim.models.contact.hertz_fastsim import HertzFastsim, HertzFastsimOptio
 from wearsim.models.contact.slender import Slender
 from wearsim.models.contact.strip_model import grid_about_hertz
 from wearsim.models.tangential.strip_theory import StripTheory
-from wearsim.plugins import ContactModelSpec, Options
-from wearsim.types import Creepage, Grid, OperatingPoint
+from wearsim.plugins import ContactModelSpec, Options, SingleContactModel
+from wearsim.types import ContactSolution, Creepage, Grid, OperatingPoint
 
 CREEPAGE = Creepage(1e-3)
 
@@ -239,6 +239,46 @@ def _inclined_gap(gap, point, compliance):
     return gap + np.linspace(0.0, 1e-8, len(gap)), point, compliance
 
 
+def without_hardening(model):
+    """Return a model whose peak pressure lacks a part that rises with the pressure, 20 % here."""
+
+    class LacksHardening(model):
+        def solve_one(self, gap, curvature, point, wear_compliance=None, warm=None):
+            solution = super().solve_one(gap, curvature, point, wear_compliance, warm)
+            peak = solution.peak_pressure
+            return replace(solution, peak_pressure=peak / (1.0 + 0.3 * peak / 1e9))
+
+    return LacksHardening
+
+
+class ForgetsHardening(SingleContactModel):
+    """Foundation that hardens with depth d, p = k d (1 + d/d_0), with the peak pressure k d."""
+
+    def __init__(self, grid, materials):
+        self.grid = grid
+
+    def solve_contact(self, gap, longitudinal_curvature, point, wear_compliance=None, warm=None):
+        modulus, hardening, spacing = 3e14, 5e-6, self.grid.spacing
+        level = np.linspace(gap.min(), gap.min() + 2e-5, 20_001)[:, None]
+        depth = np.maximum(level - gap, 0.0)
+        half_length = np.sqrt(2.0 * depth / longitudinal_curvature)
+        # mean of d and of d^2 along a strip: 2/3 and 8/15 of their values in the middle
+        line_load = (
+            2.0 * half_length * modulus * depth * (2.0 / 3.0 + 8.0 / 15.0 * depth / hardening)
+        )
+        chosen = int(np.searchsorted(line_load.sum(axis=1) * spacing, point.normal_force))
+        zeros = np.zeros_like(gap)
+        return ContactSolution(
+            *(self.grid.y, half_length[chosen], line_load[chosen], zeros, 0.0, 0.0, 0.0),
+            approach=float(level[chosen, 0]),
+            peak_pressure=modulus * float(depth[chosen].max()),
+            adhesion_fraction=0.0,
+            power=0.0,
+            longitudinal_creepage=point.creepage.longitudinal,
+            iterations=1,
+        )
+
+
 MUTANTS = {
     "solution-is-complete-and-finite": [
         after(lambda solution, gap: {"power": np.nan}),
@@ -316,6 +356,11 @@ MUTANTS = {
         WeakTraction,
         ReversedTraction,
         after(lambda solution, gap: {"peak_pressure": 2.0 * solution.peak_pressure}),
+    ],
+    "peak-pressure-follows-strips": [
+        without_hardening(without("fields")),
+        without_hardening(Unmodified),
+        ForgetsHardening,
     ],
     "pass-loop": [IgnoresLoop, LosesEnergy],
 }

@@ -280,6 +280,30 @@ def fields(fixture: ContactFixture) -> None:
         require(not slip.any(), "points in adhesion have slip")
 
 
+@CAPABILITIES.specified_in("wearsim.types.ContactSolution")
+def peak_pressure_follows_strips(fixture: ContactFixture) -> None:
+    """The peak pressure is that of `fields`, or in a constant ratio to the strip means q/(2 a)."""
+    ratios, curvature = {}, fixture.case.curvature
+    for part in (0.25, 0.5, 1.0, 1.25):
+        for shape, gap in fixture.gaps.items():
+            point = fixture.point(normal_force=part * fixture.case.normal_force)
+            solution, case = fixture.solve(point, gap), f"{shape}, {point.normal_force:.4g} N"
+            inside = solution.half_length > 0.0
+            means = solution.line_load[inside] / (2.0 * solution.half_length[inside])
+            ratios[case] = solution.peak_pressure / float(means.max())
+            if fixture.model.capabilities.fields:
+                pressure = fixture.model.fields(solution, gap, curvature, point, 801).pressure
+                agree(f"{case}: peak_pressure", solution.peak_pressure, float(pressure.max()), 0.02)
+    least, most = min(ratios, key=ratios.__getitem__), max(ratios, key=ratios.__getitem__)
+    require(
+        fixture.model.capabilities.fields or ratios[most] <= 1.01 * ratios[least],
+        f"peak_pressure is {ratios[least]:.4g} times the greatest q/(2 a) of a strip ({least}) and"
+        f" {ratios[most]:.4g} times ({most}): either it lacks a part of the pressure that carries"
+        " the load, or the shape of the pressure along a strip changes with the load, which"
+        " `fields` must then return",
+    )
+
+
 def _pass_loop(fixture: ContactFixture) -> PassLoop:
     """Return two alternating rollers with a spring, a lagging term, tilt and spin."""
     case, y, shape = fixture.case, fixture.grid.y, (2, fixture.grid.strips)
