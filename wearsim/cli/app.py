@@ -229,7 +229,7 @@ class Shell(TyperGroup):
 
 def _message(error: BaseException) -> str:
     if isinstance(error, SolverError) and error.state:
-        from wearsim.cli.render.summary import solver_state
+        from wearsim.cli.render.failure import solver_state
 
         return f"error: {error.at_shell}\nstate at the failure: {solver_state(error.state)}"
     if isinstance(error, ScenarioError | Interrupted):  # their messages start with file or progress

@@ -105,6 +105,7 @@ def draw(
 def show(file: ResultsFile, json: Json = False) -> None:
     """Show the content of a results file and the end state."""
     from wearsim.cli.render import ensemble_table, summary
+    from wearsim.cli.render.failure import failure_rows
     from wearsim.report.text import count
     from wearsim.results import DissipationResult, EnsembleResult, open_results
 
@@ -133,7 +134,7 @@ def show(file: ResultsFile, json: Json = False) -> None:
         first, last = (count(float(result.record_passes[place])) for place in (0, -1))
         rows = [
             ("test", summary.standing(result)),
-            *summary.failure(result),
+            *failure_rows(result),
             ("contact model", result.described_model),
             ("stepper", f"{result.stepper}, tolerance {result.raw.tolerance:g}"),
             ("seed", str(result.raw.seed)),
