@@ -134,7 +134,7 @@ class CapabilityError(WearsimError):
     ...     wearsim.run(wearsim.load_scenario("rig.toml", model))
     ... except wearsim.CapabilityError as error:
     ...     print(error)
-    rig.toml: contact model 'hertz' takes no wear compliance; set evolution.stepper = ...
+    rig.toml: contact model 'hertz' ...
     """
 
     exit_code = 2
