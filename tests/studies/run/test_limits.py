@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,13 +11,16 @@ import pytest
 from study_examples import LOADS, ROLLERS, STEPPERS, after, run_differences, short
 
 from wearsim.errors import Interrupted, ResultsFileError
-from wearsim.evolution.integrate import evolve
+from wearsim.evolution.integrate import Evolution
 from wearsim.evolution.limits import Limit
-from wearsim.evolution.state import fresh_state
+from wearsim.evolution.state import WearState, fresh_state
 from wearsim.results import Result, open_results
+from wearsim.studies.ensemble.batch import joined_problem
 from wearsim.studies.run import run as studies
 from wearsim.studies.run.assemble import assemble_problem
 from wearsim.studies.run.draws import draw
+from wearsim.studies.run.grid import strips_of_run
+from wearsim.types import Grid
 
 
 @pytest.fixture
@@ -132,6 +136,11 @@ def test_depth_after_the_end_extends_the_test(path: Path) -> None:
     np.testing.assert_array_equal(extended.depth[:rows], whole.depth)
 
 
+def fixed_grid() -> Grid:
+    """Return the strips of `short`, which its scenario gives."""
+    return strips_of_run(draw(short()))
+
+
 def _warning(result: Result) -> str:
     (found,) = (text for text in result.warnings if "not reached" in text)
     return found
@@ -147,15 +156,22 @@ def test_limit_that_is_never_reached_is_reported(path: Path) -> None:
     assert "log" in _warning(logged)
 
 
-def test_limit_is_located_for_one_test_of_a_batch() -> None:
-    # as a study of many tests uses it: one after another from the steps of the batch
-    scenario = short()
-    problem, stepper, _ = assemble_problem(draw(scenario))
-    limit, found = Limit.parse("depth 0.6 um"), []
-    for advance in evolve(problem, fresh_state(problem), stepper, 6e3, lambda _: np.inf, 10**4):
-        state = limit.crossing(stepper, advance, 0)
-        if state is not None:
-            found.append(state)
-            break
-    assert limit.values(problem, found[0])[0] == pytest.approx(limit.value, rel=1e-7)
-    assert limit.is_reached(problem, found[0])[0]
+def test_limit_of_each_test_of_a_batch_is_that_of_the_test_alone() -> None:
+    limit, problems, alone = Limit.parse("depth 0.6 um"), [], []
+    for force in ("250 N", "300 N", "350 N"):
+        scenario = short(load__normal_force=force)
+        problem, stepper, _ = assemble_problem(draw(scenario), fixed_grid())
+        problems.append(problem)
+        alone.append(studies.run(scenario, until=limit.text))
+    joined = replace(joined_problem(problems), model=problems[0].model)
+    found: dict[int, WearState] = {}
+    tests = Evolution(joined, fresh_state(joined), stepper, 6e3, 10**4, lambda _: np.inf)
+    for advance in tests:
+        for place, number in enumerate(advance.numbers.tolist()):
+            state = None if number in found else limit.crossing(stepper, advance, place)
+            if state is not None:
+                found[number] = state
+    assert sorted(found) == [0, 1, 2]
+    for number, run in enumerate(alone):
+        assert found[number].passes[0] == run.passes[-1]
+        np.testing.assert_array_equal(found[number].cylinder_depth[0, 0, 0], run.profiles[-1])
