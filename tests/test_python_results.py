@@ -130,6 +130,11 @@ def test_unknown_variables_list_the_known_ones(kind: str, results: dict) -> None
     assert not hasattr(results[kind], "_private")
 
 
+def test_observable_as_an_attribute_names_the_method(results: dict) -> None:
+    with pytest.raises(AttributeError, match=r"values\('depth'\) returns this variable"):
+        results["ensemble"].depth  # noqa: B018
+
+
 def test_unknown_observables_list_the_known_ones(results: dict) -> None:
     tests = results["ensemble"]
     for call in (tests.at_end, tests.estimate, tests.course, tests.sensitivity, tests.independent):

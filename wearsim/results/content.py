@@ -268,11 +268,14 @@ class StudyResult(Generic[Data]):
     path: Path | None = None
 
     def __getattr__(self, name: str) -> Any:
-        if name.startswith("_") or hasattr(type(self), name):
+        if name.startswith("_") or name == "raw" or hasattr(type(self), name):
             return object.__getattribute__(self, name)  # raises the error of the attribute
         known = [known for known in dir(self) if not known.startswith("_")]
         kind = f"an attribute of {type(self).__name__}"
-        raise AttributeError(str(unknown_name(name, kind, known)), name=name, obj=self)
+        message = str(unknown_name(name, kind, known))
+        if name in self.raw.schema.variables:
+            message = f"'{name}' is not {kind}; values('{name}') returns this variable of the file"
+        raise AttributeError(message, name=name, obj=self)
 
     def to_xarray(self) -> xarray.Dataset:
         """Return all variables of the results file as a dataset of xarray.
