@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hertz_fastsim_examples import CONTACTS, RIG, SPEED, batch, contact, draws
+from scipy.integrate import trapezoid
 
 from wearsim.contact_batch import ContactBatch
 from wearsim.errors import CapabilityError, ContactError
@@ -108,7 +109,7 @@ def test_fields_support_friction_per_point():
     fields = model.fields(solution, gap, RIG[0], local)
     assert fields.x.shape == (201, 50)
     spacing = solution.y[1] - solution.y[0]
-    force = np.trapezoid(fields.traction_x, fields.x, axis=0).sum() * spacing
+    force = trapezoid(fields.traction_x, fields.x, axis=0).sum() * spacing
     # the solution includes the corners that the trapezoidal rule omits at the edges
     assert force == pytest.approx(solution.force_x, rel=1e-4)
     bound = friction[::-1] * 4.0 / 3.0 * fields.pressure[:-1]

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 
 from tests.materials import STEEL
 from tests.studies.study_examples import short
@@ -73,7 +74,7 @@ def test_fields_integrate_to_the_strips(variant):
     spacing = np.diff(solution.y)[0]
 
     def total(values):
-        return np.trapezoid(values, fields.x, axis=0).sum() * spacing
+        return trapezoid(values, fields.x, axis=0).sum() * spacing
 
     assert total(fields.pressure) == pytest.approx(300.0, rel=1e-4)
     assert fields.pressure.max() == pytest.approx(solution.peak_pressure, rel=1e-6)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 
 from wearsim.contact_batch import ContactBatch
 from wearsim.errors import CapabilityError, ContactError
@@ -166,5 +167,5 @@ def test_fields(case):
     assert case.model.capabilities.fields
     fields = case.model.fields(case.solution, case.gap, CURVATURE, POINT)
     middle = case.grid.strips // 2
-    power = np.trapezoid(fields.power_density[:, middle], fields.x[:, middle])
+    power = trapezoid(fields.power_density[:, middle], fields.x[:, middle])
     assert abs(power) == pytest.approx(case.solution.dissipation[middle], rel=0.1)
