@@ -41,7 +41,7 @@ class Load(ABC):
     """Load on a roller as a function of time, before any feedback.
 
     `stiffness` [N/m] is the decrease of the load per displacement of the roller: its worn descent,
-    less the fall of the elastic approach since the start of the test.
+    less the fall of the elastic approach from that of unworn bodies under the same load.
     """
 
     stiffness: float = 0.0
