@@ -11,6 +11,7 @@ from tests.evolution import SCENARIOS
 from wearsim.errors import CapabilityError, ScenarioError
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.scenario import Scenario, load_scenario
+from wearsim.studies.contact.monte_carlo import dissipation
 from wearsim.studies.contact.single import study_contact
 from wearsim.studies.ensemble.api import ensemble
 from wearsim.studies.plausibility import plausibility_warnings
@@ -123,6 +124,15 @@ def test_realisations_share_strips_that_end_with_the_roller(tmp_path: Path) -> N
     assert result.failed == 0
     spacing = float(result.y[1] - result.y[0])
     assert (10e-3 / spacing) == pytest.approx(round(10e-3 / spacing), rel=1e-9)
+
+
+def test_realisations_of_one_contact_end_with_the_roller(tmp_path: Path) -> None:
+    random = {"distribution": "uniform", "low": "-0.3 mrad", "high": "0.3 mrad"}
+    result = dissipation(short(**FLAT, creepage__tilt=random), 20, tmp_path / "d.h5")
+    spacing = float(result.y[1] - result.y[0])
+    assert spacing * len(result.y) == pytest.approx(WIDTH + 4.0 * spacing, rel=1e-9)
+    full = 0.1 * LOAD * result.scenario.rolling_speed * 1e-3
+    assert result.values("power") == pytest.approx(full, rel=0.02)
 
 
 @pytest.mark.parametrize("model", ["hertz", "hertz-fastsim", "semi-hertzian"])

@@ -39,7 +39,10 @@ def contact_positions(scenario: Scenario, inputs: Mapping[str, FloatArray]) -> F
     """
     if not scenario.creepage.tilt_shifts_contact:
         return inputs["offset"]
-    return np.asarray(inputs["offset"] - scenario.roller.crown_radius * inputs["tilt"])
+    shift = -scenario.roller.crown_radius * inputs["tilt"]
+    if scenario.roller.width is not None:
+        shift = np.clip(shift, -0.5 * scenario.roller.width, 0.5 * scenario.roller.width)
+    return np.asarray(inputs["offset"] + shift)
 
 
 def contact_centre(scenario: Scenario, rollers: Sequence[int]) -> float:
@@ -328,7 +331,8 @@ def realisation_grid(
     half = 1.2 * float((away + half_widths).max())
     if ends_roller(scenario, centre - half, centre + half):
         strips = choice.strips or strips_of_roller(scenario, 121, load)
-        return roller_grid(scenario, strips, float(away.max()))
+        shifted = any(OFFSET in item.keys for item in scenario.random)
+        return roller_grid(scenario, strips, float(away.max()) if shifted else 0.0)
     grid = suggested_grid(scenario, load)
     if grid is None:
         grid = Grid.spanning(-1.2 * mean_b, 1.2 * mean_b, 121)
