@@ -83,7 +83,11 @@ def test_wrong_choice_of_rows_is_refused(choice: ProfileChoice, message: str) ->
     assert str(caught.value).startswith(message)
 
 
-@pytest.mark.parametrize("content", [_sdf()[:40], _x3p()[:40], b"PK\x03\x04", b"bISO-2.0"])
+@pytest.mark.parametrize(
+    "content",
+    [_sdf()[:40], _x3p()[:40], b"PK\x03\x04", b"bISO-2.0"],
+    ids=["cut SDF", "cut X3P", "start of X3P", "start of SDF"],  # the content has the time of day
+)
 def test_damaged_surface_is_refused(content: bytes) -> None:
     with pytest.raises(ScenarioError, match=r"map: is no (SDF|X3P) file of one surface or profile"):
         read_profile(content, "map", ProfileChoice(row=0))
