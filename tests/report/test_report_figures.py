@@ -69,6 +69,21 @@ def test_depth_is_drawn_for_every_worn_step(result: Result) -> None:
     assert drawn[-1] == pytest.approx(result.depth[-1] * 1e6)
 
 
+def test_depth_of_every_roller_pass_has_no_stepping_error() -> None:
+    options = {"operation.duration": "0.1 min", "evolution.stepper": "per-pass"}
+    axes = panel(
+        run_figure(study_run.run(load_scenario(SCENARIOS / "rig-450min.toml", options))), "Depth"
+    )
+    (label,) = axes.get_legend_handles_labels()[1]  # type: ignore[attr-defined]
+    assert label == "depth\n(no stepping error: every roller pass is solved)"
+
+
+def test_figure_states_the_limit_at_which_a_run_stopped() -> None:
+    scenario = load_scenario(SCENARIOS / "rig-450min.toml", SHORT)
+    stopped = study_run.run(scenario, until="depth 0.1 um")
+    assert "(slender, implicit, stopped at depth 0.1 um)" in run_figure(stopped).get_suptitle()
+
+
 def test_different_rollers_have_separate_curves_of_dissipation() -> None:
     three = study_run.run(load_scenario(SCENARIOS / "rig-three-rollers.toml", SHORT))
     axes = panel(run_figure(three), "Dissipated")
@@ -81,7 +96,9 @@ def test_logged_load_is_drawn_with_that_at_the_steps(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     logged = study_run.run(load_scenario(SCENARIOS / "rig-logged-load.toml", SHORT))
-    assert len(panel(run_figure(logged), "Normal force").get_lines()) == 2  # type: ignore[attr-defined]
+    log, steps = panel(run_figure(logged), "Normal force").get_lines()  # type: ignore[attr-defined]
+    # a line between the steps would contradict the log
+    assert (log.get_linestyle(), steps.get_linestyle(), steps.get_marker()) == ("-", "None", "o")
 
     def fail(self: Result) -> None:
         raise PluginError("not here")

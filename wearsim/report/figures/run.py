@@ -73,6 +73,8 @@ def _caption(result: Result) -> str:
         below = shown(float(np.max(result.depth_below_nominal[-1])), "um")
         depth = f"{depth} worn since the start, depth below nominal {below}"
     unfinished = "" if result.finished else ", failed" if result.failure else ", unfinished"
+    if result.until:
+        unfinished = f", stopped at {result.until}"
     return (
         f"{count(float(result.passes[-1]))} roller passes in"
         f" {shown(float(result.time[-1]), 'min')}"
@@ -158,7 +160,12 @@ def _draw_depth(axes: Axes, result: Result) -> None:
             low = np.maximum(low, 0.05 * depth)
         band = (low * UM, (depth + error) * UM)
         axes.fill_between(passes / unit, *band, color=ORANGE, alpha=0.35, lw=0, label=estimate)
-    style, label = ("-o", "depth, one dot per step") if len(passes) <= 80 else ("-", "depth")
+    if result.stepper == "per-pass":
+        style, label, estimate = "-", "depth", "no stepping error: every roller pass is solved"
+    elif len(passes) <= 80:
+        style, label = "-o", "depth, one dot per step"
+    else:
+        style, label = "-", "depth"
     label += "" if visible else f"\n({estimate})"
     axes.plot(passes / unit, depth * UM, style, color=BLUE, ms=2.6, label=label)
     title = "Depth worn since the start" if result.start_height.any() else "Depth"
@@ -197,7 +204,8 @@ def _draw_normal_force(axes: Axes, result: Result) -> None:
     base = _base_load(result)
     if base is not None:
         axes.plot(base[0] * MIN, base[1], color=GREY, lw=0.8, label="without feedback")
-    style = "o-" if base is not None else "-"
+    # between the steps, a line would contradict the load; at many of them, the dots are a line
+    style = "o" if base is not None else "-"
     for roller in range(rollers):
         label = "at the steps" if rollers == 1 else f"roller {roller + 1}"
         colour = ROLLERS[roller % len(ROLLERS)]
