@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,9 @@ from wearsim.csv_tables import read_columns
 from wearsim.errors import ScenarioError
 from wearsim.input_files import read_input
 from wearsim.profiles import ProfileChoice
+from wearsim.scenario import load_scenario
 
+SCENARIOS = Path(__file__).parents[1] / "scenarios"
 LOAD = np.array([300.0, 301.25, 299.5])
 
 
@@ -103,3 +106,17 @@ def test_other_files_are_decoded(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_bytes("time [s],load [N]\n0,1\n".encode("utf-16"))
     assert read_input(path) == "time [s],load [N]\n0,1\n"
+
+
+def test_columns_of_a_log_are_chosen_by_name(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("Zeit;Kraft [kN]\n23:59:00;0,3\n01:00:00;0,31\n")
+    rig = (SCENARIOS / "rig-logged-load.toml").read_text()
+    path = tmp_path / "rig.toml"
+    path.write_text(re.sub(r"(?m)^file = .*", 'file = "log.csv"', rig))
+    test = {"operation.duration": "50 min"}
+    with pytest.raises(ScenarioError, match=r"choose other names with load\.columns"):
+        load_scenario(path, test)
+    scenario = load_scenario(path, {**test, "load.columns": ["Zeit", "Kraft"]})
+    assert scenario.load.build().extremes(0.0, 3660.0) == pytest.approx((300.0, 310.0))
+    with pytest.raises(ScenarioError, match="time and load need two columns"):
+        load_scenario(path, {**test, "load.columns": ["Zeit", "Zeit"]})

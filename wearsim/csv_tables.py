@@ -11,6 +11,7 @@ from __future__ import annotations
 import csv
 import difflib
 import re
+from dataclasses import replace
 from operator import methodcaller
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -66,6 +67,7 @@ def read_columns(
     units: Mapping[str, str] | None = None,
     rising: str | None = None,
     either_way: bool = False,
+    choice: str = "",
 ) -> dict[str, FloatArray]:
     """Read columns of numbers from a CSV file with units in its headers.
 
@@ -91,6 +93,8 @@ def read_columns(
         A column whose values must increase from row to row.
     either_way : bool
         Whether they may also decrease from row to row; the rows are then returned in reverse.
+    choice : str
+        How the user chooses columns by other names, for messages.
 
     Returns
     -------
@@ -130,6 +134,10 @@ def read_columns(
     wanted = {name: (unit, (units or {}).get(name)) for name, unit in columns.items()}
     found = _find_columns(header, below, sample, separator, wanted, names, mistakes)
     body = lines[start:]
+    missing = [k for k, mistake in enumerate(mistakes) if mistake.what.startswith("column")]
+    if choice and missing and len(found) < len(columns):
+        last = mistakes[missing[-1]]
+        mistakes[missing[-1]] = replace(last, expected=f"{last.expected}; {choice}")
     numbers: Sequence[int] = range(start + 1, start + 1 + len(body))
     table = None if mistakes else _regular_numbers(body, header, found, separator)
     if table is None and not mistakes:  # perhaps there are comments between the rows
@@ -268,7 +276,8 @@ def _find_columns(
         else:
             near = difflib.get_close_matches(name, [other for other, _ in heads], n=1)
             what = f"column '{name}' is missing" + (f" (is it '{near[0]}'?)" if near else "")
-            got, expected = ", ".join(header.cells), _head(name, unit)
+            got = ", ".join(header.cells)
+            expected = " or ".join(_head(other, unit) for other in names[name])
             mistakes.append(_mistake(header.line, what, got, expected))
     return found
 

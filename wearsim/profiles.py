@@ -25,6 +25,11 @@ _SDF = (b"aISO-", b"bISO-", b"aBCR-", b"bBCR-")
 _X3P = b"PK\x03\x04"
 MAX_POINTS = 1_000_000  # of a filtered profile
 ROW_CHOICES = ("row", "mean_rows", "at")
+_NAMES = (
+    "choose other names with --columns Y,Z or, in a scenario, profile_columns = [Y, Z];"
+    " a minus sign before Z makes it a depth"
+)
+_CLEARLY = 3.0  # heights above the ends of a profile over those below
 _INSTALL = "pip install 'wearsim[surfaces]'"
 
 
@@ -36,7 +41,7 @@ class ProfileChoice:
     ----------
     columns : tuple of str, optional
         Names of the columns of position and height in a CSV file; a column "depth" is positive
-        downwards.
+        downwards, and so is one after a minus sign, "-Tiefe".
     units : tuple of str, optional
         Units of these columns where the header has none, ("mm", "um").
     row : int, optional
@@ -139,7 +144,11 @@ def read_profile(content: str | bytes, file: str, choice: ProfileChoice | None =
     if choice.rows:
         what = f"{choice.rows[0]} is for the rows of a surface, and this is a CSV file"
         raise _error(file, what)
-    y, height = names = choice.columns or ("y", "height")
+    y, height = choice.columns or ("y", "height")
+    # a column chosen by the name "depth" has the sign of one found by that name
+    downwards = choice.columns and (height.startswith("-") or height.casefold() == "depth")
+    height = height.removeprefix("-")
+    names = y, height
     if y == height:
         raise _error(file, "position and height need two columns", y)
     columns = read_columns(
@@ -151,10 +160,38 @@ def read_profile(content: str | bytes, file: str, choice: ProfileChoice | None =
         units=dict(zip(names, choice.units or (), strict=False)),
         rising=y,
         either_way=True,
+        choice=_NAMES,
     )
-    # a column chosen by the name "depth" has the sign of one found by that name
-    sign = -1.0 if choice.columns and height.casefold() == "depth" else 1.0
-    return Profile(columns[y], sign * columns[height])
+    return Profile(columns[y], (-1.0 if downwards else 1.0) * columns[height])
+
+
+def sign_note(profile: Profile, choice: ProfileChoice, file: str) -> str | None:
+    """Return a note if a column chosen by its name seems to hold depths read as heights.
+
+    Parameters
+    ----------
+    profile : Profile
+        As read, with worn material negative.
+    choice : ProfileChoice
+    file : str
+        Name of the file.
+
+    Returns
+    -------
+    str or None
+        None if the sign is known from the name, or the profile does not rise above its ends.
+    """
+    position, name = choice.columns or ("y", "height")
+    if name.startswith("-") or name.casefold() in {"height", "z", "depth"}:
+        return None
+    level = 0.5 * float(profile.height[0] + profile.height[-1])
+    above, below = float(profile.height.max()) - level, level - float(profile.height.min())
+    if above <= _CLEARLY * below:
+        return None
+    return (
+        f"{file}: column '{name}' rises {1e6 * above:.4g} um above its ends, and worn material is"
+        f" negative; if it holds depths, choose the columns {position} and -{name}"
+    )
 
 
 def is_surface(content: bytes) -> bool:

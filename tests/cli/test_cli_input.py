@@ -213,6 +213,25 @@ def test_contact_states_profile_and_sign(command: Command, scenario: Path) -> No
     assert "(worn is negative; read from the column depth)" in rows
 
 
+def test_depths_under_another_name_take_a_minus_sign(command: Command, scenario: Path) -> None:
+    Path("worn.csv").write_text("Ort [mm];Tiefe [um]\n3;0\n0;2,5\n-3;0\n", encoding="utf-16")
+    profile = ("contact", scenario, "--profile", "worn.csv", "--columns")
+    heights = command(*profile, "Ort,Tiefe")
+    assert "height 0 to 2.5 um" in " ".join(heights.stdout.split())
+    assert (
+        "note: worn.csv: column 'Tiefe' rises 2.5 um above its ends, and worn material is negative;"
+        " if it holds depths, choose the columns Ort and -Tiefe\n"
+    ) in heights.stderr
+    depths = command(*profile, "Ort,-Tiefe")
+    assert "height -2.5 to 0 um" in " ".join(depths.stdout.split())
+    assert "Tiefe" not in depths.stderr
+    start = ("check", scenario, "--set", "cylinder.profile='worn.csv'", "--set")
+    checked = command(*start, "cylinder.profile_columns=['Ort', '-Tiefe']")
+    assert "height -2.5 to 0 um" in " ".join(checked.stdout.split())
+    checked = command(*start, "cylinder.profile_columns=['Ort', 'Tiefe']")
+    assert "note: worn.csv: column 'Tiefe' rises 2.5 um above its ends" in checked.stderr
+
+
 def test_options_of_a_profile_need_one(command: Command, scenario: Path) -> None:
     for option in (("--filter", "0.8 mm"), ("--columns", "y,z"), ("--row", 2)):
         result = command("contact", scenario, *option)
@@ -348,10 +367,11 @@ def test_contact_notes_that_random_inputs_are_at_their_means(command: Command) -
     )
     lines = command("contact", paper, "--set", field).stderr.splitlines()
     assert (
-        "random inputs are set to their means: creepage.longitudinal, creepage.misalignment,"
+        "note: random inputs are set to their means: creepage.longitudinal, creepage.misalignment,"
         " load.normal_force"
     ) in lines
-    assert "random fields are set to the means of their marginals: friction.coefficient" in lines
+    fields = "random fields are set to the means of their marginals: friction.coefficient"
+    assert f"note: {fields}" in lines
     assert "means" not in command("contact", SCENARIOS / "mean-contact.toml").stderr
 
 

@@ -58,7 +58,23 @@ rig.toml: [cylinder.material] poison_ratio: unknown key (did you mean 'poisson_r
     "text for a number": (
         "coefficient = 0.1",
         'coefficient = "0.1"',
-        'rig.toml: [friction] coefficient: is not a number, got "0.1", expected a number above 0',
+        (
+            'rig.toml: [friction] coefficient: needs a number without quotes, got "0.1",'
+            " expected a number above 0"
+        ),
+    ),
+    "a percentage for a number": (
+        "coefficient = 0.1",
+        'coefficient = "10 %"',
+        (
+            'rig.toml: [friction] coefficient: needs a number without quotes and %, got "10 %",'
+            " expected a number above 0"
+        ),
+    ),
+    "an angle of chamfers without chamfer": (
+        'radius = "20 mm"',
+        'radius = "20 mm"\nchamfer_angle = "30 deg"',
+        "rig.toml: [roller] chamfer_angle: has no meaning without chamfer",
     ),
     "a number that is not finite": (
         "coefficient = 0.1",
@@ -158,7 +174,7 @@ rig.toml: [load] file: log.csv line 3: column 'load': is not a number, got 'x', 
         'radius = "25 mm"\nprofile = "log.csv"',
         """\
 rig.toml: [cylinder] profile: log.csv line 1: column 'y' is missing, got time [min], load [m], expected y [m]
-rig.toml: [cylinder] profile: log.csv line 1: column 'height' is missing, got time [min], load [m], expected height [m]""",
+rig.toml: [cylinder] profile: log.csv line 1: column 'height' is missing, got time [min], load [m], expected height [m] or z [m] or depth [m]; choose other names with --columns Y,Z or, in a scenario, profile_columns = [Y, Z]; a minus sign before Z makes it a depth""",
     ),
     "creepage and bearing torque mixed up": (
         SLIP,
@@ -198,7 +214,7 @@ rig.toml: [contact] model: no contact model is named 'slendr'; known: hertz-fast
         'model = "hertz-fastsim"\nmx = "3"\nmz = 4\nwidth = "0 mm"\nmodle = 1',
         """\
 rig.toml: [contact] width: must be above zero, got "0 mm", expected a length above zero such as "20 mm"
-rig.toml: [contact] mx: is not a whole number, got "3", expected a whole number of at least 2
+rig.toml: [contact] mx: needs a number without quotes, got "3", expected a whole number of at least 2
 rig.toml: [contact] mz: unknown key (known here: centre, model, mx, my, strips, width)
 rig.toml: [contact] modle: unknown key (did you mean 'model'?)""",
     ),
@@ -259,7 +275,7 @@ rig.toml: [outputs] spacing: unknown choice, got "lin", expected one of "even", 
         'radius = "20 mm"\nradius = "2 mm"',
         (
             "rig.toml: line 6, column 16: is not valid TOML: cannot overwrite a value,"
-            ' got radius = "2 mm"'
+            ' got radius = "2 mm", expected each key and table once in the file'
         ),
     ),
 }

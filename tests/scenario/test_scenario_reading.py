@@ -172,3 +172,19 @@ def test_importing_the_package_loads_no_heavy_library() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize(
+    ("line", "remedy"),
+    [
+        ("coefficient = 10 %", "expected a plain number, coefficient = 0.1"),
+        (r'profile = "C:\data\p.csv"', r"expected paths with / or, with \, in single quotes"),
+        (r'profile = "C:\Users\p.csv"', r"expected paths with / or, with \, in single quotes"),
+        ("differential_slip = True", "expected true or false"),
+        ("rollers = 3\nrollers = 4", "expected each key and table once in the file"),
+    ],
+)
+def test_invalid_toml_has_its_remedy(line: str, remedy: str) -> None:
+    with pytest.raises(ScenarioError, match="is not valid TOML") as caught:
+        parse_scenario(f"[table]\n{line}\n", "rig.toml", str)
+    assert str(caught.value).endswith(remedy)

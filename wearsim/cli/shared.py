@@ -169,7 +169,7 @@ Columns: TypeAlias = Annotated[
     typer.Option(
         "--columns",
         metavar="Y,Z",
-        help="Names of the columns of position and height in the profile.",
+        help="Names of the columns of position and height in the profile; -Z is a depth.",
         show_default=False,
     ),
 ]

@@ -85,8 +85,14 @@ class Limit:
             if value % 1.0:
                 raise ValueError(f"'{text}' is not a whole number of passes")
         elif parts and kind in {"", "time", "depth", "roller depth", "volume"}:
+            try:
+                value = quantity(parts[2], _QUANTITIES[kind or "time"][0])
+            except ValueError as error:
+                if kind:
+                    raise
+                what = f"'{text}' is not a limit, expected one such as {_EXAMPLES}"
+                raise ValueError(what) from error
             kind = kind or "time"
-            value = quantity(parts[2], _QUANTITIES[kind][0])
         else:
             raise ValueError(f"'{text}' is not a limit, expected one such as {_EXAMPLES}")
         if not 0.0 < value < np.inf:

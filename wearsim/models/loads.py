@@ -41,6 +41,9 @@ class RecordedOptions(Options):
     """Options of the load `recorded`."""
 
     file: InputFile = Field(description="CSV with columns such as 'time [min]', 'load [N]'")
+    columns: tuple[str, str] | None = Field(
+        None, description="names of the columns of time and load, if they are others"
+    )
     gaps: Literal["error", "hold", "interpolate"] = Field(
         "interpolate",
         description="load in a gap, an interval of more than ten times the usual one: an error, the"
@@ -84,10 +87,17 @@ ZERO_DRIFT = 0.01  # part of the greatest load by which a log may be below zero 
 
 
 @lru_cache(maxsize=4)  # a log may have millions of rows, and a study builds its load several times
-def _read_log(text: str, path: str, gaps: str) -> tuple[PiecewiseLinear, FloatArray, FloatArray]:
+def _read_log(
+    text: str, path: str, gaps: str, names: tuple[str, str] | None
+) -> tuple[PiecewiseLinear, FloatArray, FloatArray]:
     """Return the log, its pauses and its gaps [s]."""
-    columns = read_columns(text, path, {"time": "s", "load": "N"}, rising="time")
-    time, load = columns["time"], columns["load"]
+    first, second = names or ("time", "load")
+    choice = "choose other names with load.columns = [TIME, LOAD]"
+    if first == second:
+        raise ScenarioError(path, [Mistake("", "", "time and load need two columns", first)])
+    units = {first: "s", second: "N"}
+    columns = read_columns(text, path, units, rising=first, choice=choice)
+    time, load = columns[first], columns[second]
     load = np.where((load < 0.0) & (load >= -ZERO_DRIFT * load.max()), 0.0, load)
     steps = np.diff(time)
     before = np.flatnonzero(steps > GAP * np.median(steps))
@@ -121,7 +131,7 @@ class RecordedLoad(Load):
     def __init__(self, options: RecordedOptions) -> None:
         self.stiffness = options.stiffness
         self._log, self._pauses, self._gaps = _read_log(
-            options.file.text, options.file.path, options.gaps
+            options.file.text, options.file.path, options.gaps, options.columns
         )
 
     @property

@@ -51,7 +51,9 @@ def test_limit_is_read(text: str | float, quantity: str, value: float) -> None:
     [
         ("depth 50", 'needs a unit, got "50", expected a length such as'),
         ("depth 3 min", '"3 min"'),
-        ("12", "needs a unit"),
+        ("12", "'12' is not a limit, expected one such as \"depth 50 um\""),
+        ("30 um", "'30 um' is not a limit, expected one such as \"depth 50 um\""),
+        ("100 kpasses", "'100 kpasses' is not a limit, expected one such as"),
         ("deep 5 um", "'deep 5 um' is not a limit, expected one such as \"depth 50 um\""),
         ("forever", "is not a limit"),
         ("", "is not a limit"),

@@ -81,7 +81,7 @@ def contact(
     loaded = read_scenario(scenario, settings)
     from wearsim.cli.progress import Display
     from wearsim.input_files import read_input
-    from wearsim.profiles import ProfileChoice, gaussian_filtered, load_profile
+    from wearsim.profiles import ProfileChoice, gaussian_filtered, load_profile, sign_note
     from wearsim.quantities import quantity
     from wearsim.results import refuse_inputs
     from wearsim.studies.contact.single import study_contact
@@ -116,6 +116,8 @@ def contact(
     with Display(quiet=False, kernels=kernels, transient=True):
         study = study_contact(loaded, cylinder.profile, with_fields, with_error=True)
     notes = [*study.notes, *_notes_on_means(loaded)]
+    if cylinder.profile and profile and (sign := sign_note(cylinder.profile, choice, str(profile))):
+        notes.append(sign)
     if figure is not None and not has_fields:
         notes.append(f"model '{study.model}' gives no fields; the figure shows its strips only")
     if json:
@@ -131,9 +133,9 @@ def contact(
 
         save_figure(contact_figure(study, loaded.title), figure)
     if not json:
-        write_notes((), study.warnings)
-        for text in [*notes, *([f"figure: {figure}"] if figure else [])]:
-            note(text)
+        write_notes(notes, study.warnings)
+        if figure:
+            note(f"figure: {figure}")
 
 
 def _notes_on_means(scenario: Scenario) -> list[str]:

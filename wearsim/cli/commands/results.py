@@ -58,7 +58,7 @@ def plot(
     """Draw the figure of a results file of any kind."""
     path = figure if figure is not None else Path(f"{file.stem}.png")
     check_figure(path, force)
-    from wearsim.profiles import load_profile
+    from wearsim.profiles import load_profile, sign_note
     from wearsim.report.parts import Measured
     from wearsim.results import DissipationResult, open_results, refuse_inputs
 
@@ -71,6 +71,11 @@ def plot(
         )
     choice = profile_choice(columns, units, row, mean_rows, at)
     read = [(name.stem, load_profile(name, choice)) for name in measured or []]
+    signs = [
+        sign_note(one, choice, str(name))
+        for name, (_, one) in zip(measured or [], read, strict=True)
+    ]
+    write_notes(filter(None, signs))
     profiles = [Measured(label, one.y, one.height) for label, one in read]
     draw(result, path, profiles)
     for profile in profiles:

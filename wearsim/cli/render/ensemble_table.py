@@ -134,7 +134,7 @@ def _target_rows(result: EnsembleResult) -> Rows:
         return []
     rows = []
     if result.until:
-        rows.append((f"until {result.until}", _target_met(result, Target.parse(result.until))))
+        rows.append((f"precision {result.until}", _target_met(result, Target.parse(result.until))))
     saved = result.estimate("depth", -1, ()).variance_saved
     if saved is not None:
         text = f"removes {shown(saved, '%', 3)} of the variance of the mean depth"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import json
+import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -14,13 +15,14 @@ from pydantic_core import ErrorDetails
 
 from wearsim.errors import Mistake, PluginError, ScenarioError
 from wearsim.plugins import Spec, registry
-from wearsim.quantities import DECIMAL_COMMA, Quantity
+from wearsim.quantities import DECIMAL_COMMA, NUMBER, Quantity
 from wearsim.scenario.parse.fields import RandomInput, choices, field_at, form, model_at
 from wearsim.units import QuantityError, shown
 
 M = TypeVar("M", bound=BaseModel)
 S = TypeVar("S", bound=Spec)
 
+_NUMBER_IN_TEXT = re.compile(rf"(?:{NUMBER.pattern}) ?%?")
 _BOUNDS = {"greater_than", "greater_than_equal", "less_than", "less_than_equal"}
 _WHAT = {
     "finite_number": "must be finite",
@@ -247,6 +249,8 @@ def _translate(
             what += nearest(value, choices(field))
         if isinstance(value, str) and DECIMAL_COMMA.fullmatch(value):
             what = "needs a decimal point"
+        elif isinstance(value, str) and _NUMBER_IN_TEXT.fullmatch(value) and "number" in what:
+            what = "needs a number without quotes" + (" and %" if value.endswith("%") else "")
         message = details["msg"].removeprefix("Input should be ")
         expected = expected or message[:1].lower() + message[1:]
         mistakes.add(place, key, what, shown(value), expected)

@@ -290,8 +290,16 @@ def _syntax_mistake(text: str, message: str) -> Mistake:
     line = text.splitlines()[int(number[1]) - 1].strip() if number else None
     bare = re.match(r"([\w.-]+)\s*=\s*([0-9.+-][^\"'#]*?)\s*(?:#.*)?$", line or "")
     expected = f'quotes around a value with a unit, {bare[1]} = "{bare[2]}"' if bare else None
-    if bare and DECIMAL_COMMA.fullmatch(bare[2]):
+    if what.startswith(("cannot overwrite", "cannot declare")):
+        expected = "each key and table once in the file"
+    elif "unescaped" in what or "hex" in what:
+        expected = "paths with / or, with \\, in single quotes"
+    elif re.search(r"=\s*(True|False)\b", line or ""):
+        expected = "true or false"
+    elif bare and DECIMAL_COMMA.fullmatch(bare[2]):
         expected = f"a decimal point, {bare[1]} = {bare[2].replace(',', '.')}"
+    elif bare and (percent := re.fullmatch(r"([0-9.]+) ?%", bare[2])):
+        expected = f"a plain number, {bare[1]} = {float(percent[1]) / 100.0:.6g}"
     return Mistake("", match["place"], f"is not valid TOML: {what}", line, expected)
 
 

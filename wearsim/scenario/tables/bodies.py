@@ -19,6 +19,7 @@ from wearsim.profiles import (
     gaussian_filtered,
     name_of_rows,
     read_profile,
+    sign_note,
 )
 from wearsim.quantities import (
     InputFile,
@@ -260,6 +261,8 @@ def _check_edges(mistakes: Mistakes, table: RollerTable, radius: float) -> None:
     if table.chamfer_angle >= 0.5 * math.pi:
         angle = f"{math.degrees(table.chamfer_angle):.6g} deg"
         mistakes.add("roller", "chamfer_angle", "is too great", angle, "less than 90 deg")
+    if "chamfer_angle" in table.model_fields_set and table.chamfer is None:
+        mistakes.add("roller", "chamfer_angle", "has no meaning without chamfer")
 
 
 def read_cylinder(mistakes: Mistakes, raw: Mapping[str, object]) -> Cylinder | None:
@@ -287,6 +290,8 @@ def read_cylinder(mistakes: Mistakes, raw: Mapping[str, object]) -> Cylinder | N
     except ValueError as error:
         mistakes.add("cylinder", "profile_filter", str(error))
         return None
+    if sign := sign_note(profile, choice, table.profile.path):
+        mistakes.notes.append(sign)
     return Cylinder(
         _radius(table.radius, table.diameter),
         table.material,
