@@ -100,6 +100,15 @@ class ChangesInput(Unmodified):
         return super().solve_one(gap, *args, **kwargs)
 
 
+class LevelsInput(Unmodified):
+    """Subtracts the smallest gap in place, after the solution."""
+
+    def solve_one(self, gap, *args, **kwargs):
+        solution = super().solve_one(gap, *args, **kwargs)
+        gap -= gap.min()
+        return solution
+
+
 class DependsOnWarmStart(Unmodified):
     """Mixes the warm start into the solution."""
 
@@ -291,6 +300,7 @@ MUTANTS = {
     "zero-outside-the-contact": [
         after(lambda solution, gap: {"dissipation": solution.dissipation + 1e-12}),
         after(lambda solution, gap: {"dissipation": solution.dissipation - 1e-12}),
+        after(lambda solution, gap: {"half_length": 1e3 * solution.half_length}),  # in mm
     ],
     "power-equals-strip-sum": [
         after(lambda solution, gap: {"dissipation": 0.99 * solution.dissipation})
@@ -332,7 +342,7 @@ MUTANTS = {
         after(lambda solution, gap: {"peak_pressure": solution.peak_pressure * len(gap)})
     ],
     "repeated-solves-identical": [Drifting, Buffered],
-    "inputs-unchanged": [ChangesInput],
+    "inputs-unchanged": [ChangesInput, LevelsInput],
     "result-independent-of-warm-start": [DependsOnWarmStart],
     "invalid-input-raises-contact-error": [HidesErrors, WrongError],
     "contact-wider-than-strips-raises": [Truncating],

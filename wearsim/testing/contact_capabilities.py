@@ -302,7 +302,7 @@ def peak_pressure_follows_strips(fixture: ContactFixture) -> None:
         f"peak_pressure is {ratios[least]:.4g} times the greatest q/(2 a) of a strip ({least}) and"
         f" {ratios[most]:.4g} times ({most}): either it lacks a part of the pressure that carries"
         " the load, or the shape of the pressure along a strip changes with the load, which"
-        " `fields` must then return",
+        " `fields` must then return; if neither can be, skip this check: without={...}",
     )
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from wearsim.contact_batch import ContactBatch
 from wearsim.plugins import ContactModel, ContactModelSpec
-from wearsim.testing.checks import Fixture
+from wearsim.testing.checks import Fixture, require
 from wearsim.types import (
     ContactSolution,
     Creepage,
@@ -24,6 +24,7 @@ from wearsim.types import (
 STEEL = Material(youngs_modulus=210e9, poisson_ratio=0.3)
 NUMBERS = tuple(item.name for item in fields(ContactSolution) if item.type == "float")
 STRIPS = ("half_length", "line_load", "dissipation")
+_MOST_OF_OVERLAP = 1.001
 
 
 @dataclass(frozen=True)
@@ -185,3 +186,14 @@ class ContactFixture(Fixture[ContactModelSpec]):
             for shape, gap in self.gaps.items()
             for slip, point in ((slip, self.point(creep)) for slip, creep in CREEPAGES.items())
         }
+
+    def require_overlap(self, case: str, solution: ContactSolution) -> None:
+        """Check that no half-length exceeds that of the overlap, kappa a^2/2 = approach - gap."""
+        overlap = solution.approach - self.gaps[case.partition(",")[0]]
+        most = np.sqrt(2.0 * np.maximum(overlap, 0.0) / self.case.curvature)
+        place = int(np.argmax(solution.half_length - most))
+        require(
+            solution.half_length[place] <= _MOST_OF_OVERLAP * most[place],
+            f"{case}: half_length is {solution.half_length[place]:.4g} m in a strip whose"
+            f" overlap, approach less gap, has {most[place]:.4g} m; are both in metres?",
+        )
