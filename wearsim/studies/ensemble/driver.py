@@ -325,7 +325,7 @@ class EnsembleWork:
     def _report_progress(self) -> None:
         status, target, now = self.file.status, self.target or DEFAULT_TARGET, time.monotonic()
         done, failed = int((status == DONE).sum()), int((status == FAILED).sum())
-        if done and now > self._next_estimate:
+        if done and (now > self._next_estimate or self._is_complete()):
             self._estimate = target.interval(self._result().estimate_for(target))
             # at most 5 % of the time
             self._next_estimate = now + max(BETWEEN_ESTIMATES, 20.0 * (time.monotonic() - now))
