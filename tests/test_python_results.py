@@ -237,7 +237,7 @@ def test_profile_is_read_from_its_file(scenario: Scenario, tmp_path: Path) -> No
 
 
 def test_arguments_of_another_kind_are_named(scenario: Scenario) -> None:
-    with pytest.raises(TypeError, match="values must be a list, got the text '300 N'"):
+    with pytest.raises(TypeError, match="values must be a list, got '300 N'"):
         wearsim.sweep(scenario, "load.normal_force", "300 N")
     with pytest.raises(
         TypeError, match="overrides must be a mapping of values by dotted key, got a list"

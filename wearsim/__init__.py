@@ -38,8 +38,9 @@ Errors
 
 A scenario is a `Scenario` or the path of its file. All numbers are in SI. Functions that take
 ``output`` write a results file, which is replaced only with ``force=True``; without it the result
-is kept in memory. ``progress=True`` shows the progress on a terminal or in a notebook. Errors are
-subclasses of `WearsimError`.
+is kept in memory. ``progress=True`` shows the progress on a terminal or in a notebook. Errors of
+scenarios, files and solutions are subclasses of `WearsimError`; a wrong argument is a `TypeError`
+or a `ValueError`.
 
 Examples
 --------

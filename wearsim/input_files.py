@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from wearsim.profiles import ProfileChoice
+    from wearsim.types import Profile
 
 _TDMS = b"TDSm"
 
@@ -50,7 +51,11 @@ def read_input(path: Path, choice: ProfileChoice | None = None) -> str:
         return _log_of_tdms(content, path.name)
     if not is_surface(content):
         return decode(content)
-    profile = read_profile(content, path.name, choice)
+    return csv_of_profile(read_profile(content, path.name, choice))
+
+
+def csv_of_profile(profile: Profile) -> str:
+    """Return a profile as CSV, from which it is read again bit for bit."""
     return _as_csv("y [m],height [m]", profile.y, profile.height)
 
 

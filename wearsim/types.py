@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -110,7 +110,10 @@ class Profile:
     def __post_init__(self) -> None:
         for name in ("y", "height"):
             try:
-                values = np.array(getattr(self, name), dtype=np.float64)
+                given: Any = np.ma.array(getattr(self, name))
+                if np.iscomplexobj(given):
+                    raise TypeError("complex numbers")
+                values = given.astype(np.float64).filled(np.nan)
             except (TypeError, ValueError) as error:
                 raise _profile_error(name, "is not a sequence of numbers") from error
             object.__setattr__(self, name, values)
@@ -134,6 +137,13 @@ class Profile:
             if span > most:
                 expected = "metres: multiply mm by 1e-3, um by 1e-6"
                 raise _profile_error(name, "has a range that cannot be", f"{span:g} m", expected)
+
+    def __repr__(self) -> str:
+        y, height = self.y * 1e3, self.height * 1e6
+        return (
+            f"<Profile: {len(y)} points, y {y[0]:.4g} to {y[-1]:.4g} mm,"
+            f" height {height.min():.4g} to {height.max():.4g} um>"
+        )
 
 
 _MOST_Y = 4.0  # m: a wider profile is in other units
@@ -259,6 +269,12 @@ class ContactSolution:
     power: float
     longitudinal_creepage: float
     iterations: int
+
+    def __repr__(self) -> str:
+        return (
+            f"<ContactSolution: {len(self.y)} strips, approach {self.approach * 1e6:.4g} um, peak"
+            f" pressure {self.peak_pressure / 1e6:.4g} MPa, power {self.power:.4g} W>"
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,6 +17,7 @@ from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.base import SMALLEST_STEP, Step, Stepper
 from wearsim.quantities import NUMBER, quantity
 from wearsim.types import FloatArray
+from wearsim.units import QuantityError
 
 _EXAMPLES = '"depth 50 um", "roller depth 5 um", "volume 12 mm^3", "12 h" or "2e6 passes"'
 _LOCATED = 1e-9  # error of the passes at a limit, relative to the passes
@@ -87,16 +88,14 @@ class Limit:
         elif parts and kind in {"", "time", "depth", "roller depth", "volume"}:
             try:
                 value = quantity(parts[2], _QUANTITIES[kind or "time"][0])
-            except ValueError as error:
-                if kind:
-                    raise
-                what = f"'{text}' is not a limit, expected one such as {_EXAMPLES}"
-                raise ValueError(what) from error
+            except QuantityError as error:
+                what = f": {error}" if kind else f", expected one such as {_EXAMPLES}"
+                raise ValueError(f"'{text}' is not a limit{what}") from error
             kind = kind or "time"
         else:
             raise ValueError(f"'{text}' is not a limit, expected one such as {_EXAMPLES}")
         if not 0.0 < value < np.inf:
-            raise ValueError(f"'{text}' must be above zero")
+            raise ValueError(f"'{text}' is not a limit: it must be above zero")
         return cls(kind, value, words)
 
     @property

@@ -148,6 +148,7 @@ class Scenario:
         ----------
         tables : mapping of str to object
             Values by table and key, as in a scenario file; a dotted key leads into inner tables.
+            ``cylinder.profile`` is a file, or a `Profile`.
         folder, name
             As in `from_toml`.
 
@@ -326,6 +327,11 @@ def load_scenario(path: str | Path, overrides: Mapping[str, object] | None = Non
     >>> wearsim.load_scenario("rig.toml", {"load.normal_force": "350 N", "operation.rollers": 1})
     <Scenario 'a wear test': 1 roller, constant load, 450000 passes, slender>
     """
+    if not isinstance(path, str | Path):
+        raise TypeError(
+            f"scenario must be a Scenario or the path of its file, got a {type(path).__name__};"
+            " Scenario.from_dict makes one from tables"
+        )
     if "\n" in str(path):
         what = "is a text, not the name of a file; Scenario.from_toml reads it"
         raise ScenarioError("scenario", [Mistake("", "", what)])
@@ -389,11 +395,4 @@ def as_scenario(scenario: Scenario | str | Path) -> Scenario:
     TypeError
         If it is something else.
     """
-    if isinstance(scenario, Scenario):
-        return scenario
-    if isinstance(scenario, str | Path):
-        return load_scenario(scenario)
-    raise TypeError(
-        f"scenario must be a Scenario or the path of its file, got a {type(scenario).__name__};"
-        " Scenario.from_dict makes one from tables"
-    )
+    return scenario if isinstance(scenario, Scenario) else load_scenario(scenario)

@@ -41,9 +41,16 @@ def plot(
     ----------
     result : Result, DissipationResult or EnsembleResult
     axes : Axes, optional
+
+    Raises
+    ------
+    TypeError
+        If `axes` is something else, as an array of axes or a figure.
     """
     if axes is None:
         return figure_of(result)
+    if not isinstance(axes, Axes):
+        raise TypeError(f"ax must be one Axes of matplotlib, got a {type(axes).__name__}")
     if isinstance(result, EnsembleResult):
         draw_course(axes, result)
     elif isinstance(result, DissipationResult):

@@ -31,6 +31,7 @@ from wearsim.results.ensemble.schema import (
 )
 from wearsim.results.io.atomic_write import Storage, parts_folder
 from wearsim.results.io.files import (
+    as_path,
     check_complete,
     check_layout,
     format_of,
@@ -308,9 +309,9 @@ def read_ensemble(path: str | Path) -> EnsembleData:
         If the file or a part is missing, foreign, truncated, damaged, or of another layout.
     """
     try:
-        return _read(Path(path))
+        return _read(as_path(path))
     except ResultsFileError:  # its parts may have been merged since the file was opened
-        return _read(Path(path))
+        return _read(as_path(path))
 
 
 def _read(path: Path) -> EnsembleData:

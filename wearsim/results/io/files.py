@@ -96,6 +96,22 @@ def kind_of(path: str | Path) -> FileKind:
     return read_file(path, lambda file: _kind(path, file)[0])
 
 
+def as_path(path: str | Path) -> Path:
+    """Return the path of a results file.
+
+    Raises
+    ------
+    TypeError
+        If it is no path, as a result.
+    """
+    if not isinstance(path, str | Path):
+        raise TypeError(
+            f"a results file must be named by its path, got a {type(path).__name__};"
+            " result.path is the file of a result"
+        )
+    return Path(path)
+
+
 def read_file(path: str | Path, take: Callable[[h5py.File], Stored]) -> Stored:
     """Open a file and return what `take` reads from it.
 
@@ -110,8 +126,10 @@ def read_file(path: str | Path, take: Callable[[h5py.File], Stored]) -> Stored:
     ------
     ResultsFileError
         As `read_results`.
+    TypeError
+        As `as_path`.
     """
-    _check_signature(path)
+    _check_signature(as_path(path))
     try:
         with _opened(path) as file:
             return take(file)

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from wearsim.errors import Mistake, ScenarioError
-from wearsim.input_files import read_input
+from wearsim.input_files import csv_of_profile, read_input
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.plugins import LoadSpec, Options, RandomInputSpec
-from wearsim.profiles import split_name
+from wearsim.profiles import ROW_CHOICES, split_name
 from wearsim.quantities import DECIMAL_COMMA
 from wearsim.scenario.parse.fields import RandomInput, RandomInputTable
 from wearsim.scenario.parse.mistakes import Mistakes, installed, nearest
@@ -51,10 +51,18 @@ from wearsim.scenario.tables.plugin import (
     read_load,
     read_wear,
 )
+from wearsim.types import Profile
 from wearsim.units import shown
 
 #: Keys that exclude each other: an override of one removes the others.
 _ALTERNATIVES = {**ALTERNATIVES, "creepage": (("misalignment", "yaw"), ("misalignment", "tilt"))}
+
+
+PROFILE = "cylinder.profile"
+#: Name of the file that holds a profile given as arrays, among the files of a scenario.
+PROFILE_FILE = "profile-from-python.csv"
+#: Keys that say how the file of a profile is read.
+_OF_PROFILE_FILES = ("profile_columns", "profile_units", *(f"profile_{key}" for key in ROW_CHOICES))
 
 
 def parse_override(text: str) -> tuple[str, object]:
@@ -118,6 +126,10 @@ def apply_overrides(text: str, file: str, overrides: Mapping[str, object]) -> st
             continue
         try:
             table = _descend(document, names, key)
+            if dotted == PROFILE and isinstance(value, Profile):
+                for other in [name for name in table if name in _OF_PROFILE_FILES]:
+                    del table[other]
+                value = PROFILE_FILE  # noqa: PLW2901
             table[key] = as_toml(value)
         except ValueError as error:
             unfit = isinstance(error, tomlkit.exceptions.ConvertError)
@@ -205,6 +217,8 @@ READERS: dict[str, Callable[[Mistakes, Mapping[str, object]], Any]] = {
 
 def flat(tables: Mapping[str, object], prefix: str = "") -> Iterator[tuple[str, object]]:
     """Yield the values of nested tables by dotted key."""
+    if not isinstance(tables, Mapping):
+        raise TypeError(f"tables must be a mapping by name, got a {type(tables).__name__}")
     for key, value in tables.items():
         if isinstance(value, Mapping) and value:
             yield from flat(value, f"{prefix}{key}.")
@@ -229,6 +243,9 @@ def parse_fields(
     overrides: Mapping[str, object] | None = None,
 ) -> dict[str, Any]:
     """Return the fields of a `Scenario`; parameters and errors as in `parse_scenario`."""
+    if not isinstance(text, str):
+        kind = type(text).__name__
+        raise TypeError(f"text must be TOML in a str, got a {kind}; load_scenario reads a file")
     if not isinstance(overrides, Mapping | None):
         kind = type(overrides).__name__
         raise TypeError(f"overrides must be a mapping of values by dotted key, got a {kind}")
@@ -237,9 +254,11 @@ def parse_fields(
         text = apply_overrides(text, name, overrides)
         data = _parse_toml(text, name)
     files: dict[str, str] = {}
+    profile = (overrides or {}).get(PROFILE)
+    given = profile if isinstance(profile, Profile) else None
 
     def read_and_keep(path: str) -> str:
-        files[path] = read(path)
+        files[path] = csv_of_profile(given) if path == PROFILE_FILE and given else read(path)
         return files[path]
 
     mistakes = Mistakes(name, read_and_keep, keys_by_place)
@@ -283,6 +302,9 @@ def _parse_toml(text: str, name: str) -> dict[str, Any]:
 def _syntax_mistake(text: str, message: str) -> Mistake:
     """Return the mistake of invalid TOML, with its place and the line."""
     match = re.fullmatch(r"(?P<what>.*) \(at (?P<place>.*)\)", message, re.DOTALL)
+    if re.fullmatch(r".*\.toml", text.strip()):
+        remedy = "TOML; load_scenario reads a file"
+        return Mistake("", "", "is the name of a file, not its text", shown(text), remedy)
     if match is None:
         return Mistake("", "", f"is not valid TOML: {message}")
     what = match["what"][:1].lower() + match["what"][1:]

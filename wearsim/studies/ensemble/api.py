@@ -276,8 +276,7 @@ def resume_ensemble(
     >>> wearsim.resume_ensemble("rig-ensemble.h5", realisations=20, scheduler="serial").count
     20
     """
-    path = Path(file)
-    data = read_ensemble(path)
+    data, path = read_ensemble(file), Path(file)
     check_plugins(path, data)
     if data.finished and realisations is None and not (failed and len(data.failed)):
         return open_ensemble(path)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
 
 from wearsim.errors import unknown_name
-from wearsim.results import EnsembleResult, Result
+from wearsim.results import EnsembleResult, Result, open_results
 from wearsim.types import FloatArray, IntArray
 from wearsim.uq.estimation.estimates import Design
 from wearsim.uq.estimation.intervals import Interval
@@ -98,7 +99,7 @@ class Comparison:
 
 
 def compare(
-    results: Sequence[Comparable],
+    results: Sequence[Comparable | str | Path],
     labels: Sequence[str] | None = None,
     observable: str = "depth",
 ) -> Comparison:
@@ -106,8 +107,8 @@ def compare(
 
     Parameters
     ----------
-    results : sequence of Result or EnsembleResult
-        Two or more.
+    results : sequence of Result, EnsembleResult or path
+        Two or more, or their files.
     labels : sequence of str, optional
         One for each result; by default "1", "2" and so on.
     observable : str
@@ -121,8 +122,12 @@ def compare(
     ------
     UnknownNameError
         If one lacks the observable; it lists the known ones.
+    TypeError
+        If the results are not a sequence of runs and ensembles.
     ValueError
-        If there are fewer than two results, or one has no realisations.
+        If there are fewer than two results, or one has no realisations, or a label is missing.
+    ResultsFileError
+        If a file cannot be read.
 
     Examples
     --------
@@ -131,19 +136,31 @@ def compare(
     >>> print(f"{comparison.rows[1].difference.value * 1e6:.1f} um deeper")
     27.6 um deeper
     """
-    if len(results) < 2:
+    if isinstance(results, str) or not isinstance(results, Sequence):
+        raise TypeError(f"results must be a list of two or more, got {results!r}")
+    tests = [_comparable(item) for item in results]
+    if len(tests) < 2:
         raise ValueError("there must be two or more to compare")
-    labels = labels or [str(number) for number in range(1, len(results) + 1)]
-    for label, result in zip(labels, results, strict=True):
+    labels = labels or [str(number) for number in range(1, len(tests) + 1)]
+    if len(labels) != len(tests):
+        raise ValueError(f"{len(tests)} results need as many labels, got {len(labels)}")
+    for label, result in zip(labels, tests, strict=True):
         if observable not in observables_of(result):
             raise unknown_name(observable, f"an observable of {label}", observables_of(result))
         if isinstance(result, EnsembleResult) and result.count == 0:
             raise ValueError(f"{label} has no successful realisation")
     rows = [
-        _row(label, result, observable, results[0] if number else None)
-        for number, (label, result) in enumerate(zip(labels, results, strict=True))
+        _row(label, result, observable, tests[0] if number else None)
+        for number, (label, result) in enumerate(zip(labels, tests, strict=True))
     ]
     return Comparison(observable, rows)
+
+
+def _comparable(item: Comparable | str | Path) -> Comparable:
+    result = open_results(item) if isinstance(item, str | Path) else item
+    if not isinstance(result, Result | EnsembleResult):
+        raise TypeError(f"only results of wear tests can be compared, got {result!r}")
+    return result
 
 
 def observables_of(result: Comparable) -> tuple[str, ...]:

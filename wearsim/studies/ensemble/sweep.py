@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -74,8 +74,8 @@ def sweep(
     >>> [f"{result.depth[-1] * 1e6:.1f} um" for result in results]
     ['42.6 um', '48.1 um']
     """
-    if isinstance(values, str):
-        raise TypeError(f"values must be a list, got the text '{values}'")
+    if isinstance(values, str) or not isinstance(values, Iterable):
+        raise TypeError(f"values must be a list, got {values!r}")
     base, names = as_scenario(scenario), [str(value) for value in values]
     if not names:
         raise ValueError("a sweep needs one or more values")

@@ -145,8 +145,8 @@ def resume(
     >>> print(f"{longer.time[-1] / 60:.0f} min")
     500 min
     """
-    path = Path(file)
-    if kind_of(path) == "ensemble":
+    kind, path = kind_of(file), Path(file)
+    if kind == "ensemble":
         raise ResultsFileError(
             f"{path}: holds an ensemble of wear tests, which resume_ensemble continues; expected"
             " a single wear test"
