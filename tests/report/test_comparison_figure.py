@@ -93,7 +93,10 @@ def test_few_realisations_have_no_range():
 def test_runs_are_drawn_with_their_difference(comparison):
     one = comparison.rows[2]
     other = study.run(short())
-    axes = comparison_figure(compare([other, other], ["a", "b"])).axes[1]
+    left, axes = comparison_figure(compare([other, other], ["a", "b"])).axes
+    assert left.get_title(loc="left") == "Depth against roller passes"
+    assert left.get_ylabel() == "depth [um]"
+    assert curves(left)["b"].get_ydata() == pytest.approx(other.depth * 1e6)
     assert axes.get_title(loc="left") == "Value and estimated error"
     assert any(text.get_text().startswith("equal (estimated errors") for text in axes.texts)
     assert one.difference is None  # for a run against an ensemble

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from textwrap import fill
 
 import numpy as np
@@ -24,6 +25,7 @@ from wearsim.report.text import (
     OBSERVABLES,
     Named,
     against,
+    pass_unit,
     realisations,
     sufficient_for,
 )
@@ -50,7 +52,8 @@ def comparison_figure(comparison: Comparison, title: str = "") -> Figure:
     -------
     Figure
         Two panels: the distribution function of each ensemble and each run as a line with its
-        error; the mean and the 90 % range of each, in rows with their labels.
+        error, or the courses of runs alone; the mean and the 90 % range of each, in rows with
+        their labels.
     """
     named, rows = OBSERVABLES[comparison.observable], comparison.rows
     colours = list(COLOURS[: len(rows)])
@@ -59,13 +62,31 @@ def comparison_figure(comparison: Comparison, title: str = "") -> Figure:
     caption = fill(title, _LINE_LENGTH)
     with titled_figure(13.0, max(4.6, 1.8 + _ROW_HEIGHT * len(rows)), caption) as figure:
         left, right = figure.subplots(1, 2)
-        for row, colour in zip(rows, colours, strict=True):
-            _draw_distribution(left, row, colour, named)
         label = f"{named.words} at the end [{named.unit}]"
-        name_axes(left, "Cumulative distribution", label, "cumulative probability [%]")
-        left.set_ylim(0.0, 100.0)
+        if all(row.course is not None for row in rows):
+            _draw_courses(left, rows, colours, named)
+        else:
+            for row, colour in zip(rows, colours, strict=True):
+                _draw_distribution(left, row, colour, named)
+            name_axes(left, "Cumulative distribution", label, "cumulative probability [%]")
+            left.set_ylim(0.0, 100.0)
         _draw_ranges(right, comparison, colours, named, label)
     return figure
+
+
+def _draw_courses(
+    axes: Axes, rows: Sequence[Compared], colours: Sequence[str], named: Named
+) -> None:
+    """Draw the observable of each run against roller passes."""
+    unit, name = pass_unit(max(row.passes for row in rows))
+    for row, colour in zip(rows, colours, strict=True):
+        assert row.course is not None
+        passes, values = row.course
+        across, up = passes / unit, values * named.per_si
+        # the dot at the end shows a run that another one covers
+        axes.plot(across, up, "-o", markevery=[-1], ms=4.5, color=colour, label=row.label)
+    words = named.words[:1].upper() + named.words[1:]
+    name_axes(axes, f"{words} against roller passes", name, f"{named.words} [{named.unit}]")
 
 
 def _draw_distribution(axes: Axes, row: Compared, colour: str, named: Named) -> None:

@@ -56,6 +56,8 @@ class Compared:
         Difference of two runs, this one minus the first, with the estimated errors of both.
     values : ndarray, shape (count,)
         Values of the realisations, ascending.
+    course : ndarray, shape (2, steps), optional
+        Roller passes and values of the steps of a run.
     """
 
     label: str
@@ -74,6 +76,7 @@ class Compared:
     paired: Paired | None
     difference: Interval | None
     values: FloatArray
+    course: FloatArray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,6 +180,11 @@ def _values(result: Comparable, observable: str) -> tuple[IntArray, FloatArray]:
     return np.zeros(1, np.int64), np.array([float(np.max(result.values(observable)[-1]))])
 
 
+def _course(result: Result, observable: str) -> FloatArray:
+    values = np.asarray(result.values(observable))
+    return np.stack([result.passes, values if values.ndim == 1 else values.max(axis=1)])
+
+
 def _row(label: str, result: Comparable, observable: str, first: Comparable | None) -> Compared:
     _, values = _values(result, observable)
     deeper = None if first is None else _deeper(result, first, observable)
@@ -200,6 +208,7 @@ def _row(label: str, result: Comparable, observable: str, first: Comparable | No
             if isinstance(first, Result)
             else None,
             values=values,
+            course=_course(result, observable),
         )
     estimate = result.estimate(observable, probabilities=QUANTILES)
     return Compared(
