@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import inspect
 import logging
 import time
 from collections.abc import Callable, Iterator
@@ -11,6 +12,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from importlib.metadata import PackageNotFoundError, version
 from itertools import islice
 from tempfile import TemporaryDirectory
+from types import FrameType
 
 import cloudpickle
 import dask
@@ -250,6 +252,10 @@ def _without_log() -> Iterator[None]:
 
 
 def _local_cluster(count: int) -> LocalCluster:
+    if any(frame.f_globals.get("__name__") == "__mp_main__" for frame in _imports_above()):
+        # a worker imports a script without guard, and would start another cluster: it ends
+        # without a traceback, and the process that the user started raises the error
+        raise SystemExit(1)
     try:
         with sigint_blocked():
             return LocalCluster(
@@ -266,7 +272,16 @@ def _local_cluster(count: int) -> LocalCluster:
         raise WorkerError(
             f"no Dask cluster could be started here ({cause}); a script must run its study under"
             ' `if __name__ == "__main__":` and cannot be read from standard input'
-        ) from error
+        ) from None  # its causes have a hundred lines and no other information
+
+
+def _imports_above() -> Iterator[FrameType]:
+    """Yield the frames of modules that are being imported."""
+    frame = inspect.currentframe()
+    while frame is not None:
+        if frame.f_code.co_name == "<module>":
+            yield frame
+        frame = frame.f_back
 
 
 def _connected(address: str) -> Client:
