@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -25,6 +26,7 @@ from wearsim.cli.shared import (
     write_notes,
     write_table,
 )
+from wearsim.errors import SolverError, WearsimError
 
 if TYPE_CHECKING:
     from wearsim.results import EnsembleResult, Result
@@ -63,10 +65,18 @@ def run(
 
     write_notes(loaded.notes)
     watcher = RunWatcher(quiet, kernels=lambda: kernels_of(loaded))
-    with stop_on_signals() as stop, watcher as watch:
-        result = study.run(
-            loaded, path, until=until, force=force, on_event=watch, stop_requested=stop.is_set
-        )
+    try:
+        with stop_on_signals() as stop, watcher as watch:
+            result = study.run(
+                loaded, path, until=until, force=force, on_event=watch, stop_requested=stop.is_set
+            )
+    except SolverError as error:
+        from wearsim.results import open_results
+
+        with suppress(WearsimError):  # a file that was there before may be of any kind
+            if getattr(open_results(path), "failure", ""):
+                error.add_note(f"the last accepted step is kept: wearsim show {path}")
+        raise
     report(result, json)
 
 
