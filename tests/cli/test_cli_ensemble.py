@@ -129,6 +129,7 @@ def test_former_name_of_precision_is_accepted_with_a_warning(command: Command, t
     result = command("ensemble", tests, "-n", 3, "--until", "depth.mean 1%", *HERE)
     assert result.exit_code == 0, result.output
     assert "warning: --until of ensembles is now --precision" in result.stderr
+    assert "  precision depth.mean 1% " in result.stdout
     assert open_ensemble("tests-ensemble.h5").until == "depth.mean 1%"
     both = command("ensemble", tests, "--until", "depth.mean 1%", "--precision", "depth.mean 2%")
     assert both.exit_code == 2

@@ -134,6 +134,9 @@ def test_plot_takes_columns_and_units_of_a_measurement(command: Command, finishe
     result = command("plot", finished, "-o", "x.svg", *named)
     assert result.exit_code == 0
     assert "measured: probe" in Path("x.svg").read_text()
+    Path("deep.csv").write_text("position;trace\n1;0\n0;0,5\n-1;0\n")
+    result = command("plot", finished, "-o", "z.svg", "--measured", "deep.csv", *named[2:])
+    assert "note: deep.csv: column 'trace' rises 0.5 um above its ends" in result.stderr
     for option, value in (("--columns", "y"), ("--mean-rows", "3"), ("--at", "2 kg")):
         result = command("plot", finished, "-o", "y.svg", *named[:2], option, value)
         assert result.exit_code == 2
