@@ -88,7 +88,9 @@ def test_missing_and_complex_heights_are_mistakes(height: Any, message: str) -> 
 
 def test_arrays_have_short_reprs(scenario: Scenario) -> None:
     assert repr(GROOVE) == "<Profile: 161 points, y -8 to 8 mm, height -20 to -0.01632 um>"
-    assert repr(wearsim.solve_contact(scenario)).startswith("<ContactSolution: ")
+    solution = repr(wearsim.solve_contact(scenario))
+    assert solution.startswith("<ContactSolution: ")
+    assert repr(wearsim.study_contact(scenario)) == f"<ContactStudy 'slender': {solution}>"
 
 
 def test_files_must_be_named_by_their_paths(scenario: Scenario) -> None:

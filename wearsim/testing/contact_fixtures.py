@@ -195,5 +195,5 @@ class ContactFixture(Fixture[ContactModelSpec]):
         require(
             solution.half_length[place] <= _MOST_OF_OVERLAP * most[place],
             f"{case}: half_length is {solution.half_length[place]:.4g} m in a strip whose"
-            f" overlap, approach less gap, has {most[place]:.4g} m; are both in metres?",
+            f" overlap, approach less gap, has {most[place]:.4g} m; both must be in metres",
         )

@@ -80,6 +80,9 @@ class ContactStudy:
     warnings: tuple[str, ...]
     widened: bool = False
 
+    def __repr__(self) -> str:
+        return f"<ContactStudy '{self.described_model}': {self.solution!r}>"
+
 
 def study_contact(
     scenario: Scenario | str | Path,
