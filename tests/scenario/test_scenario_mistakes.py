@@ -270,6 +270,14 @@ rig.toml: [outputs] spacing: unknown choice, got "lin", expected one of "even", 
             ' radius = "20 mm"'
         ),
     ),
+    "a text without its end": (
+        'radius = "20 mm"',
+        'radius = "20 mm',
+        (
+            "rig.toml: line 5, column 16: is not valid TOML: illegal character '\\n',"
+            ' got radius = "20 mm, expected a quotation mark at the end of the text'
+        ),
+    ),
     "a key given twice": (
         'radius = "20 mm"',
         'radius = "20 mm"\nradius = "2 mm"',

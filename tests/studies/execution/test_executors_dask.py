@@ -171,7 +171,7 @@ def test_killed_scheduler_is_reported(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
 ) -> None:
     with (
-        dask.config.set({"distributed.comm.timeouts.connect": "0.5s"}),
+        dask.config.set({"distributed.comm.timeouts.connect": "3s"}),
         scheduler(tmp_path) as (where, process),
         worker(where, tmp_path),
         executor(where) as cluster,

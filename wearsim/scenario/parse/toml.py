@@ -318,6 +318,8 @@ def _syntax_mistake(text: str, message: str) -> Mistake:
         expected = "paths with / or, with \\, in single quotes"
     elif re.search(r"=\s*(True|False)\b", line or ""):
         expected = "true or false"
+    elif "illegal character '\\n'" in what and (line or "").count('"') % 2:
+        expected = "a quotation mark at the end of the text"
     elif bare and DECIMAL_COMMA.fullmatch(bare[2]):
         expected = f"a decimal point, {bare[1]} = {bare[2].replace(',', '.')}"
     elif bare and (percent := re.fullmatch(r"([0-9.]+) ?%", bare[2])):

@@ -242,13 +242,15 @@ def cluster(
 @contextmanager
 def _without_log() -> Iterator[None]:
     """Silence the client's log, which repeats with tracebacks what is raised as an error here."""
-    log = logging.getLogger("distributed.client")
-    level = log.level
-    log.setLevel(logging.CRITICAL + 1)
+    logs = [logging.getLogger(f"distributed.{name}") for name in ("client", "batched")]
+    levels = [log.level for log in logs]
+    for log in logs:
+        log.setLevel(logging.CRITICAL + 1)
     try:
         yield
     finally:
-        log.setLevel(level)
+        for log, level in zip(logs, levels, strict=True):
+            log.setLevel(level)
 
 
 def _local_cluster(count: int) -> LocalCluster:
