@@ -24,6 +24,12 @@ def _margin(passes: float) -> float:
     return max(_MARGIN[0], _MARGIN[1] * passes)
 
 
+def _end_of_pause(pauses: FloatArray, done: float) -> float:
+    """Return the end of the last pause that has begun after some passes; -inf if none has."""
+    begun = int(np.searchsorted(pauses[:, 0], done + _margin(done), side="right")) - 1
+    return float(pauses[begun, 1]) if begun >= 0 else -np.inf
+
+
 def at_rest(problem: WearProblem, passes: FloatArray) -> BoolArray:
     """Return whether the next step of each realisation is a pause.
 
@@ -39,9 +45,7 @@ def at_rest(problem: WearProblem, passes: FloatArray) -> BoolArray:
     """
     found = np.zeros(len(passes), dtype=np.bool_)
     for place, (pauses, done) in enumerate(zip(_long(problem), passes.tolist(), strict=True)):
-        margin = _margin(done)
-        begun = int(np.searchsorted(pauses[:, 0], done + margin, side="right")) - 1
-        found[place] = begun >= 0 and done < pauses[begun, 1] - margin
+        found[place] = done < _end_of_pause(pauses, done) - _margin(done)
     return found
 
 
@@ -111,9 +115,7 @@ def without_load(problem: WearProblem, passes: FloatArray) -> BoolArray:
     """Return whether there is no load at this instant; parameters and result as of `at_rest`."""
     found = np.zeros(len(passes), dtype=np.bool_)
     for place, (pauses, done) in enumerate(zip(problem.pauses, passes.tolist(), strict=False)):
-        margin = _margin(done)
-        begun = int(np.searchsorted(pauses[:, 0], done + margin, side="right")) - 1
-        found[place] = begun >= 0 and done <= pauses[begun, 1] + margin
+        found[place] = done <= _end_of_pause(pauses, done) + _margin(done)
     return found
 
 
