@@ -67,7 +67,7 @@ class WatchedStorage(Storage):
 
 
 class _WatchedFile(io.FileIO):
-    """A file whose writes and closing are stages at which a fault can be injected."""
+    """A file in which a fault can be injected when it is written or closed."""
 
     stage: Callable[[str], Any] = nullcontext
 

@@ -29,7 +29,7 @@ def test_notebook_runs(tmp_path: Path) -> None:
     outputs = {cell.source: cell.outputs for cell in notebook.cells if cell.cell_type == "code"}
 
     def shown(start: str) -> str:
-        """Return what a cell shows, texts and types of data together."""
+        """Return the text output of a cell, and its other output as text."""
         (found,) = [outputs[source] for source in outputs if source.startswith(start)]
         parts = [item.get("text", "") for item in found]
         return " ".join(parts + [str(item.get("data", "")) for item in found])

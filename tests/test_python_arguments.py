@@ -20,7 +20,7 @@ GROOVE = Profile(Y, -20e-6 * np.exp(-((Y / 3e-3) ** 2)))
 
 @pytest.fixture
 def scenario(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Scenario:
-    """Return a scenario whose file is in the current folder."""
+    """Return a scenario, and write its file in the current folder."""
     monkeypatch.chdir(tmp_path)
     Path("rig.toml").write_text(short_rig())
     return wearsim.load_scenario("rig.toml")

@@ -190,7 +190,7 @@ def _cells(line: str, place: int, separator: str) -> _Row:
 
 
 def _rows(body: list[str], start: int, separator: str) -> Iterator[_Row]:
-    """Iterate over the rows of a body, whose first line has the index `start`."""
+    """Iterate over the rows of a body; `start` is the index of its first line in the file."""
     return (_cells(line, start + k, separator) for k, line in enumerate(body) if _has_cells(line))
 
 
@@ -387,7 +387,7 @@ def _number(cell: str, line: int, column: _Column, mistakes: list[Mistake]) -> f
 def _check_order(
     lines: Sequence[int], values: FloatArray, name: str, either_way: bool, mistakes: list[Mistake]
 ) -> None:
-    """Add a mistake for each row whose value does not increase (or decrease) from the last."""
+    """Add a mistake for each value that breaks the increasing, or decreasing, order."""
     step = values[1:] - values[:-1]
     falling = either_way and len(step) > 0 and step[0] < 0.0
     for k in (step >= 0.0 if falling else step <= 0.0).nonzero()[0].tolist():

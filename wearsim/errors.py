@@ -219,7 +219,7 @@ class SolverError(WearsimError):
 
 
 class ContactError(SolverError):
-    """A contact problem without solution, or whose solver did not converge.
+    """A contact problem without solution, or a solver that did not converge.
 
     Examples
     --------

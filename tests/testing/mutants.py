@@ -249,7 +249,7 @@ def _inclined_gap(gap, point, compliance):
 
 
 def without_hardening(model):
-    """Return a model whose peak pressure lacks a part that rises with the pressure, 20 % here."""
+    """Return a model that omits the hardening term, about 20 %, from its peak pressure."""
 
     class LacksHardening(model):
         def solve_one(self, gap, curvature, point, wear_compliance=None, warm=None):

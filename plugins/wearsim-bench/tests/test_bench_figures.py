@@ -147,7 +147,7 @@ def test_savings_are_bars():
 
 
 def crowded(families, each, times=(1e-4, 3e-4, 5e-4)):
-    """Return a topic of one group with several methods of each family, whose lines coincide."""
+    """Return a topic with one group; the lines of the methods of a family coincide."""
     items = tuple(
         measured(f"family {family}, option {option}", f"{n} strips", times[n], 1e-2 / (1 + family))
         for family in range(families)

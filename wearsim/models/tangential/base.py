@@ -297,7 +297,7 @@ def covered_share(strips: Strips) -> FloatArray | float:
 
 
 def equivalent_ellipse(strips: Strips) -> tuple[float, float]:
-    """Return the semi-axes a and b [m] of the ellipse whose flexibilities the strips have.
+    """Return the semi-axes a and b [m] of the ellipse that gives the flexibilities of strips.
 
     a is the largest half-length of the strips, and the area is theirs: b = area/(pi a). Hence b
     changes smoothly as strips come into contact, and a gap between two patches has no effect. The

@@ -351,7 +351,7 @@ def _merged(path: Path, file: h5py.File) -> tuple[EnsembleData, StoredRows]:
 def _read_unchanged(
     path: Path, identity: os.stat_result, take: Callable[[h5py.File], Array]
 ) -> Array:
-    """Return what `take` reads from a file, which must be the one that was opened before."""
+    """Apply `take` to a file after checking that it has not been replaced."""
 
     def checked(file: h5py.File) -> Array:
         if not os.path.samestat(os.fstat(file.id.get_vfd_handle()), identity):

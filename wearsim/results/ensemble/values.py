@@ -210,7 +210,7 @@ class EnsembleValues(StudyResult[EnsembleData]):
 
     @property
     def kept(self) -> int:
-        """Number of realisations, starting with the first, whose profile is stored."""
+        """Number of stored profiles: those of the first realisations."""
         return kept_profiles(self.requested, len(self.y))
 
     @cached_property
