@@ -32,9 +32,10 @@ ERRORS = {
 }
 COUNTS = {"warm_seconds": "warm-started", "prepare_seconds": "first prepared"}
 ABOUT = (
-    "The time is that of one solve from a cold start, with a model already built for its strips,"
-    " as the mean over the contacts of a group. A warm start begins with the solution at 1 % less"
-    " load. Errors are relative to half-space solutions by CONTACT, whose own errors are"
+    "The time is that of one solve without a starting solution, by a model that has been built for"
+    " its strips; it is the mean over the contacts of a group. A warm start begins with the"
+    " solution under a load that is 1 % lower. Errors are relative to half-space solutions by"
+    " CONTACT, whose own errors are"
     f" {100.0 * POWER_ERRORS[0]:g} to {100.0 * POWER_ERRORS[1]:g} % in power, up to"
     f" {100.0 * PURE_SPIN_ERROR:g} % with pure spin, and {100.0 * STRIPS_ERROR:g} % in P_l(y);"
     " models that differ by less than that are not ranked. The peak pressure and the width of"
