@@ -31,7 +31,7 @@ lint: $(VENV)/.installed-dev
 
 bench: $(VENV)/.installed-dev
 	mkdir -p out
-	-$(BIN)/wearsim bench contact stepping sampling growth savings --hard -o out/bench --force
+	-$(BIN)/wearsim bench contact stepping sampling growth savings stated-errors --hard -o out/bench --force
 	$(BIN)/python -m tests.benchmarks.report -o out/benchmarks.md
 	$(BIN)/python -m tests.benchmarks.models -o out/models.md
 

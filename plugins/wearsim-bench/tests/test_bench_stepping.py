@@ -17,6 +17,7 @@ from wearsim_bench.stepping.groups import EVERY_PASS, StepperBenchmark, of_model
 from wearsim_bench.stepping.runs import EndState, PreparedTest, WearTest, errors_of
 from wearsim_bench.stepping.solvers import SOLVERS, solved_by
 from wearsim_bench.stepping.topic import RIG, SPRING, stepping
+from wearsim_bench.stepping.turns import NOTABLE
 
 QUICK = Effort(quick=True, repetitions=1)
 SHORT = WearTest(RIG, 0.2)  # 600 passes
@@ -24,7 +25,7 @@ STEPPERS = set(get_args(EvolutionTable.model_fields["stepper"].annotation)) - {"
 
 
 def benchmark_of(model, test=SHORT):
-    return StepperBenchmark("problems", test, Method(model), 1)
+    return StepperBenchmark("problems", test, Method(model), 1, lambda what: None)
 
 
 def end_of(test=SHORT, **changes):
@@ -54,6 +55,20 @@ def test_all_steppers_and_solvers_are_measured(topic, progress):
     parts = [part for _, part in progress]
     assert parts == sorted(parts)
     assert parts[-1] <= 1.0
+
+
+def test_solvers_are_compared_with_the_default(topic):
+    for group in [name for name in topic.groups if not name.startswith("contact models")]:
+        compared = {(item.method, item.setting) for item in topic.of(group) if item.remark}
+        assert compared == {
+            (item.method, item.setting)
+            for item in topic.of(group)
+            if item.method.startswith(SOLVERS) and item.errors.get("profile", 0.0) >= NOTABLE
+        }
+        assert compared
+        assert f"of {len(compared)} settings of LSODA and BDF" in topic.conclusions[group]
+    for group in topic.groups:
+        assert "The default meets its tolerance of 0.001" in topic.conclusions[group]
 
 
 def test_contact_models_have_separate_references(topic):
@@ -151,7 +166,7 @@ def test_errors_are_relative():
 
 
 def test_refusal_is_reported_once():
-    rows = list(of_steppers(benchmark_of("hertz"), (1e-1, 1e-2)))
+    rows = of_steppers(benchmark_of("hertz"), (1e-1, 1e-2))
     refused = [item for item in rows if item.failed]
     assert [item.method for item in refused] == ["implicit"]
     assert "contact model 'hertz' takes no wear compliance" in refused[0].failed
@@ -162,7 +177,7 @@ def test_refusal_is_reported_once():
 
 def test_stepper_with_many_steps_skips_low_tolerances(monkeypatch):
     monkeypatch.setattr(stepping_groups, "MOST_STEPS", 5)
-    rows = list(of_steppers(benchmark_of(DEFAULT_MODEL), (1e-1, 1e-3, 1e-4)))
+    rows = of_steppers(benchmark_of(DEFAULT_MODEL), (1e-1, 1e-3, 1e-4))
     settings = [item.setting for item in rows if item.method == "explicit"]
     assert settings == ["tolerance 1e-1", "tolerance 1e-3"]
 

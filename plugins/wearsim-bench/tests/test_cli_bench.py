@@ -2,6 +2,7 @@
 
 import json
 import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -69,6 +70,24 @@ def test_files_are_overwritten_only_with_force(command):
     assert "bench/growth.json exists" in refused.stderr
     assert command("bench", "stepping", "-q").exit_code == 0
     assert command("bench", "growth", "-q", "--force").exit_code == 0
+
+
+def test_options_of_random_tests_reach_their_topic(command, monkeypatch, tmp_path):
+    options = []
+
+    def measure(effort, on_progress, **given):
+        options.append(given)
+        return artificial("stated-errors")(effort, on_progress)
+
+    monkeypatch.setattr("wearsim_bench.stated_errors.topic.stated_errors", measure)
+    topic = "bench", "stated-errors", "-q"
+    assert command(*topic, "--tests", 7, "--seed", 2, "--references", "kept").exit_code == 0
+    assert command(*topic, "--force").exit_code == 0
+    assert options == [{"number": 7, "seed": 2, "references": Path("kept")}, {}]
+    assert (tmp_path / "bench" / "stated-errors.json").exists()
+    refused = command("bench", "growth", "--seed", 2, "-q")
+    assert refused.exit_code == 2
+    assert "applies to the topic stated-errors" in " ".join(refused.stderr.split())
 
 
 @pytest.mark.usefixtures("quick_topics")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypeAlias
 
@@ -25,6 +26,7 @@ class TopicName(StrEnum):
     sampling = "sampling"
     growth = "growth"
     savings = "savings"
+    stated_errors = "stated-errors"
 
 
 MODEL_TOPICS = (TopicName.contact, TopicName.stepping, TopicName.growth)  # accept --plugin
@@ -32,7 +34,7 @@ Topics: TypeAlias = Annotated[
     list[TopicName] | None,
     typer.Argument(
         metavar="[TOPIC]...",
-        help="contact, stepping, sampling, growth, savings; all of them by default.",
+        help="contact, stepping, sampling, growth, savings, stated-errors; all of them by default.",
         show_default=False,
     ),
 ]
@@ -54,6 +56,27 @@ All: TypeAlias = Annotated[
 Folder: TypeAlias = Annotated[
     Path, typer.Option("--output", "-o", metavar="DIR", help="Folder for figures, JSON and tables.")
 ]
+Tests: TypeAlias = Annotated[
+    int | None,
+    typer.Option(
+        metavar="N", min=1, help="Random tests of stated-errors, by default 40.", show_default=False
+    ),
+]
+Seed: TypeAlias = Annotated[
+    int | None,
+    typer.Option(
+        metavar="N", min=0, help="Seed of the random tests, by default 1.", show_default=False
+    ),
+]
+References: TypeAlias = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="DIR",
+        help="Folder that keeps the reference solutions of the random tests; they do not depend on"
+        " the stepper.",
+        show_default=False,
+    ),
+]
 
 
 app = typer.Typer(
@@ -69,6 +92,9 @@ def bench(
     plugin: Plugin = None,
     hard: Hard = False,
     quick: Quick = False,
+    tests: Tests = None,
+    seed: Seed = None,
+    references: References = None,
     output: Folder = Path("bench"),
     show_all: All = False,
     json: Json = False,
@@ -79,6 +105,13 @@ def bench(
     selected = list(dict.fromkeys(topics or ([] if hard else TopicName)))
     if plugin is not None:
         selected = _topics_of_model(selected, topics, plugin)
+    options = {"number": tests, "seed": seed, "references": references}
+    study = {name: value for name, value in options.items() if value is not None}
+    if study and TopicName.stated_errors not in selected:
+        raise typer.BadParameter(
+            f"applies to the topic {TopicName.stated_errors.value}, which is not selected",
+            param_hint="--tests, --seed or --references",
+        )
     endings = (".json", ".md", ".png")
     paths = [output / (topic.value + ending) for topic in selected for ending in endings]
     paths += [output / f"hard{ending}" for ending in endings[:2] if hard]
@@ -96,7 +129,10 @@ def bench(
     try:
         for topic in selected:
             with progress_bar(topic.value, quiet) as on_progress:
-                measured = _measuring_function(topic)(effort, on_progress)
+                measure = _measuring_function(topic)
+                if topic == TopicName.stated_errors:
+                    measure = partial(measure, **study)
+                measured = measure(effort, on_progress)
             results.topic(measured)
         passed = not hard or _run_hard_cases(effort, results, quiet)
     finally:
@@ -150,7 +186,7 @@ def _measuring_function(name: TopicName) -> Callable[[Effort, OnProgress], Topic
     from importlib import import_module
 
     function: Callable[[Effort, OnProgress], Topic] = getattr(
-        import_module(f"wearsim_bench.{name.value}.topic"), name.value
+        import_module(f"wearsim_bench.{name.name}.topic"), name.name
     )
     return function
 

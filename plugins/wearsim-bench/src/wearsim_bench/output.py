@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from wearsim_bench.measure.measurement import Effort, Topic
 
 _WORDS = ("setting",)
-_NAMED = 2  # columns of words before the numbers
 _NAMES = 24  # minimum width of the column of names
 _NUMBER = 12  # width of a column of numbers with its separator
 _FIXED = _NAMES + 2 + 19 + 17  # width of the columns of names, settings and marks
@@ -116,12 +115,18 @@ class Output:
 
     def _show(self, topic: Topic) -> None:
         """Print a table for each group of problems, followed by the failures."""
-        from wearsim_bench.figures.table import MARKS, column_heads, has_front, table_rows
+        from wearsim_bench.figures.table import (
+            MARKS,
+            column_heads,
+            has_front,
+            shown_groups,
+            table_rows,
+        )
 
         screen, columns = _screen(), column_heads(topic)
         screen.print(f"\n{topic.title}\n{topic.about}")
         screen.print(MARKS if has_front(topic) else "")
-        for group in topic.groups:
+        for group in shown_groups(topic, whole=self.whole):
             rows = table_rows(topic, group, self.machine.yardstick, whole=self.whole)
             measured = [row for row in rows if not row.failed]
             if measured:
@@ -129,15 +134,18 @@ class Output:
             for row in rows:
                 if row.failed:
                     screen.print(f"{group}: {row.cells[0]}, {row.cells[1]}: {row.cells[-1]}")
+            if group in topic.conclusions:
+                screen.print(topic.conclusions[group])
 
 
 def _print_measured(title: str, columns: Sequence[str], rows: Sequence[TableRow]) -> None:
     """Print as many columns as fit the width; the marks are always printed."""
-    numbers = range(_NAMED, len(columns) - 1)
+    from wearsim_bench.figures.table import NAMED, filled_columns
+
+    *named, last = filled_columns(columns, [(*row.cells[:-1], "marks") for row in rows])
     available = _screen().width - _FIXED
-    kept = [0, 1, *list(numbers)[: max(3, available // _NUMBER)], len(columns) - 1]
-    # omit empty columns
-    kept = [k for k in kept if k < _NAMED or any(row.cells[k] not in ("-", "") for row in rows)]
+    numbers = [k for k in named if k >= NAMED][: max(3, available // _NUMBER)]
+    kept = [*range(NAMED), *numbers, *[last] * any(row.cells[last] for row in rows)]
     cells = ([row.cells[k] for k in kept] for row in rows)
     _print_table(title, [columns[k] for k in kept], cells, [*map(_style, rows)])
 

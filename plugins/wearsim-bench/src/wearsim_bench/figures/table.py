@@ -11,6 +11,7 @@ from wearsim_bench.measure.measurement import Effort, Measurement, Topic
 
 FRONT, DEFAULT = "*", "default"
 MARKS = f"{FRONT} Pareto front of time and error; {DEFAULT}: default of a scenario"
+NAMED = 2  # columns of words before the numbers
 FEW = 12  # groups of up to this many measurements are shown in full
 _ROUNDING = 1e-10
 
@@ -37,7 +38,12 @@ class TableRow:
 
 def has_front(topic: Topic) -> bool:
     """Return whether a topic compares methods, rather than sizes or alternatives of one method."""
-    return not {"times", "peak_bytes"} & set(topic.counts)
+    return not {"times", "peak_bytes", "covered"} & set(topic.counts)
+
+
+def shown_groups(topic: Topic, *, whole: bool = False) -> list[str]:
+    """Return the groups of a topic that tables show; all of them if `whole`."""
+    return [group for group in topic.groups if whole or group not in topic.details]
 
 
 def column_heads(topic: Topic) -> list[str]:
@@ -60,8 +66,8 @@ def table_rows(
     yardstick : float
         Reference time of the machine [s].
     whole : bool
-        Return all measurements; otherwise the Pareto front, the default, and the most accurate
-        setting of every other method.
+        Return all measurements; otherwise the Pareto front, the default, those with a remark, and
+        the most accurate setting of every other method.
     """
     front = {id(item) for item in topic.front(group)} if has_front(topic) else set()
     items = topic.of(group) if whole else selected(topic, group)
@@ -69,7 +75,7 @@ def table_rows(
 
 
 def selected(topic: Topic, group: str) -> list[Measurement]:
-    """Return the Pareto front, the default, and the best setting of every other method."""
+    """Return the Pareto front, the default, remarks, and the best setting of other methods."""
     items, kept = topic.of(group), {id(item) for item in topic.front(group)}
     if len(items) <= FEW or not has_front(topic):
         return items
@@ -77,11 +83,11 @@ def selected(topic: Topic, group: str) -> list[Measurement]:
         own = [item for item in items if item.method == method]
         if not any(id(item) in kept for item in own):
             kept.add(id(min(own, key=lambda item: item.errors.get(topic.error, float("inf")))))
-    return [item for item in items if id(item) in kept or item.default]
+    return [item for item in items if id(item) in kept or item.default or item.remark]
 
 
 def _row(topic: Topic, item: Measurement, yardstick: float, front: bool) -> TableRow:
-    marks = " ".join([FRONT] * front + [DEFAULT] * item.default)
+    marks = " ".join([FRONT] * front + [DEFAULT] * item.default + [item.remark] * bool(item.remark))
     if item.failed:
         empty = (NOTHING,) * (1 + len(topic.errors) + len(topic.counts))
         cells = (item.method, item.setting, NOTHING, *empty, item.failed)
@@ -93,6 +99,15 @@ def _row(topic: Topic, item: Measurement, yardstick: float, front: bool) -> Tabl
     return TableRow(
         (item.method, item.setting, time, ratio, *errors, *counts, marks), front, item.default
     )
+
+
+def filled_columns(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> list[int]:
+    """Return the columns to show: method and setting, and others in which a row has a value."""
+    return [
+        column
+        for column in range(len(heads))
+        if column < NAMED or any(row[column] not in (NOTHING, "") for row in rows)
+    ]
 
 
 def percent(value: float | None) -> str:
@@ -127,17 +142,22 @@ def markdown(topic: Topic, machine: Machine, effort: Effort, *, whole: bool = Fa
     whole : bool
         Return all measurements, see `table_rows`.
     """
-    parts = [f"## {topic.title}", topic.about, measured_on(machine, effort)]
+    parts = [f"## {topic.title}", topic.about, measured_on(machine, effort, topic.timing)]
     parts += [f"{MARKS}."] if has_front(topic) else []
-    for group in topic.groups:
-        rows = (row.cells for row in table_rows(topic, group, machine.yardstick, whole=whole))
-        parts += [f"### {group[:1].upper()}{group[1:]}", markdown_table(column_heads(topic), rows)]
+    for group in shown_groups(topic, whole=whole):
+        rows = [row.cells for row in table_rows(topic, group, machine.yardstick, whole=whole)]
+        heads = column_heads(topic)
+        kept = filled_columns(heads, rows)
+        table = markdown_table([heads[k] for k in kept], ([row[k] for k in kept] for row in rows))
+        parts += [f"### {group[:1].upper()}{group[1:]}", table]
+        parts += [topic.conclusions[group]] if group in topic.conclusions else []
     return "\n\n".join(parts) + "\n"
 
 
-def measured_on(machine: Machine, effort: Effort) -> str:
+def measured_on(machine: Machine, effort: Effort, timing: str = "") -> str:
     """Return a sentence on the machine, its yardstick, and the extent of the benchmark."""
-    times = "timed once" if effort.repetitions == 1 else f"best of {effort.repetitions}"
+    best = "timed once" if effort.repetitions == 1 else f"best of {effort.repetitions}"
+    times = timing or best
     texts = [f"Measured on {machine}; one yardstick is {brief(machine.yardstick)}; {times}"]
     texts += ["quick: few cases and short tests, for a trial run"] * effort.quick
     texts += [f"contact model {effort.plugin}"] * (effort.plugin is not None)

@@ -15,6 +15,7 @@ from wearsim.report.parts import GREY, figure_style, name_axes, write_message
 from wearsim.report.text import brief
 from wearsim_bench.figures.lines import EndLabel, label_ends, set_log_axis
 from wearsim_bench.figures.sizes import growth_figure, savings_figure
+from wearsim_bench.figures.stated_errors import stated_errors_figure
 from wearsim_bench.figures.table import measured_on
 from wearsim_bench.measure.machine import Machine
 from wearsim_bench.measure.measurement import Effort, Measurement, Topic
@@ -50,9 +51,11 @@ def bench_figure(topic: Topic, machine: Machine, effort: Effort) -> Figure:
         for each family, with the other families in grey. Or time and memory against size, or
         speed-ups.
     """
-    under = fill(measured_on(machine, effort), _LETTERS)
+    under = fill(measured_on(machine, effort, topic.timing), _LETTERS)
     if "peak_bytes" in topic.counts:
         return growth_figure(topic, under)
+    if "covered" in topic.counts:
+        return stated_errors_figure(topic, under)
     if "times" in topic.counts:
         return savings_figure(topic, under)
     rows = list(_rows(topic))

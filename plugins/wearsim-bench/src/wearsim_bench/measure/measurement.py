@@ -52,6 +52,8 @@ class Measurement:
         Whether this is the default method and setting of a scenario.
     failed : str
         Reason of a failure; empty if there is none.
+    remark : str
+        Text for the last column of a table.
 
     Raises
     ------
@@ -67,6 +69,7 @@ class Measurement:
     counts: Mapping[str, float] = field(default_factory=dict)
     default: bool = False
     failed: str = ""
+    remark: str = ""
 
     def __post_init__(self) -> None:
         time = {} if self.seconds is None else {"time": self.seconds}
@@ -113,6 +116,12 @@ class Topic:
         The measurements, group by group.
     floor : float
         Relative error of the reference; smaller errors cannot be distinguished.
+    details : tuple of str
+        Groups that tables show only if all measurements are requested.
+    conclusions : mapping of str to str
+        Sentence on the measurements of a group, by group.
+    timing : str
+        How times were obtained, if not as the smallest of all repetitions.
     """
 
     name: str
@@ -124,6 +133,9 @@ class Topic:
     counts: Mapping[str, str]
     measurements: tuple[Measurement, ...]
     floor: float = 0.0
+    details: tuple[str, ...] = ()
+    conclusions: Mapping[str, str] = field(default_factory=dict)
+    timing: str = ""
 
     @property
     def groups(self) -> list[str]:
@@ -143,9 +155,11 @@ class Topic:
         in_front = {id(item) for group in self.groups for item in self.front(group)}
         rows = [{**asdict(item), "front": id(item) in in_front} for item in self.measurements]
         words = {"title": self.title, "about": self.about, "seconds": self.seconds}
+        words |= {"timing": self.timing} if self.timing else {}
         against = {"error": self.error, "floor": self.floor}
         heads = {"errors": dict(self.errors), "counts": dict(self.counts)}
-        return {**words, **against, **heads, "measurements": rows}
+        concluded = {"conclusions": dict(self.conclusions)}
+        return {**words, **against, **heads, **concluded, "measurements": rows}
 
 
 def pareto(items: Iterable[Measurement], error: str, floor: float = 0.0) -> list[Measurement]:

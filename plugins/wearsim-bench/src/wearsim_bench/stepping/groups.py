@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import get_args
 
@@ -13,15 +13,16 @@ from wearsim.scenario.tables.plain import DEFAULT_TOLERANCE, EvolutionTable
 from wearsim_bench.contact.methods import Method
 from wearsim_bench.contact.worn_profiles import failure_reason
 from wearsim_bench.measure.measurement import Measurement
-from wearsim_bench.measure.timing import timed_result
 from wearsim_bench.stepping.runs import EndState, PreparedTest, WearTest, errors_of
 from wearsim_bench.stepping.solvers import SOLVERS, Solver, solved_by
+from wearsim_bench.stepping.turns import TimedRun, add_rounds, compared, timed
 
 EVERY_PASS = "per-pass"
 CONVERGED = 1e-7  # tolerance of the reference solver if the loop over passes is not compiled
 #: checks of the reference: ten times the tolerance, and an independent solver
 _CHECKS: tuple[tuple[Solver, float], ...] = (("LSODA", 1e-6), ("BDF", CONVERGED))
 CLOSE = 1e-5  # tolerance at which the error is negligible compared with that of the strips
+CLOSER = 1e-6  # tolerance of the reference for numbers of strips
 MOST_STEPS = 1500  # steps above which lower tolerances are not tried
 _WARM_UP = 1e-4  # fraction of the passes of an untimed run, for compilation
 _STEPPERS = tuple(
@@ -31,6 +32,8 @@ _STEPPERS = tuple(
 )
 #: steps a test from fresh bodies over a number of passes
 Steps = Callable[[float], EndState]
+#: called with a description of each measurement
+Report = Callable[[str], object]
 
 
 @dataclass(frozen=True)
@@ -71,14 +74,17 @@ class StepperBenchmark:
         The wear test.
     model : Method
         The contact model.
-    repetitions : int
-        Repetitions of each timing.
+    rounds : int
+        Rounds in which the methods of a group are timed in turns.
+    report : callable
+        Called with a description of each measurement.
     """
 
     group: str
     test: WearTest
     model: Method
-    repetitions: int
+    rounds: int
+    report: Report
 
     def prepared(self, strips: int, **evolution: object) -> PreparedTest:
         """Return the test on `strips` strips, with keys of the table [evolution]."""
@@ -100,27 +106,29 @@ class StepperBenchmark:
         prepared = self.prepared(strips, stepper=EVERY_PASS)
         if is_compiled(prepared.problem):
             prepared.stepped(1.0)
-            end, seconds = timed_result(lambda: prepared.stepped(prepared.stop), 1)
-            return self._row(EVERY_PASS, "every pass", seconds, end), Reference(end, {})
+            end, seconds = timed(lambda: prepared.stepped(prepared.stop))
+            row = self._row(EVERY_PASS, "every pass", end)
+            return replace(row, seconds=seconds), Reference(end, {})
         steps = partial(by_solver, "LSODA", prepared.problem, CONVERGED)
-        end, seconds = timed_result(lambda: steps(prepared.stop), 1)
+        end, seconds = timed(lambda: steps(prepared.stop))
         looser, other = (
             errors_of(by_solver(solver, prepared.problem, tolerance, prepared.stop), end)
             for solver, tolerance in _CHECKS
         )
         reference = Reference(end, {name: max(looser[name], other[name]) for name in looser})
         setting = f"converged, {_power(CONVERGED)}"
-        return self._row("LSODA", setting, seconds, end, known=reference.known), reference
+        row = self._row("LSODA", setting, end, known=reference.known)
+        return replace(row, seconds=seconds), reference
 
-    def measured(
+    def first_run(
         self,
         method: str,
         setting: str,
         prepare: Callable[[], tuple[Steps, float]],
         exact: Reference,
         default: bool = False,
-    ) -> Measurement:
-        """Return error and time of one method.
+    ) -> TimedRun:
+        """Return a method with its errors and the time of its first run.
 
         Parameters
         ----------
@@ -133,20 +141,36 @@ class StepperBenchmark:
         default : bool
             Whether this is the default of a scenario.
         """
+        self.report(f"{method}, {setting}")
         try:
             steps, stop = prepare()
             steps(max(_WARM_UP * stop, 1.0))
-            end, seconds = timed_result(lambda: steps(stop), self.repetitions)
-            errors = exact.errors_of(end)
-            return self._row(method, setting, seconds, end, errors, default, exact.known)
+            run = partial(steps, stop)
+            end, seconds = timed(run)
+            row = self._row(method, setting, end, exact.errors_of(end), default, exact.known)
+            return TimedRun(row, run, [seconds])
         except Exception as error:
-            return Measurement(self.group, method, setting, failed=failure_reason(error))
+            row = Measurement(self.group, method, setting, failed=failure_reason(error))
+            return TimedRun(row, lambda: exact.end)
+
+    def timed_in_turns(self, runs: Sequence[TimedRun], stepper: str) -> list[Measurement]:
+        """Return the measurements of runs after all rounds, and remarks on the solvers.
+
+        Parameters
+        ----------
+        runs : sequence of TimedRun
+            Results of `first_run`.
+        stepper : str
+            Name of the stepper that the solvers are compared with.
+        """
+        self.report("timing in turns")
+        add_rounds(runs, self.rounds)
+        return [run.measurement for run in compared(runs, stepper, SOLVERS)]
 
     def _row(
         self,
         method: str,
         setting: str,
-        seconds: float,
         end: EndState,
         errors: Mapping[str, float] | None = None,
         default: bool = False,
@@ -158,11 +182,14 @@ class StepperBenchmark:
             group=self.group,
             method=method,
             setting=setting,
-            seconds=seconds,
             errors=errors or {},
             counts={**counts, "solves": solves, **(known or {})},
             default=default,
         )
+
+    def failed(self, method: str, setting: str, error: Exception) -> list[Measurement]:
+        """Return the one measurement of a group whose reference has failed."""
+        return [Measurement(self.group, method, setting, failed=failure_reason(error))]
 
 
 def by_solver(solver: Solver, problem: WearProblem, tolerance: float, passes: float) -> EndState:
@@ -170,8 +197,10 @@ def by_solver(solver: Solver, problem: WearProblem, tolerance: float, passes: fl
     return EndState(problem, solved_by(solver, problem, passes, tolerance))
 
 
-def of_steppers(bench: StepperBenchmark, tolerances: Sequence[float]) -> Iterator[Measurement]:
-    """Yield all steppers and solvers over tolerances, on the default strips.
+def of_steppers(
+    bench: StepperBenchmark, tolerances: Sequence[float], finer: Sequence[float] = ()
+) -> list[Measurement]:
+    """Return all steppers and solvers over tolerances, on the default strips.
 
     Parameters
     ----------
@@ -180,30 +209,33 @@ def of_steppers(bench: StepperBenchmark, tolerances: Sequence[float]) -> Iterato
     tolerances : sequence of float
         Decreasing tolerances. Failures for the same reason are reported once; after more than
         `MOST_STEPS` steps, lower tolerances are skipped.
+    finer : sequence of float
+        Tolerances of the default stepper, by default the same.
     """
     strips = bench.test.grid().strips
     try:
+        bench.report("reference")
         row, exact = bench.exact(strips)
     except Exception as error:
-        yield Measurement(bench.group, EVERY_PASS, "every pass", failed=failure_reason(error))
-        return
-    yield row
+        return bench.failed(EVERY_PASS, "every pass", error)
     usual = bench.prepared(strips).name
+    runs: list[TimedRun] = []
     for method in (*_STEPPERS, *SOLVERS):
         failures = set()
-        for tolerance in tolerances:
-            measurement = bench.measured(
+        for tolerance in (finer or tolerances) if method == usual else tolerances:
+            run = bench.first_run(
                 method,
                 f"tolerance {_power(tolerance)}",
                 partial(_prepared, bench, strips, method, tolerance),
                 exact,
                 default=method == usual and tolerance == DEFAULT_TOLERANCE,
             )
-            if measurement.failed not in failures or not measurement.failed:
-                yield measurement
-            failures.add(measurement.failed)
-            if measurement.counts.get("steps", 0) > MOST_STEPS:
+            if run.row.failed not in failures or not run.row.failed:
+                runs.append(run)
+            failures.add(run.row.failed)
+            if method != usual and run.row.counts.get("steps", 0) > MOST_STEPS:
                 break
+    return [row, *bench.timed_in_turns(runs, usual)]
 
 
 def _prepared(
@@ -217,29 +249,37 @@ def _prepared(
     return prepared.stepped, prepared.stop
 
 
-def of_model(bench: StepperBenchmark, tolerances: Sequence[float]) -> Iterator[Measurement]:
-    """Yield a contact model with its default stepper, relative to its own reference."""
+def of_model(bench: StepperBenchmark, tolerances: Sequence[float]) -> list[Measurement]:
+    """Return a contact model with its default stepper, relative to its own reference."""
     strips, name = bench.test.grid().strips, bench.model.name
     try:
+        bench.report(f"{name}, reference")
         _, exact = bench.exact(strips)
         usual = bench.prepared(strips).name
     except Exception as error:
-        yield Measurement(bench.group, name, "every pass", failed=failure_reason(error))
-        return
-    for tolerance in tolerances:
-        yield bench.measured(
+        return bench.failed(name, "every pass", error)
+    runs = [
+        bench.first_run(
             name,
             f"{usual}, {_power(tolerance)}",
             partial(_prepared, bench, strips, usual, tolerance),
             exact,
             default=bench.model.default and tolerance == DEFAULT_TOLERANCE,
         )
+        for tolerance in tolerances
+    ]
+    return bench.timed_in_turns(runs, usual)
 
 
-def of_strips(bench: StepperBenchmark, counts: Sequence[int]) -> Iterator[Measurement]:
-    """Yield numbers of strips, with default steps and with steps of negligible error.
+def of_strips(
+    bench: StepperBenchmark,
+    counts: Sequence[int],
+    tolerances: Sequence[float] = (DEFAULT_TOLERANCE,),
+) -> list[Measurement]:
+    """Return numbers of strips, with the default stepper and with steps of negligible error.
 
-    The reference has twice the default number of strips.
+    The reference has twice the default number of strips; its error is the difference from the same
+    reference at ten times the tolerance.
 
     Parameters
     ----------
@@ -247,25 +287,33 @@ def of_strips(bench: StepperBenchmark, counts: Sequence[int]) -> Iterator[Measur
         The benchmark.
     counts : sequence of int
         Numbers of strips in addition to the default.
+    tolerances : sequence of float
+        Tolerances of the default stepper.
     """
     default = bench.test.grid().strips
     try:
+        bench.report("reference")
         finest = bench.prepared(2 * default + 1)
-        exact = Reference(by_solver("LSODA", finest.problem, CLOSE, finest.stop), {})
-    except Exception as error:
-        yield Measurement(
-            bench.group, "LSODA", f"{2 * default + 1} strips", failed=failure_reason(error)
+        end, looser = (
+            by_solver("LSODA", finest.problem, tolerance, finest.stop)
+            for tolerance in (CLOSER, CLOSE)
         )
-        return
-    for method, tolerance in ((finest.name, DEFAULT_TOLERANCE), ("LSODA", CLOSE)):
-        for strips in sorted({*counts, default}):
-            yield bench.measured(
-                f"{method}, {_power(tolerance)}",
-                f"{strips} strips",
-                partial(_prepared, bench, strips, method, tolerance),
-                exact,
-                default=method == finest.name and strips == default,
-            )
+        exact = Reference(end, errors_of(looser, end))
+    except Exception as error:
+        return bench.failed("LSODA", f"{2 * default + 1} strips", error)
+    settings = [*((finest.name, tolerance) for tolerance in tolerances), ("LSODA", CLOSE)]
+    runs = [
+        bench.first_run(
+            f"{method}, {_power(tolerance)}",
+            f"{strips} strips",
+            partial(_prepared, bench, strips, method, tolerance),
+            exact,
+            default=method == finest.name and (strips, tolerance) == (default, DEFAULT_TOLERANCE),
+        )
+        for method, tolerance in settings
+        for strips in sorted({*counts, default})
+    ]
+    return bench.timed_in_turns(runs, finest.name)
 
 
 def _power(tolerance: float) -> str:

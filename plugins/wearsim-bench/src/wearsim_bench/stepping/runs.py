@@ -79,6 +79,8 @@ class PreparedTest:
     ----------
     scenario : Scenario
         Scenario of the test.
+    grid : Grid, optional
+        Strips, by default those of the scenario.
 
     Attributes
     ----------
@@ -92,8 +94,8 @@ class PreparedTest:
         Number of passes of the test.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
-        built: tuple[WearProblem, Stepper, str] = assemble_problem(draw(scenario))
+    def __init__(self, scenario: Scenario, grid: Grid | None = None) -> None:
+        built: tuple[WearProblem, Stepper, str] = assemble_problem(draw(scenario), grid)
         self.problem, self.stepper, self.name = built
         self.stop, self._max_steps = float(scenario.total_passes), scenario.evolution.max_steps
 

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 from wearsim.scenario.tables.plain import DEFAULT_TOLERANCE
 from wearsim_bench.contact.methods import DEFAULT_MODEL, Method, methods
 from wearsim_bench.measure.measurement import Effort, Measurement, OnProgress, Topic
 from wearsim_bench.stepping.groups import (
+    CLOSER,
     CONVERGED,
+    Report,
     StepperBenchmark,
     of_model,
     of_steppers,
@@ -18,12 +19,14 @@ from wearsim_bench.stepping.groups import (
 )
 from wearsim_bench.stepping.runs import WearTest
 from wearsim_bench.stepping.solvers import MOST_SOLVES
+from wearsim_bench.stepping.turns import LONG, NEGLIGIBLE, NOTABLE, ROUNDS, TIE, conclusion
 
 RIG = "rig-450min"
 SPRING = {"load.kind": "spring", "load.stiffness": "690 N/mm"}
 WHOLE, PART, EARLY = 450.0, 45.0, 4.5  # min
 TOLERANCES = (1e-1, 1e-2, DEFAULT_TOLERANCE, 1e-4, 1e-5)
-FEWER = (1e-2, DEFAULT_TOLERANCE, 1e-4)
+FEWER = (1e-1, 1e-2, DEFAULT_TOLERANCE, 1e-4)
+FINER = (1e-1, 3e-2, 1e-2, 3e-3, DEFAULT_TOLERANCE, 3e-4, 1e-4, 3e-5, 1e-5)  # default stepper
 STRIPS, EARLY_STRIPS = (25, 41, 75), (15, 25, 41)
 QUICK = 0.005  # fraction of every test
 QUICK_TOLERANCES = (1e-1, DEFAULT_TOLERANCE)
@@ -36,12 +39,18 @@ ABOUT = (
     f" the reference is LSODA of scipy at a tolerance of {CONVERGED:g} with the same contact model."
     " The error of this reference is the difference of its profile from that of BDF at the same"
     " tolerance, or of LSODA at ten times the tolerance; smaller errors are replaced by it. The"
-    " reference for numbers of strips has twice the default number, and these errors include those"
-    " of stepping. A tolerance of the steppers of wearsim applies to the whole test, one of BDF and"
-    " LSODA to each step, so that equal tolerances do not mean equal errors. BDF and LSODA use the"
-    " wear per pass of the same contacts and its Jacobian by finite differences, which LSODA"
-    f" requires only while the problem is stiff, and at most {MOST_SOLVES} contact solves. A method"
-    " that takes more than a second is timed once."
+    " reference for numbers of strips has twice the default number and is computed by LSODA at a"
+    f" tolerance of {CLOSER:g}; these errors include those of stepping. A tolerance of the steppers"
+    " of wearsim applies to the whole test, one of BDF and LSODA to each step, so that equal"
+    " tolerances do not mean equal errors. BDF and LSODA use the wear per pass of the same contacts"
+    " and its Jacobian by finite differences, which LSODA requires only while the problem is stiff,"
+    f" and at most {MOST_SOLVES} contact solves. The methods of a group are timed in turns; times"
+    f" are medians of {ROUNDS} rounds, of one round for a method that takes more than {LONG:g} s."
+    f" A setting of BDF or LSODA with a profile error of {100.0 * NOTABLE:g} % or more is dominated"
+    " if some setting of the default stepper is as fast, by the median of the ratios of paired"
+    " times, and as near in depth, profile and volume, all within a factor of"
+    f" {TIE:g}; errors below {NEGLIGIBLE:g} count as that. Of one that is not dominated, the"
+    " nearest setting is given with its largest ratio."
 )
 
 
@@ -50,7 +59,7 @@ class _Group:
     """A group of measurements and its approximate number of measurements."""
 
     name: str
-    measure: Callable[[], Iterator[Measurement]]
+    measure: Callable[[Report], list[Measurement]]
     size: int
 
 
@@ -70,14 +79,20 @@ def stepping(effort: Effort, on_progress: OnProgress) -> Topic:
         If the requested contact model is not registered.
     """
     measurements: list[Measurement] = []
+    conclusions: dict[str, str] = {}
     groups = _groups(effort)
     total, completed = sum(group.size for group in groups), 0
     for group in groups:
-        on_progress(group.name, completed / total)
-        for number, item in enumerate(group.measure(), start=1):
-            measurements.append(item)
-            part = min(number, group.size)
-            on_progress(f"{group.name}: {item.method}, {item.setting}", (completed + part) / total)
+        done = 0
+
+        def report(what: str, group: _Group = group, completed: int = completed) -> None:
+            nonlocal done
+            on_progress(f"{group.name}: {what}", (completed + min(done, group.size)) / total)
+            done += 1
+
+        items = group.measure(report)
+        measurements += items
+        conclusions[group.name] = conclusion(items, DEFAULT_TOLERANCE)
         completed += group.size
     return Topic(
         name="stepping",
@@ -88,41 +103,60 @@ def stepping(effort: Effort, on_progress: OnProgress) -> Topic:
         errors=ERRORS,
         counts=COUNTS,
         measurements=tuple(measurements),
+        conclusions={group: text for group, text in conclusions.items() if text},
+        timing="timed once" if effort.quick else f"median of {ROUNDS}",
     )
 
 
 def _groups(effort: Effort) -> list[_Group]:
-    share, repetitions = QUICK if effort.quick else 1.0, effort.repetitions
+    share, rounds = (QUICK, 1) if effort.quick else (1.0, ROUNDS)
     whole, part, early = (share * minutes for minutes in (WHOLE, PART, EARLY))
-    models = methods(effort.plugin)
     default = Method(effort.plugin or DEFAULT_MODEL)
     tests = {
         f"rig, {whole:g} min": (WearTest(RIG, whole), TOLERANCES),
         f"spring, {part:g} min": (WearTest(RIG, part, SPRING), FEWER),
         f"three rollers, {part:g} min": (WearTest("rig-three-rollers", part), FEWER),
     }
+    finer = QUICK_TOLERANCES if effort.quick else FINER
     groups = []
     for name, (test, tolerances) in tests.items():
         chosen = QUICK_TOLERANCES if effort.quick else tolerances
-        steppers = partial(of_steppers, StepperBenchmark(name, test, default, repetitions), chosen)
-        groups.append(_Group(name, steppers, 1 + 5 * len(chosen)))
+
+        def steppers(
+            report: Report,
+            name: str = name,
+            test: WearTest = test,
+            chosen: Sequence[float] = chosen,
+        ) -> list[Measurement]:
+            bench = StepperBenchmark(name, test, default, rounds, report)
+            return of_steppers(bench, chosen, finer)
+
+        groups.append(_Group(name, steppers, 2 + 4 * len(chosen) + len(finer)))
+    models, usual = methods(effort.plugin), QUICK_TOLERANCES[1:] if effort.quick else FEWER[1:3]
     title = f"contact models, {part:g} min"
-    benches = [
-        StepperBenchmark(title, WearTest(RIG, part), method, repetitions) for method in models
-    ]
-    usual = QUICK_TOLERANCES[1:] if effort.quick else FEWER[:2]
-    measured = partial(_of_models, benches, usual)
-    groups.append(_Group(title, measured, len(usual) * len(benches)))
+
+    def all_models(report: Report) -> list[Measurement]:
+        benches = (
+            StepperBenchmark(title, WearTest(RIG, part), method, rounds, report)
+            for method in models
+        )
+        return [item for bench in benches for item in of_model(bench, usual)]
+
+    groups.append(_Group(title, all_models, (2 + len(usual)) * len(models)))
     if effort.plugin is None:
+        decades = QUICK_TOLERANCES if effort.quick else TOLERANCES
         for minutes, counts in ((whole, STRIPS), (early, EARLY_STRIPS)):
             name = f"strips, {minutes:g} min"
-            bench = StepperBenchmark(name, WearTest(RIG, minutes), default, repetitions)
-            groups.append(_Group(name, partial(of_strips, bench, counts), 2 * len(counts) + 2))
+
+            def strips(
+                report: Report,
+                name: str = name,
+                minutes: float = minutes,
+                counts: Sequence[int] = counts,
+            ) -> list[Measurement]:
+                bench = StepperBenchmark(name, WearTest(RIG, minutes), default, rounds, report)
+                return of_strips(bench, counts, decades)
+
+            size = 2 + (len(decades) + 1) * (len(counts) + 1)
+            groups.append(_Group(name, strips, size))
     return groups
-
-
-def _of_models(
-    benches: Sequence[StepperBenchmark], tolerances: Sequence[float]
-) -> Iterator[Measurement]:
-    for bench in benches:
-        yield from of_model(bench, tolerances)

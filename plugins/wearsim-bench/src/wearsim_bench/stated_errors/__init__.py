@@ -1,0 +1,1 @@
+"""Study of stated errors against true ones."""
