@@ -50,8 +50,10 @@ def test_help_of_a_verb_loads_nothing_slow(verb: str):
     assert not loaded & (SLOW - {"pydantic"})
 
 
-def test_reading_a_results_file_does_not_load_numba():
-    assert "numba" not in modules_after("import wearsim\nwearsim.open_results")
+@pytest.mark.parametrize("name", ["open_results", "run", "ensemble", "solve_contact"])
+def test_numba_is_not_loaded_before_a_kernel_is_called(name: str):
+    scenario = "wearsim.load_scenario('scenarios/rig-450min.toml')"
+    assert not modules_after(f"import wearsim\nwearsim.{name}\n{scenario}") & {"numba", "h5py"}
 
 
 def test_reading_a_scenario_does_not_load_matplotlib():

@@ -22,7 +22,7 @@ import hashlib, json, sys
 import wearsim
 solution = wearsim.solve_contact(wearsim.load_scenario(r"{SCENARIOS / "rig-450min.toml"}"))
 from wearsim.mechanics.slender.newton import solve_slender as kernel
-stats = getattr(kernel, "stats")
+stats = kernel.dispatcher.stats
 print(json.dumps({{
     "bits": hashlib.sha256(solution.dissipation.tobytes()).hexdigest(),
     "hits": sum(stats.cache_hits.values()),
@@ -37,7 +37,7 @@ import json
 import wearsim
 from wearsim.mechanics.tangential.kalker_coefficients import short_limit as kernel
 kernel(0.1, 0.3)
-stats = kernel.stats
+stats = kernel.dispatcher.stats
 print(json.dumps({"hits": sum(stats.cache_hits.values()), "path": stats.cache_path,
     "file": wearsim.__file__}))
 """

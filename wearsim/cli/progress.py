@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import math
 import os
 import signal
@@ -109,6 +110,7 @@ class Display:
 
     def show(self, text: str, *, always: bool = False) -> None:
         """Show a text on the line, or write it if a second has passed since the last one."""
+        _collect_garbage()
         self.live.update(self._task.id, description=text)
         now = self._now()
         if not self.live.disable or not (always or now - self._written >= BETWEEN_LINES):
@@ -135,6 +137,13 @@ class Display:
             self.live.console.print(text)
         elif also_quiet or not self._quiet:
             note(text)
+
+
+def _collect_garbage() -> None:
+    """Enable the collector of garbage, without the objects of the imports; see `app.main`."""
+    if not gc.isenabled():
+        gc.freeze()
+        gc.enable()
 
 
 class Counter(Display):

@@ -5,54 +5,132 @@ from __future__ import annotations
 import gc
 import os
 import shutil
+import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
-from functools import cache
+from functools import cache, update_wrapper
 from hashlib import sha256
 from pathlib import Path
 from tempfile import TemporaryFile
+from threading import RLock
 from typing import Any, ParamSpec, TypeVar
 
-import numba
 import numpy as np
-from numba.core import event
-from numba.extending import register_jitable
 
 from wearsim.types import FloatArray
 
 P = ParamSpec("P")
 R = TypeVar("R")
 
-_CONFIG: Any = numba.config
-
 # kernels are never passed to C code, for which numba would compile a second wrapper
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True}
 KEPT = 86400.0  # seconds for which the compiled kernels of other sources are kept
-_KERNELS: list[Any] = []  # all kernels, as numba's dispatchers
+_KERNELS: list[Kernel] = []
+_SUBROUTINES: list[Callable[..., Any]] = []  # those that numba has not been given yet
+_REPORTS: list[Callable[[str], None]] = []
+_LOCK = RLock()
 
 
-class _WithoutCollection(event.Listener):
-    """Listener that disables Python's garbage collector, a tenth of the time, in compilations."""
+class Kernel:
+    """Function that numba compiles, or reads from the cache, when it is first called.
 
-    def __init__(self) -> None:
-        self.depth, self.collecting = 0, True
+    numba takes half a second to import and to prepare, and many commands call no kernel.
 
-    def on_start(self, event: Any) -> None:
-        """Disable the collector at the start of the outermost compilation."""
-        if self.depth == 0:
-            self.collecting = gc.isenabled()
-            gc.disable()
-        self.depth += 1
+    Parameters
+    ----------
+    function : callable
+        The function in Python.
+    """
 
-    def on_end(self, event: Any) -> None:
-        """Enable the collector at the end of the outermost compilation."""
-        self.depth -= 1
-        if self.depth == 0 and self.collecting:
+    def __init__(self, function: Callable[..., Any]) -> None:
+        update_wrapper(self, function)
+        self.__name__: str = function.__name__
+        self._function = function
+        self._dispatcher: Any = None
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Call the compiled function."""
+        if self._dispatcher is None:
+            # of the objects of numba and of a compilation almost all remain; collecting garbage
+            # among them takes a tenth of the time
+            with _without_collection():
+                return self.dispatcher(*arguments)
+        return self._dispatcher(*arguments)
+
+    @property
+    def dispatcher(self) -> Any:
+        """Dispatcher of numba, which compiled functions call."""
+        with _LOCK:
+            if self._dispatcher is None:
+                self._dispatcher = _compiled(self._function)
+        return self._dispatcher
+
+    def is_compiled_by(self, dispatcher: object) -> bool:
+        """Return whether `dispatcher` is that of this kernel."""
+        return dispatcher is self._dispatcher
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether this process has compiled the function or read it from the cache."""
+        return self._dispatcher is not None and bool(self._dispatcher.signatures)
+
+
+def _compiled(function: Callable[..., Any]) -> Any:
+    """Return a dispatcher of numba with the options of kernels and their cache."""
+    numba = _prepared_numba()
+    _register_subroutines()
+    folder, folder_of_user = _cache_folder(), numba.config.CACHE_DIR
+    try:
+        if folder is not None:
+            numba.config.CACHE_DIR = str(folder)
+        return numba.njit(function, cache=folder is not None, **_OPTIONS)
+    finally:
+        numba.config.CACHE_DIR = folder_of_user
+
+
+@cache
+def _prepared_numba() -> Any:
+    """Import numba, let compiled functions call kernels, and report compilations."""
+    import numba  # noqa: PLC0415
+    from numba.core import event  # noqa: PLC0415
+    from numba.extending import typeof_impl  # noqa: PLC0415
+
+    class Compilations(event.Listener):
+        """Listener that reports every kernel when its compilation starts."""
+
+        def on_start(self, event: Any) -> None:
+            """Report the kernel; subroutines are compiled as a part of it."""
+            dispatcher = event.data["dispatcher"]
+            if any(kernel.is_compiled_by(dispatcher) for kernel in _KERNELS):
+                for report in _REPORTS:
+                    report(dispatcher.__name__)
+
+        def on_end(self, event: Any) -> None:
+            """Do nothing at the end of a compilation."""
+
+    event.register("numba:compile", Compilations())
+    typeof_impl.register(Kernel)(lambda kernel, _: numba.typeof(kernel.dispatcher))
+    return numba
+
+
+def _register_subroutines() -> None:
+    from numba.extending import register_jitable  # noqa: PLC0415
+
+    while _SUBROUTINES:
+        register_jitable(**_OPTIONS)(_SUBROUTINES.pop())
+
+
+@contextmanager
+def _without_collection() -> Iterator[None]:
+    """Disable Python's garbage collector in the context."""
+    collecting = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collecting:
             gc.enable()
-
-
-event.register("numba:compile", _WithoutCollection())
 
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
@@ -62,13 +140,7 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
     Every kernel is called with one signature only (C-contiguous float64 arrays, floats, ints), so
     that processes that start at the same time write identical cache entries.
     """
-    folder, folder_of_user = _cache_folder(), _CONFIG.CACHE_DIR
-    try:
-        if folder is not None:
-            _CONFIG.CACHE_DIR = str(folder)
-        compiled: Any = numba.njit(function, cache=folder is not None, **_OPTIONS)
-    finally:
-        _CONFIG.CACHE_DIR = folder_of_user
+    compiled: Any = Kernel(function)
     _KERNELS.append(compiled)
     return compiled  # type: ignore[no-any-return]
 
@@ -79,23 +151,10 @@ def subroutine(function: Callable[P, R]) -> Callable[P, R]:
     A subroutine needs no wrapper for Python and no entry in the cache, which saves a third of the
     compilation time.
     """
-    return register_jitable(**_OPTIONS)(function)
-
-
-class _Compilations(event.Listener):
-    """Listener that reports every kernel when its compilation starts."""
-
-    def __init__(self, report: Callable[[str], None]) -> None:
-        self._report = report
-
-    def on_start(self, event: Any) -> None:
-        """Report the kernel; subroutines are compiled as a part of it."""
-        dispatcher = event.data["dispatcher"]
-        if any(dispatcher is compiled for compiled in _KERNELS):
-            self._report(dispatcher.__name__)
-
-    def on_end(self, event: Any) -> None:
-        """Do nothing at the end of a compilation."""
+    _SUBROUTINES.append(function)
+    if "numba" in sys.modules:
+        _register_subroutines()
+    return function
 
 
 @contextmanager
@@ -104,13 +163,16 @@ def compilation_reported(report: Callable[[str], None]) -> Iterator[None]:
 
     A kernel that is read from the cache is not compiled.
     """
-    with event.install_listener("numba:compile", _Compilations(report)):
+    _REPORTS.append(report)
+    try:
         yield
+    finally:
+        _REPORTS.remove(report)
 
 
 def ready_kernels() -> set[str]:
     """Return the names of the kernels that this process has compiled or read from the cache."""
-    return {kernel.__name__ for kernel in _KERNELS if kernel.signatures}
+    return {kernel.__name__ for kernel in _KERNELS if kernel.is_ready}
 
 
 def not_cached(names: Iterable[str]) -> set[str]:
@@ -144,7 +206,8 @@ def _cache_folder() -> Path | None:
     for path in sorted(package.rglob("*.py")):
         digest.update(path.read_bytes())
     home = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA") or "~/.cache"
-    places = [_CONFIG.CACHE_DIR, package / "__pycache__", os.path.expanduser(home)]
+    of_user = os.environ.get("NUMBA_CACHE_DIR", "")
+    places: list[Any] = [of_user, package / "__pycache__", os.path.expanduser(home)]
     for place in filter(None, places):
         folder = Path(place, install + digest.hexdigest()[:12])
         found = folder.is_dir()
