@@ -14,7 +14,7 @@ from wearsim.report.text import si_key
 from wearsim.results.dissipation import VARIABLES as DISSIPATION
 from wearsim.results.ensemble.schema import ENSEMBLE, STATISTICS
 from wearsim.results.run_schema import VARIABLES as RUN
-from wearsim.scenario import scenario_schema
+from wearsim.scenario.examples import scenario_schema
 
 ROOT = Path(__file__).parents[1]
 HEAD = ["quantity", "symbol", "scenario key", "name in code", "file variable", "label"]

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 SLOW = {"numpy", "numba", "h5py", "pint", "pydantic", "matplotlib", "scipy"}
+READ = f"wearsim.load_scenario({str(Path(__file__).parents[1] / 'scenarios/rig-450min.toml')!r})"
 HELP = """
 import contextlib, io, sys
 from wearsim.cli.app import app
@@ -17,13 +19,13 @@ assert "wearsim" in output.getvalue(), output.getvalue()
 """
 
 
-def modules_after(code: str) -> set[str]:
-    """Return the top-level modules loaded by `code` in a separate process."""
-    tail = "\nimport sys\nsys.stderr.write('\\n'.join({n.split('.')[0] for n in sys.modules}))"
+def modules_after(code: str, *, whole: bool = False) -> set[str]:
+    """Return the modules loaded by `code` in a separate process, by the first or `whole` name."""
+    tail = "\nimport sys\nsys.stderr.write('\\n'.join(sys.modules))"
     done = subprocess.run(
         [sys.executable, "-c", code + tail], capture_output=True, text=True, check=True
     )
-    return set(done.stderr.split("\n"))
+    return {name if whole else name.split(".")[0] for name in done.stderr.split("\n")}
 
 
 def test_importing_wearsim_loads_nothing_slow():
@@ -52,8 +54,13 @@ def test_help_of_a_verb_loads_nothing_slow(verb: str):
 
 @pytest.mark.parametrize("name", ["open_results", "run", "ensemble", "solve_contact"])
 def test_numba_is_not_loaded_before_a_kernel_is_called(name: str):
-    scenario = "wearsim.load_scenario('scenarios/rig-450min.toml')"
-    assert not modules_after(f"import wearsim\nwearsim.{name}\n{scenario}") & {"numba", "h5py"}
+    assert not modules_after(f"import wearsim\nwearsim.{name}\n{READ}") & {"numba", "h5py"}
+
+
+def test_a_run_loads_neither_ensembles_nor_the_json_schema():
+    loaded = modules_after(f"import wearsim.cli.progress\nwearsim.run\n{READ}", whole=True)
+    unused = "execution", "ensemble.result", "uq.estimation.estimates", "csv_export", "examples"
+    assert not {name for name in loaded if name.startswith("wearsim.") and name.endswith(unused)}
 
 
 def test_reading_a_scenario_does_not_load_matplotlib():

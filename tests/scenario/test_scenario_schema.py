@@ -11,7 +11,8 @@ import pytest
 from scenario_examples import GOOD
 
 from wearsim.errors import ScenarioError
-from wearsim.scenario import parse_scenario, scenario_schema
+from wearsim.scenario import parse_scenario
+from wearsim.scenario.examples import scenario_schema
 
 SCENARIOS = sorted((Path(__file__).parents[2] / "scenarios").glob("*.toml"))
 Schema = dict[str, Any]

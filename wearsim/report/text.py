@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from wearsim.results import EnsembleResult
 from wearsim.results.ensemble.schema import OBSERVABLES as STORED
-from wearsim.studies.ensemble.compare import Compared, Comparison
-from wearsim.uq.distributions.base import MaxentDistribution
-from wearsim.uq.estimation.estimates import Target
-from wearsim.uq.estimation.intervals import Interval
-from wearsim.uq.estimation.mann_whitney import FEWEST, Paired
-from wearsim.uq.sensitivity.sobol_indices import FEWEST_BASES, fewest_realisations
+
+if TYPE_CHECKING:
+    from wearsim.results import EnsembleResult
+    from wearsim.studies.ensemble.compare import Compared, Comparison
+    from wearsim.uq.distributions.base import MaxentDistribution
+    from wearsim.uq.estimation.estimates import Target
+    from wearsim.uq.estimation.intervals import Interval
+    from wearsim.uq.estimation.mann_whitney import Paired
 
 # One SI unit in each engineering unit.
 PER_SI = {
@@ -262,20 +263,22 @@ def too_few(result: EnsembleResult, names: list[str] | None = None) -> str:
     names : list of str, optional
         Random inputs; all by default.
     """
+    from wearsim.uq.sensitivity import sobol_indices  # noqa: PLC0415
+
     groups = [item["name"] for item in result.raw.groups]
     if result.plan == "saltelli":
-        needed = FEWEST_BASES * (len(groups) + 2)
+        needed = sobol_indices.FEWEST_BASES * (len(groups) + 2)
     else:
-        needed = max(_needed(result, name) for name in (groups if names is None else names))
+        names = groups if names is None else names
+        needed = max(sobol_indices.fewest_realisations(_different(result, n)) for n in names)
     return f"{TOO_FEW_REALISATIONS}, {count(needed)} are sufficient"
 
 
-def _needed(result: EnsembleResult, name: str) -> int:
-    """Return the sample size that the Sobol index of one input requires."""
+def _different(result: EnsembleResult, name: str) -> int:
+    """Return the number of columns of an input; equal ones carry the same information."""
     keys = [item["key"] for item in result.raw.inputs if item["input"] == name]
     columns = np.column_stack([result.inputs[key].reshape(result.count, -1) for key in keys])
-    # equal columns carry the same information
-    return fewest_realisations(np.unique(columns, axis=1).shape[1])
+    return int(np.unique(columns, axis=1).shape[1])
 
 
 EQUAL = "equal in all tests"
@@ -350,6 +353,8 @@ def _of_tests(first: Compared, row: Compared, deeper: Interval) -> str:
     if low == high and row.count + first.count > 2:
         return EQUAL
     if not math.isfinite(deeper.value):
+        from wearsim.uq.estimation.mann_whitney import FEWEST  # noqa: PLC0415
+
         return f"too few realisations, {FEWEST} of each are sufficient"
     pairs = "pairs of tests" if row.kind == first.kind else "the tests of the ensemble"
     return f"in {part_with_interval(deeper)} of {pairs}"

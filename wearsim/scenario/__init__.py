@@ -1,6 +1,5 @@
 """Scenarios: TOML with units, validated as a whole, immutable and in SI once read."""
 
-from wearsim.scenario.examples import scenario_schema
 from wearsim.scenario.parse.fields import Persistence, RandomInput
 from wearsim.scenario.parse.toml import parse_override
 from wearsim.scenario.realise import realise
@@ -53,5 +52,4 @@ __all__ = [
     "parse_scenario",
     "realise",
     "require_run",
-    "scenario_schema",
 ]

@@ -19,7 +19,6 @@ from wearsim.plugins import (
 )
 from wearsim.results.content import StudyData
 from wearsim.scenario import Scenario
-from wearsim.studies.execution.factory import whole_number
 
 #: Memory limit for the results of a study.
 MOST_BYTES = 4_000_000_000
@@ -50,6 +49,8 @@ def checked_count(scenario: Scenario, realisations: int) -> int:
         raise TypeError(
             f"scenario must be a Scenario, got {scenario!r}; wearsim.load_scenario reads one"
         )
+    from wearsim.studies.execution.factory import whole_number  # noqa: PLC0415
+
     count = whole_number("realisations", realisations, 1000)
     size = bytes_per_realisation(scenario)
     if count * size > MOST_BYTES:

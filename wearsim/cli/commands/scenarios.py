@@ -44,7 +44,7 @@ def check(scenario: ScenarioFile, settings: Settings = None, json: Json = False)
 
 def schema() -> None:
     """Write the JSON Schema of a scenario, for editors."""
-    from wearsim.scenario import scenario_schema
+    from wearsim.scenario.examples import scenario_schema
 
     write_json(scenario_schema())
 
