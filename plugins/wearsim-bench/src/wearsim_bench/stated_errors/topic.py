@@ -104,6 +104,7 @@ def stated_errors(
         measurements=tuple(item for items in summary.values() for item in items),
         details=(TESTS,),
         conclusions=described,
+        timing="timed once",
     )
 
 
