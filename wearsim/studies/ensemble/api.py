@@ -48,6 +48,8 @@ from wearsim.studies.run.schedule import RecordSchedule
 from wearsim.types import FloatArray, Grid
 from wearsim.uq.estimation.estimates import Target
 
+PRELOAD = f"{RealisationRunner.__module__} numba scipy.special"  # all of them used by every worker
+
 Watcher = Callable[[EnsembleProgress], None]
 
 
@@ -140,7 +142,7 @@ def ensemble(
             workers,
             on_notice=on_notice or getattr(watch, "notice", None),
             stop_requested=stop_requested,
-            preload=RealisationRunner.__module__,
+            preload=PRELOAD,
             realisations=request.realisations,
         ) as pool,
     ):
@@ -302,7 +304,7 @@ def resume_ensemble(
             workers,
             on_notice=on_notice or getattr(watch, "notice", None),
             stop_requested=stop_requested,
-            preload=RealisationRunner.__module__,
+            preload=PRELOAD,
             realisations=data.requested,
         ) as pool,
         EnsembleFile.open(path, storage) as opened,

@@ -24,6 +24,7 @@ from wearsim.uq.estimation.estimates import Target
 from wearsim.uq.estimation.intervals import UNKNOWN, Interval
 
 SECONDS = 4.0  # duration of a batch; a test costs a third more in batches of 20 than of 40
+GROWTH = 4  # greatest ratio of the size of a batch to that of the greatest before it
 MOST_IN_BATCH = 256
 AHEAD = 3  # batches for each worker that may be beyond the next interim analysis
 BETWEEN_ESTIMATES = 0.5  # s
@@ -166,7 +167,7 @@ class EnsembleWork:
         self._deferred: dict[int, Outcome] = {}
         self._stopping = self._reached = False
         self._ahead = AHEAD * max(pool.workers, 1)
-        self._run, self._rate = 0, 0.0
+        self._run, self._rate, self._largest = 0, 0.0, 0
         # time and number of realisations after each of the last batches
         self._recent: deque[tuple[float, int]] = deque(maxlen=RECENT)
         self._next_estimate, self._estimate = -math.inf, UNKNOWN
@@ -257,11 +258,19 @@ class EnsembleWork:
             yield batch
 
     def _batch_size(self) -> int:
-        """Return the batch size for `SECONDS`, limited so that all workers end together."""
+        """Return the batch size for `SECONDS`, limited so that all workers end together.
+
+        The rate is that of the last batches: before the first ones the workers load the kernels,
+        and a realisation takes longer in a small batch.
+        """
         workers = max(self.pool.workers, 1)
         left = self.total - int((self.file.status != PENDING).sum())
-        most = max(min(-(-left // (2 * workers)), MOST_IN_BATCH), 1)
-        size = int(np.clip(SECONDS * self._rate / workers, 1, most))
+        most = max(min(-(-left // (2 * workers)), MOST_IN_BATCH, GROWTH * self._largest), 1)
+        rate = self._rate
+        if len(self._recent) > 1:
+            (start, before), (end, run) = self._recent[0], self._recent[-1]
+            rate = (run - before) / max(end - start, 1e-9)
+        size = int(np.clip(SECONDS * rate / workers, 1, most))
         self._ahead = AHEAD * workers * size
         return size
 
@@ -270,6 +279,7 @@ class EnsembleWork:
         now = [item for item in outcomes if item.number < self._limit]
         self._deferred |= {item.number: item for item in outcomes if item.number >= self._limit}
         self._run += len(outcomes)
+        self._largest = max(self._largest, len(outcomes))
         self._recent.append((time.monotonic(), self._run))
         self._rate = self._run / max(time.monotonic() - self.started, 1e-9)
         if now and not self._reached:

@@ -42,7 +42,7 @@ def executor(
     stop_requested : callable, optional
         Called while a cluster has no workers; True stops the study.
     preload : str
-        Module that worker processes on this machine import as they start.
+        Modules that worker processes on this machine import as they start, separated by spaces.
     realisations : int, optional
         Number of realisations, if known; no more processes are started on this machine.
 

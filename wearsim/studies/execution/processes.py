@@ -137,7 +137,7 @@ class Processes:
     on_notice : callable, optional
         Called with a message when a process ended unexpectedly.
     preload : str
-        Module that the processes import as they start.
+        Modules that the processes import as they start, separated by spaces.
     """
 
     def __init__(
@@ -221,7 +221,7 @@ class _Worker:
     folder : str
         Temporary folder of the study.
     preload : str
-        Module that the process imports as it starts.
+        Modules that the process imports as it starts, separated by spaces.
     """
 
     numbers: Batch
@@ -261,10 +261,11 @@ class _Worker:
 
 
 def _initialise(parent_end: Connection, folder: str, preload: str) -> None:
-    """Prepare a worker process: ignore Ctrl-C, end with the parent process, and import a module."""
+    """Prepare a worker process: ignore Ctrl-C, end with the parent process, and import modules."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     Thread(target=_end_with_parent, args=(parent_end, folder), daemon=True).start()
-    import_module(preload)
+    for module in preload.split():
+        import_module(module)
 
 
 def _end_with_parent(parent_end: Connection, folder: str) -> None:
