@@ -161,6 +161,21 @@ def test_compiled_loop_equals_python_loop(half_length, tolerance):
     assert fast.full_solves < 30
 
 
+def test_compiled_loop_equals_python_loop_in_partial_slip():
+    problem, _, _ = built(
+        creepage__longitudinal=2e-4,
+        friction__coefficient=0.4,
+        wear__cylinder__k_over_h="1e-10 1/Pa",
+        contact__strips=61,
+        operation__passes=100_000,
+    )
+    state = fresh_state(problem)
+    slow, fast = run_in_python(problem, state, 300), run_compiled(problem, state, 300)
+    depth = slow.cylinder_depth
+    assert np.abs(depth - fast.cylinder_depth).max() < 3e-6 * depth.max()
+    assert fast.full_solves < 30
+
+
 @pytest.mark.parametrize(("half_length", "tolerance"), HALF_LENGTHS)
 def test_chord_method_leaves_a_small_residual(half_length, tolerance):
     problem, _, _ = built(
