@@ -32,11 +32,11 @@ print(json.dumps({{
 }}))
 """
 
-STRIP = """
+PATCH = """
 import json
 import wearsim
-from wearsim.mechanics.tangential.kalker_coefficients import short_limit as kernel
-kernel(0.1, 0.3)
+from wearsim.mechanics.hertz.ellipse import prescribed_ellipse as kernel
+kernel(1e-3, 2e-3, 300.0, 1e11)
 stats = kernel.dispatcher.stats
 print(json.dumps({"hits": sum(stats.cache_hits.values()), "path": stats.cache_path,
     "file": wearsim.__file__}))
@@ -165,7 +165,7 @@ def test_every_kernel_has_one_signature(tmp_path: Path):
 
 
 def test_writable_install_has_its_cache_next_to_the_kernels(site: Path):
-    first, second = (run(STRIP, PYTHONPATH=site) for _ in range(2))
+    first, second = (run(PATCH, PYTHONPATH=site) for _ in range(2))
     assert Path(first["file"]).is_relative_to(site)
     cache = site / "wearsim" / "mechanics" / "__pycache__"
     assert Path(first["path"]).is_relative_to(cache)
@@ -175,7 +175,7 @@ def test_writable_install_has_its_cache_next_to_the_kernels(site: Path):
 def test_read_only_install_has_its_cache_in_the_user_folder(site: Path, tmp_path: Path):
     make_read_only(site)
     environment = {"PYTHONPATH": site, "XDG_CACHE_HOME": tmp_path / "cache"}
-    first, second = (run(STRIP, **environment) for _ in range(2))
+    first, second = (run(PATCH, **environment) for _ in range(2))
     assert Path(first["file"]).is_relative_to(site)
     assert Path(first["path"]).is_relative_to(tmp_path / "cache")
     assert (first["hits"], second["hits"]) == (0, 1)
@@ -214,7 +214,7 @@ def test_cache_is_renewed_when_a_callee_elsewhere_changes(site: Path, tmp_path: 
 
 def test_unwritable_folder_of_the_user_falls_back_to_the_next(site: Path, tmp_path: Path):
     (tmp_path / "file").write_text("not a folder")
-    found = run(STRIP, PYTHONPATH=site, NUMBA_CACHE_DIR=tmp_path / "file")
+    found = run(PATCH, PYTHONPATH=site, NUMBA_CACHE_DIR=tmp_path / "file")
     cache = site / "wearsim" / "mechanics" / "__pycache__"
     assert Path(found["path"]).is_relative_to(cache)
 
@@ -223,7 +223,7 @@ def test_kernels_of_former_sources_are_removed_after_a_day(site: Path):
     cache = site / "wearsim" / "mechanics" / "__pycache__"
     source = site / "wearsim" / "mechanics" / "hertz" / "elasticity.py"
     for days in (2, 0.5, 0):
-        run(STRIP, PYTHONPATH=site)
+        run(PATCH, PYTHONPATH=site)
         newest = max(cache.glob("wearsim-*"), key=lambda folder: folder.stat().st_mtime)
         then = time.time() - 86400 * days
         os.utime(newest, (then, then))
@@ -235,6 +235,6 @@ def test_kernels_of_other_installs_are_kept_in_a_shared_folder(site: Path, tmp_p
     other = tmp_path / "cache" / "wearsim-0123abcd-0123456789ab"
     other.mkdir(parents=True)
     os.utime(other, (0.0, 0.0))
-    run(STRIP, PYTHONPATH=site, NUMBA_CACHE_DIR=tmp_path / "cache")
+    run(PATCH, PYTHONPATH=site, NUMBA_CACHE_DIR=tmp_path / "cache")
     assert other.is_dir()
     assert len(list(other.parent.iterdir())) == 2

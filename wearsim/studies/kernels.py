@@ -16,11 +16,11 @@ _MODELS = {
     "hertz-fastsim": {"hertz_on_profile"},
     "semi-hertzian": {"solve_semi_hertzian"},
 }
-_BATCH = {"solve_contacts", "find_patches", "fit_within", "one_flexibility", "prescribed_ellipse"}
+_BATCH = {"solve_contacts", "find_patches", "fit_within", "prescribed_ellipse"}
 _THEORIES: dict[str, set[str]] = {
     "strip": set(),
     "fastsim": {"closed_form"},
-    "fastrip": {"fastrip", "beyond_strip_theory", "one_flexibility"},
+    "fastrip": {"fastrip", "beyond_strip_theory"},
 }
 _FIELDS: dict[str, set[str]] = {
     "strip": set(),
@@ -49,7 +49,7 @@ def kernels_of(
     steps = study == "test"
     contact, evolution = scenario.contact, scenario.evolution
     model, name = contact.model, evolution.stepper
-    found = {"coefficient", "short_limit"} | _MODELS.get(model, set())
+    found = set(_MODELS.get(model, ()))
     theory = getattr(contact.options, "tangential", "strip")
     if model == "hertz-fastsim":
         march = getattr(contact.options, "closed_form", "") == "never"

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wearsim.mechanics.numerics.jit import kernel, subroutine
+from wearsim.mechanics.numerics.jit import subroutine
 from wearsim.types import FloatArray
 
 # Table of Kalker (1990), Three-Dimensional Elastic Bodies in Rolling Contact: one row per ratio,
@@ -80,7 +80,7 @@ class Flexibilities(NamedTuple):
     spin: float
 
 
-@kernel
+@subroutine
 def short_limit(ratio: float, nu: float) -> tuple[float, float, float, float]:
     """Return C11, C22, C23 and C33 for a/b -> 0, a contact that is long across rolling.
 
@@ -111,7 +111,7 @@ def long_limit(ratio: float, nu: float) -> tuple[float, float, float, float]:
     nu : float
         Poisson's ratio.
     """
-    log = math.log(16.0 / ratio**2)
+    log = math.log(16.0 / (ratio * ratio))
     rest = 3.0 - math.log(4.0)
     along, across = log - 2.0 * nu, (1.0 - nu) * log + 2.0 * nu
     turning = (1.0 - nu) * log - 2.0 + 4.0 * nu
@@ -165,13 +165,13 @@ def _at(knots: FloatArray, values: FloatArray, slopes: FloatArray, k: int, place
         i += 1
     step = knots[i + 1] - knots[i]
     t = (place - knots[i]) / step
-    h00, h01 = (1.0 + 2.0 * t) * (1.0 - t) ** 2, t * t * (3.0 - 2.0 * t)
-    h10, h11 = step * t * (1.0 - t) ** 2, step * t * t * (t - 1.0)
+    h00, h01 = (1.0 + 2.0 * t) * ((1.0 - t) * (1.0 - t)), t * t * (3.0 - 2.0 * t)
+    h10, h11 = step * t * ((1.0 - t) * (1.0 - t)), step * t * t * (t - 1.0)
     logarithm = h00 * values[i, k] + h01 * values[i + 1, k]
     return math.exp(logarithm + h10 * slopes[i, k] + h11 * slopes[i + 1, k])
 
 
-@kernel
+@subroutine
 def coefficient(which: int, ratio: float, nu: float, table: Spline) -> float:
     """Return one creepage coefficient, interpolated as described in `creepage_coefficients`.
 
@@ -203,8 +203,8 @@ def coefficient(which: int, ratio: float, nu: float, table: Spline) -> float:
     if place > high:  # continued towards the limit at b/a = 0
         slenderness, edge = 1.0 / ratio, math.exp(-high)
         excess = value / long_limit(edge, nu)[which] - 1.0
-        decay = math.log(16.0 / edge**2) / math.log(16.0 / slenderness**2)
-        return long_limit(slenderness, nu)[which] * (1.0 + excess * decay**2)
+        decay = math.log(16.0 / (edge * edge)) / math.log(16.0 / (slenderness * slenderness))
+        return long_limit(slenderness, nu)[which] * (1.0 + excess * (decay * decay))
     return value
 
 
@@ -311,7 +311,7 @@ def flexibilities(
     )
 
 
-@kernel
+@subroutine
 def one_flexibility(
     longitudinal: float,
     lateral: float,
