@@ -48,9 +48,11 @@ import wearsim
 from pathlib import Path
 from numba.core import event
 from wearsim.contact_batch import ContactBatch
+from wearsim.mechanics.numerics import jit
 from wearsim.models.contact.hertz_fastsim import HertzFastsim, HertzFastsimOptions
 from wearsim.types import Creepage, Grid, Material, OperatingPoint
 
+jit._ALONGSIDE.clear()  # compile all of them in this process
 compiled = event.RecordingListener()
 event.register("numba:compile", compiled)
 
@@ -179,6 +181,18 @@ def test_read_only_install_has_its_cache_in_the_user_folder(site: Path, tmp_path
     assert Path(first["file"]).is_relative_to(site)
     assert Path(first["path"]).is_relative_to(tmp_path / "cache")
     assert (first["hits"], second["hits"]) == (0, 1)
+
+
+@pytest.mark.slow
+def test_kernel_compiled_by_another_process_is_read_from_the_cache(tmp_path: Path):
+    code = "import json; from wearsim.mechanics.tangential import strip_theory as m;"
+    names = "from wearsim.mechanics.numerics.jit import not_cached; print(json.dumps("
+    names += "sorted(not_cached(['strip_contacts', 'solve_slender']))))"
+    run(f"{code} m.compile_strip_contacts(); {names}", NUMBA_CACHE_DIR=tmp_path)
+    stats = "s = m.strip_contacts.dispatcher.stats; print(json.dumps(len(s.cache_misses)))"
+    missing = run(f"{code} {names}", NUMBA_CACHE_DIR=tmp_path)
+    assert missing == ["solve_slender"]
+    assert run(CONTACT.rpartition("stats =")[0] + code + stats, NUMBA_CACHE_DIR=tmp_path) == 0
 
 
 @pytest.mark.slow

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import gc
+from types import SimpleNamespace
 
 import numba
 import numpy as np
 import pytest
 
-from wearsim.mechanics.numerics.jit import kernel, subroutine
+from wearsim.mechanics.numerics import jit
+from wearsim.mechanics.numerics.jit import compile_alongside, kernel, subroutine
 
 
 def _third_of_root(x: float) -> float:
@@ -89,3 +91,39 @@ def test_cache_folder_of_other_functions_is_unchanged(place: str, monkeypatch, t
     monkeypatch.setattr(numba.config, "CACHE_DIR", own)
     kernel(_third_of_root)
     assert own == numba.config.CACHE_DIR
+
+
+def _compile_others() -> None:
+    raise AssertionError("is called in another process")
+
+
+@pytest.mark.parametrize("cached", [True, False])
+def test_other_kernels_are_compiled_in_a_process_alongside(cached, monkeypatch, tmp_path):
+    started = []
+    fake = SimpleNamespace(DEVNULL=None, Popen=lambda command, **_: started.append(command))
+    monkeypatch.setattr(jit, "subprocess", fake)
+    monkeypatch.setattr(jit, "_cache_folder", lambda: tmp_path if cached else None)
+    monkeypatch.setattr(jit.os, "cpu_count", lambda: 2)
+
+    @kernel
+    def large(x: float) -> float:
+        return 3.0 * x
+
+    compile_alongside("large", _compile_others)
+    assert large(1.0) + large(2.0) == 9.0
+    ends = [command[-1].partition("; from ")[2] for command in started]
+    assert ends == [f"{__name__} import _compile_others; _compile_others()"] * cached
+
+
+def test_nothing_is_started_on_one_processor(monkeypatch, tmp_path):
+    monkeypatch.setattr(jit, "_cache_folder", lambda: tmp_path)
+    monkeypatch.setattr(jit.os, "cpu_count", lambda: 1)
+
+    @kernel
+    def larger(x: float) -> float:
+        return 4.0 * x
+
+    compile_alongside("larger", _compile_others)
+    before = len(jit._STARTED)
+    assert larger(1.0) == 4.0
+    assert len(jit._STARTED) == before

@@ -5,15 +5,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import wearsim
 from tests.materials import STEEL
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.mechanics.tangential.strip_interaction import strip_elasticity
 from wearsim.mechanics.tangential.strip_theory import (
     SUMS,
+    compile_strip_contacts,
     new_tractions,
     strip_contacts,
     strips_of_contact,
 )
+from wearsim.scenario.examples import shipped_scenario
 
 PAIR = combine(STEEL, STEEL)
 ELASTICITY = strip_elasticity(PAIR.contact_modulus, PAIR.shear_modulus)
@@ -190,3 +193,9 @@ def test_contact_totals_are_the_sums_over_strips():
     assert sums[4, 1] == pytest.approx(peak, rel=1e-9)
     adhering = found.adhesion_length.sum() / (2.0 * half_length.sum())
     assert sums[5, 1] == pytest.approx(adhering, rel=1e-9)
+
+
+def test_call_that_compiles_strip_contacts_has_the_signature_of_the_model():
+    compile_strip_contacts()
+    wearsim.solve_contact(shipped_scenario("rig-450min"))
+    assert len(strip_contacts.dispatcher.signatures) == 1

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import os
 import shutil
+import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -29,6 +30,8 @@ KEPT = 86400.0  # seconds for which the compiled kernels of other sources are ke
 _KERNELS: list[Kernel] = []
 _SUBROUTINES: list[Callable[..., Any]] = []  # those that numba has not been given yet
 _REPORTS: list[Callable[[str], None]] = []
+_ALONGSIDE: dict[str, Callable[[], None]] = {}  # by the name of a kernel
+_STARTED: list[Any] = []  # processes that compile kernels
 _LOCK = RLock()
 
 
@@ -103,6 +106,7 @@ def _prepared_numba() -> Any:
             """Report the kernel; subroutines are compiled as a part of it."""
             dispatcher = event.data["dispatcher"]
             if any(kernel.is_compiled_by(dispatcher) for kernel in _KERNELS):
+                _call_elsewhere(_ALONGSIDE.pop(dispatcher.__name__, None))
                 for report in _REPORTS:
                     report(dispatcher.__name__)
 
@@ -168,6 +172,37 @@ def compilation_reported(report: Callable[[str], None]) -> Iterator[None]:
         yield
     finally:
         _REPORTS.remove(report)
+
+
+def compile_alongside(name: str, function: Callable[[], None]) -> None:
+    """Call a function that compiles kernels in another process, when this one compiles a kernel.
+
+    This process reads the kernels from the cache when it calls them; it compiles those that are not
+    there by then. Nothing is started without a cache or a second processor.
+
+    Parameters
+    ----------
+    name : str
+        The kernel whose compilation starts the process.
+    function : callable
+        Public function of a module.
+    """
+    _ALONGSIDE[name] = function
+
+
+def _call_elsewhere(function: Callable[[], None] | None) -> None:
+    """Start a process that calls a function, if there are a cache and a second processor for it.
+
+    It ends when the function returns, also after the end of this process.
+    """
+    if function is None or _cache_folder() is None or (os.cpu_count() or 1) == 1:
+        return
+    name = function.__name__
+    code = f"import sys; sys.path[:] = {sys.path!r}; from {function.__module__} import {name}"
+    quiet: dict[str, Any] = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
+    with suppress(OSError):
+        command = [sys.executable, "-c", f"{code}; {name}()"]
+        _STARTED.append(subprocess.Popen(command, **quiet, start_new_session=True))
 
 
 def ready_kernels() -> set[str]:

@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wearsim.mechanics.numerics.jit import kernel, subroutine
+from wearsim.mechanics.numerics.jit import compile_alongside, kernel, subroutine
 from wearsim.mechanics.tangential.carter import spin_turns, straight_force, strip_force
 from wearsim.mechanics.tangential.strip_interaction import (
     StripElasticity,
@@ -265,3 +265,17 @@ def strip_contacts(
         sums[0, k], sums[1, k] = sum_x * spacing, sum_y * spacing
         sums[2, k], sums[3, k] = moment * spacing, power * spacing
         sums[4, k], sums[5, k] = peak, 0.5 * adhering / length
+
+
+def compile_strip_contacts() -> None:
+    """Compile `strip_contacts` by a call for one contact of one strip."""
+    strip, contact = np.ones((1, 1)), np.ones(1)
+    elasticity = StripElasticity(1e11, 4e10, np.ones((2, 2)))
+    slips = (contact, contact, contact, contact)  # rolling speed, both creepages, and spin
+    sums = np.empty((len(SUMS), 1))
+    strip_contacts(
+        strip, strip, contact, 1.0, elasticity, *slips, strip, strip, np.empty((1, 1)), sums
+    )
+
+
+compile_alongside("solve_slender", compile_strip_contacts)
