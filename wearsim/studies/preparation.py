@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -83,8 +84,8 @@ def software() -> Mapping[str, str]:
     """Return the versions of the packages that results may depend on, by name."""
     found = {}
     for name in SOFTWARE:
-        try:
-            found[name] = version(name)
+        try:  # a module that is loaded states its version without a search for its metadata
+            found[name] = getattr(sys.modules.get(name), "__version__", "") or version(name)
         except PackageNotFoundError:
             found[name] = "unknown"
     return found

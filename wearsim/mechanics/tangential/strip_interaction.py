@@ -32,7 +32,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wearsim.mechanics.numerics.jit import subroutine
-from wearsim.mechanics.tangential.kalker_coefficients import creepage_coefficients, short_limit
+from wearsim.mechanics.tangential.kalker_coefficients import coefficient, short_limit, spline
 from wearsim.types import FloatArray
 
 _STEP = 0.05  # of ln(a/b) in the table; the error of linear interpolation is below 1e-4
@@ -66,9 +66,12 @@ def strip_elasticity(contact_modulus: float, shear_modulus: float) -> StripElast
     nu = min(max(1.0 - shear_modulus / contact_modulus, 0.0), 0.5)
     ratios = np.exp(np.arange(_LOWEST, _HIGHEST + _STEP, _STEP))
     limit_x, limit_y, *_ = short_limit(float(ratios[0]), nu)
-    kalker = [creepage_coefficients(float(ratio), nu) for ratio in ratios]
-    widening = np.array([(c.c11 / limit_x, c.c22 / limit_y) for c in kalker])
-    return StripElasticity(float(contact_modulus), float(shear_modulus), widening)
+    limits = (limit_x, limit_y)  # of C11 and C22
+    widening = [
+        [coefficient(which, ratio, nu, spline(which)) / limits[which] for which in range(2)]
+        for ratio in ratios.tolist()
+    ]
+    return StripElasticity(float(contact_modulus), float(shear_modulus), np.array(widening))
 
 
 @subroutine
