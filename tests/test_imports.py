@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 SLOW = {"numpy", "numba", "h5py", "pint", "pydantic", "matplotlib", "scipy"}
-READ = f"wearsim.load_scenario({str(Path(__file__).parents[1] / 'scenarios/rig-450min.toml')!r})"
+RIG = Path(__file__).parents[1] / "scenarios" / "rig-450min.toml"
+READ = f"wearsim.load_scenario({str(RIG)!r})"
 HELP = """
 import contextlib, io, sys
 from wearsim.cli.app import app
@@ -81,3 +82,24 @@ def test_command_and_module_give_the_same_help():
     ]
     assert outputs[0] == outputs[1]
     assert "Usage: wearsim" in outputs[0]
+
+
+VERB = """
+import sys
+from wearsim.cli.app import main
+try:
+    sys.argv[1:] = {arguments!r}
+    main()
+except SystemExit as ended:
+    assert not ended.code, ended.code
+"""
+
+
+def test_verbs_load_only_what_they_use(tmp_path: Path):
+    file = str(tmp_path / "run.h5")
+    run = ["run", str(RIG), "--set", "operation.duration=1 min", "-o", file, "--quiet"]
+    loaded = modules_after(VERB.format(arguments=run), whole=True)
+    assert loaded >= {"numba", "h5py"}
+    assert not loaded & {"scipy.special", "scipy.stats", "scipy.optimize", "matplotlib", "loky"}
+    shown = modules_after(VERB.format(arguments=["show", file]))
+    assert not shown & {"numba", "scipy", "matplotlib"}

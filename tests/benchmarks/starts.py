@@ -65,7 +65,7 @@ def run_rows(effort: Effort) -> list[Row]:
         until_output = min(first_output(folder, cache) for _ in range(effort.repetitions))
         later = best(lambda: call(*command, NUMBA_CACHE_DIR=cache), effort.repetitions)
     return [
-        Row("first `wearsim run` after install, compiling", first, "20 s, aim 8 s"),
-        Row("later `wearsim run`, to its first output", until_output, "1.5 s"),
-        Row("later `wearsim run`, to its end", later),
+        Row("first `wearsim run` after install, compiling", first, "10 s, aim 6 s"),
+        Row("later `wearsim run`, to its first output", until_output, "1.0 s"),
+        Row("later `wearsim run`, to its end", later, "1.0 s, aim 0.6 s"),
     ]
