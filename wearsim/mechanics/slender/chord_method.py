@@ -30,7 +30,6 @@ from wearsim.mechanics.slender.half_length import (
     add_around,
     add_length_slopes,
     find_factors,
-    gather_length_slopes,
     log_half_length,
     new_half_lengths,
 )
@@ -102,7 +101,6 @@ class ChordState(NamedTuple):
     change: FloatArray
     work: FloatArray
     matrix: FloatArray
-    order: IntArray
     strip_inputs: FloatArray
     tractions: StripTractions
 
@@ -122,12 +120,11 @@ def new_chord_state(constants: ContactConstants, contacts: int, n: int) -> Chord
         np.empty((contacts, n, n)),
         np.empty((contacts, n)),
         np.zeros((contacts, n)),
-        new_half_lengths(constants.curvature_influence, log_scale, REACH),
+        new_half_lengths(constants.curvature_influence, log_scale),
         np.empty(n),
         np.empty(n),
         np.empty((6, max(n, BAND))),
         np.empty((n, n)),
-        np.empty(n, np.int64),
         np.zeros((3, n)),
         new_tractions(n),
     )
@@ -176,15 +173,15 @@ def set_anchor(
     n = line_load.shape[1]
     reach, small = min(BAND, n), 1e-3
     guards, count = _number_strips(g, line_load, state), state.loaded[g]
-    matrix, work = state.matrix, state.work
+    matrix, work, near = state.matrix, state.work, state.lengths.near
     state.surface[g] = 0.0
     for c in range(count):
         j = state.active[g, c]
         q = line_load[g, j]
         tau = log_half_length(g, j, line_load, state.lengths)
-        read_influence(constants.table, tau, n, True, work[0], work[1])
-        read_influence(constants.table, tau + small, reach, True, work[2], work[3])
-        read_influence(constants.table, tau - small, reach, True, work[4], work[5])
+        read_influence(constants.table, tau, n, work[0], work[1])
+        read_influence(constants.table, tau + small, reach, work[2], work[3])
+        read_influence(constants.table, tau - small, reach, work[4], work[5])
         for r in range(count):
             matrix[c, r] = constants.unit * work[1, abs(state.active[g, r] - j)]
         for k in range(reach):
@@ -196,16 +193,17 @@ def set_anchor(
         for r in range(guards):
             state.guard_row[g, r, c] = constants.unit * work[1, abs(state.guard[g, r] - j)]
         add_around(j, 0, n - 1, constants.unit * q, work[0], state.surface[g])
-        if constants.curvature_influence.shape[0] > 0:
-            gather_length_slopes(g, j, constants.unit * q, work[0], work[1], state.lengths)
+        for d in range(min(n, REACH + 1)):
+            slope = constants.unit * q * (work[1, d] - work[0, d])
+            near[REACH - d, j + 2 * REACH] = near[REACH + d, j + 2 * REACH] = slope
     if constants.curvature_influence.shape[0] > 0:
         row = np.full(line_load.shape, -1)
         for r in range(count):
             row[g, state.active[g, r]] = r
-        add_length_slopes(g, line_load, row, state.lengths, matrix)
-    if not factor_in_place(matrix, count, state.order):
+        add_length_slopes(g, constants.table, constants.unit, line_load, row, state.lengths, matrix)
+    if not factor_in_place(matrix, count):
         return False
-    invert_factored(matrix, count, state.order, state.inverse[g])
+    invert_factored(matrix, count, state.inverse[g])
     for r in range(count):
         state.unit_load[g, r] = 0.0
         for c in range(count):
@@ -228,7 +226,7 @@ def fill_remainder(g: int, loads: Loads, constants: ContactConstants, state: Cho
                 work[0, k] = state.near[g, c, 2, k] * x * x
         else:
             tau = log_half_length(g, j, loads.line_load, state.lengths)
-            read_influence(constants.table, tau, reach, True, work[2], work[3])
+            read_influence(constants.table, tau, reach, work[2], work[3])
             for k in range(reach):
                 phi = constants.unit * q * work[2, k]
                 work[0, k] = phi - state.near[g, c, 0, k] - state.near[g, c, 1, k] * x

@@ -25,14 +25,13 @@ from typing import NamedTuple
 import numpy as np
 
 from wearsim.mechanics.numerics.jit import subroutine
-from wearsim.mechanics.slender.influence import HIGHEST, read_influence
+from wearsim.mechanics.slender.influence import HIGHEST, interpolation, read_influence
 from wearsim.types import FloatArray, IntArray
 
 SWEEPS = 2
 LOWEST_FACTOR = 0.1
 HIGHEST_FACTOR = 4.0
-REACH = 4  # strips on either side whose loads enter the derivative of s in the chord method
-NEWTON_REACH = 3  # the same in Newton's method, whose last steps then shrink a hundredfold
+REACH = 3  # strips on either side whose loads enter the derivative of s
 
 
 class HalfLengths(NamedTuple):
@@ -40,8 +39,10 @@ class HalfLengths(NamedTuple):
 
     `table` is from `curvature_table`, or from `no_table` for strips without interaction, and
     `log_scale` is ln(a/dy) of such a strip at 1 N/m, (contacts,). `factor` is s and `log_ratio` is
-    ln(a/dy), (contacts, strips); `slope` is the derivative of ln s_j by ln q of strip
-    j + c - reach, (contacts, strips, c). `slope_part`, `gathered` and `work` are work space.
+    ln(a/dy), (contacts, strips). `slope[k, REACH + c, i + 2 REACH]` is the derivative of ln s of
+    strip i by ln q of strip i + c, and `near[REACH + d, i + 2 REACH]` is the derivative by the ln s
+    of strip i of its influence on strip i + d; both are zero beyond the strips. `chained`,
+    `gathered` and `work` are work space.
     """
 
     table: FloatArray
@@ -49,29 +50,35 @@ class HalfLengths(NamedTuple):
     factor: FloatArray
     log_ratio: FloatArray
     slope: FloatArray
-    slope_part: FloatArray
+    near: FloatArray
+    chained: FloatArray
     gathered: FloatArray
     work: FloatArray
 
 
 @subroutine
-def new_half_lengths(table: FloatArray, log_scale: FloatArray, reach: int) -> HalfLengths:
-    """Return the `HalfLengths` of contacts, to be filled; `reach` is `REACH` or `NEWTON_REACH`."""
+def new_half_lengths(table: FloatArray, log_scale: FloatArray) -> HalfLengths:
+    """Return the `HalfLengths` of contacts, to be filled."""
     contacts, n = log_scale.shape[0], table.shape[2]
+    wide = n + 4 * REACH
     lengths = HalfLengths(
         table,
         log_scale,
         np.empty((contacts, n)),
         np.empty((contacts, n)),
-        np.empty((contacts, n, 2 * reach + 1)),
-        np.empty((n, 4 * reach + 1)),
-        np.empty((n, 4 * reach + 1)),
-        np.empty((3, n)),
+        np.empty((contacts, 2 * REACH + 1, wide)),
+        np.empty((2 * REACH + 1, wide)),
+        np.empty((2 * REACH + 1, wide)),
+        np.empty((4 * REACH + 1, n)),
+        np.empty((4, n)),
     )
-    # numba compiles a loop faster than np.zeros
-    for i in range(n):
-        for c in range(4 * reach + 1):
-            lengths.slope_part[i, c] = lengths.gathered[i, c] = 0.0
+    # numba compiles loops faster than np.zeros
+    for c in range(2 * REACH + 1):
+        for i in range(wide):
+            lengths.near[c, i] = lengths.chained[c, i] = 0.0
+        for k in range(contacts):
+            for i in range(wide):
+                lengths.slope[k, c, i] = 0.0
     return lengths
 
 
@@ -96,10 +103,12 @@ def fill_half_lengths(
 ) -> None:
     """Fill the half-length a [m] of every strip, (contacts, strips)."""
     for k in range(line_load.shape[0]):
+        one_newton = spacing * np.exp(lengths.log_scale[k])
         for j in range(line_load.shape[1]):
             half_length[k, j] = 0.0
             if line_load[k, j] > 0.0:
-                half_length[k, j] = spacing * np.exp(log_half_length(k, j, line_load, lengths))
+                square = line_load[k, j] * lengths.factor[k, j]
+                half_length[k, j] = one_newton * np.sqrt(square)
 
 
 @subroutine
@@ -115,27 +124,113 @@ def add_around(
 
 
 @subroutine
-def _add_slope(
-    j: int,
-    weight: float,
+def add_influences(
+    table: FloatArray,
+    k: int,
+    left: int,
+    right: int,
+    weight: FloatArray,
+    log_ratio: FloatArray,
     value: FloatArray,
-    tangent: FloatArray,
-    chained: bool,
-    slope: FloatArray,
-    slope_part: FloatArray,
+    total: FloatArray,
 ) -> None:
-    """Add the derivative by the loads of the curvature that strip `j` causes nearby.
+    """Add the influence of the loaded strips of contact `k` to the strips `left` to `right`.
 
-    The curvature depends on ln q_j through a and, if `chained`, on ln s_j through a and 1/s.
+    Parameters
+    ----------
+    table : ndarray, shape (nodes, 2, strips)
+        Of F_k or C_k.
+    weight : ndarray, shape (strips,)
+        Factors of the influence of each strip; 0 for strips without load.
+    log_ratio : ndarray, shape (contacts, strips)
+        ln(a/dy).
+    value : ndarray, shape (strips,)
+        Work space.
+    total : ndarray, shape (strips,)
+        Increased.
     """
-    wide, reach = slope.shape[1], slope.shape[1] // 2
-    for i in range(max(0, j - reach), min(slope.shape[0], j + reach + 1)):
-        by_length = weight * (tangent[abs(i - j)] - value[abs(i - j)])
-        slope_part[i, j - i + 2 * reach] += by_length
-        if chained:
-            by_factor, start = by_length - weight * value[abs(i - j)], j - i + reach
-            for c in range(wide):
-                slope_part[i, start + c] += by_factor * slope[j, c]
+    for j in range(weight.shape[0]):
+        if weight[j] == 0.0:
+            continue
+        node, (v0, v1, w0, w1), _ = interpolation(table, log_ratio[k, j])
+        v0, v1, w0, w1 = v0 * weight[j], v1 * weight[j], w0 * weight[j], w1 * weight[j]
+        for d in range(max(right - j, j - left) + 1):
+            low = v0 * table[node, 0, d] + v1 * table[node, 1, d]
+            value[d] = low + (w0 * table[node + 1, 0, d] + w1 * table[node + 1, 1, d])
+        here = np.uint64(j)
+        for d in range(np.uint64(0), np.uint64(right - j + 1)):
+            total[here + d] += value[d]
+        for d in range(np.uint64(1), np.uint64(j - left + 1)):
+            total[here - d] += value[d]
+
+
+@subroutine
+def _fill_near(k: int, table: FloatArray, weight: FloatArray, lengths: HalfLengths) -> None:
+    """Fill the derivatives of the influence of each strip by its ln q and by its ln s.
+
+    The influence of a strip on those up to the reach away is `weight` times F_k or C_k; it depends
+    on ln q through a (`near`), and where it is divided by s, on ln s through a and 1/s (`chained`).
+    Both are 0 for strips without weight.
+    """
+    near, chained, log_ratio = lengths.near, lengths.chained, lengths.log_ratio
+    value, tangent = lengths.work[1], lengths.work[2]
+    count = min(weight.shape[0], REACH + 1)
+    for j in range(weight.shape[0]):
+        here = j + 2 * REACH
+        if weight[j] != 0.0:
+            read_influence(table, log_ratio[k, j], count, value, tangent)
+        for d in range(count):
+            by_length = by_factor = 0.0
+            if weight[j] != 0.0:
+                by_length = weight[j] * (tangent[d] - value[d])
+                by_factor = by_length - weight[j] * value[d]
+            near[REACH - d, here] = near[REACH + d, here] = by_length
+            chained[REACH - d, here] = chained[REACH + d, here] = by_factor
+
+
+@subroutine
+def _gather(
+    k: int, first: int, last: int, far: int, part: FloatArray, lengths: HalfLengths
+) -> None:
+    """Fill `gathered` with the derivatives by ln q of the influence on strips, through s.
+
+    Parameters
+    ----------
+    k, first, last : int
+        Contact, and the strips concerned.
+    far : int
+        Greatest distance between a strip and that of q.
+    part : ndarray
+        `near` or `chained`: derivative of the influence of each strip by its ln s.
+    """
+    slope, gathered = lengths.slope, lengths.gathered
+    start, stop = np.uint64(first), np.uint64(last + 1)
+    for c in range(-far, far + 1):
+        for i in range(start, stop):
+            gathered[far + c, i] = 0.0
+        for d in range(max(-REACH, c - REACH), min(REACH, c + REACH) + 1):
+            shift = np.uint64(2 * REACH + d)
+            for i in range(start, stop):
+                derivative = part[REACH + d, i + shift] * slope[k, REACH + c - d, i + shift]
+                gathered[far + c, i] += derivative
+
+
+@subroutine
+def _add_slopes(
+    k: int, first: int, last: int, total: FloatArray, chained: bool, lengths: HalfLengths
+) -> None:
+    """Add the derivative of ln K, with K in `total`, to that of ln s."""
+    near, slope, gathered = lengths.near, lengths.slope, lengths.gathered
+    if chained:
+        _gather(k, first, last, REACH, lengths.chained, lengths)
+    for c in range(2 * REACH + 1):
+        shift = np.uint64(c + REACH)
+        for i in range(np.uint64(first), np.uint64(last + 1)):
+            here = i + np.uint64(2 * REACH)
+            if chained:
+                slope[k, c, here] += (gathered[c, i] + near[c, i + shift]) / total[i]
+            else:
+                slope[k, c, here] = near[c, i + shift] / total[i]
 
 
 @subroutine
@@ -147,41 +242,6 @@ def _find_span(k: int, line_load: FloatArray) -> tuple[int, int]:
     while first < last and not line_load[k, first] > 0.0:
         first += 1
     return first, last
-
-
-@subroutine
-def _update_factors(
-    k: int,
-    first: int,
-    last: int,
-    line_load: FloatArray,
-    total: FloatArray,
-    sloped: bool,
-    lengths: HalfLengths,
-) -> float:
-    """Multiply s by the curvature `total` within its bounds; return the greatest ln(a/dy).
-
-    If `sloped`, the slope of ln K is added to that of ln s, truncated to the reach, and
-    `slope_part` is cleared.
-    """
-    widest, factor = -np.inf, lengths.factor
-    slope, slope_part = lengths.slope[k], lengths.slope_part
-    wide = slope.shape[1]
-    for j in range(first, last + 1):
-        if line_load[k, j] > 0.0:
-            before = factor[k, j]
-            after = min(max(before * total[j], LOWEST_FACTOR), HIGHEST_FACTOR)
-            factor[k, j] = after
-            lengths.log_ratio[k, j] += 0.5 * np.log(after / before)
-            widest = max(widest, lengths.log_ratio[k, j])
-            if sloped:
-                scale = 1.0 / total[j]
-                for c in range(wide):
-                    slope[j, c] += slope_part[j, c + wide // 2] * scale
-    if sloped:
-        for j in range(max(0, first - wide // 2), min(slope.shape[0], last + wide // 2 + 1)):
-            slope_part[j] = 0.0
-    return widest
 
 
 @subroutine
@@ -204,73 +264,61 @@ def find_factors(k: int, line_load: FloatArray, sloped: bool, lengths: HalfLengt
     float
         The greatest ln(a/dy) encountered; where it exceeds HIGHEST the results are incomplete.
     """
-    total, value, tangent = lengths.work[0], lengths.work[1], lengths.work[2]
-    slope, n = lengths.slope[k], line_load.shape[1]
+    total, value, weight = lengths.work[0], lengths.work[1], lengths.work[3]
+    factor, log_ratio = lengths.factor, lengths.log_ratio
     first, last = _find_span(k, line_load)
-    widest = -np.inf
-    slope[:] = 0.0
-    for j in range(n):
-        lengths.factor[k, j] = 1.0
+    widest, log_scale = -np.inf, lengths.log_scale[k]
+    for j in range(line_load.shape[1]):
+        factor[k, j], weight[j] = 1.0, 0.0
         if line_load[k, j] > 0.0:
-            lengths.log_ratio[k, j] = log_half_length(k, j, line_load, lengths)
-            widest = max(widest, lengths.log_ratio[k, j])
+            log_ratio[k, j] = log_scale + 0.5 * np.log(line_load[k, j])
+            widest = max(widest, log_ratio[k, j])
     if lengths.table.shape[0] == 0:
         return widest
     for sweep in range(SWEEPS):
         if widest > HIGHEST:
             break
-        total[:] = 0.0
         for j in range(first, last + 1):
-            if not line_load[k, j] > 0.0:
-                continue
-            count, weight = max(last - j, j - first) + 1, 0.25 / lengths.factor[k, j]
-            if sloped:
-                count = min(n, max(count, slope.shape[1]))
-            read_influence(lengths.table, lengths.log_ratio[k, j], count, sloped, value, tangent)
-            if sloped:
-                _add_slope(j, weight, value, tangent, sweep > 0, slope, lengths.slope_part)
-            add_around(j, first, last, weight, value, total)
-        reached = _update_factors(k, first, last, line_load, total, sloped, lengths)
-        widest = max(widest, reached)
+            total[j] = 0.0
+            if line_load[k, j] > 0.0:
+                weight[j] = 0.25 / factor[k, j]
+        add_influences(lengths.table, k, first, last, weight, log_ratio, value, total)
+        if sloped:
+            _fill_near(k, lengths.table, weight, lengths)
+            _add_slopes(k, first, last, total, sweep > 0, lengths)
+        for j in range(first, last + 1):
+            if line_load[k, j] > 0.0:
+                after = min(max(factor[k, j] * total[j], LOWEST_FACTOR), HIGHEST_FACTOR)
+                factor[k, j] = after
+                log_ratio[k, j] = log_scale + 0.5 * np.log(line_load[k, j] * after)
+                widest = max(widest, log_ratio[k, j])
     return widest
-
-
-@subroutine
-def gather_length_slopes(
-    k: int, j: int, push: float, value: FloatArray, tangent: FloatArray, lengths: HalfLengths
-) -> None:
-    """Add the derivative of the surface around strip `j` of contact `k` by ln q, through s_j.
-
-    `value` and `tangent` are those of F_k (see `read_influence`), and `push` is the displacement
-    for F_k = 1.
-    """
-    slope, gathered = lengths.slope[k], lengths.gathered
-    wide, reach = slope.shape[1], slope.shape[1] // 2
-    for i in range(max(0, j - reach), min(slope.shape[0], j + reach + 1)):
-        moved, start = push * (tangent[abs(i - j)] - value[abs(i - j)]), j - i + reach
-        for c in range(wide):
-            gathered[i, start + c] += moved * slope[j, c]
 
 
 @subroutine
 def add_length_slopes(
     k: int, line_load: FloatArray, index: IntArray, lengths: HalfLengths, matrix: FloatArray
 ) -> None:
-    """Add the terms of `gather_length_slopes` to the Jacobian of contact `k` and clear them.
+    """Add the derivative of the displacements by the loads, through s, to a Jacobian.
 
-    `matrix` is stored by columns; `index` is the row of each strip in contact and -1 for the
-    others, (contacts, strips).
+    Parameters
+    ----------
+    k : int
+        Number of the contact.
+    line_load : ndarray, shape (contacts, strips)
+        q [N/m].
+    index : ndarray of int, shape (contacts, strips)
+        Row of each strip in contact, -1 for the others.
+    lengths : HalfLengths
+        From `find_factors`, with slopes; `near` is the derivative of the displacements by ln s.
+    matrix : ndarray
+        Jacobian of contact `k`, by columns.
     """
     gathered = lengths.gathered
-    n, half = gathered.shape[0], gathered.shape[1] // 2
     first, last = _find_span(k, line_load)
+    _gather(k, first, last, 2 * REACH, lengths.near, lengths)
     for j in range(first, last + 1):
-        column = index[k, j]
-        if column < 0:
-            continue
-        scale = 1.0 / line_load[k, j]
-        for i in range(max(0, j - half), min(n, j + half + 1)):
-            if index[k, i] >= 0:
-                matrix[column, index[k, i]] += gathered[i, j - i + half] * scale
-    for i in range(max(0, first - half), min(n, last + half + 1)):
-        gathered[i] = 0.0
+        column, scale = index[k, j], 1.0 / max(line_load[k, j], 1e-300)
+        for i in range(max(first, j - 2 * REACH), min(last, j + 2 * REACH) + 1):
+            if column >= 0 and index[k, i] >= 0:
+                matrix[column, index[k, i]] += scale * gathered[j - i + 2 * REACH, i]

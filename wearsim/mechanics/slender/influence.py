@@ -158,51 +158,13 @@ def _tabulated(
 
 
 @subroutine
-def _weights(table: FloatArray, tau: float) -> tuple[int, float, tuple[float, float, float, float]]:
-    """Return the node below `tau`, the distance to it in steps, and the weights of the cubic.
+def interpolation(
+    table: FloatArray, tau: float
+) -> tuple[int, tuple[float, float, float, float], tuple[float, float, float, float]]:
+    """Return the node below `tau` and the weights of the cubic, for F_k (or C_k) and its tangent.
 
-    The weights are those of value and slope at the node, then at the next one.
-    """
-    position = max((tau - LOWEST) / STEP, 0.0)
-    node = min(int(position), table.shape[0] - 2)
-    s = position - node
-    low, low_slope = (1.0 + 2.0 * s) * (1.0 - s) ** 2, s * (1.0 - s) ** 2
-    high, high_slope = s * s * (3.0 - 2.0 * s), s * s * (s - 1.0)
-    return node, s, (low, low_slope, high, high_slope)
-
-
-@subroutine
-def read_value(table: FloatArray, tau: float, distance: int) -> float:
-    """Interpolate F_k or C_k of one strip at one distance.
-
-    Parameters
-    ----------
-    table, tau
-        As in `read_influence`.
-    distance : int
-        k.
-
-    Returns
-    -------
-    float
-        F_k (or C_k).
-    """
-    node, _, (v0, v1, w0, w1) = _weights(table, tau)
-    low = v0 * table[node, 0, distance] + v1 * table[node, 1, distance]
-    high = w0 * table[node + 1, 0, distance] + w1 * table[node + 1, 1, distance]
-    return float(low + high)
-
-
-@subroutine
-def read_influence(
-    table: FloatArray,
-    tau: float,
-    count: int,
-    sloped: bool,
-    value: FloatArray,
-    tangent: FloatArray,
-) -> None:
-    """Interpolate F_k or C_k of one strip, and its derivative for Newton's method.
+    The weights are those of value and slope at the node, then at the next one. The tangent is
+    d(q F_k)/dq = F_k + (dF_k/dtau)/2, as a is proportional to the square root of q.
 
     Parameters
     ----------
@@ -210,26 +172,50 @@ def read_influence(
         From `influence_table` or `curvature_table`.
     tau : float
         ln(a/dy) of the loaded strip, up to HIGHEST; values below LOWEST are replaced by LOWEST.
+    """
+    position = max((tau - LOWEST) / STEP, 0.0)
+    node = min(int(position), table.shape[0] - 2)
+    s = position - node
+    low, low_slope = (1.0 + 2.0 * s) * (1.0 - s) ** 2, s * (1.0 - s) ** 2
+    high, high_slope = s * s * (3.0 - 2.0 * s), s * s * (s - 1.0)
+    half = 0.5 / STEP if tau > LOWEST else 0.0
+    tangent = (
+        low + half * 6.0 * s * (s - 1.0),
+        low_slope + half * (3.0 * s - 1.0) * (s - 1.0),
+        high - half * 6.0 * s * (s - 1.0),
+        high_slope + half * s * (3.0 * s - 2.0),
+    )
+    return node, (low, low_slope, high, high_slope), tangent
+
+
+@subroutine
+def read_value(table: FloatArray, tau: float, distance: int) -> float:
+    """Interpolate F_k or C_k of one strip at one distance k; arguments as in `read_influence`."""
+    node, (v0, v1, w0, w1), _ = interpolation(table, tau)
+    low = v0 * table[node, 0, distance] + v1 * table[node, 1, distance]
+    high = w0 * table[node + 1, 0, distance] + w1 * table[node + 1, 1, distance]
+    return float(low + high)
+
+
+@subroutine
+def read_influence(
+    table: FloatArray, tau: float, count: int, value: FloatArray, tangent: FloatArray
+) -> None:
+    """Interpolate F_k or C_k of one strip, and its derivative for Newton's method.
+
+    Parameters
+    ----------
+    table, tau
+        As in `interpolation`.
     count : int
         Number of distances k to fill.
-    sloped : bool
-        Whether the derivative is computed.
-    value : ndarray, shape (>= count,)
-        Filled: F_k (or C_k).
-    tangent : ndarray, shape (>= count,)
-        Filled if `sloped`: d(q F_k)/dq = F_k + (dF_k/dtau)/2, as a is proportional to the square
-        root of q.
+    value, tangent : ndarray, shape (>= count,)
+        Filled: F_k (or C_k) and its tangent.
     """
-    node, s, (v0, v1, w0, w1) = _weights(table, tau)
-    half = 0.5 / STEP if tau > LOWEST else 0.0
-    d0 = v0 + half * 6.0 * s * (s - 1.0)
-    d1 = v1 + half * (3.0 * s - 1.0) * (s - 1.0)
-    e0 = w0 - half * 6.0 * s * (s - 1.0)
-    e1 = w1 + half * s * (3.0 * s - 2.0)
-    low, low_slope = table[node, 0], table[node, 1]
-    high, high_slope = table[node + 1, 0], table[node + 1, 1]
+    node, (v0, v1, w0, w1), (d0, d1, e0, e1) = interpolation(table, tau)
     for k in range(count):
-        a, b, c, d = low[k], low_slope[k], high[k], high_slope[k]
+        # indices instead of rows: numba counts the references to every row
+        a, b = table[node, 0, k], table[node, 1, k]
+        c, d = table[node + 1, 0, k], table[node + 1, 1, k]
         value[k] = v0 * a + v1 * b + w0 * c + w1 * d
-        if sloped:
-            tangent[k] = d0 * a + d1 * b + e0 * c + e1 * d
+        tangent[k] = d0 * a + d1 * b + e0 * c + e1 * d

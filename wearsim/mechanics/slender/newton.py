@@ -12,7 +12,7 @@ of strips in contact and the unknown approach delta uses the steps of `newton_st
 
 Where contacts wear shared bodies, the gap of contact k opens by the wear that all contacts cause on
 its bodies: the left-hand side is increased by D_i, the sum over its bodies and all l of their
-contacts of c_l,i q_l,i. `body_elimination` turns the steps of the separate contacts into the
+contacts of c_l,i q_l,i. `body_wear` turns the steps of the separate contacts into the
 coupled step.
 """
 
@@ -24,29 +24,29 @@ from typing import Any
 import numpy as np
 
 from wearsim.mechanics.numerics.jit import kernel, subroutine
-from wearsim.mechanics.numerics.lu import factor_in_place, solve_factored
-from wearsim.mechanics.slender.half_length import (
-    NEWTON_REACH,
-    add_around,
-    add_length_slopes,
-    fill_half_lengths,
-    find_factors,
-    gather_length_slopes,
-    new_half_lengths,
-)
-from wearsim.mechanics.slender.influence import HIGHEST, read_influence
-from wearsim.mechanics.slender.newton_step import (
-    NewtonState,
-    add_approach,
+from wearsim.mechanics.numerics.lu import solve_factored
+from wearsim.mechanics.slender.body_wear import (
     add_depths,
-    correct_residual,
     factor_depths,
     fill_responses,
     new_depth_system,
+    solve_depths,
+)
+from wearsim.mechanics.slender.half_length import (
+    fill_half_lengths,
+    find_factors,
+    new_half_lengths,
+)
+from wearsim.mechanics.slender.influence import HIGHEST
+from wearsim.mechanics.slender.newton_step import (
+    NewtonState,
+    add_approach,
+    add_displacement,
+    correct_residual,
+    fill_jacobian,
     new_newton_state,
     number_strips,
     predict_surface,
-    solve_depths,
     update_loads,
 )
 from wearsim.types import FloatArray, IntArray
@@ -255,9 +255,8 @@ def solve_slender(
                 total[:] = 0.0
             state = new_newton_state(contacts, n)
             surface, lowest = state.surface, state.lowest
-            value, tangent = state.value, state.tangent
             log_scale = log_scales_of(contact_modulus, longitudinal_curvature[number], spacing)
-            lengths = new_half_lengths(curvature_influence, log_scale, NEWTON_REACH)
+            lengths = new_half_lengths(curvature_influence, log_scale)
             for k in range(contacts):
                 for i in range(n):  # a loop, as numba takes seconds to compile an array assignment
                     surface[k, i] = own[k, i]
@@ -281,65 +280,38 @@ def solve_slender(
                 iteration += 1
                 for k in range(contacts):
                     for i in range(n):
-                        surface[k, i] = gap[number, k, i] - lowest[k]
+                        surface[k, i] = gap[number, k, i] - lowest[k] + own[k, i] * total[k, i]
                 if bodies is not None:
                     add_depths(bodies, shared[number], total, surface)
                 renewed = False
                 for k in range(contacts):
-                    fresh, matrix, order = state.fresh[k], state.matrix[k], state.order[k]
+                    fresh = state.fresh[k]
                     if fresh:
                         number_strips(k, total, state)
                     if find_factors(k, total, fresh, lengths) > HIGHEST:
                         outcome = TOO_FINE
                         break
-                    size, step, pressed = state.size[k], state.step[k], surface[k]
-                    # add the displacement, and fill a fresh Jacobian
-                    for column in range(size):
-                        j = state.place[k, column]
-                        push, tau = unit * total[k, j], lengths.log_ratio[k, j]
-                        reach = max(j + 1, n - j)
-                        read_influence(table, tau, reach, fresh, value, tangent)
-                        if fresh:
-                            state.diagonal[k, column] = unit * tangent[0]
-                            outer = state.outer[k, column]
-                            outer[:] = 0.0
-                            add_around(j, 0, n - 1, unit, tangent, outer)
-                            for row in range(size):
-                                matrix[column, row] = outer[state.place[k, row]]
-                            if curvature_influence.shape[0] > 0:
-                                gather_length_slopes(k, j, push, value, tangent, lengths)
-                        state.pressed[k, column] = push * value[0]
-                        add_around(j, 0, n - 1, push, value, pressed)
-                    if fresh and curvature_influence.shape[0] > 0:
-                        add_length_slopes(k, total, state.rows, lengths, matrix)
-                    for row in range(size):
-                        i = state.place[k, row]
-                        surface[k, i] += own[k, i] * total[k, i]
-                        state.missing[k, row] = -surface[k, i]
-                        if fresh:
-                            matrix[row, row] += own[k, i]
-                    if fresh:
-                        if not factor_in_place(matrix, size, order):
-                            outcome = SINGULAR
-                            break
-                        step[:size] = 1.0
-                        solve_factored(matrix, size, order, step, state.unit_load[k])
+                    if not fresh:
+                        add_displacement(k, table, unit, total, lengths, state)
+                    elif fill_jacobian(k, table, unit, own, total, lengths, state):
+                        solve_factored(state.matrix[k], state.size[k], state.unit_load[k])
                         state.unit_load_sum[k] = 0.0
-                        for row in range(size):
+                        for row in range(state.size[k]):
                             state.unit_load_sum[k] += state.unit_load[k, row]
-                        state.fresh[k] = False
-                        if not abs(state.unit_load_sum[k]) > 0.0:
-                            outcome = SINGULAR
-                            break
-                        renewed = True
+                        state.fresh[k], renewed = False, True
                         if bodies is not None:
                             fill_responses(k, state, system)
+                    if state.fresh[k] or not abs(state.unit_load_sum[k]) > 0.0:
+                        outcome = SINGULAR
+                        break
+                    for row in range(state.size[k]):
+                        state.missing[k, row] = -surface[k, state.place[k, row]]
                 if outcome != CONTINUE:
                     break
                 if (
                     bodies is not None
                     and renewed
-                    and not factor_depths(bodies, shared[number], state.rows, system)
+                    and not factor_depths(bodies, shared[number], state, system)
                 ):
                     outcome = SINGULAR
                     break
@@ -347,13 +319,12 @@ def solve_slender(
                     for k in range(contacts):
                         if sweep:
                             correct_residual(k, table, unit, total, lengths, state)
-                        size, step = state.size[k], state.step[k]
-                        solve_factored(
-                            state.matrix[k], size, state.order[k], state.missing[k], step
-                        )
+                        for row in range(state.size[k]):
+                            state.step[k, row] = state.missing[k, row]
+                        solve_factored(state.matrix[k], state.size[k], state.step[k])
                         add_approach(k, load[k] / spacing, total, state, delta)
                     if bodies is not None:
-                        solve_depths(bodies, shared[number], state.rows, system, state.step, delta)
+                        solve_depths(bodies, shared[number], state, system, delta)
                 change, left = update_loads(total, state, iteration > CAUTIOUS)
                 for k in range(contacts):
                     predict_surface(k, surface, state)
