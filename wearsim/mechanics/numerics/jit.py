@@ -222,8 +222,13 @@ def not_cached(names: Iterable[str]) -> set[str]:
 
 
 def own_array(array: FloatArray) -> FloatArray:
-    """Return a writable contiguous copy, the only kind of array that kernels accept."""
+    """Return a writable contiguous copy, the kind of array that kernels accept."""
     return np.array(array, dtype=np.float64, order="C")
+
+
+def kernel_input(array: FloatArray) -> FloatArray:
+    """Return `array` if kernels accept it, or a copy; for arrays that kernels do not change."""
+    return array if array.flags.carray and array.dtype == np.float64 else own_array(array)
 
 
 @cache

@@ -200,7 +200,7 @@ def set_anchor(
         row = np.full(line_load.shape, -1)
         for r in range(count):
             row[g, state.active[g, r]] = r
-        add_length_slopes(g, constants.table, constants.unit, line_load, row, state.lengths, matrix)
+        add_length_slopes(g, line_load, row, state.lengths, matrix)
     if not factor_in_place(matrix, count):
         return False
     invert_factored(matrix, count, state.inverse[g])

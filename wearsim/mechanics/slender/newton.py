@@ -246,11 +246,13 @@ def solve_slender(
     for number in range(gap.shape[0]):
         load, total, delta = loads[number], line_load[number], approach[number]
         own = compliance[number]
-        started = False
+        started, finite = False, True
         for k in range(contacts):
             for i in range(n):
                 started = started or total[k, i] > 0.0
-        for attempt in range(2 if started else 1):
+                finite = finite and abs(gap[number, k, i]) < np.inf
+        status[number], iterations[number] = NOT_FINITE, 0
+        for attempt in range(int(finite) + int(finite and started)):
             if attempt > 0:
                 total[:] = 0.0
             state = new_newton_state(contacts, n)

@@ -11,7 +11,7 @@ from pydantic import Field
 from wearsim.contact_batch import NO_BODY, ContactBatch, ContactBatchSolution
 from wearsim.errors import ContactError
 from wearsim.mechanics.hertz.elasticity import ElasticPair
-from wearsim.mechanics.numerics.jit import own_array
+from wearsim.mechanics.numerics.jit import kernel_input, own_array
 from wearsim.mechanics.slender import newton as kernels
 from wearsim.mechanics.slender.influence import HIGHEST, curvature_table, no_table
 from wearsim.mechanics.tangential.strip_interaction import strip_elasticity
@@ -75,9 +75,9 @@ class NormalContacts(NamedTuple):
             approach = own_array(start.approach).reshape(shape)
         status, iterations = np.zeros((2, shape[0]), np.int64)
         return cls(
-            own_array(batch.gap).reshape(wide),
-            own_array(batch.longitudinal_curvature).reshape(shape),
-            own_array(batch.normal_force).reshape(shape),
+            kernel_input(batch.gap).reshape(wide),
+            kernel_input(batch.longitudinal_curvature).reshape(shape),
+            kernel_input(batch.normal_force).reshape(shape),
             line_load,
             approach,
             np.zeros(wide),
@@ -105,7 +105,7 @@ class NormalContacts(NamedTuple):
         constants : Constants
         """
         if not isinstance(wear, SharedWear):
-            own = np.zeros(self.gap.shape) if wear is None else own_array(wear)
+            own = np.zeros(self.gap.shape) if wear is None else kernel_input(wear)
             self._solve(own.reshape(self.gap.shape), None, None, constants)
             return
         for numbers, own, members, shared in wear.groups:
@@ -142,10 +142,6 @@ class NormalContacts(NamedTuple):
             self.status,
             self.iterations,
         )
-        # the kernels skip strips with a gap that is not finite
-        finite = np.isfinite(self.gap)
-        if np.count_nonzero(finite) < finite.size:
-            self.status[~finite.all(axis=(1, 2))] = kernels.NOT_FINITE
 
 
 def strip_tractions(
@@ -175,11 +171,11 @@ def strip_tractions(
         grid.y,
         grid.spacing,
         strip_elasticity(pair.contact_modulus, pair.shear_modulus),
-        own_array(batch.rolling_speed),
-        own_array(batch.longitudinal),
-        own_array(batch.lateral),
-        own_array(batch.spin),
-        -batch.spin[:, None] * grid.y if variation is None else own_array(variation),
+        kernel_input(batch.rolling_speed),
+        kernel_input(batch.longitudinal),
+        kernel_input(batch.lateral),
+        kernel_input(batch.spin),
+        -batch.spin[:, None] * grid.y if variation is None else kernel_input(variation),
         friction,
         dissipation,
         sums,
