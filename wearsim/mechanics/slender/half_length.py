@@ -25,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wearsim.mechanics.numerics.jit import subroutine
-from wearsim.mechanics.slender.influence import HIGHEST, interpolation, read_influence
+from wearsim.mechanics.slender.influence import HIGHEST, interpolation
 from wearsim.types import FloatArray, IntArray
 
 SWEEPS = 2
@@ -152,7 +152,7 @@ def add_influences(
     for j in range(weight.shape[0]):
         if weight[j] == 0.0:
             continue
-        node, (v0, v1, w0, w1), _ = interpolation(table, log_ratio[k, j])
+        node, (v0, v1, w0, w1), _ = interpolation(table.shape[0], log_ratio[k, j])
         v0, v1, w0, w1 = v0 * weight[j], v1 * weight[j], w0 * weight[j], w1 * weight[j]
         for d in range(max(right - j, j - left) + 1):
             low = v0 * table[node, 0, d] + v1 * table[node, 1, d]
@@ -173,17 +173,18 @@ def _fill_near(k: int, table: FloatArray, weight: FloatArray, lengths: HalfLengt
     Both are 0 for strips without weight.
     """
     near, chained, log_ratio = lengths.near, lengths.chained, lengths.log_ratio
-    value, tangent = lengths.work[1], lengths.work[2]
-    count = min(weight.shape[0], REACH + 1)
     for j in range(weight.shape[0]):
-        here = j + 2 * REACH
-        if weight[j] != 0.0:
-            read_influence(table, log_ratio[k, j], count, value, tangent)
-        for d in range(count):
+        tau = log_ratio[k, j] if weight[j] != 0.0 else 0.0
+        node, (v0, v1, w0, w1), (d0, d1, e0, e1) = interpolation(table.shape[0], tau)
+        for d in range(min(weight.shape[0], REACH + 1)):
             by_length = by_factor = 0.0
             if weight[j] != 0.0:
-                by_length = weight[j] * (tangent[d] - value[d])
-                by_factor = by_length - weight[j] * value[d]
+                a, b = table[node, 0, d], table[node, 1, d]
+                c, e = table[node + 1, 0, d], table[node + 1, 1, d]
+                value = v0 * a + v1 * b + w0 * c + w1 * e
+                by_length = weight[j] * (d0 * a + d1 * b + e0 * c + e1 * e - value)
+                by_factor = by_length - weight[j] * value
+            here = j + 2 * REACH
             near[REACH - d, here] = near[REACH + d, here] = by_length
             chained[REACH - d, here] = chained[REACH + d, here] = by_factor
 

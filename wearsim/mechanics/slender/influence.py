@@ -159,7 +159,7 @@ def _tabulated(
 
 @subroutine
 def interpolation(
-    table: FloatArray, tau: float
+    nodes: int, tau: float
 ) -> tuple[int, tuple[float, float, float, float], tuple[float, float, float, float]]:
     """Return the node below `tau` and the weights of the cubic, for F_k (or C_k) and its tangent.
 
@@ -168,13 +168,13 @@ def interpolation(
 
     Parameters
     ----------
-    table : ndarray, shape (nodes, 2, strips)
-        From `influence_table` or `curvature_table`.
+    nodes : int
+        Number of nodes of the table; numba would count the references to the table itself.
     tau : float
         ln(a/dy) of the loaded strip, up to HIGHEST; values below LOWEST are replaced by LOWEST.
     """
     position = max((tau - LOWEST) / STEP, 0.0)
-    node = min(int(position), table.shape[0] - 2)
+    node = min(int(position), nodes - 2)
     s = position - node
     low, low_slope = (1.0 + 2.0 * s) * (1.0 - s) ** 2, s * (1.0 - s) ** 2
     high, high_slope = s * s * (3.0 - 2.0 * s), s * s * (s - 1.0)
@@ -189,15 +189,6 @@ def interpolation(
 
 
 @subroutine
-def read_value(table: FloatArray, tau: float, distance: int) -> float:
-    """Interpolate F_k or C_k of one strip at one distance k; arguments as in `read_influence`."""
-    node, (v0, v1, w0, w1), _ = interpolation(table, tau)
-    low = v0 * table[node, 0, distance] + v1 * table[node, 1, distance]
-    high = w0 * table[node + 1, 0, distance] + w1 * table[node + 1, 1, distance]
-    return float(low + high)
-
-
-@subroutine
 def read_influence(
     table: FloatArray, tau: float, count: int, value: FloatArray, tangent: FloatArray
 ) -> None:
@@ -205,14 +196,16 @@ def read_influence(
 
     Parameters
     ----------
-    table, tau
+    table : ndarray, shape (nodes, 2, strips)
+        From `influence_table` or `curvature_table`.
+    tau : float
         As in `interpolation`.
     count : int
         Number of distances k to fill.
     value, tangent : ndarray, shape (>= count,)
         Filled: F_k (or C_k) and its tangent.
     """
-    node, (v0, v1, w0, w1), (d0, d1, e0, e1) = interpolation(table, tau)
+    node, (v0, v1, w0, w1), (d0, d1, e0, e1) = interpolation(table.shape[0], tau)
     for k in range(count):
         # indices instead of rows: numba counts the references to every row
         a, b = table[node, 0, k], table[node, 1, k]

@@ -14,7 +14,7 @@ from wearsim.mechanics.slender.half_length import (
     add_influences,
     add_length_slopes,
 )
-from wearsim.mechanics.slender.influence import HIGHEST, read_influence, read_value
+from wearsim.mechanics.slender.influence import HIGHEST, interpolation
 from wearsim.types import BoolArray, FloatArray, IntArray
 
 MANIFOLD = 3.0  # ratio of new to old load of a strip up to which the Jacobian may be reused
@@ -136,13 +136,19 @@ def fill_jacobian(
     n, size, coupled = line_load.shape[1], state.size[k], lengths.table.shape[0] > 0
     place, outer, matrix = state.place, state.outer, state.matrix[k]
     value, tangent, surface = state.value, state.tangent, state.surface[k]
+    nodes, log_ratio = table.shape[0], lengths.log_ratio
     near, near_strips = lengths.near, min(n, REACH + 1) if coupled else 0
     left = np.uint64(place[k, 0])
     contiguous = place[k, size - 1] - place[k, 0] == size - 1
     for column in range(size):
         j = place[k, column]
         push, here = unit * line_load[k, j], np.uint64(j)
-        read_influence(table, lengths.log_ratio[k, j], max(j + 1, n - j), value, tangent)
+        node, (v0, v1, w0, w1), (d0, d1, e0, e1) = interpolation(nodes, log_ratio[k, j])
+        for d in range(max(j + 1, n - j)):
+            a, b = table[node, 0, d], table[node, 1, d]
+            c, e = table[node + 1, 0, d], table[node + 1, 1, d]
+            value[d] = v0 * a + v1 * b + w0 * c + w1 * e
+            tangent[d] = d0 * a + d1 * b + e0 * c + e1 * e
         for d in range(np.uint64(0), np.uint64(n - j)):
             surface[here + d] += push * value[d]
             outer[k, column, here + d] = unit * tangent[d]
@@ -194,16 +200,22 @@ def correct_residual(
     Strips whose load changes by more than `MAX_CORRECTED` are skipped, as the correction must be
     far smaller than the step.
     """
+    nodes, log_ratio, place, steps = table.shape[0], lengths.log_ratio, state.place, state.step
+    missing, diagonal = state.missing, state.diagonal
     for row in range(state.size[k]):
-        j = state.place[k, row]
-        old, step = line_load[k, j], state.step[k, row]
+        j = place[k, row]
+        old, step = line_load[k, j], steps[k, row]
         if abs(step) > MAX_CORRECTED * old:
             continue
-        before = lengths.log_ratio[k, j]
-        after = min(before + 0.5 * np.log1p(step / old), HIGHEST)
-        pressed = old * read_value(table, before, 0)
-        pressed = unit * ((old + step) * read_value(table, after, 0) - pressed)
-        state.missing[k, row] -= pressed - state.diagonal[k, row] * step
+        tau = log_ratio[k, j]
+        node, (v0, v1, w0, w1), _ = interpolation(nodes, tau)
+        low = v0 * table[node, 0, 0] + v1 * table[node, 1, 0]
+        before = old * (low + (w0 * table[node + 1, 0, 0] + w1 * table[node + 1, 1, 0]))
+        tau = min(tau + 0.5 * np.log1p(step / old), HIGHEST)
+        node, (v0, v1, w0, w1), _ = interpolation(nodes, tau)
+        low = v0 * table[node, 0, 0] + v1 * table[node, 1, 0]
+        after = (old + step) * (low + (w0 * table[node + 1, 0, 0] + w1 * table[node + 1, 1, 0]))
+        missing[k, row] -= unit * (after - before) - diagonal[k, row] * step
 
 
 @subroutine
