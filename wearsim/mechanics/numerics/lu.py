@@ -6,7 +6,8 @@ without pivoting, which would take a third of the time.
 A system is stored by columns: ``matrix[j, i]`` is the coefficient of unknown j in equation i. Every
 inner loop thus runs along a row in memory, which is a column of the system. Inner loops that do not
 start at 0 have unsigned indices: numba then omits the handling of negative indices, and the loops
-are vectorised, which makes them three times faster.
+are vectorised, which makes them three times faster. Indices of both axes replace rows, and loops
+replace calls, as numba counts the references to every row and argument.
 """
 
 from __future__ import annotations
@@ -17,26 +18,6 @@ from wearsim.mechanics.numerics.jit import subroutine
 from wearsim.types import FloatArray
 
 PANEL = 4  # unknowns eliminated together; the loops over the rows of a panel are unrolled
-
-
-@subroutine
-def _eliminate_panel(matrix: FloatArray, size: int, start: int) -> None:
-    """Eliminate the four unknowns of a full panel from all later columns."""
-    # indices of both axes instead of rows: numba counts the references to every row
-    s1, s2, s3 = start + 1, start + 2, start + 3
-    p0, p1, p2, p3 = matrix[start, start], matrix[s1, s1], matrix[s2, s2], matrix[s3, s3]
-    u01, u02, u03 = matrix[start, s1], matrix[start, s2], matrix[start, s3]
-    u12, u13, u23 = matrix[s1, s2], matrix[s1, s3], matrix[s2, s3]
-    for i in range(start + PANEL, size):
-        f0 = matrix[i, start] * p0
-        f1 = (matrix[i, s1] - f0 * u01) * p1
-        f2 = (matrix[i, s2] - f0 * u02 - f1 * u12) * p2
-        f3 = (matrix[i, s3] - f0 * u03 - f1 * u13 - f2 * u23) * p3
-        matrix[i, start], matrix[i, s1], matrix[i, s2], matrix[i, s3] = f0, f1, f2, f3
-        for j in range(np.uint64(start + PANEL), np.uint64(size)):
-            matrix[i, j] -= (f0 * matrix[start, j] + f1 * matrix[s1, j]) + (
-                f2 * matrix[s2, j] + f3 * matrix[s3, j]
-            )
 
 
 @subroutine
@@ -67,28 +48,23 @@ def factor_in_place(matrix: FloatArray, size: int) -> bool:
             if not abs(matrix[k, k]) > 0.0:
                 return False
             matrix[k, k] = 1.0 / matrix[k, k]
-        if stop < size:
-            _eliminate_panel(matrix, size, start)
-    return True
-
-
-@subroutine
-def _subtract_rows(
-    matrix: FloatArray, start: int, stop: int, first: int, last: int, solution: FloatArray
-) -> None:
-    """Subtract the rows of a panel times its unknowns from the entries `first` to `last`."""
-    if stop - start == PANEL:
+        if stop == size:
+            break
         s1, s2, s3 = start + 1, start + 2, start + 3
-        x0, x1, x2, x3 = solution[start], solution[s1], solution[s2], solution[s3]
-        for j in range(np.uint64(first), np.uint64(last)):
-            solution[j] -= (x0 * matrix[start, j] + x1 * matrix[s1, j]) + (
-                x2 * matrix[s2, j] + x3 * matrix[s3, j]
-            )
-        return
-    for k in range(start, stop):
-        x0 = solution[k]
-        for j in range(np.uint64(first), np.uint64(last)):
-            solution[j] -= x0 * matrix[k, j]
+        p0, p1, p2, p3 = matrix[start, start], matrix[s1, s1], matrix[s2, s2], matrix[s3, s3]
+        u01, u02, u03 = matrix[start, s1], matrix[start, s2], matrix[start, s3]
+        u12, u13, u23 = matrix[s1, s2], matrix[s1, s3], matrix[s2, s3]
+        for i in range(stop, size):
+            f0 = matrix[i, start] * p0
+            f1 = (matrix[i, s1] - f0 * u01) * p1
+            f2 = (matrix[i, s2] - f0 * u02 - f1 * u12) * p2
+            f3 = (matrix[i, s3] - f0 * u03 - f1 * u13 - f2 * u23) * p3
+            matrix[i, start], matrix[i, s1], matrix[i, s2], matrix[i, s3] = f0, f1, f2, f3
+            for j in range(np.uint64(stop), np.uint64(size)):
+                matrix[i, j] -= (f0 * matrix[start, j] + f1 * matrix[s1, j]) + (
+                    f2 * matrix[s2, j] + f3 * matrix[s3, j]
+                )
+    return True
 
 
 @subroutine
@@ -108,13 +84,29 @@ def solve_factored(matrix: FloatArray, size: int, solution: FloatArray) -> None:
             solution[k] *= matrix[k, k]
             for j in range(k + 1, stop):
                 solution[j] -= solution[k] * matrix[k, j]
-        _subtract_rows(matrix, start, stop, stop, size, solution)
+        if stop < size:
+            s1, s2, s3 = start + 1, start + 2, start + 3
+            x0, x1, x2, x3 = solution[start], solution[s1], solution[s2], solution[s3]
+            for j in range(np.uint64(stop), np.uint64(size)):
+                solution[j] -= (x0 * matrix[start, j] + x1 * matrix[s1, j]) + (
+                    x2 * matrix[s2, j] + x3 * matrix[s3, j]
+                )
     for start in range((size - 1) // PANEL * PANEL, -1, -PANEL):
         stop = min(start + PANEL, size)
         for k in range(stop - 1, start, -1):
             for j in range(start, k):
                 solution[j] -= solution[k] * matrix[k, j]
-        _subtract_rows(matrix, start, stop, 0, start, solution)
+        if stop - start < PANEL:
+            for k in range(start, stop):
+                for j in range(start):
+                    solution[j] -= solution[k] * matrix[k, j]
+            continue
+        s1, s2, s3 = start + 1, start + 2, start + 3
+        x0, x1, x2, x3 = solution[start], solution[s1], solution[s2], solution[s3]
+        for j in range(start):
+            solution[j] -= (x0 * matrix[start, j] + x1 * matrix[s1, j]) + (
+                x2 * matrix[s2, j] + x3 * matrix[s3, j]
+            )
 
 
 @subroutine
