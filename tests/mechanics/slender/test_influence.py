@@ -12,6 +12,7 @@ from wearsim.mechanics.slender.influence import (
     mean_asinh,
     middle_curvature,
     read_influence,
+    read_value,
 )
 
 
@@ -82,6 +83,7 @@ def test_table_interpolates_the_function(tau, tabulated, function):
     table, expected = tabulated(40), direct(tau, 40, function)
     value, tangent = np.empty(40), np.empty(40)
     read_influence(table, tau, 40, value, tangent)
+    assert [read_value(table, tau, k) for k in range(40)] == pytest.approx(value, rel=1e-14)
     np.testing.assert_allclose(value, expected, atol=2e-9)
     step = 1e-4
     if LOWEST < tau < HIGHEST:

@@ -189,6 +189,15 @@ def interpolation(
 
 
 @subroutine
+def read_value(table: FloatArray, tau: float, distance: int) -> float:
+    """Interpolate F_k or C_k of one strip at one distance k; arguments as in `read_influence`."""
+    node, (v0, v1, w0, w1), _ = interpolation(table.shape[0], tau)
+    low = v0 * table[node, 0, distance] + v1 * table[node, 1, distance]
+    high = w0 * table[node + 1, 0, distance] + w1 * table[node + 1, 1, distance]
+    return float(low + high)
+
+
+@subroutine
 def read_influence(
     table: FloatArray, tau: float, count: int, value: FloatArray, tangent: FloatArray
 ) -> None:

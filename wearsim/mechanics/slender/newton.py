@@ -55,7 +55,7 @@ CONVERGED, SINGULAR, TOO_FINE, NO_CONVERGENCE, NOT_FINITE = range(5)
 CONTINUE = -1
 
 TOLERANCE = 1e-8  # predicted change of the next step, relative to the greatest line load
-REUSED = 0.05  # relative change up to which the Jacobian may be reused
+REUSED = 0.1  # relative change up to which the Jacobian may be reused
 SHRINKING = 0.2  # ratio of successive steps up to which it may be reused
 FIRST = 0.1  # assumed ratio of the second step to the first
 AT_BEST = 0.01  # least assumed ratio of successive steps, as the Jacobian is approximate
