@@ -339,9 +339,13 @@ class SharedWear:
             numbers = np.array([number for number, other in enumerate(kinds) if other == kind])
             part = wear if len(numbers) == len(wear) else wear[numbers]
             members = _membership(bodies, contacts, kind)
-            alone = (members == NO_BODY)[:, :, None]
-            own = np.where(alone, part, 0.0).sum(axis=2)
-            groups.append((numbers, own, members, np.where(alone, 0.0, part)))
+            own, shared = np.zeros((len(part), contacts, part.shape[-1])), part.copy()
+            for side in (0, 1):
+                alone = members[:, side] == NO_BODY
+                if np.count_nonzero(alone):
+                    own[:, alone] += part[:, alone, side]
+                    shared[:, alone, side] = 0.0
+            groups.append((numbers, own, members, shared))
         return groups
 
 
