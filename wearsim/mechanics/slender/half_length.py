@@ -91,9 +91,9 @@ def log_half_length(k: int, j: int, line_load: FloatArray, lengths: HalfLengths)
 @subroutine
 def factor_growth(k: int, j: int, growth: FloatArray, lengths: HalfLengths) -> float:
     """Return the growth of ln s of strip `j` from that of ln q, (strips,), to first order."""
-    n, total, reach = growth.shape[0], 0.0, lengths.slope_part.shape[1] // 4
-    for c in range(max(0, reach - j), min(2 * reach + 1, n + reach - j)):
-        total += lengths.slope[k, j, c] * growth[j + c - reach]
+    n, total, slope = growth.shape[0], 0.0, lengths.slope
+    for c in range(max(-REACH, -j), min(REACH, n - 1 - j) + 1):
+        total += slope[k, REACH + c, j + 2 * REACH] * growth[j + c]
     return total
 
 
