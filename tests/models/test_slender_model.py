@@ -178,6 +178,45 @@ def test_single_solution_equals_batch_bit_for_bit(creepage, warm):
         assert np.array_equal(getattr(single, item.name), getattr(batch[0], item.name))
 
 
+@pytest.mark.parametrize("wear", [0.0, 3e-12])
+@pytest.mark.parametrize("half_length", ["coupled", "local"])
+def test_solution_from_another_load_equals_the_cold_one(half_length, wear):
+    """The cold and the warm solution differ by the residual; both carry their load to rounding."""
+    model, gap, point, _ = contact(half_length=half_length)
+    less, compliance = replace(point, normal_force=297.0), np.full_like(gap, wear)
+    near = model.solve_one(gap, RIG, less, compliance)
+    cold = model.solve_one(gap, RIG, point, compliance)
+    spacing = cold.y[1] - cold.y[0]
+    for start in (near, cold):
+        warm = model.solve_one(gap, RIG, point, compliance, start)
+        assert warm.iterations < cold.iterations
+        peak = cold.line_load.max()
+        np.testing.assert_allclose(warm.line_load, cold.line_load, atol=2e-8 * peak)
+        assert warm.power == pytest.approx(cold.power, rel=1e-7)
+        assert warm.line_load.sum() * spacing == pytest.approx(300.0, rel=1e-12)
+
+
+def test_gap_that_is_not_finite_fails_alone():
+    model, gap, point, alone = contact()
+    bad = gap.copy()
+    bad[3] = np.inf
+    with pytest.raises(ContactError, match=r"^contact 1: .* a value is not finite"):
+        model.solve(ContactBatch.of(np.stack([gap, bad, gap]), RIG, [point] * 3))
+    np.testing.assert_array_equal(model.solve_one(gap, RIG, point).line_load, alone.line_load)
+
+
+def test_inputs_are_not_changed_and_may_be_read_only():
+    model, gap, point, near = contact()
+    batch, warm = ContactBatch.of(gap[None], RIG, [point]), ContactBatchSolution.of([near])
+    before = model.solve(batch, np.full((1, len(gap)), 1e-13), warm=warm)
+    shared = np.broadcast_to(np.array(1e-13), (1, len(gap)))
+    read_only = replace(batch, gap=np.broadcast_to(gap, (1, len(gap))))
+    loads = near.line_load.copy()
+    after = model.solve(read_only, shared, warm=warm)
+    np.testing.assert_array_equal(after.line_load, before.line_load)
+    np.testing.assert_array_equal(near.line_load, loads)
+
+
 def test_infinite_power_is_an_error_naming_the_contact():
     model, gap, point, _ = contact()
     bad = replace(point, creepage=Creepage(np.nan))
