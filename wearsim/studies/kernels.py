@@ -11,7 +11,7 @@ from wearsim.scenario import Scenario
 
 #: Kernels of the built-in contact models and tangential theories, with the kernels that they call.
 _MODELS = {
-    "slender": {"middle_curvature", "solve_slender"},
+    "slender": {"solve_slender"},
     "hertz": {"hertz_on_profile"},
     "hertz-fastsim": {"hertz_on_profile"},
     "semi-hertzian": {"solve_semi_hertzian"},

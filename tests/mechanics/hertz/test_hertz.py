@@ -8,7 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.special import ellipe, ellipkm1
 
-from wearsim.mechanics.hertz.ellipse import axis_ratio, elliptic_integrals, given_ellipse, hertz
+from wearsim.mechanics.hertz.ellipse import (
+    axis_ratio,
+    elliptic_integrals,
+    elliptic_integrals_of,
+    given_ellipse,
+    hertz,
+)
 from wearsim.mechanics.hertz.parabola_fit import (
     CONVERGED,
     LEAVES_STRIPS,
@@ -180,3 +186,11 @@ def test_unsuitable_profiles_have_a_status():
     assert fit(lambda y: 1e-3 * y**2)[-1] == LEAVES_STRIPS
     assert fit(lambda y: 1e6 * y**2, strips=9)[-1] == TOO_FEW_STRIPS
     assert fit_parabola(np.zeros(2), np.zeros(2), 0.0, 1.0)[-1] == 2
+
+
+def test_elliptic_integrals_of_an_array_are_those_of_its_elements():
+    complement = np.concatenate(
+        [np.geomspace(1e-300, 1.0, 400), 1.0 - np.geomspace(1e-16, 0.5, 99)]
+    )
+    expected = np.array([elliptic_integrals(value) for value in complement.tolist()])
+    np.testing.assert_array_equal(np.transpose(elliptic_integrals_of(complement)), expected)

@@ -84,6 +84,38 @@ def elliptic_integrals(complement: float) -> tuple[float, float]:
     return first, first * total
 
 
+def elliptic_integrals_of(complement: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the `elliptic_integrals` of an array, bit for bit equal, without compiled code.
+
+    Parameters
+    ----------
+    complement : ndarray, shape (points,)
+        Complementary moduli.
+
+    Returns
+    -------
+    first, d_integral : ndarray, shape (points,)
+        K and D.
+    """
+    first, d_integral = np.empty_like(complement), np.empty_like(complement)
+    places, weight = np.arange(len(complement)), 1.0
+    mean, root, total = np.ones_like(complement), complement, np.full_like(complement, 0.5)
+    half_difference_squared = 0.25 * (1.0 - complement) / (1.0 + complement)
+    squared_modulus = (1.0 - complement) * (1.0 + complement)
+    for _ in range(40):
+        total = total + weight * half_difference_squared
+        mean, root = 0.5 * (mean + root), np.sqrt(mean * root)
+        going = np.abs(mean - root) > 4e-16 * mean
+        ended = places[~going]
+        first[ended] = 0.5 * math.pi / (0.5 * (mean + root))[~going]
+        d_integral[ended] = first[ended] * total[~going]
+        places, mean, root, total = places[going], mean[going], root[going], total[going]
+        squared_modulus = squared_modulus[going]
+        weight *= 2.0
+        half_difference_squared = (0.5 * (mean - root)) ** 2 / squared_modulus
+    return first, d_integral
+
+
 @subroutine
 def axis_ratio(curvature_ratio: float) -> float:
     """Return the ratio of minor to major semi-axis of the patch.

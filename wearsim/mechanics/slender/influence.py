@@ -24,8 +24,8 @@ from math import comb
 
 import numpy as np
 
-from wearsim.mechanics.hertz.ellipse import elliptic_integrals
-from wearsim.mechanics.numerics.jit import kernel, subroutine
+from wearsim.mechanics.hertz.ellipse import elliptic_integrals_of
+from wearsim.mechanics.numerics.jit import subroutine
 from wearsim.types import FloatArray
 
 LOWEST = -10.0  # ln(a/dy) below which F_k does not depend on a, to 1e-9
@@ -84,7 +84,6 @@ def mean_asinh(t: FloatArray) -> tuple[FloatArray, FloatArray]:
     return value, slope
 
 
-@kernel
 def middle_curvature(t: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return h(t) and its logarithmic derivative t h'(t).
 
@@ -98,14 +97,11 @@ def middle_curvature(t: FloatArray) -> tuple[FloatArray, FloatArray]:
     value, slope : ndarray, shape (points,)
         h(t) and t h'(t), to 1e-15.
     """
-    value, slope = np.empty(len(t)), np.empty(len(t))
-    for i in range(len(t)):
-        square = 1.0 + t[i] * t[i]
-        complement = t[i] / np.sqrt(square)
-        first, d_integral = elliptic_integrals(complement)
-        value[i] = 4.0 / np.pi * complement * first
-        slope[i] = 4.0 / np.pi * complement * d_integral / square
-    return value, slope
+    square = 1.0 + t * t
+    complement = t / np.sqrt(square)
+    first, d_integral = elliptic_integrals_of(complement)
+    factor = 4.0 / np.pi * complement
+    return factor * first, factor * d_integral / square
 
 
 @cache
