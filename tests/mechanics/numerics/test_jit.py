@@ -103,7 +103,7 @@ def test_other_kernels_are_compiled_in_a_process_alongside(cached, monkeypatch, 
     fake = SimpleNamespace(DEVNULL=None, Popen=lambda command, **_: started.append(command))
     monkeypatch.setattr(jit, "subprocess", fake)
     monkeypatch.setattr(jit, "_cache_folder", lambda: tmp_path if cached else None)
-    monkeypatch.setattr(jit.os, "cpu_count", lambda: 2)
+    monkeypatch.setattr(jit.os, "sched_getaffinity", lambda _: {0, 1}, raising=False)
 
     @kernel
     def large(x: float) -> float:
@@ -117,7 +117,7 @@ def test_other_kernels_are_compiled_in_a_process_alongside(cached, monkeypatch, 
 
 def test_nothing_is_started_on_one_processor(monkeypatch, tmp_path):
     monkeypatch.setattr(jit, "_cache_folder", lambda: tmp_path)
-    monkeypatch.setattr(jit.os, "cpu_count", lambda: 1)
+    monkeypatch.setattr(jit.os, "sched_getaffinity", lambda _: {0}, raising=False)
 
     @kernel
     def larger(x: float) -> float:

@@ -195,7 +195,9 @@ def _call_elsewhere(function: Callable[[], None] | None) -> None:
 
     It ends when the function returns, also after the end of this process.
     """
-    if function is None or _cache_folder() is None or (os.cpu_count() or 1) == 1:
+    affinity = getattr(os, "sched_getaffinity", None)  # not on every platform
+    processors = len(affinity(0)) if affinity else os.cpu_count()
+    if function is None or processors == 1 or _cache_folder() is None:
         return
     name = function.__name__
     code = f"import sys; sys.path[:] = {sys.path!r}; from {function.__module__} import {name}"
