@@ -210,10 +210,10 @@ def solve_slender(
 ) -> None:
     """Solve sets of slender contacts, from starting line loads.
 
-    The contacts of a set are independent or wear shared bodies. Strips on an elastic foundation give
-    line loads to a contact without a start, and correct starting line loads where bodies wear. A
-    set that fails is solved again without a start and without the correction. The kernel is compiled separately for independent
-    contacts (`bodies` and `shared` None), without the parts for shared bodies.
+    The contacts of a set are independent or wear shared bodies. Strips on an elastic foundation
+    give line loads to a contact without a start, and correct starting line loads where bodies wear.
+    A set that fails is solved again without start and correction. The kernel is compiled separately
+    for independent contacts (`bodies` and `shared` None), without the parts for shared bodies.
 
     Parameters
     ----------
