@@ -61,25 +61,22 @@ def new_half_lengths(table: FloatArray, log_scale: FloatArray) -> HalfLengths:
     """Return the `HalfLengths` of contacts, to be filled."""
     contacts, n = log_scale.shape[0], table.shape[2]
     wide = n + 4 * REACH
-    lengths = HalfLengths(
+    slopes = np.empty((contacts + 2, 2 * REACH + 1, wide))
+    for k in range(contacts + 2):  # numba compiles loops faster than np.zeros
+        for c in range(2 * REACH + 1):
+            for i in range(wide):
+                slopes[k, c, i] = 0.0
+    return HalfLengths(
         table,
         log_scale,
         np.empty((contacts, n)),
         np.empty((contacts, n)),
-        np.empty((contacts, 2 * REACH + 1, wide)),
-        np.empty((2 * REACH + 1, wide)),
-        np.empty((2 * REACH + 1, wide)),
+        slopes[:contacts],
+        slopes[contacts],
+        slopes[contacts + 1],
         np.empty((4 * REACH + 1, n)),
         np.empty((4, n)),
     )
-    # numba compiles loops faster than np.zeros
-    for c in range(2 * REACH + 1):
-        for i in range(wide):
-            lengths.near[c, i] = lengths.chained[c, i] = 0.0
-        for k in range(contacts):
-            for i in range(wide):
-                lengths.slope[k, c, i] = 0.0
-    return lengths
 
 
 @subroutine

@@ -261,38 +261,39 @@ def solve_slender(
             lengths = new_half_lengths(curvature_influence, log_scale)
             if bodies is not None:
                 system = new_depth_system(bodies, n)
-            relaxed = not started
+            corrected = not started
             for k in range(contacts):
                 # relative to the least gap, as the displacements under a vanishing load would be
                 # lost in the rounding of a deep groove
                 lowest[k] = gap[number, k, 0]
                 for i in range(n):
                     lowest[k] = min(lowest[k], gap[number, k, i])
-                loaded = False
-                for i in range(n):  # a loop, as numba takes seconds to compile an array assignment
-                    surface[k, i] = gap[number, k, i] - lowest[k]
                     yielding[k, i] = own[k, i]
                     if bodies is not None:  # as if all contacts wore the same strips
                         both = shared[number, k, 0, i] + shared[number, k, 1, i]
                         yielding[k, i] += contacts * both
-                    loaded, relaxed = loaded or total[k, i] > 0.0, relaxed or yielding[k, i] > 0.0
-                if not loaded:
-                    soft = FIRST_FOUNDATION * unit
-                    rest_on_foundation(k, surface, yielding, soft, load[k] / spacing, total, delta)
-            # a foundation under the displacements of the starting loads brings them within a tenth
-            # in a quarter of the time of a Jacobian; a second attempt does without
-            if relaxed and attempt == 0:
-                soft, widest = FOUNDATION * unit, -np.inf
+                    corrected = corrected or yielding[k, i] > 0.0
+                number_strips(k, total, state)
+            # a foundation gives loads to contacts without a start; another one, under the
+            # displacements of these loads, brings them within a tenth in a quarter of the time of a
+            # Jacobian. A second attempt does without
+            for sweep in range(2 if corrected and attempt == 0 else 1):
+                soft, widest = (FOUNDATION if sweep else FIRST_FOUNDATION) * unit, -np.inf
                 for k in range(contacts):
                     for i in range(n):
                         surface[k, i] = gap[number, k, i] - lowest[k]
-                        surface[k, i] -= (soft + yielding[k, i] - own[k, i]) * total[k, i]
-                    widest = max(widest, find_factors(k, total, False, lengths))
-                if bodies is not None:
+                        if sweep:
+                            surface[k, i] -= (soft + yielding[k, i] - own[k, i]) * total[k, i]
+                    if sweep:
+                        widest = max(widest, find_factors(k, total, False, lengths))
+                if bodies is not None and sweep:
                     add_depths(bodies, shared[number], total, surface)
                 for k in range(contacts if widest <= HIGHEST else 0):
-                    add_displacement(k, table, unit, total, lengths, state)
-                    rest_on_foundation(k, surface, yielding, soft, load[k] / spacing, total, delta)
+                    if sweep:
+                        add_displacement(k, table, unit, total, lengths, state)
+                    if sweep or state.size[k] == 0:
+                        sum_of_loads = load[k] / spacing
+                        rest_on_foundation(k, surface, yielding, soft, sum_of_loads, total, delta)
             outcome, before, iteration = CONTINUE, 0.0, 0
             while outcome == CONTINUE:
                 iteration += 1
