@@ -12,15 +12,14 @@ from wearsim.evolution.quantities import mean_along, sum_in_order, worn_volume
 from wearsim.evolution.state import Depths, WearState
 from wearsim.evolution.steppers.base import Step
 from wearsim.evolution.steppers.single_step import WearIncrement, carried_loads, solve_present
+from wearsim.mechanics.numerics.linearised_wear import difference_sizes
 from wearsim.types import FloatArray
 
 # lower bounds: the depth grows with a power of 2/3 to 1 of the passes, the volume with about 1
 DEPTH_EXPONENT, VOLUME_EXPONENT = 0.5, 0.75
 COVER = 1.5  # safety factor on an error estimate
-FIRST_ORDER_COVER = 2.0  # for schemes of first order, with less conservative estimates
 SHARE = 0.7  # part of the tolerance that one step may use
 MIN_BUDGET = 0.02  # part of the error budget that a step may always add, so that a run never stalls
-DEEP = 0.5  # depths are compared where the groove is deeper than this part of its greatest depth
 DEPTHS = ("cylinder_depth", "roller_depth")
 
 
@@ -43,23 +42,30 @@ def depth_difference(one: WearState, other: WearState) -> Depths:
     return one.cylinder_depth - other.cylinder_depth, one.roller_depth - other.roller_depth
 
 
-def greatest_where_deep(state: WearState, depths: Depths) -> FloatArray:
-    """Return the greatest absolute depth where `state` is worn deep, shape (realisations,) [m]."""
-    cylinder, roller = (
-        np.where(worn >= DEEP * worn.max(axis=(0, 1, 3), keepdims=True), np.abs(depth), 0.0)
-        for worn, depth in zip(state.depths, depths, strict=True)
-    )
-    return greatest_depth((cylinder, roller))
+def sizes(problem: WearProblem, state: WearState, differences: FloatArray) -> FloatArray:
+    """Return the sizes of differences in depth, shape (3, realisations).
+
+    Parameters
+    ----------
+    problem : WearProblem
+    state : WearState
+    differences : ndarray
+        Differences in depth, as `WearState.stacked` [m].
+
+    Returns
+    -------
+    ndarray
+        Greatest difference where the state is worn deep [m]; volume [m^3], with its sign; Euclidean
+        norm over all bodies, relative to that of the depths.
+    """
+    found = difference_sizes(state.stacked, differences, problem.volume_weights)
+    found[2] /= np.where(found[3] > 0.0, found[3], np.inf)
+    return np.asarray(found[:3])
 
 
 def state_difference(problem: WearProblem, one: WearState, other: WearState) -> FloatArray:
-    """Return the difference of two states in depth [m] and volume [m^3], shape (2, realisations).
-
-    The difference in depth is the greatest where the first state is worn deep.
-    """
-    volumes = volume_of(problem, one.depths), volume_of(problem, other.depths)
-    depth = greatest_where_deep(one, depth_difference(one, other))
-    return np.array([depth, np.abs(volumes[0] - volumes[1])])
+    """Return the absolute `sizes` of the difference of two states, shape (3, realisations)."""
+    return np.abs(sizes(problem, one, one.stacked - other.stacked))
 
 
 def variation_bias(
@@ -84,6 +90,8 @@ def variation_bias(
     cylinder, roller : ndarray
         Depth to add, shapes as in `WearState` [m]; None where nothing varies.
     """
+    if problem.constant_load is not None and not problem.varying:
+        return None
     start, stop = problem.time(first), problem.time(first + passes)
     deviations = [item for item in problem.deviations(start, stop) if np.count_nonzero(item[2])]
     if not deviations:
@@ -167,6 +175,11 @@ def half_quadrature(problem: WearProblem, state: WearState) -> tuple[WearProblem
         contacts=state.contacts.at(contacts),
         coarse_step_solution=None,
         half_quadrature_solution=None,
+        **{
+            name: values.take(first, axis=axis)
+            for name, axis in (("wear_exponents", 1), ("past_loads", 2))
+            if (values := getattr(state, name)) is not None
+        },
     )
 
 
@@ -202,10 +215,11 @@ def with_pass_errors(
     half = step(halved, start.half_quadrature_solution or first, passes)
     volume = volume_of(problem, end.depths)
     variance = start.scatter[1] + _volume_variance(problem, end, passes)
-    depth = np.square(greatest_depth(end.depths) / np.where(volume > 0.0, volume, 1.0)) * variance
+    relative = variance / np.square(np.where(volume > 0.0, volume, np.inf))
+    depth = np.square(greatest_depth(end.depths)) * relative
     return end.replaced(
         quadrature=state_difference(problem, coarse, half),
-        scatter=np.array([depth, variance]),
+        scatter=np.array([depth, variance, relative]),
         half_quadrature_solution=half,
     )
 
@@ -270,21 +284,21 @@ def excess(
     problem : WearProblem
     start, end : WearState
         The test before and after the step.
-    added : ndarray, shape (2, realisations)
-        Error of depth [m] and volume [m^3] that the step adds.
+    added : ndarray, shape (3, realisations)
+        Errors that the step adds, as of `sizes`; those of depth and volume are compared.
     stop : float
         Passes at the end of the test.
-    reached : ndarray, shape (2, realisations), optional
-        Error of depth [m] and volume [m^3] after the step, at most `added` and the error before.
+    reached : ndarray, shape (3, realisations), optional
+        Errors after the step, at most `added` and the error before.
     """
     worst = np.zeros(problem.shape[2])
     parts = (end.passes / stop).tolist()
-    sizes = greatest_depth(end.depths), volume_of(problem, end.depths)
+    grown = greatest_depth(end.depths), volume_of(problem, end.depths)
     # errors that a shorter step would not reduce must not shorten it
-    reducible = np.array([start.depth_error, start.volume_error]) - start.irreducible
+    reducible = np.array([start.depth_error, start.volume_error]) - start.irreducible[:2]
     arrays = reducible, added, reducible + added if reached is None else reached
     for kind, exponent in enumerate((DEPTH_EXPONENT, VOLUME_EXPONENT)):
-        columns = (a[kind].tolist() for a in (sizes, *arrays))
+        columns = (a[kind].tolist() for a in (grown, *arrays))
         for v, (part, size, before, error, total) in enumerate(zip(parts, *columns, strict=True)):
             if size > 0.0:
                 allowed = _allowance(tolerance, size, exponent, before, part)

@@ -116,7 +116,7 @@ class Evolution:
         max_steps: int,
         next_record: Callable[[float], float],
     ) -> None:
-        self.problem, self.state, self.stepper = problem, state, stepper
+        self.problem, self.state, self.stepper = problem, stepper.started(problem, state), stepper
         self.stop, self.max_steps, self._next_record = stop, max_steps, next_record
         self.numbers = np.arange(problem.shape[2])
         self.failures: dict[int, Exception] = {}
@@ -165,9 +165,9 @@ class Evolution:
             some = problem.at(places), state.at(places), lengths[places]
             accepted.append((places, list(self.stepper.rest(*some, self.stop))))
         for places, tried in done:
-            columns = self.numbers[places], tried.excess, lengths[places]
+            columns = self.numbers[places], tried.excess, lengths[places], tried.ratio
             each = zip(*(column.tolist() for column in columns), strict=True)
-            chosen = np.flatnonzero([self._trials[n].accepts(over, step) for n, over, step in each])
+            chosen = np.flatnonzero([self._trials[n].accepts(*values) for n, *values in each])
             if chosen.size:
                 accepted.append((places[chosen], [item.at(chosen) for item in tried.path]))
         warning = done[0][1].warning if done else None

@@ -86,6 +86,10 @@ def rest(problem: WearProblem, state: WearState, passes: FloatArray, stop: float
         duration = float((problem.time(done) - problem.time(state.passes))[0])
         each = zip(problem.terms.values(), terms, strict=True)
         terms = np.array([term.advance(value, 0.0 * value, duration) for term, value in each])
+    if state.past_spans is not None:  # multistep formulas start again, from the last rates
+        spans = np.full_like(state.past_spans, np.inf)
+        spans[0] = 0.0
+        state = state.replaced(past_spans=spans, order=np.ones(len(done), dtype=np.int64))
     return state.replaced(
         passes=done,
         terms=terms,

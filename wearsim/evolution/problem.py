@@ -159,6 +159,29 @@ class WearProblem:
         return np.stack([station, self.roller[contact]], axis=1)
 
     @cached_property
+    def body_rows(self) -> IntArray:
+        """`bodies` counted together, the stations of the cylinder first, as in `stacked`."""
+        return self.bodies + np.array([0, self.shape[0]])
+
+    @cached_property
+    def volume_weights(self) -> FloatArray:
+        """Whether a body of `stacked` is the cylinder, and its volume per sum of depths [m^2].
+
+        Shape (2, stations + rollers).
+        """
+        kinematics, stations = self.kinematics, self.shape[0]
+        cylinder = np.full(stations, kinematics.cylinder_radius / stations)
+        rollers = kinematics.roller_radius * kinematics.multiplicity
+        kinds = np.concatenate([np.ones(stations), np.zeros(self.rollers)])
+        volumes = 2.0 * np.pi * self.grid.spacing * np.concatenate([cylinder, rollers])
+        return np.array([kinds, volumes])
+
+    @cached_property
+    def nominal_least_gap(self) -> FloatArray:
+        """Least gap before wear, shape (stations, contacts, realisations) [m]."""
+        return np.asarray(self.nominal_gap.min(axis=-1))
+
+    @cached_property
     def nominal_gap(self) -> FloatArray:
         """Gap before wear, shape (stations, contacts, realisations, strips) [m].
 
@@ -200,6 +223,13 @@ class WearProblem:
     def stiffness(self) -> FloatArray:
         """Loss of load per descent of the roller, shape (realisations,) [N/m]."""
         return np.array([load.stiffness for load in self.loads])
+
+    @cached_property
+    def constant_load(self) -> FloatArray | None:
+        """Load before feedback, if it is constant in all realisations, shape (realisations,)."""
+        if not all(load.constant for load in self.loads):
+            return None
+        return self.force(np.zeros(len(self.loads)))
 
     @cached_property
     def has_spring(self) -> bool:
@@ -267,43 +297,53 @@ class WearProblem:
         values: FloatArray = getattr(contacts, name)
         return values.reshape(self.shape + values.shape[1:])
 
-    def wear_per_pass(self, contacts: ContactBatchSolution) -> tuple[FloatArray, FloatArray]:
-        """Return the depth worn off either body by one pass of each contact, where it touches.
+    def wear_per_pass(self, contacts: ContactBatchSolution) -> FloatArray:
+        """Return the depth worn off both bodies by one pass of each contact, where it touches.
 
         Returns
         -------
-        cylinder, roller : ndarray, shape (stations, contacts, realisations, strips)
-            Depth per pass of that contact [m].
+        ndarray, shape (2, stations, contacts, realisations, strips)
+            Depth of the cylinder and of the rollers per pass of that contact [m].
         """
         return self._depths(contacts, dict.fromkeys(BODIES, 1.0))
 
-    def wear_parts(
-        self, contacts: ContactBatchSolution, passes: FloatArray | float
-    ) -> tuple[FloatArray, FloatArray]:
+    def wear_parts(self, contacts: ContactBatchSolution, passes: FloatArray | float) -> FloatArray:
         """Return the contribution of each contact to the wear of the bodies over some passes [m].
 
         Returns
         -------
-        cylinder, roller : ndarray, shape (stations, contacts, realisations, strips)
+        ndarray, shape (2, stations, contacts, realisations, strips)
+            Wear of the cylinder and of the rollers.
         """
         each = np.asarray(passes)[..., None]
+        if self.linear_wear:
+            power = self.values_of(contacts, "dissipation")
+            return np.asarray(self._wear_coefficients * each * power)
         return self._depths(contacts, {b: share * each for b, share in self.wear_shares.items()})
+
+    @cached_property
+    def _wear_coefficients(self) -> FloatArray:
+        """Contribution of each contact to the wear per roller pass and dissipation, as parts."""
+        factors = [self.wear_factors[body] for body in BODIES]
+        shares = [self.wear_shares[body] for body in BODIES]
+        each = zip(shares, factors, strict=True)
+        return np.stack([share * np.asarray(factor)[:, None] for share, factor in each])
 
     def _depths(
         self, contacts: ContactBatchSolution, passes: Mapping[Body, FloatArray | float]
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return the depth that `passes` passes of each contact wear off either body [m]."""
+    ) -> FloatArray:
+        """Return the depth that `passes` passes of each contact wear off both bodies [m]."""
         dissipation, speed = self.values_of(contacts, "dissipation"), self.kinematics.rolling_speed
-        found = []
-        for body in BODIES:
+        found = np.empty((len(BODIES), *dissipation.shape))
+        for depth, body in zip(found, BODIES, strict=True):
             factor = self.wear_factors[body]
             if factor is None:
                 each = zip(contacts, cycle(self.laws), strict=False)
                 depths = np.array([law.depth_per_pass(body, c, speed) for c, law in each])
-                found.append(passes[body] * depths.reshape(dissipation.shape))
+                depth[:] = passes[body] * depths.reshape(dissipation.shape)
             else:
-                found.append((passes[body] * factor[:, None]) * dissipation)
-        return found[0], found[1]
+                np.multiply(passes[body] * factor[:, None], dissipation, out=depth)
+        return found
 
     @cached_property
     def wear_factors(self) -> dict[Body, FloatArray | None]:
@@ -316,6 +356,11 @@ class WearProblem:
             body: [law.depth_per_dissipation(body, speed) for law in self.laws] for body in BODIES
         }
         return {b: None if None in each else np.array(each) for b, each in factors.items()}
+
+    @cached_property
+    def linear_wear(self) -> bool:
+        """Whether wear is linear in the dissipation."""
+        return all(factor is not None for factor in self.wear_factors.values())
 
     def shared_wear(
         self, cylinder: FloatArray, roller: FloatArray
@@ -362,6 +407,10 @@ class WearProblem:
             return values
         sums = [values[:, self.roller == r].sum(axis=1) for r in range(self.rollers)]
         return np.stack(sums, axis=1)
+
+    def power_of_rollers(self, contacts: ContactBatchSolution) -> FloatArray:
+        """Return the mean power of each roller's contacts, shape (rollers, realisations) [W]."""
+        return np.asarray(self.per_roller(self.values_of(contacts, "power")).mean(axis=0))
 
     def total_power(self, power: FloatArray) -> FloatArray:
         """Return the power of all physical rollers, shape (N,) [W], from (S, C, N)."""

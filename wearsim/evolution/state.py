@@ -106,6 +106,7 @@ _AXES = {
     "energy": 0,
     "depth_error": 0,
     "volume_error": 0,
+    "profile_error": 0,
     "quadrature": 1,
     "scatter": 1,
     "step": 0,
@@ -117,6 +118,12 @@ _AXES = {
     "loop_contacts": 3,
     "decay": 0,
     "approach_factor": 2,
+    "wear_exponents": 2,
+    "past_wear": 2,
+    "past_energy": 1,
+    "past_loads": 3,
+    "past_spans": 1,
+    "order": 0,
 }
 
 
@@ -145,11 +152,13 @@ class WearState:
         Error estimate of the worn depth, the greater of both bodies [m].
     volume_error : ndarray, shape (realisations,)
         Error estimate of the volume worn off both bodies [m^3].
-    quadrature : ndarray, shape (2, realisations)
-        Part of these errors due to the quadrature over inputs drawn at every pass: in depth [m]
-        and volume [m^3].
-    scatter : ndarray, shape (2, realisations)
-        Variance between tests due to these draws: of depth [m^2] and volume [m^6].
+    profile_error : ndarray, shape (realisations,)
+        Error estimate of the profiles of all bodies: its Euclidean norm over that of the depths.
+    quadrature : ndarray, shape (3, realisations)
+        Part of these errors due to the quadrature over inputs drawn at every pass: in depth [m],
+        volume [m^3] and profile.
+    scatter : ndarray, shape (3, realisations)
+        Variance between tests due to these draws: of depth [m^2], volume [m^6] and profile.
     step : ndarray, shape (realisations,)
         Length of the next step proposed by the step-size control [passes]; 0 before the first.
     steps, rejected : ndarray of int, shape (realisations,)
@@ -173,6 +182,19 @@ class WearState:
     approach_factor : ndarray, shape (stations, rollers, realisations), optional
         Elastic approach of each roller on unworn bodies over the power 2/3 of its load
         [m/N^(2/3)], where a load has a spring.
+    wear_exponents : ndarray, shape (stations, contacts, realisations, strips), optional
+        Exponent of the wear of a strip as a power of its line load, in the last implicit step.
+    past_wear : ndarray, shape (5, stations + rollers, realisations, strips), optional
+        Wear per roller pass of cylinder and rollers [m], and divided differences of order 1 to 4 of
+        their depths over the exposure (see `implicit`) at the present and at past points.
+    past_energy : ndarray, shape (5, realisations), optional
+        The same of the energy [J].
+    past_loads : ndarray, shape (5, stations, contacts, realisations), optional
+        Loads of the contacts [N], and their divided differences, where springs or terms act.
+    past_spans : ndarray, shape (4, realisations), optional
+        Exposure from the past points to the present one; infinite where there is none.
+    order : ndarray of int, shape (realisations,), optional
+        Order of the next implicit step.
     """
 
     passes: FloatArray
@@ -183,6 +205,7 @@ class WearState:
     energy: FloatArray
     depth_error: FloatArray
     volume_error: FloatArray
+    profile_error: FloatArray
     quadrature: FloatArray
     scatter: FloatArray
     step: FloatArray
@@ -196,11 +219,29 @@ class WearState:
     half_quadrature_solution: WearState | None = None
     decay: FloatArray | None = None
     approach_factor: FloatArray | None = None
+    wear_exponents: FloatArray | None = None
+    past_wear: FloatArray | None = None
+    past_energy: FloatArray | None = None
+    past_loads: FloatArray | None = None
+    past_spans: FloatArray | None = None
+    order: IntArray | None = None
 
     @property
     def depths(self) -> Depths:
         """Worn depths of cylinder and rollers [m]."""
         return self.cylinder_depth, self.roller_depth
+
+    @property
+    def stacked(self) -> FloatArray:
+        """Worn depths of all bodies, shape (stations + rollers, realisations, strips) [m]."""
+        return np.concatenate([self.cylinder_depth[:, 0], self.roller_depth[0]])
+
+    def with_stacked(self, depths: FloatArray) -> WearState:
+        """Return the state with other depths, as in `stacked`."""
+        stations = len(self.cylinder_depth)
+        return self.replaced(
+            cylinder_depth=depths[:stations, None], roller_depth=depths[None, stations:]
+        )
 
     @property
     def auxiliary(self) -> dict[str, Any]:
@@ -270,6 +311,9 @@ class WearState:
                 values[name] = cls.from_arrays(part)
         columns = _with_prefix(arrays, _CONTACT)
         values["contacts"] = ContactBatchSolution(**columns | {"y": columns["y"][0]})
+        values.setdefault("profile_error", np.zeros_like(values["depth_error"]))
+        for name in ("quadrature", "scatter"):  # files of earlier versions lack the profile
+            values[name] = np.resize(values[name], (3, *values[name].shape[1:]))
         return cls(**values)
 
 
@@ -312,7 +356,14 @@ def widened_state(state: WearState, y: FloatArray, strips: int) -> WearState:
     strips : int
         Number of strips added on each side.
     """
-    contacts, loop = state.contacts, state.loop_strips
+    contacts = state.contacts
+    optional = {
+        name: widened(values, strips)
+        for name in ("loop_strips", "past_wear", "wear_exponents")
+        if (values := getattr(state, name)) is not None
+    }
+    if "wear_exponents" in optional:  # zero on the added strips
+        optional["wear_exponents"][optional["wear_exponents"] == 0.0] = 1.0
     return state.replaced(
         cylinder_depth=widened(state.cylinder_depth, strips),
         roller_depth=widened(state.roller_depth, strips),
@@ -323,7 +374,7 @@ def widened_state(state: WearState, y: FloatArray, strips: int) -> WearState:
             line_load=widened(contacts.line_load, strips),
             dissipation=widened(contacts.dissipation, strips),
         ),
-        loop_strips=None if loop is None else widened(loop, strips),
+        **optional,
         **{name: widened_state(part, y, strips) for name, part in state.auxiliary.items()},
     )
 
@@ -343,8 +394,9 @@ def fresh_state(problem: WearProblem) -> WearState:
         energy=zeros,
         depth_error=zeros,
         volume_error=zeros,
-        quadrature=np.zeros((2, realisations)),
-        scatter=np.zeros((2, realisations)),
+        profile_error=zeros,
+        quadrature=np.zeros((3, realisations)),
+        scatter=np.zeros((3, realisations)),
         step=zeros,
         steps=counts,
         rejected=counts,

@@ -68,6 +68,8 @@ class ThermalOptions(Options):
 class ConstantLoad(Load):
     """Constant load, with the stiffness of the mounting spring if there is one."""
 
+    constant = True
+
     def __init__(self, options: ConstantOptions) -> None:
         self._force = options.normal_force
         self.stiffness = options.stiffness if isinstance(options, SpringOptions) else 0.0

@@ -45,6 +45,8 @@ class Load(ABC):
     """
 
     stiffness: float = 0.0
+    #: whether the load is the same at all times; it is then computed once
+    constant: bool = False
 
     @property
     def span(self) -> tuple[float, float] | None:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeAlias
+
+import numpy as np
 
 from wearsim.errors import ContactError, StepError
 from wearsim.evolution.pauses import rest, step_or_rest
@@ -27,10 +28,11 @@ class Trial:
     ----------
     proposed : float
         Length of the first trial step [passes].
-    order : int
-        Order of the scheme.
     forced : bool
         Whether every step has the proposed length, for any error.
+    taper : float
+        Greatest ratio of a proposed step to the passes left, for a step to the stop; before it,
+        steps take half of the passes left.
 
     Attributes
     ----------
@@ -40,9 +42,9 @@ class Trial:
         Trial steps rejected.
     """
 
-    def __init__(self, proposed: float, order: int, forced: bool) -> None:
+    def __init__(self, proposed: float, forced: bool, taper: float = 1.0) -> None:
         self.proposed, self.rejected = proposed, 0
-        self._order, self._forced = order, forced
+        self._forced, self._taper = forced, taper
         self._cause: StepError | ContactError | None = None
 
     def step(self, passes: float, stop: float) -> float:
@@ -62,9 +64,11 @@ class Trial:
                 f" passes); {self._cause or 'the error does not fall with the step'}"
             )
         left = stop - passes
-        if self._forced or self.proposed >= left:
+        if self._forced:
             return min(self.proposed, left)
-        # leave no very short step before the stop
+        if self.proposed >= self._taper * left:
+            return left
+        # leave no very short step before the stop, and errors that have no time left to decay
         return 0.5 * left if self.proposed > 0.5 * left else self.proposed
 
     def reject(self, failure: StepError | ContactError, step: float) -> None:
@@ -72,13 +76,21 @@ class Trial:
         self._cause, self.proposed = failure, 0.2 * step
         self.rejected += 1
 
-    def accepts(self, excess: float, step: float) -> bool:
-        """Return whether a step with such an excess of error is accepted; propose the next."""
+    def accepts(self, excess: float, step: float, ratio: float) -> bool:
+        """Return whether a step with such an excess of error is accepted; propose the next.
+
+        Parameters
+        ----------
+        excess : float
+            Error that the step adds, relative to its allowance.
+        step : float
+            Its length [passes].
+        ratio : float
+            Ratio of the next step to it, by the error.
+        """
         if self._forced:
             return True
-        # the error that a step adds grows as the step to the power order + 1
-        aim = SAFETY / math.pow(excess, 1.0 / (self._order + 1)) if excess > 0.0 else GROW
-        chosen = step * min(GROW, max(SHRINK, aim))
+        chosen = step * max(SHRINK, ratio)
         if excess <= 1.0:
             # a step shortened by the stop does not limit the length of the next one
             self.proposed = max(chosen, self.proposed) if step < self.proposed else chosen
@@ -102,12 +114,15 @@ class Attempt:
         States after the start of the step: at intermediate points, if any, and at its end.
     excess : ndarray, shape (realisations,)
         Error that the step adds, relative to its allowance.
+    ratio : ndarray, shape (realisations,)
+        Ratio of the next step to this one, by the error.
     warning : str, optional
         Message to the user about this step.
     """
 
     path: tuple[WearState, ...]
     excess: FloatArray
+    ratio: FloatArray
     warning: str | None = None
 
 
@@ -125,6 +140,8 @@ class Stepper(ABC):
     #: whether every pass is a step: the run then stops at every record, and the number of steps
     #: does not depend on the records
     pass_by_pass = False
+    #: see `Trial`; errors of strips that have just come into contact have not decayed at the stop
+    taper = 1.0
     #: order of the scheme: a step adds an error that grows as the step to the power order + 1
     order = 1
 
@@ -133,7 +150,18 @@ class Stepper(ABC):
 
     def trial(self, proposed: float) -> Trial:
         """Return the search for the length of a step, with the first trial [passes]."""
-        return Trial(proposed, self.order, forced=self.forced_step is not None)
+        return Trial(proposed, self.forced_step is not None, self.taper)
+
+    def started(self, problem: WearProblem, state: WearState) -> WearState:
+        """Return the state from which the integration starts."""
+        return state
+
+    def ratio(self, excess: FloatArray) -> FloatArray:
+        """Return the ratio of the next step to one with such an excess, shape (realisations,)."""
+        # the error that a step adds grows as the step to the power order + 1
+        with np.errstate(divide="ignore"):
+            aim = SAFETY * excess ** (-1.0 / (self.order + 1))
+        return np.minimum(GROW, aim)
 
     @abstractmethod
     def proposed(self, problem: WearProblem, state: WearState) -> FloatArray:

@@ -173,6 +173,7 @@ class ExplicitStepper(Stepper):
             **{name: solution.replaced(passes=passes) for name, solution in end.auxiliary.items()},
             depth_error=state.depth_error + added[0],
             volume_error=state.volume_error + added[1],
+            profile_error=state.profile_error + added[2],
             steps=state.steps + 1,
         )
         worst = max(oscillation(contact.line_load) for contact in end.contacts)
@@ -185,11 +186,11 @@ class ExplicitStepper(Stepper):
                 f" {worst:.0%} of its peak; the step of {step.max():.4g} passes is"
                 f" {ratio:.2g} times the stability limit"
             )
-        return Attempt((end,), over, warning)
+        return Attempt((end,), over, self.ratio(over), warning)
 
 
 def _errors(problem: WearProblem, start: WearState, end: WearState, step: FloatArray) -> FloatArray:
-    """Return the error that a step adds, in depth [m] and volume [m^3], shape (2, realisations).
+    """Return the errors that a step adds, as of `sizes`, shape (3, realisations).
 
     It is half the difference to a step with the wear rate of its end, plus the effect of the
     variation of load and processes within the step.

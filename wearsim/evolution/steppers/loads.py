@@ -125,7 +125,6 @@ def corrected_loads(
     loads: FloatArray,
     target: FloatArray,
     approach: FloatArray,
-    part: FloatArray | float,
 ) -> FloatArray:
     """Return loads closer to those at which a spring and the contact are in equilibrium.
 
@@ -141,10 +140,8 @@ def corrected_loads(
         Loads by the spring at the displacement of that solution [N].
     approach : ndarray
         Part of the displacement that depends on the load [m].
-    part : float or ndarray, shape (realisations,)
-        Fraction of that displacement by which the spring extends in the mean over the step.
     """
-    slope = part * APPROACH_EXPONENT * np.maximum(approach, 0.0) / loads
+    slope = APPROACH_EXPONENT * np.maximum(approach, 0.0) / loads
     return np.asarray(loads + (target - loads) / (1.0 + problem.stiffness * slope))
 
 

@@ -67,7 +67,7 @@ class PerPassStepper(Stepper):
             # for output only: the compiled loop continues from its own memory
             contacts, _ = solve_at_record(problem, end, on_profile=False)
             end = end.replaced(contacts=contacts)
-        return Attempt((end,), np.zeros(step.shape))
+        return Attempt((end,), np.zeros(step.shape), np.ones(step.shape))
 
 
 def run_passes(

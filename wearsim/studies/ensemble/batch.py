@@ -12,7 +12,7 @@ from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import ContactInputs, sum_in_order
 from wearsim.evolution.state import WearState, fresh_state
 from wearsim.evolution.steppers.base import Stepper
-from wearsim.evolution.steppers.step_doubling import ImplicitStepper
+from wearsim.evolution.steppers.implicit import ImplicitStepper
 from wearsim.plugins import BODIES
 from wearsim.studies.run.draws import Draws
 from wearsim.studies.run.recorder import Due, due_records, history_row, states_at

@@ -1,0 +1,265 @@
+"""Implicit stepper: backward differentiation formulas of variable order and step length."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from wearsim.contact_batch import ContactBatchSolution
+from wearsim.evolution.problem import WearProblem
+from wearsim.evolution.quantities import values_between
+from wearsim.evolution.state import WearState
+from wearsim.evolution.steppers.base import Attempt, Step
+from wearsim.evolution.steppers.implicit_solution import EndOfStep
+from wearsim.evolution.steppers.loads import mean_force
+from wearsim.evolution.steppers.single_step import WearIncrement, carried_loads
+from wearsim.evolution.steppers.step_doubling import StepDoublingStepper
+from wearsim.mechanics.numerics.multistep import (
+    MAX_ORDER,
+    ROWS,
+    extrapolated,
+    formulas,
+    local_errors,
+    new_differences,
+)
+from wearsim.types import BoolArray, FloatArray, IntArray
+
+LIMIT = 2.0  # error of an accepted step, relative to the one aimed at
+SAFETY = 0.8  # ratio of the next step to the one that would meet the aim
+GROW = (2.2, 2.2, 1.8)  # greatest ratio of successive steps, by order
+PART_EXPONENT = 0.5  # early errors decay: they may be greater, by this power of the passes done
+WHOLE_PASSES = 2.0  # steps above which passes are counted one by one
+
+
+class ImplicitStepper(StepDoublingStepper):
+    """Stepper of order one to three that solves the contacts on the profiles at each step's end.
+
+    It is stable for any step length. Order and step length follow from the error that a step adds
+    to the profiles, estimated by the next divided difference.
+    """
+
+    taper = 4.0
+
+    def started(self, problem: WearProblem, state: WearState) -> WearState:
+        """Return the state with the rates and differences that the formulas need."""
+        return state if state.past_spans is not None else with_rates(problem, state)
+
+    def proposed(self, problem: WearProblem, state: WearState) -> FloatArray:
+        """Return the forced step, the one proposed after the last step, or a first step."""
+        proposed = super().proposed(problem, state)
+        if self.forced_step is not None:
+            return proposed
+        return np.where(state.step > 0.0, proposed, math.sqrt(self.tolerance) * proposed)
+
+    def attempt(
+        self, problem: WearProblem, state: WearState, step: FloatArray, stop: float, scheme: Step
+    ) -> Attempt:
+        """Take a step as two halves and as a whole; choose order and length of the next one."""
+        doubled = self.doubled(problem, state, step, stop, scheme)
+        half, end = doubled.path
+        errors = local_errors(end.past_wear, end.past_spans, end.stacked)
+        errors *= (end.passes / stop) ** PART_EXPONENT / self.tolerance
+        columns = zip(errors.T.tolist(), end.order.tolist(), strict=True)
+        chosen = zip(*(_next_step(*column) for column in columns), strict=True)
+        over, order, ratio = (np.array(column) for column in chosen)
+        if doubled.varies:
+            variation = self.excess(problem, state, doubled, stop)
+            over, ratio = np.maximum(over, variation), np.minimum(ratio, self.ratio(variation))
+        coarse = end.coarse_step_solution.replaced(order=order)
+        end = end.replaced(order=order, coarse_step_solution=coarse)
+        return Attempt((half, end), over, ratio)
+
+    def scheme(self, problem: WearProblem, state: WearState) -> Step:
+        """Return the implicit step."""
+        return implicit_step
+
+
+def _next_step(errors: list[float], order: int) -> tuple[float, int, float]:
+    """Return the excess of a step, and order and length of the next one relative to it.
+
+    Parameters
+    ----------
+    errors : list of float
+        Error that the step has added at each order, relative to the one aimed at; infinite where
+        it is unknown.
+    order : int
+        Order of the step.
+    """
+    known = sum(map(math.isfinite, errors))
+    if not known:
+        return 0.0, order, GROW[0]
+    excess = errors[min(order, known) - 1] / LIMIT
+    best = (0.0, 1)
+    for other in range(max(1, order - 1), min(order + 1, known) + 1):
+        error = max(errors[other - 1], 1e-12)
+        best = max(best, (SAFETY * error ** (-1.0 / (other + 1)), other))
+    # the first steps have no estimate of the next order
+    order = order + 1 if order + 1 > known and order < MAX_ORDER and excess <= 1.0 else best[1]
+    return excess, order, min(best[0], GROW[order - 1])
+
+
+def with_rates(problem: WearProblem, state: WearState) -> WearState:
+    """Return a state without past points, and with the rates of wear and energy of its contacts."""
+    times = problem.time(state.passes)
+    here = problem.at_time(times, times)
+    conditions = _conditions(here, problem, state, np.zeros_like(state.passes))
+    spans = np.full((ROWS - 1, len(state.passes)), np.inf)
+    spans[0] = 0.0
+    feedback = problem.has_spring or bool(problem.terms)
+    wear, energy = _wear_per_pass(here, state.contacts)
+    return state.replaced(
+        past_wear=_starting(wear, conditions.mean),
+        past_energy=_starting(energy, conditions.mean),
+        past_loads=_starting(carried_loads(problem, state.contacts), None) if feedback else None,
+        past_spans=spans,
+        order=np.ones(len(state.passes), dtype=np.int64),
+        wear_exponents=np.ones((*problem.shape, problem.grid.strips)),
+    )
+
+
+def _starting(rates: FloatArray, exposure: FloatArray | None) -> FloatArray:
+    """Return the differences of a solution with one point, from its change per pass."""
+    differences = np.zeros((ROWS, *rates.shape))
+    differences[0] = rates
+    if exposure is not None:
+        differences[1] = rates / exposure.reshape(-1, *(1,) * (rates.ndim - 2))
+    return differences
+
+
+def _wear_per_pass(
+    problem: WearProblem, contacts: ContactBatchSolution
+) -> tuple[FloatArray, FloatArray]:
+    """Return depth [m] and energy [J] per roller pass, (stations + rollers, N, strips) and (N,)."""
+    cylinder, roller = WearIncrement(problem, contacts, 1.0).depths
+    power = problem.total_power(problem.values_of(contacts, "power"))
+    wear = np.concatenate([cylinder[:, 0], roller[0]])
+    return wear, power / problem.kinematics.pass_rate
+
+
+@dataclass(frozen=True)
+class _Conditions:
+    """Prescribed conditions of a step.
+
+    Wear is nearly proportional to the load and the friction coefficient. Their product, integrated
+    over the passes, is the exposure; the formulas take it as independent variable, in which wear
+    is smooth also where load and friction vary.
+
+    Parameters
+    ----------
+    force : ndarray, shape (realisations,)
+        Load before feedback for the solution at the end of the step [N].
+    own, mean : ndarray, shape (realisations,)
+        Exposure per pass in these conditions, and its mean over the step.
+    """
+
+    force: FloatArray
+    own: FloatArray
+    mean: FloatArray
+
+
+def _conditions(
+    here: WearProblem, problem: WearProblem, state: WearState, passes: FloatArray
+) -> _Conditions:
+    """Return the conditions of a step; `here` is the problem with processes at their means.
+
+    Where the load varies smoothly it is taken at the end of the step, and where it scatters its
+    mean: the part of its variance that a linear trend explains decides.
+    """
+    if problem.constant_load is not None and not problem.varying:
+        offset = problem.inputs.normal_force_offset.mean(axis=0)
+        exposure = problem.constant_load + offset
+        return _Conditions(problem.constant_load, exposure, exposure)
+    start, stop = problem.time(state.passes), problem.time(state.passes + passes)
+    force = mean = mean_force(problem, state, passes)
+    deviation = values_between([load.deviation for load in problem.loads], start, stop)
+    if deviation.any() and not problem.pauses:
+        first, last = problem.force(start), problem.force(stop)
+        variance = np.where(deviation > 0.0, 12.0 * deviation**2, np.inf)
+        trend = np.minimum(1.0, np.square(last - first) / variance)
+        force = mean + np.where(np.abs(last - mean) < 0.5 * mean, trend, 0.0) * (last - mean)
+    offset = here.inputs.normal_force_offset.mean(axis=0)
+    own, mean = force + offset, mean + offset
+    if any(item.name == "friction" for item in problem.varying):
+        friction = here.inputs.friction.mean(axis=0)
+        own, mean = own * friction, mean * friction
+    return _Conditions(force, own, mean)
+
+
+def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) -> WearState:
+    """Step over `passes` passes with the contacts solved on the profiles at the step's end.
+
+    A backward differentiation formula of the order in `state`. Energy changes by the same formula
+    as the depths, so that Archard's wear law holds to round-off. Passes are counted one by one: the
+    formula is applied to the depths half a pass later, ``u + f/2`` with the wear per pass f, whose
+    derivative is f up to terms of second order in f. A step in which a depth or the energy would
+    decrease is repeated at first order, where neither can.
+
+    Raises
+    ------
+    StepError
+        If the iteration for the contacts does not converge.
+    """
+    if state.past_spans is None:
+        state = with_rates(problem, state)
+    here = problem.at_time(problem.time(state.passes), problem.time(state.passes + passes))
+    conditions = _conditions(here, problem, state, passes)
+    end, decreased = _step(here, state, passes, conditions, state.order)
+    again = np.flatnonzero(decreased & (state.order > 1))
+    if again.size:
+        conditions = _Conditions(*(column[again] for column in vars(conditions).values()))
+        some = here.at(again), state.at(again), passes[again]
+        part, _ = _step(*some, conditions, np.ones(len(again), dtype=np.int64))
+        end = end.with_others(again, part)
+    return end
+
+
+def _step(
+    problem: WearProblem,
+    state: WearState,
+    passes: FloatArray,
+    conditions: _Conditions,
+    order: IntArray,
+) -> tuple[WearState, BoolArray]:
+    """Return the state after an implicit step, and whether depths or energy would decrease.
+
+    Both have one entry per realisation, as has `order`.
+    """
+    realisations, start = len(passes), state.stacked
+    half_pass = np.where(passes > WHOLE_PASSES, 0.5, 0.0)
+    weights = np.empty((2, ROWS, realisations))
+    factor, spans = np.empty(realisations), np.empty((ROWS - 1, realisations))
+    formulas(state.past_spans, conditions.mean * passes, order, half_pass, weights, factor, spans)
+    worn_passes = factor / conditions.own - half_pass
+    added, guess = extrapolated(weights, state.past_wear)
+    old_energy = state.past_energy[:, None, :, None]
+    energy = extrapolated(weights, old_energy)[0]
+    loads = None
+    if state.past_loads is not None:
+        old = state.past_loads.reshape(ROWS, -1, realisations, 1)
+        loads = extrapolated(weights, old)[1] + (1.0 - half_pass[:, None]) * old[0]
+        loads = loads.reshape(problem.shape)
+    step = EndOfStep(problem, state, start + added, conditions.force, passes, worn_passes)
+    end, worn, loads = step.solved(start + guess, loads)
+    power = problem.total_power(problem.values_of(end.contacts, "power"))
+    rate = (power / problem.kinematics.pass_rate)[None, :, None]
+    energy = energy + worn_passes[:, None] * rate
+    new_energy = new_differences(rate, energy, half_pass, old_energy, spans)
+    past_loads = None
+    if loads is not None:
+        new = loads.reshape(-1, realisations, 1)
+        past_loads = new_differences(new, new - old[0], 0.0 * half_pass, old, spans)
+        past_loads = past_loads.reshape(ROWS, *problem.shape)
+    end = end.replaced(
+        passes=state.passes + passes,
+        energy=state.energy + energy[0, :, 0],
+        past_wear=new_differences(
+            worn / worn_passes[:, None], added + worn, half_pass, state.past_wear, spans
+        ),
+        past_energy=new_energy[:, 0, :, 0],
+        past_loads=past_loads,
+        past_spans=spans,
+    )
+    decreased = (end.stacked < start).any(axis=(0, 2)) | (energy[0, :, 0] < 0.0)
+    return end, decreased

@@ -1,0 +1,233 @@
+"""Solution of the contacts at the end of an implicit step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wearsim.contact_batch import ContactBatch, ContactBatchSolution
+from wearsim.errors import StepError
+from wearsim.evolution.problem import WearProblem
+from wearsim.evolution.state import WearState, contact_batch
+from wearsim.evolution.steppers.loads import (
+    checked_loads,
+    corrected_loads,
+    fresh_approach,
+    with_feedback,
+)
+from wearsim.evolution.steppers.single_step import REALISATION
+from wearsim.mechanics.numerics.linearised_wear import linearised_wear, wear_of_bodies
+from wearsim.plugins import SharedWear
+from wearsim.types import BoolArray, FloatArray
+
+MAX_FIXED_POINT = 60
+RELAXATION_INTERVAL = 20  # iterations between relaxations of the tolerance by a factor of ten
+MAX_LINEAR_EXPONENT = 1.0  # of dissipation as a power of line load; 1 in full sliding
+MAX_EXPONENT = 50.0  # T gamma's wear law goes as the power 44 where catastrophic wear begins
+
+
+@dataclass(frozen=True)
+class EndOfStep:
+    """Equations of an implicit step: depths ``base + wear of worn_passes at the end``.
+
+    Parameters
+    ----------
+    problem : WearProblem
+        Problem with every process at its value for the step.
+    start : WearState
+        State at the start of the step.
+    base : ndarray, shape (stations + rollers, realisations, strips)
+        Depths without the wear at the end [m].
+    force : ndarray, shape (realisations,)
+        Load before feedback [N].
+    passes : ndarray, shape (realisations,)
+        Length of the step.
+    worn_passes : ndarray, shape (realisations,)
+        Passes of the wear at the end.
+    """
+
+    problem: WearProblem
+    start: WearState
+    base: FloatArray
+    force: FloatArray
+    passes: FloatArray
+    worn_passes: FloatArray
+
+    def solved(
+        self, guess: FloatArray, loads: FloatArray | None
+    ) -> tuple[WearState, FloatArray, FloatArray | None]:
+        """Solve contacts, wear and loads together.
+
+        The wear enters the contact problem as a compliance: it is linearised in the line load about
+        an earlier solution. Exponents of the line load, loads and creepage depend on the solution
+        and are iterated. Realisations that have converged are not solved again while others
+        continue.
+
+        Parameters
+        ----------
+        guess : ndarray
+            Predicted depths, shape as `base` [m].
+        loads : ndarray, shape (stations, contacts, realisations), optional
+            Predicted loads, where springs or load terms act [N].
+
+        Returns
+        -------
+        end : WearState
+            Depths, contacts, load terms and number of solves at the end.
+        worn : ndarray
+            Wear of the bodies, shape as `base` [m].
+        loads : ndarray, optional
+            Loads in equilibrium with springs and load terms.
+
+        Raises
+        ------
+        StepError
+            If the iteration does not converge.
+        """
+        problem, start, feedback = self.problem, self.start, loads is not None
+        if loads is None:
+            loads = with_feedback(problem, self.force, np.zeros(()), ())
+        loads = target = checked_loads(start, loads)
+        gap = problem.gap(*start.with_stacked(self.base).depths)
+        depths, ends, contacts = guess, start.with_stacked(guess), start.contacts
+        wear = self._parts(contacts)
+        exponents = np.reshape(start.wear_exponents, contacts.line_load.shape)
+        active = np.ones(problem.shape[REALISATION], dtype=np.bool_)
+        iterations = np.zeros(len(active), dtype=np.int64)
+        worn = np.empty_like(self.base)
+        for iteration in range(1, MAX_FIXED_POINT + 1):
+            compliance = np.empty((len(active), len(problem.bodies), 2, gap.shape[-1]))
+            constant = linearised_wear(contacts.line_load, wear, exponents, compliance)
+            batch = contact_batch(problem, gap + self._opening(constant), loads, *ends.depths)
+            shared = SharedWear(problem.bodies, compliance)
+            solved = solve_compliant(problem, batch, shared, contacts, active)
+            iterations += active
+            new, exponents = self._parts(solved), exponents.copy()
+            rest, opening, depth = wear_of_bodies(
+                solved.line_load,
+                contacts.line_load,
+                new,
+                wear,
+                compliance,
+                constant,
+                problem.body_rows,
+                self.base,
+                MAX_LINEAR_EXPONENT if problem.linear_wear else MAX_EXPONENT,
+                exponents,
+                worn,
+            )
+            used, depths = depths, self.base + worn
+            ends = start.with_stacked(depths)
+            depth[depth <= 0.0] = np.inf
+            change = rest
+            if feedback:
+                target = self._equilibrium(solved, loads, gap)
+                moved = np.abs(target / loads - 1.0).max(axis=(0, 1))
+                change = np.maximum(change, opening * moved)
+            if problem.slip_profile is not None:
+                moved = np.abs(depths - used).max(axis=(0, 2))
+                change = np.maximum(change, opening * (moved / depth))
+            # strips at an edge may enter and leave the contact in turn: relax the tolerance slowly
+            relaxation = 10.0 ** ((iteration - 1) // RELAXATION_INTERVAL)
+            active &= ~(change <= problem.iteration_tolerance * relaxation * depth)
+            if not active.any():
+                end = ends.replaced(
+                    solves=start.solves + iterations * problem.contacts_each,
+                    contacts=solved,
+                    terms=self._terms(solved),
+                    wear_exponents=exponents.reshape(*problem.shape, -1),
+                )
+                return end, worn, target if feedback else None
+            contacts, wear, loads = solved, new, target
+        raise StepError(
+            f"an implicit step of {self.passes[0]:.4g} passes from pass {start.passes[0]:.0f} did"
+            f" not converge (last relative change {(change / depth).max():.1e})",
+            start.to_arrays(),
+        )
+
+    def _parts(self, contacts: ContactBatchSolution) -> FloatArray:
+        """Return the contributions of the contacts to the wear, shape (2, contacts, strips) [m]."""
+        parts = self.problem.wear_parts(contacts, self.worn_passes)
+        return parts.reshape(2, *contacts.line_load.shape)
+
+    def _opening(self, parts: FloatArray) -> FloatArray | float:
+        """Return the gap opened by contributions of the contacts, shape (S, C, N, strips) [m]."""
+        if not parts.any():
+            return 0.0
+        problem = self.problem
+        shaped = parts.reshape(2, *problem.shape, -1)
+        cylinder, roller = problem.sum_of_parts(*shaped)
+        return cylinder + problem.at_contacts(roller)
+
+    def _equilibrium(
+        self, solved: ContactBatchSolution, loads: FloatArray, gap: FloatArray
+    ) -> FloatArray:
+        """Return loads closer to equilibrium than those of a solution, shape (S, C, N) [N]."""
+        problem, displacement, approach = self.problem, np.zeros(()), np.zeros(())
+        if problem.has_spring:
+            # worn descent less the recovery of the elastic approach
+            approach = problem.values_of(solved, "approach")
+            fresh = fresh_approach(problem, self.start, self.force)
+            displacement = approach - problem.nominal_least_gap - fresh
+        target = with_feedback(problem, self.force, displacement, self._terms(solved))
+        if problem.has_spring:
+            target = corrected_loads(problem, loads, target, approach - gap.min(axis=-1))
+        return checked_loads(self.start, target)
+
+    def _terms(self, solved: ContactBatchSolution) -> FloatArray:
+        """Return the load terms at the end of the step, shape (terms, rollers, realisations).
+
+        They advance with the mean of the powers at its start and end.
+        """
+        problem, start = self.problem, self.start
+        if not problem.terms:
+            return start.terms
+        power = 0.5 * (problem.power_of_rollers(start.contacts) + problem.power_of_rollers(solved))
+        begin = problem.time(start.passes)
+        duration = float((problem.time(start.passes + self.passes) - begin)[0])
+        each = zip(problem.terms.values(), start.terms, strict=True)
+        return np.array([term.advance(value, power, duration) for term, value in each])
+
+
+def solve_compliant(
+    problem: WearProblem,
+    batch: ContactBatch,
+    wear: SharedWear,
+    warm: ContactBatchSolution,
+    active: BoolArray,
+) -> ContactBatchSolution:
+    """Solve the contacts of the active realisations; the others keep their solutions.
+
+    Parameters
+    ----------
+    problem : WearProblem
+    batch : ContactBatch
+        The contacts, in the problem's order.
+    wear : SharedWear
+        Wear compliance with a first axis of realisations.
+    warm : ContactBatchSolution
+        Solutions to start from, in the problem's order.
+    active : ndarray of bool, shape (realisations,)
+
+    Returns
+    -------
+    ContactBatchSolution
+        In the problem's order; those of inactive realisations are taken from `warm`.
+    """
+    model, realisations = problem.model, problem.shape[REALISATION]
+    coupled = len(batch) // realisations
+    everywhere = np.count_nonzero(active) == realisations
+    if everywhere and coupled == 1:
+        return model.solve(batch, wear.total.reshape(batch.gap.shape), None, warm)
+    if everywhere and realisations == 1:
+        return model.solve(batch, None, wear, warm)
+    # the contacts of one realisation next to each other, which the problem has `realisations` apart
+    numbers = np.flatnonzero(active)
+    order = np.arange(len(batch)).reshape(coupled, realisations)[:, numbers].T.ravel()
+    some, near, part = batch.at(order), warm.at(order), wear.at(numbers)
+    if coupled == 1:
+        solved = model.solve(some, part.total.reshape(some.gap.shape), None, near)
+    else:
+        solved = model.solve(some, None, part, near)
+    return warm.with_others(order, solved)

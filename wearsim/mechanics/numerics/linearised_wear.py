@@ -1,0 +1,178 @@
+"""Wear of a step, linearised in the line load of every strip."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wearsim.mechanics.numerics.jit import kernel
+from wearsim.types import FloatArray, IntArray
+
+LEAST_EXPONENT = 0.4  # wear is proportional to q^(1/2) in adhesion and at a steady wear rate
+DEEP = 0.5  # depths are compared where a groove is deeper than this part of its greatest depth
+MIN_LOG_CHANGE = 1e-7  # least relative change of a line load for the estimate of an exponent
+
+
+@kernel
+def linearised_wear(
+    line_load: FloatArray, wear: FloatArray, exponents: FloatArray, compliance: FloatArray
+) -> FloatArray:
+    """Linearise the wear u of each strip about its line load q_0.
+
+    u = (1 - e) u_0 + e (u_0/q_0) q, with the exponent e of u ~ q^e.
+
+    Parameters
+    ----------
+    line_load : ndarray, shape (contacts, strips)
+        Line load q_0 [N/m]; contact number c * realisations + v.
+    wear : ndarray, shape (2, contacts, strips)
+        Depth u_0 that each contact wears off its two bodies [m].
+    exponents : ndarray, shape (contacts, strips)
+        Exponent e.
+    compliance : ndarray, shape (realisations, contacts each, 2, strips)
+        Result: e u_0/q_0 [m/(N/m)]; u_0/q_0 is interpolated to strips without load.
+
+    Returns
+    -------
+    ndarray, shape (2, contacts, strips)
+        The constant part (1 - e) u_0 [m].
+    """
+    contacts, n = line_load.shape
+    realisations = len(compliance)
+    constant = np.empty((2, contacts, n))
+    for k in range(contacts):
+        c, v = k // realisations, k % realisations
+        for side in range(2):
+            last = -1
+            for i in range(n):
+                constant[side, k, i] = (1.0 - exponents[k, i]) * wear[side, k, i]
+                if not line_load[k, i] > 0.0:
+                    continue
+                here = wear[side, k, i] / line_load[k, i]
+                start = compliance[v, c, side, last] if last >= 0 else here
+                for j in range(last + 1, i):
+                    part = (j - last) / (i - last) if last >= 0 else 1.0
+                    compliance[v, c, side, j] = start + (here - start) * part
+                compliance[v, c, side, i] = here
+                last = i
+            for j in range(last + 1, n):
+                compliance[v, c, side, j] = compliance[v, c, side, last] if last >= 0 else 0.0
+            for i in range(n):
+                compliance[v, c, side, i] *= exponents[k, i]
+    return constant
+
+
+@kernel
+def wear_of_bodies(
+    loads: FloatArray,
+    old_loads: FloatArray,
+    wear: FloatArray,
+    old_wear: FloatArray,
+    compliance: FloatArray,
+    constant: FloatArray,
+    bodies: IntArray,
+    base: FloatArray,
+    greatest: float,
+    exponents: FloatArray,
+    worn: FloatArray,
+) -> FloatArray:
+    """Add the wear of all contacts, and compare it with that linearised about another solution.
+
+    Parameters
+    ----------
+    loads, old_loads : ndarray, shape (contacts, strips)
+        Line loads of the solution, and of the other one [N/m].
+    wear, old_wear : ndarray, shape (2, contacts, strips)
+        Their wear [m].
+    compliance, constant : ndarray
+        As in `linearised_wear`.
+    bodies : ndarray of int, shape (contacts each, 2)
+        Rows in `worn` of the two bodies of each contact.
+    base : ndarray, shape (bodies, realisations, strips)
+        Depths without this wear [m].
+    greatest : float
+        Upper bound of the exponents.
+    exponents : ndarray, shape (contacts, strips)
+        Updated by the two solutions in strips whose load has changed.
+    worn : ndarray, shape (bodies, realisations, strips)
+        Result: wear of the bodies [m].
+
+    Returns
+    -------
+    ndarray, shape (3, realisations)
+        Greatest opening less the linearised one, greatest opening, and greatest depth of both
+        bodies of a contact [m].
+    """
+    contacts, n = loads.shape
+    realisations = len(compliance)
+    worn[:] = 0.0
+    rest = np.zeros(worn.shape)
+    for k in range(contacts):
+        c, v = k // realisations, k % realisations
+        for side in range(2):
+            body = bodies[c, side]
+            for i in range(n):
+                linear = constant[side, k, i] + compliance[v, c, side, i] * loads[k, i]
+                worn[body, v, i] += wear[side, k, i]
+                rest[body, v, i] += wear[side, k, i] - linear
+        for i in range(n):
+            new, old = wear[0, k, i] + wear[1, k, i], old_wear[0, k, i] + old_wear[1, k, i]
+            if not (new > 0.0 and old > 0.0):
+                continue
+            rise = np.log(loads[k, i] / old_loads[k, i])
+            if abs(rise) > MIN_LOG_CHANGE:
+                slope = np.log(new / old) / rise
+                exponents[k, i] = min(max(slope, LEAST_EXPONENT), greatest)
+    sizes = np.zeros((3, realisations))
+    for c in range(len(bodies)):
+        one, other = bodies[c, 0], bodies[c, 1]
+        for v in range(realisations):
+            for i in range(n):
+                opening = worn[one, v, i] + worn[other, v, i]
+                depth = base[one, v, i] + base[other, v, i] + opening
+                sizes[0, v] = max(sizes[0, v], abs(rest[one, v, i] + rest[other, v, i]))
+                sizes[1, v] = max(sizes[1, v], opening)
+                sizes[2, v] = max(sizes[2, v], depth)
+    return sizes
+
+
+@kernel
+def difference_sizes(
+    depths: FloatArray, differences: FloatArray, weights: FloatArray
+) -> FloatArray:
+    """Return the sizes of differences in the depths of all bodies.
+
+    Parameters
+    ----------
+    depths, differences : ndarray, shape (bodies, realisations, strips)
+        Depths and differences of depths [m].
+    weights : ndarray, shape (2, bodies)
+        One for a body of the first kind and zero for others; volume per sum of depths [m^2].
+
+    Returns
+    -------
+    ndarray, shape (4, realisations)
+        Greatest absolute difference where the bodies of a kind are worn deeper than half their
+        greatest depth [m]; volume of the differences [m^3]; Euclidean norms of differences and
+        depths [m].
+    """
+    bodies, realisations, n = depths.shape
+    sizes = np.zeros((4, realisations))
+    for v in range(realisations):
+        deepest = np.zeros(2)
+        for b in range(bodies):
+            kind = 0 if weights[0, b] > 0.0 else 1
+            for i in range(n):
+                deepest[kind] = max(deepest[kind], depths[b, v, i])
+        for b in range(bodies):
+            kind = 0 if weights[0, b] > 0.0 else 1
+            total = 0.0
+            for i in range(n):
+                difference = differences[b, v, i]
+                total += difference
+                sizes[2, v] += difference * difference
+                sizes[3, v] += depths[b, v, i] * depths[b, v, i]
+                if depths[b, v, i] >= DEEP * deepest[kind]:
+                    sizes[0, v] = max(sizes[0, v], abs(difference))
+            sizes[1, v] += weights[1, b] * total
+        sizes[2, v], sizes[3, v] = np.sqrt(sizes[2, v]), np.sqrt(sizes[3, v])
+    return sizes

@@ -1,0 +1,188 @@
+"""Backward differentiation formulas for unequal steps, in divided differences."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wearsim.mechanics.numerics.jit import kernel
+from wearsim.types import FloatArray, IntArray
+
+MAX_ORDER = 3
+ROWS = MAX_ORDER + 2  # of the divided differences: the highest one is that of the error estimate
+# greatest ratios of a step to the last one; steps that grow by them are stable: below
+# 1 + sqrt(2) at second order, and at third order if only every second step grows
+_RATIO_2, _RATIO_3 = 2.4, 1.9
+
+
+@kernel
+def formulas(
+    spans: FloatArray,
+    steps: FloatArray,
+    orders: IntArray,
+    start: FloatArray,
+    weights: FloatArray,
+    factor: FloatArray,
+    distances: FloatArray,
+) -> None:
+    """Compute the formula of one step for each of several solutions.
+
+    A solution is known by its value at the present point and its divided differences of order 1 to
+    4 over the present and past points. The value y at the end of a step satisfies
+
+        y - factor * y' = y_0 + sum_k weights[0, k] * difference_k,
+
+    with the derivative y' at the end. The sum with ``weights[1]`` instead predicts y. Where a
+    point is missing, or the step is much longer than the last one, the order is lower.
+
+    Parameters
+    ----------
+    spans : ndarray, shape (4, solutions)
+        Distances from the present point back to the past points, infinite where there is none; a
+        point of distance zero stands for a known derivative at the present point.
+    steps : ndarray, shape (solutions,)
+        Length of the step.
+    orders : ndarray of int, shape (solutions,)
+        Order of the formula.
+    start : ndarray, shape (solutions,)
+        Value of both weights for k = 0.
+    weights : ndarray, shape (2, 5, solutions)
+        Result: weights of the formula and of the prediction.
+    factor : ndarray, shape (solutions,)
+        Result: factor of the derivative.
+    distances : ndarray, shape (4, solutions)
+        Result: `spans` of the end of the step.
+
+    References
+    ----------
+    .. [1] E. Hairer, S.P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed.
+       (1993), section III.5, DOI 10.1007/978-3-540-78862-1.
+    """
+    for v in range(len(steps)):
+        step = steps[v]
+        known = 1
+        distances[0, v] = step
+        for k in range(ROWS - 1):
+            if np.isfinite(spans[k, v]):
+                known += 1
+            if k < ROWS - 2:
+                distances[k + 1, v] = step + spans[k, v]
+        order = min(orders[v], known)
+        if order == 3 and step > _RATIO_3 * spans[0, v]:
+            order = 2
+        if order == 2 and step > _RATIO_2 * spans[0, v]:
+            order = 1
+        inverse = 0.0
+        for k in range(order):
+            inverse += 1.0 / distances[k, v]
+        factor[v] = 1.0 / inverse
+        product, inverse = 1.0, 0.0
+        for k in range(ROWS):
+            weights[0, k, v] = product * (1.0 - factor[v] * inverse) if k < order else 0.0
+            weights[1, k, v] = product if k <= order and k < known else 0.0
+            if k < ROWS - 1:
+                product *= distances[k, v]
+                inverse += 1.0 / distances[k, v]
+        weights[0, 0, v] = weights[1, 0, v] = start[v]
+
+
+@kernel
+def extrapolated(weights: FloatArray, differences: FloatArray) -> FloatArray:
+    """Return sums of divided differences with the weights of `formulas`.
+
+    Parameters
+    ----------
+    weights : ndarray, shape (2, 5, solutions)
+    differences : ndarray, shape (5, rows, solutions, columns)
+
+    Returns
+    -------
+    ndarray, shape (2, rows, solutions, columns)
+    """
+    _, rows, solutions, columns = differences.shape
+    sums = np.empty((2, rows, solutions, columns))
+    for m in range(2):
+        for r in range(rows):
+            for v in range(solutions):
+                for i in range(columns):
+                    total = weights[m, 0, v] * differences[0, r, v, i]
+                    for k in range(1, ROWS):
+                        if weights[m, k, v] != 0.0:
+                            total += weights[m, k, v] * differences[k, r, v, i]
+                    sums[m, r, v, i] = total
+    return sums
+
+
+@kernel
+def new_differences(
+    first: FloatArray,
+    change: FloatArray,
+    part: FloatArray,
+    old: FloatArray,
+    distances: FloatArray,
+) -> FloatArray:
+    """Return the divided differences at the end of a step.
+
+    Parameters
+    ----------
+    first : ndarray, shape (rows, solutions, columns)
+        Content of row 0, which is no difference.
+    change : ndarray, shape (rows, solutions, columns)
+        Change of the values in the step, without `part` times that of row 0.
+    part : ndarray, shape (solutions,)
+    old : ndarray, shape (5, rows, solutions, columns)
+        Divided differences at its start.
+    distances : ndarray, shape (4, solutions)
+        Distances from the end of the step back to the other points.
+    """
+    _, rows, solutions, columns = old.shape
+    new = np.empty((ROWS, rows, solutions, columns))
+    for r in range(rows):
+        for v in range(solutions):
+            for i in range(columns):
+                new[0, r, v, i] = first[r, v, i]
+                value = change[r, v, i] + part[v] * (first[r, v, i] - old[0, r, v, i])
+                value /= distances[0, v]
+                new[1, r, v, i] = value
+                for k in range(2, ROWS):
+                    value = (value - old[k - 1, r, v, i]) / distances[k - 1, v]
+                    new[k, r, v, i] = value
+    return new
+
+
+@kernel
+def local_errors(differences: FloatArray, spans: FloatArray, depths: FloatArray) -> FloatArray:
+    """Return the relative error that the last step has added at each order.
+
+    Parameters
+    ----------
+    differences : ndarray, shape (5, rows, solutions, columns)
+    spans : ndarray, shape (4, solutions)
+        Distances from the present point back to the past points.
+    depths : ndarray, shape (rows, solutions, columns)
+        Values at the present point.
+
+    Returns
+    -------
+    ndarray, shape (3, solutions)
+        Euclidean norm of the error at order 1, 2 and 3, over that of the values; infinite where
+        points are missing.
+    """
+    _, rows, solutions, columns = differences.shape
+    errors = np.full((MAX_ORDER, solutions), np.inf)
+    for v in range(solutions):
+        size = 0.0
+        for r in range(rows):
+            for i in range(columns):
+                size += depths[r, v, i] ** 2
+        product, inverse = 1.0, 0.0
+        for k in range(MAX_ORDER):
+            if not np.isfinite(spans[k + 1, v]):
+                break
+            product *= spans[k, v]
+            inverse += 1.0 / spans[k, v]
+            total = 0.0
+            for r in range(rows):
+                for i in range(columns):
+                    total += differences[k + 2, r, v, i] ** 2
+            errors[k, v] = np.sqrt(total / size) * product / inverse if size > 0.0 else 0.0
+    return errors
