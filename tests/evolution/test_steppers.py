@@ -14,7 +14,7 @@ from wearsim.evolution.steppers.base import Attempt
 from wearsim.evolution.steppers.forward_euler import ExplicitStepper, stability_limit
 from wearsim.evolution.steppers.per_pass import PerPassStepper, run_compiled, run_in_python
 from wearsim.evolution.steppers.single_step import recovery_at
-from wearsim.evolution.steppers.step_doubling import ImplicitStepper
+from wearsim.evolution.steppers.implicit import ImplicitStepper
 from wearsim.studies.ensemble.batch import joined_problem
 
 THREE = {"roller__offset": ["-1 mm", "0.3 mm", "1 mm"]}
@@ -259,7 +259,7 @@ class Overflowing(ExplicitStepper):
 
     def attempt(self, problem, state, step, stop, scheme):
         end = replace(state, passes=state.passes + step, energy=np.where(step > 10.0, np.inf, 0.0))
-        return Attempt((end,), np.zeros(1))
+        return Attempt((end,), np.zeros(1), np.ones(1))
 
 
 def test_step_to_a_value_that_is_not_finite_is_shortened_or_fails():

@@ -18,6 +18,7 @@ from wearsim.types import FloatArray
 # lower bounds: the depth grows with a power of 2/3 to 1 of the passes, the volume with about 1
 DEPTH_EXPONENT, VOLUME_EXPONENT = 0.5, 0.75
 COVER = 1.5  # safety factor on an error estimate
+VARYING_COVER = 4.0 / 3.0  # another one where inputs vary, so that errors change irregularly
 SHARE = 0.7  # part of the tolerance that one step may use
 MIN_BUDGET = 0.02  # part of the error budget that a step may always add, so that a run never stalls
 DEPTHS = ("cylinder_depth", "roller_depth")
@@ -295,7 +296,8 @@ def excess(
     parts = (end.passes / stop).tolist()
     grown = greatest_depth(end.depths), volume_of(problem, end.depths)
     # errors that a shorter step would not reduce must not shorten it
-    reducible = np.array([start.depth_error, start.volume_error]) - start.irreducible[:2]
+    before = np.array([start.depth_error, start.volume_error, start.profile_error])
+    reducible = before - start.irreducible
     arrays = reducible, added, reducible + added if reached is None else reached
     for kind, exponent in enumerate((DEPTH_EXPONENT, VOLUME_EXPONENT)):
         columns = (a[kind].tolist() for a in (grown, *arrays))

@@ -161,7 +161,7 @@ class WearProblem:
     @cached_property
     def body_rows(self) -> IntArray:
         """`bodies` counted together, the stations of the cylinder first, as in `stacked`."""
-        return self.bodies + np.array([0, self.shape[0]])
+        return np.asarray(self.bodies + np.array([0, self.shape[0]]))
 
     @cached_property
     def volume_weights(self) -> FloatArray:

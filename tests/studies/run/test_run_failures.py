@@ -20,7 +20,7 @@ from wearsim.errors import (
     SolverError,
     StepError,
 )
-from wearsim.evolution.steppers import step_doubling as implicit
+from wearsim.evolution.steppers import implicit
 from wearsim.results import Result, open_results, read_results, write_results
 from wearsim.scenario import Scenario, parse_scenario
 from wearsim.studies.run import recorder

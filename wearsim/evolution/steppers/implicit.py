@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,11 +27,30 @@ from wearsim.mechanics.numerics.multistep import (
 )
 from wearsim.types import BoolArray, FloatArray, IntArray
 
+TREND = 0.9  # part of the variance of a smooth load that its linear trend explains
 LIMIT = 2.0  # error of an accepted step, relative to the one aimed at
 SAFETY = 0.8  # ratio of the next step to the one that would meet the aim
 GROW = (2.2, 2.2, 1.8)  # greatest ratio of successive steps, by order
 PART_EXPONENT = 0.5  # early errors decay: they may be greater, by this power of the passes done
 WHOLE_PASSES = 2.0  # steps above which passes are counted one by one
+
+
+class Past(NamedTuple):
+    """Rates, differences and past points of a state; see `WearState`."""
+
+    wear: FloatArray
+    energy: FloatArray
+    loads: FloatArray | None
+    spans: FloatArray
+    order: IntArray
+
+    @classmethod
+    def of(cls, state: WearState) -> Past:
+        """Return those of a state of the implicit stepper."""
+        wear, energy, spans, order = (
+            getattr(state, name) for name in ("past_wear", "past_energy", "past_spans", "order")
+        )
+        return cls(wear, energy, state.past_loads, spans, order)
 
 
 class ImplicitStepper(StepDoublingStepper):
@@ -59,15 +79,16 @@ class ImplicitStepper(StepDoublingStepper):
         """Take a step as two halves and as a whole; choose order and length of the next one."""
         doubled = self.doubled(problem, state, step, stop, scheme)
         half, end = doubled.path
-        errors = local_errors(end.past_wear, end.past_spans, end.stacked)
+        past = Past.of(end)
+        errors = local_errors(past.wear, past.spans, end.stacked)
         errors *= (end.passes / stop) ** PART_EXPONENT / self.tolerance
-        columns = zip(errors.T.tolist(), end.order.tolist(), strict=True)
+        columns = zip(errors.T.tolist(), past.order.tolist(), strict=True)
         chosen = zip(*(_next_step(*column) for column in columns), strict=True)
         over, order, ratio = (np.array(column) for column in chosen)
         if doubled.varies:
             variation = self.excess(problem, state, doubled, stop)
             over, ratio = np.maximum(over, variation), np.minimum(ratio, self.ratio(variation))
-        coarse = end.coarse_step_solution.replaced(order=order)
+        coarse = end.auxiliary["coarse_step_solution"].replaced(order=order)
         end = end.replaced(order=order, coarse_step_solution=coarse)
         return Attempt((half, end), over, ratio)
 
@@ -164,8 +185,7 @@ def _conditions(
 ) -> _Conditions:
     """Return the conditions of a step; `here` is the problem with processes at their means.
 
-    Where the load varies smoothly it is taken at the end of the step, and where it scatters its
-    mean: the part of its variance that a linear trend explains decides.
+    The load is that at the end of the step where it varies smoothly, and else its mean.
     """
     if problem.constant_load is not None and not problem.varying:
         offset = problem.inputs.normal_force_offset.mean(axis=0)
@@ -177,8 +197,9 @@ def _conditions(
     if deviation.any() and not problem.pauses:
         first, last = problem.force(start), problem.force(stop)
         variance = np.where(deviation > 0.0, 12.0 * deviation**2, np.inf)
-        trend = np.minimum(1.0, np.square(last - first) / variance)
-        force = mean + np.where(np.abs(last - mean) < 0.5 * mean, trend, 0.0) * (last - mean)
+        smooth = np.square(last - first) > TREND * variance
+        smooth &= np.abs(last - mean) < 0.5 * mean
+        force = np.where(smooth, last, mean)
     offset = here.inputs.normal_force_offset.mean(axis=0)
     own, mean = force + offset, mean + offset
     if any(item.name == "friction" for item in problem.varying):
@@ -205,8 +226,9 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
         state = with_rates(problem, state)
     here = problem.at_time(problem.time(state.passes), problem.time(state.passes + passes))
     conditions = _conditions(here, problem, state, passes)
-    end, decreased = _step(here, state, passes, conditions, state.order)
-    again = np.flatnonzero(decreased & (state.order > 1))
+    order = Past.of(state).order
+    end, decreased = _step(here, state, passes, conditions, order)
+    again = np.flatnonzero(decreased & (order > 1))
     if again.size:
         conditions = _Conditions(*(column[again] for column in vars(conditions).values()))
         some = here.at(again), state.at(again), passes[again]
@@ -226,18 +248,18 @@ def _step(
 
     Both have one entry per realisation, as has `order`.
     """
-    realisations, start = len(passes), state.stacked
+    realisations, start, past = len(passes), state.stacked, Past.of(state)
     half_pass = np.where(passes > WHOLE_PASSES, 0.5, 0.0)
     weights = np.empty((2, ROWS, realisations))
     factor, spans = np.empty(realisations), np.empty((ROWS - 1, realisations))
-    formulas(state.past_spans, conditions.mean * passes, order, half_pass, weights, factor, spans)
+    formulas(past.spans, conditions.mean * passes, order, half_pass, weights, factor, spans)
     worn_passes = factor / conditions.own - half_pass
-    added, guess = extrapolated(weights, state.past_wear)
-    old_energy = state.past_energy[:, None, :, None]
+    added, guess = extrapolated(weights, past.wear)
+    old_energy = past.energy[:, None, :, None]
     energy = extrapolated(weights, old_energy)[0]
     loads = None
-    if state.past_loads is not None:
-        old = state.past_loads.reshape(ROWS, -1, realisations, 1)
+    if past.loads is not None:
+        old = past.loads.reshape(ROWS, -1, realisations, 1)
         loads = extrapolated(weights, old)[1] + (1.0 - half_pass[:, None]) * old[0]
         loads = loads.reshape(problem.shape)
     step = EndOfStep(problem, state, start + added, conditions.force, passes, worn_passes)
@@ -255,7 +277,7 @@ def _step(
         passes=state.passes + passes,
         energy=state.energy + energy[0, :, 0],
         past_wear=new_differences(
-            worn / worn_passes[:, None], added + worn, half_pass, state.past_wear, spans
+            worn / worn_passes[:, None], added + worn, half_pass, past.wear, spans
         ),
         past_energy=new_energy[:, 0, :, 0],
         past_loads=past_loads,

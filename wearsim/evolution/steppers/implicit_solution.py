@@ -22,6 +22,7 @@ from wearsim.plugins import SharedWear
 from wearsim.types import BoolArray, FloatArray
 
 MAX_FIXED_POINT = 60
+CONVERGED = 50.0  # change of wear over the whole depth, relative to the tolerance of iterations
 RELAXATION_INTERVAL = 20  # iterations between relaxations of the tolerance by a factor of ten
 MAX_LINEAR_EXPONENT = 1.0  # of dissipation as a power of line load; 1 in full sliding
 MAX_EXPONENT = 50.0  # T gamma's wear law goes as the power 44 where catastrophic wear begins
@@ -92,7 +93,7 @@ class EndOfStep:
         gap = problem.gap(*start.with_stacked(self.base).depths)
         depths, ends, contacts = guess, start.with_stacked(guess), start.contacts
         wear = self._parts(contacts)
-        exponents = np.reshape(start.wear_exponents, contacts.line_load.shape)
+        exponents = np.asarray(start.wear_exponents).reshape(contacts.line_load.shape)
         active = np.ones(problem.shape[REALISATION], dtype=np.bool_)
         iterations = np.zeros(len(active), dtype=np.int64)
         worn = np.empty_like(self.base)
@@ -122,7 +123,8 @@ class EndOfStep:
             depth[depth <= 0.0] = np.inf
             change = rest
             if feedback:
-                target = self._equilibrium(solved, loads, gap)
+                # loads of realisations that have converged must not depend on the others
+                target = np.where(active, self._equilibrium(solved, loads, gap), target)
                 moved = np.abs(target / loads - 1.0).max(axis=(0, 1))
                 change = np.maximum(change, opening * moved)
             if problem.slip_profile is not None:
@@ -130,7 +132,8 @@ class EndOfStep:
                 change = np.maximum(change, opening * (moved / depth))
             # strips at an edge may enter and leave the contact in turn: relax the tolerance slowly
             relaxation = 10.0 ** ((iteration - 1) // RELAXATION_INTERVAL)
-            active &= ~(change <= problem.iteration_tolerance * relaxation * depth)
+            converged = CONVERGED * problem.iteration_tolerance * relaxation
+            active &= ~(change <= converged * depth)
             if not active.any():
                 end = ends.replaced(
                     solves=start.solves + iterations * problem.contacts_each,

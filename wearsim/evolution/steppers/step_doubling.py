@@ -8,6 +8,7 @@ import numpy as np
 
 from wearsim.evolution.error_estimates import (
     COVER,
+    VARYING_COVER,
     biased_coarse_solution,
     excess,
     sizes,
@@ -87,7 +88,7 @@ class StepDoublingStepper(Stepper):
         passes = np.where(step == stop - state.passes, stop, end.passes)
         after = end.stacked - coarse.stacked
         change = after - (state.stacked - coarse_start.stacked)
-        cover = np.array(self.cover)[:, None]
+        cover = np.array(self.cover)[:, None] * (1.0 if bias is None else VARYING_COVER)
         added, reached = (cover * np.abs(sizes(problem, end, one)) for one in (change, after))
         auxiliary = {
             name: solution.replaced(

@@ -31,8 +31,8 @@ from wearsim.studies.run.inputs import (
 )
 from wearsim.types import FloatArray, Grid
 
-ITERATION_FRACTION = 0.05  # convergence criterion of a step's iterations, over the tolerance
-ITERATION_RANGE = 1e-8, 1e-3
+ITERATION_FRACTION = 1e-3  # convergence criterion of a step's iterations, over the tolerance
+ITERATION_RANGE = 1e-8, 1e-5
 
 PARABOLA = {"hertz", "hertz-fastsim", "semi-hertzian"}  # models that fit one to the gap
 

@@ -1,0 +1,91 @@
+"""Linearisation of wear in the line load, and its comparison with the wear of a solution."""
+
+import numpy as np
+import pytest
+
+from wearsim.mechanics.numerics.linearised_wear import (
+    difference_sizes,
+    linearised_wear,
+    wear_of_bodies,
+)
+
+LOAD = np.array([[0.0, 2.0, 0.0, 0.0, 4.0, 0.0]])
+WEAR = np.array([[[0.0, 4.0, 0.0, 0.0, 20.0, 0.0]], np.zeros((1, 6))])
+
+
+def compared(load, old_load, wear, old_wear, exponents, greatest=1.0):
+    """Exponents and sizes of one contact whose second body does not wear."""
+    both = np.stack([wear, np.zeros_like(wear)]), np.stack([old_wear, np.zeros_like(wear)])
+    compliance, worn = np.empty((1, 1, 2, load.shape[1])), np.empty((2, 1, load.shape[1]))
+    constant = linearised_wear(old_load, both[1], exponents, compliance)
+    rows, base = np.array([[0, 1]]), np.zeros_like(worn)
+    sizes = wear_of_bodies(
+        load, old_load, *both, compliance, constant, rows, base, greatest, exponents, worn
+    )
+    assert (worn[0] == wear).all()
+    return exponents[0], sizes[:, 0]
+
+
+def test_ratio_is_extended_to_strips_without_load():
+    compliance = np.empty((1, 1, 2, 6))
+    constant = linearised_wear(LOAD, WEAR, np.ones((1, 6)), compliance)
+    assert compliance[0, 0, 0] == pytest.approx([2.0, 2.0, 3.0, 4.0, 5.0, 5.0])
+    assert not compliance[0, 0, 1].any()
+    assert not constant.any()
+
+
+def test_contact_without_load_has_no_compliance():
+    compliance = np.empty((2, 1, 2, 3))
+    linearised_wear(np.zeros((2, 3)), np.zeros((2, 2, 3)), np.ones((2, 3)), compliance)
+    assert not compliance.any()
+
+
+def test_linearisation_has_value_and_slope_of_a_power_law():
+    load, exponent = np.array([[1.0, 2.0, 3.0]]), 0.7
+    wear = np.stack([load**exponent, 2.0 * load**exponent])
+    compliance = np.empty((1, 1, 2, 3))
+    constant = linearised_wear(load, wear, np.full((1, 3), exponent), compliance)
+    slope = compliance[0, 0]
+    assert constant[:, 0] + slope * load == pytest.approx(wear[:, 0])
+    assert slope[0] == pytest.approx(exponent * load[0] ** (exponent - 1.0))
+
+
+def test_exponent_of_a_power_law_is_estimated():
+    load, new = np.array([[1.0, 2.0, 3.0, 0.0]]), np.array([[1.5, 1.0, 3.0, 0.0]])
+    exponents, _ = compared(new, load, new**0.7, load**0.7, np.full((1, 4), 0.9))
+    # no estimate in a strip of constant load, nor in one without load
+    assert exponents == pytest.approx([0.7, 0.7, 0.9, 0.9])
+
+
+def test_exponents_are_limited_to_their_bounds():
+    load, new = np.array([[1.0, 1.0]]), np.array([[2.0, 2.0]])
+    exponents, _ = compared(new, load, new ** np.array([[3.0, 0.1]]), load, np.ones((1, 2)))
+    assert exponents.tolist() == [1.0, 0.4]
+
+
+def test_linear_wear_leaves_no_difference():
+    load, new = np.array([[1.0, 2.0]]), np.array([[1.5, 1.0]])
+    _, sizes = compared(new, load, 2.0 * new, 2.0 * load, np.ones((1, 2)))
+    assert sizes.tolist() == [0.0, 3.0, 3.0]
+
+
+def test_contacts_on_one_body_add_their_wear():
+    loads, rows = np.array([[1.0], [2.0]]), np.array([[0, 1], [0, 2]])
+    wear = np.array([[[1.0], [2.0]], [[10.0], [20.0]]])
+    compliance, worn = np.empty((1, 2, 2, 1)), np.empty((3, 1, 1))
+    constant = linearised_wear(loads, wear, np.ones((2, 1)), compliance)
+    base = np.full((3, 1, 1), 100.0)
+    sizes = wear_of_bodies(
+        loads, loads, wear, wear, compliance, constant, rows, base, 1.0, np.ones((2, 1)), worn
+    )
+    assert worn.ravel().tolist() == [3.0, 10.0, 20.0]
+    assert sizes[:, 0].tolist() == [0.0, 23.0, 223.0]
+
+
+def test_sizes_of_differences():
+    depths = np.array([[[4.0, 1.0, 3.0]], [[0.0, 1.0, 1.0]]])
+    differences = np.array([[[0.1, -9.0, -0.2]], [[5.0, 0.3, 0.0]]])
+    weights = np.array([[1.0, 0.0], [2.0, 3.0]])
+    sizes = difference_sizes(depths, differences, weights)[:, 0]
+    expected = [0.3, 2.0 * -9.1 + 3.0 * 5.3, np.linalg.norm(differences), np.linalg.norm(depths)]
+    assert sizes == pytest.approx(expected)

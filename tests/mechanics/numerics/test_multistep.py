@@ -1,0 +1,103 @@
+"""Backward differentiation formulas in divided differences."""
+
+import numpy as np
+import pytest
+
+from wearsim.mechanics.numerics.multistep import (
+    ROWS,
+    extrapolated,
+    formulas,
+    local_errors,
+    new_differences,
+)
+
+ONE, NONE = np.ones(1), np.zeros(1)
+POINTS = np.array([0.0, -0.11, -0.18, -0.32, -0.4])
+
+
+class Solution:
+    """Solution of an equation y' = f(t, y), linear in y, that begins with exact points."""
+
+    def __init__(self, exact, points=POINTS):
+        table = [exact(points)]
+        for k in range(1, ROWS):
+            table.append((table[-1][:-1] - table[-1][1:]) / (points[:-k] - points[k:]))
+        self.differences = np.array([0.0, *(row[0] for row in table[1:])]).reshape(ROWS, 1, 1, 1)
+        self.spans = -points[1:, None]
+        self.value = np.full((1, 1, 1), exact(points[0]))
+
+    def step(self, length, order, constant, slope=0.0):
+        """Take a step; the derivative at its end is ``constant + slope * y``."""
+        weights, factor = np.empty((2, ROWS, 1)), np.empty(1)
+        distances = np.empty((ROWS - 1, 1))
+        formulas(self.spans, length * ONE, np.array([order]), NONE, weights, factor, distances)
+        added, guess = extrapolated(weights, self.differences)
+        new = (self.value + added + factor[0] * constant) / (1.0 - factor[0] * slope)
+        change = new - self.value
+        self.differences = new_differences(0.0 * new, change, NONE, self.differences, distances)
+        guess, self.value, self.spans = self.value + guess, new, distances
+        return guess.item()
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_formula_is_exact_for_polynomials_of_its_order(order):
+    exact = np.polynomial.Polynomial([0.3, -0.7, 1.1, 2.0][: order + 1])
+    solution, t = Solution(exact), 0.0
+    for length in (0.1, 0.15, 0.12, 0.2, 0.2, 0.07):
+        t += length
+        guess = solution.step(length, order, exact.deriv()(t))
+        assert solution.value.item() == pytest.approx(exact(t), rel=1e-12)
+        assert guess == pytest.approx(exact(t), rel=1e-12)
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_formula_converges_with_its_order(order):
+    def error(count):
+        lengths = 1.0 + 0.3 * np.sin(np.arange(count))
+        solution = Solution(lambda t: np.exp(-t), POINTS / count)
+        for length in lengths / lengths.sum():
+            solution.step(length, order, 0.0, slope=-1.0)
+        return abs(solution.value.item() - np.exp(-1.0))
+
+    assert np.log(error(40) / error(160)) / np.log(4.0) == pytest.approx(order, abs=0.15)
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_local_error_is_that_of_a_step_from_exact_points(order):
+    length = 0.05
+    solution = Solution(lambda t: np.exp(-t), POINTS * 0.5)
+    solution.step(length, order, -np.exp(-length))
+    exact = np.exp(-length)
+    errors = local_errors(solution.differences, solution.spans, solution.value)[:, 0] * exact
+    assert errors[order - 1] == pytest.approx(abs(solution.value.item() - exact), rel=0.2)
+    assert (np.diff(errors) < 0.0).all()
+
+
+def test_known_derivative_replaces_a_past_point():
+    # the differences of a start with value and derivative are those of a double point
+    solution = Solution(np.exp)
+    solution.differences[2:] = 0.0
+    solution.differences[1] = 1.0
+    solution.spans[:] = np.inf
+    solution.spans[0] = 0.0
+    solution.step(0.01, 1, np.exp(0.01))
+    errors = local_errors(solution.differences, solution.spans, solution.value)[:, 0]
+    assert errors[0] == pytest.approx(0.5e-4, rel=0.02)
+    assert not np.isfinite(errors[1:]).any()
+
+
+def test_order_is_lowered_after_a_sudden_growth_of_the_step():
+    spans = np.array([[1.0], [2.0], [3.0], [4.0]])
+    for length, order in ((1.5, 3), (2.2, 2), (3.0, 1)):
+        weights, factor = np.empty((2, ROWS, 1)), np.empty(1)
+        distances = np.empty((ROWS - 1, 1))
+        formulas(spans, length * ONE, np.array([3]), ONE, weights, factor, distances)
+        assert np.count_nonzero(weights[0]) == order
+        assert weights[:, 0].ravel().tolist() == [1.0, 1.0]
+        assert distances.ravel() == pytest.approx([length, *(length + spans[:3, 0])])
+
+
+def test_missing_points_have_no_estimate():
+    spans = np.array([[1.0], [2.0], [np.inf], [np.inf]])
+    errors = local_errors(np.ones((ROWS, 1, 1, 2)), spans, np.ones((1, 1, 2)))
+    assert np.isfinite(errors[:, 0]).tolist() == [True, False, False]
