@@ -12,9 +12,9 @@ from wearsim.evolution.quantities import centroid, oscillation
 from wearsim.evolution.state import fresh_state, unworn_contacts
 from wearsim.evolution.steppers.base import Attempt
 from wearsim.evolution.steppers.forward_euler import ExplicitStepper, stability_limit
+from wearsim.evolution.steppers.implicit import ImplicitStepper
 from wearsim.evolution.steppers.per_pass import PerPassStepper, run_compiled, run_in_python
 from wearsim.evolution.steppers.single_step import recovery_at
-from wearsim.evolution.steppers.implicit import ImplicitStepper
 from wearsim.studies.ensemble.batch import joined_problem
 
 THREE = {"roller__offset": ["-1 mm", "0.3 mm", "1 mm"]}
@@ -233,7 +233,7 @@ def test_implicit_steps_beyond_the_limit_do_not_oscillate(half_worn):
     state, stepper = roughened(state), ImplicitStepper(1.0, forced_step=step)
     for _ in range(10):
         state = next_state(problem, stepper, state)
-        assert oscillation(state.contacts[0].line_load) < 1e-3
+        assert oscillation(state.contacts[0].line_load) < 2e-3
 
 
 def test_limit_is_the_interpenetration_of_the_strips(half_worn):

@@ -54,7 +54,7 @@ def test_formula_is_exact_for_polynomials_of_its_order(order):
 def test_formula_converges_with_its_order(order):
     def error(count):
         lengths = 1.0 + 0.3 * np.sin(np.arange(count))
-        solution = Solution(lambda t: np.exp(-t), POINTS / count)
+        solution = Solution(lambda t: np.exp(-t), 10.0 * POINTS / count)
         for length in lengths / lengths.sum():
             solution.step(length, order, 0.0, slope=-1.0)
         return abs(solution.value.item() - np.exp(-1.0))

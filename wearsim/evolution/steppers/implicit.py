@@ -31,7 +31,7 @@ TREND = 0.9  # part of the variance of a smooth load that its linear trend expla
 LIMIT = 2.0  # error of an accepted step, relative to the one aimed at
 SAFETY = 0.8  # ratio of the next step to the one that would meet the aim
 GROW = (2.2, 2.2, 1.8)  # greatest ratio of successive steps, by order
-PART_EXPONENT = 0.5  # early errors decay: they may be greater, by this power of the passes done
+PART_EXPONENT = 0.25  # early errors decay: they may be greater, by this power of the passes done
 WHOLE_PASSES = 2.0  # steps above which passes are counted one by one
 
 
@@ -61,6 +61,7 @@ class ImplicitStepper(StepDoublingStepper):
     """
 
     taper = 4.0
+    cover = (1.0, 1.0, 1.0)
 
     def started(self, problem: WearProblem, state: WearState) -> WearState:
         """Return the state with the rates and differences that the formulas need."""
@@ -85,12 +86,13 @@ class ImplicitStepper(StepDoublingStepper):
         columns = zip(errors.T.tolist(), past.order.tolist(), strict=True)
         chosen = zip(*(_next_step(*column) for column in columns), strict=True)
         over, order, ratio = (np.array(column) for column in chosen)
-        if doubled.varies:
-            variation = self.excess(problem, state, doubled, stop)
-            over, ratio = np.maximum(over, variation), np.minimum(ratio, self.ratio(variation))
-        coarse = end.auxiliary["coarse_step_solution"].replaced(order=order)
-        end = end.replaced(order=order, coarse_step_solution=coarse)
-        return Attempt((half, end), over, ratio)
+        by_doubling = np.isinf(errors[0]) | doubled.varies
+        if by_doubling.any():
+            excess = self.excess(problem, state, doubled, stop)
+            over = np.where(by_doubling, np.maximum(over, excess), over)
+            ratio = np.where(by_doubling, np.minimum(ratio, self.ratio(excess)), ratio)
+        others = {name: one.replaced(order=order) for name, one in end.auxiliary.items()}
+        return Attempt((half, end.replaced(order=order, **others)), over, ratio)
 
     def scheme(self, problem: WearProblem, state: WearState) -> Step:
         """Return the implicit step."""
@@ -127,7 +129,7 @@ def with_rates(problem: WearProblem, state: WearState) -> WearState:
     here = problem.at_time(times, times)
     conditions = _conditions(here, problem, state, np.zeros_like(state.passes))
     spans = np.full((ROWS - 1, len(state.passes)), np.inf)
-    spans[0] = 0.0
+    spans[0, conditions.mean > 0.0] = 0.0  # a test that begins in a pause has no rates yet
     feedback = problem.has_spring or bool(problem.terms)
     wear, energy = _wear_per_pass(here, state.contacts)
     return state.replaced(
@@ -145,6 +147,7 @@ def _starting(rates: FloatArray, exposure: FloatArray | None) -> FloatArray:
     differences = np.zeros((ROWS, *rates.shape))
     differences[0] = rates
     if exposure is not None:
+        exposure = np.where(exposure > 0.0, exposure, np.inf)
         differences[1] = rates / exposure.reshape(-1, *(1,) * (rates.ndim - 2))
     return differences
 

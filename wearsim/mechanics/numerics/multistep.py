@@ -184,5 +184,7 @@ def local_errors(differences: FloatArray, spans: FloatArray, depths: FloatArray)
             for r in range(rows):
                 for i in range(columns):
                     total += differences[k + 2, r, v, i] ** 2
-            errors[k, v] = np.sqrt(total / size) * product / inverse if size > 0.0 else 0.0
+            # the difference contains the error of the step itself
+            factor = product / (inverse + 1.0 / spans[k + 1, v])
+            errors[k, v] = np.sqrt(total / size) * factor if size > 0.0 else 0.0
     return errors
