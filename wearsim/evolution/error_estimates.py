@@ -18,6 +18,7 @@ from wearsim.types import FloatArray
 # lower bounds: the depth grows with a power of 2/3 to 1 of the passes, the volume with about 1
 DEPTH_EXPONENT, VOLUME_EXPONENT = 0.5, 0.75
 COVER = 1.5  # safety factor on an error estimate
+UNCERTAIN = 0.3  # part of the bias by variation within a step that may be wrong
 VARYING_COVER = 4.0 / 3.0  # another one where inputs vary, so that errors change irregularly
 SHARE = 0.7  # part of the tolerance that one step may use
 MIN_BUDGET = 0.02  # part of the error budget that a step may always add, so that a run never stalls
@@ -71,8 +72,8 @@ def state_difference(problem: WearProblem, one: WearState, other: WearState) -> 
 
 def variation_bias(
     problem: WearProblem, end: WearState, first: FloatArray, passes: FloatArray
-) -> Depths | None:
-    """Return the wear that a step misses where load and processes vary within it.
+) -> tuple[Depths, FloatArray] | None:
+    """Return the wear and energy that a step misses where load and processes vary within it.
 
     The step takes their exact means, but wear is not linear in them. The bias due to the variance
     is half the second difference of the wear at the mean and one standard deviation to either
@@ -88,8 +89,10 @@ def variation_bias(
 
     Returns
     -------
-    cylinder, roller : ndarray
-        Depth to add, shapes as in `WearState` [m]; None where nothing varies.
+    depths : tuple of ndarray
+        Depth of cylinder and rollers to add, shapes as in `WearState` [m].
+    energy : ndarray, shape (realisations,)
+        Energy to add [J]. None is returned where nothing varies.
     """
     if problem.constant_load is not None and not problem.varying:
         return None
@@ -100,7 +103,7 @@ def variation_bias(
     here = problem.at_time(start, stop)
     loads = carried_loads(problem, end.contacts)
     mean: WearIncrement | None = None
-    bias: Depths | None = None
+    biases: list[tuple[FloatArray, FloatArray, FloatArray]] = []
     for name, rollers, deviation in deviations:
         values = loads if name == "normal_force_offset" else getattr(here.inputs, name)
         values = values.reshape(-1, values.shape[-1])
@@ -116,36 +119,44 @@ def variation_bias(
         less, more = (
             _shifted_wear(here, end, loads, {name: sign * shift}, passes) for sign in (-1.0, 1.0)
         )
-        own = (
-            0.5 * (less.cylinder - 2.0 * mean.cylinder + more.cylinder),
-            0.5 * (less.roller - 2.0 * mean.roller + more.roller),
-        )
-        bias = own if bias is None else (bias[0] + own[0], bias[1] + own[1])
-    return bias
+        columns = zip(*(_wear_and_energy(one, passes) for one in (less, mean, more)), strict=True)
+        cylinder, roller, energy = (0.5 * (low - 2.0 * mid + up) for low, mid, up in columns)
+        biases.append((cylinder, roller, energy))
+    if not biases:
+        return None
+    cylinder, roller, energy = (np.sum(parts, axis=0) for parts in zip(*biases, strict=True))
+    return (cylinder, roller), energy
 
 
-def biased_coarse_solution(end: WearState, coarse: WearState, bias: Depths | None) -> WearState:
-    """Return the coarse-step solution with the bias of the variation within a step.
+def _wear_and_energy(
+    wear: WearIncrement, passes: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the depths of cylinder and rollers [m] and the energy [J] of some passes."""
+    problem = wear.problem
+    power = problem.total_power(problem.values_of(wear.contacts, "power"))
+    return wear.cylinder, wear.roller, power * (passes / problem.kinematics.pass_rate)
 
-    The bias is added to the profile of the coarse-step solution, where further wear reduces it as
-    it would in the test. Its sign is chosen so that it increases the difference of the two
-    solutions and cannot cancel another error.
+
+def biased_coarse_solution(end: WearState, coarse: WearState, bias: Depths) -> WearState:
+    """Return the coarse-step solution with the uncertainty of the variation within a step.
+
+    A part of the bias is added to the profile of the coarse-step solution, where further wear
+    reduces it as it would in the test. Its sign is chosen so that it increases the difference of
+    the two solutions and cannot cancel another error.
 
     Parameters
     ----------
     end, coarse : WearState
         The test and its coarse-step solution after the step.
-    bias : tuple of ndarray, optional
-        Result of `variation_bias`.
+    bias : tuple of ndarray
+        Depths of the result of `variation_bias`.
     """
-    if bias is None:
-        return coarse
     along = sum(
         sum_in_order((a * b).sum(axis=-1), axis=axis).sum(axis=0)
         for axis, a, b in zip((0, 1), depth_difference(coarse, end), bias, strict=True)
     )
-    sign = np.where(along < 0.0, -1.0, 1.0)[:, None]
-    return coarse.with_added((sign * bias[0], sign * bias[1]))
+    part = UNCERTAIN * np.where(along < 0.0, -1.0, 1.0)[:, None]
+    return coarse.with_added((part * bias[0], part * bias[1]))
 
 
 def _shifted_wear(
@@ -178,7 +189,7 @@ def half_quadrature(problem: WearProblem, state: WearState) -> tuple[WearProblem
         half_quadrature_solution=None,
         **{
             name: values.take(first, axis=axis)
-            for name, axis in (("wear_exponents", 1), ("past_loads", 2))
+            for name, axis in (("wear_exponents", 1), ("past_feedback", 2))
             if (values := getattr(state, name)) is not None
         },
     )

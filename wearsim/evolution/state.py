@@ -121,7 +121,7 @@ _AXES = {
     "wear_exponents": 2,
     "past_wear": 2,
     "past_energy": 1,
-    "past_loads": 3,
+    "past_feedback": 3,
     "past_spans": 1,
     "order": 0,
 }
@@ -189,8 +189,8 @@ class WearState:
         their depths over the exposure (see `implicit`) at the present and at past points.
     past_energy : ndarray, shape (5, realisations), optional
         The same of the energy [J].
-    past_loads : ndarray, shape (5, stations, contacts, realisations), optional
-        Loads of the contacts [N], and their divided differences, where springs or terms act.
+    past_feedback : ndarray, shape (5, stations, contacts, realisations), optional
+        Part of the loads due to springs and terms [N], and its divided differences.
     past_spans : ndarray, shape (4, realisations), optional
         Exposure from the past points to the present one; infinite where there is none.
     order : ndarray of int, shape (realisations,), optional
@@ -222,7 +222,7 @@ class WearState:
     wear_exponents: FloatArray | None = None
     past_wear: FloatArray | None = None
     past_energy: FloatArray | None = None
-    past_loads: FloatArray | None = None
+    past_feedback: FloatArray | None = None
     past_spans: FloatArray | None = None
     order: IntArray | None = None
 

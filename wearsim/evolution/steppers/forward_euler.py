@@ -205,4 +205,4 @@ def _errors(problem: WearProblem, start: WearState, end: WearState, step: FloatA
     bias = variation_bias(problem, end, start.passes, step)
     if bias is None:
         return errors
-    return errors + COVER * state_difference(problem, end, end.with_added(bias))
+    return errors + COVER * state_difference(problem, end, end.with_added(bias[0]))

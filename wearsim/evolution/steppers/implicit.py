@@ -11,11 +11,11 @@ import numpy as np
 from wearsim.contact_batch import ContactBatchSolution
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import values_between
-from wearsim.evolution.state import WearState
+from wearsim.evolution.state import LEAST_LOAD, WearState
 from wearsim.evolution.steppers.base import Attempt, Step
 from wearsim.evolution.steppers.implicit_solution import EndOfStep
 from wearsim.evolution.steppers.loads import mean_force
-from wearsim.evolution.steppers.single_step import WearIncrement, carried_loads
+from wearsim.evolution.steppers.single_step import WearIncrement
 from wearsim.evolution.steppers.step_doubling import StepDoublingStepper
 from wearsim.mechanics.numerics.multistep import (
     MAX_ORDER,
@@ -40,7 +40,7 @@ class Past(NamedTuple):
 
     wear: FloatArray
     energy: FloatArray
-    loads: FloatArray | None
+    feedback: FloatArray | None
     spans: FloatArray
     order: IntArray
 
@@ -50,7 +50,7 @@ class Past(NamedTuple):
         wear, energy, spans, order = (
             getattr(state, name) for name in ("past_wear", "past_energy", "past_spans", "order")
         )
-        return cls(wear, energy, state.past_loads, spans, order)
+        return cls(wear, energy, state.past_feedback, spans, order)
 
 
 class ImplicitStepper(StepDoublingStepper):
@@ -86,11 +86,10 @@ class ImplicitStepper(StepDoublingStepper):
         columns = zip(errors.T.tolist(), past.order.tolist(), strict=True)
         chosen = zip(*(_next_step(*column) for column in columns), strict=True)
         over, order, ratio = (np.array(column) for column in chosen)
-        by_doubling = np.isinf(errors[0]) | doubled.varies
-        if by_doubling.any():
+        unknown = np.isinf(errors[0])
+        if unknown.any():
             excess = self.excess(problem, state, doubled, stop)
-            over = np.where(by_doubling, np.maximum(over, excess), over)
-            ratio = np.where(by_doubling, np.minimum(ratio, self.ratio(excess)), ratio)
+            over, ratio = np.where(unknown, (excess, self.ratio(excess)), (over, ratio))
         others = {name: one.replaced(order=order) for name, one in end.auxiliary.items()}
         return Attempt((half, end.replaced(order=order, **others)), over, ratio)
 
@@ -129,26 +128,24 @@ def with_rates(problem: WearProblem, state: WearState) -> WearState:
     here = problem.at_time(times, times)
     conditions = _conditions(here, problem, state, np.zeros_like(state.passes))
     spans = np.full((ROWS - 1, len(state.passes)), np.inf)
-    spans[0, conditions.mean > 0.0] = 0.0  # a test that begins in a pause has no rates yet
+    spans[0] = 0.0
     feedback = problem.has_spring or bool(problem.terms)
     wear, energy = _wear_per_pass(here, state.contacts)
     return state.replaced(
         past_wear=_starting(wear, conditions.mean),
         past_energy=_starting(energy, conditions.mean),
-        past_loads=_starting(carried_loads(problem, state.contacts), None) if feedback else None,
+        past_feedback=np.zeros((ROWS, *problem.shape)) if feedback else None,
         past_spans=spans,
         order=np.ones(len(state.passes), dtype=np.int64),
         wear_exponents=np.ones((*problem.shape, problem.grid.strips)),
     )
 
 
-def _starting(rates: FloatArray, exposure: FloatArray | None) -> FloatArray:
+def _starting(rates: FloatArray, exposure: FloatArray) -> FloatArray:
     """Return the differences of a solution with one point, from its change per pass."""
     differences = np.zeros((ROWS, *rates.shape))
     differences[0] = rates
-    if exposure is not None:
-        exposure = np.where(exposure > 0.0, exposure, np.inf)
-        differences[1] = rates / exposure.reshape(-1, *(1,) * (rates.ndim - 2))
+    differences[1] = rates / exposure.reshape(-1, *(1,) * (rates.ndim - 2))
     return differences
 
 
@@ -205,6 +202,9 @@ def _conditions(
         force = np.where(smooth, last, mean)
     offset = here.inputs.normal_force_offset.mean(axis=0)
     own, mean = force + offset, mean + offset
+    if problem.pauses:  # as the loads of the contacts
+        least = LEAST_LOAD * problem.greatest_load
+        own, mean = np.maximum(own, least), np.maximum(mean, least)
     if any(item.name == "friction" for item in problem.varying):
         friction = here.inputs.friction.mean(axis=0)
         own, mean = own * friction, mean * friction
@@ -260,22 +260,22 @@ def _step(
     added, guess = extrapolated(weights, past.wear)
     old_energy = past.energy[:, None, :, None]
     energy = extrapolated(weights, old_energy)[0]
-    loads = None
-    if past.loads is not None:
-        old = past.loads.reshape(ROWS, -1, realisations, 1)
-        loads = extrapolated(weights, old)[1] + (1.0 - half_pass[:, None]) * old[0]
-        loads = loads.reshape(problem.shape)
+    feedback = None
+    if past.feedback is not None:
+        old = past.feedback.reshape(ROWS, -1, realisations, 1)
+        feedback = extrapolated(weights, old)[1] + (1.0 - half_pass[:, None]) * old[0]
+        feedback = feedback.reshape(problem.shape)
     step = EndOfStep(problem, state, start + added, conditions.force, passes, worn_passes)
-    end, worn, loads = step.solved(start + guess, loads)
+    end, worn, feedback = step.solved(start + guess, feedback)
     power = problem.total_power(problem.values_of(end.contacts, "power"))
     rate = (power / problem.kinematics.pass_rate)[None, :, None]
     energy = energy + worn_passes[:, None] * rate
     new_energy = new_differences(rate, energy, half_pass, old_energy, spans)
-    past_loads = None
-    if loads is not None:
-        new = loads.reshape(-1, realisations, 1)
-        past_loads = new_differences(new, new - old[0], 0.0 * half_pass, old, spans)
-        past_loads = past_loads.reshape(ROWS, *problem.shape)
+    past_feedback = None
+    if feedback is not None:
+        new = feedback.reshape(-1, realisations, 1)
+        past_feedback = new_differences(new, new - old[0], 0.0 * half_pass, old, spans)
+        past_feedback = past_feedback.reshape(ROWS, *problem.shape)
     end = end.replaced(
         passes=state.passes + passes,
         energy=state.energy + energy[0, :, 0],
@@ -283,7 +283,7 @@ def _step(
             worn / worn_passes[:, None], added + worn, half_pass, past.wear, spans
         ),
         past_energy=new_energy[:, 0, :, 0],
-        past_loads=past_loads,
+        past_feedback=past_feedback,
         past_spans=spans,
     )
     decreased = (end.stacked < start).any(axis=(0, 2)) | (energy[0, :, 0] < 0.0)

@@ -23,6 +23,7 @@ from wearsim.types import BoolArray, FloatArray
 
 MAX_FIXED_POINT = 60
 CONVERGED = 50.0  # change of wear over the whole depth, relative to the tolerance of iterations
+LEAST_GUESS = 0.1  # first guess of a load, over that without springs and load terms
 RELAXATION_INTERVAL = 20  # iterations between relaxations of the tolerance by a factor of ten
 MAX_LINEAR_EXPONENT = 1.0  # of dissipation as a power of line load; 1 in full sliding
 MAX_EXPONENT = 50.0  # T gamma's wear law goes as the power 44 where catastrophic wear begins
@@ -56,7 +57,7 @@ class EndOfStep:
     worn_passes: FloatArray
 
     def solved(
-        self, guess: FloatArray, loads: FloatArray | None
+        self, guess: FloatArray, feedback: FloatArray | None
     ) -> tuple[WearState, FloatArray, FloatArray | None]:
         """Solve contacts, wear and loads together.
 
@@ -69,8 +70,8 @@ class EndOfStep:
         ----------
         guess : ndarray
             Predicted depths, shape as `base` [m].
-        loads : ndarray, shape (stations, contacts, realisations), optional
-            Predicted loads, where springs or load terms act [N].
+        feedback : ndarray, shape (stations, contacts, realisations), optional
+            Predicted part of the loads due to springs and load terms, where there are any [N].
 
         Returns
         -------
@@ -78,18 +79,20 @@ class EndOfStep:
             Depths, contacts, load terms and number of solves at the end.
         worn : ndarray
             Wear of the bodies, shape as `base` [m].
-        loads : ndarray, optional
-            Loads in equilibrium with springs and load terms.
+        feedback : ndarray, optional
+            That part, in equilibrium with springs and load terms.
 
         Raises
         ------
         StepError
             If the iteration does not converge.
         """
-        problem, start, feedback = self.problem, self.start, loads is not None
-        if loads is None:
-            loads = with_feedback(problem, self.force, np.zeros(()), ())
-        loads = target = checked_loads(start, loads)
+        problem, start = self.problem, self.start
+        prescribed = with_feedback(problem, self.force, np.zeros(()), ())
+        loads = checked_loads(start, prescribed)
+        if feedback is not None:
+            loads = np.maximum(prescribed + feedback, LEAST_GUESS * prescribed)
+        target = loads
         gap = problem.gap(*start.with_stacked(self.base).depths)
         depths, ends, contacts = guess, start.with_stacked(guess), start.contacts
         wear = self._parts(contacts)
@@ -122,7 +125,7 @@ class EndOfStep:
             ends = start.with_stacked(depths)
             depth[depth <= 0.0] = np.inf
             change = rest
-            if feedback:
+            if feedback is not None:
                 # loads of realisations that have converged must not depend on the others
                 target = np.where(active, self._equilibrium(solved, loads, gap), target)
                 moved = np.abs(target / loads - 1.0).max(axis=(0, 1))
@@ -141,7 +144,7 @@ class EndOfStep:
                     terms=self._terms(solved),
                     wear_exponents=exponents.reshape(*problem.shape, -1),
                 )
-                return end, worn, target if feedback else None
+                return end, worn, None if feedback is None else target - prescribed
             contacts, wear, loads = solved, new, target
         raise StepError(
             f"an implicit step of {self.passes[0]:.4g} passes from pass {start.passes[0]:.0f} did"

@@ -35,14 +35,11 @@ class Doubled:
         States in the middle and at the end.
     added, reached : ndarray, shape (3, realisations)
         Errors, as of `sizes`, that the step adds and those at its end.
-    varies : bool
-        Whether the load or a process varies within the step.
     """
 
     path: tuple[WearState, WearState]
     added: FloatArray
     reached: FloatArray
-    varies: bool
 
 
 class StepDoublingStepper(Stepper):
@@ -84,7 +81,12 @@ class StepDoublingStepper(Stepper):
         coarse = scheme(problem, coarse_start, step)
         end = with_pass_errors(problem, state, end, coarse, scheme, step)
         bias = variation_bias(problem, end, state.passes, step)
-        coarse = biased_coarse_solution(end, coarse, bias)
+        if bias is not None:
+            depths, energy = bias
+            end, coarse = (
+                one.with_added(depths).replaced(energy=one.energy + energy) for one in (end, coarse)
+            )
+            coarse = biased_coarse_solution(end, coarse, depths)
         passes = np.where(step == stop - state.passes, stop, end.passes)
         after = end.stacked - coarse.stacked
         change = after - (state.stacked - coarse_start.stacked)
@@ -108,7 +110,7 @@ class StepDoublingStepper(Stepper):
             profile_error=reached[2] + fixed[2],
             **auxiliary,
         )
-        return Doubled((half, end), added, reached, bias is not None)
+        return Doubled((half, end), added, reached)
 
     def excess(
         self, problem: WearProblem, state: WearState, doubled: Doubled, stop: float
