@@ -105,6 +105,7 @@ def test_implicit_steps_agree_with_per_pass_steps(creepage, regime, passes):
     greatest = reference.cylinder_depth.max()
     difference = np.abs(implicit.cylinder_depth - reference.cylinder_depth).max()
     assert difference < 5e-3 * greatest
-    assert abs(implicit.cylinder_depth.max() - greatest) < implicit.depth_error[0]
-    assert implicit.depth_error[0] < 2e-3 * greatest
+    error = abs(implicit.cylinder_depth.max() - greatest)
+    assert error < min(implicit.depth_error[0], 2e-3 * greatest)
+    assert implicit.depth_error[0] < 1e-2 * greatest
     assert implicit.solves < 0.7 * reference.solves

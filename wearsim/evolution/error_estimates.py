@@ -19,7 +19,7 @@ from wearsim.types import FloatArray
 DEPTH_EXPONENT, VOLUME_EXPONENT = 0.5, 0.75
 COVER = 1.5  # safety factor on an error estimate
 UNCERTAIN = 0.3  # part of the bias by variation within a step that may be wrong
-VARYING_COVER = 4.0 / 3.0  # another one where inputs vary, so that errors change irregularly
+VARYING_COVER = 2.0  # another one where inputs vary, so that errors change irregularly
 SHARE = 0.7  # part of the tolerance that one step may use
 MIN_BUDGET = 0.02  # part of the error budget that a step may always add, so that a run never stalls
 DEPTHS = ("cylinder_depth", "roller_depth")

@@ -92,8 +92,8 @@ def test_passes_in_python_pass_over_a_pause() -> None:
 def test_pause_changes_nothing_but_the_time() -> None:
     # the same log without the pause from 41 to 80 s
     shorter = {t - 39 if t >= 80 else t: f for t, f in FORCES.items() if t not in (41, 60)}
-    one = studies.run(paused(evolution__tolerance=1e-4))
-    other = studies.run(paused(shorter, evolution__tolerance=1e-4, operation__passes=4050))
+    one = studies.run(paused(evolution__tolerance=1e-5))
+    other = studies.run(paused(shorter, evolution__tolerance=1e-5, operation__passes=4050))
     assert one.depth[-1] == pytest.approx(other.depth[-1], rel=2e-4)
 
 

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wearsim.contact_batch import ContactBatchSolution
+from wearsim.evolution.error_estimates import greatest_depth
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import values_between
 from wearsim.evolution.state import LEAST_LOAD, WearState
@@ -61,7 +62,6 @@ class ImplicitStepper(StepDoublingStepper):
     """
 
     taper = 4.0
-    cover = (1.0, 1.0, 1.0)
 
     def started(self, problem: WearProblem, state: WearState) -> WearState:
         """Return the state with the rates and differences that the formulas need."""
@@ -82,10 +82,16 @@ class ImplicitStepper(StepDoublingStepper):
         half, end = doubled.path
         past = Past.of(end)
         errors = local_errors(past.wear, past.spans, end.stacked)
-        errors *= (end.passes / stop) ** PART_EXPONENT / self.tolerance
+        part = (end.passes / stop) ** PART_EXPONENT
+        errors *= part / self.tolerance
         columns = zip(errors.T.tolist(), past.order.tolist(), strict=True)
         chosen = zip(*(_next_step(*column) for column in columns), strict=True)
         over, order, ratio = (np.array(column) for column in chosen)
+        # local errors miss some of what an abrupt change of wear adds
+        allowed = self.tolerance * greatest_depth(end.depths) / part
+        added = doubled.added[0] / np.where(allowed > 0.0, allowed, np.inf)
+        over = np.maximum(over, added)
+        ratio = np.where(added > 1.0, np.minimum(ratio, self.ratio(added)), ratio)
         unknown = np.isinf(errors[0])
         if unknown.any():
             excess = self.excess(problem, state, doubled, stop)

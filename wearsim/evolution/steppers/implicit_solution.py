@@ -23,7 +23,8 @@ from wearsim.types import BoolArray, FloatArray
 
 MAX_FIXED_POINT = 60
 CONVERGED = 50.0  # change of wear over the whole depth, relative to the tolerance of iterations
-LEAST_GUESS = 0.1  # first guess of a load, over that without springs and load terms
+LEAST_GUESS = 0.1  # first guess of a load over that without feedback; ratio of its iterates
+LOST = 1e-9  # load over that without feedback, below which contact is lost
 RELAXATION_INTERVAL = 20  # iterations between relaxations of the tolerance by a factor of ten
 MAX_LINEAR_EXPONENT = 1.0  # of dissipation as a power of line load; 1 in full sliding
 MAX_EXPONENT = 50.0  # T gamma's wear law goes as the power 44 where catastrophic wear begins
@@ -179,7 +180,9 @@ class EndOfStep:
         target = with_feedback(problem, self.force, displacement, self._terms(solved))
         if problem.has_spring:
             target = corrected_loads(problem, loads, target, approach - gap.min(axis=-1))
-        return checked_loads(self.start, target)
+        if (target < LOST * loads).any():
+            checked_loads(self.start, np.where(loads < LOST * self.force, target, 1.0))
+        return np.maximum(target, LEAST_GUESS * loads)
 
     def _terms(self, solved: ContactBatchSolution) -> FloatArray:
         """Return the load terms at the end of the step, shape (terms, rollers, realisations).
