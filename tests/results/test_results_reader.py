@@ -208,14 +208,14 @@ def _with_about(text: str) -> Callable[[h5py.File], None]:
         (
             _newer,
             (
-                "has layout 4 of wearsim-run, and this wearsim reads layout 3; update wearsim to"
+                "has layout 5 of wearsim-run, and this wearsim reads layout 4; update wearsim to"
                 " read it"
             ),
         ),
         (
             _older,
             (
-                "has layout 2 of wearsim-run, and this wearsim reads layout 3; repeat the"
+                "has layout 3 of wearsim-run, and this wearsim reads layout 4; repeat the"
                 " computation, or read it with the version of wearsim that wrote it"
             ),
         ),

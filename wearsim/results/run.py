@@ -144,6 +144,11 @@ class Result(StudyResult[RunData]):
     volume_error = Stored(
         "volume_error", "Estimated error of the volume worn off both bodies, after each step [m^3]."
     )
+    profile_error = Stored(
+        "profile_error",
+        "Estimated error of the profiles of all bodies after each step: its root mean square over"
+        " the strips, relative to that of the depths.",
+    )
     rejected = Stored("rejected", "Rejected steps so far, after each step.")
     solves = Stored("solves", "Contact solves of accepted steps so far, after each step.")
     full_solves = Stored("full_solves", "Roller passes solved in full so far, after each step.")
@@ -303,6 +308,7 @@ class Result(StudyResult[RunData]):
             "elastic_approach_m": _number(last["elastic_approach"]),
             "depth_error_m": _number(last["depth_error"]),
             "volume_error_m3": _number(last["volume_error"]),
+            "relative_profile_error": _number(last["profile_error"]),
             "relative_depth_error": _number(_relative(last["depth_error"], deepest)),
             "relative_volume_error": _number(
                 _relative(last["volume_error"], last["worn_volume"] + rollers)

@@ -90,6 +90,13 @@ VARIABLES: Mapping[str, Variable] = by_name(
             "estimated error of the volume worn off both bodies",
             "history",
         ),
+        Variable(
+            "profile_error",
+            _TEST,
+            "1",
+            "estimated root mean square error of all profiles, over that of the depths",
+            "history",
+        ),
         Variable("rejected", _STEP, "1", "rejected steps so far", "history"),
         Variable("solves", _STEP, "1", "contact solves of accepted steps so far", "history"),
         Variable("full_solves", _STEP, "1", "roller passes solved in full so far", "history"),
@@ -115,4 +122,4 @@ VARIABLES: Mapping[str, Variable] = by_name(
     )
 )
 
-RUN = Schema("wearsim-run", 3, "a wear test, from `wearsim run`", AXES, VARIABLES)
+RUN = Schema("wearsim-run", 4, "a wear test, from `wearsim run`", AXES, VARIABLES)

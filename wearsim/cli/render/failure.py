@@ -29,12 +29,13 @@ _STATE = {
     "roller_depth": ("roller depth", "um"),
     "depth_error": ("error of depth", "um"),
     "volume_error": ("error of volume", "mm^3"),
+    "profile_error": ("error of profiles", "1"),
     "energy": ("dissipated energy", "J"),
     "step": ("step in passes", "1"),
 }
 _INTERNAL = (
     *("contact_", "coarse_step_", "half_quadrature_", "loop_", "quadrature", "scatter"),
-    *("approach_factor", "decay"),
+    *("approach_factor", "decay", "past_", "order", "wear_exponents"),
 )
 
 

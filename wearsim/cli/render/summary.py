@@ -190,8 +190,10 @@ def run_line(result: Result) -> str:
         volume = np.max(result.worn_volume[-1])
         depth = _within("depth", np.max(result.depth_error[-1]), depth)
         volume = _within("worn volume", np.max(result.volume_error[-1]), volume)
+        profile = _within("profile", np.max(result.profile_error[-1]), 1.0)
         error = (
-            f"{depth}, {volume} (estimated numerical error of the steps, not of model or inputs)"
+            f"{depth}, {profile}, {volume} (estimated numerical error of the steps, not of model or"
+            " inputs)"
         )
     return _line(used, error, lapse(result.raw.wall_seconds))
 

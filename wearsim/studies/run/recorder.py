@@ -129,6 +129,7 @@ def history_row(
         "normal_force": mean_along(problem.per_roller(loads), axis=0)[0],
         "depth_error": state.depth_error,
         "volume_error": state.volume_error,
+        "profile_error": state.profile_error,
         "rejected": state.rejected,
         "solves": state.solves,
         "full_solves": state.full_solves,
