@@ -7,9 +7,10 @@ import pytest
 
 from tests.evolution import built, cylinder_depth_of, cylinder_volume_of, never, next_state, stepped
 from wearsim.errors import SolverError, StepError
+from wearsim.evolution.contacts import unworn_contacts
 from wearsim.evolution.integrate import evolve
 from wearsim.evolution.quantities import centroid, oscillation
-from wearsim.evolution.state import fresh_state, unworn_contacts
+from wearsim.evolution.state import fresh_state
 from wearsim.evolution.steppers.base import Attempt
 from wearsim.evolution.steppers.forward_euler import ExplicitStepper, stability_limit
 from wearsim.evolution.steppers.implicit import ImplicitStepper
@@ -243,7 +244,7 @@ def test_implicit_steps_beyond_the_limit_do_not_oscillate(half_worn):
 
 def test_limit_is_the_interpenetration_of_the_strips(half_worn):
     problem, state = half_worn
-    cylinder, _ = problem.shared_wear(*problem.wear_per_pass(state.contacts))
+    cylinder, _ = problem.sum_of_parts(*problem.wear_parts(state.contacts, 1.0))
     wear = stability_limit(problem, state) * cylinder.max()
     # 0.6 of twice the interpenetration: about 0.2 um for worn strips of 0.1 mm
     assert 0.1e-6 < wear < 0.4e-6

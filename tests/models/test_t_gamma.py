@@ -81,7 +81,7 @@ def test_mild_wear_is_archard_wear():
     linear = {"law": "archard-dissipation", "cylinder": energy[0], "roller": energy[1]}
     _, archard = worn(operation__duration="30 min", wear=linear)
     np.testing.assert_allclose(state.cylinder_depth, archard.cylinder_depth, rtol=1e-6, atol=1e-15)
-    assert (problem.shared_wear(*problem.wear_per_pass(state.contacts))[1] > 0.0).any()
+    assert (problem.sum_of_parts(*problem.wear_parts(state.contacts, 1.0))[1] > 0.0).any()
 
 
 @pytest.mark.parametrize(

@@ -51,6 +51,7 @@ def test_run_is_exported_in_engineering_units(tmp_path: Path) -> None:
         "adhesion_fraction",
         "depth_error [um]",
         "volume_error [mm^3]",
+        "profile_error",
         "rejected",
         "solves",
         "full_solves",

@@ -362,23 +362,6 @@ class WearProblem:
         """Whether wear is linear in the dissipation."""
         return all(factor is not None for factor in self.wear_factors.values())
 
-    def shared_wear(
-        self, cylinder: FloatArray, roller: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return depth per roller pass of the bodies, from `wear_per_pass` of the contacts.
-
-        Every station of the cylinder is worn by all contacts in turn, every roller by its own
-        contacts at all stations.
-
-        Returns
-        -------
-        cylinder_rate : ndarray, shape (stations, 1, realisations, strips)
-        roller_rate : ndarray, shape (1, rollers, realisations, strips)
-            Depth per roller pass [m].
-        """
-        shares = self.wear_shares
-        return self.sum_of_parts(cylinder * shares["cylinder"], roller * shares["roller"])
-
     @cached_property
     def wear_shares(self) -> dict[Body, FloatArray]:
         """Passes of each contact over a point of either body per roller pass.
@@ -392,7 +375,7 @@ class WearProblem:
     def sum_of_parts(
         self, cylinder: FloatArray, roller: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the wear of the bodies, shapes as `shared_wear`, from that of `wear_parts`."""
+        """Return the wear of cylinder and rollers, shapes as in `WearState`, from `wear_parts`."""
         return sum_along(cylinder, axis=1), sum_along(self._sum_of_roller(roller), axis=0)
 
     def per_roller(self, values: FloatArray) -> FloatArray:
@@ -407,10 +390,6 @@ class WearProblem:
             return values
         sums = [values[:, self.roller == r].sum(axis=1) for r in range(self.rollers)]
         return np.stack(sums, axis=1)
-
-    def power_of_rollers(self, contacts: ContactBatchSolution) -> FloatArray:
-        """Return the mean power of each roller's contacts, shape (rollers, realisations) [W]."""
-        return np.asarray(self.per_roller(self.values_of(contacts, "power")).mean(axis=0))
 
     def total_power(self, power: FloatArray) -> FloatArray:
         """Return the power of all physical rollers, shape (N,) [W], from (S, C, N)."""

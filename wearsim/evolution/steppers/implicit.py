@@ -9,10 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from wearsim.contact_batch import ContactBatchSolution
+from wearsim.evolution.contacts import LEAST_LOAD
 from wearsim.evolution.error_estimates import greatest_depth
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import values_between
-from wearsim.evolution.state import LEAST_LOAD, WearState
+from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.base import Attempt, Step
 from wearsim.evolution.steppers.implicit_solution import EndOfStep
 from wearsim.evolution.steppers.loads import mean_force

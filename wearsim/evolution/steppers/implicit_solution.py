@@ -8,8 +8,9 @@ import numpy as np
 
 from wearsim.contact_batch import ContactBatch, ContactBatchSolution
 from wearsim.errors import StepError
+from wearsim.evolution.contacts import contact_batch
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import WearState, contact_batch
+from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.loads import (
     checked_loads,
     corrected_loads,
@@ -192,7 +193,11 @@ class EndOfStep:
         problem, start = self.problem, self.start
         if not problem.terms:
             return start.terms
-        power = 0.5 * (problem.power_of_rollers(start.contacts) + problem.power_of_rollers(solved))
+        powers = [
+            problem.per_roller(problem.values_of(contacts, "power")).mean(axis=0)
+            for contacts in (start.contacts, solved)
+        ]
+        power = 0.5 * (powers[0] + powers[1])
         begin = problem.time(start.passes)
         duration = float((problem.time(start.passes + self.passes) - begin)[0])
         each = zip(problem.terms.values(), start.terms, strict=True)

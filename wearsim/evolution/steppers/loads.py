@@ -8,9 +8,10 @@ import numpy as np
 
 from wearsim.contact_batch import ContactBatchSolution
 from wearsim.errors import StepError
+from wearsim.evolution.contacts import LEAST_LOAD
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import values_between
-from wearsim.evolution.state import HERTZ, LEAST_LOAD, Depths, WearState
+from wearsim.evolution.state import HERTZ, Depths, WearState
 from wearsim.types import FloatArray
 
 APPROACH_EXPONENT = 0.75  # approach as a power of the load: 2/3 in a Hertzian contact, 1 in a flat

@@ -10,9 +10,10 @@ import numpy as np
 
 from wearsim.contact_batch import ContactBatchSolution
 from wearsim.errors import StepError
+from wearsim.evolution.contacts import contact_batch
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import Redraw
-from wearsim.evolution.state import HERTZ, WearState, contact_batch, joined_states
+from wearsim.evolution.state import HERTZ, WearState, joined_states
 from wearsim.evolution.steppers.base import Attempt, Step, Stepper
 from wearsim.evolution.steppers.loads import APPROACH_EXPONENT
 from wearsim.evolution.steppers.single_step import MAX_LOAD_ITERATIONS, solve_at_record

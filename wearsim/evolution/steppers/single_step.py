@@ -9,8 +9,9 @@ import numpy as np
 
 from wearsim.contact_batch import ContactBatchSolution
 from wearsim.errors import StepError
+from wearsim.evolution.contacts import contact_batch
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import WearState, contact_batch
+from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.loads import (
     checked_loads,
     corrected_loads,

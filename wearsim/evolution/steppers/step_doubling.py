@@ -128,7 +128,7 @@ class StepDoublingStepper(Stepper):
 
 def first_steps(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the passes that wear off a tenth of the elastic approach, shape (realisations,)."""
-    cylinder, roller = problem.shared_wear(*problem.wear_per_pass(state.contacts))
+    cylinder, roller = problem.sum_of_parts(*problem.wear_parts(state.contacts, 1.0))
     rate = (cylinder + roller).max(axis=(0, 1, 3))
     worn = np.where(rate > 0.0, rate, 1.0)
     return np.asarray(np.where(rate > 0.0, 0.1 * elastic_approach(problem, state) / worn, np.inf))

@@ -18,7 +18,7 @@ from wearsim.errors import (
     SolverError,
     WearsimError,
 )
-from wearsim.evolution.state import unworn_contacts
+from wearsim.evolution.contacts import unworn_contacts
 from wearsim.plugins import ContactModel, ContactModelSpec, FrictionField, registry
 from wearsim.scenario import RandomInput, Scenario, realise
 from wearsim.studies.contact.single import study_contact

@@ -7,7 +7,7 @@ from pathlib import Path
 from time import perf_counter
 
 from wearsim.errors import ContactError, WearsimError
-from wearsim.evolution.state import unworn_contacts
+from wearsim.evolution.contacts import unworn_contacts
 from wearsim.plugins import ContactModel
 from wearsim.profiles import load_profile
 from wearsim.scenario import Scenario, as_scenario, described_model

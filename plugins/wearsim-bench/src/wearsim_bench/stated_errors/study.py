@@ -72,7 +72,7 @@ def first_pass(prepared: PreparedTest, end: EndState) -> float:
     function of the passes, which no step estimates.
     """
     problem, state = prepared.problem, fresh_state(prepared.problem)
-    rates = problem.shared_wear(*problem.wear_per_pass(state.contacts))
+    rates = problem.sum_of_parts(*problem.wear_parts(state.contacts, 1.0))
     return float((greatest_depth(rates) / greatest_depth(end.state.depths))[0])
 
 

@@ -1,0 +1,84 @@
+"""Contacts of a wear problem as a batch."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wearsim.contact_batch import ContactBatch
+from wearsim.evolution.problem import WearProblem
+from wearsim.types import FloatArray
+
+LEAST_LOAD = 1e-3  # next to a pause, of the greatest load
+
+
+def contact_batch(
+    problem: WearProblem,
+    gap: FloatArray,
+    loads: FloatArray,
+    cylinder_depth: FloatArray,
+    roller_depth: FloatArray,
+) -> ContactBatch:
+    """Return all contacts as a batch, numbered as in `WearProblem`, the realisation fastest.
+
+    Parameters
+    ----------
+    problem : WearProblem
+    gap : ndarray, shape (stations, contacts, realisations, strips)
+        Gap of each contact [m].
+    loads : ndarray, shape (stations, contacts, realisations)
+        Normal force of each contact [N].
+    cylinder_depth, roller_depth : ndarray
+        Worn depths, shapes as in `WearState` [m].
+    """
+    worn = problem.at_contacts(roller_depth)
+    return ContactBatch(
+        gap=gap.reshape(-1, problem.grid.strips),
+        normal_force=loads.ravel(),
+        **problem.input_columns,
+        variation=_creepage_variation(problem, cylinder_depth, worn),
+        rolling_radius=_rolling_radius(problem, worn) if problem.free else None,
+        shape=problem.shape,
+    )
+
+
+def unworn_contacts(problem: WearProblem) -> ContactBatch:
+    """Return the contacts of the unworn bodies under the loads at the start of the test."""
+    force = problem.force(np.zeros(len(problem.loads)))
+    if problem.pauses:
+        force = np.maximum(force, LEAST_LOAD * problem.greatest_load)
+    loads = np.broadcast_to(force + problem.inputs.normal_force_offset, problem.shape)
+    cylinder, roller = np.zeros((1, 1, 1, 1)), np.zeros((1, problem.rollers, 1, 1))
+    return contact_batch(problem, problem.nominal_gap, loads, cylinder, roller)
+
+
+def _rolling_radius(problem: WearProblem, roller_depth: FloatArray) -> FloatArray:
+    """Return the rolling radius of free rollers, shape (all contacts, strips) [m]."""
+    kinematics, s = problem.kinematics, problem.from_apex[problem.roller]
+    radius = kinematics.roller_radius - s * s / (2.0 * kinematics.crown_radius) - roller_depth
+    return _of_contacts(problem, radius)
+
+
+def _creepage_variation(
+    problem: WearProblem, cylinder_depth: FloatArray, roller_depth: FloatArray
+) -> FloatArray | None:
+    """Return the variation of creepage, (all contacts, strips), or None for spin alone.
+
+    The tilt enters differential slip once: as the shift of the contact away from the apex or,
+    where it shifts nothing, as the term -phi y of the spin.
+    """
+    if problem.slip_profile is None:
+        return None
+    variation: FloatArray = (
+        problem.slip_profile[problem.roller]
+        + roller_depth / problem.kinematics.roller_radius
+        - cylinder_depth / problem.kinematics.cylinder_radius
+    )
+    if not problem.tilt_shifts:
+        variation = variation - problem.spin[:, :, None] * problem.from_apex[problem.roller]
+    return _of_contacts(problem, variation)
+
+
+def _of_contacts(problem: WearProblem, values: FloatArray) -> FloatArray:
+    """Return values that broadcast to all contacts as (all contacts, strips)."""
+    shape = (*problem.shape, problem.grid.strips)
+    return np.broadcast_to(values, shape).reshape(-1, shape[-1])
