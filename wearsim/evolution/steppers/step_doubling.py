@@ -1,4 +1,4 @@
-"""Step doubling, and the implicit stepper."""
+"""Step doubling: error estimates by a solution with steps of twice the length."""
 
 from __future__ import annotations
 
