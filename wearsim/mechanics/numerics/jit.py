@@ -8,7 +8,7 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import cache, update_wrapper
 from hashlib import sha256
@@ -30,7 +30,7 @@ KEPT = 86400.0  # seconds for which the compiled kernels of other sources are ke
 _KERNELS: list[Kernel] = []
 _SUBROUTINES: list[Callable[..., Any]] = []  # those that numba has not been given yet
 _REPORTS: list[Callable[[str], None]] = []
-_ALONGSIDE: dict[str, Callable[[], None]] = {}  # by the name of a kernel
+_ALONGSIDE: dict[str, list[Callable[[], None]]] = {}  # by the name of a kernel
 _STARTED: list[Any] = []  # processes that compile kernels
 _LOCK = RLock()
 
@@ -106,7 +106,7 @@ def _prepared_numba() -> Any:
             """Report the kernel; subroutines are compiled as a part of it."""
             dispatcher = event.data["dispatcher"]
             if any(kernel.is_compiled_by(dispatcher) for kernel in _KERNELS):
-                _call_elsewhere(_ALONGSIDE.pop(dispatcher.__name__, None))
+                _call_elsewhere(_ALONGSIDE.pop(dispatcher.__name__, []))
                 for report in _REPORTS:
                     report(dispatcher.__name__)
 
@@ -187,23 +187,23 @@ def compile_alongside(name: str, function: Callable[[], None]) -> None:
     function : callable
         Public function of a module.
     """
-    _ALONGSIDE[name] = function
+    _ALONGSIDE.setdefault(name, []).append(function)
 
 
-def _call_elsewhere(function: Callable[[], None] | None) -> None:
-    """Start a process that calls a function, if there are a cache and a second processor for it.
+def _call_elsewhere(functions: Sequence[Callable[[], None]]) -> None:
+    """Start a process that calls functions, if there are a cache and a second processor for it.
 
-    It ends when the function returns, also after the end of this process.
+    It ends when the last function returns, also after the end of this process.
     """
     affinity = getattr(os, "sched_getaffinity", None)  # not on every platform
     processors = len(affinity(0)) if affinity else os.cpu_count()
-    if function is None or processors == 1 or _cache_folder() is None:
+    if not functions or processors == 1 or _cache_folder() is None:
         return
-    name = function.__name__
-    code = f"import sys; sys.path[:] = {sys.path!r}; from {function.__module__} import {name}"
+    calls = (f"from {one.__module__} import {one.__name__}; {one.__name__}()" for one in functions)
+    code = "; ".join([f"import sys; sys.path[:] = {sys.path!r}", *calls])
     quiet: dict[str, Any] = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
     with suppress(OSError):
-        command = [sys.executable, "-c", f"{code}; {name}()"]
+        command = [sys.executable, "-c", code]
         _STARTED.append(subprocess.Popen(command, **quiet, start_new_session=True))
 
 

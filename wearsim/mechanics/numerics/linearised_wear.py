@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wearsim.mechanics.numerics.jit import kernel
+from wearsim.mechanics.numerics.jit import compile_alongside, kernel
 from wearsim.types import FloatArray, IntArray
 
 LEAST_EXPONENT = 0.4  # wear is proportional to q^(1/2) in adhesion and at a steady wear rate
@@ -176,3 +176,17 @@ def difference_sizes(
             sizes[1, v] += weights[1, b] * total
         sizes[2, v], sizes[3, v] = np.sqrt(sizes[2, v]), np.sqrt(sizes[3, v])
     return sizes
+
+
+def compile_linearised_wear() -> None:
+    """Compile the kernels of a step by a call for one contact of one strip."""
+    strip, wear, worn = np.ones((1, 1)), np.ones((2, 1, 1)), np.ones((2, 1, 1))
+    compliance, rows = np.ones((1, 1, 2, 1)), np.array([[0, 1]])
+    constant = linearised_wear(strip, wear, strip, compliance)
+    wear_of_bodies(
+        strip, strip, wear, wear, compliance, constant, rows, worn, 1.0, np.ones((1, 1)), worn
+    )
+    difference_sizes(worn, worn, np.ones((2, 2)))
+
+
+compile_alongside("solve_slender", compile_linearised_wear)

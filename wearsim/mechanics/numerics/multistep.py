@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wearsim.mechanics.numerics.jit import kernel
+from wearsim.mechanics.numerics.jit import compile_alongside, kernel
 from wearsim.types import FloatArray, IntArray
 
 MAX_ORDER = 3
@@ -188,3 +188,17 @@ def local_errors(differences: FloatArray, spans: FloatArray, depths: FloatArray)
             factor = product / (inverse + 1.0 / spans[k + 1, v])
             errors[k, v] = np.sqrt(total / size) * factor if size > 0.0 else 0.0
     return errors
+
+
+def compile_multistep() -> None:
+    """Compile the kernels of a step by a call for one solution of one value."""
+    one, order = np.ones(1), np.ones(1, dtype=np.int64)
+    spans, weights = np.ones((ROWS - 1, 1)), np.empty((2, ROWS, 1))
+    differences, value = np.ones((ROWS, 1, 1, 1)), np.ones((1, 1, 1))
+    formulas(spans, one, order, one, weights, np.empty(1), np.empty((ROWS - 1, 1)))
+    extrapolated(weights, differences)
+    new_differences(value, value, one, differences, spans)
+    local_errors(differences, spans, value)
+
+
+compile_alongside("solve_slender", compile_multistep)
