@@ -115,6 +115,8 @@ def test_plugin_error_fails_one_realisation_only(monkeypatch):
     runs = runs_of(3, **ONE)
 
     class Broken(type(runs[1].problem.loads[0])):
+        constant = False
+
         def __init__(self):
             pass
 

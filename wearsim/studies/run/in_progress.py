@@ -145,10 +145,9 @@ class RunInProgress:
     def _check_errors(self) -> None:
         """Warn if an estimated error exceeds the tolerance."""
         state, tolerance = self.recorder.state, self.scenario.evolution.tolerance
-        depth, volume = greatest_depth(state.depths), volume_of(self.problem, state.depths)
-        sizes = depth, volume, (depth > 0.0).astype(float)
-        errors = state.depth_error, state.volume_error, state.profile_error
-        for kind, name in enumerate(("depth", "worn volume", "profile")):
+        sizes = greatest_depth(state.depths), volume_of(self.problem, state.depths)
+        errors = state.depth_error, state.volume_error
+        for kind, name in enumerate(("depth", "worn volume")):
             parts = [errors[kind], state.quadrature[kind], SIGMAS * np.sqrt(state.scatter[kind])]
             size = np.where(sizes[kind] > 0.0, sizes[kind], np.inf)
             relative, quadrature, scatter = (float((part / size).max()) for part in parts)
