@@ -129,5 +129,5 @@ def test_scatter_of_a_log_needs_no_steps_of_its_own(tmp_path):
     exact, _ = stepped(*built(evolution__stepper="per-pass", **changes))
     assert state.steps[0] < 201  # half of the rows
     error = abs(state.cylinder_depth.max() / exact.cylinder_depth.max() - 1.0)
-    assert error < 2e-3
+    assert error < 4e-3
     assert error * state.cylinder_depth.max() < state.depth_error[0]

@@ -11,6 +11,7 @@ from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import mean_along, sum_in_order, worn_volume
 from wearsim.evolution.state import Depths, WearState
 from wearsim.evolution.steppers.base import Step
+from wearsim.evolution.steppers.loads import smooth_loads
 from wearsim.evolution.steppers.single_step import WearIncrement, carried_loads, solve_present
 from wearsim.mechanics.numerics.linearised_wear import difference_sizes
 from wearsim.types import FloatArray
@@ -71,7 +72,11 @@ def state_difference(problem: WearProblem, one: WearState, other: WearState) -> 
 
 
 def variation_bias(
-    problem: WearProblem, end: WearState, first: FloatArray, passes: FloatArray
+    problem: WearProblem,
+    end: WearState,
+    first: FloatArray,
+    passes: FloatArray,
+    follows_trends: bool = False,
 ) -> tuple[Depths, FloatArray] | None:
     """Return the wear and energy that a step misses where load and processes vary within it.
 
@@ -86,6 +91,8 @@ def variation_bias(
         State at the step's end.
     first, passes : ndarray, shape (realisations,)
         Start and length of the step [passes].
+    follows_trends : bool
+        Whether the scheme takes a smooth load at the end of the step instead of its mean.
 
     Returns
     -------
@@ -100,6 +107,11 @@ def variation_bias(
     deviations = [item for item in problem.deviations(start, stop) if np.count_nonzero(item[2])]
     if not deviations:
         return None
+    if follows_trends:
+        name, rollers, deviation = deviations[0]
+        if name == "normal_force_offset":
+            deviation = np.where(smooth_loads(problem, first, passes), 0.0, deviation)
+            deviations[0] = name, rollers, deviation
     here = problem.at_time(start, stop)
     loads = carried_loads(problem, end.contacts)
     mean: WearIncrement | None = None

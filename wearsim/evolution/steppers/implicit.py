@@ -12,11 +12,10 @@ from wearsim.contact_batch import ContactBatchSolution
 from wearsim.evolution.contacts import LEAST_LOAD
 from wearsim.evolution.error_estimates import greatest_depth
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.quantities import values_between
 from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.base import Attempt, Step
 from wearsim.evolution.steppers.implicit_solution import EndOfStep
-from wearsim.evolution.steppers.loads import mean_force
+from wearsim.evolution.steppers.loads import mean_force, smooth_loads
 from wearsim.evolution.steppers.single_step import WearIncrement
 from wearsim.evolution.steppers.step_doubling import StepDoublingStepper
 from wearsim.mechanics.numerics.multistep import (
@@ -29,7 +28,6 @@ from wearsim.mechanics.numerics.multistep import (
 )
 from wearsim.types import BoolArray, FloatArray, IntArray
 
-TREND = 0.9  # part of the variance of a smooth load that its linear trend explains
 LIMIT = 2.0  # error of an accepted step, relative to the one aimed at
 SAFETY = 0.8  # ratio of the next step to the one that would meet the aim
 GROW = (2.2, 2.2, 1.8)  # greatest ratio of successive steps, by order
@@ -63,6 +61,7 @@ class ImplicitStepper(StepDoublingStepper):
     """
 
     taper = 4.0
+    follows_trends = True
 
     def started(self, problem: WearProblem, state: WearState) -> WearState:
         """Return the state with the rates and differences that the formulas need."""
@@ -133,14 +132,14 @@ def with_rates(problem: WearProblem, state: WearState) -> WearState:
     """Return a state without past points, and with the rates of wear and energy of its contacts."""
     times = problem.time(state.passes)
     here = problem.at_time(times, times)
-    conditions = _conditions(here, problem, state, np.zeros_like(state.passes))
+    exposure = _exposure(here, problem, problem.force(times))
     spans = np.full((ROWS - 1, len(state.passes)), np.inf)
     spans[0] = 0.0
     feedback = problem.has_spring or bool(problem.terms)
     wear, energy = _wear_per_pass(here, state.contacts)
     return state.replaced(
-        past_wear=_starting(wear, conditions.mean),
-        past_energy=_starting(energy, conditions.mean),
+        past_wear=_starting(wear, exposure),
+        past_energy=_starting(energy, exposure),
         past_feedback=np.zeros((ROWS, *problem.shape)) if feedback else None,
         past_spans=spans,
         order=np.ones(len(state.passes), dtype=np.int64),
@@ -195,27 +194,23 @@ def _conditions(
     The load is that at the end of the step where it varies smoothly, and else its mean.
     """
     if problem.constant_load is not None and not problem.varying:
-        offset = problem.inputs.normal_force_offset.mean(axis=0)
-        exposure = problem.constant_load + offset
+        exposure = _exposure(here, problem, problem.constant_load)
         return _Conditions(problem.constant_load, exposure, exposure)
-    start, stop = problem.time(state.passes), problem.time(state.passes + passes)
     force = mean = mean_force(problem, state, passes)
-    deviation = values_between([load.deviation for load in problem.loads], start, stop)
-    if deviation.any() and not problem.pauses:
-        first, last = problem.force(start), problem.force(stop)
-        variance = np.where(deviation > 0.0, 12.0 * deviation**2, np.inf)
-        smooth = np.square(last - first) > TREND * variance
-        smooth &= np.abs(last - mean) < 0.5 * mean
-        force = np.where(smooth, last, mean)
-    offset = here.inputs.normal_force_offset.mean(axis=0)
-    own, mean = force + offset, mean + offset
+    smooth = smooth_loads(problem, state.passes, passes)
+    if smooth.any():
+        force = np.where(smooth, problem.force(problem.time(state.passes + passes)), mean)
+    return _Conditions(force, _exposure(here, problem, force), _exposure(here, problem, mean))
+
+
+def _exposure(here: WearProblem, problem: WearProblem, force: FloatArray) -> FloatArray:
+    """Return the exposure per pass for a load before feedback, shape (realisations,) [N]."""
+    exposure = force + here.inputs.normal_force_offset.mean(axis=0)
     if problem.pauses:  # as the loads of the contacts
-        least = LEAST_LOAD * problem.greatest_load
-        own, mean = np.maximum(own, least), np.maximum(mean, least)
+        exposure = np.maximum(exposure, LEAST_LOAD * problem.greatest_load)
     if any(item.name == "friction" for item in problem.varying):
-        friction = here.inputs.friction.mean(axis=0)
-        own, mean = own * friction, mean * friction
-    return _Conditions(force, own, mean)
+        exposure = exposure * here.inputs.friction.mean(axis=0)
+    return np.asarray(exposure)
 
 
 def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) -> WearState:

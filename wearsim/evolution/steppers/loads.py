@@ -12,8 +12,9 @@ from wearsim.evolution.contacts import LEAST_LOAD
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import values_between
 from wearsim.evolution.state import HERTZ, Depths, WearState
-from wearsim.types import FloatArray
+from wearsim.types import BoolArray, FloatArray
 
+TREND = 0.9  # part of the variance of a smooth load that its linear trend explains
 APPROACH_EXPONENT = 0.75  # approach as a power of the load: 2/3 in a Hertzian contact, 1 in a flat
 
 
@@ -119,6 +120,27 @@ def mean_force(problem: WearProblem, state: WearState, passes: FloatArray) -> Fl
     """Return the exact mean over a step of the load before feedback, shape (N,) [N]."""
     start, stop = problem.time(state.passes), problem.time(state.passes + passes)
     return values_between([load.mean for load in problem.loads], start, stop)
+
+
+def smooth_loads(problem: WearProblem, first: FloatArray, passes: FloatArray) -> BoolArray:
+    """Return whether each load before feedback varies smoothly over a step, shape (N,).
+
+    A linear trend then explains most of its variance.
+
+    Parameters
+    ----------
+    problem : WearProblem
+    first, passes : ndarray, shape (realisations,)
+        Start and length of the step [passes].
+    """
+    start, stop = problem.time(first), problem.time(first + passes)
+    deviation = values_between([load.deviation for load in problem.loads], start, stop)
+    if problem.pauses or not deviation.any():
+        return np.zeros(len(first), dtype=np.bool_)
+    loads = problem.force(start), problem.force(stop)
+    middle, change = 0.5 * (loads[0] + loads[1]), np.abs(loads[1] - loads[0])
+    trend = np.square(change) > TREND * 12.0 * np.square(deviation)
+    return np.asarray(trend & (deviation > 0.0) & (change < middle))
 
 
 def corrected_loads(

@@ -52,6 +52,8 @@ class StepDoublingStepper(Stepper):
     steps. The step-size control limits the error added by each step.
     """
 
+    #: whether the scheme takes a smooth load at the end of the step instead of its mean
+    follows_trends = False
     #: safety factors on the estimates of the errors of depth, volume and profile
     cover = (COVER, COVER, COVER)
 
@@ -80,7 +82,7 @@ class StepDoublingStepper(Stepper):
         end = scheme(problem, half, 0.5 * step)
         coarse = scheme(problem, coarse_start, step)
         end = with_pass_errors(problem, state, end, coarse, scheme, step)
-        bias = variation_bias(problem, end, state.passes, step)
+        bias = variation_bias(problem, end, state.passes, step, self.follows_trends)
         if bias is not None:
             depths, energy = bias
             end, coarse = (
@@ -90,7 +92,10 @@ class StepDoublingStepper(Stepper):
         passes = np.where(step == stop - state.passes, stop, end.passes)
         after = end.stacked - coarse.stacked
         change = after - (state.stacked - coarse_start.stacked)
-        cover = np.array(self.cover)[:, None] * (1.0 if bias is None else VARYING_COVER)
+        cover = np.array(self.cover)[:, None]
+        if bias is not None:
+            varies = sum(np.count_nonzero(worn, axis=(0, 1, 3)) for worn in bias[0])
+            cover = cover * np.where(np.asarray(varies) > 0, VARYING_COVER, 1.0)
         added, reached = (cover * np.abs(sizes(problem, end, one)) for one in (change, after))
         auxiliary = {
             name: solution.replaced(

@@ -11,7 +11,7 @@ MIN_ORDER = 0.4  # with a random process, errors decrease as the square root of 
 #: criteria in the order of columns, with their definitions
 CRITERIA: Mapping[str, str] = {
     "volume": "worn volume minus K/H times dissipated energy",
-    "energy": "energy minus the sum of P_l dy over strips and half steps",
+    "energy": "energy minus the integral of P_l over strips and time, by the trapezoidal rule",
     "work": "power minus that of the forces and creepages",
     "load": "sum of q dy minus the load",
     "oscillation": "second difference of q on the finest strips, relative to its peak",
