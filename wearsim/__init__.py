@@ -52,7 +52,7 @@ and an ensemble of 16 tests with random friction, ``rig-ensemble.h5``.
 >>> print(f"{result.depth[-1] * 1e6:.1f} um deep, {result.width[-1] * 1e3:.1f} mm wide")
 48.1 um deep, 13.8 mm wide
 >>> wearsim.open_results("rig.h5")
-<Result 'a wear test': 1350000 roller passes, depth 48.1 um>
+<Result 'a wear test': 1350000 roller passes, depth 48.11 um>
 >>> random = wearsim.load_scenario(
 ...     "rig.toml",
 ...     {"friction.coefficient": {"distribution": "uniform", "low": 0.08, "high": 0.12}},

@@ -100,7 +100,7 @@ class Result(StudyResult[RunData]):
     --------
     >>> result = wearsim.run("rig.toml")
     >>> result
-    <Result 'a wear test': 1350000 roller passes, depth 48.1 um>
+    <Result 'a wear test': 1350000 roller passes, depth 48.11 um>
     >>> result.y.shape == result.profiles[-1].shape  # the groove at the end
     True
     >>> f"{result.final['relative_depth_error']:.1%}"
