@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wearsim.contact_batch import ContactBatchSolution
+from wearsim.errors import StepError
 from wearsim.evolution.contacts import LEAST_LOAD
 from wearsim.evolution.error_estimates import greatest_depth
 from wearsim.evolution.problem import WearProblem
@@ -220,7 +221,7 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
     as the depths, so that Archard's wear law holds to round-off. Passes are counted one by one: the
     formula is applied to the depths half a pass later, ``u + f/2`` with the wear per pass f, whose
     derivative is f up to terms of second order in f. A step in which a depth or the energy would
-    decrease is repeated at first order, where neither can.
+    decrease, or contact would be lost, is repeated at first order.
 
     Raises
     ------
@@ -232,12 +233,19 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
     here = problem.at_time(problem.time(state.passes), problem.time(state.passes + passes))
     conditions = _conditions(here, problem, state, passes)
     order = Past.of(state).order
-    end, decreased = _step(here, state, passes, conditions, order)
+    first_order = np.ones_like(order)
+    try:
+        end, decreased = _step(here, state, passes, conditions, order)
+    except StepError:
+        # the past points may lead beyond the depth at which a spring is unloaded
+        if len(order) > 1 or order[0] == 1:
+            raise
+        return _step(here, state, passes, conditions, first_order)[0]
     again = np.flatnonzero(decreased & (order > 1))
     if again.size:
         conditions = _Conditions(*(column[again] for column in vars(conditions).values()))
         some = here.at(again), state.at(again), passes[again]
-        part, _ = _step(*some, conditions, np.ones(len(again), dtype=np.int64))
+        part, _ = _step(*some, conditions, first_order[again])
         end = end.with_others(again, part)
     return end
 

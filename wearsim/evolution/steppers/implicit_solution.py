@@ -132,6 +132,8 @@ class EndOfStep:
                 target = np.where(active, self._equilibrium(solved, loads, gap), target)
                 moved = np.abs(target / loads - 1.0).max(axis=(0, 1))
                 change = np.maximum(change, opening * moved)
+                # far from equilibrium, or without one if the spring is unloaded
+                change[(target <= LEAST_GUESS * loads).any(axis=(0, 1))] = np.inf
             if problem.slip_profile is not None:
                 moved = np.abs(depths - used).max(axis=(0, 2))
                 change = np.maximum(change, opening * (moved / depth))

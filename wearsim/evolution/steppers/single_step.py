@@ -108,6 +108,8 @@ def solve_loaded(
     """
     first = fresh if elastic is None else elastic
     loads = loads_at(displacement_at(problem, [state.depths], fresh - first))
+    if problem.has_spring:  # a stiff spring may seem unloaded until the approach has converged
+        loads = np.where(loads > 0.0, loads, carried_loads(problem, state.contacts))
     contacts = solve(problem, state, checked_loads(state, loads))
     solves = int(contacts is not state.contacts)
     if not problem.has_spring:
