@@ -41,11 +41,17 @@ def contact_batch(
     )
 
 
+def at_least(problem: WearProblem, loads: FloatArray) -> FloatArray:
+    """Return loads that do not fall below a small part of the greatest load of a test with pauses.
+
+    Axis -1 of the loads is that of the realisations.
+    """
+    return np.maximum(loads, LEAST_LOAD * problem.greatest_load) if problem.pauses else loads
+
+
 def unworn_contacts(problem: WearProblem) -> ContactBatch:
     """Return the contacts of the unworn bodies under the loads at the start of the test."""
-    force = problem.force(np.zeros(len(problem.loads)))
-    if problem.pauses:
-        force = np.maximum(force, LEAST_LOAD * problem.greatest_load)
+    force = at_least(problem, problem.force(np.zeros(len(problem.loads))))
     loads = np.broadcast_to(force + problem.inputs.normal_force_offset, problem.shape)
     cylinder, roller = np.zeros((1, 1, 1, 1)), np.zeros((1, problem.rollers, 1, 1))
     return contact_batch(problem, problem.nominal_gap, loads, cylinder, roller)

@@ -14,6 +14,7 @@ import numpy as np
 from wearsim.contact_batch import ContactBatchSolution
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
+from wearsim.evolution.steppers.loads import advanced_terms
 from wearsim.types import BoolArray, FloatArray, IntArray
 
 _MARGIN = 1e-6, 1e-7  # passes, and part of the passes done, by which a state may miss a boundary
@@ -83,9 +84,7 @@ def rest(problem: WearProblem, state: WearState, passes: FloatArray, stop: float
     done = np.where(passes == stop - state.passes, stop, state.passes + passes)
     terms = state.terms
     if problem.terms:
-        duration = float((problem.time(done) - problem.time(state.passes))[0])
-        each = zip(problem.terms.values(), terms, strict=True)
-        terms = np.array([term.advance(value, 0.0 * value, duration) for term, value in each])
+        terms = advanced_terms(problem, state, done, np.zeros_like(terms[0]))
     if state.past_spans is not None:  # multistep formulas start again, from the last rates
         spans = np.full_like(state.past_spans, np.inf)
         spans[0] = 0.0

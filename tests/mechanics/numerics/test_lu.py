@@ -17,7 +17,7 @@ def solved(system, size, right):
 
 
 def definite(size):
-    """Return a random matrix whose symmetric part is positive definite, as those of contacts."""
+    """Return a random matrix with a positive definite symmetric part."""
     random = np.random.default_rng(size)
     root, skew = random.normal(size=(2, size, size))
     return root @ root.T + skew - skew.T + np.eye(size)

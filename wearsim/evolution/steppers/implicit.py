@@ -10,7 +10,7 @@ import numpy as np
 
 from wearsim.contact_batch import ContactBatchSolution
 from wearsim.errors import StepError
-from wearsim.evolution.contacts import LEAST_LOAD
+from wearsim.evolution.contacts import at_least
 from wearsim.evolution.error_estimates import greatest_depth
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
@@ -161,9 +161,13 @@ def _wear_per_pass(
 ) -> tuple[FloatArray, FloatArray]:
     """Return depth [m] and energy [J] per roller pass, (stations + rollers, N, strips) and (N,)."""
     cylinder, roller = WearIncrement(problem, contacts, 1.0).depths
+    return np.concatenate([cylinder[:, 0], roller[0]]), _energy_per_pass(problem, contacts)
+
+
+def _energy_per_pass(problem: WearProblem, contacts: ContactBatchSolution) -> FloatArray:
+    """Return the energy that all contacts dissipate in a roller pass, shape (N,) [J]."""
     power = problem.total_power(problem.values_of(contacts, "power"))
-    wear = np.concatenate([cylinder[:, 0], roller[0]])
-    return wear, power / problem.kinematics.pass_rate
+    return np.asarray(power / problem.kinematics.pass_rate)
 
 
 @dataclass(frozen=True)
@@ -206,9 +210,7 @@ def _conditions(
 
 def _exposure(here: WearProblem, problem: WearProblem, force: FloatArray) -> FloatArray:
     """Return the exposure per pass for a load before feedback, shape (realisations,) [N]."""
-    exposure = force + here.inputs.normal_force_offset.mean(axis=0)
-    if problem.pauses:  # as the loads of the contacts
-        exposure = np.maximum(exposure, LEAST_LOAD * problem.greatest_load)
+    exposure = at_least(problem, force + here.inputs.normal_force_offset.mean(axis=0))
     if any(item.name == "friction" for item in problem.varying):
         exposure = exposure * here.inputs.friction.mean(axis=0)
     return np.asarray(exposure)
@@ -277,8 +279,7 @@ def _step(
         feedback = feedback.reshape(problem.shape)
     step = EndOfStep(problem, state, start + added, conditions.force, passes, worn_passes)
     end, worn, feedback = step.solved(start + guess, feedback)
-    power = problem.total_power(problem.values_of(end.contacts, "power"))
-    rate = (power / problem.kinematics.pass_rate)[None, :, None]
+    rate = _energy_per_pass(problem, end.contacts)[None, :, None]
     energy = energy + worn_passes[:, None] * rate
     new_energy = new_differences(rate, energy, half_pass, old_energy, spans)
     past_feedback = None

@@ -12,6 +12,7 @@ from wearsim.evolution.contacts import contact_batch
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.loads import (
+    advanced_terms,
     checked_loads,
     corrected_loads,
     fresh_approach,
@@ -200,10 +201,7 @@ class EndOfStep:
             for contacts in (start.contacts, solved)
         ]
         power = 0.5 * (powers[0] + powers[1])
-        begin = problem.time(start.passes)
-        duration = float((problem.time(start.passes + self.passes) - begin)[0])
-        each = zip(problem.terms.values(), start.terms, strict=True)
-        return np.array([term.advance(value, power, duration) for term, value in each])
+        return advanced_terms(problem, start, start.passes + self.passes, power)
 
 
 def solve_compliant(

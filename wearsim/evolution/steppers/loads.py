@@ -8,7 +8,7 @@ import numpy as np
 
 from wearsim.contact_batch import ContactBatchSolution
 from wearsim.errors import StepError
-from wearsim.evolution.contacts import LEAST_LOAD
+from wearsim.evolution.contacts import at_least
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import values_between
 from wearsim.evolution.state import HERTZ, Depths, WearState
@@ -54,10 +54,28 @@ def with_feedback(
         loads -= problem.stiffness * displacement
     for term in terms:
         loads += term[problem.roller]
-    if problem.pauses:
-        # a spring that has descended lifts the roller while the load rises from a pause
-        loads = np.maximum(loads, LEAST_LOAD * problem.greatest_load)
-    return loads
+    # a spring that has descended lifts the roller while the load rises from a pause
+    return at_least(problem, loads)
+
+
+def advanced_terms(
+    problem: WearProblem, state: WearState, stop: FloatArray, power: FloatArray
+) -> FloatArray:
+    """Return the load terms after a step, shape (terms, rollers, realisations) [N].
+
+    Parameters
+    ----------
+    problem : WearProblem
+    state : WearState
+        State at the start of the step.
+    stop : ndarray, shape (realisations,)
+        Passes at its end.
+    power : ndarray, shape (rollers, realisations)
+        Mean dissipated power of each roller [W].
+    """
+    duration = float((problem.time(stop) - problem.time(state.passes))[0])
+    each = zip(problem.terms.values(), state.terms, strict=True)
+    return np.array([term.advance(value, power, duration) for term, value in each])
 
 
 def checked_loads(state: WearState, loads: FloatArray) -> FloatArray:

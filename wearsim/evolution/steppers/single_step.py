@@ -13,6 +13,7 @@ from wearsim.evolution.contacts import contact_batch
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.loads import (
+    advanced_terms,
     checked_loads,
     corrected_loads,
     displacement_at,
@@ -50,16 +51,6 @@ class WearIncrement:
         self.depths = problem.sum_of_parts(*self.parts)
         self.cylinder, self.roller = self.depths
         self.problem, self.contacts = problem, contacts
-
-    @property
-    def flat_parts(self) -> FloatArray:
-        """The contributions with one axis of contacts, shape (2, contacts, strips) [m]."""
-        return self.parts.reshape(len(self.parts), *self.contacts.line_load.shape)
-
-    @property
-    def opening(self) -> FloatArray:
-        """Gap that the step opens, shape (stations, contacts, realisations, strips) [m]."""
-        return self.cylinder + self.problem.at_contacts(self.roller)
 
 
 REALISATION = 2  # axis of the realisations
@@ -275,10 +266,8 @@ def worn_state(
     """
     terms, begin = state.terms, state.passes
     if problem.terms:
-        duration = float((problem.time(begin + passes) - problem.time(begin))[0])
         mean = problem.per_roller(power).mean(axis=0)
-        each = zip(problem.terms.values(), terms, strict=True)
-        terms = np.array([term.advance(value, mean, duration) for term, value in each])
+        terms = advanced_terms(problem, state, begin + passes, mean)
     return state.replaced(
         passes=begin + passes,
         terms=terms,

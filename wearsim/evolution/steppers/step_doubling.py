@@ -54,8 +54,6 @@ class StepDoublingStepper(Stepper):
 
     #: whether the scheme takes a smooth load at the end of the step instead of its mean
     follows_trends = False
-    #: safety factors on the estimates of the errors of depth, volume and profile
-    cover = (COVER, COVER, COVER)
 
     def proposed(self, problem: WearProblem, state: WearState) -> FloatArray:
         """Return the forced step, the one proposed after the last step, or a first step."""
@@ -92,7 +90,7 @@ class StepDoublingStepper(Stepper):
         passes = np.where(step == stop - state.passes, stop, end.passes)
         after = end.stacked - coarse.stacked
         change = after - (state.stacked - coarse_start.stacked)
-        cover = np.array(self.cover)[:, None]
+        cover = np.full((3, len(step)), COVER)
         if bias is not None:
             varies = sum(np.count_nonzero(worn, axis=(0, 1, 3)) for worn in bias[0])
             cover = cover * np.where(np.asarray(varies) > 0, VARYING_COVER, 1.0)

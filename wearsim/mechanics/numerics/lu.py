@@ -1,7 +1,7 @@
 """Dense LU factorisation, with results that do not depend on the BLAS library and its threads.
 
-The systems are those of contacts, whose symmetric part is positive definite: elimination is stable
-without pivoting, which would take a third of the time.
+The matrices of contact problems have a positive definite symmetric part, so that elimination is
+stable without pivoting, which would take a third of the time.
 
 A system is stored by columns: ``matrix[j, i]`` is the coefficient of unknown j in equation i. Every
 inner loop thus runs along a row in memory, which is a column of the system. Inner loops that do not

@@ -31,7 +31,7 @@ from wearsim.types import FloatArray, IntArray
 SWEEPS = 2
 LOWEST_FACTOR = 0.1
 HIGHEST_FACTOR = 4.0
-REACH = 3  # strips on either side whose loads enter the derivative of s
+REACH = 3  # neighbours on either side in the derivative of s with respect to the line loads
 
 
 class HalfLengths(NamedTuple):

@@ -21,11 +21,11 @@ K_OVER_H = 1.1e-11  # 1/Pa, of the rig
 RIG_SLIDING, LARGEST = 0.1 * 1e-3 * 300.0 * 1.35e6, 2.0
 DIFFERENTIAL_SLIP = 1e-3  # greatest differential slip in a groove of the rig
 PASSES = 5e3, 1.35e6
-#: passes of tests whose passes are slow to solve individually: without a compiled loop, or with
-#: inputs drawn at every pass
+#: passes of tests without a compiled loop over passes, and of those with inputs drawn at every
+#: pass: each pass takes long
 SLOW_PASSES = 5e3, 1e4
-#: of tests with differential slip, with many strips, and of those whose reference is a solver of
-#: differential equations
+#: passes of tests with differential slip, which have many strips, and of tests that are compared
+#: with a solver of differential equations
 FEWER_PASSES = 5e3, 1e5
 
 

@@ -125,7 +125,7 @@ def coverage(rows: Sequence[Measurement], quantity: str) -> Coverage:
 
 
 def worst(rows: Sequence[Measurement], quantity: str, count: int) -> list[Measurement]:
-    """Return the tests whose true error exceeds the stated one most, the worst first."""
+    """Return the tests with the greatest ratios of true to stated error, in decreasing order."""
 
     def ratio(row: Measurement) -> float:
         true, own = row.errors[quantity], row.errors[STATED + quantity]

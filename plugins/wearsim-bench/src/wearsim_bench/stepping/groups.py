@@ -188,7 +188,7 @@ class StepperBenchmark:
         )
 
     def failed(self, method: str, setting: str, error: Exception) -> list[Measurement]:
-        """Return the one measurement of a group whose reference has failed."""
+        """Return the measurement that replaces a group if its reference cannot be computed."""
         return [Measurement(self.group, method, setting, failed=failure_reason(error))]
 
 

@@ -104,7 +104,7 @@ def comparison(stepper: TimedRun, solver: TimedRun, name: str) -> Comparison:
 
 
 def compared(runs: Sequence[TimedRun], stepper: str, solvers: Sequence[str]) -> list[TimedRun]:
-    """Return the runs with remarks on the solvers whose profile error is notable.
+    """Return the runs, with a remark on every solver of more than the least profile error.
 
     Parameters
     ----------
