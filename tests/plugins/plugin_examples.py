@@ -16,6 +16,7 @@ HOOKS = (
     "wearsim_wear_laws",
     "wearsim_loads",
     "wearsim_random_inputs",
+    "wearsim_motion_laws",
 )
 RIG = (
     BODIES

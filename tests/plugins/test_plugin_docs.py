@@ -20,6 +20,7 @@ from wearsim.plugins import (
     Capabilities,
     ContactModelSpec,
     LoadSpec,
+    MotionLawSpec,
     RandomInputSpec,
     WearLawSpec,
     registry,
@@ -29,6 +30,7 @@ from wearsim.testing import random_inputs
 from wearsim.testing.checks import ConfiguredSpec
 from wearsim.testing.contact_fixtures import ContactFixture
 from wearsim.testing.kit import CONTACT_MODEL
+from wearsim.testing.motion_laws import MOTION_LAW, MotionLawFixture
 from wearsim.testing.random_inputs import RandomInputFixture
 from wearsim.testing.wear_and_loads import LOADS, WEAR_LAW, LoadFixture, WearLawFixture
 from wearsim.units import ANGLE, FORCE
@@ -149,6 +151,13 @@ def test_documented_random_inputs_pass_the_checks_and_run(documented):
     assert 270.0 < result.drawn["load.normal_force"][0] < 330.0
     assert np.abs(result.drawn["creepage.tilt"]).max() <= 0.5e-3
     assert len(set(result.drawn["creepage.yaw"])) == 3
+
+
+def test_documented_motion_law_passes_the_checks(documented):
+    tables = documented("wearsim_motion_laws")
+    assert 'law = "power"' in tables["cam"]
+    spec = registry().get(MotionLawSpec, "power")
+    run_checks(MOTION_LAW, MotionLawFixture(ConfiguredSpec(spec, {"order": 4})))
 
 
 def rig_with(tables: str):

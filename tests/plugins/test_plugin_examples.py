@@ -15,10 +15,11 @@ from plugin_examples import HOOKS, Point, rig
 
 import wearsim
 from wearsim.errors import ScenarioError
-from wearsim.plugins import LoadSpec, RandomInputSpec, WearLawSpec, registry
+from wearsim.plugins import LoadSpec, MotionLawSpec, RandomInputSpec, WearLawSpec, registry
 from wearsim.plugins.manager import HookSpecs
 from wearsim.testing import random_inputs
 from wearsim.testing.checks import ConfiguredSpec
+from wearsim.testing.motion_laws import MOTION_LAW, MotionLawFixture
 from wearsim.testing.random_inputs import RandomInputFixture
 from wearsim.testing.wear_and_loads import LOADS, WEAR_LAW, LoadFixture, WearLawFixture
 
@@ -139,3 +140,10 @@ def test_example_of_a_random_input_runs(example):
     assert flat.quantile(np.array([0.25, 0.5])) == pytest.approx([2.5, 3.0])
     assert (*flat.support, flat.mean) == pytest.approx((2.0, 4.0, 3.0))
     assert flat.std == pytest.approx(1.0 / np.sqrt(3.0), rel=1e-6)
+
+
+def test_example_of_a_motion_law_runs(example):
+    example("wearsim_motion_laws")
+    fixture = MotionLawFixture(ConfiguredSpec(registry().get(MotionLawSpec, "cosine")))
+    for check in MOTION_LAW.values():
+        check(fixture)

@@ -14,6 +14,7 @@ from wearsim.errors import PluginError, ScenarioError
 from wearsim.plugins import (
     ContactModelSpec,
     LoadSpec,
+    MotionLawSpec,
     Options,
     RandomInputSpec,
     WearLawSpec,
@@ -43,9 +44,8 @@ def test_every_kind_of_spec_is_registered():
             kind("new", Options, "new", factory=lambda options: None, protocol=2, **more)
         ]
 
-    kinds = dict(
-        zip(HOOKS, (ContactModelSpec, WearLawSpec, LoadSpec, RandomInputSpec), strict=True)
-    )
+    specs = ContactModelSpec, WearLawSpec, LoadSpec, RandomInputSpec, MotionLawSpec
+    kinds = dict(zip(HOOKS, specs, strict=True))
     plugins = Registry([Point(module(**{hook: of(kind) for hook, kind in kinds.items()}))])
     for kind in kinds.values():
         assert plugins.names(kind) == ["new"]
@@ -163,6 +163,7 @@ def test_spec_of_another_protocol_is_listed_and_refused_when_selected(
         ("wearsim_wear_laws", WearLawSpec),
         ("wearsim_loads", LoadSpec),
         ("wearsim_random_inputs", RandomInputSpec),
+        ("wearsim_motion_laws", MotionLawSpec),
     ],
 )
 def test_every_kind_of_spec_has_a_protocol(hook, spec):

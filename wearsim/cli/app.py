@@ -45,7 +45,7 @@ BUILT_IN = {
     "compare": "Compare runs and ensembles, with confidence intervals.",
     "export": "Write a results file as CSV, with units in the headers.",
     "maxent": "Compute a maximum-entropy distribution from moments.",
-    "plugins": "List contact models, wear laws, loads and random inputs.",
+    "plugins": "List contact models, wear laws, loads, random inputs and motion laws.",
     "schema": "Write the JSON Schema of a scenario, for editors.",
     "new": "Create a new plugin or scenario.",
 }

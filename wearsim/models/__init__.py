@@ -1,14 +1,21 @@
-"""Built-in contact models, wear laws, loads and random inputs, registered by the plugin hooks."""
+"""Built-in models, laws, loads and random inputs, registered by the hooks of plugins."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
-from wearsim.models import loads, wear
+from wearsim.models import loads, motion, wear
 from wearsim.models.contact import hertz as hertz_model
 from wearsim.models.contact import hertz_fastsim, slender, strip_model
 from wearsim.models.random import distributions, varying
-from wearsim.plugins import ContactModelSpec, LoadSpec, RandomInputSpec, WearLawSpec, hookimpl
+from wearsim.plugins import (
+    ContactModelSpec,
+    LoadSpec,
+    MotionLawSpec,
+    RandomInputSpec,
+    WearLawSpec,
+    hookimpl,
+)
 
 
 @hookimpl
@@ -33,3 +40,9 @@ def wearsim_loads() -> Iterable[LoadSpec]:
 def wearsim_random_inputs() -> Iterable[RandomInputSpec]:
     """Yield the built-in distributions, friction fields and processes."""
     return (*distributions.SPECS, *varying.SPECS)
+
+
+@hookimpl
+def wearsim_motion_laws() -> Iterable[MotionLawSpec]:
+    """Yield the built-in motion laws of cams."""
+    return motion.SPECS

@@ -16,6 +16,7 @@ from wearsim.plugins.specs import (
     PROTOCOL,
     ContactModelSpec,
     LoadSpec,
+    MotionLawSpec,
     RandomInputSpec,
     Spec,
     WearLawSpec,
@@ -198,6 +199,46 @@ class HookSpecs:
                 )
         """
 
+    @hookspec
+    def wearsim_motion_laws(self) -> Iterable[MotionLawSpec]:  # type: ignore[empty-body]
+        """Yield motion laws, selected by ``law`` in the entries of ``cam.motion``.
+
+        The requirements are documented in `MotionLaw` and tested by
+        `wearsim.testing.motion_law_tests`.
+
+        Returns
+        -------
+        iterable of MotionLawSpec
+
+        Examples
+        --------
+        .. code-block:: python
+
+            import numpy as np
+            from wearsim.plugins import MotionLaw, MotionLawSpec, Options, hookimpl
+
+
+            class Cosine(MotionLaw):
+                def __init__(self, options, angle, rise, unit):
+                    self.rate, self.height = np.pi / angle, 0.5 * rise
+
+                def lift(self, angle):
+                    turn = self.rate * angle
+                    waves = 1.0 - np.cos(turn), np.sin(turn), np.cos(turn)
+                    return self.height * np.stack([w * self.rate**k for k, w in enumerate(waves)])
+
+
+            @hookimpl
+            def wearsim_motion_laws():
+                yield MotionLawSpec(
+                    name="cosine",
+                    factory=Cosine,
+                    options=Options,
+                    summary="half a period of a cosine",
+                    protocol=2,
+                )
+        """
+
 
 S = TypeVar("S", bound=Spec)
 
@@ -208,6 +249,7 @@ _HOOKS: dict[type[Spec], str] = {
     WearLawSpec: "wearsim_wear_laws",
     LoadSpec: "wearsim_loads",
     RandomInputSpec: "wearsim_random_inputs",
+    MotionLawSpec: "wearsim_motion_laws",
 }
 
 

@@ -1,4 +1,4 @@
-"""Base classes of wear laws, loads and random inputs, and the specs that hooks yield."""
+"""Base classes of wear and motion laws, loads and random inputs, and the specs of all hooks."""
 
 from __future__ import annotations
 
@@ -102,6 +102,27 @@ class LoadTerm(ABC):
         The compiled per-pass loop supports first-order lags only; other terms need Python.
         """
         return None
+
+
+class MotionLaw(ABC):
+    """Motion of a follower over one segment of a cam's turn.
+
+    `breaks` are the angles from the segment's start [rad] where a derivative above the second
+    jumps; the second derivative is continuous within a segment.
+    """
+
+    breaks: tuple[float, ...] = ()
+
+    @abstractmethod
+    def lift(self, angle: FloatArray) -> FloatArray:
+        """Return lift and derivatives at angles from the segment's start [rad], shape (points,).
+
+        Returns
+        -------
+        ndarray, shape (3, points)
+            Lift above that at the segment's start [m, or rad of a swinging arm], and its first and
+            second derivative by the angle.
+        """
 
 
 Frame: TypeAlias = Literal["contact", "cylinder", "roller"]
@@ -301,6 +322,25 @@ class LoadSpec(Spec):
 
     factory: Callable[[Any], Load | LoadTerm] = field(kw_only=True)
     role: Literal["base", "term"] = "base"
+
+
+@dataclass(frozen=True)
+class MotionLawSpec(Spec):
+    """Spec of a motion law, selected by the key `law` of an entry of ``cam.motion``.
+
+    Parameters
+    ----------
+    factory : callable
+        ``factory(options, angle, rise, unit)`` returns a MotionLaw for a segment of `angle` [rad]
+        over which the follower rises by `rise`, in `unit`: "m", or "rad" for a swinging arm.
+    rise : {"required", "none", "own"}
+        Whether the entry gives a rise, or the law has none, or finds it from its options.
+    """
+
+    kind: ClassVar[str] = "motion law"
+
+    factory: Callable[[Any, float, float, str], MotionLaw] = field(kw_only=True)
+    rise: Literal["required", "none", "own"] = "required"
 
 
 @dataclass(frozen=True)

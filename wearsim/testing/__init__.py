@@ -1,8 +1,8 @@
 """Conformance tests for plugins, built by one line of a pytest module.
 
 ``test_sponge = contact_model_tests(SPEC)`` gives one test item for each requirement on a contact
-model; random inputs, wear laws and loads have equivalent functions. A failed item reports the
-measured numbers, the requirement and the dotted name of the class or method that specifies it.
+model; the other kinds of plugins have equivalent functions. A failed item reports the measured
+numbers, the requirement and the dotted name of the class or method that specifies it.
 """
 
 from wearsim.testing.checks import Check, Checks, ConformanceError
@@ -10,6 +10,7 @@ from wearsim.testing.contact_fixtures import STEEL, ContactCase
 from wearsim.testing.kit import (
     contact_model_tests,
     load_tests,
+    motion_law_tests,
     random_input_tests,
     wear_law_tests,
 )
@@ -23,6 +24,7 @@ __all__ = [
     "ContactCase",
     "contact_model_tests",
     "load_tests",
+    "motion_law_tests",
     "random_input_tests",
     "sliding_contact",
     "wear_law_tests",

@@ -17,6 +17,7 @@ from wearsim.errors import PluginError, WearsimError, described
 from wearsim.plugins import (
     ContactModelSpec,
     LoadSpec,
+    MotionLawSpec,
     Options,
     Quantity,
     RandomInputSpec,
@@ -180,7 +181,7 @@ def agree(
     )
 
 
-S = TypeVar("S", ContactModelSpec, WearLawSpec, LoadSpec, RandomInputSpec)
+S = TypeVar("S", ContactModelSpec, WearLawSpec, LoadSpec, RandomInputSpec, MotionLawSpec)
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Test functions for plugin authors: contact models, random inputs, wear laws and loads."""
+"""Test functions for plugin authors, one for each kind of plugin."""
 
 from __future__ import annotations
 
@@ -6,12 +6,13 @@ from collections.abc import Callable, Mapping
 from functools import cache
 from typing import TypeVar
 
-from wearsim.plugins import ContactModelSpec, LoadSpec, RandomInputSpec, WearLawSpec
+from wearsim.plugins import ContactModelSpec, LoadSpec, MotionLawSpec, RandomInputSpec, WearLawSpec
 from wearsim.testing import random_inputs
 from wearsim.testing.checks import Check, Checks, ConfiguredSpec, resolve, spec_checks
 from wearsim.testing.contact_behaviour import BEHAVIOUR
 from wearsim.testing.contact_capabilities import CAPABILITIES
 from wearsim.testing.contact_fixtures import ContactCase, ContactFixture
+from wearsim.testing.motion_laws import MOTION_LAW, MotionLawFixture
 from wearsim.testing.random_inputs import RandomInputFixture
 from wearsim.testing.wear_and_loads import LOADS, WEAR_LAW, LoadFixture, WearLawFixture
 from wearsim.units import Kind
@@ -182,5 +183,38 @@ def load_tests(
     return build_tests(
         LOADS[resolved.role],
         lambda: LoadFixture(ConfiguredSpec(resolved, options, files=files), duration),
+        without,
+    )
+
+
+def motion_law_tests(
+    spec: MotionLawSpec | str,
+    options: Mapping[str, object] = NOTHING,
+    *,
+    files: Mapping[str, str] = NOTHING,
+    angle: float = 1.5,
+    rise: float = 8e-3,
+    without: Mapping[str, str] = NOTHING,
+) -> Tests[MotionLawFixture]:
+    """Return tests of a motion law, one item per requirement.
+
+    Parameters
+    ----------
+    spec, options, without
+        See `contact_model_tests`.
+    files : mapping of str to str
+        Content of the files that the options name.
+    angle, rise : float
+        Of the segment [rad], [m].
+
+    Returns
+    -------
+    callable
+        See `contact_model_tests`.
+    """
+    resolved = resolve(MotionLawSpec, spec)
+    return build_tests(
+        MOTION_LAW,
+        lambda: MotionLawFixture(ConfiguredSpec(resolved, options, files=files), angle, rise),
         without,
     )

@@ -123,7 +123,7 @@ _HEADS = ("name", "kind", "distribution", "version", "protocol", "capabilities",
 
 
 def plugins(json: Json = False) -> None:
-    """List contact models, wear laws, loads and random inputs."""
+    """List contact models, wear laws, loads, random inputs and motion laws."""
     from wearsim.plugins import registry
 
     found = registry()

@@ -1,0 +1,113 @@
+"""Stations along the angle of a cam, their weights and their choice."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from cams import MM, Motion, rise_and_return, segment
+
+from wearsim.mechanics.cam import Panel, Stations, choose_stations, extreme, motion_mistakes
+from wearsim.mechanics.cam.stations import NUMBERS, interpolation, lobatto
+
+WHOLE = Panel(0, 0.0, math.tau, dwell=False)
+
+
+@pytest.mark.parametrize("number", [1, 2, 3, 7, 8, 13, 25, 500])
+def test_weights_integrate_and_points_interpolate_polynomials(number):
+    points, weights = lobatto(number)
+    places = np.array([0.0, 0.123, 0.5, 1.0])
+    for degree in range(min(number, 30)):
+        assert weights @ points**degree == pytest.approx(1.0 / (degree + 1), rel=1e-13)
+        values = interpolation(number, places) @ points**degree
+        assert values == pytest.approx(places**degree, rel=1e-12, abs=1e-12)
+
+
+def test_numbers_of_stations_are_nested():
+    for few, many in itertools.pairwise(NUMBERS):
+        assert lobatto(many)[0][::2] == pytest.approx(lobatto(few)[0], abs=1e-15)
+
+
+def test_dwell_has_one_station_and_a_cycloidal_rise_thirteen():
+    motion = rise_and_return("cycloidal")
+
+    def lift(panel, theta):
+        return 1.0 + motion.lift_in(panel.segment, theta)[:1] / MM
+
+    stations = choose_stations(motion.panels, lift, 2.5e-4)
+    assert stations.numbers == (1, 13, 1, 13)
+    assert stations.weight.sum() == pytest.approx(math.tau, rel=1e-14)
+    assert choose_stations(motion.panels, lift, 2.5e-4, 5).numbers == (1, 5, 1, 5)
+
+
+def test_chosen_stations_represent_a_sharp_peak_within_the_tolerance():
+    def peak(panel, theta):
+        return np.exp(-(((theta - 1.0) / 0.1) ** 2))[None]
+
+    stations = choose_stations([WHOLE], peak, 1e-4)
+    angle, values = stations.values_at(peak(WHOLE, stations.angle)[0], 50)
+    assert len(stations.panels) > 1
+    assert values == pytest.approx(peak(WHOLE, angle)[0], abs=1e-4)
+    integral = stations.weight @ peak(WHOLE, stations.angle)[0]
+    assert integral == pytest.approx(0.1 * math.sqrt(math.pi), rel=1e-4)
+
+
+def test_integral_converges_faster_than_any_power():
+    errors = []
+    for number in NUMBERS:
+        stations = Stations((WHOLE,), (number,))
+        errors.append(abs(stations.weight @ np.exp(np.cos(stations.angle)) - 7.954926521012846))
+    assert errors[1] < 1e-2 * errors[0]
+    assert errors[2] < 1e-4 * errors[1]
+
+
+def test_extreme_is_found_to_round_off():
+    value, angle = extreme([WHOLE], lambda panel, theta: np.sin(3.0 * theta) + 0.1 * theta)
+    exact = (math.acos(-0.1 / 3.0) + 2.0 * math.tau) / 3.0
+    assert value == pytest.approx(math.sin(3.0 * exact) + 0.1 * exact, rel=1e-14)
+    assert angle == pytest.approx(exact, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("parts", "place", "words"),
+    [
+        (
+            [("dwell", 90.0), ("cycloidal", 90.0, 1.0), ("cycloidal", 170.0, -1.0)],
+            2,
+            "sum to 350 deg 360 deg, such as 180 deg for segment 3 (cycloidal)",
+        ),
+        (
+            [("dwell", 180.0), ("cycloidal", 90.0, 2.0), ("cycloidal", 90.0, -1.5)],
+            3,
+            "return to its start 0.5 after segment 3 (cycloidal)",
+        ),
+        (
+            [("dwell", 180.0), ("polynomial", 90.0, 1.0, {"start": ["1 m/rad"]})],
+            0,
+            "jumps before segment 2 (polynomial) from 0 to 1 per rad",
+        ),
+    ],
+)
+def test_mistakes_of_a_motion_name_the_segment(parts, place, words):
+    segments = []
+    for law, degrees, *more in parts:
+        options = more[1] if len(more) > 1 else {}
+        segments.append(segment(law, degrees, more[0] if more else 0.0, **options))
+    found = [" ".join(map(str, item[1:])) for item in motion_mistakes(segments, "{:.4g}".format)]
+    flat = " ".join(found)
+    for part in words.split(" 360 deg, such as "):
+        assert part in flat
+    assert place >= 0
+
+
+def test_motion_at_a_boundary_is_that_of_the_following_segment():
+    motion = rise_and_return("harmonic")
+    assert motion.segment_at(np.radians([0.0, 90.0, 180.0, 270.0, 360.0, -90.0])).tolist() == [
+        *(0, 1, 2, 3, 0, 3)
+    ]
+    second = motion.lift(np.radians([90.0, 89.999]))[2]
+    assert second[0] > 0.0
+    assert second[1] == 0.0
+    assert isinstance(motion, Motion)

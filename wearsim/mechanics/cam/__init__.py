@@ -1,0 +1,31 @@
+"""Cams: motion of the follower, kinematics of the roller on the cam, stations along the angle."""
+
+from wearsim.mechanics.cam.follower import Follower, RollerKinematics
+from wearsim.mechanics.cam.motion import Motion, Panel, Segment, motion_mistakes
+from wearsim.mechanics.cam.shapes import (
+    Arc,
+    Line,
+    eccentric_cam,
+    shape_motion,
+    tangent_cam,
+    three_arc_cam,
+)
+from wearsim.mechanics.cam.stations import Stations, choose_stations, extreme
+
+__all__ = [
+    "Arc",
+    "Follower",
+    "Line",
+    "Motion",
+    "Panel",
+    "RollerKinematics",
+    "Segment",
+    "Stations",
+    "choose_stations",
+    "eccentric_cam",
+    "extreme",
+    "motion_mistakes",
+    "shape_motion",
+    "tangent_cam",
+    "three_arc_cam",
+]

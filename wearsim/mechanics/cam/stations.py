@@ -1,0 +1,197 @@
+"""Stations along the angle of a cam: Chebyshev-Lobatto points with Clenshaw-Curtis weights.
+
+The weights integrate a polynomial of degree n - 1 through n points exactly: Clenshaw, Curtis,
+Numerische Mathematik 2 (1960), DOI 10.1007/BF01386223. Between the points that polynomial is
+evaluated by the barycentric formula: Berrut, Trefethen, SIAM Review 46 (2004),
+DOI 10.1137/S0036144502417715.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+
+from wearsim.mechanics.cam.motion import Panel
+from wearsim.types import FloatArray, IntArray
+
+NUMBERS = (7, 13, 25)  # of stations on a panel; every set contains the one before
+_MOST_HALVINGS = 6
+_SAMPLES = 193
+
+
+@lru_cache
+def lobatto(number: int) -> tuple[FloatArray, FloatArray]:
+    """Return the Chebyshev-Lobatto points on [0, 1] and their weights; one point is the middle."""
+    if number == 1:
+        return np.array([0.5]), np.ones(1)
+    n = number - 1
+    points = 0.5 - 0.5 * np.cos(np.pi * np.arange(number) / n)
+    even = np.arange(2, n + 1, 2)
+    factor = np.where(even == n, 1.0, 2.0) / (even**2 - 1.0)
+    angles = np.pi * np.outer(np.arange(number), even) / n
+    weights = (1.0 - np.cos(angles) @ factor) / n
+    weights[[0, -1]] *= 0.5
+    return points, weights
+
+
+def interpolation(number: int, places: FloatArray) -> FloatArray:
+    """Return the matrix that interpolates values at `lobatto` points.
+
+    Parameters
+    ----------
+    number : int
+        Number of points.
+    places : ndarray, shape (places,)
+        Positions between 0 and 1.
+
+    Returns
+    -------
+    ndarray, shape (places, number)
+    """
+    if number == 1:
+        return np.ones((len(places), 1))
+    signs = np.where(np.arange(number) % 2, -1.0, 1.0)
+    signs[[0, -1]] *= 0.5
+    difference = np.asarray(places)[:, None] - lobatto(number)[0]
+    hit = difference == 0.0
+    matrix = signs / np.where(hit, 1.0, difference)
+    matrix = np.where(hit.any(axis=1, keepdims=True), hit.astype(np.float64), matrix)
+    return np.asarray(matrix / matrix.sum(axis=1, keepdims=True))
+
+
+@dataclass(frozen=True)
+class Stations:
+    """Stations of all panels, in the order of the angle; two at an angle between panels.
+
+    Parameters
+    ----------
+    panels : tuple of Panel
+        Panels, halved where a polynomial would need too many points.
+    numbers : tuple of int
+        Stations on each.
+    """
+
+    panels: tuple[Panel, ...]
+    numbers: tuple[int, ...]
+
+    @property
+    def count(self) -> int:
+        """Number of stations."""
+        return sum(self.numbers)
+
+    @cached_property
+    def panel(self) -> IntArray:
+        """Number of the panel of each station."""
+        return np.repeat(np.arange(len(self.panels)), self.numbers)
+
+    @cached_property
+    def first(self) -> IntArray:
+        """Number of the first station of each panel."""
+        return np.cumsum([0, *self.numbers[:-1]])
+
+    @cached_property
+    def angle(self) -> FloatArray:
+        """Angle of each station, shape (stations,) [rad]."""
+        each = zip(self.panels, self.numbers, strict=True)
+        return np.concatenate([p.start + (p.stop - p.start) * lobatto(n)[0] for p, n in each])
+
+    @cached_property
+    def weight(self) -> FloatArray:
+        """Weight of each station in an integral over a turn, shape (stations,) [rad]."""
+        each = zip(self.panels, self.numbers, strict=True)
+        return np.concatenate([(p.stop - p.start) * lobatto(n)[1] for p, n in each])
+
+    def values_at(self, values: FloatArray, samples: int) -> tuple[FloatArray, FloatArray]:
+        """Return values between the stations.
+
+        Parameters
+        ----------
+        values : ndarray, shape (stations, ...)
+        samples : int
+            Equally spaced points of every panel, its ends among them.
+
+        Returns
+        -------
+        angle : ndarray, shape (points,)
+        values : ndarray, shape (points, ...)
+        """
+        places, angles, found = np.linspace(0.0, 1.0, samples), [], []
+        for panel, number, first in zip(self.panels, self.numbers, self.first, strict=True):
+            matrix = interpolation(number, places)
+            angles.append(panel.start + (panel.stop - panel.start) * places)
+            found.append(np.tensordot(matrix, values[first : first + number], axes=1))
+        return np.concatenate(angles), np.concatenate(found)
+
+
+def choose_stations(
+    panels: Sequence[Panel],
+    quantities: Callable[[Panel, FloatArray], FloatArray],
+    tolerance: float,
+    number: int | None = None,
+) -> Stations:
+    """Return stations that represent some quantities and their integrals.
+
+    Parameters
+    ----------
+    panels : sequence of Panel
+        Smooth parts of the turn.
+    quantities : callable
+        Quantities at angles within a panel, shape (quantities, points).
+    tolerance : float
+        Allowed error between the stations and of the integrals, of the greatest value.
+    number : int, optional
+        Stations on each moving panel, instead of 7, 13 or 25 as the tolerance requires; a dwell
+        has one.
+    """
+    places = np.linspace(0.0, 1.0, _SAMPLES)
+    scale = 0.0
+    for panel in panels:
+        sample = quantities(panel, panel.start + (panel.stop - panel.start) * places[::8])
+        scale = np.maximum(scale, np.abs(sample).max(axis=1))
+
+    def split(panel: Panel, halvings: int) -> list[tuple[Panel, int]]:
+        if panel.dwell or number is not None:
+            return [(panel, 1 if panel.dwell or number is None else number)]
+        width = panel.stop - panel.start
+        exact = quantities(panel, panel.start + width * places)
+        for count in NUMBERS:
+            values = quantities(panel, panel.start + width * lobatto(count)[0])
+            error = np.abs(values @ interpolation(count, places).T - exact).max(axis=1)
+            if (error <= tolerance * scale).all() or (
+                count == NUMBERS[-1] and halvings == _MOST_HALVINGS
+            ):
+                return [(panel, count)]
+        middle = 0.5 * (panel.start + panel.stop)
+        halves = panel._replace(stop=middle), panel._replace(start=middle)
+        return [item for half in halves for item in split(half, halvings + 1)]
+
+    chosen = [item for panel in panels for item in split(panel, 0)]
+    return Stations(tuple(panel for panel, _ in chosen), tuple(count for _, count in chosen))
+
+
+def extreme(
+    panels: Sequence[Panel], quantity: Callable[[Panel, FloatArray], FloatArray]
+) -> tuple[float, float]:
+    """Return the greatest value of a quantity over a turn, and its angle [rad].
+
+    Parameters
+    ----------
+    panels : sequence of Panel
+    quantity : callable
+        Its value at angles within a panel; not a number where it is not defined.
+    """
+    best = -np.inf, 0.0
+    for panel in panels:
+        low, high = panel.start, panel.stop
+        for _ in range(1 if panel.dwell else 6):
+            angles = np.linspace(low, high, _SAMPLES)
+            values = quantity(panel, angles)
+            values = np.where(np.isnan(values), -np.inf, values)
+            place = int(values.argmax())
+            if values[place] > best[0]:
+                best = float(values[place]), float(angles[place])
+            low, high = angles[max(place - 1, 0)], angles[min(place + 1, _SAMPLES - 1)]
+    return best
