@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import lru_cache
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
@@ -19,8 +20,10 @@ from wearsim.quantities import (
     PerPower,
     PositiveDuration,
     PositiveForce,
+    Quantity,
 )
 from wearsim.types import FloatArray
+from wearsim.units import FORCE, TORQUE, TORSIONAL_STIFFNESS
 
 
 class ConstantOptions(Options):
@@ -63,6 +66,100 @@ class ThermalOptions(Options):
     time_constant: PositiveDuration = Field(
         description="time to 63 % of the steady state, e.g. '20 min'"
     )
+
+
+class _FollowerOptions(Options):
+    """Options of the load of a follower, a force or a torque."""
+
+    external: InputFile | None = Field(
+        None,
+        description="CSV with columns 'angle [deg]' and 'force [N]', or 'torque [N m]' of an arm,"
+        " over a turn; positive presses the roller on the outer flank",
+    )
+    feedback: Literal["none", "static", "inertia"] = Field(
+        "static",
+        description="effect of wear on the load: none, by the spring, or by the spring and the"
+        " inertia of the changed motion",
+    )
+
+
+class FollowerOptions(_FollowerOptions):
+    """Options of the load `follower`."""
+
+    preload: Annotated[float, Quantity(FORCE, "not negative")] = Field(
+        description="force on the follower without lift, e.g. '300 N'"
+    )
+    stiffness: NonNegativeStiffness = Field(
+        0.0, description="increase of the force per lift, e.g. '5 N/mm'"
+    )
+
+
+class ArmOptions(_FollowerOptions):
+    """Options of the load `follower-arm`."""
+
+    preload: Annotated[float, Quantity(TORQUE, "not negative")] = Field(
+        description="torque on the arm without lift, e.g. '24 N m'"
+    )
+    stiffness: Annotated[float, Quantity(TORSIONAL_STIFFNESS, "not negative")] = Field(
+        0.0, description="increase of the torque per angle of the arm, e.g. '32 N m/rad'"
+    )
+
+
+class FollowerLoad(Load):
+    """Preload and spring of a follower; the load on the roller differs along the cam.
+
+    `force` is the force [N], or torque [N m], on the follower without lift, and `spring` the
+    increase per lift [N/m, or N m/rad].
+    """
+
+    def __init__(self, options: FollowerOptions | ArmOptions) -> None:
+        self.preload, self.spring = options.preload, options.stiffness
+        self.feedback = options.feedback
+        arm = isinstance(options, ArmOptions)
+        self._external = _periodic(options.external, arm) if options.external else None
+
+    def force(self, time: FloatArray) -> FloatArray:
+        """Return the preload at each `time` [s], shape as `time`."""
+        return np.full_like(time, self.preload)
+
+    def mean(self, start: float, stop: float) -> float:
+        """Return the preload."""
+        return self.preload
+
+    @property
+    def has_external(self) -> bool:
+        """Whether there is an external force."""
+        return self._external is not None
+
+    def external(self, theta: FloatArray) -> FloatArray:
+        """Return the external force [N] or torque [N m] at angles of the cam [rad]."""
+        if self._external is None:
+            return np.zeros_like(theta)
+        return np.asarray(self._external(np.mod(theta, math.tau)))
+
+
+def _periodic(file: InputFile, arm: bool) -> Callable[[FloatArray], FloatArray]:
+    """Return a closed cubic spline through the external force or torque of a file."""
+    from scipy.interpolate import CubicSpline  # noqa: PLC0415  (slow to import)
+
+    name, unit = ("torque", "N m") if arm else ("force", "N")
+    columns = read_columns(file.text, file.path, {"angle": "rad", name: unit}, rising="angle")
+    angle, force = columns["angle"], columns[name]
+    turn = angle[-1] - angle[0]
+    if turn > math.tau * (1.0 + 1e-9) or len(angle) < 4:
+        got = f"{math.degrees(angle[0]):.6g} to {math.degrees(angle[-1]):.6g} deg"
+        expected = "at least 4 rows within 360 deg"
+        raise ScenarioError(file.path, [Mistake("", "", "is not one turn", got, expected)])
+    if turn < math.tau * (1.0 - 1e-9):
+        angle, force = np.append(angle, angle[0] + math.tau), np.append(force, force[0])
+    elif abs(force[-1] - force[0]) > 1e-9 * float(np.abs(force).max()):
+        got = f"{force[0]:.6g} and {force[-1]:.6g} {unit}"
+        expected = "equal values at 0 and 360 deg"
+        raise ScenarioError(file.path, [Mistake("", "", f"the {name} jumps", got, expected)])
+    force[-1] = force[0]
+    spline = CubicSpline(angle - angle[0], force, bc_type="periodic")
+    start = float(angle[0])
+    return lambda theta: spline(np.mod(theta - start, math.tau))
 
 
 class ConstantLoad(Load):
@@ -219,6 +316,20 @@ SPECS = (
         factory=RecordedLoad,
         options=RecordedOptions,
         summary="a logged load from a CSV file, linear between samples",
+        protocol=2,
+    ),
+    LoadSpec(
+        name="follower",
+        factory=FollowerLoad,
+        options=FollowerOptions,
+        summary="preload, spring and inertia of a cam's follower, and an external force by angle",
+        protocol=2,
+    ),
+    LoadSpec(
+        name="follower-arm",
+        factory=FollowerLoad,
+        options=ArmOptions,
+        summary="the load 'follower' of a swinging arm, which is chosen for it",
         protocol=2,
     ),
     LoadSpec(

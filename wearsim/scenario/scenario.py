@@ -14,6 +14,7 @@ from wearsim.profiles import split_name
 from wearsim.scenario.parse.fields import RandomInput
 from wearsim.scenario.parse.toml import flat, parse_fields, reader_in
 from wearsim.scenario.tables.bodies import Cylinder, Roller
+from wearsim.scenario.tables.cam import Cam
 from wearsim.scenario.tables.plain import (
     CreepageTable,
     EvolutionTable,
@@ -62,6 +63,8 @@ class Scenario:
         The tables; a random input is represented by its mean.
     wear : WearChoice, optional
         The wear law; optional in a scenario of a single contact.
+    cam : Cam, optional
+        The cam; `cylinder` is then its base circle.
     notes : tuple of str
         Notes for the user on the validity of the results.
     random : tuple of RandomInput
@@ -94,6 +97,7 @@ class Scenario:
     evolution: EvolutionTable
     outputs: OutputsTable
     sampling: SamplingTable
+    cam: Cam | None = None
     notes: tuple[str, ...] = ()
     random: tuple[RandomInput, ...] = ()
     drawn: Mapping[str, Drawn] = field(default_factory=dict)
@@ -212,7 +216,7 @@ class Scenario:
     def __repr__(self) -> str:
         rollers = self.operation.rollers
         length = "one contact"
-        if self.operation.passes or self.operation.duration:
+        if self.has_length:
             length = f"{self.total_passes} passes"
         random = f", {len(self.random)} random" if self.random else ""
         return (
@@ -242,8 +246,14 @@ class Scenario:
         return digest.hexdigest()
 
     @property
+    def has_length(self) -> bool:
+        """Whether a duration or a number of passes or turns is given."""
+        operation = self.operation
+        return bool(operation.passes or operation.turns or operation.duration)
+
+    @property
     def rolling_speed(self) -> float:
-        """Rolling velocity V, the cylinder's surface speed [m/s]."""
+        """Rolling velocity V, the surface speed of the cylinder or the base circle [m/s]."""
         return self.operation.speed * self.cylinder.radius
 
     @property
@@ -256,6 +266,8 @@ class Scenario:
         """Number of roller passes of the test, at least one; raises as `require_run`."""
         if self.operation.passes is not None:
             return self.operation.passes
+        if self.operation.turns is not None:
+            return self.operation.turns * self.operation.rollers
         if self.operation.duration is None:
             raise ScenarioError(self.file, [_NO_LENGTH])
         return max(1, round(self.pass_rate * self.operation.duration))
@@ -266,12 +278,7 @@ class Scenario:
         return self.total_passes / self.pass_rate
 
     def per_roller(self, value: float | tuple[float, ...]) -> tuple[float, ...]:
-        """Return one value per roller.
-
-        Parameters
-        ----------
-        value : float or tuple of float
-            One value for all rollers, or one per roller.
+        """Return one value per roller, from one for all rollers or one per roller.
 
         Examples
         --------
@@ -295,8 +302,10 @@ def require_run(scenario: Scenario) -> None:
     ScenarioError
         If it has no duration or no wear law; both are reported together.
     """
-    has_length = scenario.operation.duration or scenario.operation.passes
-    mistakes = [*([] if has_length else [_NO_LENGTH]), *([] if scenario.wear else [_NO_WEAR])]
+    mistakes = [
+        *([] if scenario.has_length else [_NO_LENGTH]),
+        *([] if scenario.wear else [_NO_WEAR]),
+    ]
     if mistakes:
         raise ScenarioError(scenario.file, mistakes)
 
@@ -359,7 +368,7 @@ def parse_scenario(
     read: Callable[[str], str],
     overrides: Mapping[str, object] | None = None,
 ) -> Scenario:
-    """Return the scenario that a text holds.
+    """Return the scenario that a text holds; errors as `load_scenario`.
 
     Parameters
     ----------
@@ -372,17 +381,6 @@ def parse_scenario(
         ``scenario.files.__getitem__``.
     overrides : mapping of str to object, optional
         Values by dotted key.
-
-    Returns
-    -------
-    Scenario
-
-    Raises
-    ------
-    ScenarioError
-        With all mistakes of the scenario.
-    PluginError
-        If two plugins have the same name.
     """
     return Scenario(**parse_fields(text, name, read, overrides))
 

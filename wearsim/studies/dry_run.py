@@ -50,9 +50,8 @@ def dry_run(scenario: Scenario) -> Data:
     >>> data["contact_model"]
     'slender'
     """
-    load, operation = scenario.load.build(), scenario.operation
-    has_end = operation.duration is not None or operation.passes is not None
-    is_run = has_end and scenario.wear is not None
+    load = scenario.load.build()
+    is_run = scenario.has_length and scenario.wear is not None
     low, high = load_range(scenario, load, scenario.total_time if is_run else 0.0)
     roller, cylinder = scenario.roller, scenario.cylinder
     pair, patch = combine(cylinder.material, roller.material), fresh_patch(scenario, high)

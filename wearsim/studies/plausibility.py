@@ -68,8 +68,7 @@ def log_file(scenario: Scenario) -> str | None:
 
 def greatest_load(scenario: Scenario, load: Load) -> float:
     """Return the greatest load of the test, or of the start of a single contact [N]."""
-    ends = scenario.operation.duration is not None or scenario.operation.passes is not None
-    return load.extremes(0.0, scenario.total_time if ends else 0.0)[1]
+    return load.extremes(0.0, scenario.total_time if scenario.has_length else 0.0)[1]
 
 
 def _greatest(scenario: Scenario, key: str, value: float | tuple[float, ...]) -> float:

@@ -10,6 +10,7 @@ from wearsim.mechanics.cam.shapes import (
     tangent_cam,
     three_arc_cam,
 )
+from wearsim.mechanics.cam.skid import Rolling, SkidArc, skid_arcs
 from wearsim.mechanics.cam.stations import Stations, choose_stations, extreme
 
 __all__ = [
@@ -19,13 +20,16 @@ __all__ = [
     "Motion",
     "Panel",
     "RollerKinematics",
+    "Rolling",
     "Segment",
+    "SkidArc",
     "Stations",
     "choose_stations",
     "eccentric_cam",
     "extreme",
     "motion_mistakes",
     "shape_motion",
+    "skid_arcs",
     "tangent_cam",
     "three_arc_cam",
 ]

@@ -12,21 +12,27 @@ import numpy as np
 
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.input_files import csv_of_profile, read_input
-from wearsim.mechanics.hertz.elasticity import combine
-from wearsim.plugins import LoadSpec, Options, RandomInputSpec
+from wearsim.plugins import LoadSpec, MotionLawSpec, Options, RandomInputSpec
 from wearsim.profiles import ROW_CHOICES, split_name
 from wearsim.quantities import DECIMAL_COMMA
 from wearsim.scenario.parse.fields import RandomInput, RandomInputTable
 from wearsim.scenario.parse.mistakes import Mistakes, installed, nearest
 from wearsim.scenario.parse.random_inputs import validate
 from wearsim.scenario.tables.bodies import (
-    Cylinder,
     CylinderTable,
-    Roller,
     RollerTable,
+    dundurs_note,
     read_cylinder,
     read_roller,
 )
+from wearsim.scenario.tables.cam import (
+    CamTable,
+    FollowerTable,
+    assemble_cam,
+    of_follower,
+    refuse_cylinder,
+)
+from wearsim.scenario.tables.cam_motion import MotionTable
 from wearsim.scenario.tables.plain import (
     ALTERNATIVES,
     CreepageTable,
@@ -186,11 +192,11 @@ def _descend(document: Any, tables: list[str], key: str) -> MutableMapping[str, 
     return table  # type: ignore[no-any-return]
 
 
-DUNDURS_LIMIT = 0.1
-
 TABLES: dict[str, type[Options]] = {
     "roller": RollerTable,
     "cylinder": CylinderTable,
+    "cam": CamTable,
+    "follower": FollowerTable,
     "operation": OperationTable,
     "load": LoadTable,
     "friction": FrictionTable,
@@ -201,7 +207,9 @@ TABLES: dict[str, type[Options]] = {
     "outputs": OutputsTable,
     "sampling": SamplingTable,
 }
+#: [cam] replaces [cylinder]
 REQUIRED = ("roller", "cylinder", "operation", "load", "friction", "creepage")
+_ABSENT = {*REQUIRED, "wear", "cam", "follower"}  # tables without defaults
 
 #: functions that read the tables with more checks than those of their models
 READERS: dict[str, Callable[[Mistakes, Mapping[str, object]], Any]] = {
@@ -263,13 +271,16 @@ def parse_fields(
 
     mistakes = Mistakes(name, read_and_keep, keys_by_place)
     top = _read_top(mistakes, data)
-    sections = {table: _read_table(mistakes, table, data) for table in TABLES}
+    refuse_cylinder(mistakes, data)
+    tables = of_follower(data)
+    sections = {table: _read_table(mistakes, table, tables) for table in TABLES}
+    assemble_cam(mistakes, sections)
     check_lists(mistakes, data)
     check_correlation(mistakes, sections["sampling"])
     mistakes.raise_any()
     random = tuple(mistakes.random_inputs)
     notes = (
-        *_dundurs_note(sections["roller"], sections["cylinder"]),
+        *dundurs_note(sections["roller"], sections["cylinder"]),
         *(f"{item.name}: {warning}" for item in random for warning in item.warnings),
         *_unused_sampling_note(data, random),
         *mistakes.notes,
@@ -340,9 +351,9 @@ def _read_top(mistakes: Mistakes, data: Mapping[str, object]) -> TopTable:
 
 
 def _read_table(mistakes: Mistakes, table: str, data: Mapping[str, object]) -> Any:
-    if table not in data and table in REQUIRED:
+    if table not in data and table in REQUIRED and not (table == "cylinder" and "cam" in data):
         mistakes.add(table, "", "the table is missing")
-    if table not in data and table in {*REQUIRED, "wear"}:
+    if table not in data and table in _ABSENT:
         return None
     raw = data.get(table, {})
     if not isinstance(raw, dict):
@@ -363,19 +374,6 @@ def _unused_sampling_note(data: Mapping[str, Any], random: tuple[RandomInput, ..
     return [f"{', '.join(keys)} {have} no effect: no input is random"] if keys else []
 
 
-def _dundurs_note(roller: Roller, cylinder: Cylinder) -> list[str]:
-    """Return a note if the coupling of pressure and traction is not negligible."""
-    dundurs = combine(cylinder.material, roller.material).dundurs
-    if abs(dundurs) <= DUNDURS_LIMIT:
-        return []
-    return [
-        (
-            f"the materials' Dundurs constant is {dundurs:.3g}: beyond {DUNDURS_LIMIT} the coupling"
-            " of pressure and traction, which is neglected, is no longer small"
-        )
-    ]
-
-
 def keys_by_place() -> dict[str, set[str]]:
     """Return the keys of every table and of every plugin, by their place in words."""
     keys = {"the top of the file": set(TopTable.model_fields)}
@@ -385,6 +383,9 @@ def keys_by_place() -> dict[str, set[str]]:
             term = isinstance(spec, LoadSpec) and spec.role == "term"
             place = f"[load.{spec.name}]" if term else f'[{table}] with {key} = "{spec.name}"'
             keys[place] = set(spec.options.model_fields)
+    for law in installed(MotionLawSpec):
+        keys[f'an entry of cam.motion with law = "{law.name}"'] = set(law.options.model_fields)
+    keys["an entry of cam.motion"] = set(MotionTable.model_fields)
     keys["a random input"] = set(RandomInputTable.model_fields)
     return keys | {
         f'a random input with distribution = "{spec.name}"': set(spec.options.model_fields)

@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import Field, PlainValidator
 
 from wearsim.errors import ScenarioError
+from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.plugins import Options
 from wearsim.profiles import (
     ROW_CHOICES,
@@ -32,9 +33,10 @@ from wearsim.quantities import (
 from wearsim.scenario.parse.mistakes import Mistakes
 from wearsim.scenario.parse.random_inputs import validate
 from wearsim.types import FloatArray, Material, Profile
-from wearsim.units import ANGLE, QuantityError, shown
+from wearsim.units import ANGLE, INERTIA, QuantityError, shown
 
 _ROUNDING = 1e-9
+DUNDURS_LIMIT = 0.1
 
 #: Handbook constants: phosphor bronze C51000, ductile iron of EN 1563.
 MATERIALS = {
@@ -113,6 +115,9 @@ class RollerTable(Options):
         default=math.radians(45.0), description="Angle of the chamfers to the axis, up to 90 deg."
     )
     material: MaterialField = Field(description="Name of a material, or a table of its constants.")
+    inertia: Annotated[float, Quantity(INERTIA, "not negative")] = Field(
+        default=0.0, description="Moment of inertia about its pin, for a free roller on a cam."
+    )
 
 
 class CylinderTable(Options):
@@ -162,6 +167,7 @@ class Roller(Options):
     edge_radius: float = Field(0.0, description="Radius of the rounded edges, or 0 [m].")
     chamfer: float = Field(0.0, description="Width of the chamfers, or 0 [m].")
     chamfer_angle: float = Field(0.0, description="Angle of the chamfers to the axis [rad].")
+    inertia: float = Field(0.0, description="Moment of inertia about its pin [kg m^2].")
 
     @property
     def edge(self) -> float:
@@ -239,6 +245,7 @@ def read_roller(mistakes: Mistakes, raw: Mapping[str, object]) -> Roller | None:
         edge_radius=table.edge_radius or 0.0,
         chamfer=table.chamfer or 0.0,
         chamfer_angle=table.chamfer_angle if table.chamfer else 0.0,
+        inertia=table.inertia,
     )
 
 
@@ -299,3 +306,16 @@ def read_cylinder(mistakes: Mistakes, raw: Mapping[str, object]) -> Cylinder | N
         table.profile.path,
         table.profile_filter,
     )
+
+
+def dundurs_note(roller: Roller, cylinder: Cylinder) -> list[str]:
+    """Return a note if the coupling of pressure and traction is not negligible."""
+    dundurs = combine(cylinder.material, roller.material).dundurs
+    if abs(dundurs) <= DUNDURS_LIMIT:
+        return []
+    return [
+        (
+            f"the materials' Dundurs constant is {dundurs:.3g}: beyond {DUNDURS_LIMIT} the coupling"
+            " of pressure and traction, which is neglected, is no longer small"
+        )
+    ]

@@ -46,6 +46,9 @@ class OperationTable(Options):
         gt=0,
         description="Number of roller passes of the whole test, all rollers together.",
     )
+    turns: int | None = Field(
+        default=None, gt=0, description="Number of turns of a cam; passes are turns times rollers."
+    )
     rollers: int = Field(default=1, ge=1, description="Number of rollers on the cylinder.")
 
 
@@ -176,7 +179,7 @@ CADENCES = ("records", "every_passes", "every")
 ALTERNATIVES = {
     "roller": (("radius", "diameter"), ("crown_radius", "crown_diameter")),
     "cylinder": (("radius", "diameter"),),
-    "operation": (("duration", "passes"),),
+    "operation": (("duration", "passes", "turns"),),
     "outputs": (CADENCES,),
 }
 

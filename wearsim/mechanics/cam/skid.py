@@ -1,0 +1,183 @@
+"""Skid of a free roller over a turn of the cam.
+
+The rolling roller turns at omega times `spin`. Traction and bearing give it the acceleration
+I dOmega/dt = F_t R - T_b, and F_t is at most mu N. Where rolling would need more, the roller skids:
+the slip w = spin - Omega/omega grows as
+
+    dw/dtheta = spin' + drag - s reach,   drag = T_b/(I omega^2),   reach = mu N R/(I omega^2),
+
+with the sign s of w, until w returns to zero and rolling needs less than mu N. T_b opposes the
+roller's rotation. The slip dissipates mu N R |w| per angle.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from wearsim.mechanics.cam.motion import Panel
+from wearsim.types import FloatArray
+
+_POINTS = 513  # of a panel, every second one is the middle of an interval
+_MOST_TURNS = 90
+
+
+class Rolling(NamedTuple):
+    """Requirements of rolling at some angles, arrays of one shape.
+
+    Parameters
+    ----------
+    spin, spin_per_rad : ndarray
+        Speed of the rolling roller per speed of the cam, and its derivative by the angle.
+    drag, reach : ndarray
+        Bearing torque, and greatest torque of the traction, over I omega^2; not negative.
+    """
+
+    spin: FloatArray
+    spin_per_rad: FloatArray
+    drag: FloatArray
+    reach: FloatArray
+
+    def demand(self) -> FloatArray:
+        """Return the torque that rolling needs, over the greatest of the traction."""
+        needed = self.spin_per_rad + np.sign(self.spin) * self.drag
+        return np.asarray(needed / np.where(self.reach > 0.0, self.reach, 1e-300))
+
+
+@dataclass(frozen=True)
+class SkidArc:
+    """Part of a panel in which the roller skids.
+
+    Parameters
+    ----------
+    panel : int
+        Number of the panel.
+    theta, slip, slip_per_rad : ndarray, shape (points,)
+        Angles [rad], slip w and its derivative.
+    """
+
+    panel: int
+    theta: FloatArray
+    slip: FloatArray
+    slip_per_rad: FloatArray
+
+    def slip_at(self, theta: FloatArray) -> FloatArray:
+        """Return the slip at angles of the arc [rad]."""
+        from scipy.interpolate import CubicHermiteSpline  # noqa: PLC0415  (slow to import)
+
+        spline = CubicHermiteSpline(self.theta, self.slip, self.slip_per_rad)
+        return np.asarray(spline(np.clip(theta, self.theta[0], self.theta[-1])))
+
+
+def skid_arcs(
+    panels: Sequence[Panel], rolling: Callable[[Panel, FloatArray], Rolling]
+) -> list[SkidArc]:
+    """Return the arcs of a turn in which the roller skids, in the order of the angle.
+
+    Parameters
+    ----------
+    panels : sequence of Panel
+        Smooth parts of the turn.
+    rolling : callable
+        Requirements of rolling at angles within a panel.
+
+    Raises
+    ------
+    ValueError
+        If the roller rolls nowhere, or its skid does not repeat from turn to turn.
+    """
+    grids = [np.linspace(panel.start, panel.stop, _POINTS) for panel in panels]
+    values = [rolling(*pair) for pair in zip(panels, grids, strict=True)]
+    demands = [np.abs(value.demand()) for value in values]
+    jumps = [float(values[k].spin[0] - values[k - 1].spin[-1]) for k in range(len(panels))]
+    size = max(float(np.abs(value.spin).max()) for value in values)
+    jumps = [jump if abs(jump) > 1e-9 * size else 0.0 for jump in jumps]
+    if max(demand.max() for demand in demands) <= 1.0 and not any(jumps):
+        return []
+    first = int(np.argmin([demand.min() for demand in demands]))
+    if demands[first].min() >= 1.0:
+        raise ValueError("the roller rolls nowhere: the traction never suffices")
+    start = int(np.argmin(demands[first])) // 2 * 2
+    slip, passed = 0.0, list[float]()
+    for _ in range(_MOST_TURNS):
+        before = slip
+        passed.append(slip)
+        if len(passed) == 3:  # the skid of a heavy roller becomes periodic slowly: Aitken's method
+            bend = passed[2] - 2.0 * passed[1] + passed[0]
+            if bend != 0.0 and abs(passed[2] - passed[1]) < abs(passed[1] - passed[0]):
+                before = slip = passed[2] - (passed[2] - passed[1]) ** 2 / bend
+            passed.clear()
+        found: list[SkidArc] = []
+        for number in range(len(panels) + 1):
+            k = (first + number) % len(panels)
+            low = start if number == 0 else 0
+            high = start if number == len(panels) else _POINTS - 1
+            if number > 0:
+                slip += jumps[k]
+            part = slice(low, high + 1)
+            trace = _Trace(grids[k][part], Rolling(*(a[part] for a in values[k])))
+            slip, arcs = trace.follow(slip)
+            found += [SkidArc(k, *arc) for arc in arcs]
+        if abs(slip - before) <= 1e-9 * size:
+            return sorted(found, key=lambda arc: float(arc.theta[0]))
+    raise ValueError("the roller skids on through whole turns")
+
+
+class _Trace:
+    """Slip along a part of a panel, on points of which every second one is a middle."""
+
+    def __init__(self, theta: FloatArray, values: Rolling) -> None:
+        self.theta, self.values = theta, values
+        self.demand = values.demand()
+
+    def _rate(self, place: int, sign: float, slip: float) -> float:
+        values = self.values
+        turning = math.copysign(1.0, float(values.spin[place]) - slip)
+        drag = turning * float(values.drag[place])
+        return float(values.spin_per_rad[place]) + drag - sign * float(values.reach[place])
+
+    def follow(self, slip: float) -> tuple[float, list[tuple[FloatArray, ...]]]:
+        """Return the slip at the end, from that at the start, and the arcs between."""
+        arcs: list[list[tuple[float, float, float]]] = []
+        inside = slip != 0.0
+        for place in range(0, len(self.theta) - 1, 2):
+            low, high = self.theta[place : place + 3 : 2].tolist()
+            if slip == 0.0:
+                if abs(self.demand[place + 2]) <= 1.0:
+                    inside = False
+                    continue
+                sign = math.copysign(1.0, self.demand[place + 2])
+                start = low
+                if abs(self.demand[place]) < 1.0:  # rolling ends within the interval
+                    near, far = abs(self.demand[place]), abs(self.demand[place + 2])
+                    start = low + (1.0 - near) / (far - near) * (high - low)
+                rate = self._rate(place + 2, sign, 0.0)
+                last = 0.5 * rate * (high - start) if start > low else rate * (high - start)
+                arcs.append([(start, 0.0, 0.0 if start > low else rate), (high, last, rate)])
+                slip, inside = last, True
+                continue
+            sign = math.copysign(1.0, slip)
+            rates = [self._rate(place + k, sign, slip) for k in range(3)]
+            if not inside or not arcs:
+                arcs.append([(low, slip, rates[0])])
+                inside = True
+            after = slip + (high - low) / 6.0 * (rates[0] + 4.0 * rates[1] + rates[2])
+            if after * sign > 0.0:
+                slip = after
+                arcs[-1].append((high, slip, rates[2]))
+                continue
+            # the roller catches up within the interval
+            part = slip / (slip - after)
+            stop = low + part * (high - low)
+            arcs[-1].append((stop, 0.0, rates[0] + part * (rates[2] - rates[0])))
+            slip, inside = 0.0, False
+            if abs(self.demand[place + 2]) > 1.0:
+                turned = math.copysign(1.0, self.demand[place + 2])
+                rate = self._rate(place + 2, turned, 0.0)
+                slip, inside = rate * (high - stop), True
+                arcs.append([(stop, 0.0, rate), (high, slip, rate)])
+        return slip, [tuple(np.array(arc).T) for arc in arcs if arc[-1][0] > arc[0][0]]

@@ -1,0 +1,303 @@
+"""Turn of a cam before wear: kinematics, loads and skid of the roller at any angle."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from wearsim.errors import Mistake, ScenarioError
+from wearsim.mechanics.cam import (
+    Panel,
+    RollerKinematics,
+    Rolling,
+    SkidArc,
+    Stations,
+    choose_stations,
+    extreme,
+    skid_arcs,
+)
+from wearsim.models.loads import FollowerLoad
+from wearsim.scenario import Scenario
+from wearsim.types import BoolArray, FloatArray
+
+STEEP = {"translating": math.radians(30.0), "swinging": math.radians(45.0)}
+SHARP = 2.0  # radius of the pitch curve over that of the roller, below which the contact is warned
+PART_OF_TOLERANCE = 0.25  # for the stations
+_FINE = 1e-10  # tolerance of integrals over a turn
+
+
+@dataclass(frozen=True)
+class Point:
+    """State of follower and roller at some angles, arrays of one shape.
+
+    Parameters
+    ----------
+    angle : ndarray
+        Angle of the cam [rad].
+    kinematics : RollerKinematics
+        Motion and rolling.
+    inner : ndarray of bool
+        Whether the roller touches the inner flank of a groove.
+    normal_force : ndarray
+        Normal force N on the flank in contact; not positive where an outer roller loses it [N].
+    drive_torque : ndarray
+        Torque on the cam without losses [N m].
+    stiffness : ndarray
+        Decrease of N per displacement of the roller along the normal [N/m].
+    """
+
+    angle: FloatArray
+    kinematics: RollerKinematics
+    inner: BoolArray
+    normal_force: FloatArray
+    drive_torque: FloatArray
+    stiffness: FloatArray
+
+
+class CamTurn:
+    """A turn of a scenario's cam.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        With a cam; random inputs are at their means, or drawn.
+
+    Raises
+    ------
+    ScenarioError
+        If the cam is undercut, the follower jumps, or the roller cannot roll; only `checked`.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        if scenario.cam is None:
+            what = "is needed for the kinematics of a cam"
+            raise ScenarioError(scenario.file, [Mistake("cam", "", what, "none", "a table [cam]")])
+        self.scenario, self.cam = scenario, scenario.cam
+        self.speed = scenario.operation.speed
+        load = scenario.load.build()
+        self.load = load if isinstance(load, FollowerLoad) else None
+        self._constant = 0.0 if self.load else float(load.force(np.zeros(1))[0])
+
+    def effort(self, lift: FloatArray, theta: FloatArray) -> FloatArray:
+        """Return the force [N] or torque [N m] on the follower, positive on the outer flank."""
+        if self.load is None:
+            raise ValueError("the load is not that of a follower")
+        static = self.load.preload + self.load.spring * lift[0] + self.load.external(theta)
+        return np.asarray(static + self.cam.inertia * self.speed**2 * lift[2])
+
+    def point(self, lift: FloatArray, theta: FloatArray) -> Point:
+        """Return the state at lifts, shape (3, points), and angles [rad], shape (points,)."""
+        follower, inner = self.cam.follower, np.zeros(len(theta), dtype=bool)
+        if self.load is None:
+            found = follower.kinematics(lift)
+            force = np.full(len(theta), self._constant)
+            effort = force * follower.lever * np.cos(found.pressure_angle)
+            spring = 0.0
+        else:
+            effort, spring = self.effort(lift, theta), self.load.spring
+            if self.cam.groove:
+                inner = effort < 0.0
+            found = follower.kinematics(lift, inner)
+            force = follower.normal_force(found, np.abs(effort) if self.cam.groove else effort)
+        lever = follower.lever * np.cos(found.pressure_angle)
+        return Point(theta, found, inner, force, effort * found.lift_per_rad, spring / lever**2)
+
+    def at(self, panel: Panel, theta: FloatArray) -> Point:
+        """Return the state at angles within a panel [rad]."""
+        return self.point(self.cam.motion.lift_in(panel.segment, theta), theta)
+
+    def at_angles(self, theta: FloatArray) -> Point:
+        """Return the state at any angles [rad]; between segments that of the following one."""
+        theta = np.asarray(theta, dtype=np.float64)
+        return self.point(self.cam.motion.lift(theta), theta)
+
+    @cached_property
+    def panels(self) -> tuple[Panel, ...]:
+        """Smooth parts of the turn, on each of which the roller touches one flank."""
+        steady = self.load is None or not self.load.has_external
+        panels = [panel._replace(dwell=panel.dwell and steady) for panel in self.cam.motion.panels]
+        return tuple(part for panel in panels for part in self._flanks(panel))
+
+    def _flanks(self, panel: Panel) -> Iterator[Panel]:
+        """Yield the parts of a panel between changes of the flank."""
+        if self.cam.groove and self.load is not None and not panel.dwell:
+            theta = np.linspace(panel.start, panel.stop, 721)
+            effort = self._effort_in(panel, theta)
+            for place in np.flatnonzero(effort[:-1] * effort[1:] < 0.0):
+                low, high = float(theta[place]), float(theta[place + 1])
+                for _ in range(60):
+                    middle = 0.5 * (low + high)
+                    ends = self._effort_in(panel, np.array([low, middle]))
+                    low, high = (middle, high) if ends[0] * ends[1] > 0.0 else (low, middle)
+                yield panel._replace(stop=low)
+                panel = panel._replace(start=low)
+        yield panel
+
+    def _effort_in(self, panel: Panel, theta: FloatArray) -> FloatArray:
+        return self.effort(self.cam.motion.lift_in(panel.segment, theta), theta)
+
+    @property
+    def free(self) -> bool:
+        """Whether the roller is driven by the cam alone."""
+        return self.scenario.creepage.drive == "free"
+
+    @cached_property
+    def arcs(self) -> list[SkidArc]:
+        """Arcs in which a free roller skids.
+
+        Raises
+        ------
+        ScenarioError
+            If the roller rolls nowhere.
+        """
+        torque, inertia = self.scenario.creepage.bearing_torque or 0.0, self.scenario.roller.inertia
+        if not self.free:
+            return []
+        if inertia == 0.0:
+            ratio, theta = extreme(self.panels, lambda p, x: torque / self._greatest_torque(p, x))
+            if ratio > 1.0:
+                at = f"{math.degrees(theta):.4g} deg"
+                what = "exceeds the torque that friction transmits: the roller stops at"
+                raise self._mistake("creepage", "bearing_torque", what, at, "a smaller torque")
+            return []
+        scale = inertia * self.speed**2
+
+        def rolling(panel: Panel, theta: FloatArray) -> Rolling:
+            found, most = self.at(panel, theta).kinematics, self._greatest_torque(panel, theta)
+            drag = np.full(len(theta), torque / scale)
+            return Rolling(found.spin, found.spin_per_rad, drag, most / scale)
+
+        try:
+            return skid_arcs(self.panels, rolling)
+        except ValueError as error:
+            remedy = "a smaller inertia, bearing torque or speed, or a greater load"
+            raise self._mistake("roller", "inertia", str(error), None, remedy) from error
+
+    def _greatest_torque(self, panel: Panel, theta: FloatArray) -> FloatArray:
+        """Return the greatest torque that friction transmits to the roller [N m]."""
+        friction = self.scenario.friction.coefficient
+        force = np.maximum(self.at(panel, theta).normal_force, 0.0)
+        return np.asarray(friction * force * self.scenario.roller.radius)
+
+    @cached_property
+    def parts(self) -> tuple[Panel, ...]:
+        """Panels, split where a skid begins or ends."""
+        found = []
+        for number, panel in enumerate(self.panels):
+            ends = [
+                float(edge)
+                for arc in self.arcs
+                if arc.panel == number
+                for edge in (arc.theta[0], arc.theta[-1])
+            ]
+            edges = sorted({panel.start, panel.stop, *ends})
+            for low, high in itertools.pairwise(edges):
+                if high - low > 1e-9:
+                    skids = self.slip(np.array([0.5 * (low + high)]))[0] != 0.0
+                    dwell = panel.dwell and not skids
+                    found.append(panel._replace(start=low, stop=high, dwell=dwell))
+        return tuple(found)
+
+    def slip(self, theta: FloatArray) -> FloatArray:
+        """Return the slip of the roller, its lack of speed over that of the cam."""
+        found = np.zeros(len(theta))
+        for arc in self.arcs:
+            inside = (theta >= arc.theta[0] - 1e-12) & (theta <= arc.theta[-1] + 1e-12)
+            found[inside] = arc.slip_at(theta[inside])
+        return found
+
+    def torque(self, point: Point) -> FloatArray:
+        """Return the torque that the traction gives the rolling roller [N m]."""
+        torque = np.sign(point.kinematics.spin) * (self.scenario.creepage.bearing_torque or 0.0)
+        rate = self.speed**2 * point.kinematics.spin_per_rad
+        return np.asarray(torque + self.scenario.roller.inertia * rate)
+
+    @cached_property
+    def stations(self) -> Stations:
+        """Stations of a run, by the tolerance of the scenario."""
+        tolerance = PART_OF_TOLERANCE * self.scenario.evolution.tolerance
+        return choose_stations(self.parts, self._represented, tolerance, self.cam.stations)
+
+    def _represented(self, panel: Panel, theta: FloatArray) -> FloatArray:
+        """Return what the stations must represent: depth in full slip, N ds, traction and slip."""
+        point = self.at(panel, theta)
+        force, travel = np.maximum(point.normal_force, 0.0), point.kinematics.travel
+        rows = [force ** (2.0 / 3.0), force * travel, travel]
+        if self.free:
+            most = np.maximum(self._greatest_torque(panel, theta), 1e-300)
+            rows += [1.0 + self.torque(point) / most, self.slip(theta)]
+        return np.stack(rows)
+
+    def integral(self, quantity: str) -> float:
+        """Return the integral of a quantity over the turn: "travel" or "load" (N ds)."""
+
+        def values(panel: Panel, theta: FloatArray) -> FloatArray:
+            point = self.at(panel, theta)
+            factor = point.normal_force if quantity == "load" else 1.0
+            return np.asarray(factor * point.kinematics.travel)
+
+        fine = choose_stations(self.panels, lambda p, x: values(p, x)[None], _FINE)
+        each = zip(fine.panels, fine.numbers, fine.first, strict=True)
+        return float(
+            sum(fine.weight[i : i + n] @ values(p, fine.angle[i : i + n]) for p, n, i in each)
+        )
+
+    def at_stations(self, stations: Stations) -> Point:
+        """Return the state at stations, at both sides of a boundary between segments."""
+        segments = np.array([panel.segment for panel in stations.panels])[stations.panel]
+        lift = np.empty((3, stations.count))
+        for number in np.unique(segments):
+            chosen = segments == number
+            lift[:, chosen] = self.cam.motion.lift_in(int(number), stations.angle[chosen])
+        return self.point(lift, stations.angle)
+
+    def _mistake(
+        self, table: str, key: str, what: str, got: str | None, expected: str | None
+    ) -> ScenarioError:
+        return ScenarioError(self.scenario.file, [Mistake(table, key, what, got, expected)])
+
+    def checked(self) -> CamTurn:
+        """Return the turn if the roller can follow it.
+
+        Raises
+        ------
+        ScenarioError
+            If the cam is undercut, the follower jumps or the roller rolls nowhere.
+        """
+        mistakes = []
+        radius = self.scenario.roller.radius
+        sharpest, theta = extreme(self.panels, self._undercut)
+        if sharpest >= 1.0 - 1e-9:
+            flank = "inner flank" if self.at_angles(np.array([theta])).inner[0] else "cam"
+            got = f"{1e3 * radius / sharpest:.4g} mm at {self.place(theta)}"
+            what = f"the {flank} is undercut: the radius of the pitch curve is"
+            expected = f"more than the roller's {1e3 * radius:.6g} mm; a greater base_radius,"
+            expected += " a smaller roller or a gentler motion"
+            mistakes.append(Mistake("cam", "base_radius", what, got, expected))
+        least, theta = extreme(self.panels, lambda p, x: -self.at(p, x).normal_force)
+        if -least <= 0.0 and not self.cam.groove:
+            got = f"{-least:.4g} N at {self.place(theta)}"
+            what = "the follower jumps: the normal force is"
+            expected = "more than 0 N; a greater preload or stiffness, or a smaller speed or mass"
+            mistakes.append(Mistake("load", "preload", what, got, expected))
+        if mistakes:
+            raise ScenarioError(self.scenario.file, mistakes)
+        self.arcs  # noqa: B018  (raises where the roller rolls nowhere)
+        return self
+
+    def _undercut(self, panel: Panel, theta: FloatArray) -> FloatArray:
+        """Return the curvature of the pitch curve times the roller's radius, 1 at a cusp."""
+        point = self.at(panel, theta)
+        side = np.where(point.inner, -1.0, 1.0)
+        return np.asarray(side * point.kinematics.pitch_curvature * self.scenario.roller.radius)
+
+    def place(self, theta: float) -> str:
+        """Return an angle and its segment in words."""
+        motion = self.cam.motion
+        number = int(motion.segment_at(np.array([theta]))[0])
+        return f"{math.degrees(theta) % 360.0:.4g} deg, {motion.segment_label(number)}"
