@@ -77,11 +77,19 @@ def _creepage_variation(
     variation: FloatArray = (
         problem.slip_profile[problem.roller]
         + roller_depth / problem.kinematics.roller_radius
-        - cylinder_depth / problem.kinematics.cylinder_radius
+        - _per_radius(problem, cylinder_depth)
     )
     if not problem.tilt_shifts:
         variation = variation - problem.spin[:, :, None] * problem.from_apex[problem.roller]
     return _of_contacts(problem, variation)
+
+
+def _per_radius(problem: WearProblem, depth: FloatArray) -> FloatArray:
+    """Return the depth of the cylinder over its radius of curvature, shape as `depth`."""
+    cam = problem.kinematics.cam
+    if cam is None:
+        return np.asarray(depth / problem.kinematics.cylinder_radius)
+    return np.asarray(depth * cam.surface_curvature[..., None])
 
 
 def _of_contacts(problem: WearProblem, values: FloatArray) -> FloatArray:

@@ -33,7 +33,7 @@ def _roller_depth(problem: WearProblem, state: WearState) -> FloatArray:
 
 
 def _volume(problem: WearProblem, state: WearState) -> FloatArray:
-    radius, spacing = problem.kinematics.cylinder_radius, problem.grid.spacing
+    radius, spacing = problem.kinematics.track_radius, problem.grid.spacing
     return np.asarray(worn_volume(state.cylinder_depth, spacing, radius).mean(axis=(0, 1)))
 
 

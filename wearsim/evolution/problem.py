@@ -141,6 +141,9 @@ class WearProblem:
             self,
             laws=tuple(self.laws[number] for number in numbers),
             loads=tuple(self.loads[number] for number in numbers),
+            kinematics=self.kinematics
+            if self.kinematics.cam is None
+            else replace(self.kinematics, cam=self.kinematics.cam.at(realisations)),
             flat_gap=np.take(self.flat_gap, realisations, axis=2),
             from_apex=part(self.from_apex, 1),
             inputs=self.inputs.at(realisations, axis=1),
@@ -203,14 +206,20 @@ class WearProblem:
         """Inputs by their name in `ContactBatch`, those that no step changes, shape (contacts,)."""
         columns: dict[str, FloatArray | float] = {
             "longitudinal_curvature": self.kinematics.longitudinal_curvature,
-            "rolling_speed": self.kinematics.rolling_speed,
+            "rolling_speed": self.kinematics.speed,
             "longitudinal": self.inputs.longitudinal,
             "lateral": self.inputs.yaw,
             "spin": self.spin,
             "friction": self.inputs.friction,
         }
+        cam = self.kinematics.cam
         if self.free:
             columns["bearing_torque"] = self.inputs.bearing_torque
+        if self.free and cam is not None:
+            skids = np.isfinite(cam.skid)
+            torque = self.inputs.bearing_torque + cam.inertia_torque
+            columns["bearing_torque"] = np.where(skids, np.nan, torque)
+            columns["longitudinal"] = np.where(skids, cam.skid, self.inputs.longitudinal)
         return {n: np.broadcast_to(column, self.shape).ravel() for n, column in columns.items()}
 
     @cached_property
@@ -221,7 +230,12 @@ class WearProblem:
 
     @cached_property
     def stiffness(self) -> FloatArray:
-        """Loss of load per descent of the roller, shape (realisations,) [N/m]."""
+        """Loss of load per descent of the roller, shape (realisations,) [N/m].
+
+        Of a cam, shape (stations, 1, realisations).
+        """
+        if self.kinematics.cam is not None:
+            return self.kinematics.cam.stiffness
         return np.array([load.stiffness for load in self.loads])
 
     @cached_property
@@ -253,9 +267,21 @@ class WearProblem:
         return np.array(found)
 
     def force(self, time: FloatArray) -> FloatArray:
-        """Return the load before feedback at a time [s] of each realisation, shape (N,) [N]."""
+        """Return the load before feedback at a time [s] of each realisation, shape (N,) [N].
+
+        On a cam, shape (stations, 1, N).
+        """
         each = zip(self.loads, time[:, None], strict=True)
-        return np.array([load.force(own)[0] for load, own in each])
+        return self.at_stations(np.array([load.force(own)[0] for load, own in each]))
+
+    def mean_force(self, start: FloatArray, stop: FloatArray) -> FloatArray:
+        """Return the exact mean of the load before feedback between two times; as `force`."""
+        return self.at_stations(values_between([load.mean for load in self.loads], start, stop))
+
+    def at_stations(self, force: FloatArray) -> FloatArray:
+        """Return the normal force at the stations under a load of each realisation, as `force`."""
+        cam = self.kinematics.cam
+        return force if cam is None else force * cam.load_factor + cam.load_rest
 
     def deviations(
         self, start: FloatArray, stop: FloatArray
@@ -333,29 +359,35 @@ class WearProblem:
         self, contacts: ContactBatchSolution, passes: Mapping[Body, FloatArray | float]
     ) -> FloatArray:
         """Return the depth that `passes` passes of each contact wear off both bodies [m]."""
-        dissipation, speed = self.values_of(contacts, "dissipation"), self.kinematics.rolling_speed
+        dissipation = self.values_of(contacts, "dissipation")
         found = np.empty((len(BODIES), *dissipation.shape))
         for depth, body in zip(found, BODIES, strict=True):
             factor = self.wear_factors[body]
             if factor is None:
-                each = zip(contacts, cycle(self.laws), strict=False)
-                depths = np.array([law.depth_per_pass(body, c, speed) for c, law in each])
+                speeds = np.broadcast_to(self.kinematics.speed, self.shape).ravel().tolist()
+                each = zip(contacts, cycle(self.laws), speeds, strict=False)
+                depths = np.array([law.depth_per_pass(body, c, v) for c, law, v in each])
                 depth[:] = passes[body] * depths.reshape(dissipation.shape)
             else:
-                np.multiply(passes[body] * factor[:, None], dissipation, out=depth)
+                np.multiply(passes[body] * factor[..., None], dissipation, out=depth)
         return found
 
     @cached_property
     def wear_factors(self) -> dict[Body, FloatArray | None]:
         """Depth per pass and dissipation of either body, shape (realisations,) [m/(W/m)].
 
-        None if wear is not linear in the dissipation.
+        Of a cam, shape (stations, 1, realisations). None if wear is not linear in the dissipation.
         """
-        speed = self.kinematics.rolling_speed
+        speeds = np.ravel(self.kinematics.speed).tolist()
         factors = {
-            body: [law.depth_per_dissipation(body, speed) for law in self.laws] for body in BODIES
+            body: [law.depth_per_dissipation(body, v) for v in speeds for law in self.laws]
+            for body in BODIES
         }
-        return {b: None if None in each else np.array(each) for b, each in factors.items()}
+        shape = (len(self.laws),) if self.kinematics.cam is None else (len(speeds), 1, -1)
+        return {
+            b: None if None in each else np.array(each).reshape(shape)
+            for b, each in factors.items()
+        }
 
     @cached_property
     def linear_wear(self) -> bool:
@@ -368,9 +400,10 @@ class WearProblem:
 
         Broadcast to (stations, contacts, realisations, strips).
         """
-        own = self.weight * self.kinematics.roller_share / self.shape[0]
-        shares: dict[Body, FloatArray] = {"cylinder": self.cylinder_share, "roller": own}
-        return {body: share[None, :, None, None] for body, share in shares.items()}
+        share = np.reshape(self.kinematics.roller_share, (-1, 1))
+        own = self.weight * share / self.shape[0]
+        shares: dict[Body, FloatArray] = {"cylinder": self.cylinder_share[None], "roller": own}
+        return {body: share[:, :, None, None] for body, share in shares.items()}
 
     def sum_of_parts(
         self, cylinder: FloatArray, roller: FloatArray
@@ -395,4 +428,12 @@ class WearProblem:
         """Return the power of all physical rollers, shape (N,) [W], from (S, C, N)."""
         physical_contacts = (self.cylinder_share * self.kinematics.physical_rollers)[None, :, None]
         total = sum_in_order(power * physical_contacts, axis=1)
-        return np.asarray(mean_along(total, axis=0)[0])
+        return np.asarray(self.mean_over_turn(total)[0])
+
+    def mean_over_turn(self, values: FloatArray) -> FloatArray:
+        """Return the mean over the stations weighted by their time, first axis of length one."""
+        cam = self.kinematics.cam
+        if cam is None:
+            return mean_along(values, axis=0)
+        share = cam.time_share.reshape(-1, *(1,) * (values.ndim - 1))
+        return np.asarray((share * values).sum(axis=0, keepdims=True))

@@ -98,17 +98,64 @@ class Varying:
 
 
 @dataclass(frozen=True)
+class CamStations:
+    """Quantities that differ between the stations of a cam.
+
+    Arrays have the shape (stations, 1, 1) or, where drawn values change them, (stations, 1,
+    realisations).
+
+    Parameters
+    ----------
+    angle : ndarray
+        Angle of the cam [rad].
+    rolling_speed, longitudinal_curvature, surface_curvature : ndarray
+        Rolling velocity V [m/s], relative curvature along rolling and that of the cam [1/m].
+    length, time_share : ndarray
+        Length of the cam's surface [m] and part of a turn that each station represents.
+    load_factor, load_rest : ndarray
+        The normal force is the load of the problem times the factor, plus the rest [N].
+    stiffness : ndarray
+        Decrease of the normal force per displacement of the roller [N/m].
+    inertia_torque : ndarray
+        Torque that accelerates a free roller, added to that of its bearing [N m].
+    skid : ndarray
+        Longitudinal creepage where a free roller skids; not a number where it rolls.
+    """
+
+    angle: FloatArray
+    rolling_speed: FloatArray
+    longitudinal_curvature: FloatArray
+    surface_curvature: FloatArray
+    length: FloatArray
+    time_share: FloatArray
+    load_factor: FloatArray
+    load_rest: FloatArray
+    stiffness: FloatArray
+    inertia_torque: FloatArray
+    skid: FloatArray
+
+    def at(self, realisations: IntArray) -> CamStations:
+        """Return the stations of some realisations, by number and in that order."""
+        columns = ((item.name, getattr(self, item.name)) for item in fields(self))
+        return CamStations(
+            **{n: a if a.shape[2] == 1 else a[:, :, realisations] for n, a in columns}
+        )
+
+
+@dataclass(frozen=True)
 class Kinematics:
-    """Radii, speed and number of the rollers on the cylinder.
+    """Radii, speed and number of the rollers on the cylinder, or on a cam.
 
     Parameters
     ----------
     cylinder_radius, roller_radius, crown_radius : float
-        Radii [m].
+        Radii [m]; that of the base circle of a cam.
     rolling_speed : float
-        Rolling velocity V [m/s].
+        Rolling velocity V [m/s]; on a cam that of the base circle.
     multiplicity : ndarray of int, shape (rollers,)
         Physical rollers represented by each roller of the problem; identical ones are merged.
+    cam : CamStations, optional
+        Stations of a cam.
     """
 
     cylinder_radius: float
@@ -116,6 +163,7 @@ class Kinematics:
     crown_radius: float
     rolling_speed: float
     multiplicity: FloatArray
+    cam: CamStations | None = None
 
     @cached_property
     def physical_rollers(self) -> float:
@@ -128,14 +176,39 @@ class Kinematics:
         return self.physical_rollers * (self.rolling_speed / (2.0 * np.pi * self.cylinder_radius))
 
     @cached_property
-    def longitudinal_curvature(self) -> float:
-        """Relative curvature along rolling [1/m]."""
+    def longitudinal_curvature(self) -> FloatArray | float:
+        """Relative curvature along rolling; of a cam at every station, (stations, 1, 1) [1/m]."""
+        if self.cam is not None:
+            return self.cam.longitudinal_curvature
         return 1.0 / self.cylinder_radius + 1.0 / self.roller_radius
 
     @cached_property
-    def roller_share(self) -> float:
-        """Overrollings of a point of one roller per pass of all rollers."""
-        return self.cylinder_radius / self.roller_radius / self.physical_rollers
+    def surface_curvature(self) -> FloatArray | float:
+        """Curvature of the cylinder, or of a cam at every station, (stations, 1, 1) [1/m]."""
+        return 1.0 / self.cylinder_radius if self.cam is None else self.cam.surface_curvature
+
+    @cached_property
+    def speed(self) -> FloatArray | float:
+        """Rolling velocity; of a cam at every station, (stations, 1, 1) [m/s]."""
+        return self.rolling_speed if self.cam is None else self.cam.rolling_speed
+
+    @cached_property
+    def track_radius(self) -> FloatArray | float:
+        """Radius of the track whose volume each station represents [m].
+
+        The mean over the stations is the volume worn off a cam; shape (stations, 1, 1).
+        """
+        if self.cam is None:
+            return self.cylinder_radius
+        return len(self.cam.length) * self.cam.length / (2.0 * np.pi)
+
+    @cached_property
+    def roller_share(self) -> FloatArray | float:
+        """Overrollings of a point of one roller per pass of all rollers.
+
+        The mean over the stations is that of a turn of a cam; shape (stations, 1, 1).
+        """
+        return self.track_radius / self.roller_radius / self.physical_rollers
 
 
 def width(y: FloatArray, worn: FloatArray, threshold: float) -> float:
@@ -157,7 +230,7 @@ def width(y: FloatArray, worn: FloatArray, threshold: float) -> float:
     return float(right - left)
 
 
-def worn_volume(worn: FloatArray, spacing: float, radius: float) -> FloatArray:
+def worn_volume(worn: FloatArray, spacing: float, radius: FloatArray | float) -> FloatArray:
     """Return the worn volume of a body of revolution, 2 pi R times the worn area [m^3].
 
     First order in depth over radius: the volume for which Archard's wear law holds exactly.

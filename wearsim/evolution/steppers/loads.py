@@ -35,7 +35,7 @@ def mean_loads(
     terms = []
     if problem.terms:
         power = problem.per_roller(problem.values_of(contacts, "power"))
-        mean_power, duration = power.mean(axis=0), float((stop - start)[0])
+        mean_power, duration = problem.mean_over_turn(power)[0], float((stop - start)[0])
         each = zip(problem.terms.values(), state.terms, strict=True)
         terms = [term.mean_force(value, mean_power, duration) for term, value in each]
     return with_feedback(problem, mean_force(problem, state, passes), displacement, terms)
@@ -137,7 +137,7 @@ def displacement_at(
 def mean_force(problem: WearProblem, state: WearState, passes: FloatArray) -> FloatArray:
     """Return the exact mean over a step of the load before feedback, shape (N,) [N]."""
     start, stop = problem.time(state.passes), problem.time(state.passes + passes)
-    return values_between([load.mean for load in problem.loads], start, stop)
+    return problem.mean_force(start, stop)
 
 
 def smooth_loads(problem: WearProblem, first: FloatArray, passes: FloatArray) -> BoolArray:

@@ -96,7 +96,7 @@ def is_compiled(problem: WearProblem) -> bool:
     """Return whether the contact model has a compiled loop that covers the problem."""
     linear = all(problem.wear_factors[body] is not None for body in BODIES)
     lags = all(term.lag() is not None for term in problem.terms.values())
-    prescribed = not problem.free and problem.shape[0] == 1
+    prescribed = not problem.free and problem.kinematics.cam is None
     return problem.model.capabilities.pass_loop and linear and lags and prescribed
 
 
@@ -109,9 +109,10 @@ def turn_order(problem: WearProblem) -> IntArray:
 def _passes(
     problem: WearProblem, state: WearState, count: int, redraw: Redraw | None
 ) -> tuple[FloatArray, WearProblem]:
-    """Return the load before feedback [N] of the next passes, and the problem of their contacts.
+    """Return the load before feedback of the next passes, and the problem of their contacts.
 
-    The load and the processes of a pass are those at its middle.
+    The load has the shape (passes, stations) [N]. It and the processes are those at the middle of
+    a pass.
     """
     first, order, kinematics = int(state.passes[0]), turn_order(problem), problem.kinematics
     rollers = order[(first + np.arange(count)) % len(order)]
@@ -121,7 +122,7 @@ def _passes(
         inputs = inputs.with_value_of(item, rollers, item.paths[0].at(times)[:, None])
     if redraw is not None:
         inputs = redraw(inputs, first)
-    force = problem.loads[0].force(times)[:, None]
+    force = problem.at_stations(problem.loads[0].force(times)).reshape(-1, count).T
     passes = replace(problem, inputs=inputs, roller=rollers, weight=np.ones(count), varying=())
     return force + inputs.normal_force_offset, passes
 
@@ -131,7 +132,7 @@ def _fresh_approaches(state: WearState, force: FloatArray, passes: WearProblem) 
     if state.approach_factor is None:
         return np.zeros((passes.shape[0], len(force)))
     factor = state.approach_factor[:, passes.roller, 0]
-    return np.asarray(factor * np.maximum(force[:, 0], 0.0) ** HERTZ)
+    return np.asarray(factor * np.maximum(force.T, 0.0) ** HERTZ)
 
 
 def _term_rates(problem: WearProblem) -> FloatArray:
@@ -234,7 +235,7 @@ def run_in_python(
     problem: WearProblem, state: WearState, count: int, redraw: Redraw | None = None
 ) -> WearState:
     """Run `count` passes of a single realisation by full solves: slow, but for any plugin."""
-    kinematics, speed = problem.kinematics, problem.kinematics.rolling_speed
+    kinematics, cam = problem.kinematics, problem.kinematics.cam
     force, passes = _passes(problem, state, count, redraw)
     fresh = _fresh_approaches(state, force, passes)
     cylinder, roller = state.cylinder_depth.copy(), state.roller_depth.copy()
@@ -245,25 +246,32 @@ def run_in_python(
     for number, r in enumerate(passes.roller):
         one = passes.with_contacts(np.array([number]))
         multiplicity = float(kinematics.multiplicity[r])
-        ratio = kinematics.cylinder_radius / kinematics.roller_radius
-        ratio /= multiplicity * stations
         for s in range(stations):
+            speed, part = kinematics.rolling_speed, 1.0 / stations
+            length = kinematics.cylinder_radius / stations
+            if cam is not None:
+                speed, part = float(cam.rolling_speed[s, 0, 0]), float(cam.time_share[s, 0, 0])
+                length = float(cam.length[s, 0, 0]) / math.tau
+            ratio = length / kinematics.roller_radius / multiplicity
             unworn = one.nominal_gap[s, 0, 0]
             gap = unworn + cylinder[s, 0, 0] + roller[0, r, 0]
-            free = float(force[number, 0]) + float(terms[:, r, 0].sum())
+            free = float(force[number, s]) + float(terms[:, r, 0].sum())
             zero = float(unworn.min() + fresh[s, number])
-            most = free - problem.loads[0].stiffness * (float(gap.min()) - zero)
-            if problem.pauses and min(most, float(force[number, 0])) <= 0.0:
+            stiffness = float(np.reshape(problem.stiffness, (-1, 1))[s if cam else 0, 0])
+            most = free - stiffness * (float(gap.min()) - zero)
+            if problem.pauses and min(most, float(force[number, s])) <= 0.0:
                 for t, term in enumerate(problem.terms.values()):
                     terms[t, r] = term.advance(terms[t, r], np.zeros(1), turn / multiplicity)
                 continue
             place = s * problem.rollers + r
             batch = contact_batch(one, one.nominal_gap, np.zeros(one.shape), cylinder, roller)
-            contact = _solve_pass(problem, gap, batch.point(s), free, zero, contacts[place])
+            curvature = float(batch.longitudinal_curvature[s])
+            spring = stiffness, free, zero
+            contact = _solve_pass(problem, gap, curvature, batch.point(s), spring, contacts[place])
             contacts[place] = contact
             cylinder[s, 0, 0] += law.depth_per_pass("cylinder", contact, speed)
             roller[0, r, 0] += ratio * law.depth_per_pass("roller", contact, speed)
-            energy += contact.power * turn / stations
+            energy += contact.power * turn * part
             power = np.array([contact.power])
             for t, term in enumerate(problem.terms.values()):
                 terms[t, r] = term.advance(terms[t, r], power, turn / multiplicity)
@@ -283,9 +291,9 @@ def run_in_python(
 def _solve_pass(
     problem: WearProblem,
     gap: FloatArray,
+    curvature: float,
     point: OperatingPoint,
-    free: float,
-    zero: float,
+    spring: tuple[float, float, float],
     warm: ContactSolution,
 ) -> ContactSolution:
     """Solve the contact of one pass together with the load of a spring.
@@ -295,12 +303,12 @@ def _solve_pass(
     problem : WearProblem
     gap : ndarray, shape (strips,)
         Present gap [m].
+    curvature : float
+        Relative curvature along rolling [1/m].
     point : OperatingPoint
         Operating point, except for its load.
-    free : float
-        Load without displacement of the roller [N].
-    zero : float
-        Approach without displacement of the roller [m].
+    spring : tuple of float
+        Stiffness [N/m], load without displacement of the roller [N], and the approach there [m].
     warm : ContactSolution
         Solution of the roller's previous pass.
 
@@ -309,8 +317,7 @@ def _solve_pass(
     StepError
         If the load is not positive, or does not converge.
     """
-    stiffness, lowest = problem.loads[0].stiffness, float(gap.min())
-    curvature, solution = problem.kinematics.longitudinal_curvature, warm
+    (stiffness, free, zero), lowest, solution = spring, float(gap.min()), warm
     most = free - stiffness * (lowest - zero)  # without elastic approach
     if not most > 0.0:
         raise StepError(f"contact is lost: the load of a pass has fallen to {most:.4g} N")

@@ -266,7 +266,7 @@ def worn_state(
     """
     terms, begin = state.terms, state.passes
     if problem.terms:
-        mean = problem.per_roller(power).mean(axis=0)
+        mean = problem.mean_over_turn(problem.per_roller(power))[0]
         terms = advanced_terms(problem, state, begin + passes, mean)
     return state.replaced(
         passes=begin + passes,

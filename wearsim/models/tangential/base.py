@@ -220,7 +220,7 @@ def complete(
 ) -> ContactSolution:
     """Solve the tangential problem of `strips` and return the complete contact solution."""
     longitudinal = point.creepage.longitudinal
-    if point.bearing_torque is not None:
+    if point.bearing_torque is not None and not math.isnan(point.bearing_torque):
         longitudinal = _balanced_creepage(theory, strips, pair, point)
     slip = local_slip(strips, point, longitudinal)
     friction = friction_per_strip(strips, point)

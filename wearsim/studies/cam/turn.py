@@ -6,11 +6,12 @@ import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
 from wearsim.errors import Mistake, ScenarioError
+from wearsim.evolution.quantities import CamStations
 from wearsim.mechanics.cam import (
     Panel,
     RollerKinematics,
@@ -198,18 +199,56 @@ class CamTurn:
             edges = sorted({panel.start, panel.stop, *ends})
             for low, high in itertools.pairwise(edges):
                 if high - low > 1e-9:
-                    skids = self.slip(np.array([0.5 * (low + high)]))[0] != 0.0
-                    dwell = panel.dwell and not skids
+                    rolls = np.isnan(self.slip(np.array([0.5 * (low + high)]))[0])
+                    dwell = panel.dwell and bool(rolls)
                     found.append(panel._replace(start=low, stop=high, dwell=dwell))
         return tuple(found)
 
-    def slip(self, theta: FloatArray) -> FloatArray:
-        """Return the slip of the roller, its lack of speed over that of the cam."""
-        found = np.zeros(len(theta))
+    def slip(self, theta: FloatArray, within: FloatArray | None = None) -> FloatArray:
+        """Return the slip of the roller, its lack of speed over that of the cam.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (points,)
+            Angles [rad].
+        within : ndarray, shape (points,), optional
+            Angles on the same side of an arc's end, by default `theta`.
+
+        Returns
+        -------
+        ndarray, shape (points,)
+            Not a number where the roller rolls.
+        """
+        found = np.full(len(theta), np.nan)
+        within = np.mod(theta, math.tau) if within is None else within
         for arc in self.arcs:
-            inside = (theta >= arc.theta[0] - 1e-12) & (theta <= arc.theta[-1] + 1e-12)
-            found[inside] = arc.slip_at(theta[inside])
+            inside = (within >= arc.theta[0]) & (within <= arc.theta[-1])
+            found[inside] = arc.slip_at(np.mod(theta[inside], math.tau))
         return found
+
+    @cached_property
+    def normal_range(self) -> tuple[float, float]:
+        """Least and greatest normal force of the turn [N]."""
+        greatest, _ = extreme(self.panels, lambda p, x: self.at(p, x).normal_force)
+        least, _ = extreme(self.panels, lambda p, x: -self.at(p, x).normal_force)
+        return -least, greatest
+
+    @cached_property
+    def curvatures(self) -> tuple[float, float]:
+        """Least and greatest relative curvature along rolling [1/m]."""
+        greatest, _ = extreme(self.panels, lambda p, x: self.at(p, x).kinematics.relative_curvature)
+        least, _ = extreme(self.panels, lambda p, x: -self.at(p, x).kinematics.relative_curvature)
+        return -least, greatest
+
+    @cached_property
+    def greatest_skid(self) -> float:
+        """Greatest creepage of a skid, 0 without any."""
+        radius = self.scenario.roller.radius
+        sizes = [
+            np.abs(arc.slip / self.at_angles(arc.theta).kinematics.travel).max()
+            for arc in self.arcs
+        ]
+        return radius * float(max(sizes, default=0.0))
 
     def torque(self, point: Point) -> FloatArray:
         """Return the torque that the traction gives the rolling roller [N m]."""
@@ -230,8 +269,66 @@ class CamTurn:
         rows = [force ** (2.0 / 3.0), force * travel, travel]
         if self.free:
             most = np.maximum(self._greatest_torque(panel, theta), 1e-300)
-            rows += [1.0 + self.torque(point) / most, self.slip(theta)]
+            middle = np.full(len(theta), 0.5 * (panel.start + panel.stop))
+            slip = np.nan_to_num(self.slip(theta, middle))
+            rows += [1.0 + self.torque(point) / most, slip]
         return np.stack(rows)
+
+    def station_values(
+        self, point: Point, weight: FloatArray, within: FloatArray | None = None
+    ) -> CamStations:
+        """Return the values of the stations for a wear problem.
+
+        Parameters
+        ----------
+        point : Point
+            State at the stations.
+        weight : ndarray, shape (stations,)
+            Angles that they represent [rad].
+        within : ndarray, shape (stations,), optional
+            As in `slip`.
+        """
+        found, count = point.kinematics, len(point.angle)
+        factor, rest = np.ones(count), np.zeros(count)
+        if self.load is not None:
+            lever = self.cam.follower.lever * np.cos(found.pressure_angle)
+            factor = np.where(point.inner, -1.0, 1.0) / lever
+            rest = point.normal_force - factor * self.load.preload
+        feedback = self.load is not None and self.load.feedback != "none"
+        side = np.sign(found.spin)
+        slip = self.slip(point.angle, within)
+        creepage = side * self.scenario.roller.radius * slip / found.travel
+        columns = {
+            "angle": point.angle,
+            "rolling_speed": self.speed * found.travel,
+            "longitudinal_curvature": found.relative_curvature,
+            "surface_curvature": np.where(point.inner, -1.0, 1.0) * found.curvature,
+            "length": weight * found.travel,
+            "time_share": weight / math.tau,
+            "load_factor": factor,
+            "load_rest": rest,
+            "stiffness": point.stiffness if feedback else np.zeros(count),
+            "inertia_torque": self.scenario.roller.inertia
+            * self.speed**2
+            * side
+            * found.spin_per_rad,
+            "skid": creepage,
+        }
+        return CamStations(**{name: np.array(a)[:, None, None] for name, a in columns.items()})
+
+    @property
+    def run_stations(self) -> CamStations:
+        """The stations of a run."""
+        stations = self.stations
+        middles = np.array([0.5 * (panel.start + panel.stop) for panel in stations.panels])
+        point = self.at_stations(stations)
+        return self.station_values(point, stations.weight, middles[stations.panel])
+
+    def stations_at(self, theta: FloatArray) -> CamStations:
+        """Return stations at given angles [rad], with equal weights."""
+        return self.station_values(
+            self.at_angles(theta), np.full(len(theta), math.tau / len(theta))
+        )
 
     def integral(self, quantity: str) -> float:
         """Return the integral of a quantity over the turn: "travel" or "load" (N ds)."""
@@ -301,3 +398,9 @@ class CamTurn:
         motion = self.cam.motion
         number = int(motion.segment_at(np.array([theta]))[0])
         return f"{math.degrees(theta) % 360.0:.4g} deg, {motion.segment_label(number)}"
+
+
+@lru_cache(maxsize=16)
+def turn_of(scenario: Scenario) -> CamTurn:
+    """Return the turn of a scenario's cam; errors as `CamTurn.checked`."""
+    return CamTurn(scenario).checked()

@@ -20,6 +20,7 @@ from wearsim.evolution.steppers.single_step import explicit_step
 from wearsim.evolution.steppers.stabilised import StabilisedStepper
 from wearsim.plugins import ContactModel
 from wearsim.scenario import Scenario
+from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.run.draws import Draws
 from wearsim.studies.run.grid import strips_of_run
 from wearsim.studies.run.inputs import (
@@ -129,7 +130,8 @@ def assemble_problem(
     grid = grid if grid is not None else strips_of_run(draws)
     chosen = model or prepared_model(scenario, grid)
     first, multiplicity = merged_rollers(draws)
-    name = chosen_stepper(scenario, chosen, 2 if draws.passes else len(first))
+    several = len(first) > 1 or draws.passes or scenario.cam
+    name = chosen_stepper(scenario, chosen, 2 if several else 1)
     stepper = build_stepper(scenario, name)
     if scenario.evolution.nodes is not None and (stepper.pass_by_pass or not draws.passes):
         raise ScenarioError(
@@ -217,6 +219,7 @@ def build_problem(
     rollers: Sequence[int] = (0,),
     multiplicity: FloatArray | None = None,
     realisations: int = 1,
+    angles: FloatArray | None = None,
 ) -> WearProblem:
     """Return the problem of some rollers without wear, for any number of realisations.
 
@@ -235,9 +238,15 @@ def build_problem(
         Number of physical rollers that each represents, by default one.
     realisations : int
         Number of realisations.
+    angles : ndarray, shape (stations,), optional
+        Angles of a cam, instead of the stations of a run [rad].
     """
     creepage, roller, cylinder = scenario.creepage, scenario.roller, scenario.cylinder
     count, values = len(rollers), contact_inputs(scenario, rollers, drawn)
+    cam = None
+    if scenario.cam is not None:
+        turn = turn_of(scenario)
+        cam = turn.run_stations if angles is None else turn.stations_at(angles)
     s, height = grid.y - values.pop("offset")[..., None], start_height(scenario, grid)
     gap = s * s / (2.0 * roller.crown_radius) - height
     if roller.width is not None:
@@ -256,8 +265,11 @@ def build_problem(
             crown_radius=roller.crown_radius,
             rolling_speed=scenario.rolling_speed,
             multiplicity=np.ones(count) if multiplicity is None else multiplicity,
+            cam=cam,
         ),
-        flat_gap=np.broadcast_to(gap, (count, realisations, grid.strips))[None],
+        flat_gap=np.broadcast_to(
+            gap, (1 if cam is None else len(cam.angle), count, realisations, grid.strips)
+        ),
         from_apex=s,
         inputs=ContactInputs.uniform(count, realisations).with_values(values),
         roller=np.arange(count, dtype=np.int64),

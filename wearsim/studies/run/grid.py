@@ -14,6 +14,7 @@ from wearsim.mechanics.hertz.ellipse import HertzContact, hertz
 from wearsim.plugins import WearLaw
 from wearsim.scenario import Scenario
 from wearsim.scenario.tables.plain import DEFAULT_TOLERANCE
+from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.run.draws import Draws
 from wearsim.studies.run.inputs import OFFSET, TILT, contact_inputs, load_range
 from wearsim.studies.run.roller_ends import ends_roller, roller_grid, strips_of_roller
@@ -59,7 +60,7 @@ def contact_grid(scenario: Scenario, load: float) -> Grid:
     They are those of the scenario, those of the profile's whole width, or the choice of the model.
     """
     choice, profile = scenario.contact, scenario.cylinder.profile
-    centre, half_width = contact_centre(scenario, [0]), fresh_patch(scenario, load).b
+    centre, half_width = contact_centre(scenario, [0]), widest_patch(scenario, load).b
     if choice.width is None and profile is not None:
         return profile_grid(profile, half_width, choice.strips)
     half = 1.2 * half_width
@@ -134,13 +135,16 @@ def wider_grid(scenario: Scenario, grid: Grid, load: float, shift: float = 0.0) 
     return Grid.spanning(*edges, grid.strips + 2 * added)
 
 
-def fresh_patch(scenario: Scenario, load: float) -> HertzContact:
+def fresh_patch(scenario: Scenario, load: float, curvature: float | None = None) -> HertzContact:
     """Return the patch of the unworn bodies under `load` [N], that of Hertz.
 
-    Where a roller ends within it, the patch is that of a line contact as wide as the roller.
+    Where a roller ends within it, the patch is that of a line contact as wide as the roller. The
+    relative curvature along rolling [1/m] is that of cylinder and roller unless it is given.
     """
     modulus = combine(scenario.cylinder.material, scenario.roller.material).contact_modulus
-    along = 0.5 * (1.0 / scenario.cylinder.radius + 1.0 / scenario.roller.radius)
+    if curvature is None:
+        curvature = 1.0 / scenario.cylinder.radius + 1.0 / scenario.roller.radius
+    along = 0.5 * curvature
     patch = hertz(along, 0.5 / scenario.roller.crown_radius, load, modulus)
     half = 0.5 * (scenario.roller.width or math.inf)
     if patch.b <= half:
@@ -149,6 +153,15 @@ def fresh_patch(scenario: Scenario, load: float) -> HertzContact:
     half_length = math.sqrt(2.0 * line_load / (math.pi * modulus * along))
     pressure = 2.0 * line_load / (math.pi * half_length)
     return replace(patch, a=half_length, b=half, peak_pressure=max(pressure, patch.peak_pressure))
+
+
+def widest_patch(scenario: Scenario, load: float) -> HertzContact:
+    """Return the widest patch under `load` [N] around the cylinder or the cam."""
+    if scenario.cam is None:
+        return fresh_patch(scenario, load)
+    curvatures = turn_of(scenario).curvatures
+    patches = [fresh_patch(scenario, load, max(curvature, 1e-3)) for curvature in curvatures]
+    return max(patches, key=lambda patch: patch.b)
 
 
 def predicted_half_width(draws: Draws, load: float) -> float:
@@ -164,6 +177,8 @@ def predicted_half_width(draws: Draws, load: float) -> float:
     law, patch, roller = scenario.wear.build(), fresh_patch(scenario, load), scenario.roller
     friction = draws.greatest_mean("friction", scenario.friction.coefficient)
     longitudinal = draws.greatest_mean("longitudinal", creepage.longitudinal or 0.0)
+    if scenario.cam is not None:
+        longitudinal = max(longitudinal, turn_of(scenario).greatest_skid)
     yaw, tilt = (
         max(abs(angle) for angle in (*draws.range_of(name), *scenario.per_roller(given)))
         for name, given in (("yaw", creepage.yaw), ("tilt", creepage.tilt))
@@ -218,7 +233,10 @@ def wear_per_load(
         longitudinal_creepage=0.0,
         iterations=0,
     )
-    share = scenario.cylinder.radius / scenario.roller.radius / scenario.operation.rollers
+    radius = scenario.cylinder.radius
+    if scenario.cam is not None:
+        radius = turn_of(scenario).integral("travel") / math.tau
+    share = radius / scenario.roller.radius / scenario.operation.rollers
     depth = law.depth_per_pass("cylinder", sliding, speed)
     depth = depth + share * law.depth_per_pass("roller", sliding, speed)
     return float((depth / line_load).max())
@@ -251,7 +269,7 @@ def strips_of_run(draws: Draws) -> Grid:
     scenario, choice = draws.scenario, draws.scenario.contact
     load = load_range(scenario, scenario.load.build(), scenario.total_time)[1]
     load += draws.range_of("normal_force_offset")[1]
-    patch, rollers = fresh_patch(scenario, load), range(scenario.operation.rollers)
+    patch, rollers = widest_patch(scenario, load), range(scenario.operation.rollers)
     centre = contact_centre(scenario, rollers)
     positions = contact_positions(scenario, contact_inputs(scenario, rollers))
     shift = float(np.abs(positions - centre).max())

@@ -10,9 +10,11 @@ import numpy as np
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.quantities import ContactInputs, Redraw
+from wearsim.models.loads import FollowerLoad
 from wearsim.plugins import Load
 from wearsim.scenario import RandomInput, Scenario
 from wearsim.scenario.parse.fields import CONTACT_FIELDS
+from wearsim.studies.cam.turn import turn_of
 from wearsim.types import FloatArray
 from wearsim.uq.sampling.sampler import GaussianCopula, Sampler
 from wearsim.uq.sampling.sobol import Stream
@@ -106,6 +108,9 @@ def load_range(scenario: Scenario, load: Load, stop: float) -> tuple[float, floa
             ],
         )
     low, high = load.extremes(0.0, stop)
+    if isinstance(load, FollowerLoad):
+        low, high = turn_of(scenario).normal_range
+        return (low if low > 0.0 else high), high  # where N changes sign, the flank changes
     if scenario.load.terms:
         return low, high
     mistake = None

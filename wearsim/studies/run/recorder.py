@@ -14,7 +14,7 @@ from wearsim.evolution.integrate import Advance
 from wearsim.evolution.limits import take_side_step
 from wearsim.evolution.pauses import opened
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.quantities import mean_along, width, worn_volume
+from wearsim.evolution.quantities import width, worn_volume
 from wearsim.evolution.state import WearState, joined_states
 from wearsim.evolution.steppers.base import Stepper
 from wearsim.evolution.steppers.loads import descents, elastic_approaches
@@ -119,14 +119,14 @@ def history_row(
         "step_passes": state.passes - (state if before is None else before).passes,
         "depth": state.cylinder_depth.max(axis=(0, 1, 3)),
         "width": np.array([width(problem.grid.y, groove, threshold) for groove in worn]),
-        "worn_volume": worn_volume(state.cylinder_depth, spacing, kinematics.cylinder_radius).mean(
+        "worn_volume": worn_volume(state.cylinder_depth, spacing, kinematics.track_radius).mean(
             axis=(0, 1)
         ),
         "roller_depth": state.roller_depth[0].max(axis=-1),
         "roller_worn_volume": worn_volume(state.roller_depth[0], spacing, kinematics.roller_radius),
         "dissipated_energy": state.energy,
         "power": problem.total_power(problem.values_of(state.contacts, "power")),
-        "normal_force": mean_along(problem.per_roller(loads), axis=0)[0],
+        "normal_force": problem.mean_over_turn(problem.per_roller(loads))[0],
         "depth_error": state.depth_error,
         "volume_error": state.volume_error,
         "profile_error": state.profile_error,
@@ -135,10 +135,10 @@ def history_row(
         "full_solves": state.full_solves,
         "peak_pressure": per_roller("peak_pressure").max(axis=0),
         **{
-            name: mean_along(per_roller(name), axis=0)[0]
+            name: problem.mean_over_turn(per_roller(name))[0]
             for name in ("approach", "longitudinal_creepage", "adhesion_fraction")
         },
-        **{n: mean_along(problem.per_roller(v), axis=0)[0] for n, v in approach.items()},
+        **{n: problem.mean_over_turn(problem.per_roller(v))[0] for n, v in approach.items()},
     }
 
 
