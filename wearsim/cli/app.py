@@ -36,6 +36,7 @@ FIRST_PARTY = {"bench": "wearsim-bench", "reproduce": "wearsim-chevalier2005"}
 BUILT_IN = {
     "check": "Check a scenario: print all mistakes, or the inputs and a summary of the run.",
     "contact": "Solve one contact: the first roller at the start of the load.",
+    "cam": "Show motion, loads and fresh contact of a cam along its angle.",
     "dissipation": "Solve one contact for many realisations of its random inputs.",
     "run": "Run a wear test and write its results file.",
     "ensemble": "Run a wear test for each realisation of the random inputs.",

@@ -141,9 +141,7 @@ class WearProblem:
             self,
             laws=tuple(self.laws[number] for number in numbers),
             loads=tuple(self.loads[number] for number in numbers),
-            kinematics=self.kinematics
-            if self.kinematics.cam is None
-            else replace(self.kinematics, cam=self.kinematics.cam.at(realisations)),
+            kinematics=self.kinematics.at(realisations),
             flat_gap=np.take(self.flat_gap, realisations, axis=2),
             from_apex=part(self.from_apex, 1),
             inputs=self.inputs.at(realisations, axis=1),
@@ -216,10 +214,7 @@ class WearProblem:
         if self.free:
             columns["bearing_torque"] = self.inputs.bearing_torque
         if self.free and cam is not None:
-            skids = np.isfinite(cam.skid)
-            torque = self.inputs.bearing_torque + cam.inertia_torque
-            columns["bearing_torque"] = np.where(skids, np.nan, torque)
-            columns["longitudinal"] = np.where(skids, cam.skid, self.inputs.longitudinal)
+            columns |= cam.free_rolling(self.inputs)
         return {n: np.broadcast_to(column, self.shape).ravel() for n, column in columns.items()}
 
     @cached_property
@@ -230,10 +225,7 @@ class WearProblem:
 
     @cached_property
     def stiffness(self) -> FloatArray:
-        """Loss of load per descent of the roller, shape (realisations,) [N/m].
-
-        Of a cam, shape (stations, 1, realisations).
-        """
+        """Loss of load per descent, shape (realisations,), or (stations, 1, 1) of a cam [N/m]."""
         if self.kinematics.cam is not None:
             return self.kinematics.cam.stiffness
         return np.array([load.stiffness for load in self.loads])
@@ -433,7 +425,4 @@ class WearProblem:
     def mean_over_turn(self, values: FloatArray) -> FloatArray:
         """Return the mean over the stations weighted by their time, first axis of length one."""
         cam = self.kinematics.cam
-        if cam is None:
-            return mean_along(values, axis=0)
-        share = cam.time_share.reshape(-1, *(1,) * (values.ndim - 1))
-        return np.asarray((share * values).sum(axis=0, keepdims=True))
+        return mean_along(values, axis=0) if cam is None else cam.mean_over_turn(values)

@@ -141,6 +141,20 @@ class CamStations:
             **{n: a if a.shape[2] == 1 else a[:, :, realisations] for n, a in columns}
         )
 
+    def free_rolling(self, inputs: ContactInputs) -> dict[str, FloatArray]:
+        """Return torque [N m] and creepage of free rollers; a torque of nan where they skid."""
+        skids = np.isfinite(self.skid)
+        torque = inputs.bearing_torque + self.inertia_torque
+        return {
+            "bearing_torque": np.where(skids, np.nan, torque),
+            "longitudinal": np.where(skids, self.skid, inputs.longitudinal),
+        }
+
+    def mean_over_turn(self, values: FloatArray) -> FloatArray:
+        """Return the mean weighted by the time at the stations, first axis of length one."""
+        share = self.time_share.reshape(-1, *(1,) * (values.ndim - 1))
+        return np.asarray((share * values).sum(axis=0, keepdims=True))
+
 
 @dataclass(frozen=True)
 class Kinematics:
@@ -164,6 +178,10 @@ class Kinematics:
     rolling_speed: float
     multiplicity: FloatArray
     cam: CamStations | None = None
+
+    def at(self, realisations: IntArray) -> Kinematics:
+        """Return the kinematics of some realisations, by number and in that order."""
+        return self if self.cam is None else replace(self, cam=self.cam.at(realisations))
 
     @cached_property
     def physical_rollers(self) -> float:

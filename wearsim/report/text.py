@@ -36,6 +36,9 @@ PER_SI = {
     "W/mm": 1e-3,
     "W/mm^2": 1e-6,
     "J": 1.0,
+    "deg": 180.0 / math.pi,
+    "N m": 1.0,
+    "rpm": 30.0 / math.pi,
 }
 NOTHING = "-"
 

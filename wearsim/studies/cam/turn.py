@@ -11,7 +11,6 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from wearsim.errors import Mistake, ScenarioError
-from wearsim.evolution.quantities import CamStations
 from wearsim.mechanics.cam import (
     Panel,
     RollerKinematics,
@@ -273,62 +272,6 @@ class CamTurn:
             slip = np.nan_to_num(self.slip(theta, middle))
             rows += [1.0 + self.torque(point) / most, slip]
         return np.stack(rows)
-
-    def station_values(
-        self, point: Point, weight: FloatArray, within: FloatArray | None = None
-    ) -> CamStations:
-        """Return the values of the stations for a wear problem.
-
-        Parameters
-        ----------
-        point : Point
-            State at the stations.
-        weight : ndarray, shape (stations,)
-            Angles that they represent [rad].
-        within : ndarray, shape (stations,), optional
-            As in `slip`.
-        """
-        found, count = point.kinematics, len(point.angle)
-        factor, rest = np.ones(count), np.zeros(count)
-        if self.load is not None:
-            lever = self.cam.follower.lever * np.cos(found.pressure_angle)
-            factor = np.where(point.inner, -1.0, 1.0) / lever
-            rest = point.normal_force - factor * self.load.preload
-        feedback = self.load is not None and self.load.feedback != "none"
-        side = np.sign(found.spin)
-        slip = self.slip(point.angle, within)
-        creepage = side * self.scenario.roller.radius * slip / found.travel
-        columns = {
-            "angle": point.angle,
-            "rolling_speed": self.speed * found.travel,
-            "longitudinal_curvature": found.relative_curvature,
-            "surface_curvature": np.where(point.inner, -1.0, 1.0) * found.curvature,
-            "length": weight * found.travel,
-            "time_share": weight / math.tau,
-            "load_factor": factor,
-            "load_rest": rest,
-            "stiffness": point.stiffness if feedback else np.zeros(count),
-            "inertia_torque": self.scenario.roller.inertia
-            * self.speed**2
-            * side
-            * found.spin_per_rad,
-            "skid": creepage,
-        }
-        return CamStations(**{name: np.array(a)[:, None, None] for name, a in columns.items()})
-
-    @property
-    def run_stations(self) -> CamStations:
-        """The stations of a run."""
-        stations = self.stations
-        middles = np.array([0.5 * (panel.start + panel.stop) for panel in stations.panels])
-        point = self.at_stations(stations)
-        return self.station_values(point, stations.weight, middles[stations.panel])
-
-    def stations_at(self, theta: FloatArray) -> CamStations:
-        """Return stations at given angles [rad], with equal weights."""
-        return self.station_values(
-            self.at_angles(theta), np.full(len(theta), math.tau / len(theta))
-        )
 
     def integral(self, quantity: str) -> float:
         """Return the integral of a quantity over the turn: "travel" or "load" (N ds)."""

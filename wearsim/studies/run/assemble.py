@@ -20,6 +20,7 @@ from wearsim.evolution.steppers.single_step import explicit_step
 from wearsim.evolution.steppers.stabilised import StabilisedStepper
 from wearsim.plugins import ContactModel
 from wearsim.scenario import Scenario
+from wearsim.studies.cam.stations import cam_stations
 from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.run.draws import Draws
 from wearsim.studies.run.grid import strips_of_run
@@ -245,8 +246,7 @@ def build_problem(
     count, values = len(rollers), contact_inputs(scenario, rollers, drawn)
     cam = None
     if scenario.cam is not None:
-        turn = turn_of(scenario)
-        cam = turn.run_stations if angles is None else turn.stations_at(angles)
+        cam = cam_stations(turn_of(scenario), angles)
     s, height = grid.y - values.pop("offset")[..., None], start_height(scenario, grid)
     gap = s * s / (2.0 * roller.crown_radius) - height
     if roller.width is not None:

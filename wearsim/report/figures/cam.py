@@ -1,0 +1,151 @@
+"""Figure of a cam before wear: motion, profile, kinematics, load and contact along the angle."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from wearsim.mechanics.cam import Motion, Stations
+from wearsim.report.parts import BLUE, GREEN, GREY, ORANGE, RED, name_axes, titled_figure
+from wearsim.report.text import PER_SI
+from wearsim.studies.cam.study import CamStudy
+from wearsim.studies.cam.turn import CamTurn, Point
+from wearsim.types import FloatArray
+
+MM, DEG = PER_SI["mm"], PER_SI["deg"]
+_SAMPLES = 121  # of a panel
+
+
+def cam_figure(study: CamStudy, title: str) -> Figure:
+    """Return the figure of a cam.
+
+    Parameters
+    ----------
+    study : CamStudy
+    title : str
+
+    Returns
+    -------
+    Figure
+        Five panels: the cam with its roller, the motion, pressure angle and curvature, speeds, and
+        normal force with peak pressure.
+    """
+    turn = study.turn
+    fine = turn.at_stations(Stations(turn.panels, (_SAMPLES,) * len(turn.panels)))
+    lift, unit = ("arm", "deg") if turn.cam.follower.swings else ("lift", "mm")
+    scale = PER_SI[unit]
+    found, angle = fine.kinematics, fine.angle * DEG
+    with titled_figure(12.0, 8.6, title) as figure:
+        panels = figure.subplot_mosaic(
+            [["shape", "motion"], ["shape", "pressure"], ["load", "speed"]],
+            width_ratios=[1.0, 1.25],
+        )
+        draw_shape(panels["shape"], turn, fine)
+        axes = panels["motion"]
+        axes.plot(angle, found.lift * scale, color=BLUE, label=f"{lift} [{unit}]")
+        axes.plot(angle, found.lift_per_rad * scale, color=ORANGE, label="velocity, per rad")
+        axes.plot(angle, found.lift_per_rad2 * scale, color=GREEN, label="acceleration, per rad^2")
+        name_axes(axes, "motion of the follower", "", f"[{unit}]")
+        axes.margins(y=0.18)
+        axes.legend(loc="upper right", ncols=3)
+        axes = panels["pressure"]
+        axes.plot(angle, found.pressure_angle * DEG, color=BLUE)
+        name_axes(axes, "pressure angle, and curvature of the cam", "", "pressure angle [deg]")
+        _second(axes, angle, found.curvature / MM, "curvature [1/mm]")
+        axes = panels["speed"]
+        axes.plot(angle, turn.speed * found.travel, color=BLUE)
+        name_axes(axes, "rolling speed, and roller/cam speed", "angle [deg]", "rolling speed [m/s]")
+        _second(axes, angle, found.spin, "roller/cam speed")
+        axes = panels["load"]
+        axes.plot(angle, fine.normal_force, color=BLUE)
+        axes.plot(study.point.angle * DEG, study.point.normal_force, ".", color=BLUE, ms=4.0)
+        name_axes(axes, "normal force, and peak pressure", "angle [deg]", "normal force [N]")
+        _second(
+            axes,
+            study.point.angle * DEG,
+            study.peak_pressure * PER_SI["MPa"],
+            "peak pressure [MPa]",
+        )
+        for name in ("motion", "pressure", "speed", "load"):
+            name_segments(panels[name], turn.cam.motion, names=name in {"motion", "load"})
+        for skid in study.skids:
+            for name in ("speed", "load"):
+                panels[name].axvspan(skid.start * DEG, skid.stop * DEG, color=RED, alpha=0.12, lw=0)
+    return figure
+
+
+def _second(axes: Axes, angle: FloatArray, values: FloatArray, label: str) -> None:
+    """Draw values on a second axis at the right."""
+    other = axes.twinx()
+    other.plot(angle, values, "." if len(angle) < _SAMPLES else "-", ms=4.0, color=ORANGE)
+    other.set_ylabel(label, color=ORANGE)
+    other.spines["right"].set_visible(True)
+    other.grid(visible=False)
+
+
+def name_segments(axes: Axes, motion: Motion, *, names: bool) -> None:
+    """Mark the segments of a turn on an axis of the angle in degrees, with their names."""
+    axes.set(xlim=(0.0, 360.0), xticks=np.arange(0.0, 361.0, 45.0))
+    for part, start, stop in zip(motion.segments, motion.starts, motion.starts[1:], strict=False):
+        axes.axvline(stop * DEG, color=GREY, lw=0.6, ls=":")
+        if names and stop - start > 0.15:
+            axes.text(
+                0.5 * (start + stop) * DEG,
+                0.02,
+                part.name,
+                transform=axes.get_xaxis_transform(),
+                ha="center",
+                va="bottom",
+                fontsize=7.0,
+                color=GREY,
+            )
+
+
+def roller_centres(turn: CamTurn, point: Point) -> FloatArray:
+    """Return the roller's centre in the cam, (2, points), by the angles against its turn [m]."""
+    follower = turn.cam.follower
+    position = follower.rest + point.kinematics.lift
+    if follower.swings:
+        c, arm = follower.centre_distance, follower.arm_length
+        x, y = c - arm * np.cos(position), arm * np.sin(position)
+        radius, turned = np.hypot(x, y), np.arctan2(y, x)
+        angle = point.angle + (turned if follower.towards else -turned)
+    else:
+        radius = np.hypot(position, follower.offset)
+        angle = point.angle + np.arcsin(follower.offset / radius)
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle)])
+
+
+def surface_points(turn: CamTurn, point: Point, depth: FloatArray | float = 0.0) -> FloatArray:
+    """Return points of the cam's surface worn by a depth, shape (2, points) [m].
+
+    The polar angle of a point is about the angle of the cam at which it passes the roller.
+    """
+    centre = roller_centres(turn, point)
+    direction = np.gradient(centre, axis=1)
+    size = np.hypot(*direction)
+    moves = size > 0.0
+    direction = direction[:, moves] / size[moves]
+    normal = np.stack([direction[1], -direction[0]])
+    side = np.where(point.inner, -1.0, 1.0)[moves]
+    worn = np.broadcast_to(depth, moves.shape)[moves]
+    radius = side * turn.scenario.roller.radius + worn
+    return np.asarray(centre[:, moves] - radius * normal)
+
+
+def draw_shape(axes: Axes, turn: CamTurn, point: Point) -> None:
+    """Draw the cam, its pitch curve and the roller at the start of the turn."""
+    radius = turn.scenario.roller.radius
+    centre, surface = roller_centres(turn, point), surface_points(turn, point)
+    axes.plot(*(surface * MM), color=BLUE, lw=1.6, label="cam")
+    axes.plot(*(centre * MM), color=GREY, lw=0.8, ls="--", label="pitch curve")
+    around = np.linspace(0.0, 2.0 * np.pi, 181)
+    roller = centre[:, :1] + radius * np.stack([np.cos(around), np.sin(around)])
+    axes.plot(*(roller * MM), color=ORANGE, lw=1.2, label="roller at 0 deg")
+    base = turn.cam.base_radius * np.stack([np.cos(around), np.sin(around)])
+    axes.plot(*(base * MM), color=GREY, lw=0.6, ls=":", label="base circle")
+    axes.plot(0.0, 0.0, "+", color="black", ms=8.0)
+    axes.set_aspect("equal")
+    axes.legend(loc="upper left")
+    name_axes(axes, "cam", "x [mm]", "y [mm]")

@@ -1,0 +1,57 @@
+"""Stations of a wear problem along the angle of a cam."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from wearsim.evolution.quantities import CamStations
+from wearsim.studies.cam.turn import CamTurn, Point
+from wearsim.types import FloatArray
+
+
+def cam_stations(turn: CamTurn, theta: FloatArray | None = None) -> CamStations:
+    """Return the stations of a run, or stations of equal weight at given angles.
+
+    Parameters
+    ----------
+    turn : CamTurn
+    theta : ndarray, shape (stations,), optional
+        Angles [rad].
+    """
+    if theta is not None:
+        weight = np.full(len(theta), math.tau / len(theta))
+        return _values(turn, turn.at_angles(theta), weight, None)
+    stations = turn.stations
+    middles = np.array([0.5 * (panel.start + panel.stop) for panel in stations.panels])
+    point = turn.at_stations(stations)
+    return _values(turn, point, stations.weight, middles[stations.panel])
+
+
+def _values(
+    turn: CamTurn, point: Point, weight: FloatArray, within: FloatArray | None
+) -> CamStations:
+    """Return the values at points with weights [rad]; `within` as in `CamTurn.slip`."""
+    found, count, roller = point.kinematics, len(point.angle), turn.scenario.roller
+    factor, rest = np.ones(count), np.zeros(count)
+    if turn.load is not None:
+        lever = turn.cam.follower.lever * np.cos(found.pressure_angle)
+        factor = np.where(point.inner, -1.0, 1.0) / lever
+        rest = point.normal_force - factor * turn.load.preload
+    feedback = turn.load is not None and turn.load.feedback != "none"
+    side = np.sign(found.spin)
+    columns = {
+        "angle": point.angle,
+        "rolling_speed": turn.speed * found.travel,
+        "longitudinal_curvature": found.relative_curvature,
+        "surface_curvature": np.where(point.inner, -1.0, 1.0) * found.curvature,
+        "length": weight * found.travel,
+        "time_share": weight / math.tau,
+        "load_factor": factor,
+        "load_rest": rest,
+        "stiffness": point.stiffness if feedback else np.zeros(count),
+        "inertia_torque": roller.inertia * turn.speed**2 * side * found.spin_per_rad,
+        "skid": side * roller.radius * turn.slip(point.angle, within) / found.travel,
+    }
+    return CamStations(**{name: np.array(a)[:, None, None] for name, a in columns.items()})

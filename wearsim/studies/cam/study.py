@@ -1,0 +1,259 @@
+"""Study of a cam before wear: motion, loads and contact along the angle."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+
+from wearsim.contact_batch import ContactBatchSolution
+from wearsim.evolution.problem import WearProblem
+from wearsim.evolution.state import unworn_contacts
+from wearsim.mechanics.cam import Panel, extreme
+from wearsim.scenario import Scenario, as_scenario
+from wearsim.studies.cam.turn import SHARP, STEEP, CamTurn, Point, turn_of
+from wearsim.studies.run.assemble import build_problem, prepared_model
+from wearsim.studies.run.grid import contact_grid, fresh_patch
+from wearsim.types import FloatArray
+
+HARMONIC_DEPTH = 50e-6  # m, worn depth at which the harmonic limit is given
+FEWEST_SWEEPS = 10.0  # of the contact around the roller in a life, below which it wears unevenly
+_MOST_TEETH = 12  # greatest denominator of a ratio at which the same points of the roller meet
+
+
+@dataclass(frozen=True)
+class Skid:
+    """Arc in which a free roller skids: its ends [rad] and dissipated energy per turn [J]."""
+
+    start: float
+    stop: float
+    energy: float
+
+
+@dataclass(frozen=True, eq=False)
+class CamStudy:
+    """Motion, loads and fresh contact of a cam.
+
+    Parameters
+    ----------
+    turn : CamTurn
+        The turn, which gives the state at any angle.
+    point : Point
+        State at the stations, arrays of shape (stations,).
+    weight : ndarray, shape (stations,), optional
+        Angles that the stations of a run represent [rad]; None for chosen angles.
+    contacts : ContactBatchSolution
+        Fresh contact at the stations, on the strips of the contact model.
+    peak_pressure, patch_length, patch_width : ndarray, shape (stations,)
+        Of the fresh contact after Hertz [Pa], [m].
+    perimeter : float
+        Length of the cam's surface [m].
+    load_integral : float
+        Integral of N ds over a turn [N m].
+    max_pressure_angle : tuple of float
+        Greatest pressure angle, and the angle of the cam there [rad].
+    min_radius_of_curvature : float, optional
+        Least radius of the convex parts of the cam [m]; None without any.
+    harmonic_limit : float, optional
+        Harmonic of the worn depth up to which wear is stable with the inertia of the follower.
+    jump_speed : float, optional
+        Speed at which the follower jumps [rad/s].
+    winding_number : float
+        Length of the cam's surface over that of the roller.
+    winding_ratio : tuple of int
+        Nearest ratio of small numbers.
+    sweeps : float, optional
+        Times that the contact moves around the roller in a life beyond that ratio.
+    skids : tuple of Skid
+        Arcs in which a free roller skids.
+    warnings : tuple of str
+    """
+
+    turn: CamTurn
+    point: Point
+    weight: FloatArray | None
+    contacts: ContactBatchSolution
+    peak_pressure: FloatArray
+    patch_length: FloatArray
+    patch_width: FloatArray
+    perimeter: float
+    load_integral: float
+    max_pressure_angle: tuple[float, float]
+    min_radius_of_curvature: float | None
+    harmonic_limit: float | None
+    jump_speed: float | None
+    winding_number: float
+    winding_ratio: tuple[int, int]
+    sweeps: float | None
+    skids: tuple[Skid, ...]
+    warnings: tuple[str, ...]
+
+
+def study_cam(scenario: Scenario | str | Path, angles: FloatArray | None = None) -> CamStudy:
+    """Return motion, loads and fresh contact of a scenario's cam.
+
+    Parameters
+    ----------
+    scenario : Scenario or path
+        A scenario with a cam, or its file.
+    angles : ndarray, shape (points,), optional
+        Angles of the cam, instead of the stations of a run [rad].
+
+    Raises
+    ------
+    ScenarioError
+        If there is no cam, it is undercut, the follower jumps or the roller cannot roll.
+    ContactError
+        If a contact has no solution.
+
+    Examples
+    --------
+    >>> from wearsim.scenario.examples import shipped_scenario
+    >>> study = study_cam(shipped_scenario("cam-eccentric"), np.radians([0.0, 60.0]))
+    >>> print([f"{force:.6f} N" for force in study.point.normal_force])
+    ['319.538258 N', '325.782926 N']
+    """
+    scenario = as_scenario(scenario)
+    turn = turn_of(scenario)
+    weight = None
+    if angles is None:
+        point, weight = turn.at_stations(turn.stations), turn.stations.weight
+    else:
+        point = turn.at_angles(np.asarray(angles, dtype=np.float64))
+    patches = [
+        fresh_patch(scenario, force, curvature)
+        for force, curvature in zip(
+            point.normal_force.tolist(), point.kinematics.relative_curvature.tolist(), strict=True
+        )
+    ]
+    problem = _fresh_problem(scenario, turn, angles)
+    contacts = problem.model.solve(unworn_contacts(problem))
+    panels = turn.panels
+    steepest = extreme(panels, lambda p, x: np.abs(turn.at(p, x).kinematics.pressure_angle))
+    sharpest, _ = extreme(panels, lambda p, x: turn.at(p, x).kinematics.curvature)
+    perimeter = turn.integral("travel")
+    winding = perimeter / (math.tau * scenario.roller.radius)
+    ratio = Fraction(winding).limit_denominator(_MOST_TEETH)
+    sweeps = None
+    if scenario.has_length:
+        creep = np.asarray(contacts.longitudinal_creepage)
+        share = np.full(len(creep), 1.0 / len(creep)) if weight is None else weight / math.tau
+        drift = abs(winding * (1.0 - float(share @ creep)) - float(ratio))
+        sweeps = drift * scenario.total_passes / scenario.operation.rollers
+    skids = _skids(turn)
+    return CamStudy(
+        turn,
+        point,
+        weight,
+        contacts,
+        np.array([patch.peak_pressure for patch in patches]),
+        np.array([2.0 * patch.a for patch in patches]),
+        np.array([2.0 * patch.b for patch in patches]),
+        perimeter,
+        turn.integral("load"),
+        steepest,
+        1.0 / sharpest if sharpest > 0.0 else None,
+        harmonic_limit(turn, HARMONIC_DEPTH),
+        _jump_speed(turn),
+        winding,
+        (ratio.numerator, ratio.denominator),
+        sweeps,
+        skids,
+        tuple(cam_warnings(turn, skids, sweeps)),
+    )
+
+
+def _fresh_problem(scenario: Scenario, turn: CamTurn, angles: FloatArray | None) -> WearProblem:
+    grid = contact_grid(scenario, turn.normal_range[1])
+    return build_problem(scenario, prepared_model(scenario, grid), grid, {}, angles=angles)
+
+
+def harmonic_limit(turn: CamTurn, depth: float) -> float | None:
+    """Return the harmonic up to which a worn depth is stable; None without inertia.
+
+    A harmonic h of the depth d grows as exp(d (m omega^2 h^2 - k)/N), which is real below
+    h* = sqrt((N/d + k)/(m omega^2)), with the least N of the turn.
+
+    Parameters
+    ----------
+    turn : CamTurn
+    depth : float
+        Worn depth d [m].
+    """
+    lever, cam = turn.cam.follower.lever, turn.cam
+    inertia = cam.inertia / lever**2 * turn.speed**2
+    if inertia == 0.0 or turn.load is None:
+        return None
+    least = max(turn.normal_range[0], 0.0)
+    return math.sqrt((least / depth + turn.load.spring / lever**2) / inertia)
+
+
+def _jump_speed(turn: CamTurn) -> float | None:
+    """Return the speed at which the normal force falls to zero, if there is any [rad/s]."""
+    load, cam = turn.load, turn.cam
+    if load is None or cam.inertia == 0.0 or cam.groove:
+        return None
+
+    def ratio(panel: Panel, theta: FloatArray) -> FloatArray:
+        lift = cam.motion.lift_in(panel.segment, theta)
+        static = load.preload + load.spring * lift[0] + load.external(theta)
+        return np.asarray(-cam.inertia * lift[2] / static)
+
+    greatest, _ = extreme(turn.panels, ratio)
+    return 1.0 / math.sqrt(greatest) if greatest > 0.0 else None
+
+
+def _skids(turn: CamTurn) -> tuple[Skid, ...]:
+    """Return the skids with their energies, the sums over the stations of a run."""
+    if not turn.arcs:
+        return ()
+    stations, scenario = turn.stations, turn.scenario
+    point = turn.at_stations(stations)
+    middles = np.array([0.5 * (panel.start + panel.stop) for panel in stations.panels])
+    within = middles[stations.panel]
+    slip = np.nan_to_num(np.abs(turn.slip(point.angle, within)))
+    power = scenario.friction.coefficient * point.normal_force * scenario.roller.radius * slip
+    found: list[Skid] = []
+    for arc in turn.arcs:
+        start, stop = float(arc.theta[0]), float(arc.theta[-1])
+        inside = (within > start) & (within < stop)
+        energy = float((stations.weight * power)[inside].sum())
+        if found and abs(found[-1].stop - start) < 1e-12:
+            energy, start = energy + found[-1].energy, found.pop().start
+        found.append(Skid(start, stop, energy))
+    return tuple(found)
+
+
+def cam_warnings(
+    turn: CamTurn, skids: tuple[Skid, ...] = (), sweeps: float | None = None
+) -> list[str]:
+    """Return warnings of a steep pressure angle, a sharp cam, skids and uneven roller wear."""
+    follower, panels, found = turn.cam.follower, turn.panels, []
+    limit = STEEP[follower.kind]
+    angle, theta = extreme(panels, lambda p, x: np.abs(turn.at(p, x).kinematics.pressure_angle))
+    if angle > limit:
+        found.append(
+            f"cam: the pressure angle reaches {math.degrees(angle):.4g} deg at"
+            f" {turn.place(theta)}, more than {math.degrees(limit):g} deg"
+        )
+    radius = turn.scenario.roller.radius
+    sharp, theta = extreme(panels, lambda p, x: turn.at(p, x).kinematics.pitch_curvature)
+    if sharp * SHARP * radius > 1.0:
+        found.append(
+            f"cam: the radius of the pitch curve falls to {1e3 / sharp:.4g} mm at"
+            f" {turn.place(theta)}, less than twice the roller's {1e3 * radius:.6g} mm"
+        )
+    found += [
+        f"roller: it skids from {math.degrees(skid.start):.4g} to {math.degrees(skid.stop):.4g} deg"
+        f" and dissipates {skid.energy:.4g} J per turn"
+        for skid in skids
+    ]
+    if sweeps is not None and sweeps < FEWEST_SWEEPS:
+        found.append(
+            f"roller: the contact moves around it only {sweeps:.3g} times in a life; it may wear"
+            " unevenly, while even wear is assumed"
+        )
+    return found
