@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import math
 import re
 import tomllib
 from pathlib import Path
@@ -23,13 +24,25 @@ FILES = {
     "profile.csv": PROFILE,
     **{f"map.sdf#{rows}": PROFILE for rows in ("row=3", "mean_rows=[0, 10]", 'at="2 mm"')},
     "log.csv": "time [min], load [N]\n0, 300\n450, 310\n",
+    "force.csv": "angle [deg], force [N]\n0, 10\n90, 20\n180, 10\n270, 0\n",
+    "lift.csv": "angle [deg], lift [mm]\n"
+    + "".join(f"{a}, {math.cos(math.radians(a))}\n" for a in range(0, 360, 10)),
+    "cam.csv": "angle [deg], radius [mm]\n" + "".join(f"{a}, 25\n" for a in range(0, 360, 10)),
 }
 
 
-def alternatives() -> list[tuple[str, str, str]]:
-    """Return table, line and remark of every alternative in the starter scenario."""
+STARTERS = ("starter", "starter_cam")
+
+
+def alternatives() -> list[tuple[str, str, str, str]]:
+    """Return starter, table, line and remark of every alternative in the starter scenarios."""
+    return [(name, *item) for name in STARTERS for item in alternatives_of(name)]
+
+
+def alternatives_of(name: str) -> list[tuple[str, str, str]]:
+    """Return table, line and remark of every alternative in a starter scenario."""
     found, table = [], ""
-    for line in starter_scenario().splitlines():
+    for line in starter_scenario(name).splitlines():
         if line.startswith("["):
             table = line[1 : line.index("]")]
         parts = re.fullmatch(r"# (\w+ = [^#]*?)\s*(#.*)?", line)
@@ -38,14 +51,15 @@ def alternatives() -> list[tuple[str, str, str]]:
     return found
 
 
-def with_alternative(table: str, line: str, remark: str) -> str:
-    """Return the starter scenario with one alternative applied according to its remark."""
+def with_alternative(name: str, table: str, line: str, remark: str) -> str:
+    """Return a starter scenario with one alternative applied according to its remark."""
     replaced = re.findall(r"instead of (\w+)", remark)
     companions = re.findall(r'with (\w+ = "[^"]+")', remark)
     added = [line, *companions]
     removed = {*replaced, *(item.split(" = ")[0] for item in added)}
     lines, here = [], ""
-    for text in starter_scenario().splitlines():
+    multiline = re.sub(r"\[\n(.*?)\n\]", _on_one_line, starter_scenario(name), flags=re.DOTALL)
+    for text in multiline.splitlines():
         if text.startswith("["):
             here = text[1 : text.index("]")]
             lines.append(text)
@@ -53,6 +67,10 @@ def with_alternative(table: str, line: str, remark: str) -> str:
         elif here != table or text.split(" = ")[0] not in removed:
             lines.append(text)
     return "\n".join(lines)
+
+
+def _on_one_line(found: re.Match[str]) -> str:
+    return f"[{' '.join(found[1].split())}]"
 
 
 def test_new_scenario_runs_unchanged(command: Command) -> None:
@@ -102,19 +120,24 @@ def test_unwritable_files_are_reported(command: Command) -> None:
 
 
 def test_starter_scenario_shows_every_key() -> None:
-    text = starter_scenario()
-    sections = dict(zip(*[iter(re.split(r"^\[(\w+)\]", text, flags=re.M)[1:])] * 2, strict=True))
+    sections: dict[str, str] = {}
+    for name in STARTERS:
+        parts = iter(re.split(r"^\[(\w+)\]", starter_scenario(name), flags=re.M)[1:])
+        for table, text in zip(*[parts] * 2, strict=True):
+            sections[table] = sections.get(table, "") + text
     assert set(sections) == set(TABLES)
     for table, model in TABLES.items():
         shown = set(re.findall(r"^(?:# )?(\w+)(?:\.\w+)? = ", sections[table], flags=re.M))
+        if table == "follower":  # those of a swinging arm are in words
+            shown |= set(re.findall(r"\w+", sections[table]))
         assert set(model.model_fields) <= shown, table
 
 
-@pytest.mark.parametrize(("table", "line", "remark"), alternatives())
+@pytest.mark.parametrize(("name", "table", "line", "remark"), alternatives())
 def test_every_alternative_of_the_starter_scenario_is_valid(
-    table: str, line: str, remark: str
+    name: str, table: str, line: str, remark: str
 ) -> None:
-    text = with_alternative(table, line, remark)
+    text = with_alternative(name, table, line, remark)
     key, value = next(iter(tomllib.loads(line).items()))
     assert tomllib.loads(text)[table][key] == value
     parse_scenario(text, "new.toml", FILES.__getitem__)

@@ -32,7 +32,9 @@ def test_built_in_plugins_use_the_same_hooks(install):
     plugins = registry()
     assert plugins.names(ContactModelSpec) == ["hertz", "hertz-fastsim", "semi-hertzian", "slender"]
     assert plugins.names(WearLawSpec) == ["archard-dissipation", "t-gamma"]
-    assert plugins.names(LoadSpec) == ["constant", "recorded", "spring", "thermal"]
+    assert plugins.names(LoadSpec) == [
+        *("constant", "follower", "follower-arm", "recorded", "spring", "thermal")
+    ]
     assert {item.distribution for item in plugins.all()} == {"wearsim"}
     assert all(item.spec.summary for item in plugins.all())
     assert not plugins.broken

@@ -25,7 +25,7 @@ rig.toml: [roller] radius: needs a unit, got 20, expected a length above zero su
 rig.toml: [roller] diameter: wrong dimension, got "20 MPa" (a pressure), expected a length above zero such as "20 mm"
 rig.toml: [roller] radus: unknown key (did you mean 'radius'?)
 rig.toml: [roller] speed: unknown key (it belongs in [operation])
-rig.toml: [roller] foo: unknown key (known here: chamfer, chamfer_angle, crown_diameter, crown_radius, diameter, edge_radius, material, offset, radius, width)""",
+rig.toml: [roller] foo: unknown key (known here: chamfer, chamfer_angle, crown_diameter, crown_radius, diameter, edge_radius, inertia, material, offset, radius, width)""",
     ),
     "no radius": (
         'radius = "20 mm"\ncrown_radius = "500 mm"\n',
@@ -109,7 +109,7 @@ rig.toml: [cylinder.material] poison_ratio: unknown key (did you mean 'poisson_r
         'duration = "450 min"',
         'duration = 07:30:00\npasses = "many"',
         """\
-rig.toml: [operation] duration or passes: exactly one is needed, got duration and passes
+rig.toml: [operation] duration or passes or turns: exactly one is needed, got duration and passes
 rig.toml: [operation] duration: ':30:00' is not a unit, got "07:30:00", expected a time above zero such as "450 min"
 rig.toml: [operation] passes: is not a whole number, got "many", expected a whole number above 0""",
     ),

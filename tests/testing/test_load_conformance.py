@@ -13,9 +13,14 @@ from wearsim.testing.wear_and_loads import LOADS, LoadFixture
 
 LOG = "time [min], load [N]\n0, 300\n5, 320\n7, 280\n60, 305\n"
 PAUSED = "time [min], load [N]\n0, 0\n5, 0\n7, 280\n20, 290\n21, 0\n30, 0\n40, 10\n60, 305\n"
+FORCE = {"f.csv": "angle [deg], force [N]\n0, 10\n90, 20\n180, 10\n270, 0\n"}
 TESTED = {
     "constant": [({"normal_force": "300 N"}, {})],
     "spring": [({"normal_force": "300 N", "stiffness": "690 N/mm"}, {})],
+    "follower": [
+        ({"preload": "300 N", "stiffness": "5 N/mm", "external": "f.csv"}, {"files": FORCE})
+    ],
+    "follower-arm": [({"preload": "24 N m", "stiffness": "32 N m/rad"}, {})],
     "recorded": [
         ({"file": "log.csv", "stiffness": "5 N/mm"}, {"files": {"log.csv": LOG}}),
         ({"file": "log.csv"}, {"files": {"log.csv": PAUSED}}),

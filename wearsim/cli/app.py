@@ -48,7 +48,7 @@ BUILT_IN = {
     "maxent": "Compute a maximum-entropy distribution from moments.",
     "plugins": "List contact models, wear laws, loads, random inputs and motion laws.",
     "schema": "Write the JSON Schema of a scenario, for editors.",
-    "new": "Create a new plugin or scenario.",
+    "new": "Create a new plugin, scenario or cam.",
 }
 #: modules in `wearsim.cli.commands` of the verbs that have not one of their name
 _MODULES = {

@@ -20,24 +20,18 @@ if TYPE_CHECKING:
 
 # One SI unit in each engineering unit.
 PER_SI = {
-    "1": 1.0,
+    **dict.fromkeys(("1", "m/s", "s", "N", "N m", "W", "J"), 1.0),
     "%": 1e2,
     "um": 1e6,
     "mm": 1e3,
     "mm^3": 1e9,
-    "m/s": 1.0,
-    "s": 1.0,
     "min": 1.0 / 60.0,
-    "N": 1.0,
     "N mm": 1e3,
     "N/mm": 1e-3,
     "MPa": 1e-6,
-    "W": 1.0,
     "W/mm": 1e-3,
     "W/mm^2": 1e-6,
-    "J": 1.0,
-    "deg": 180.0 / math.pi,
-    "N m": 1.0,
+    "deg": math.degrees(1.0),
     "rpm": 30.0 / math.pi,
 }
 NOTHING = "-"

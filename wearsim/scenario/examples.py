@@ -10,7 +10,7 @@ from pydantic import BaseModel, Field, RootModel, create_model
 from pydantic.json_schema import GenerateJsonSchema
 from pydantic_core import core_schema
 
-from wearsim.plugins import Options, RandomInputSpec
+from wearsim.plugins import MotionLawSpec, Options, RandomInputSpec
 from wearsim.scenario.parse.fields import (
     FRICTION,
     RandomInputTable,
@@ -21,6 +21,7 @@ from wearsim.scenario.parse.fields import (
 from wearsim.scenario.parse.mistakes import installed
 from wearsim.scenario.parse.toml import REQUIRED, TABLES
 from wearsim.scenario.scenario import Scenario, load_scenario
+from wearsim.scenario.tables.cam_motion import MotionTable
 from wearsim.scenario.tables.plain import TopTable
 from wearsim.scenario.tables.plugin import PLUGIN_TABLES
 
@@ -53,9 +54,9 @@ def shipped_scenario(name: str, overrides: Mapping[str, object] | None = None) -
     return load_scenario(folder / f"{name}.toml", overrides)
 
 
-def starter_scenario() -> str:
-    """Return the TOML of a complete scenario, with alternatives as comments."""
-    return Path(__file__).with_name("starter.toml").read_text(encoding="utf-8")
+def starter_scenario(name: Literal["starter", "starter_cam"] = "starter") -> str:
+    """Return the TOML of a complete scenario, of a cam if named so, with alternatives."""
+    return Path(__file__).with_name(f"{name}.toml").read_text(encoding="utf-8")
 
 
 Model: TypeAlias = type[BaseModel]
@@ -91,9 +92,17 @@ def scenario_schema() -> dict[str, Any]:
     random = _random_inputs()
     tables: dict[str, Any] = {}
     for table, model in TABLES.items():
+        own = _fields(model, table, random)
+        if table == "cam":
+            motion, laws = model.model_fields["motion"], _motion_laws()
+            described = Field(None, description=motion.description)
+            kind: Any = tuple[laws, ...]  # type: ignore[valid-type]
+            own |= {"motion": (kind, described)} if laws else {}
+            own = own if laws else {key: kept for key, kept in own.items() if key != "motion"}
         kind = _one_of(table, _choices(table, random) if table in PLUGIN_TABLES else [])
-        kind = kind or _model(table, model.__doc__, _fields(model, table, random))
-        tables[table] = kind, Field(... if table in REQUIRED else None, description=model.__doc__)
+        kind = kind or _model(table, model.__doc__, own)
+        needed = table in REQUIRED and table != "cylinder"  # a cam may replace it
+        tables[table] = kind, Field(... if needed else None, description=model.__doc__)
     scenario = _model(
         "wearsim scenario",
         "Scenario of a wear simulation of a rolling contact, for wearsim.",
@@ -103,6 +112,19 @@ def scenario_schema() -> dict[str, Any]:
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         **scenario.model_json_schema(schema_generator=_ScenarioSchema),
     }
+
+
+def _motion_laws() -> Any:
+    """Return the model of an entry of `cam.motion`, for each motion law."""
+    named = MotionTable.model_fields["law"]
+    models = []
+    for spec in installed(MotionLawSpec):
+        fields = {**_fields(MotionTable), **_fields(spec.options)}
+        fields["law"] = Literal[spec.name], Field(..., description=named.description)
+        if spec.rise != "required":
+            del fields["rise"]
+        models.append(_model(f"motion {spec.name}", spec.summary, fields))
+    return _one_of("MotionLaw", models)
 
 
 def _model(name: str, description: str | None, fields: dict[str, Any]) -> Model:

@@ -11,6 +11,7 @@ from wearsim.csv_tables import column_names
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.plugins import Load
 from wearsim.scenario import Cylinder, RandomInput, Scenario, described_model
+from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.contact.single import study_contact
 from wearsim.studies.plausibility import log_file, plausibility_warnings, range_90
 from wearsim.studies.run.assemble import assemble_problem
@@ -69,6 +70,7 @@ def dry_run(scenario: Scenario) -> Data:
             "offset_m": None if "roller.offset" in random else scenario.per_roller(roller.offset),
         },
         "cylinder": {"radius_m": cylinder.radius},
+        "cam": _cam(scenario),
         "profile": profile_data(cylinder, scenario.files),
         "contact_modulus_Pa": pair.contact_modulus,
         "shear_modulus_Pa": pair.shear_modulus,
@@ -77,6 +79,7 @@ def dry_run(scenario: Scenario) -> Data:
             "kind": scenario.load.kind,
             **fixed_load,
             "stiffness_N_per_m": load.stiffness,
+            "feedback": getattr(load, "feedback", None),
             "terms": [term.name for term in scenario.load.terms],
         },
         "log": _log(scenario, load),
@@ -106,6 +109,29 @@ def dry_run(scenario: Scenario) -> Data:
     else:
         data["strips"] = study_contact(scenario).grid.strips
     return data | {"notes": scenario.notes, "warnings": plausibility_warnings(scenario)}
+
+
+def _cam(scenario: Scenario) -> Data | None:
+    """Return the stations of a cam's run, if there is a cam."""
+    if (cam := scenario.cam) is None:
+        return None
+    turn = turn_of(scenario)
+    stations, motion = turn.stations, cam.motion
+    point = turn.at_stations(stations)
+    names = [motion.segments[stations.panels[k].segment].name for k in stations.panel]
+    return {
+        "base_radius_m": cam.base_radius,
+        "follower": cam.follower.kind,
+        "groove": cam.groove,
+        "stations": {
+            "segment": names,
+            "angle_rad": point.angle,
+            "weight_rad": stations.weight,
+            "rolling_speed_m_per_s": turn.speed * point.kinematics.travel,
+            "curvature_per_m": point.kinematics.curvature,
+            "normal_force_N": point.normal_force,
+        },
+    }
 
 
 def profile_data(cylinder: Cylinder, files: Mapping[str, str]) -> Data | None:
@@ -225,10 +251,10 @@ def plan(data: Data) -> TableRows:
     )
     return [
         ("roller", radii),
-        ("cylinder", f"radius {data['cylinder']['radius_m'] * 1e3:.6g} mm"),
+        _body_row(data),
         *profile_rows(data["profile"]),
         ("elasticity", moduli),
-        ("rolling speed", f"{data['rolling_speed_m_per_s']:.4g} m/s"),
+        ("rolling speed", _speed_text(data)),
         ("load", _load_text(data["load"])),
         *_log_rows(data["log"]),
         *([("friction", f"{data['friction']:.4g}")] if "friction" in data else []),
@@ -238,6 +264,36 @@ def plan(data: Data) -> TableRows:
         ("initial patch (Hertz)", size),
         *_test_rows(data),
     ]
+
+
+def _body_row(data: Data) -> tuple[str, str]:
+    """Return the row of the cylinder or the cam."""
+    cam = data["cam"]
+    if cam is None:
+        return "cylinder", f"radius {data['cylinder']['radius_m'] * 1e3:.6g} mm"
+    kind = f"{cam['follower']} follower" + (" in a groove" if cam["groove"] else "")
+    count, radius = len(cam["stations"]["angle_rad"]), cam["base_radius_m"]
+    return "cam", f"base radius {radius * 1e3:.6g} mm, {kind}, {count} stations"
+
+
+def _speed_text(data: Data) -> str:
+    if data["cam"] is None:
+        return f"{data['rolling_speed_m_per_s']:.4g} m/s"
+    speeds = data["cam"]["stations"]["rolling_speed_m_per_s"]
+    return _range((speeds.min(), speeds.max()), "m/s", 1.0)
+
+
+def station_table(data: Data) -> tuple[list[str], list[list[str]]] | None:
+    """Return heads and rows of the table of a cam's stations, in engineering units."""
+    stations = (data["cam"] or {}).get("stations")
+    if stations is None:
+        return None
+    heads = ["angle [deg]", "weight [deg]", "V [m/s]", "curvature [1/mm]", "N [N]"]
+    sizes = [np.degrees(1.0), np.degrees(1.0), 1.0, 1e-3, 1.0]
+    columns = [values * size for values, size in zip([*stations.values()][1:], sizes, strict=True)]
+    rows = [[f"{value:.4g}" for value in row] for row in zip(*columns, strict=True)]
+    named = [[*row, name] for row, name in zip(rows, stations["segment"], strict=True)]
+    return [*heads, "segment"], named
 
 
 def _range(bounds: Sequence[float], unit: str, size: float) -> str:
@@ -267,6 +323,8 @@ def _load_text(load: Data) -> str:
         text += f", {low:.4g} N" if low == high else f", {low:.4g} to {high:.4g} N"
     if load["stiffness_N_per_m"] > 0.0:
         text += f", less {load['stiffness_N_per_m'] / 1e3:.4g} N/mm of descent"
+    if load["feedback"] is not None:
+        text += f", feedback {load['feedback']}"
     return text + "".join(f", plus {term}" for term in load["terms"])
 
 

@@ -7,10 +7,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from wearsim.mechanics.hertz.elasticity import combine
-from wearsim.models.loads import gap_text
+from wearsim.models.loads import FollowerLoad, gap_text
 from wearsim.plugins import Load
 from wearsim.quantities import InputFile
 from wearsim.scenario import RandomInput, Scenario
+from wearsim.studies.cam.checks import cam_warnings, skids_of
+from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.run.grid import fresh_patch
 from wearsim.studies.run.roller_ends import (
     LEAST_PER_EDGE,
@@ -57,6 +59,7 @@ def plausibility_warnings(scenario: Scenario) -> list[str]:
         *_of_slip(scenario),
         *_of_width(scenario, load),
         *_of_log(scenario, load),
+        *_of_cam(scenario),
     ]
 
 
@@ -68,6 +71,8 @@ def log_file(scenario: Scenario) -> str | None:
 
 def greatest_load(scenario: Scenario, load: Load) -> float:
     """Return the greatest load of the test, or of the start of a single contact [N]."""
+    if isinstance(load, FollowerLoad):
+        return turn_of(scenario).normal_range[1]
     return load.extremes(0.0, scenario.total_time if scenario.has_length else 0.0)[1]
 
 
@@ -148,6 +153,13 @@ def _of_edge(scenario: Scenario, force: float) -> Iterator[str]:
         f"roller.{key}: {shape}, which the strips do not resolve: the peak pressure at the ends of"
         " the roller depends on their number"
     )
+
+
+def _of_cam(scenario: Scenario) -> list[str]:
+    if scenario.cam is None:
+        return []
+    turn = turn_of(scenario)
+    return cam_warnings(turn, skids_of(turn))
 
 
 def _of_log(scenario: Scenario, load: Load) -> Iterator[str]:

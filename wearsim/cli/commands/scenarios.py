@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -27,7 +27,7 @@ def check(scenario: ScenarioFile, settings: Settings = None, json: Json = False)
     """Check a scenario: print all mistakes, or the inputs and a summary of the run."""
     loaded = read_scenario(scenario, settings)
     from wearsim.cli.progress import Display
-    from wearsim.studies.dry_run import dry_run, plan
+    from wearsim.studies.dry_run import dry_run, plan, station_table
     from wearsim.studies.kernels import kernels_of
 
     def kernels() -> set[str]:
@@ -39,6 +39,8 @@ def check(scenario: ScenarioFile, settings: Settings = None, json: Json = False)
         write_json(data)
         return
     write_table(f"ok: {loaded.title}", plan(data))
+    if stations := station_table(data):
+        write_list(*stations)
     write_notes(data["notes"], data["warnings"])
 
 
@@ -51,7 +53,7 @@ def schema() -> None:
 
 new = typer.Typer(
     name="new",
-    help="Create a new plugin or scenario.",
+    help="Create a new plugin, scenario or cam.",
     no_args_is_help=True,
     rich_markup_mode=None,
 )
@@ -98,6 +100,16 @@ def new_plugin(name: Name, directory: Directory = Path()) -> None:
 @new.command("scenario")
 def new_scenario(file: NewScenario = Path("scenario.toml"), force: Force = False) -> None:
     """Create a commented scenario that runs unchanged."""
+    _write_scenario("starter", file, force)
+
+
+@new.command("cam")
+def new_cam(file: NewScenario = Path("cam.toml"), force: Force = False) -> None:
+    """Create a commented scenario of a cam that runs unchanged."""
+    _write_scenario("starter_cam", file, force)
+
+
+def _write_scenario(name: Literal["starter", "starter_cam"], file: Path, force: bool) -> None:
     from wearsim.scenario.examples import starter_scenario
 
     try:
@@ -107,7 +119,7 @@ def new_scenario(file: NewScenario = Path("scenario.toml"), force: Force = False
         refuse_existing(file, force, "FILE")
         if not file.parent.is_dir():
             raise typer.BadParameter(f"folder {file.parent} does not exist", param_hint="FILE")
-        file.write_text(starter_scenario(), encoding="utf-8")
+        file.write_text(starter_scenario(name), encoding="utf-8")
     except OSError as error:
         raise _unwritable(error, file, "FILE") from error
     typer.echo(file)

@@ -132,9 +132,14 @@ def _from_law(mistakes: Mistakes, place: str, raw: dict[str, object], unit: str)
         mistakes.add(place, "rise", f"has no meaning with law = {shown(entry.law)}")
         return None
     try:
-        law = spec.factory(options, entry.angle, _rise(entry.rise, unit), unit)
+        rise = _rise(entry.rise, unit)
     except QuantityError as error:
-        mistakes.add(place, "rise" if error.got == shown(entry.rise) else "", *_parts(error))
+        mistakes.add(place, "rise", *_parts(error))
+        return None
+    try:
+        law = spec.factory(options, entry.angle, rise, unit)
+    except QuantityError as error:
+        mistakes.add(place, "", *_parts(error))
     except ScenarioError as error:
         mistakes.add_file(error, place, "file")
     except ValueError as error:

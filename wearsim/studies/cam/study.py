@@ -14,23 +14,14 @@ from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import unworn_contacts
 from wearsim.mechanics.cam import Panel, extreme
 from wearsim.scenario import Scenario, as_scenario
-from wearsim.studies.cam.turn import SHARP, STEEP, CamTurn, Point, turn_of
+from wearsim.studies.cam.checks import Skid, cam_warnings, skids_of
+from wearsim.studies.cam.turn import CamTurn, Point, turn_of
 from wearsim.studies.run.assemble import build_problem, prepared_model
 from wearsim.studies.run.grid import contact_grid, fresh_patch
 from wearsim.types import FloatArray
 
 HARMONIC_DEPTH = 50e-6  # m, worn depth at which the harmonic limit is given
-FEWEST_SWEEPS = 10.0  # of the contact around the roller in a life, below which it wears unevenly
 _MOST_TEETH = 12  # greatest denominator of a ratio at which the same points of the roller meet
-
-
-@dataclass(frozen=True)
-class Skid:
-    """Arc in which a free roller skids: its ends [rad] and dissipated energy per turn [J]."""
-
-    start: float
-    stop: float
-    energy: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +134,7 @@ def study_cam(scenario: Scenario | str | Path, angles: FloatArray | None = None)
         share = np.full(len(creep), 1.0 / len(creep)) if weight is None else weight / math.tau
         drift = abs(winding * (1.0 - float(share @ creep)) - float(ratio))
         sweeps = drift * scenario.total_passes / scenario.operation.rollers
-    skids = _skids(turn)
+    skids = skids_of(turn)
     return CamStudy(
         turn,
         point,
@@ -204,56 +195,3 @@ def _jump_speed(turn: CamTurn) -> float | None:
 
     greatest, _ = extreme(turn.panels, ratio)
     return 1.0 / math.sqrt(greatest) if greatest > 0.0 else None
-
-
-def _skids(turn: CamTurn) -> tuple[Skid, ...]:
-    """Return the skids with their energies, the sums over the stations of a run."""
-    if not turn.arcs:
-        return ()
-    stations, scenario = turn.stations, turn.scenario
-    point = turn.at_stations(stations)
-    middles = np.array([0.5 * (panel.start + panel.stop) for panel in stations.panels])
-    within = middles[stations.panel]
-    slip = np.nan_to_num(np.abs(turn.slip(point.angle, within)))
-    power = scenario.friction.coefficient * point.normal_force * scenario.roller.radius * slip
-    found: list[Skid] = []
-    for arc in turn.arcs:
-        start, stop = float(arc.theta[0]), float(arc.theta[-1])
-        inside = (within > start) & (within < stop)
-        energy = float((stations.weight * power)[inside].sum())
-        if found and abs(found[-1].stop - start) < 1e-12:
-            energy, start = energy + found[-1].energy, found.pop().start
-        found.append(Skid(start, stop, energy))
-    return tuple(found)
-
-
-def cam_warnings(
-    turn: CamTurn, skids: tuple[Skid, ...] = (), sweeps: float | None = None
-) -> list[str]:
-    """Return warnings of a steep pressure angle, a sharp cam, skids and uneven roller wear."""
-    follower, panels, found = turn.cam.follower, turn.panels, []
-    limit = STEEP[follower.kind]
-    angle, theta = extreme(panels, lambda p, x: np.abs(turn.at(p, x).kinematics.pressure_angle))
-    if angle > limit:
-        found.append(
-            f"cam: the pressure angle reaches {math.degrees(angle):.4g} deg at"
-            f" {turn.place(theta)}, more than {math.degrees(limit):g} deg"
-        )
-    radius = turn.scenario.roller.radius
-    sharp, theta = extreme(panels, lambda p, x: turn.at(p, x).kinematics.pitch_curvature)
-    if sharp * SHARP * radius > 1.0:
-        found.append(
-            f"cam: the radius of the pitch curve falls to {1e3 / sharp:.4g} mm at"
-            f" {turn.place(theta)}, less than twice the roller's {1e3 * radius:.6g} mm"
-        )
-    found += [
-        f"roller: it skids from {math.degrees(skid.start):.4g} to {math.degrees(skid.stop):.4g} deg"
-        f" and dissipates {skid.energy:.4g} J per turn"
-        for skid in skids
-    ]
-    if sweeps is not None and sweeps < FEWEST_SWEEPS:
-        found.append(
-            f"roller: the contact moves around it only {sweeps:.3g} times in a life; it may wear"
-            " unevenly, while even wear is assumed"
-        )
-    return found

@@ -240,6 +240,16 @@ class CamTurn:
         return -least, greatest
 
     @cached_property
+    def greatest_demand(self) -> float:
+        """Greatest traction of a rolling free roller, over that of friction; at most 1."""
+
+        def demand(panel: Panel, theta: FloatArray) -> FloatArray:
+            torque = np.abs(self.torque(self.at(panel, theta)))
+            return np.asarray(torque / self._greatest_torque(panel, theta))
+
+        return min(extreme(self.panels, demand)[0], 1.0)
+
+    @cached_property
     def greatest_skid(self) -> float:
         """Greatest creepage of a skid, 0 without any."""
         radius = self.scenario.roller.radius

@@ -177,13 +177,16 @@ def predicted_half_width(draws: Draws, load: float) -> float:
     law, patch, roller = scenario.wear.build(), fresh_patch(scenario, load), scenario.roller
     friction = draws.greatest_mean("friction", scenario.friction.coefficient)
     longitudinal = draws.greatest_mean("longitudinal", creepage.longitudinal or 0.0)
+    differs = creepage.drive == "free" or creepage.differential_slip
     if scenario.cam is not None:
-        longitudinal = max(longitudinal, turn_of(scenario).greatest_skid)
+        turn, differs = turn_of(scenario), creepage.differential_slip
+        saturation = friction * patch.a * turn.curvatures[1]
+        creep = saturation * turn.greatest_demand if turn.free else 0.0
+        longitudinal = max(longitudinal, creep, turn.greatest_skid)
     yaw, tilt = (
         max(abs(angle) for angle in (*draws.range_of(name), *scenario.per_roller(given)))
         for name, given in (("yaw", creepage.yaw), ("tilt", creepage.tilt))
     )
-    differs = creepage.drive == "free" or creepage.differential_slip
     curvature = 1.0 / roller.radius + 1.0 / scenario.cylinder.radius if differs else 0.0
     crown, profile = 2.0 * roller.crown_radius, scenario.cylinder.profile
     start = 0.0 if profile is None else float(np.ptp(profile.height))
