@@ -106,8 +106,8 @@ class CamStations:
 
     Parameters
     ----------
-    angle : ndarray
-        Angle of the cam [rad].
+    angle, segment : ndarray
+        Angle of the cam [rad], and number of the segment of its motion, from 1.
     rolling_speed, longitudinal_curvature, surface_curvature : ndarray
         Rolling velocity V [m/s], relative curvature along rolling and that of the cam [1/m].
     length, time_share : ndarray
@@ -120,9 +120,14 @@ class CamStations:
         Torque that accelerates a free roller, added to that of its bearing [N m].
     skid : ndarray
         Longitudinal creepage where a free roller skids; not a number where it rolls.
+    pressure_angle : ndarray
+        Angle between the common normal and the path of the roller's centre [rad].
+    between : ndarray, shape (points, stations)
+        Matrix that interpolates values of the stations along the angle.
     """
 
     angle: FloatArray
+    segment: FloatArray
     rolling_speed: FloatArray
     longitudinal_curvature: FloatArray
     surface_curvature: FloatArray
@@ -133,12 +138,14 @@ class CamStations:
     stiffness: FloatArray
     inertia_torque: FloatArray
     skid: FloatArray
+    pressure_angle: FloatArray
+    between: FloatArray
 
     def at(self, realisations: IntArray) -> CamStations:
         """Return the stations of some realisations, by number and in that order."""
         columns = ((item.name, getattr(self, item.name)) for item in fields(self))
         return CamStations(
-            **{n: a if a.shape[2] == 1 else a[:, :, realisations] for n, a in columns}
+            **{n: a[:, :, realisations] if a.shape[2:] > (1,) else a for n, a in columns}
         )
 
     def free_rolling(self, inputs: ContactInputs) -> dict[str, FloatArray]:

@@ -20,7 +20,7 @@ from wearsim.results.ensemble.result import EnsembleResult
 from wearsim.results.ensemble.schema import FAILED, OBSERVABLES, PENDING
 from wearsim.results.io.atomic_write import replacement
 from wearsim.results.run import Result, RunData
-from wearsim.results.run_schema import AXES, VARIABLES
+from wearsim.results.run_schema import ALL_VARIABLES, AXES
 from wearsim.types import FloatArray
 from wearsim.units import engineers_unit
 
@@ -237,7 +237,7 @@ def _run_tables(raw: RunData) -> dict[str, Iterable[str]]:
         del records["roller_depth_profiles.csv"]
     history = [
         column
-        for name, variable in VARIABLES.items()
+        for name, variable in raw.schema.variables.items()
         if variable.kind == "history"
         for column in _columns(name, raw.history[name], variable.dims, name)
     ]
@@ -248,7 +248,7 @@ def _run_tables(raw: RunData) -> dict[str, Iterable[str]]:
 def _records(raw: RunData, name: str) -> Iterator[Column]:
     """Yield y, and a column for every record and contact."""
     yield from _columns("y", raw.static["y"], ("y",), "y")
-    dims = ("y", *VARIABLES[name].dims[1:-1])
+    dims = ("y", *ALL_VARIABLES[name].dims[1:-1])
     quantity = "depth" if name.endswith("depth_profile") else name
     for passes, array in zip(raw.records["record_passes"], raw.records[name], strict=True):
         title = f"{quantity} at {passes:.12g} passes"
@@ -264,7 +264,7 @@ def _columns(name: str, array: FloatArray, dims: Sequence[str], title: str) -> I
             if length > 1
         ]
         values = array[(slice(None), *index)]
-        yield _column(" ".join([title, *labels]), values, _unit(name, VARIABLES[name].unit))
+        yield _column(" ".join([title, *labels]), values, _unit(name, ALL_VARIABLES[name].unit))
 
 
 def _study_tables(raw: DissipationData) -> dict[str, Iterable[str]]:

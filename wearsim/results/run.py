@@ -16,7 +16,7 @@ from wearsim.results.content import (
     StudyData,
     StudyResult,
 )
-from wearsim.results.run_schema import RUN, VARIABLES
+from wearsim.results.run_schema import CAM_RUN, RUN
 from wearsim.results.tables import as_frame
 from wearsim.types import FloatArray
 
@@ -77,7 +77,7 @@ class RunData(StudyData):
     @property
     def schema(self) -> Schema:
         """Schema of the results file."""
-        return RUN
+        return CAM_RUN if "station_angle" in self.static else RUN
 
     @property
     def variables(self) -> Arrays:
@@ -199,10 +199,11 @@ class Result(StudyResult[RunData]):
         >>> print(f"{result.values('half_length').max() * 1e3:.2f} mm")
         0.14 mm
         """
-        if name not in VARIABLES:
-            raise unknown_name(name, "a variable of a run", VARIABLES)
+        variables = self.raw.schema.variables
+        if name not in variables:
+            raise unknown_name(name, "a variable of a run", variables)
         array = self.raw.variables[name]
-        dims = zip(VARIABLES[name].dims, array.shape, strict=True)
+        dims = zip(variables[name].dims, array.shape, strict=True)
         return array.reshape([n for dim, n in dims if n != 1 or dim not in _DROPPED])
 
     def to_dataframe(self) -> pandas.DataFrame:
@@ -227,7 +228,7 @@ class Result(StudyResult[RunData]):
         """
         columns = [
             (name, item.unit, self.values(name))
-            for name, item in VARIABLES.items()
+            for name, item in self.raw.schema.variables.items()
             if item.kind == "history"
         ]
         return as_frame(columns, "step", range(len(self.passes)))
@@ -293,6 +294,7 @@ class Result(StudyResult[RunData]):
         )
         return {
             "passes": _number(last["passes"]),
+            **self._final_of_cam(last),
             "time_s": _number(last["time"]),
             "depth_m": _number(last["depth"]),
             **below_nominal,
@@ -313,6 +315,27 @@ class Result(StudyResult[RunData]):
             "relative_volume_error": _number(
                 _relative(last["volume_error"], last["worn_volume"] + rollers)
             ),
+        }
+
+    def _final_of_cam(self, last: Arrays) -> dict[str, Number]:
+        """Return the final state of a cam, and depth and lift error per station."""
+        if "turns" not in last:
+            return {}
+        curve = self.raw.records["lift_error_curve"][-1].mean(axis=(1, 2))
+        worst = self.raw.history["peak_pressure"][-1].argmax(axis=0)[None]
+        places = last["peak_pressure_angle"]
+        dwell = curve[int(np.argmax(self.raw.static["station_weight"]))]
+        return {
+            "turns": _number(last["turns"]),
+            "depth_angle_rad": _number(last["depth_angle"]),
+            "lift_error_m": _number(last["lift_error"].max(axis=0)),
+            "peak_pressure_angle_rad": _number(np.take_along_axis(places, worst, axis=0)),
+            "lift_error_greatest_at_rad": float(self.raw.static["station_angle"][curve.argmax()]),
+            "lift_error_smallest_at_rad": float(self.raw.static["station_angle"][curve.argmin()]),
+            "station_angle_rad": self.raw.static["station_angle"].tolist(),
+            "station_depth_m": last["station_depth"].mean(axis=-1).tolist(),
+            "station_lift_error_m": curve.tolist(),
+            "station_lift_error_from_dwell_m": (curve - dwell).tolist(),
         }
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from wearsim.results.content import Axis, Schema, Variable, by_name
 
@@ -122,4 +123,48 @@ VARIABLES: Mapping[str, Variable] = by_name(
     )
 )
 
+_CURVE = ("record", "station", "roller", "realisation")
+#: further variables of the run of a cam
+CAM_VARIABLES: Mapping[str, Variable] = by_name(
+    (
+        Variable("station_angle", ("station",), "rad", "angle of the cam at a station", "static"),
+        Variable(
+            "station_weight", ("station",), "rad", "angle that a station represents", "static"
+        ),
+        Variable(
+            "station_length",
+            ("station",),
+            "m",
+            "length of the cam's surface that a station represents",
+            "static",
+        ),
+        Variable(
+            "station_segment", ("station",), "1", "number of the segment of a station", "static"
+        ),
+        Variable("pressure_angle", ("station",), "rad", "pressure angle at a station", "static"),
+        Variable("turns", _STEP, "1", "turns of the cam", "history"),
+        Variable(
+            "station_depth",
+            ("step", "station", "realisation"),
+            "m",
+            "greatest depth of the cam at a station",
+            "history",
+        ),
+        Variable("depth_angle", _TEST, "rad", "angle of the greatest depth of the cam", "history"),
+        Variable(
+            "peak_pressure_angle", _ROLLER, "rad", "angle of the greatest peak pressure", "history"
+        ),
+        Variable(
+            "lift_error",
+            _ROLLER,
+            "m",
+            "greatest less smallest change of the lift by wear over the angle",
+            "history",
+        ),
+        Variable("lift_error_curve", _CURVE, "m", "change of the lift by wear", "record"),
+    )
+)
+ALL_VARIABLES: Mapping[str, Variable] = {**VARIABLES, **CAM_VARIABLES}
+
 RUN = Schema("wearsim-run", 4, "a wear test, from `wearsim run`", AXES, VARIABLES)
+CAM_RUN = replace(RUN, variables=ALL_VARIABLES)

@@ -9,6 +9,7 @@ import pytest
 from cam_text import cam, prescribed
 
 from wearsim.errors import ScenarioError
+from wearsim.scenario import Scenario
 from wearsim.studies.cam.checks import cam_warnings, skids_of
 from wearsim.studies.cam.stations import cam_stations
 from wearsim.studies.cam.study import study_cam

@@ -118,12 +118,18 @@ class Stations:
         angle : ndarray, shape (points,)
         values : ndarray, shape (points, ...)
         """
-        places, angles, found = np.linspace(0.0, 1.0, samples), [], []
-        for panel, number, first in zip(self.panels, self.numbers, self.first, strict=True):
-            matrix = interpolation(number, places)
-            angles.append(panel.start + (panel.stop - panel.start) * places)
-            found.append(np.tensordot(matrix, values[first : first + number], axes=1))
-        return np.concatenate(angles), np.concatenate(found)
+        places = np.linspace(0.0, 1.0, samples)
+        angles = [panel.start + (panel.stop - panel.start) * places for panel in self.panels]
+        return np.concatenate(angles), self.values_between(values, places)
+
+    def values_between(self, values: FloatArray, places: FloatArray) -> FloatArray:
+        """Return values at positions of every panel, from 0 to 1, (points, ...)."""
+        each = zip(self.numbers, self.first, strict=True)
+        parts = [
+            np.tensordot(interpolation(number, places), values[first : first + number], axes=1)
+            for number, first in each
+        ]
+        return np.concatenate(parts)
 
 
 def choose_stations(

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from wearsim.report.figures.cam_run import cam_run_figure
 from wearsim.report.figures.contact import dissipation_figure, draw_density
 from wearsim.report.figures.ensemble import draw_course, ensemble_figure
 from wearsim.report.figures.run import draw_worn_profiles, run_figure
@@ -29,6 +30,8 @@ def figure_of(
         return ensemble_figure(result, measured)
     if isinstance(result, DissipationResult):
         return dissipation_figure(result)
+    if "station_angle" in result.raw.static:
+        return cam_run_figure(result, tuple(measured))
     return run_figure(result, measured)
 
 

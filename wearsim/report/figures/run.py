@@ -51,23 +51,24 @@ def run_figure(result: Result, measured: Sequence[Measured] = ()) -> Figure:
         Four panels: profiles and dissipated power per length at records, depth against roller
         passes, normal force against time.
     """
-    with titled_figure(11.0, 7.6, f"{result.title}\n{_caption(result)}") as figure:
+    with titled_figure(11.0, 7.6, f"{result.title}\n{caption(result)}") as figure:
         panels = figure.subplot_mosaic(
             [["profiles", "depth"], ["dissipation", "load"]], width_ratios=[1.15, 1.0]
         )
-        colours = _Colours(result.record_passes)
+        colours = Colours(result.record_passes)
         _draw_profiles(panels["profiles"], result, colours, measured)
         _draw_dissipation(panels["dissipation"], result, colours)
         extent = _extent(result, [profile.y for profile in measured])
         for name in ("profiles", "dissipation"):
             panels[name].set_xlim(*extent)
         colours.draw_bar(figure, [panels["profiles"], panels["dissipation"]])
-        _draw_depth(panels["depth"], result)
+        draw_depth(panels["depth"], result)
         _draw_normal_force(panels["load"], result)
     return figure
 
 
-def _caption(result: Result) -> str:
+def caption(result: Result) -> str:
+    """Return passes, time, model, depth and width of a run in words."""
     depth = f"depth {shown(float(np.max(result.depth[-1])), 'um')}"
     if result.start_height.any():
         below = shown(float(np.max(result.depth_below_nominal[-1])), "um")
@@ -85,11 +86,11 @@ def _caption(result: Result) -> str:
 
 def draw_worn_profiles(axes: Axes, result: Result) -> None:
     """Draw the profiles of the cylinder at the records, from black at the start to the end."""
-    _draw_profiles(axes, result, _Colours(result.record_passes), ())
+    _draw_profiles(axes, result, Colours(result.record_passes), ())
     axes.set_xlim(*_extent(result, []))
 
 
-class _Colours:
+class Colours:
     """Drawn records and their colours, by roller passes; the start of the run is black."""
 
     def __init__(self, passes: FloatArray) -> None:
@@ -103,16 +104,18 @@ class _Colours:
         self._map = colormaps[RECORDS].reversed()
 
     def of(self, record: int) -> tuple[float, float, float, float] | str:
+        """Return the colour of a record."""
         passes = float(self._passes[record])
         return self._map(self._norm(passes)) if passes > 0.0 else "black"
 
     def draw_bar(self, figure: Figure, panels: list[Axes]) -> None:
+        """Draw the scale of the colours next to panels."""
         mapped = ScalarMappable(self._norm, self._map)
         figure.colorbar(mapped, ax=panels, label=self.name, aspect=45, pad=0.02)
 
 
 def _draw_profiles(
-    axes: Axes, result: Result, colours: _Colours, measured: Sequence[Measured]
+    axes: Axes, result: Result, colours: Colours, measured: Sequence[Measured]
 ) -> None:
     y = result.y * MM
     worn = np.asarray(result.profiles)
@@ -147,7 +150,8 @@ def _extent(result: Result, others: Sequence[FloatArray]) -> tuple[float, float]
     return min(ends) * MM, max(ends) * MM
 
 
-def _draw_depth(axes: Axes, result: Result) -> None:
+def draw_depth(axes: Axes, result: Result) -> None:
+    """Draw the depth against the roller passes, with its estimated error."""
     drawn, unit, name = set_depth_axes(axes, result.passes, result.depth)
     passes, depth, error = (
         values[drawn] for values in (result.passes, result.depth, result.depth_error)
@@ -173,7 +177,7 @@ def _draw_depth(axes: Axes, result: Result) -> None:
     axes.legend(loc="upper left")
 
 
-def _draw_dissipation(axes: Axes, result: Result, colours: _Colours) -> None:
+def _draw_dissipation(axes: Axes, result: Result, colours: Colours) -> None:
     y = result.y * MM
     power = np.asarray(result.dissipation) * W_MM
     power = power if power.ndim == 3 else power[:, None]  # (record, roller, strip)

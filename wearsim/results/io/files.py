@@ -30,7 +30,7 @@ from wearsim.results.dissipation import (
 from wearsim.results.ensemble.schema import ENSEMBLE
 from wearsim.results.io.atomic_write import DISK, Storage
 from wearsim.results.run import RunData
-from wearsim.results.run_schema import RUN
+from wearsim.results.run_schema import CAM_RUN, RUN
 
 if TYPE_CHECKING:
     import h5py
@@ -191,10 +191,12 @@ def format_of(file: h5py.File) -> str:
 
 def _run_data(path: str | Path, file: h5py.File) -> RunData:
     attributes = read_attributes(path, file, RUN, RunData)
-    variables = _variables(file, RUN)
+    schema = CAM_RUN if "station_angle" in file else RUN
+    check_complete(path, file, schema.variables)
+    variables = _variables(file, schema)
 
     def of_kind(kind: str) -> Arrays:
-        return {name: variables[name] for name, item in RUN.variables.items() if item.kind == kind}
+        return {n: variables[n] for n, item in schema.variables.items() if item.kind == kind}
 
     return RunData(
         **attributes,

@@ -10,6 +10,8 @@ from wearsim.evolution.quantities import CamStations
 from wearsim.studies.cam.turn import CamTurn, Point
 from wearsim.types import FloatArray
 
+_BETWEEN = 49  # points of a panel between its stations, for the lift error
+
 
 def cam_stations(turn: CamTurn, theta: FloatArray | None = None) -> CamStations:
     """Return the stations of a run, or stations of equal weight at given angles.
@@ -22,15 +24,25 @@ def cam_stations(turn: CamTurn, theta: FloatArray | None = None) -> CamStations:
     """
     if theta is not None:
         weight = np.full(len(theta), math.tau / len(theta))
-        return _values(turn, turn.at_angles(theta), weight, None)
+        segments = np.asarray(turn.cam.motion.segment_at(theta), dtype=np.float64)
+        return _values(turn, turn.at_angles(theta), weight, segments, None, np.eye(len(theta)))
     stations = turn.stations
     middles = np.array([0.5 * (panel.start + panel.stop) for panel in stations.panels])
     point = turn.at_stations(stations)
-    return _values(turn, point, stations.weight, middles[stations.panel])
+    between = stations.values_at(np.eye(stations.count), _BETWEEN)[1]
+    numbers = np.array([float(panel.segment) for panel in stations.panels])
+    segments = numbers[stations.panel]
+    within = middles[stations.panel]
+    return _values(turn, point, stations.weight, segments, within, between)
 
 
 def _values(
-    turn: CamTurn, point: Point, weight: FloatArray, within: FloatArray | None
+    turn: CamTurn,
+    point: Point,
+    weight: FloatArray,
+    segments: FloatArray,
+    within: FloatArray | None,
+    between: FloatArray,
 ) -> CamStations:
     """Return the values at points with weights [rad]; `within` as in `CamTurn.slip`."""
     found, count, roller = point.kinematics, len(point.angle), turn.scenario.roller
@@ -43,6 +55,7 @@ def _values(
     side = np.sign(found.spin)
     columns = {
         "angle": point.angle,
+        "segment": segments + 1.0,
         "rolling_speed": turn.speed * found.travel,
         "longitudinal_curvature": found.relative_curvature,
         "surface_curvature": np.where(point.inner, -1.0, 1.0) * found.curvature,
@@ -52,6 +65,8 @@ def _values(
         "load_rest": rest,
         "stiffness": point.stiffness if feedback else np.zeros(count),
         "inertia_torque": roller.inertia * turn.speed**2 * side * found.spin_per_rad,
+        "pressure_angle": found.pressure_angle,
         "skid": side * roller.radius * turn.slip(point.angle, within) / found.travel,
     }
-    return CamStations(**{name: np.array(a)[:, None, None] for name, a in columns.items()})
+    arrays = {name: np.array(a)[:, None, None] for name, a in columns.items()}
+    return CamStations(**arrays, between=between)

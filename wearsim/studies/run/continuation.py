@@ -11,7 +11,7 @@ from wearsim.errors import ResultsFileError
 from wearsim.evolution.limits import SAME_VALUE, Limit
 from wearsim.evolution.state import WearState, widened, widened_state
 from wearsim.results import RunData
-from wearsim.results.run_schema import VARIABLES
+from wearsim.results.run_schema import ALL_VARIABLES
 from wearsim.scenario import Scenario, parse_scenario
 from wearsim.studies.run.draws import Draws
 from wearsim.studies.run.grid import strips_of_run
@@ -33,7 +33,7 @@ def widened_run(draws: Draws, data: RunData, state: WearState) -> tuple[RunData,
     margin = spacing * np.arange(1, strips + 1)
     wider = np.concatenate([y[0] - margin[::-1], y, y[-1] + margin])
     records = {
-        name: widened(array, strips) if VARIABLES[name].dims[-1] == "y" else array
+        name: widened(array, strips) if ALL_VARIABLES[name].dims[-1] == "y" else array
         for name, array in data.records.items()
     }
     data = replace(data, static={**data.static, "y": wider}, records=records)

@@ -21,6 +21,7 @@ from wearsim.results import (
     write_results,
 )
 from wearsim.scenario import Scenario
+from wearsim.studies.cam.observables import station_columns
 from wearsim.studies.plausibility import plausibility_warnings
 from wearsim.studies.preparation import changed_origins, origin_of
 from wearsim.studies.run.assemble import assemble_problem, start_height
@@ -270,6 +271,7 @@ class RunInProgress:
                 ),
                 "start_height": start_height(scenario, problem.grid),
                 "multiplicity": kinematics.multiplicity,
+                **station_columns(problem),
             },
             history=self.recorder.history,
             records=self.recorder.records,

@@ -19,7 +19,8 @@ from wearsim.evolution.state import WearState, joined_states
 from wearsim.evolution.steppers.base import Stepper
 from wearsim.evolution.steppers.loads import descents, elastic_approaches
 from wearsim.evolution.steppers.single_step import present_problem, solve_at_record
-from wearsim.results.run_schema import VARIABLES
+from wearsim.results.run_schema import ALL_VARIABLES
+from wearsim.studies.cam.observables import cam_history, cam_record
 from wearsim.studies.run.schedule import RecordSchedule
 from wearsim.types import FloatArray
 
@@ -72,7 +73,7 @@ class Finished:
 
 Event: TypeAlias = Started | Stepped | Warned | Checkpointed | Finished
 Variables = dict[str, FloatArray]
-_WITHOUT_REALISATION = {n for n, item in VARIABLES.items() if "realisation" not in item.dims}
+_WITHOUT_REALISATION = {n for n, item in ALL_VARIABLES.items() if "realisation" not in item.dims}
 
 
 def present_contacts(
@@ -139,6 +140,7 @@ def history_row(
             for name in ("approach", "longitudinal_creepage", "adhesion_fraction")
         },
         **{n: problem.mean_over_turn(problem.per_roller(v))[0] for n, v in approach.items()},
+        **cam_history(problem, state),
     }
 
 
@@ -154,6 +156,7 @@ def record_row(stepper: Stepper, problem: WearProblem, state: WearState) -> Vari
             name: problem.per_roller(problem.values_of(state.contacts, name))
             for name in ("line_load", "half_length", "dissipation")
         },
+        **cam_record(problem, state),
     }
 
 

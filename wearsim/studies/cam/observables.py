@@ -1,0 +1,67 @@
+"""Observables of a worn cam: depth and its angle, lift error, angle of the peak pressure."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wearsim.evolution.problem import WearProblem
+from wearsim.evolution.quantities import CamStations
+from wearsim.evolution.state import WearState
+from wearsim.evolution.steppers.loads import descents
+from wearsim.types import FloatArray
+
+
+def lift_errors(problem: WearProblem, state: WearState) -> FloatArray:
+    """Return the change of the lift at every station, shape (stations, rollers, N) [m].
+
+    The roller's centre moves by -D/cos(alpha) along its path, with the rise D of the least gap of
+    the unloaded bodies.
+    """
+    cam = problem.kinematics.cam
+    assert cam is not None
+    descent = problem.per_roller(descents(problem, state.depths))
+    return np.asarray(-descent / np.cos(cam.pressure_angle))
+
+
+def peak_to_peak(cam: CamStations, errors: FloatArray) -> FloatArray:
+    """Return greatest less smallest lift error over the angle, shape (rollers, N) [m]."""
+    between = np.tensordot(cam.between, errors, axes=1)
+    return np.asarray(between.max(axis=0) - between.min(axis=0))
+
+
+def cam_history(problem: WearProblem, state: WearState) -> dict[str, FloatArray]:
+    """Return the observables of a cam after a step; none of a cylinder."""
+    cam = problem.kinematics.cam
+    if cam is None:
+        return {}
+    angle = cam.angle.ravel()
+    depth = state.cylinder_depth[:, 0].max(axis=-1)
+    pressure = problem.per_roller(problem.values_of(state.contacts, "peak_pressure"))
+    return {
+        "turns": state.passes / problem.kinematics.physical_rollers,
+        "station_depth": depth,
+        "depth_angle": angle[depth.argmax(axis=0)],
+        "peak_pressure_angle": angle[pressure.argmax(axis=0)],
+        "lift_error": peak_to_peak(cam, lift_errors(problem, state)),
+    }
+
+
+def cam_record(problem: WearProblem, state: WearState) -> dict[str, FloatArray]:
+    """Return the curve of the lift error; nothing of a cylinder."""
+    if problem.kinematics.cam is None:
+        return {}
+    return {"lift_error_curve": lift_errors(problem, state)}
+
+
+def station_columns(problem: WearProblem) -> dict[str, FloatArray]:
+    """Return the columns of the stations in the results file of a cam; none of a cylinder."""
+    cam = problem.kinematics.cam
+    if cam is None:
+        return {}
+    return {
+        "station_angle": cam.angle.ravel(),
+        "station_weight": 2.0 * np.pi * cam.time_share.ravel(),
+        "station_length": cam.length.ravel(),
+        "station_segment": cam.segment.ravel(),
+        "pressure_angle": cam.pressure_angle.ravel(),
+    }
