@@ -9,6 +9,7 @@ One contact
     solve_contact(scenario)             solve the contact of the first roller
     study_contact(scenario)             the same, with its problem, fields and error estimate
     dissipation(scenario, n)            solve it for n realisations of the random inputs
+    study_cam(scenario, angles)         motion, loads and contact of a cam along its angle
 
 Wear tests
     run(scenario, output)               run a wear test from start to end
@@ -26,6 +27,7 @@ Results
     DissipationResult                   of a dissipation study: power, summaries, convergence
     EnsembleResult                      of an ensemble: estimate, course, band, sensitivity
     ContactSolution, ContactStudy       of one contact: dissipation, line_load, approach, ...
+    CamStudy                            of a cam: kinematics, loads and contact at its stations
     to_dataframe(), to_xarray(), plot() of every result of a test or a study
 
 Errors
@@ -112,6 +114,7 @@ if TYPE_CHECKING:
         open_results,
     )
     from wearsim.scenario import Scenario, load_scenario
+    from wearsim.studies.cam.study import CamStudy, study_cam
     from wearsim.studies.contact.monte_carlo import dissipation
     from wearsim.studies.contact.single import ContactStudy, solve_contact, study_contact
     from wearsim.studies.ensemble.api import ensemble, resume_ensemble
@@ -144,6 +147,7 @@ _NAMES = {
         "open_results",
     ],
     "wearsim.scenario": ["Scenario", "load_scenario"],
+    "wearsim.studies.cam.study": ["CamStudy", "study_cam"],
     "wearsim.studies.contact.monte_carlo": ["dissipation"],
     "wearsim.studies.contact.single": ["ContactStudy", "solve_contact", "study_contact"],
     "wearsim.studies.ensemble.api": ["ensemble", "resume_ensemble"],
@@ -156,6 +160,7 @@ _MODULES = {name: module for module, names in _NAMES.items() for name in names}
 
 # without the errors, which fill pages of `help(wearsim)`
 __all__ = [
+    "CamStudy",
     "ContactSolution",
     "ContactStudy",
     "DissipationResult",
@@ -174,6 +179,7 @@ __all__ = [
     "resume_ensemble",
     "run",
     "solve_contact",
+    "study_cam",
     "study_contact",
     "sweep",
 ]

@@ -7,6 +7,7 @@ import io
 import itertools
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from importlib import import_module
 from pathlib import Path, PurePosixPath
 from typing import Literal, TypeAlias
 
@@ -126,6 +127,10 @@ def export_csv(
         contents = _ensemble_tables(result)
     elif isinstance(result, Result):
         contents = _run_tables(result.raw)
+        if "station_angle" in result.raw.static:
+            # by name, since the kinematics of a cam belong to a layer above
+            table = import_module("wearsim.studies.cam.export").worn_cam(result)
+            contents["worn_cam.csv"] = [_table(table.items())]
     else:
         contents = _study_tables(result.raw)
     if decimal == ",":

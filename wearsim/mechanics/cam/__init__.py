@@ -12,6 +12,7 @@ from wearsim.mechanics.cam.shapes import (
 )
 from wearsim.mechanics.cam.skid import Rolling, SkidArc, skid_arcs
 from wearsim.mechanics.cam.stations import Stations, choose_stations, extreme
+from wearsim.mechanics.cam.surface import surface_points
 
 __all__ = [
     "Arc",
@@ -30,6 +31,7 @@ __all__ = [
     "motion_mistakes",
     "shape_motion",
     "skid_arcs",
+    "surface_points",
     "tangent_cam",
     "three_arc_cam",
 ]

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from wearsim.mechanics.cam import Motion, Stations
+from wearsim.mechanics.cam import Motion, Stations, surface_points
 from wearsim.report.parts import BLUE, GREEN, GREY, ORANGE, RED, name_axes, titled_figure
 from wearsim.report.text import PER_SI
 from wearsim.studies.cam.study import CamStudy
@@ -102,42 +102,10 @@ def name_segments(axes: Axes, motion: Motion, *, names: bool) -> None:
             )
 
 
-def roller_centres(turn: CamTurn, point: Point) -> FloatArray:
-    """Return the roller's centre in the cam, (2, points), by the angles against its turn [m]."""
-    follower = turn.cam.follower
-    position = follower.rest + point.kinematics.lift
-    if follower.swings:
-        c, arm = follower.centre_distance, follower.arm_length
-        x, y = c - arm * np.cos(position), arm * np.sin(position)
-        radius, turned = np.hypot(x, y), np.arctan2(y, x)
-        angle = point.angle + (turned if follower.towards else -turned)
-    else:
-        radius = np.hypot(position, follower.offset)
-        angle = point.angle + np.arcsin(follower.offset / radius)
-    return np.stack([radius * np.cos(angle), radius * np.sin(angle)])
-
-
-def surface_points(turn: CamTurn, point: Point, depth: FloatArray | float = 0.0) -> FloatArray:
-    """Return points of the cam's surface worn by a depth, shape (2, points) [m].
-
-    The polar angle of a point is about the angle of the cam at which it passes the roller.
-    """
-    centre = roller_centres(turn, point)
-    direction = np.gradient(centre, axis=1)
-    size = np.hypot(*direction)
-    moves = size > 0.0
-    direction = direction[:, moves] / size[moves]
-    normal = np.stack([direction[1], -direction[0]])
-    side = np.where(point.inner, -1.0, 1.0)[moves]
-    worn = np.broadcast_to(depth, moves.shape)[moves]
-    radius = side * turn.scenario.roller.radius + worn
-    return np.asarray(centre[:, moves] - radius * normal)
-
-
 def draw_shape(axes: Axes, turn: CamTurn, point: Point) -> None:
     """Draw the cam, its pitch curve and the roller at the start of the turn."""
     radius = turn.scenario.roller.radius
-    centre, surface = roller_centres(turn, point), surface_points(turn, point)
+    centre, surface = surface_points(turn.cam.follower, point.kinematics, point.angle)
     axes.plot(*(surface * MM), color=BLUE, lw=1.6, label="cam")
     axes.plot(*(centre * MM), color=GREY, lw=0.8, ls="--", label="pitch curve")
     around = np.linspace(0.0, 2.0 * np.pi, 181)

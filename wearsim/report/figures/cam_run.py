@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from wearsim.mechanics.cam import Stations
-from wearsim.report.figures.cam import name_segments, surface_points
+from wearsim.mechanics.cam import Stations, surface_points
+from wearsim.report.figures.cam import name_segments
 from wearsim.report.figures.run import Colours, caption, draw_depth
 from wearsim.report.parts import (
     BLUE,
@@ -101,12 +101,14 @@ def _draw_shape(axes: Axes, turn: CamTurn, stations: Stations, depth: FloatArray
     worn = stations.values_between(deepest, places)
     point = turn.at_stations(fine)
     factor = _round(_MAGNIFIED * turn.cam.base_radius / max(float(deepest.max()), 1e-12))
-    fresh, cut = surface_points(turn, point), surface_points(turn, point, factor * worn)
+    follower, found = turn.cam.follower, point.kinematics
+    fresh = surface_points(follower, found, point.angle)[1]
+    cut = surface_points(follower, found, point.angle, factor * worn)[1]
     axes.fill(*(cut * MM), color=BLUE, alpha=0.12, lw=0)
     axes.plot(*(fresh * MM), color=GREY, lw=0.9, label="unworn")
     axes.plot(*(cut * MM), color=BLUE, lw=1.4, label=f"worn, depth x {factor:g}")
     for start in turn.cam.motion.starts[:-1]:
-        edge = fresh[:, np.argmin(np.abs(point.angle[1:-1] - start))] * MM
+        edge = fresh[:, np.argmin(np.abs(point.angle - start))] * MM
         axes.plot([0.0, edge[0]], [0.0, edge[1]], color=GREY, lw=0.6, ls=":")
     axes.plot(0.0, 0.0, "+", color="black", ms=8.0)
     axes.set_aspect("equal")

@@ -1,0 +1,190 @@
+"""Runs of cams: against the rig, closed forms, energy, single turns and a resumed run."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cam_text import cam, prescribed
+
+import wearsim
+from wearsim.mechanics.cam.stations import NUMBERS
+from wearsim.report.figures.cam_run import cam_run_figure
+from wearsim.results.csv_export import export_csv
+from wearsim.results.io.files import read_results
+from wearsim.studies.cam.turn import turn_of
+
+SCENARIOS = Path(__file__).parents[3] / "scenarios"
+SHORT = {"operation__turns": 20_000, "contact": {"strips": 61}}
+
+
+def test_concentric_cam_equals_the_cylinder_bit_for_bit():
+    changes = {"contact.strips": 61}
+    rig, worn = (
+        wearsim.run(wearsim.load_scenario(SCENARIOS / f"{name}.toml", changes))
+        for name in ("rig-450min", "cam-concentric")
+    )
+    for name in ("depth", "width", "worn_volume", "dissipated_energy", "time", "peak_pressure"):
+        assert np.array_equal(getattr(rig, name), getattr(worn, name)), name
+    assert worn.values("turns")[-1] == 450_000
+    assert worn.values("lift_error")[-1] == 0.0
+
+
+def closed_form(force: np.ndarray, turns: float) -> np.ndarray:
+    """Return the depth in full slip at a constant load [m]."""
+    per_load = 1.1e-11 * 0.1 * 1e-3
+    return (0.75 * per_load * force * turns / math.sqrt(2.0 * 0.5)) ** (2.0 / 3.0)
+
+
+@pytest.fixture(scope="module")
+def eccentric():
+    return wearsim.run(cam("eccentric", contact={"strips": 161}))
+
+
+def test_depth_in_full_slip_is_that_of_the_closed_form_at_every_station(eccentric):
+    scenario = cam("eccentric")
+    turn = turn_of(scenario)
+    force = turn.at_stations(turn.stations).normal_force
+    exact = closed_form(force, 1.35e6)
+    assert exact[0] * 1e6 == pytest.approx(50.21965, abs=5e-6)
+    angles = eccentric.values("station_angle")
+    opposite = exact[np.abs(angles - math.pi).argmin()]
+    assert opposite * 1e6 == pytest.approx(50.72457, abs=5e-6)
+    depth = eccentric.values("station_depth")[-1]
+    assert depth == pytest.approx(exact, rel=2e-3)
+
+
+def test_worn_volume_is_the_energy_times_the_wear_factor(eccentric):
+    energy = eccentric.dissipated_energy[1:]
+    assert eccentric.worn_volume[1:] == pytest.approx(1.1e-11 * energy, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "scenario",
+    [prescribed(**SHORT), cam(**{**SHORT, "operation__turns": 3000}), cam("swinging", **SHORT)],
+    ids=["prescribed", "free", "swinging"],
+)
+def test_both_volumes_are_the_energy_times_the_wear_factor(scenario):
+    result = wearsim.run(scenario)
+    energy = 1.1e-11 * result.dissipated_energy[1:]
+    assert result.worn_volume[1:] == pytest.approx(energy, rel=1e-12)
+    assert result.roller_worn_volume[1:] == pytest.approx(energy, rel=1e-12)
+    assert result.raw.history["turns"][-1] == scenario.operation.turns
+
+
+def test_volume_with_skids_is_the_energy_times_the_wear_factor():
+    scenario = cam(roller__inertia="3e-3 kg m^2", **{**SHORT, "operation__turns": 300})
+    result = wearsim.run(scenario)
+    energy = 1.1e-11 * result.dissipated_energy[1:]
+    assert result.worn_volume[1:] == pytest.approx(energy, rel=1e-12)
+    skids = wearsim.study_cam(scenario).skids
+    turns = result.raw.history["turns"][-1]
+    assert result.dissipated_energy[-1] > turns * sum(skid.energy for skid in skids)
+
+
+def constant(load="300 N", **changes):
+    """Return the eccentric cam under a constant normal force, with equal wear of both bodies."""
+    table = {"kind": "constant", "normal_force": load}
+    scenario = cam("eccentric", wear__roller__k_over_h="1.1e-11 1/Pa", **changes)
+    text = scenario.text
+    start, stop = text.index("[load]"), text.index("[friction]")
+    lines = "".join(f'{key} = "{value}"\n' for key, value in table.items())
+    return wearsim.Scenario.from_toml(f"{text[:start]}[load]\n{lines}\n{text[stop:]}")
+
+
+def test_depths_of_both_bodies_at_a_constant_load():
+    scenario = constant(contact={"strips": 161})
+    result = wearsim.run(scenario)
+    assert result.depth[-1] * 1e6 == pytest.approx(36.74615, rel=2e-3)
+    assert result.roller_depth[-1] * 1e6 == pytest.approx(45.93268, rel=2e-3)
+    assert (result.depth + result.roller_depth)[-1] * 1e6 == pytest.approx(82.67883, rel=2e-3)
+
+
+def test_number_of_stations_is_within_the_tolerance():
+    integrals, depths = [], []
+    exact = turn_of(prescribed()).integral("load")
+    for number in (*NUMBERS, 49):
+        scenario = prescribed(cam__stations=number, wear__roller__k_over_h="0 1/Pa", **SHORT)
+        turn = turn_of(scenario)
+        point = turn.at_stations(turn.stations)
+        load = turn.stations.weight @ (point.normal_force * point.kinematics.travel)
+        integrals.append(abs(load / exact - 1.0))
+        result = wearsim.run(scenario)
+        depths.append(result.worn_volume[-1])
+    errors = np.abs(np.array(depths[:-1]) / depths[-1] - 1.0)
+    assert integrals[1] < 1e-6
+    assert integrals[1] < 1e-2 * integrals[0]
+    assert errors[1] < 2.5e-4  # the number that "auto" chooses
+    assert errors[1] < 0.1 * errors[0]
+
+
+def test_implicit_steps_agree_with_every_turn_one_by_one():
+    changes = {
+        "operation__turns": 200,
+        "contact": {"strips": 61},
+        "cam__stations": 3,
+        "wear__cylinder__k_over_h": "5e-9 1/Pa",
+        "wear__roller__k_over_h": "5e-9 1/Pa",
+        "load__stiffness": "500 N/mm",
+        "load__preload": "600 N",
+        "roller__crown_radius": "100 mm",
+    }
+    fast = wearsim.run(prescribed(**changes))
+    slow = wearsim.run(prescribed(evolution={"stepper": "per-pass"}, **changes))
+    depth, truth = (run.values("station_depth")[-1] for run in (fast, slow))
+    assert truth.min() > 3e-6
+    error = float(fast.depth_error[-1])
+    assert np.abs(depth - truth).max() <= error + 1e-3 * truth.max()
+    assert slow.worn_volume[-1] == pytest.approx(5e-9 * slow.dissipated_energy[-1], rel=1e-9)
+    assert slow.roller_worn_volume[-1] == pytest.approx(slow.worn_volume[-1], rel=1e-9)
+
+
+def test_spring_feedback_lowers_the_load():
+    changes = {"load__stiffness": "500 N/mm", "load__preload": "600 N", **SHORT}
+    changes["wear__cylinder__k_over_h"] = "5e-10 1/Pa"
+    without = wearsim.run(prescribed(load__feedback="none", **changes))
+    static = wearsim.run(prescribed(**changes))
+    assert static.depth[-1] < 0.999 * without.depth[-1]
+    assert static.normal_force[-1] < without.normal_force[-1]
+    assert without.normal_force[-1] == pytest.approx(without.normal_force[0], rel=1e-12)
+
+
+def test_lift_error_is_the_descent_over_the_cosine(eccentric):
+    final = eccentric.final
+    depth, alpha = eccentric.values("station_depth")[-1], eccentric.values("pressure_angle")
+    curve = eccentric.values("lift_error_curve")[-1]
+    assert curve == pytest.approx(-depth / np.cos(alpha), rel=1e-3)
+    assert final["lift_error_m"] == pytest.approx(np.ptp(curve), rel=2e-2)
+    assert final["station_depth_m"] == pytest.approx(depth)
+    assert abs(math.sin(final["depth_angle_rad"])) == pytest.approx(1.0, abs=1e-3)
+    assert max(final["station_lift_error_from_dwell_m"]) > 0.0
+
+
+def test_interrupted_run_of_a_cam_resumes_bit_for_bit(tmp_path):
+    scenario = prescribed(**SHORT)
+    whole = wearsim.run(scenario, tmp_path / "whole.h5")
+    wearsim.run(scenario, tmp_path / "part.h5", until="5000 passes")
+    resumed = wearsim.resume(tmp_path / "part.h5", until=f"{scenario.total_passes} passes")
+    stored = read_results(tmp_path / "whole.h5")
+    assert stored.static["station_angle"].shape == (28,)
+    assert resumed.depth[-1] == pytest.approx(whole.depth[-1], rel=1e-3)
+
+
+def test_results_of_a_cam_are_exported_and_drawn(tmp_path, eccentric):
+    files = export_csv(eccentric, tmp_path / "csv")
+    names = {path.name for path in files}
+    assert {"history.csv", "worn_cam.csv"} <= names
+    header = (tmp_path / "csv" / "worn_cam.csv").read_text().splitlines()[0]
+    assert header.startswith("angle [deg],x unworn [mm],y unworn [mm],x worn [mm],y worn [mm]")
+    columns = np.loadtxt(tmp_path / "csv" / "worn_cam.csv", delimiter=",", skiprows=1).T
+    fresh, worn = columns[1:3], columns[3:5]
+    assert np.hypot(fresh[0] - 5.0, fresh[1]) == pytest.approx(25.0, abs=1e-6)
+    lost = 25.0 - np.hypot(worn[0] - 5.0, worn[1])
+    assert lost.max() == pytest.approx(1e3 * eccentric.depth[-1], rel=1e-3)
+    assert lost.min() == pytest.approx(1e3 * eccentric.values("station_depth")[-1].min(), rel=1e-3)
+    titles = {axes.get_title(loc="left") for axes in cam_run_figure(eccentric).axes}
+    assert {"Worn depth of the cam", "Worn cam", "Lift error against the unworn cam"} <= titles
+    assert json.dumps(eccentric.final)
