@@ -13,7 +13,7 @@ from wearsim.report.text import OBSERVABLES as LABELS
 from wearsim.report.text import si_key
 from wearsim.results.dissipation import VARIABLES as DISSIPATION
 from wearsim.results.ensemble.schema import ENSEMBLE, STATISTICS
-from wearsim.results.run_schema import VARIABLES as RUN
+from wearsim.results.run_schema import ALL_VARIABLES as RUN
 from wearsim.scenario.examples import scenario_schema
 
 ROOT = Path(__file__).parents[1]

@@ -29,7 +29,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from wearsim.types import FloatArray
+from wearsim.types import BoolArray, FloatArray
 
 FollowerKind: TypeAlias = Literal["translating", "swinging"]
 
@@ -151,7 +151,7 @@ class Follower:
         """Displacement of the roller's centre per lift: 1, or the length of the arm [m]."""
         return self.arm_length if self.swings else 1.0
 
-    def kinematics(self, lift: FloatArray, inner: FloatArray | bool = False) -> RollerKinematics:
+    def kinematics(self, lift: FloatArray, inner: BoolArray | bool = False) -> RollerKinematics:
         """Return the kinematics at given lifts.
 
         Parameters

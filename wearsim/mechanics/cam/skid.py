@@ -175,7 +175,10 @@ class _Trace:
             stop = low + part * (high - low)
             arcs[-1].append((stop, 0.0, rates[0] + part * (rates[2] - rates[0])))
             slip, inside = 0.0, False
-            if abs(self.demand[place + 2]) > 1.0:
+            if abs(self.demand[place]) > 1.0 >= abs(self.demand[place + 2]):
+                # rolling begins somewhere in the rest of the interval
+                arcs[-1].append((high, 0.0, 0.0))
+            elif abs(self.demand[place + 2]) > 1.0:
                 turned = math.copysign(1.0, self.demand[place + 2])
                 rate = self._rate(place + 2, turned, 0.0)
                 slip, inside = rate * (high - stop), True

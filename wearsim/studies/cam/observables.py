@@ -15,12 +15,12 @@ def lift_errors(problem: WearProblem, state: WearState) -> FloatArray:
     """Return the change of the lift at every station, shape (stations, rollers, N) [m].
 
     The roller's centre moves by -D/cos(alpha) along its path, with the rise D of the least gap of
-    the unloaded bodies.
+    the unloaded bodies, and by +D/cos(alpha) on the inner flank of a groove.
     """
     cam = problem.kinematics.cam
     assert cam is not None
     descent = problem.per_roller(descents(problem, state.depths))
-    return np.asarray(-descent / np.cos(cam.pressure_angle))
+    return np.asarray(-np.sign(cam.load_factor) * descent / np.cos(cam.pressure_angle))
 
 
 def peak_to_peak(cam: CamStations, errors: FloatArray) -> FloatArray:

@@ -10,6 +10,7 @@ from wearsim.evolution.quantities import CamStations
 from wearsim.studies.cam.turn import CamTurn, Point
 from wearsim.types import FloatArray
 
+GRIP = 0.98  # greatest traction of a rolling roller, of friction: at the ends of a skid
 _BETWEEN = 49  # points of a panel between its stations, for the lift error
 
 
@@ -53,6 +54,9 @@ def _values(
         rest = point.normal_force - factor * turn.load.preload
     feedback = turn.load is not None and turn.load.feedback != "none"
     side = np.sign(found.spin)
+    bearing = turn.scenario.creepage.bearing_torque or 0.0
+    most = GRIP * turn.scenario.friction.coefficient * point.normal_force * roller.radius
+    torque = np.clip(side * turn.torque(point), -most, most) if turn.free else np.zeros(count)
     columns = {
         "angle": point.angle,
         "segment": segments + 1.0,
@@ -64,7 +68,7 @@ def _values(
         "load_factor": factor,
         "load_rest": rest,
         "stiffness": point.stiffness if feedback else np.zeros(count),
-        "inertia_torque": roller.inertia * turn.speed**2 * side * found.spin_per_rad,
+        "inertia_torque": torque - bearing,
         "pressure_angle": found.pressure_angle,
         "skid": side * roller.radius * turn.slip(point.angle, within) / found.travel,
     }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -61,6 +62,13 @@ class CamStudy:
     skids : tuple of Skid
         Arcs in which a free roller skids.
     warnings : tuple of str
+
+    Examples
+    --------
+    >>> from wearsim.scenario.examples import shipped_scenario
+    >>> study = wearsim.study_cam(shipped_scenario("cam-concentric"))
+    >>> print(f"{study.perimeter * 1e3:.3f} mm, {study.winding_number:g}")
+    157.080 mm, 1.25
     """
 
     turn: CamTurn
@@ -83,7 +91,9 @@ class CamStudy:
     warnings: tuple[str, ...]
 
 
-def study_cam(scenario: Scenario | str | Path, angles: FloatArray | None = None) -> CamStudy:
+def study_cam(
+    scenario: Scenario | str | Path, angles: FloatArray | Sequence[float] | None = None
+) -> CamStudy:
     """Return motion, loads and fresh contact of a scenario's cam.
 
     Parameters
@@ -103,24 +113,25 @@ def study_cam(scenario: Scenario | str | Path, angles: FloatArray | None = None)
     Examples
     --------
     >>> from wearsim.scenario.examples import shipped_scenario
-    >>> study = study_cam(shipped_scenario("cam-eccentric"), np.radians([0.0, 60.0]))
+    >>> study = wearsim.study_cam(shipped_scenario("cam-eccentric"), [0.0, 3.141592653589793])
     >>> print([f"{force:.6f} N" for force in study.point.normal_force])
-    ['319.538258 N', '325.782926 N']
+    ['319.538258 N', '324.369394 N']
     """
     scenario = as_scenario(scenario)
-    turn = turn_of(scenario)
+    turn, chosen = turn_of(scenario), None
     weight = None
     if angles is None:
         point, weight = turn.at_stations(turn.stations), turn.stations.weight
     else:
-        point = turn.at_angles(np.asarray(angles, dtype=np.float64))
+        chosen = np.asarray(angles, dtype=np.float64)
+        point = turn.at_angles(chosen)
     patches = [
         fresh_patch(scenario, force, curvature)
         for force, curvature in zip(
             point.normal_force.tolist(), point.kinematics.relative_curvature.tolist(), strict=True
         )
     ]
-    problem = _fresh_problem(scenario, turn, angles)
+    problem = _fresh_problem(scenario, turn, chosen)
     contacts = problem.model.solve(unworn_contacts(problem))
     panels = turn.panels
     steepest = extreme(panels, lambda p, x: np.abs(turn.at(p, x).kinematics.pressure_angle))

@@ -28,6 +28,7 @@ from wearsim.types import BoolArray, FloatArray
 STEEP = {"translating": math.radians(30.0), "swinging": math.radians(45.0)}
 SHARP = 2.0  # radius of the pitch curve over that of the roller, below which the contact is warned
 PART_OF_TOLERANCE = 0.25  # for the stations
+LEAST_LOAD = 1e-4  # of the greatest, where the flank of a groove changes
 _FINE = 1e-10  # tolerance of integrals over a turn
 
 
@@ -90,26 +91,46 @@ class CamTurn:
         static = self.load.preload + self.load.spring * lift[0] + self.load.external(theta)
         return np.asarray(static + self.cam.inertia * self.speed**2 * lift[2])
 
-    def point(self, lift: FloatArray, theta: FloatArray) -> Point:
-        """Return the state at lifts, shape (3, points), and angles [rad], shape (points,)."""
-        follower, inner = self.cam.follower, np.zeros(len(theta), dtype=bool)
+    def point(self, lift: FloatArray, theta: FloatArray, inner: BoolArray | None = None) -> Point:
+        """Return the state at lifts, shape (3, points), and angles [rad], shape (points,).
+
+        The flank of a groove is that which the load presses on, unless it is given.
+        """
+        follower = self.cam.follower
         if self.load is None:
+            inner = np.zeros(len(theta), dtype=bool)
             found = follower.kinematics(lift)
             force = np.full(len(theta), self._constant)
             effort = force * follower.lever * np.cos(found.pressure_angle)
             spring = 0.0
         else:
             effort, spring = self.effort(lift, theta), self.load.spring
-            if self.cam.groove:
-                inner = effort < 0.0
+            if inner is None:
+                inner = (effort < 0.0) & self.cam.groove
             found = follower.kinematics(lift, inner)
-            force = follower.normal_force(found, np.abs(effort) if self.cam.groove else effort)
+            force = follower.normal_force(found, np.where(inner, -effort, effort))
+            if self.cam.groove:  # it vanishes where the flank changes
+                force = np.maximum(force, LEAST_LOAD * self._greatest_effort / follower.lever)
         lever = follower.lever * np.cos(found.pressure_angle)
         return Point(theta, found, inner, force, effort * found.lift_per_rad, spring / lever**2)
 
     def at(self, panel: Panel, theta: FloatArray) -> Point:
         """Return the state at angles within a panel [rad]."""
-        return self.point(self.cam.motion.lift_in(panel.segment, theta), theta)
+        inner = np.full(len(theta), self._is_inner(panel))
+        return self.point(self.cam.motion.lift_in(panel.segment, theta), theta, inner)
+
+    def _is_inner(self, panel: Panel) -> bool:
+        """Return whether the roller touches the inner flank of a groove in a panel."""
+        if self.load is None or not self.cam.groove:
+            return False
+        middle = np.array([0.5 * (panel.start + panel.stop)])
+        return bool(self._effort_in(panel, middle)[0] < 0.0)
+
+    @cached_property
+    def _greatest_effort(self) -> float:
+        """Greatest magnitude of the force [N] or torque [N m] on the follower."""
+        theta = np.linspace(0.0, math.tau, 1441)
+        return float(np.abs(self.effort(self.cam.motion.lift(theta), theta)).max())
 
     def at_angles(self, theta: FloatArray) -> Point:
         """Return the state at any angles [rad]; between segments that of the following one."""
@@ -275,12 +296,15 @@ class CamTurn:
         """Return what the stations must represent: depth in full slip, N ds, traction and slip."""
         point = self.at(panel, theta)
         force, travel = np.maximum(point.normal_force, 0.0), point.kinematics.travel
-        rows = [force ** (2.0 / 3.0), force * travel, travel]
+        # in a groove the load vanishes, where a power is not smooth
+        depth = force if self.cam.groove else force ** (2.0 / 3.0)
+        rows = [depth, force * travel, travel]
         if self.free:
             most = np.maximum(self._greatest_torque(panel, theta), 1e-300)
             middle = np.full(len(theta), 0.5 * (panel.start + panel.stop))
-            slip = np.nan_to_num(self.slip(theta, middle))
-            rows += [1.0 + self.torque(point) / most, slip]
+            slip = self.slip(theta, middle)
+            demand = np.clip(self.torque(point) / most, -1.0, 1.0)
+            rows += [np.where(np.isnan(slip), 1.0 + demand, 1.0), np.nan_to_num(slip)]
         return np.stack(rows)
 
     def integral(self, quantity: str) -> float:
@@ -300,11 +324,12 @@ class CamTurn:
     def at_stations(self, stations: Stations) -> Point:
         """Return the state at stations, at both sides of a boundary between segments."""
         segments = np.array([panel.segment for panel in stations.panels])[stations.panel]
+        flanks = np.array([self._is_inner(panel) for panel in stations.panels])
         lift = np.empty((3, stations.count))
         for number in np.unique(segments):
             chosen = segments == number
             lift[:, chosen] = self.cam.motion.lift_in(int(number), stations.angle[chosen])
-        return self.point(lift, stations.angle)
+        return self.point(lift, stations.angle, flanks[stations.panel])
 
     def _mistake(
         self, table: str, key: str, what: str, got: str | None, expected: str | None
