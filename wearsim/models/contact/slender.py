@@ -10,13 +10,17 @@ from pydantic import Field
 
 from wearsim.contact_batch import NO_BODY, ContactBatch, ContactBatchSolution
 from wearsim.errors import ContactError
-from wearsim.mechanics.hertz.elasticity import ElasticPair
 from wearsim.mechanics.numerics.jit import kernel_input, own_array
 from wearsim.mechanics.slender import newton as kernels
 from wearsim.mechanics.slender.influence import HIGHEST, curvature_table, no_table
 from wearsim.mechanics.tangential.strip_interaction import strip_elasticity
-from wearsim.mechanics.tangential.strip_theory import SUMS, strip_contacts
+from wearsim.mechanics.tangential.strip_theory import SUMS
 from wearsim.models.contact.strip_model import StripModel, check_edges, grid_about_hertz
+from wearsim.models.contact.strip_tractions import (
+    is_of_a_cam,
+    strip_tractions,
+    with_balanced_creepage,
+)
 from wearsim.models.tangential.base import TangentialTheory, power_not_finite
 from wearsim.models.tangential.strip_theory import StripTheory, TangentialOptions, tangential_theory
 from wearsim.plugins import (
@@ -144,45 +148,6 @@ class NormalContacts(NamedTuple):
         )
 
 
-def strip_tractions(
-    line_load: FloatArray,
-    half_length: FloatArray,
-    batch: ContactBatch,
-    grid: Grid,
-    pair: ElasticPair,
-) -> tuple[FloatArray, FloatArray]:
-    """Return dissipation, (contacts, strips) [W/m], and `SUMS`, (6, contacts), by strip theory.
-
-    Parameters
-    ----------
-    line_load, half_length : ndarray, shape (contacts, strips)
-        Solution of the normal problems [N/m], [m].
-    batch : ContactBatch
-        The contacts, with at most one friction value per strip.
-    grid : Grid
-    pair : ElasticPair
-    """
-    friction, variation = np.empty(line_load.shape), batch.variation
-    friction[:] = batch.friction if batch.friction.ndim > 1 else batch.friction[:, None]
-    dissipation, sums = np.empty(line_load.shape), np.empty((len(SUMS), len(line_load)))
-    strip_contacts(
-        line_load,
-        half_length,
-        grid.y,
-        grid.spacing,
-        strip_elasticity(pair.contact_modulus, pair.shear_modulus),
-        kernel_input(batch.rolling_speed),
-        kernel_input(batch.longitudinal),
-        kernel_input(batch.lateral),
-        kernel_input(batch.spin),
-        -batch.spin[:, None] * grid.y if variation is None else kernel_input(variation),
-        friction,
-        dissipation,
-        sums,
-    )
-    return dissipation, sums
-
-
 _REMEDY = {
     kernels.SINGULAR: "its equations are singular: check the gap, the load and the materials",
     kernels.TOO_FINE: (
@@ -246,8 +211,8 @@ class Slender(StripModel):
     ) -> ContactBatchSolution:
         """Solve the contacts in one call if strip theory supports them.
 
-        Contacts with a bearing torque, or with another theory, have their normal problems solved in
-        one call and their tangential problems one after another.
+        Contacts with a bearing torque except those of a cam, or with another theory, have their
+        normal problems solved in one call and their tangential problems one after another.
         """
         refuse_unclaimed(self, batch, wear_compliance, coupling)
         normal = self._solve_normal(batch, wear_compliance, coupling, warm)
@@ -255,7 +220,8 @@ class Slender(StripModel):
         half_length = normal.half_length.reshape(batch.gap.shape)
         approach = normal.approach.reshape(len(batch))
         iterations = normal.iterations.repeat(normal.gap.shape[1])
-        if not isinstance(self.theory, StripTheory) or batch.bearing_torque is not None:
+        free = batch.bearing_torque is not None
+        if not isinstance(self.theory, StripTheory) or (free and not is_of_a_cam(batch)):
             return solved_one_by_one(
                 batch,
                 lambda k: self._complete(
@@ -266,6 +232,10 @@ class Slender(StripModel):
                     int(iterations[k]),
                     batch.point(k),
                 ),
+            )
+        if free:
+            batch = with_balanced_creepage(
+                batch, line_load, half_length, self._grid, self._pair, warm
             )
         dissipation, sums = strip_tractions(line_load, half_length, batch, self._grid, self._pair)
         finite = np.isfinite(sums)

@@ -1,0 +1,65 @@
+"""Roots of several monotonic functions at once, by bracketed inverse interpolation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from wearsim.types import FloatArray
+
+_MOST = 80
+
+
+def bracketed_roots(
+    function: Callable[[FloatArray], FloatArray],
+    low: FloatArray,
+    high: FloatArray,
+    first: FloatArray,
+    tolerance: float = 1e-13,
+) -> FloatArray:
+    """Return a root of each of several functions within its bracket.
+
+    Parameters
+    ----------
+    function : callable
+        Values at one point of each function, shape (functions,), of opposite sign at both ends.
+    low, high : ndarray, shape (functions,)
+        Ends of the brackets.
+    first : ndarray, shape (functions,)
+        First guesses; the middle is taken where a guess is outside of its bracket.
+    tolerance : float
+        Width of the last bracket relative to its greatest end.
+
+    Notes
+    -----
+    Chandrupatla, Advances in Engineering Software 28 (1997), DOI 10.1016/S0965-9978(96)00051-8,
+    with the first guess instead of the first bisection.
+    """
+    x0, x1 = np.array(low), np.array(high)
+    f0, f1 = function(x0), function(x1)
+    third, f_third = x0, f0
+    inside = (first > x0) & (first < x1)
+    point = np.where(inside, first, 0.5 * (x0 + x1))
+    scale = np.maximum(np.abs(x0), np.abs(x1))
+    for _ in range(_MOST):
+        value = function(point)
+        same = np.sign(value) == np.sign(f0)
+        third, f_third = np.where(same, x0, x1), np.where(same, f0, f1)
+        x1, f1 = np.where(same, x1, x0), np.where(same, f1, f0)
+        x0, f0 = point, value
+        best = np.where(np.abs(f0) < np.abs(f1), x0, x1)
+        limit = 2.0 * tolerance * np.abs(best) + tolerance**1.25 * scale
+        width = np.abs(x1 - x0)
+        if ((width <= limit) | (f0 == 0.0) | (f1 == 0.0)).all():
+            break
+        with np.errstate(divide="ignore", invalid="ignore"):
+            xi, phi = (x0 - x1) / (third - x1), (f0 - f1) / (f_third - f1)
+            quadratic = (phi**2 < xi) & ((1.0 - phi) ** 2 < 1.0 - xi)
+            part = f0 / (f1 - f0) * f_third / (f1 - f_third)
+            part = part + (third - x0) / (x1 - x0) * f0 / (f_third - f0) * f1 / (f_third - f1)
+            edge = np.where(width > 0.0, 0.5 * limit / np.where(width > 0.0, width, 1.0), 0.5)
+        edge = np.minimum(edge, 0.5)
+        part = np.clip(np.where(quadratic & np.isfinite(part), part, 0.5), edge, 1.0 - edge)
+        point = x0 + part * (x1 - x0)
+    return np.where(np.abs(f0) < np.abs(f1), x0, x1)

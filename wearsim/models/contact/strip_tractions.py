@@ -1,0 +1,122 @@
+"""Tractions of several contacts by strip theory, and creepages of the free rollers of a cam."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from wearsim.contact_batch import ContactBatch, ContactBatchSolution
+from wearsim.errors import ContactError
+from wearsim.mechanics.hertz.elasticity import ElasticPair
+from wearsim.mechanics.numerics.jit import kernel_input
+from wearsim.mechanics.numerics.roots import bracketed_roots
+from wearsim.mechanics.tangential.strip_interaction import strip_elasticity
+from wearsim.mechanics.tangential.strip_theory import SUMS, strip_contacts
+from wearsim.types import FloatArray, Grid
+
+
+def strip_tractions(
+    line_load: FloatArray,
+    half_length: FloatArray,
+    batch: ContactBatch,
+    grid: Grid,
+    pair: ElasticPair,
+) -> tuple[FloatArray, FloatArray]:
+    """Return dissipation, (contacts, strips) [W/m], and `SUMS`, (6, contacts), by strip theory.
+
+    Parameters
+    ----------
+    line_load, half_length : ndarray, shape (contacts, strips)
+        Solution of the normal problems [N/m], [m].
+    batch : ContactBatch
+        The contacts, with at most one friction value per strip.
+    grid : Grid
+    pair : ElasticPair
+    """
+    friction, variation = np.empty(line_load.shape), batch.variation
+    friction[:] = batch.friction if batch.friction.ndim > 1 else batch.friction[:, None]
+    dissipation, sums = np.empty(line_load.shape), np.empty((len(SUMS), len(line_load)))
+    strip_contacts(
+        line_load,
+        half_length,
+        grid.y,
+        grid.spacing,
+        strip_elasticity(pair.contact_modulus, pair.shear_modulus),
+        kernel_input(batch.rolling_speed),
+        kernel_input(batch.longitudinal),
+        kernel_input(batch.lateral),
+        kernel_input(batch.spin),
+        -batch.spin[:, None] * grid.y if variation is None else kernel_input(variation),
+        friction,
+        dissipation,
+        sums,
+    )
+    return dissipation, sums
+
+
+def is_of_a_cam(batch: ContactBatch) -> bool:
+    """Return whether the contacts are those of several stations."""
+    return batch.shape is not None and batch.shape[0] > 1
+
+
+def with_balanced_creepage(
+    batch: ContactBatch,
+    line_load: FloatArray,
+    half_length: FloatArray,
+    grid: Grid,
+    pair: ElasticPair,
+    guess: ContactBatchSolution | None,
+) -> ContactBatch:
+    """Return the contacts with the creepages at which the tractions balance the torques.
+
+    The lever arm is the mean rolling radius, weighted by the line load.
+
+    Parameters
+    ----------
+    batch : ContactBatch
+        With a bearing torque, not a number where a roller skids at the given creepage.
+    line_load, half_length : ndarray, shape (contacts, strips)
+        Solution of the normal problem [N/m], [m].
+    grid : Grid
+    pair : ElasticPair
+    guess : ContactBatchSolution, optional
+        Solution with the first guesses of the creepage.
+
+    Raises
+    ------
+    ContactError
+        If friction cannot transmit a torque.
+    """
+    if batch.bearing_torque is None or batch.rolling_radius is None:
+        raise ValueError("a bearing torque needs the rolling radius of each strip")
+    radius = (line_load * batch.rolling_radius).sum(axis=1) / line_load.sum(axis=1)
+    rolls = np.isfinite(batch.bearing_torque)
+    torque = np.where(rolls, batch.bearing_torque, 0.0)
+
+    def excess(creepage: FloatArray) -> FloatArray:
+        trial = replace(batch, longitudinal=creepage)
+        force = strip_tractions(line_load, half_length, trial, grid, pair)[1][0]
+        found = -force * radius - torque
+        return np.where(rolls, found, creepage - batch.longitudinal)
+
+    # a creepage of gross sliding, many times that of saturation
+    friction = batch.friction.reshape(len(batch), -1).max(axis=1)
+    saturation = friction * half_length.max(axis=1) * batch.longitudinal_curvature
+    reach = 100.0 * (saturation + np.abs(batch.lateral)) + np.abs(batch.longitudinal)
+    if batch.variation is not None:
+        reach = reach + np.abs(batch.variation).max(axis=1)
+    low, high = excess(-reach), excess(reach)
+    lost = np.flatnonzero(rolls & ((low >= 0.0) | (high <= 0.0)))
+    if len(lost):
+        k = int(lost[0])
+        carried = torque[k] + (high[k] if torque[k] > 0.0 else low[k])
+        raise ContactError(
+            f"the roller skids: the torque of {torque[k]:.4g} N m exceeds the"
+            f" {abs(carried):.4g} N m that friction can transmit at a load of"
+            f" {batch.normal_force[k]:.4g} N; lower creepage.bearing_torque or roller.inertia, or"
+            " raise the friction",
+            {"line_load": line_load[k], "half_length": half_length[k]},
+        )
+    first = np.zeros(len(batch)) if guess is None else np.nan_to_num(guess.longitudinal_creepage)
+    return replace(batch, longitudinal=bracketed_roots(excess, -reach, reach, first))
