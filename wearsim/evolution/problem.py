@@ -210,11 +210,9 @@ class WearProblem:
             "spin": self.spin,
             "friction": self.inputs.friction,
         }
-        cam = self.kinematics.cam
         if self.free:
-            columns["bearing_torque"] = self.inputs.bearing_torque
-        if self.free and cam is not None:
-            columns |= cam.free_rolling(self.inputs)
+            cam, torque = self.kinematics.cam, self.inputs.bearing_torque
+            columns |= cam.free_rolling(self.inputs) if cam else {"bearing_torque": torque}
         return {n: np.broadcast_to(column, self.shape).ravel() for n, column in columns.items()}
 
     @cached_property
@@ -240,7 +238,13 @@ class WearProblem:
     @cached_property
     def has_spring(self) -> bool:
         """Whether a load falls as its roller descends."""
-        return bool(self.stiffness.any())
+        cam = self.kinematics.cam
+        return bool(self.stiffness.any()) or (cam is not None and cam.inertia.size > 0)
+
+    def feedback(self, displacement: FloatArray) -> FloatArray:
+        """Return the decrease of the loads by displacements of the rollers, (S, C, N) [N]."""
+        cam, force = self.kinematics.cam, self.stiffness * displacement
+        return force if cam is None else force + cam.inertia_force(displacement)
 
     @cached_property
     def pauses(self) -> list[FloatArray]:
@@ -259,10 +263,7 @@ class WearProblem:
         return np.array(found)
 
     def force(self, time: FloatArray) -> FloatArray:
-        """Return the load before feedback at a time [s] of each realisation, shape (N,) [N].
-
-        On a cam, shape (stations, 1, N).
-        """
+        """Return the load before feedback at a time [s], (N,), or (S, 1, N) on a cam [N]."""
         each = zip(self.loads, time[:, None], strict=True)
         return self.at_stations(np.array([load.force(own)[0] for load, own in each]))
 
@@ -366,9 +367,9 @@ class WearProblem:
 
     @cached_property
     def wear_factors(self) -> dict[Body, FloatArray | None]:
-        """Depth per pass and dissipation of either body, shape (realisations,) [m/(W/m)].
+        """Depth per pass and dissipation of either body, (N,), or (S, 1, N) of a cam [m/(W/m)].
 
-        Of a cam, shape (stations, 1, realisations). None if wear is not linear in the dissipation.
+        None if wear is not linear in the dissipation.
         """
         speeds = np.ravel(self.kinematics.speed).tolist()
         factors = {

@@ -124,6 +124,9 @@ class CamStations:
         Angle between the common normal and the path of the roller's centre [rad].
     between : ndarray, shape (points, stations)
         Matrix that interpolates values of the stations along the angle.
+    inertia : ndarray, shape (stations, stations)
+        Decrease of the normal forces by the follower's inertia per displacement of the roller at
+        each station [N/m]; empty without this feedback.
     """
 
     angle: FloatArray
@@ -140,6 +143,7 @@ class CamStations:
     skid: FloatArray
     pressure_angle: FloatArray
     between: FloatArray
+    inertia: FloatArray
 
     def at(self, realisations: IntArray) -> CamStations:
         """Return the stations of some realisations, by number and in that order."""
@@ -156,6 +160,12 @@ class CamStations:
             "bearing_torque": np.where(skids, np.nan, torque),
             "longitudinal": np.where(skids, self.skid, inputs.longitudinal),
         }
+
+    def inertia_force(self, displacement: FloatArray) -> FloatArray | float:
+        """Return the decrease of the loads through the inertia by displacements [N]."""
+        if not self.inertia.size or not np.ndim(displacement):
+            return 0.0
+        return np.tensordot(self.inertia, displacement, axes=1)
 
     def mean_over_turn(self, values: FloatArray) -> FloatArray:
         """Return the mean weighted by the time at the stations, first axis of length one."""

@@ -109,7 +109,7 @@ def _columns(study: CamStudy) -> dict[str, Any]:
 
 def _data(study: CamStudy) -> dict[str, Any]:
     """Return the study in SI units."""
-    from wearsim.studies.cam.study import HARMONIC_DEPTH
+    from wearsim.studies.cam.checks import HARMONIC_DEPTH
 
     motion = study.turn.cam.motion
     return {
@@ -141,7 +141,7 @@ def _data(study: CamStudy) -> dict[str, Any]:
 def _summary(study: CamStudy) -> list[tuple[str, str]]:
     """Return the numbers of the turn in engineering units."""
     from wearsim.report.text import NOTHING, shown
-    from wearsim.studies.cam.study import HARMONIC_DEPTH
+    from wearsim.studies.cam.checks import HARMONIC_DEPTH
 
     turn, (angle, theta) = study.turn, study.max_pressure_angle
     least, greatest = turn.normal_range

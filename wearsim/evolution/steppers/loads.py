@@ -51,7 +51,7 @@ def with_feedback(
     loads = np.empty(problem.shape)
     loads[:] = force + problem.inputs.normal_force_offset
     if problem.has_spring:
-        loads -= problem.stiffness * displacement
+        loads -= problem.feedback(displacement)
     for term in terms:
         loads += term[problem.roller]
     # a spring that has descended lifts the roller while the load rises from a pause

@@ -12,6 +12,28 @@ from wearsim.studies.cam.turn import SHARP, STEEP, CamTurn
 
 FEWEST_SWEEPS = 10.0  # of the contact around the roller in a life, below which it wears unevenly
 
+HARMONIC_DEPTH = 50e-6  # m, worn depth at which the harmonic limit is given
+
+
+def harmonic_limit(turn: CamTurn, depth: float) -> float | None:
+    """Return the harmonic up to which a worn depth is stable; None without inertia.
+
+    A harmonic h of the depth d grows as exp(d (m omega^2 h^2 - k)/N), which is real below
+    h* = sqrt((N/d + k)/(m omega^2)), with the least N of the turn.
+
+    Parameters
+    ----------
+    turn : CamTurn
+    depth : float
+        Worn depth d [m].
+    """
+    lever, cam = turn.cam.follower.lever, turn.cam
+    inertia = cam.inertia / lever**2 * turn.speed**2
+    if inertia == 0.0 or turn.load is None:
+        return None
+    least = max(turn.normal_range[0], 0.0)
+    return math.sqrt((least / depth + turn.load.spring / lever**2) / inertia)
+
 
 @dataclass(frozen=True)
 class Skid:

@@ -6,10 +6,13 @@ import math
 
 import numpy as np
 
+from wearsim.errors import Mistake, ScenarioError
 from wearsim.evolution.quantities import CamStations
+from wearsim.studies.cam.checks import HARMONIC_DEPTH, harmonic_limit
 from wearsim.studies.cam.turn import CamTurn, Point
 from wearsim.types import FloatArray
 
+FEWEST_HARMONICS = 3
 GRIP = 0.98  # greatest traction of a rolling roller, of friction: at the ends of a skid
 _BETWEEN = 49  # points of a panel between its stations, for the lift error
 
@@ -73,4 +76,43 @@ def _values(
         "skid": side * roller.radius * turn.slip(point.angle, within) / found.travel,
     }
     arrays = {name: np.array(a)[:, None, None] for name, a in columns.items()}
-    return CamStations(**arrays, between=between)
+    inertia = np.zeros((0, 0))
+    if turn.load is not None and turn.load.feedback == "inertia":
+        inertia = _inertia(turn, point, weight)
+    return CamStations(**arrays, between=between, inertia=inertia)
+
+
+def harmonics_of(turn: CamTurn, stations: int) -> int:
+    """Return the number of harmonics of the lift error that act through the inertia.
+
+    Raises
+    ------
+    ScenarioError
+        If fewer than three are stable.
+    """
+    limit = harmonic_limit(turn, HARMONIC_DEPTH)
+    if limit is None or limit >= FEWEST_HARMONICS:
+        return math.floor(min(limit or math.inf, stations / 3.0))
+    what = "feedback of wear through the inertia is unstable above harmonic"
+    remedy = f'at least {FEWEST_HARMONICS}, or feedback = "static"'
+    mistake = Mistake("load", "feedback", what, f"{limit:.3g}", remedy)
+    raise ScenarioError(turn.scenario.file, [mistake])
+
+
+def _inertia(turn: CamTurn, point: Point, weight: FloatArray) -> FloatArray:
+    """Return the decrease of the normal forces per displacement at each station, (S, S) [N/m].
+
+    The lift error is fitted by its harmonics with the weights of the stations, as its second
+    derivative would amplify the others.
+    """
+    order = np.arange(1, harmonics_of(turn, len(weight)) + 1)
+    waves = np.outer(point.angle, order)
+    basis = np.hstack([np.ones((len(weight), 1)), np.cos(waves), np.sin(waves)])
+    root = np.sqrt(weight)[:, None]
+    fit = np.linalg.pinv(root * basis) * root.T
+    squares = np.concatenate([[0.0], -(order**2.0), -(order**2.0)])
+    lever = turn.cam.follower.lever * np.cos(point.kinematics.pressure_angle)
+    side = np.where(point.inner, -1.0, 1.0)
+    curvature = (basis * squares) @ fit  # second derivative of the lift by the lift
+    scale = turn.cam.inertia * turn.speed**2
+    return np.asarray(scale * (side / lever)[:, None] * curvature * (side / lever))

@@ -15,13 +15,18 @@ from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import unworn_contacts
 from wearsim.mechanics.cam import Panel, extreme
 from wearsim.scenario import Scenario, as_scenario
-from wearsim.studies.cam.checks import Skid, cam_warnings, skids_of
+from wearsim.studies.cam.checks import (
+    HARMONIC_DEPTH,
+    Skid,
+    cam_warnings,
+    harmonic_limit,
+    skids_of,
+)
 from wearsim.studies.cam.turn import CamTurn, Point, turn_of
 from wearsim.studies.run.assemble import build_problem, prepared_model
 from wearsim.studies.run.grid import contact_grid, fresh_patch
 from wearsim.types import FloatArray
 
-HARMONIC_DEPTH = 50e-6  # m, worn depth at which the harmonic limit is given
 _MOST_TEETH = 12  # greatest denominator of a ratio at which the same points of the roller meet
 
 
@@ -171,26 +176,6 @@ def study_cam(
 def _fresh_problem(scenario: Scenario, turn: CamTurn, angles: FloatArray | None) -> WearProblem:
     grid = contact_grid(scenario, turn.normal_range[1])
     return build_problem(scenario, prepared_model(scenario, grid), grid, {}, angles=angles)
-
-
-def harmonic_limit(turn: CamTurn, depth: float) -> float | None:
-    """Return the harmonic up to which a worn depth is stable; None without inertia.
-
-    A harmonic h of the depth d grows as exp(d (m omega^2 h^2 - k)/N), which is real below
-    h* = sqrt((N/d + k)/(m omega^2)), with the least N of the turn.
-
-    Parameters
-    ----------
-    turn : CamTurn
-    depth : float
-        Worn depth d [m].
-    """
-    lever, cam = turn.cam.follower.lever, turn.cam
-    inertia = cam.inertia / lever**2 * turn.speed**2
-    if inertia == 0.0 or turn.load is None:
-        return None
-    least = max(turn.normal_range[0], 0.0)
-    return math.sqrt((least / depth + turn.load.spring / lever**2) / inertia)
 
 
 def _jump_speed(turn: CamTurn) -> float | None:

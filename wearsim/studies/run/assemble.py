@@ -133,6 +133,11 @@ def assemble_problem(
     first, multiplicity = merged_rollers(draws)
     several = len(first) > 1 or draws.passes or scenario.cam
     name = chosen_stepper(scenario, chosen, 2 if several else 1)
+    if name == "per-pass" and getattr(scenario.load.options, "feedback", "") == "inertia":
+        what = 'follows single turns, without feedback = "inertia"'
+        remedy = 'feedback = "static", or another stepper'
+        mistake = Mistake("evolution", "stepper", what, "per-pass", remedy)
+        raise ScenarioError(scenario.file, [mistake])
     stepper = build_stepper(scenario, name)
     if scenario.evolution.nodes is not None and (stepper.pass_by_pass or not draws.passes):
         raise ScenarioError(
