@@ -125,11 +125,15 @@ MASS = Kind("a mass", "kg", "0.5 kg")
 
 INERTIA = Kind("a moment of inertia", "kg m^2", "2.94e-5 kg m^2")
 
+VISCOSITY = Kind("a viscosity", "Pa s", "0.05 Pa s")
+
+COMPRESSIBILITY = Kind("an exponent of pressure", "1/Pa", "20 1/GPa")
+
 TORSIONAL_STIFFNESS = Kind("a torsional stiffness", "N m/rad", "32 N m/rad")
 
 _KINDS = (
     *(LENGTH, FORCE, STIFFNESS, PRESSURE, WEAR_FACTOR, ROTATION_SPEED, DURATION, ANGLE, TORQUE),
-    *(SPEED, PER_POWER, DENSITY, MASS_PER_ENERGY, MASS, INERTIA, TORSIONAL_STIFFNESS),
+    *(SPEED, PER_POWER, DENSITY, MASS_PER_ENERGY, MASS, INERTIA, TORSIONAL_STIFFNESS, VISCOSITY),
     Kind("an area", "m^2", "10 mm^2"),
     Kind("a volume", "m^3", "10 mm^3"),
     Kind("a power", "W", "0.07 W"),

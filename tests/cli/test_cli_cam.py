@@ -48,6 +48,14 @@ def test_chosen_angles_keep_their_order(command: Command) -> None:
     assert stations["peak_pressure_Pa"] == pytest.approx([698.164e6, 694.681e6, 699.177e6], abs=5e2)
 
 
+def test_film_thickness_is_printed_with_a_lubricant(command: Command) -> None:
+    command("new", "cam", "film.toml")
+    stations = data(command, "film.toml", "--at", "10 deg")["stations"]
+    assert 0.1e-6 < stations["film_thickness_m"][0] < 2e-6
+    ratio = stations["film_thickness_m"][0] / 0.3e-6
+    assert stations["film_ratio"] == pytest.approx([ratio])
+
+
 def test_arm_has_its_lift_in_radians(command: Command) -> None:
     stations = data(command, str(SCENARIOS / "cam-swinging.toml"), "--at", "60 deg")["stations"]
     assert stations["lift_per_rad_rad"] == pytest.approx([0.002658663], abs=5e-10)

@@ -14,7 +14,7 @@ from wearsim.profiles import split_name
 from wearsim.scenario.parse.fields import RandomInput
 from wearsim.scenario.parse.toml import flat, parse_fields, reader_in
 from wearsim.scenario.tables.bodies import Cylinder, Roller
-from wearsim.scenario.tables.cam import Cam
+from wearsim.scenario.tables.cam import Cam, LubricantTable
 from wearsim.scenario.tables.plain import (
     CreepageTable,
     EvolutionTable,
@@ -65,6 +65,8 @@ class Scenario:
         The wear law; optional in a scenario of a single contact.
     cam : Cam, optional
         The cam; `cylinder` is then its base circle.
+    lubricant : LubricantTable, optional
+        Lubricant of the cam.
     notes : tuple of str
         Notes for the user on the validity of the results.
     random : tuple of RandomInput
@@ -98,6 +100,7 @@ class Scenario:
     outputs: OutputsTable
     sampling: SamplingTable
     cam: Cam | None = None
+    lubricant: LubricantTable | None = None
     notes: tuple[str, ...] = ()
     random: tuple[RandomInput, ...] = ()
     drawn: Mapping[str, Drawn] = field(default_factory=dict)

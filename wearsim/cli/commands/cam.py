@@ -102,6 +102,11 @@ def _columns(study: CamStudy) -> dict[str, Any]:
     }
     if study.weight is not None:
         columns["weight_rad"] = study.weight
+    lubricant = study.turn.scenario.lubricant
+    if lubricant is not None and study.film is not None:
+        columns["film_thickness_m"] = study.film
+        if lubricant.roughness is not None:
+            columns["film_ratio"] = study.film / lubricant.roughness
     if study.turn.cam.groove:
         columns["inner_flank"] = point.inner
     return columns
@@ -184,6 +189,8 @@ def _stations_table(study: CamStudy) -> tuple[list[str], list[list[str]]]:
         ("creepage", study.contacts.longitudinal_creepage, "1"),
         ("power [W]", study.contacts.power, "W"),
     ]
+    if study.film is not None:
+        columns.append(("film [um]", study.film, "um"))
     cells = [[in_unit(float(v), unit) for v in values] for _, values, unit in columns]
     rows, segments = zip(*cells, strict=True), study.turn.cam.motion.segments
     names = [segments[k].name for k in _segments(study)]

@@ -28,6 +28,7 @@ from wearsim.scenario.tables.bodies import (
 from wearsim.scenario.tables.cam import (
     CamTable,
     FollowerTable,
+    LubricantTable,
     assemble_cam,
     of_follower,
     refuse_cylinder,
@@ -197,6 +198,7 @@ TABLES: dict[str, type[Options]] = {
     "cylinder": CylinderTable,
     "cam": CamTable,
     "follower": FollowerTable,
+    "lubricant": LubricantTable,
     "operation": OperationTable,
     "load": LoadTable,
     "friction": FrictionTable,
@@ -209,7 +211,7 @@ TABLES: dict[str, type[Options]] = {
 }
 #: [cam] replaces [cylinder]
 REQUIRED = ("roller", "cylinder", "operation", "load", "friction", "creepage")
-_ABSENT = {*REQUIRED, "wear", "cam", "follower"}  # tables without defaults
+_ABSENT = {*REQUIRED, "wear", "cam", "follower", "lubricant"}  # tables without defaults
 
 #: functions that read the tables with more checks than those of their models
 READERS: dict[str, Callable[[Mistakes, Mapping[str, object]], Any]] = {

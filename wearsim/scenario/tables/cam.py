@@ -14,7 +14,7 @@ from wearsim.quantities import InputFile, Length, PositiveLength, Quantity
 from wearsim.scenario.parse.mistakes import Mistakes
 from wearsim.scenario.tables.bodies import Cylinder, MaterialField, Roller
 from wearsim.scenario.tables.cam_motion import SHAPES, read_motion
-from wearsim.units import INERTIA, MASS, shown
+from wearsim.units import COMPRESSIBILITY, INERTIA, MASS, VISCOSITY, shown
 
 _WAYS = ("motion", "lift", "profile", "shape")
 
@@ -93,6 +93,20 @@ class FollowerTable(Options):
     )
 
 
+class LubricantTable(Options):
+    """Lubricant of a cam, for the film thickness that `wearsim cam` prints; wear ignores it."""
+
+    viscosity: Annotated[float, Quantity(VISCOSITY, "positive")] = Field(
+        description="Dynamic viscosity at ambient pressure."
+    )
+    pressure_viscosity: Annotated[float, Quantity(COMPRESSIBILITY, "positive")] = Field(
+        default=20e-9, description="Exponent of the viscosity with pressure."
+    )
+    roughness: PositiveLength | None = Field(
+        default=None, description="Root mean square of both surfaces, for the ratio lambda."
+    )
+
+
 @dataclass(frozen=True)
 class Cam:
     """A cam with its follower.
@@ -138,6 +152,8 @@ def refuse_cylinder(mistakes: Mistakes, data: Mapping[str, object]) -> None:
     if "cam" not in data:
         if "follower" in data:
             mistakes.add("follower", "", "has no meaning without [cam]")
+        if "lubricant" in data:
+            mistakes.add("lubricant", "", "has no meaning without [cam]")
         for table, key in (("operation", "turns"), ("roller", "inertia")):
             keys = data.get(table)
             if isinstance(keys, dict) and key in keys:

@@ -14,6 +14,8 @@ from wearsim.contact_batch import ContactBatchSolution
 from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.state import unworn_contacts
 from wearsim.mechanics.cam import Panel, extreme
+from wearsim.mechanics.film import minimum_film
+from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.scenario import Scenario, as_scenario
 from wearsim.studies.cam.checks import (
     HARMONIC_DEPTH,
@@ -44,6 +46,8 @@ class CamStudy:
         Angles that the stations of a run represent [rad]; None for chosen angles.
     contacts : ContactBatchSolution
         Fresh contact at the stations, on the strips of the contact model.
+    film : ndarray, shape (stations,), optional
+        Least film thickness after Hamrock and Dowson [m]; None without a lubricant.
     peak_pressure, patch_length, patch_width : ndarray, shape (stations,)
         Of the fresh contact after Hertz [Pa], [m].
     perimeter : float
@@ -80,6 +84,7 @@ class CamStudy:
     point: Point
     weight: FloatArray | None
     contacts: ContactBatchSolution
+    film: FloatArray | None
     peak_pressure: FloatArray
     patch_length: FloatArray
     patch_width: FloatArray
@@ -156,6 +161,7 @@ def study_cam(
         point,
         weight,
         contacts,
+        _film(turn, point),
         np.array([patch.peak_pressure for patch in patches]),
         np.array([2.0 * patch.a for patch in patches]),
         np.array([2.0 * patch.b for patch in patches]),
@@ -176,6 +182,22 @@ def study_cam(
 def _fresh_problem(scenario: Scenario, turn: CamTurn, angles: FloatArray | None) -> WearProblem:
     grid = contact_grid(scenario, turn.normal_range[1])
     return build_problem(scenario, prepared_model(scenario, grid), grid, {}, angles=angles)
+
+
+def _film(turn: CamTurn, point: Point) -> FloatArray | None:
+    """Return the film thickness at points, if there is a lubricant [m]."""
+    scenario, lubricant = turn.scenario, turn.scenario.lubricant
+    if lubricant is None:
+        return None
+    return minimum_film(
+        turn.speed * point.kinematics.travel,
+        point.normal_force,
+        point.kinematics.relative_curvature,
+        1.0 / scenario.roller.crown_radius,
+        combine(scenario.cylinder.material, scenario.roller.material).contact_modulus,
+        lubricant.viscosity,
+        lubricant.pressure_viscosity,
+    )
 
 
 def _jump_speed(turn: CamTurn) -> float | None:
