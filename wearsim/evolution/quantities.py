@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -127,6 +127,11 @@ class CamStations:
     inertia : ndarray, shape (stations, stations)
         Decrease of the normal forces by the follower's inertia per displacement of the roller at
         each station [N/m]; empty without this feedback.
+    places : ndarray of int, shape (all stations,)
+        Number of the station that is solved for each station along the angle; equal ones are
+        solved once.
+    whole : CamStations, optional
+        All stations along the angle, where equal ones have been joined.
     """
 
     angle: FloatArray
@@ -144,13 +149,23 @@ class CamStations:
     pressure_angle: FloatArray
     between: FloatArray
     inertia: FloatArray
+    places: IntArray
+    whole: CamStations | None = None
+
+    @property
+    def along(self) -> CamStations:
+        """All stations along the angle."""
+        return self.whole or self
 
     def at(self, realisations: IntArray) -> CamStations:
         """Return the stations of some realisations, by number and in that order."""
-        columns = ((item.name, getattr(self, item.name)) for item in fields(self))
-        return CamStations(
-            **{n: a[:, :, realisations] if a.shape[2:] > (1,) else a for n, a in columns}
-        )
+        arrays = {item.name: getattr(self, item.name) for item in fields(self)}
+        drawn: dict[str, Any] = {
+            name: array[:, :, realisations]
+            for name, array in arrays.items()
+            if isinstance(array, np.ndarray) and array.shape[2:] > (1,)
+        }
+        return replace(self, **drawn)
 
     def free_rolling(self, inputs: ContactInputs) -> dict[str, FloatArray]:
         """Return torque [N m] and creepage of free rollers; a torque of nan where they skid."""

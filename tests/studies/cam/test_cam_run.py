@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,11 +12,15 @@ import pytest
 from cam_text import cam, prescribed
 
 import wearsim
+from wearsim.evolution.state import fresh_state
+from wearsim.evolution.steppers.single_step import explicit_step
 from wearsim.mechanics.cam.stations import NUMBERS
 from wearsim.report.figures.cam_run import cam_run_figure
 from wearsim.results.csv_export import export_csv
 from wearsim.results.io.files import read_results
 from wearsim.studies.cam.turn import turn_of
+from wearsim.studies.run.assemble import assemble_problem
+from wearsim.studies.run.draws import draw
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios"
 SHORT = {"operation__turns": 20_000, "contact": {"strips": 61}}
@@ -188,3 +193,43 @@ def test_results_of_a_cam_are_exported_and_drawn(tmp_path, eccentric):
     titles = {axes.get_title(loc="left") for axes in cam_run_figure(eccentric).axes}
     assert {"Worn depth of the cam", "Worn cam", "Lift error against the unworn cam"} <= titles
     assert json.dumps(eccentric.final)
+
+
+def test_equal_stations_are_solved_once():
+    scenario = prescribed(**SHORT)
+    problem = assemble_problem(draw(scenario))[0]
+    cam_ = problem.kinematics.cam
+    assert (len(cam_.angle), len(cam_.along.angle)) == (13, 28)
+    assert cam_.length.sum() == pytest.approx(cam_.along.length.sum(), rel=1e-14)
+    assert cam_.time_share.sum() == pytest.approx(1.0, rel=1e-14)
+    whole = replace(problem.kinematics, cam=cam_.along)
+    gap = np.repeat(problem.flat_gap[:1], 28, axis=0)
+    states = []
+    for one in (problem, replace(problem, kinematics=whole, flat_gap=gap)):
+        state = fresh_state(one)
+        for _ in range(3):
+            state = explicit_step(one, state, np.full(1, 50.0))
+        states.append(state)
+    merged, every = (state.cylinder_depth[:, 0, 0].max(axis=-1) for state in states)
+    assert merged[cam_.places] == pytest.approx(every, rel=1e-9)
+    assert states[0].roller_depth == pytest.approx(states[1].roller_depth, rel=1e-9)
+    assert states[0].energy == pytest.approx(states[1].energy, rel=1e-12)
+
+
+@pytest.mark.slow
+def test_implicit_steps_agree_with_20_000_single_turns_at_every_station():
+    changes = {
+        "operation__turns": 20_000,
+        "contact": {"strips": 61},
+        "cam__stations": 5,
+        "wear__cylinder__k_over_h": "3e-10 1/Pa",
+        "wear__roller__k_over_h": "3e-10 1/Pa",
+        "load__stiffness": "200 N/mm",
+        "roller__crown_radius": "200 mm",
+    }
+    fast = wearsim.run(prescribed(**changes))
+    slow = wearsim.run(prescribed(evolution={"stepper": "per-pass"}, **changes))
+    depth, truth = (run.values("station_depth")[-1] for run in (fast, slow))
+    stated = fast.depth_error[-1] / fast.depth[-1]
+    assert np.abs(depth / truth - 1.0).max() < stated
+    assert fast.normal_force[-1] == pytest.approx(slow.normal_force[-1], rel=1e-4)

@@ -102,7 +102,7 @@ def test_skid_balances_the_momentum_of_the_roller():
 
 def test_energy_of_skids_is_that_of_the_stations():
     turn = heavy()
-    stations = cam_stations(turn)
+    stations = cam_stations(turn).along
     point = turn.at_stations(turn.stations)
     power = (
         0.1 * point.normal_force * stations.rolling_speed.ravel() * np.abs(stations.skid.ravel())

@@ -39,7 +39,7 @@ def cam_history(problem: WearProblem, state: WearState) -> dict[str, FloatArray]
     pressure = problem.per_roller(problem.values_of(state.contacts, "peak_pressure"))
     return {
         "turns": state.passes / problem.kinematics.physical_rollers,
-        "station_depth": depth,
+        "station_depth": depth[cam.places],
         "depth_angle": angle[depth.argmax(axis=0)],
         "peak_pressure_angle": angle[pressure.argmax(axis=0)],
         "lift_error": peak_to_peak(cam, lift_errors(problem, state)),
@@ -48,16 +48,21 @@ def cam_history(problem: WearProblem, state: WearState) -> dict[str, FloatArray]
 
 def cam_record(problem: WearProblem, state: WearState) -> dict[str, FloatArray]:
     """Return the curve of the lift error; nothing of a cylinder."""
-    if problem.kinematics.cam is None:
-        return {}
-    return {"lift_error_curve": lift_errors(problem, state)}
+    cam = problem.kinematics.cam
+    return {} if cam is None else {"lift_error_curve": lift_errors(problem, state)[cam.places]}
+
+
+def at_every_station(problem: WearProblem, values: FloatArray) -> FloatArray:
+    """Return values of the stations, first axis, along the angle of a cam."""
+    cam = problem.kinematics.cam
+    return values if cam is None else values[cam.places]
 
 
 def station_columns(problem: WearProblem) -> dict[str, FloatArray]:
     """Return the columns of the stations in the results file of a cam; none of a cylinder."""
-    cam = problem.kinematics.cam
-    if cam is None:
+    if problem.kinematics.cam is None:
         return {}
+    cam = problem.kinematics.cam.along
     return {
         "station_angle": cam.angle.ravel(),
         "station_weight": 2.0 * np.pi * cam.time_share.ravel(),

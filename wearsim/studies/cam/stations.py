@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -37,7 +39,39 @@ def cam_stations(turn: CamTurn, theta: FloatArray | None = None) -> CamStations:
     numbers = np.array([float(panel.segment) for panel in stations.panels])
     segments = numbers[stations.panel]
     within = middles[stations.panel]
-    return _values(turn, point, stations.weight, segments, within, between)
+    found = _values(turn, point, stations.weight, segments, within, between)
+    return found if found.inertia.size else joined(found)
+
+
+_COMPARED = (
+    *("rolling_speed", "longitudinal_curvature", "surface_curvature", "load_factor", "load_rest"),
+    *("stiffness", "inertia_torque", "skid"),
+)
+
+
+def joined(stations: CamStations) -> CamStations:
+    """Return the stations with equal ones joined: those of a dwell, or of a rise and its return."""
+    columns = [getattr(stations, name).ravel() for name in _COMPARED]
+    columns.append(np.abs(stations.pressure_angle.ravel()))
+    scales = [max(float(np.nanmax(np.abs(column), initial=0.0)), 1e-300) for column in columns]
+    keys = np.stack(
+        [np.nan_to_num(c / s, nan=9.0).round(10) for c, s in zip(columns, scales, strict=True)]
+    )
+    _, first, places = np.unique(keys, axis=1, return_index=True, return_inverse=True)
+    order = np.argsort(first)  # in the order of the angle
+    places, first = np.argsort(order)[places.ravel()], first[order]
+    if len(first) == len(places):
+        return stations
+    arrays = {n: getattr(stations, n)[first] for n in (*_COMPARED, *_PLACES)}
+    for name in ("length", "time_share"):
+        total = np.bincount(places, weights=getattr(stations, name).ravel())
+        arrays[name] = total[:, None, None]
+    between = np.zeros((len(stations.between), len(first)))
+    np.add.at(between.T, places, stations.between.T)
+    return replace(stations, **arrays, between=between, places=places, whole=stations)
+
+
+_PLACES = ("angle", "segment", "pressure_angle")
 
 
 def _values(
@@ -75,11 +109,11 @@ def _values(
         "pressure_angle": found.pressure_angle,
         "skid": side * roller.radius * turn.slip(point.angle, within) / found.travel,
     }
-    arrays = {name: np.array(a)[:, None, None] for name, a in columns.items()}
+    arrays: dict[str, Any] = {name: np.array(a)[:, None, None] for name, a in columns.items()}
     inertia = np.zeros((0, 0))
     if turn.load is not None and turn.load.feedback == "inertia":
         inertia = _inertia(turn, point, weight)
-    return CamStations(**arrays, between=between, inertia=inertia)
+    return CamStations(**arrays, between=between, inertia=inertia, places=np.arange(count))
 
 
 def harmonics_of(turn: CamTurn, stations: int) -> int:

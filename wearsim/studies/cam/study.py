@@ -143,6 +143,8 @@ def study_cam(
     ]
     problem = _fresh_problem(scenario, turn, chosen)
     contacts = problem.model.solve(unworn_contacts(problem))
+    if problem.kinematics.cam is not None:
+        contacts = contacts.at(problem.kinematics.cam.places)
     panels = turn.panels
     steepest = extreme(panels, lambda p, x: np.abs(turn.at(p, x).kinematics.pressure_angle))
     sharpest, _ = extreme(panels, lambda p, x: turn.at(p, x).kinematics.curvature)

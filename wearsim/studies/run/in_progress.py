@@ -21,7 +21,7 @@ from wearsim.results import (
     write_results,
 )
 from wearsim.scenario import Scenario
-from wearsim.studies.cam.observables import station_columns
+from wearsim.studies.cam.observables import at_every_station, station_columns
 from wearsim.studies.plausibility import plausibility_warnings
 from wearsim.studies.preparation import changed_origins, origin_of
 from wearsim.studies.run.assemble import assemble_problem, start_height
@@ -266,8 +266,9 @@ class RunInProgress:
             },
             static={
                 "y": problem.grid.y,
-                "nominal_gap": problem.per_roller(
-                    problem.at_time(np.zeros(1), np.zeros(1)).nominal_gap
+                "nominal_gap": at_every_station(
+                    problem,
+                    problem.per_roller(problem.at_time(np.zeros(1), np.zeros(1)).nominal_gap),
                 ),
                 "start_height": start_height(scenario, problem.grid),
                 "multiplicity": kinematics.multiplicity,

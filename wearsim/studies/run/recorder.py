@@ -20,7 +20,7 @@ from wearsim.evolution.steppers.base import Stepper
 from wearsim.evolution.steppers.loads import descents, elastic_approaches
 from wearsim.evolution.steppers.single_step import present_problem, solve_at_record
 from wearsim.results.run_schema import ALL_VARIABLES
-from wearsim.studies.cam.observables import cam_history, cam_record
+from wearsim.studies.cam.observables import at_every_station, cam_history, cam_record
 from wearsim.studies.run.schedule import RecordSchedule
 from wearsim.types import FloatArray
 
@@ -150,10 +150,12 @@ def record_row(stepper: Stepper, problem: WearProblem, state: WearState) -> Vari
     return {
         "record_passes": state.passes,
         "record_time": problem.time(state.passes),
-        "cylinder_depth_profile": state.cylinder_depth[:, 0],
+        "cylinder_depth_profile": at_every_station(problem, state.cylinder_depth[:, 0]),
         "roller_depth_profile": state.roller_depth[0],
         **{
-            name: problem.per_roller(problem.values_of(state.contacts, name))
+            name: at_every_station(
+                problem, problem.per_roller(problem.values_of(state.contacts, name))
+            )
             for name in ("line_load", "half_length", "dissipation")
         },
         **cam_record(problem, state),
