@@ -65,3 +65,33 @@ def test_inertia_changes_the_load_by_the_curvature_of_the_lift_error():
 
 
 FEEDBACKS = ("none", "static", "inertia")
+
+
+def test_circular_cam_with_a_spring_wears_exponentially():
+    """A roller of constant width on a circular cam in full slip: D' = c N/w, N = (F - k D/cos)/cos.
+
+    The case of Dickrell, Dooner and Sawyer, J. Tribology 125 (2003), with our own derivation.
+    """
+    turns, wear, width, spring = 60_000, 1.1e-9 * 0.1 * 1e-3, 10e-3, 5e5
+    scenario = cam(
+        "eccentric",
+        cam__eccentricity="0.1 mm",
+        roller__width="10 mm",
+        roller__crown_radius="1000 m",
+        follower__mass="0 kg",
+        load__stiffness="500 N/mm",
+        load__feedback="static",
+        wear__cylinder__k_over_h="1.1e-9 1/Pa",
+        contact={"strips": 81},
+        operation__turns=turns,
+    )
+    result, turn = wearsim.run(scenario), turn_of(scenario)
+    point = turn.at_stations(turn.stations)
+    cosine = np.cos(point.kinematics.pressure_angle)
+    force = 300.0 + spring * point.kinematics.lift
+    worn = 1.0 - np.exp(-wear * spring * turns / (width * cosine**2))
+    exact = force * cosine / spring * worn
+    profiles = result.values("cylinder_depth_profile")[-1]
+    depth = profiles[:, np.abs(result.y) < 3.5e-3].mean(axis=1)
+    assert depth == pytest.approx(exact, rel=5e-4)
+    assert worn.min() > 0.25
