@@ -36,6 +36,10 @@ def cam_figure(study: CamStudy, title: str) -> Figure:
     lift, unit = ("arm", "deg") if turn.cam.follower.swings else ("lift", "mm")
     scale = PER_SI[unit]
     found, angle = fine.kinematics, fine.angle * DEG
+
+    def broken(one: FloatArray, other: FloatArray) -> tuple[FloatArray, FloatArray]:
+        return between_flanks(one, fine), between_flanks(other, fine)
+
     with titled_figure(12.0, 8.6, title) as figure:
         panels = figure.subplot_mosaic(
             [["shape", "motion"], ["shape", "pressure"], ["load", "speed"]],
@@ -52,21 +56,17 @@ def cam_figure(study: CamStudy, title: str) -> Figure:
         axes = panels["pressure"]
         axes.plot(angle, found.pressure_angle * DEG, color=BLUE)
         name_axes(axes, "pressure angle, and curvature of the cam", "", "pressure angle [deg]")
-        _second(axes, angle, found.curvature / MM, "curvature [1/mm]")
+        _second(axes, *broken(angle, found.curvature / MM), "curvature [1/mm]")
         axes = panels["speed"]
-        axes.plot(angle, turn.speed * found.travel, color=BLUE)
+        axes.plot(*broken(angle, turn.speed * found.travel), color=BLUE)
         name_axes(axes, "rolling speed, and roller/cam speed", "angle [deg]", "rolling speed [m/s]")
-        _second(axes, angle, found.spin, "roller/cam speed")
+        _second(axes, *broken(angle, found.spin), "roller/cam speed")
         axes = panels["load"]
         axes.plot(angle, fine.normal_force, color=BLUE)
         axes.plot(study.point.angle * DEG, study.point.normal_force, ".", color=BLUE, ms=4.0)
         name_axes(axes, "normal force, and peak pressure", "angle [deg]", "normal force [N]")
-        _second(
-            axes,
-            study.point.angle * DEG,
-            study.peak_pressure * PER_SI["MPa"],
-            "peak pressure [MPa]",
-        )
+        peak = study.peak_pressure * PER_SI["MPa"]
+        _second(axes, study.point.angle * DEG, peak, "peak pressure [MPa]", ".")
         for name in ("motion", "pressure", "speed", "load"):
             name_segments(panels[name], turn.cam.motion, names=name in {"motion", "load"})
         for skid in study.skids:
@@ -75,10 +75,12 @@ def cam_figure(study: CamStudy, title: str) -> Figure:
     return figure
 
 
-def _second(axes: Axes, angle: FloatArray, values: FloatArray, label: str) -> None:
+def _second(
+    axes: Axes, angle: FloatArray, values: FloatArray, label: str, style: str = "-"
+) -> None:
     """Draw values on a second axis at the right."""
     other = axes.twinx()
-    other.plot(angle, values, "." if len(angle) < _SAMPLES else "-", ms=4.0, color=ORANGE)
+    other.plot(angle, values, style, ms=4.0, color=ORANGE)
     other.set_ylabel(label, color=ORANGE)
     other.spines["right"].set_visible(True)
     other.grid(visible=False)
@@ -102,10 +104,17 @@ def name_segments(axes: Axes, motion: Motion, *, names: bool) -> None:
             )
 
 
+def between_flanks(values: FloatArray, point: Point) -> FloatArray:
+    """Return values, last axis points, with a gap where the flank of a groove changes."""
+    gaps = np.flatnonzero(np.diff(point.inner.astype(np.int64))) + 1
+    return np.insert(values, gaps, np.nan, axis=-1)
+
+
 def draw_shape(axes: Axes, turn: CamTurn, point: Point) -> None:
     """Draw the cam, its pitch curve and the roller at the start of the turn."""
     radius = turn.scenario.roller.radius
     centre, surface = surface_points(turn.cam.follower, point.kinematics, point.angle)
+    surface = between_flanks(surface, point)
     axes.plot(*(surface * MM), color=BLUE, lw=1.6, label="cam")
     axes.plot(*(centre * MM), color=GREY, lw=0.8, ls="--", label="pitch curve")
     around = np.linspace(0.0, 2.0 * np.pi, 181)

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from wearsim.mechanics.cam import Stations, surface_points
-from wearsim.report.figures.cam import name_segments
+from wearsim.report.figures.cam import between_flanks, name_segments
 from wearsim.report.figures.run import Colours, caption, draw_depth
 from wearsim.report.parts import (
     BLUE,
@@ -104,9 +104,12 @@ def _draw_shape(axes: Axes, turn: CamTurn, stations: Stations, depth: FloatArray
     follower, found = turn.cam.follower, point.kinematics
     fresh = surface_points(follower, found, point.angle)[1]
     cut = surface_points(follower, found, point.angle, factor * worn)[1]
-    axes.fill(*(cut * MM), color=BLUE, alpha=0.12, lw=0)
-    axes.plot(*(fresh * MM), color=GREY, lw=0.9, label="unworn")
-    axes.plot(*(cut * MM), color=BLUE, lw=1.4, label=f"worn, depth x {factor:g}")
+    if not turn.cam.groove:
+        axes.fill(*(cut * MM), color=BLUE, alpha=0.12, lw=0)
+    axes.plot(*(between_flanks(fresh, point) * MM), color=GREY, lw=0.9, label="unworn")
+    axes.plot(
+        *(between_flanks(cut, point) * MM), color=BLUE, lw=1.4, label=f"worn, depth x {factor:g}"
+    )
     for start in turn.cam.motion.starts[:-1]:
         edge = fresh[:, np.argmin(np.abs(point.angle - start))] * MM
         axes.plot([0.0, edge[0]], [0.0, edge[1]], color=GREY, lw=0.6, ls=":")
