@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from cam_text import cam, prescribed
 
+import wearsim
 from wearsim.errors import ScenarioError
 from wearsim.scenario import Scenario
 from wearsim.studies.cam.checks import cam_warnings, skids_of
@@ -159,6 +160,14 @@ def test_change_of_flank_is_a_jump_of_the_spin_and_a_skid():
 
 def test_slip_of_prescribed_creepage_is_that_of_the_scenario():
     assert CamTurn(prescribed()).arcs == []
+
+
+def test_study_of_one_contact_takes_the_first_station_and_dissipation_is_refused():
+    study = wearsim.study_contact(prescribed())
+    assert "contact of the cam at 45 deg; wearsim cam solves all stations" in study.notes
+    assert study.point.normal_force == pytest.approx(300.0)
+    with pytest.raises(ScenarioError, match=r"\[cam\]: has many contacts"):
+        wearsim.dissipation(prescribed(), 3)
 
 
 def test_winding_number_and_sweeps():

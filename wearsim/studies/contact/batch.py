@@ -197,6 +197,10 @@ class Realisations:
 
     def __init__(self, scenario: Scenario, count: int) -> None:
         self.scenario, self.count = scenario, count
+        if scenario.cam is not None:
+            what = "has many contacts, and this study solves one"
+            remedy = "wearsim cam for its contacts, or wearsim ensemble"
+            raise ScenarioError(scenario.file, [Mistake("cam", "", what, None, remedy)])
         mean_load = load_range(scenario, scenario.load.build(), 0.0)[0]
         self._once, field, self.notes = acting_inputs(scenario)
         drawer = Drawer(self._once, scenario.sampling.plan, count, replicates=1)

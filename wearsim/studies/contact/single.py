@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
@@ -11,6 +12,7 @@ from wearsim.evolution.contacts import unworn_contacts
 from wearsim.plugins import ContactModel
 from wearsim.profiles import load_profile
 from wearsim.scenario import Scenario, as_scenario, described_model
+from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.plausibility import plausibility_warnings
 from wearsim.studies.run.assemble import build_problem, prepared_model
 from wearsim.studies.run.grid import contact_grid, wider_grid
@@ -144,6 +146,9 @@ def study_contact(
         span = f"{1e3 * grid.edges[0]:.4g} to {1e3 * grid.edges[1]:.4g} mm"
         text = f"the contact is wider than the profile: the strips span {span}, and it is"
         notes = (*notes, f"{text} level beyond the profile")
+    if scenario.cam is not None:
+        theta = math.degrees(float(turn_of(scenario).stations.angle[0]))
+        notes = (*notes, f"contact of the cam at {theta:.4g} deg; wearsim cam solves all stations")
     fields = model.fields(solution, gap, curvature, point) if with_fields else None
     errors: tuple[float | None, float | None] = (None, None)
     seconds, warnings = None, plausibility_warnings(scenario)
@@ -166,7 +171,7 @@ def study_contact(
         seconds,
         notes,
         tuple(warnings),
-        len(notes) > len(scenario.notes),
+        any(note.startswith("the contact is wider") for note in notes),
     )
 
 
