@@ -8,12 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.quantities import mean_along, sum_in_order, worn_volume
+from wearsim.evolution.quantities import mean_along, sum_in_order, values_between, worn_volume
 from wearsim.evolution.state import Depths, WearState
 from wearsim.evolution.steppers.base import Step
 from wearsim.evolution.steppers.loads import smooth_loads
 from wearsim.evolution.steppers.single_step import WearIncrement, carried_loads, solve_present
 from wearsim.mechanics.numerics.linearised_wear import difference_sizes
+from wearsim.plugins import BODIES
 from wearsim.types import FloatArray
 
 # lower bounds: the depth grows with a power of 2/3 to 1 of the passes, the volume with about 1
@@ -104,7 +105,7 @@ def variation_bias(
     if problem.constant_load is not None and not problem.varying:
         return None
     start, stop = problem.time(first), problem.time(first + passes)
-    deviations = [item for item in problem.deviations(start, stop) if np.count_nonzero(item[2])]
+    deviations = [item for item in _deviations(problem, start, stop) if np.count_nonzero(item[2])]
     if not deviations:
         return None
     if follows_trends:
@@ -138,6 +139,24 @@ def variation_bias(
         return None
     cylinder, roller, energy = (np.sum(parts, axis=0) for parts in zip(*biases, strict=True))
     return (cylinder, roller), energy
+
+
+def _deviations(
+    problem: WearProblem, start: FloatArray, stop: FloatArray
+) -> list[tuple[str, tuple[int, ...], FloatArray]]:
+    """Return field, rollers and standard deviation of all that varies between two times [s]."""
+    load = values_between([load.deviation for load in problem.loads], start, stop)
+    return [
+        ("normal_force_offset", tuple(range(problem.rollers)), load),
+        *(
+            (
+                item.name,
+                item.rollers,
+                values_between([path.deviation for path in item.paths], start, stop),
+            )
+            for item in problem.varying
+        ),
+    ]
 
 
 def _wear_and_energy(
@@ -251,7 +270,7 @@ def with_pass_errors(
 def _volume_variance(problem: WearProblem, end: WearState, passes: FloatArray) -> FloatArray:
     """Return the variance of the volume worn in some passes, shape (realisations,) [m^6]."""
     kinematics, spacing = problem.kinematics, problem.grid.spacing
-    cylinder, roller = problem.wear_per_pass(end.contacts)
+    cylinder, roller = problem.depths_worn(end.contacts, dict.fromkeys(BODIES, 1.0))
     ratio = np.asarray(kinematics.roller_share * kinematics.physical_rollers)[..., None]
     volume = worn_volume(cylinder, spacing, kinematics.track_radius)
     volume = volume + worn_volume(roller * ratio, spacing, kinematics.roller_radius)

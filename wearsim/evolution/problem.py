@@ -171,7 +171,7 @@ class WearProblem:
         Shape (2, stations + rollers).
         """
         kinematics, stations = self.kinematics, self.shape[0]
-        cylinder = np.full(stations, kinematics.cylinder_radius / stations)
+        cylinder = np.broadcast_to(np.ravel(kinematics.track_radius) / stations, stations)
         rollers = kinematics.roller_radius * kinematics.multiplicity
         kinds = np.concatenate([np.ones(stations), np.zeros(self.rollers)])
         volumes = 2.0 * np.pi * self.grid.spacing * np.concatenate([cylinder, rollers])
@@ -230,7 +230,7 @@ class WearProblem:
 
     @cached_property
     def constant_load(self) -> FloatArray | None:
-        """Load before feedback, if it is constant in all realisations, shape (realisations,)."""
+        """Load before feedback, if it is constant in all realisations; as `force`."""
         if not all(load.constant for load in self.loads):
             return None
         return self.force(np.zeros(len(self.loads)))
@@ -276,23 +276,6 @@ class WearProblem:
         cam = self.kinematics.cam
         return force if cam is None else force * cam.load_factor + cam.load_rest
 
-    def deviations(
-        self, start: FloatArray, stop: FloatArray
-    ) -> list[tuple[str, tuple[int, ...], FloatArray]]:
-        """Return field, rollers and standard deviation of all that varies between two times [s]."""
-        load = values_between([load.deviation for load in self.loads], start, stop)
-        return [
-            ("normal_force_offset", tuple(range(self.rollers)), load),
-            *(
-                (
-                    item.name,
-                    item.rollers,
-                    values_between([path.deviation for path in item.paths], start, stop),
-                )
-                for item in self.varying
-            ),
-        ]
-
     def at_time(self, start: FloatArray, stop: FloatArray) -> WearProblem:
         """Return the problem with every process at its mean between two times [s]."""
         if not self.varying:
@@ -316,16 +299,6 @@ class WearProblem:
         values: FloatArray = getattr(contacts, name)
         return values.reshape(self.shape + values.shape[1:])
 
-    def wear_per_pass(self, contacts: ContactBatchSolution) -> FloatArray:
-        """Return the depth worn off both bodies by one pass of each contact, where it touches.
-
-        Returns
-        -------
-        ndarray, shape (2, stations, contacts, realisations, strips)
-            Depth of the cylinder and of the rollers per pass of that contact [m].
-        """
-        return self._depths(contacts, dict.fromkeys(BODIES, 1.0))
-
     def wear_parts(self, contacts: ContactBatchSolution, passes: FloatArray | float) -> FloatArray:
         """Return the contribution of each contact to the wear of the bodies over some passes [m].
 
@@ -338,7 +311,9 @@ class WearProblem:
         if self.linear_wear:
             power = self.values_of(contacts, "dissipation")
             return np.asarray(self._wear_coefficients * each * power)
-        return self._depths(contacts, {b: share * each for b, share in self.wear_shares.items()})
+        return self.depths_worn(
+            contacts, {b: share * each for b, share in self.wear_shares.items()}
+        )
 
     @cached_property
     def _wear_coefficients(self) -> FloatArray:
@@ -346,12 +321,12 @@ class WearProblem:
         factors = [self.wear_factors[body] for body in BODIES]
         shares = [self.wear_shares[body] for body in BODIES]
         each = zip(shares, factors, strict=True)
-        return np.stack([share * np.asarray(factor)[:, None] for share, factor in each])
+        return np.stack([share * np.asarray(factor)[..., None] for share, factor in each])
 
-    def _depths(
+    def depths_worn(
         self, contacts: ContactBatchSolution, passes: Mapping[Body, FloatArray | float]
     ) -> FloatArray:
-        """Return the depth that `passes` passes of each contact wear off both bodies [m]."""
+        """Return the depth that `passes` passes of each contact wear off both bodies, as parts."""
         dissipation = self.values_of(contacts, "dissipation")
         found = np.empty((len(BODIES), *dissipation.shape))
         for depth, body in zip(found, BODIES, strict=True):

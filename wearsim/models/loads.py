@@ -112,6 +112,8 @@ class FollowerLoad(Load):
     increase per lift [N/m, or N m/rad].
     """
 
+    constant = True
+
     def __init__(self, options: FollowerOptions | ArmOptions) -> None:
         self.preload, self.spring = options.preload, options.stiffness
         self.feedback = options.feedback

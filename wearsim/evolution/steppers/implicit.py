@@ -180,7 +180,7 @@ class _Conditions:
 
     Parameters
     ----------
-    force : ndarray, shape (realisations,)
+    force : ndarray, shape (realisations,) or (stations, 1, realisations)
         Load before feedback for the solution at the end of the step [N].
     own, mean : ndarray, shape (realisations,)
         Exposure per pass in these conditions, and its mean over the step.
@@ -210,6 +210,8 @@ def _conditions(
 
 def _exposure(here: WearProblem, problem: WearProblem, force: FloatArray) -> FloatArray:
     """Return the exposure per pass for a load before feedback, shape (realisations,) [N]."""
+    if force.ndim > 1:  # of a cam
+        force = problem.mean_over_turn(force)[0, 0]
     exposure = at_least(problem, force + here.inputs.normal_force_offset.mean(axis=0))
     if any(item.name == "friction" for item in problem.varying):
         exposure = exposure * here.inputs.friction.mean(axis=0)
@@ -245,7 +247,7 @@ def implicit_step(problem: WearProblem, state: WearState, passes: FloatArray) ->
         return _step(here, state, passes, conditions, first_order)[0]
     again = np.flatnonzero(decreased & (order > 1))
     if again.size:
-        conditions = _Conditions(*(column[again] for column in vars(conditions).values()))
+        conditions = _Conditions(*(column[..., again] for column in vars(conditions).values()))
         some = here.at(again), state.at(again), passes[again]
         part, _ = _step(*some, conditions, first_order[again])
         end = end.with_others(again, part)

@@ -44,7 +44,7 @@ class EndOfStep:
         State at the start of the step.
     base : ndarray, shape (stations + rollers, realisations, strips)
         Depths without the wear at the end [m].
-    force : ndarray, shape (realisations,)
+    force : ndarray, shape (realisations,) or (stations, 1, realisations)
         Load before feedback [N].
     passes : ndarray, shape (realisations,)
         Length of the step.
@@ -197,7 +197,7 @@ class EndOfStep:
         if not problem.terms:
             return start.terms
         powers = [
-            problem.per_roller(problem.values_of(contacts, "power")).mean(axis=0)
+            problem.mean_over_turn(problem.per_roller(problem.values_of(contacts, "power")))[0]
             for contacts in (start.contacts, solved)
         ]
         power = 0.5 * (powers[0] + powers[1])

@@ -12,7 +12,7 @@ import numpy as np
 
 from wearsim.contact_batch import ContactBatchSolution
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.state import unworn_contacts
+from wearsim.evolution.contacts import unworn_contacts
 from wearsim.mechanics.cam import Panel, extreme
 from wearsim.mechanics.film import minimum_film
 from wearsim.mechanics.hertz.elasticity import combine
