@@ -231,9 +231,8 @@ class WearProblem:
     @cached_property
     def constant_load(self) -> FloatArray | None:
         """Load before feedback, if it is constant in all realisations; as `force`."""
-        if not all(load.constant for load in self.loads):
-            return None
-        return self.force(np.zeros(len(self.loads)))
+        constant = all(load.constant for load in self.loads)
+        return self.force(np.zeros(len(self.loads))) if constant else None
 
     @cached_property
     def has_spring(self) -> bool:
@@ -311,16 +310,13 @@ class WearProblem:
         if self.linear_wear:
             power = self.values_of(contacts, "dissipation")
             return np.asarray(self._wear_coefficients * each * power)
-        return self.depths_worn(
-            contacts, {b: share * each for b, share in self.wear_shares.items()}
-        )
+        shares = self.wear_shares
+        return self.depths_worn(contacts, {body: shares[body] * each for body in BODIES})
 
     @cached_property
     def _wear_coefficients(self) -> FloatArray:
         """Contribution of each contact to the wear per roller pass and dissipation, as parts."""
-        factors = [self.wear_factors[body] for body in BODIES]
-        shares = [self.wear_shares[body] for body in BODIES]
-        each = zip(shares, factors, strict=True)
+        each = [(self.wear_shares[body], self.wear_factors[body]) for body in BODIES]
         return np.stack([share * np.asarray(factor)[..., None] for share, factor in each])
 
     def depths_worn(

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from wearsim.contact_batch import ContactBatchSolution
-from wearsim.evolution.problem import WearProblem
 from wearsim.evolution.contacts import unworn_contacts
+from wearsim.evolution.problem import WearProblem
 from wearsim.mechanics.cam import Panel, extreme
 from wearsim.mechanics.film import minimum_film
 from wearsim.mechanics.hertz.elasticity import combine
