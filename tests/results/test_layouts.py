@@ -56,7 +56,8 @@ def test_ensemble_of_this_layout_opens(name):
 
 
 @pytest.mark.parametrize(
-    ("name", "layout"), [("run", 1), ("run", 2), ("run", 3), ("dissipation", 1), ("ensemble", 1)]
+    ("name", "layout"),
+    [("run", 1), ("run", 2), ("run", 3), ("run", 4), ("dissipation", 1), ("ensemble", 1)],
 )
 def test_file_of_an_earlier_layout_is_refused_with_a_remedy(name, layout):
     path = FOLDER / f"{name}-{layout}.h5"

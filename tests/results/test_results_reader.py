@@ -177,12 +177,12 @@ def test_hdf5_of_another_program_is_refused(tmp_path: Path) -> None:
 
 
 def _newer(file: h5py.File) -> None:
-    file.attrs["format_version"] = 5
+    file.attrs["format_version"] = 6
     del file["depth"]
 
 
 def _older(file: h5py.File) -> None:
-    file.attrs["format_version"] = 3
+    file.attrs["format_version"] = 4
 
 
 def _incomplete(file: h5py.File) -> None:
@@ -208,14 +208,14 @@ def _with_about(text: str) -> Callable[[h5py.File], None]:
         (
             _newer,
             (
-                "has layout 5 of wearsim-run, and this wearsim reads layout 4; update wearsim to"
+                "has layout 6 of wearsim-run, and this wearsim reads layout 5; update wearsim to"
                 " read it"
             ),
         ),
         (
             _older,
             (
-                "has layout 3 of wearsim-run, and this wearsim reads layout 4; repeat the"
+                "has layout 4 of wearsim-run, and this wearsim reads layout 5; repeat the"
                 " computation, or read it with the version of wearsim that wrote it"
             ),
         ),

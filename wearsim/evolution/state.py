@@ -111,14 +111,14 @@ class WearState:
         [m/N^(2/3)], where a load has a spring.
     wear_exponents : ndarray, shape (stations, contacts, realisations, strips), optional
         Exponent of the wear of a strip as a power of its line load, in the last implicit step.
-    past_wear : ndarray, shape (5, stations + rollers, realisations, strips), optional
-        Wear per roller pass of cylinder and rollers [m], and divided differences of order 1 to 4 of
+    past_wear : ndarray, shape (6, stations + rollers, realisations, strips), optional
+        Wear per roller pass of cylinder and rollers [m], and divided differences of order 1 to 5 of
         their depths over the exposure (see `implicit`) at the present and at past points.
-    past_energy : ndarray, shape (5, realisations), optional
+    past_energy : ndarray, shape (6, realisations), optional
         The same of the energy [J].
-    past_feedback : ndarray, shape (5, stations, contacts, realisations), optional
+    past_feedback : ndarray, shape (6, stations, contacts, realisations), optional
         Part of the loads due to springs and terms [N], and its divided differences.
-    past_spans : ndarray, shape (4, realisations), optional
+    past_spans : ndarray, shape (5, realisations), optional
         Exposure from the past points to the present one; infinite where there is none.
     order : ndarray of int, shape (realisations,), optional
         Order of the next implicit step.

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from wearsim.mechanics.numerics.multistep import (
+    MAX_ORDER,
     ROWS,
     extrapolated,
     formulas,
@@ -11,8 +12,9 @@ from wearsim.mechanics.numerics.multistep import (
     new_differences,
 )
 
+ORDERS = range(1, MAX_ORDER + 1)
 ONE, NONE = np.ones(1), np.zeros(1)
-POINTS = np.array([0.0, -0.11, -0.18, -0.32, -0.4])
+POINTS = np.array([0.0, -0.11, -0.18, -0.32, -0.4, -0.47])
 
 
 class Solution:
@@ -39,18 +41,18 @@ class Solution:
         return guess.item()
 
 
-@pytest.mark.parametrize("order", [1, 2, 3])
+@pytest.mark.parametrize("order", ORDERS)
 def test_formula_is_exact_for_polynomials_of_its_order(order):
-    exact = np.polynomial.Polynomial([0.3, -0.7, 1.1, 2.0][: order + 1])
+    exact = np.polynomial.Polynomial([0.3, -0.7, 1.1, 2.0, -1.3][: order + 1])
     solution, t = Solution(exact), 0.0
-    for length in (0.1, 0.15, 0.12, 0.2, 0.2, 0.07):
+    for length in (0.1, 0.14, 0.12, 0.17, 0.17, 0.07):
         t += length
         guess = solution.step(length, order, exact.deriv()(t))
         assert solution.value.item() == pytest.approx(exact(t), rel=1e-12)
         assert guess == pytest.approx(exact(t), rel=1e-12)
 
 
-@pytest.mark.parametrize("order", [1, 2, 3])
+@pytest.mark.parametrize("order", ORDERS)
 def test_formula_converges_with_its_order(order):
     def error(count):
         lengths = 1.0 + 0.3 * np.sin(np.arange(count))
@@ -62,7 +64,7 @@ def test_formula_converges_with_its_order(order):
     assert np.log(error(40) / error(160)) / np.log(4.0) == pytest.approx(order, abs=0.15)
 
 
-@pytest.mark.parametrize("order", [1, 2, 3])
+@pytest.mark.parametrize("order", ORDERS)
 def test_local_error_is_that_of_a_step_from_exact_points(order):
     length = 0.05
     solution = Solution(lambda t: np.exp(-t), POINTS * 0.5)
@@ -70,7 +72,7 @@ def test_local_error_is_that_of_a_step_from_exact_points(order):
     exact = np.exp(-length)
     errors = local_errors(solution.differences, solution.spans, solution.value)[:, 0] * exact
     assert errors[order - 1] == pytest.approx(abs(solution.value.item() - exact), rel=0.2)
-    assert (np.diff(errors) < 0.0).all()
+    assert (np.diff(errors[: order + 1]) < 0.0).all()
 
 
 def test_known_derivative_replaces_a_past_point():
@@ -87,17 +89,17 @@ def test_known_derivative_replaces_a_past_point():
 
 
 def test_order_is_lowered_after_a_sudden_growth_of_the_step():
-    spans = np.array([[1.0], [2.0], [3.0], [4.0]])
-    for length, order in ((1.5, 3), (2.2, 2), (3.0, 1)):
+    spans = np.array([[1.0], [2.0], [3.0], [4.0], [5.0]])
+    for length, order in ((1.4, 4), (1.8, 3), (2.2, 2), (3.0, 1)):
         weights, factor = np.empty((2, ROWS, 1)), np.empty(1)
         distances = np.empty((ROWS - 1, 1))
-        formulas(spans, length * ONE, np.array([3]), ONE, weights, factor, distances)
+        formulas(spans, length * ONE, np.array([MAX_ORDER]), ONE, weights, factor, distances)
         assert np.count_nonzero(weights[0]) == order
         assert weights[:, 0].ravel().tolist() == [1.0, 1.0]
-        assert distances.ravel() == pytest.approx([length, *(length + spans[:3, 0])])
+        assert distances.ravel() == pytest.approx([length, *(length + spans[:-1, 0])])
 
 
 def test_missing_points_have_no_estimate():
-    spans = np.array([[1.0], [2.0], [np.inf], [np.inf]])
+    spans = np.array([[1.0], [2.0], [np.inf], [np.inf], [np.inf]])
     errors = local_errors(np.ones((ROWS, 1, 1, 2)), spans, np.ones((1, 1, 2)))
-    assert np.isfinite(errors[:, 0]).tolist() == [True, False, False]
+    assert np.isfinite(errors[:, 0]).tolist() == [True, False, False, False]

@@ -31,7 +31,7 @@ from wearsim.types import BoolArray, FloatArray, IntArray
 
 LIMIT = 2.0  # error of an accepted step, relative to the one aimed at
 SAFETY = 0.8  # ratio of the next step to the one that would meet the aim
-GROW = (2.2, 2.2, 1.8)  # greatest ratio of successive steps, by order
+GROW = (2.2, 2.2, 1.8, 1.45)  # greatest ratio of successive steps, by order
 PART_EXPONENT = 0.25  # early errors decay: they may be greater, by this power of the passes done
 WHOLE_PASSES = 2.0  # steps above which passes are counted one by one
 
@@ -55,7 +55,7 @@ class Past(NamedTuple):
 
 
 class ImplicitStepper(StepDoublingStepper):
-    """Stepper of order one to three that solves the contacts on the profiles at each step's end.
+    """Stepper of order one to four that solves the contacts on the profiles at each step's end.
 
     It is stable for any step length. Order and step length follow from the error that a step adds
     to the profiles, estimated by the next divided difference.

@@ -24,7 +24,7 @@ from wearsim.plugins import SharedWear
 from wearsim.types import BoolArray, FloatArray
 
 MAX_FIXED_POINT = 60
-CONVERGED = 50.0  # change of wear over the whole depth, relative to the tolerance of iterations
+CONVERGED = 500.0  # change of wear over the whole depth, relative to the tolerance of iterations
 LEAST_GUESS = 0.1  # first guess of a load over that without feedback; ratio of its iterates
 LOST = 1e-9  # load over that without feedback, below which contact is lost
 RELAXATION_INTERVAL = 20  # iterations between relaxations of the tolerance by a factor of ten

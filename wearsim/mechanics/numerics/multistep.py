@@ -7,11 +7,11 @@ import numpy as np
 from wearsim.mechanics.numerics.jit import compile_alongside, kernel
 from wearsim.types import FloatArray, IntArray
 
-MAX_ORDER = 3
+MAX_ORDER = 4
 ROWS = MAX_ORDER + 2  # of the divided differences: the highest one is that of the error estimate
-# greatest ratios of a step to the last one; steps that grow by them are stable: below
-# 1 + sqrt(2) at second order, and at third order if only every second step grows
-_RATIO_2, _RATIO_3 = 2.4, 1.9
+# greatest ratios of a step to the last one at order 2, 3 and 4, below those at which steps are
+# unstable: 1 + sqrt(2), and 2.64 and 1.64 if only every second step grows
+_RATIOS = (2.4, 1.9, 1.5)
 
 
 @kernel
@@ -27,7 +27,7 @@ def formulas(
     """Compute the formula of one step for each of several solutions.
 
     A solution is known by its value at the present point and its divided differences of order 1 to
-    4 over the present and past points. The value y at the end of a step satisfies
+    5 over the present and past points. The value y at the end of a step satisfies
 
         y - factor * y' = y_0 + sum_k weights[0, k] * difference_k,
 
@@ -36,7 +36,7 @@ def formulas(
 
     Parameters
     ----------
-    spans : ndarray, shape (4, solutions)
+    spans : ndarray, shape (5, solutions)
         Distances from the present point back to the past points, infinite where there is none; a
         point of distance zero stands for a known derivative at the present point.
     steps : ndarray, shape (solutions,)
@@ -45,11 +45,11 @@ def formulas(
         Order of the formula.
     start : ndarray, shape (solutions,)
         Value of both weights for k = 0.
-    weights : ndarray, shape (2, 5, solutions)
+    weights : ndarray, shape (2, 6, solutions)
         Result: weights of the formula and of the prediction.
     factor : ndarray, shape (solutions,)
         Result: factor of the derivative.
-    distances : ndarray, shape (4, solutions)
+    distances : ndarray, shape (5, solutions)
         Result: `spans` of the end of the step.
 
     References
@@ -67,10 +67,8 @@ def formulas(
             if k < ROWS - 2:
                 distances[k + 1, v] = step + spans[k, v]
         order = min(orders[v], known)
-        if order == 3 and step > _RATIO_3 * spans[0, v]:
-            order = 2
-        if order == 2 and step > _RATIO_2 * spans[0, v]:
-            order = 1
+        while order > 1 and step > _RATIOS[order - 2] * spans[0, v]:
+            order -= 1
         inverse = 0.0
         for k in range(order):
             inverse += 1.0 / distances[k, v]
@@ -91,8 +89,8 @@ def extrapolated(weights: FloatArray, differences: FloatArray) -> FloatArray:
 
     Parameters
     ----------
-    weights : ndarray, shape (2, 5, solutions)
-    differences : ndarray, shape (5, rows, solutions, columns)
+    weights : ndarray, shape (2, 6, solutions)
+    differences : ndarray, shape (6, rows, solutions, columns)
 
     Returns
     -------
@@ -129,9 +127,9 @@ def new_differences(
     change : ndarray, shape (rows, solutions, columns)
         Change of the values in the step, without `part` times that of row 0.
     part : ndarray, shape (solutions,)
-    old : ndarray, shape (5, rows, solutions, columns)
+    old : ndarray, shape (6, rows, solutions, columns)
         Divided differences at its start.
-    distances : ndarray, shape (4, solutions)
+    distances : ndarray, shape (5, solutions)
         Distances from the end of the step back to the other points.
     """
     _, rows, solutions, columns = old.shape
@@ -155,16 +153,16 @@ def local_errors(differences: FloatArray, spans: FloatArray, depths: FloatArray)
 
     Parameters
     ----------
-    differences : ndarray, shape (5, rows, solutions, columns)
-    spans : ndarray, shape (4, solutions)
+    differences : ndarray, shape (6, rows, solutions, columns)
+    spans : ndarray, shape (5, solutions)
         Distances from the present point back to the past points.
     depths : ndarray, shape (rows, solutions, columns)
         Values at the present point.
 
     Returns
     -------
-    ndarray, shape (3, solutions)
-        Euclidean norm of the error at order 1, 2 and 3, over that of the values; infinite where
+    ndarray, shape (4, solutions)
+        Euclidean norm of the error at orders 1 to 4, over that of the values; infinite where
         points are missing.
     """
     _, rows, solutions, columns = differences.shape
