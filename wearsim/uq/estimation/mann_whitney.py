@@ -41,7 +41,7 @@ def superiority(first: FloatArray, second: FloatArray) -> Interval:
     n, m = len(first), len(second)
     if min(n, m) < FEWEST:
         return UNKNOWN
-    of_first, of_second = _part_below(first, second), 1.0 - _part_below(second, first)
+    of_first, of_second = part_below(first, second), 1.0 - part_below(second, first)
     chance = float(of_first.mean())
     parts = np.array([of_first.var(ddof=1) / n, of_second.var(ddof=1) / m])
     low = high = chance
@@ -115,7 +115,7 @@ def paired(
     return Paired(difference, Interval(share, middle - reach, middle + reach).within(0, 1), count)
 
 
-def _part_below(values: FloatArray, others: FloatArray) -> FloatArray:
+def part_below(values: FloatArray, others: FloatArray) -> FloatArray:
     """Return the share of `others` below each of `values`; equal ones count one half."""
     ordered = np.sort(others)
     ranks = np.searchsorted(ordered, values, "left") + np.searchsorted(ordered, values, "right")

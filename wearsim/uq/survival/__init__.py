@@ -1,0 +1,1 @@
+"""Statistics of lives: censored samples, fits, mixtures over the wear factor, rare events."""
