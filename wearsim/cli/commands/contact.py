@@ -123,7 +123,7 @@ def contact(
     if json:
         write_json({**_data(loaded, study, notes, figure), "profile": start})
     else:
-        from wearsim.cli.render.summary import contact_line
+        from wearsim.report.summary import contact_line
 
         write_table(loaded.title, [*profile_rows(start), *_rows(study)])
         typer.echo(contact_line(study))
@@ -264,7 +264,8 @@ def dissipation(
     path = output if output is not None else Path(f"{scenario.stem}-dissipation.h5")
     refuse_same_file(figure, path, loaded.paths)
     from wearsim.cli.progress import Counter, stop_on_signals
-    from wearsim.cli.render.summary import dissipation_json, dissipation_line, write_spread
+    from wearsim.cli.render.dissipation_table import write_spread
+    from wearsim.report.summary import dissipation_json, dissipation_line
     from wearsim.studies.contact.monte_carlo import dissipation as study
     from wearsim.studies.kernels import kernels_of
 

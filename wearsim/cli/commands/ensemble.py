@@ -175,7 +175,7 @@ def report(result: EnsembleResult, json: bool, figure: Path | None, workers: str
         If all realisations failed.
     """
     from wearsim.cli.render.ensemble_table import ensemble_json, write_ensemble
-    from wearsim.cli.render.summary import ensemble_line
+    from wearsim.report.summary import ensemble_line
     from wearsim.studies.execution.processes import InProcess
 
     if workers == InProcess.describe:

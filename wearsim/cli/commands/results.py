@@ -109,8 +109,10 @@ def draw(
 
 def show(file: ResultsFile, json: Json = False) -> None:
     """Show the content of a results file and the end state."""
-    from wearsim.cli.render import ensemble_table, summary
+    from wearsim.cli.render import ensemble_table
+    from wearsim.cli.render.dissipation_table import write_spread
     from wearsim.cli.render.failure import failure_rows
+    from wearsim.report import summary
     from wearsim.report.text import count
     from wearsim.results import DissipationResult, EnsembleResult, open_results
 
@@ -131,7 +133,7 @@ def show(file: ResultsFile, json: Json = False) -> None:
         write_json({**data, **_origin(result.raw)})
         return
     if isinstance(result, DissipationResult):
-        summary.write_spread(result, _sources(result.raw))
+        write_spread(result, _sources(result.raw))
     elif isinstance(result, EnsembleResult):
         groups = [(f"random {item['name']}", item["text"]) for item in result.raw.groups]
         ensemble_table.write_ensemble(result, [*groups, *_sources(result.raw)])

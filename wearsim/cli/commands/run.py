@@ -82,7 +82,7 @@ def run(
 
 def report(result: Result, json: bool) -> None:
     """Write the summary of a run to stdout."""
-    from wearsim.cli.render.summary import draws, effort, end_state, run_json, run_line, standing
+    from wearsim.report.summary import draws, effort, end_state, run_json, run_line, standing
 
     if json:
         write_json(run_json(result))

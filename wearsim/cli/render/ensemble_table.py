@@ -10,8 +10,8 @@ from typing import Any
 
 import typer
 
-from wearsim.cli.render.summary import CONSTANT, Rows, input_data, input_rows, still_random
 from wearsim.cli.shared import note, write_json, write_list, write_notes, write_table
+from wearsim.report.summary import CONSTANT, Rows, input_data, input_rows, still_random
 from wearsim.report.text import (
     NOTHING,
     OBSERVABLES,
