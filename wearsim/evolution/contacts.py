@@ -38,6 +38,7 @@ def contact_batch(
         variation=_creepage_variation(problem, cylinder_depth, worn),
         rolling_radius=_rolling_radius(problem, worn) if problem.free else None,
         shape=problem.shape,
+        mean_radius=problem.free and problem.kinematics.cam is not None,
     )
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from wearsim.errors import ContactError, StepError
 from wearsim.evolution.integrate import Advance
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.quantities import worn_volume
+from wearsim.evolution.quantities import mean_along, worn_volume
 from wearsim.evolution.state import WearState
 from wearsim.evolution.steppers.base import SMALLEST_STEP, Step, Stepper
 from wearsim.quantities import NUMBER, quantity
@@ -34,7 +34,8 @@ def _roller_depth(problem: WearProblem, state: WearState) -> FloatArray:
 
 def _volume(problem: WearProblem, state: WearState) -> FloatArray:
     radius, spacing = problem.kinematics.track_radius, problem.grid.spacing
-    return np.asarray(worn_volume(state.cylinder_depth, spacing, radius).mean(axis=(0, 1)))
+    volumes = worn_volume(state.cylinder_depth, spacing, radius)
+    return np.asarray(mean_along(volumes, axis=0)[0, 0])
 
 
 #: unit, name in the history, and value of a state by the name of the quantity

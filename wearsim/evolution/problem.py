@@ -342,16 +342,14 @@ class WearProblem:
 
         None if wear is not linear in the dissipation.
         """
-        speeds = np.ravel(self.kinematics.speed).tolist()
-        factors = {
-            body: [law.depth_per_dissipation(body, v) for v in speeds for law in self.laws]
-            for body in BODIES
-        }
-        shape = (len(self.laws),) if self.kinematics.cam is None else (len(speeds), 1, -1)
-        return {
-            b: None if None in each else np.array(each).reshape(shape)
-            for b, each in factors.items()
-        }
+        stations = () if self.kinematics.cam is None else (self.shape[0], 1)
+        shape, found = (*stations, len(self.laws)), {}
+        speeds = np.broadcast_to(self.kinematics.speed, shape).ravel().tolist()
+        for body in BODIES:
+            each = zip(cycle(self.laws), speeds, strict=False)
+            factors = [law.depth_per_dissipation(body, speed) for law, speed in each]
+            found[body] = None if None in factors else np.array(factors).reshape(shape)
+        return found
 
     @cached_property
     def linear_wear(self) -> bool:

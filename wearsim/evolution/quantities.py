@@ -185,7 +185,27 @@ class CamStations:
     def mean_over_turn(self, values: FloatArray) -> FloatArray:
         """Return the mean weighted by the time at the stations, first axis of length one."""
         share = self.time_share.reshape(-1, *(1,) * (values.ndim - 1))
-        return np.asarray((share * values).sum(axis=0, keepdims=True))
+        return sum_in_order(share * values, axis=0)[None]
+
+    def matches(self, other: CamStations) -> bool:
+        """Return whether tests with both stations can be joined: they are at the same angles."""
+        return self.inertia.size == other.inertia.size == 0 and all(
+            np.array_equal(getattr(one, name), getattr(two, name))
+            for one, two in ((self, other), (self.along, other.along))
+            for name in ("angle", "segment", "time_share", "length", "between", "places")
+        )
+
+    @classmethod
+    def joined(cls, stations: Sequence[CamStations]) -> CamStations:
+        """Return the stations of several tests, of which each `matches` the first."""
+        first, differing = stations[0], {}
+        names = [item.name for item in fields(first) if item.name != "whole"]
+        for name in names:
+            values = [getattr(one, name) for one in stations]
+            if not all(np.array_equal(one, values[0], equal_nan=True) for one in values[1:]):
+                differing[name] = np.concatenate(values, axis=2)
+        whole = [one.whole for one in stations if one.whole is not None]
+        return replace(first, **differing, whole=cls.joined(whole) if whole else None)
 
 
 @dataclass(frozen=True)
@@ -327,8 +347,12 @@ def sum_along(values: FloatArray, axis: int) -> FloatArray:
 
 
 def mean_along(values: FloatArray, axis: int) -> FloatArray:
-    """Return the mean along an axis, which is kept; a view if the axis has length one."""
-    return values if values.shape[axis] == 1 else values.mean(axis=axis, keepdims=True)
+    """Return the mean along an axis, which is kept; a view if the axis has length one.
+
+    As `sum_in_order`, it does not depend on the batch size.
+    """
+    count = values.shape[axis]
+    return values if count == 1 else np.expand_dims(sum_in_order(values, axis) / count, axis)
 
 
 def sum_in_order(values: FloatArray, axis: int) -> FloatArray:

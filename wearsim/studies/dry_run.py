@@ -16,7 +16,7 @@ from wearsim.studies.contact.single import study_contact
 from wearsim.studies.plausibility import log_file, plausibility_warnings, range_90
 from wearsim.studies.run.assemble import assemble_problem
 from wearsim.studies.run.draws import draw, units_of
-from wearsim.studies.run.grid import fresh_patch
+from wearsim.studies.run.groove import fresh_patch
 from wearsim.studies.run.inputs import load_range
 from wearsim.units import in_engineers_unit
 

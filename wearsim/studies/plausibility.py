@@ -13,7 +13,7 @@ from wearsim.quantities import InputFile
 from wearsim.scenario import RandomInput, Scenario
 from wearsim.studies.cam.checks import cam_warnings, skids_of
 from wearsim.studies.cam.turn import turn_of
-from wearsim.studies.run.grid import fresh_patch
+from wearsim.studies.run.groove import fresh_patch
 from wearsim.studies.run.roller_ends import (
     LEAST_PER_EDGE,
     STRIPS_BEYOND,

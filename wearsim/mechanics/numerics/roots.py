@@ -1,4 +1,4 @@
-"""Roots of several monotonic functions at once, by bracketed inverse interpolation."""
+"""Roots of several monotonic functions at once; each is independent of the others."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from wearsim.types import FloatArray
+from wearsim.types import BoolArray, FloatArray
 
 _MOST = 80
+_MOST_SECANTS = 8
+_FIRST_STEP = 1e-3  # of the scale
 
 
 def bracketed_roots(
@@ -38,7 +40,8 @@ def bracketed_roots(
     """
     x0, x1 = np.array(low), np.array(high)
     f0, f1 = function(x0), function(x1)
-    third, f_third = x0, f0
+    done = np.zeros(len(x0), dtype=bool)
+    root, third, f_third = np.empty_like(x0), x0, f0
     inside = (first > x0) & (first < x1)
     point = np.where(inside, first, 0.5 * (x0 + x1))
     scale = np.maximum(np.abs(x0), np.abs(x1))
@@ -51,7 +54,10 @@ def bracketed_roots(
         best = np.where(np.abs(f0) < np.abs(f1), x0, x1)
         limit = 2.0 * tolerance * np.abs(best) + tolerance**1.25 * scale
         width = np.abs(x1 - x0)
-        if ((width <= limit) | (f0 == 0.0) | (f1 == 0.0)).all():
+        # a root must not depend on the number of iterations of the others
+        new = ~done & ((width <= limit) | (f0 == 0.0) | (f1 == 0.0))
+        root[new], done = best[new], done | new
+        if done.all():
             break
         with np.errstate(divide="ignore", invalid="ignore"):
             xi, phi = (x0 - x1) / (third - x1), (f0 - f1) / (f_third - f1)
@@ -62,4 +68,45 @@ def bracketed_roots(
         edge = np.minimum(edge, 0.5)
         part = np.clip(np.where(quadratic & np.isfinite(part), part, 0.5), edge, 1.0 - edge)
         point = x0 + part * (x1 - x0)
-    return np.where(np.abs(f0) < np.abs(f1), x0, x1)
+    return np.where(done, root, np.where(np.abs(f0) < np.abs(f1), x0, x1))
+
+
+def secant_roots(
+    function: Callable[[FloatArray], FloatArray],
+    first: FloatArray,
+    scale: FloatArray,
+    tolerance: float = 1e-9,
+) -> tuple[FloatArray, BoolArray]:
+    """Return a root of each of several functions near a guess, by the secant method.
+
+    Parameters
+    ----------
+    function : callable
+        Values at one point of each increasing function, shape (functions,).
+    first, scale : ndarray, shape (functions,)
+        Guesses, and a size of the arguments within which the functions vary.
+    tolerance : float
+        Last step relative to the scale; the error is far smaller, as convergence is superlinear.
+
+    Returns
+    -------
+    roots : ndarray, shape (functions,)
+    converged : ndarray of bool, shape (functions,)
+    """
+    x0, f0 = np.array(first), function(first)
+    x1 = x0 - _FIRST_STEP * np.copysign(scale, f0)
+    done, failed = f0 == 0.0, np.zeros(len(x0), dtype=bool)
+    x1[done] = x0[done]
+    for _ in range(_MOST_SECANTS):
+        if done.all():
+            break
+        f1 = function(x1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            step = np.where(f1 == 0.0, 0.0, -f1 * (x1 - x0) / (f1 - f0))
+        # a long step leads to where a function is flat
+        failed |= ~done & ~(np.abs(step) < 10.0 * scale)
+        done |= failed
+        x0, f0 = np.where(done, x0, x1), f1
+        x1[~done] += step[~done]
+        done |= np.abs(step) <= tolerance * scale
+    return x1, done & ~failed

@@ -17,7 +17,6 @@ from wearsim.mechanics.tangential.strip_interaction import strip_elasticity
 from wearsim.mechanics.tangential.strip_theory import SUMS
 from wearsim.models.contact.strip_model import StripModel, check_edges, grid_about_hertz
 from wearsim.models.contact.strip_tractions import (
-    is_of_a_cam,
     strip_tractions,
     with_balanced_creepage,
 )
@@ -211,7 +210,7 @@ class Slender(StripModel):
     ) -> ContactBatchSolution:
         """Solve the contacts in one call if strip theory supports them.
 
-        Contacts with a bearing torque except those of a cam, or with another theory, have their
+        Contacts with a bearing torque, except those of a cam, or with another theory have their
         normal problems solved in one call and their tangential problems one after another.
         """
         refuse_unclaimed(self, batch, wear_compliance, coupling)
@@ -221,7 +220,7 @@ class Slender(StripModel):
         approach = normal.approach.reshape(len(batch))
         iterations = normal.iterations.repeat(normal.gap.shape[1])
         free = batch.bearing_torque is not None
-        if not isinstance(self.theory, StripTheory) or (free and not is_of_a_cam(batch)):
+        if not isinstance(self.theory, StripTheory) or (free and not batch.mean_radius):
             return solved_one_by_one(
                 batch,
                 lambda k: self._complete(

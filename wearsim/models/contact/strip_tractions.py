@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,7 @@ from wearsim.contact_batch import ContactBatch, ContactBatchSolution
 from wearsim.errors import ContactError
 from wearsim.mechanics.hertz.elasticity import ElasticPair
 from wearsim.mechanics.numerics.jit import kernel_input
-from wearsim.mechanics.numerics.roots import bracketed_roots
+from wearsim.mechanics.numerics.roots import bracketed_roots, secant_roots
 from wearsim.mechanics.tangential.strip_interaction import strip_elasticity
 from wearsim.mechanics.tangential.strip_theory import SUMS, strip_contacts
 from wearsim.types import FloatArray, Grid
@@ -55,11 +56,6 @@ def strip_tractions(
     return dissipation, sums
 
 
-def is_of_a_cam(batch: ContactBatch) -> bool:
-    """Return whether the contacts are those of several stations."""
-    return batch.shape is not None and batch.shape[0] > 1
-
-
 def with_balanced_creepage(
     batch: ContactBatch,
     line_load: FloatArray,
@@ -88,6 +84,35 @@ def with_balanced_creepage(
     ContactError
         If friction cannot transmit a torque.
     """
+    first = np.zeros(len(batch))
+    if guess is not None:
+        first = np.nan_to_num(guess.longitudinal_creepage)
+    creepage, converged = secant_roots(
+        _excess_torque(batch, line_load, half_length, grid, pair),
+        first,
+        # of the order of the creepage of saturation
+        batch.friction.reshape(len(batch), -1).max(axis=1)
+        * half_length.max(axis=1)
+        * batch.longitudinal_curvature,
+    )
+    others = np.flatnonzero(~converged)
+    if others.size:
+        part = batch.at(others), line_load[others], half_length[others]
+        creepage[others] = _bracketed_creepage(*part, grid, pair, first[others])
+    return replace(batch, longitudinal=creepage)
+
+
+def _excess_torque(
+    batch: ContactBatch,
+    line_load: FloatArray,
+    half_length: FloatArray,
+    grid: Grid,
+    pair: ElasticPair,
+) -> Callable[[FloatArray], FloatArray]:
+    """Return the function from creepages to torques of the tractions, less those needed [N m].
+
+    It increases with the creepage. Of a roller that skids it is the excess of the creepage.
+    """
     if batch.bearing_torque is None or batch.rolling_radius is None:
         raise ValueError("a bearing torque needs the rolling radius of each strip")
     radius = (line_load * batch.rolling_radius).sum(axis=1) / line_load.sum(axis=1)
@@ -100,6 +125,19 @@ def with_balanced_creepage(
         found = -force * radius - torque
         return np.where(rolls, found, creepage - batch.longitudinal)
 
+    return excess
+
+
+def _bracketed_creepage(
+    batch: ContactBatch,
+    line_load: FloatArray,
+    half_length: FloatArray,
+    grid: Grid,
+    pair: ElasticPair,
+    first: FloatArray,
+) -> FloatArray:
+    """Return the creepages of `with_balanced_creepage` within brackets, from guesses `first`."""
+    excess = _excess_torque(batch, line_load, half_length, grid, pair)
     # a creepage of gross sliding, many times that of saturation
     friction = batch.friction.reshape(len(batch), -1).max(axis=1)
     saturation = friction * half_length.max(axis=1) * batch.longitudinal_curvature
@@ -107,7 +145,8 @@ def with_balanced_creepage(
     if batch.variation is not None:
         reach = reach + np.abs(batch.variation).max(axis=1)
     low, high = excess(-reach), excess(reach)
-    lost = np.flatnonzero(rolls & ((low >= 0.0) | (high <= 0.0)))
+    torque = np.asarray(batch.bearing_torque)
+    lost = np.flatnonzero(np.isfinite(torque) & ((low >= 0.0) | (high <= 0.0)))
     if len(lost):
         k = int(lost[0])
         carried = torque[k] + (high[k] if torque[k] > 0.0 else low[k])
@@ -118,5 +157,4 @@ def with_balanced_creepage(
             " raise the friction",
             {"line_load": line_load[k], "half_length": half_length[k]},
         )
-    first = np.zeros(len(batch)) if guess is None else np.nan_to_num(guess.longitudinal_creepage)
-    return replace(batch, longitudinal=bracketed_roots(excess, -reach, reach, first))
+    return bracketed_roots(excess, -reach, reach, first)

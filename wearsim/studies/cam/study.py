@@ -26,7 +26,8 @@ from wearsim.studies.cam.checks import (
 )
 from wearsim.studies.cam.turn import CamTurn, Point, turn_of
 from wearsim.studies.run.assemble import build_problem, prepared_model
-from wearsim.studies.run.grid import contact_grid, fresh_patch
+from wearsim.studies.run.grid import contact_grid
+from wearsim.studies.run.groove import fresh_patch
 from wearsim.types import FloatArray
 
 _MOST_TEETH = 12  # greatest denominator of a ratio at which the same points of the roller meet

@@ -9,7 +9,7 @@ import numpy as np
 
 from wearsim.evolution.integrate import Advance, Evolution, bisect_failures
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.quantities import ContactInputs, sum_in_order
+from wearsim.evolution.quantities import CamStations, ContactInputs, sum_in_order
 from wearsim.evolution.state import WearState, fresh_state
 from wearsim.evolution.steppers.base import Stepper
 from wearsim.evolution.steppers.implicit import ImplicitStepper
@@ -26,22 +26,26 @@ _ARRAYS = ("from_apex", "roller", "weight", "slip_profile")
 def can_step_together(problem: WearProblem, stepper: Stepper) -> bool:
     """Return whether a test can be stepped together with `compatible` ones.
 
-    Tests with load terms, a bearing torque, inputs drawn at every pass, several stations or a wear
-    law that is not linear in the dissipation are stepped one at a time, as are those of other
-    steppers, whose steps differ between tests in more than length.
+    Tests with load terms, a bearing torque on a cylinder, inputs drawn at every pass, or a wear law
+    that is not linear in the dissipation are stepped one at a time, as are those of other steppers,
+    whose steps differ between tests in more than length.
     """
     linear = all(problem.wear_factors[body] is not None for body in BODIES)
-    plain = not (problem.free or problem.terms or problem.has_nodes)
-    single = problem.shape[0] == problem.shape[2] == 1
+    one_by_one = problem.free and problem.shape[0] == 1
+    plain = not (one_by_one or problem.terms or problem.has_nodes)
+    single = problem.shape[2] == 1
     return isinstance(stepper, ImplicitStepper) and linear and plain and single
 
 
 def compatible(one: WearProblem, other: WearProblem) -> bool:
     """Return whether two tests that can be stepped together can be joined in one problem.
 
-    They share grid, model, kinematics and the arrays that do not depend on the realisation.
+    They share grid, model, kinematics and the arrays that do not depend on the realisation; the
+    stations of a cam have the same angles.
     """
     first, second = one.kinematics, other.kinematics
+    if (first.cam is None) != (second.cam is None):
+        return False
     arrays = [(getattr(one, name), getattr(other, name)) for name in _ARRAYS]
     varying = [[(item.name, item.rollers) for item in problem.varying] for problem in (one, other)]
     return (
@@ -52,6 +56,7 @@ def compatible(one: WearProblem, other: WearProblem) -> bool:
         and np.array_equal(first.multiplicity, second.multiplicity)
         and all(a is b if a is None or b is None else np.array_equal(a, b) for a, b in arrays)
         and all(getattr(first, name) == getattr(second, name) for name in _RADII)
+        and (first.cam is None or second.cam is None or first.cam.matches(second.cam))
         and varying[0] == varying[1]
     )
 
@@ -62,8 +67,14 @@ def joined_problem(problems: Sequence[WearProblem]) -> WearProblem:
         np.concatenate([getattr(problem.inputs, item.name) for problem in problems], axis=1)
         for item in fields(ContactInputs)
     )
+    kinematics = problems[0].kinematics
+    cams = [problem.kinematics.cam for problem in problems]
+    if kinematics.cam is not None:
+        joined = CamStations.joined([cam for cam in cams if cam is not None])
+        kinematics = replace(kinematics, cam=joined)
     return replace(
         problems[0],
+        kinematics=kinematics,
         laws=tuple(law for problem in problems for law in problem.laws),
         loads=tuple(load for problem in problems for load in problem.loads),
         flat_gap=np.concatenate([problem.flat_gap for problem in problems], axis=2),
@@ -151,7 +162,7 @@ def batch_groups(runs: Sequence[RealisationRun]) -> list[list[RealisationRun]]:
     """Return the tests in groups that can be stepped in one batch, or of one test each."""
     groups: list[list[RealisationRun]] = []
     for run in runs:
-        batched, strips = run.can_be_batched, len(run.problem.roller) * run.problem.grid.strips
+        batched, strips = run.can_be_batched, run.problem.contacts_each * run.problem.grid.strips
         limit = min(MAX_BATCH, max(1, MAX_STRIPS // strips))
         for group in groups if batched else []:
             if len(group) < limit and group[0].can_be_batched and run.can_join(group[0]):

@@ -4,24 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from wearsim.errors import Mistake, ScenarioError
-from wearsim.mechanics.hertz.elasticity import combine
-from wearsim.mechanics.hertz.ellipse import HertzContact, hertz
-from wearsim.plugins import WearLaw
 from wearsim.scenario import Scenario
 from wearsim.scenario.tables.plain import DEFAULT_TOLERANCE
-from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.run.draws import Draws
+from wearsim.studies.run.groove import fresh_patch, predicted_half_width, widest_patch
 from wearsim.studies.run.inputs import OFFSET, TILT, contact_inputs, load_range
 from wearsim.studies.run.roller_ends import ends_roller, roller_grid, strips_of_roller
-from wearsim.types import ContactSolution, FloatArray, Grid, Profile
+from wearsim.types import FloatArray, Grid, Profile
 
 STRIPS_PER_HALF_WIDTH = 12  # of the initial patch; the discretisation error is then below 1e-3
 FEWEST_PER_HALF_WIDTH = 5  # error below 1e-2, proportional to the square of the strip width
+STRIPS_PER_GROOVE = 30  # of half a groove: at its end, a coarse start has been worn away
 MOST_STRIPS = 801
 PROFILE_STRIPS_PER_HALF_WIDTH = 24  # for one contact on the whole width of a profile
 FEWEST_PROFILE_STRIPS = 161
@@ -135,117 +132,7 @@ def wider_grid(scenario: Scenario, grid: Grid, load: float, shift: float = 0.0) 
     return Grid.spanning(*edges, grid.strips + 2 * added)
 
 
-def fresh_patch(scenario: Scenario, load: float, curvature: float | None = None) -> HertzContact:
-    """Return the patch of the unworn bodies under `load` [N], that of Hertz.
-
-    Where a roller ends within it, the patch is that of a line contact as wide as the roller. The
-    relative curvature along rolling [1/m] is that of cylinder and roller unless it is given.
-    """
-    modulus = combine(scenario.cylinder.material, scenario.roller.material).contact_modulus
-    if curvature is None:
-        curvature = 1.0 / scenario.cylinder.radius + 1.0 / scenario.roller.radius
-    along = 0.5 * curvature
-    patch = hertz(along, 0.5 / scenario.roller.crown_radius, load, modulus)
-    half = 0.5 * (scenario.roller.width or math.inf)
-    if patch.b <= half:
-        return patch
-    line_load = load / (2.0 * half)
-    half_length = math.sqrt(2.0 * line_load / (math.pi * modulus * along))
-    pressure = 2.0 * line_load / (math.pi * half_length)
-    return replace(patch, a=half_length, b=half, peak_pressure=max(pressure, patch.peak_pressure))
-
-
-def widest_patch(scenario: Scenario, load: float) -> HertzContact:
-    """Return the widest patch under `load` [N] around the cylinder or the cam."""
-    if scenario.cam is None:
-        return fresh_patch(scenario, load)
-    curvatures = turn_of(scenario).curvatures
-    patches = [fresh_patch(scenario, load, max(curvature, 1e-3)) for curvature in curvatures]
-    return max(patches, key=lambda patch: patch.b)
-
-
-def predicted_half_width(draws: Draws, load: float) -> float:
-    """Return half the final width of the groove predicted for full slip [m].
-
-    Rigid bodies in full slip wear to a depth d = [(3/4) c N n / sqrt(2 R)]^(2/3) and a width
-    2 sqrt(2 R d), where c is the depth per pass and load of both bodies. For a nonlinear wear law c
-    is the greater value of the initial contact and the final groove.
-    """
-    scenario, creepage = draws.scenario, draws.scenario.creepage
-    if scenario.wear is None:
-        return 0.0
-    law, patch, roller = scenario.wear.build(), fresh_patch(scenario, load), scenario.roller
-    friction = draws.greatest_mean("friction", scenario.friction.coefficient)
-    longitudinal = draws.greatest_mean("longitudinal", creepage.longitudinal or 0.0)
-    differs = creepage.drive == "free" or creepage.differential_slip
-    if scenario.cam is not None:
-        turn, differs = turn_of(scenario), creepage.differential_slip
-        saturation = friction * patch.a * turn.curvatures[1]
-        creep = saturation * turn.greatest_demand if turn.free else 0.0
-        longitudinal = max(longitudinal, creep, turn.greatest_skid)
-    yaw, tilt = (
-        max(abs(angle) for angle in (*draws.range_of(name), *scenario.per_roller(given)))
-        for name, given in (("yaw", creepage.yaw), ("tilt", creepage.tilt))
-    )
-    curvature = 1.0 / roller.radius + 1.0 / scenario.cylinder.radius if differs else 0.0
-    crown, profile = 2.0 * roller.crown_radius, scenario.cylinder.profile
-    start = 0.0 if profile is None else float(np.ptp(profile.height))
-    half = patch.b
-    for _ in range(20):  # the slip at the sides of the groove depends weakly on its width
-        along = longitudinal + tilt / roller.radius * half + half**2 / crown * curvature
-        line_loads = 0.75 * load / np.array([patch.b, max(half, patch.b)])
-        per_load = wear_per_load(scenario, law, line_loads, friction * float(np.hypot(along, yaw)))
-        depth = (0.75 * per_load * load * scenario.total_passes / np.sqrt(crown)) ** (2.0 / 3.0)
-        before, half = half, float(np.sqrt(crown * (depth + start)))
-        if half == before:
-            break
-    return half
-
-
-def wear_per_load(
-    scenario: Scenario, law: WearLaw, line_load: FloatArray, friction_slip: float
-) -> float:
-    """Return the greatest depth per pass and line load in full slip, of both bodies [m/(N/m)].
-
-    Parameters
-    ----------
-    scenario : Scenario
-    law : WearLaw
-    line_load : ndarray, shape (strips,)
-        Line loads at which it is evaluated [N/m].
-    friction_slip : float
-        Friction coefficient times slip.
-    """
-    modulus = combine(scenario.cylinder.material, scenario.roller.material).contact_modulus
-    curvature = 1.0 / scenario.cylinder.radius + 1.0 / scenario.roller.radius
-    half_length = np.sqrt(4.0 * line_load / (np.pi * modulus * curvature))
-    speed = scenario.rolling_speed
-    dissipation = friction_slip * line_load * speed
-    sliding = ContactSolution(
-        y=np.zeros_like(line_load),
-        half_length=half_length,
-        line_load=line_load,
-        dissipation=dissipation,
-        force_x=0.0,
-        force_y=0.0,
-        spin_moment=0.0,
-        approach=0.0,
-        peak_pressure=float((2.0 * line_load / (np.pi * half_length)).max()),
-        adhesion_fraction=0.0,
-        power=float(dissipation.sum()),
-        longitudinal_creepage=0.0,
-        iterations=0,
-    )
-    radius = scenario.cylinder.radius
-    if scenario.cam is not None:
-        radius = turn_of(scenario).integral("travel") / math.tau
-    share = radius / scenario.roller.radius / scenario.operation.rollers
-    depth = law.depth_per_pass("cylinder", sliding, speed)
-    depth = depth + share * law.depth_per_pass("roller", sliding, speed)
-    return float((depth / line_load).max())
-
-
-def strips_over(width: float, half_width: float, tolerance: float) -> int:
+def strips_over(width: float, half_width: float, tolerance: float, groove: float = 0.0) -> int:
     """Return the number of strips of a run across a track, an odd number.
 
     Parameters
@@ -254,8 +141,13 @@ def strips_over(width: float, half_width: float, tolerance: float) -> int:
         Width of the track, and half-width of the initial patch [m].
     tolerance : float
         Relative error of the test.
+    groove : float
+        Half-width of the final groove, where that of the start need not be resolved [m].
     """
-    per_half_width = STRIPS_PER_HALF_WIDTH * np.sqrt(DEFAULT_TOLERANCE / tolerance)
+    per_half_width = float(STRIPS_PER_HALF_WIDTH)
+    if groove > 0.0:
+        per_half_width = min(per_half_width, STRIPS_PER_GROOVE * half_width / groove)
+    per_half_width *= np.sqrt(DEFAULT_TOLERANCE / tolerance)
     per_half_width = float(np.clip(per_half_width, FEWEST_PER_HALF_WIDTH, STRIPS_PER_HALF_WIDTH))
     strips = int(np.ceil(width / half_width * per_half_width))
     return min(strips + (strips + 1) % 2, MOST_STRIPS)
@@ -279,12 +171,16 @@ def strips_of_run(draws: Draws) -> Grid:
     if scenario.creepage.tilt_shifts_contact:
         tilt = max(abs(angle) for angle in draws.range_of("tilt"))
         shift += scenario.roller.crown_radius * tilt
-    half = shift + 1.1 * predicted_half_width(draws, load) + 1.3 * patch.b
+    groove = predicted_half_width(draws, load)
+    half = shift + 1.1 * groove + 1.3 * patch.b
     if choice.width is None and ends_roller(scenario, centre - half, centre + half):
         least = strips_over(scenario.roller.width or 0.0, patch.b, scenario.evolution.tolerance)
         return roller_grid(scenario, choice.strips or strips_of_roller(scenario, least, load))
     width = choice.width if choice.width is not None else 2.0 * half
-    strips = choice.strips or strips_over(width, patch.b, scenario.evolution.tolerance)
+    resolved = 0.0
+    if scenario.cam is not None:  # it has many contacts
+        resolved = predicted_half_width(draws, load, full_slip=False)
+    strips = choice.strips or strips_over(width, patch.b, scenario.evolution.tolerance, resolved)
     if width < 2.0 * (shift + patch.b):
         raise ScenarioError(
             scenario.file,

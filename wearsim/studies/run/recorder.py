@@ -14,7 +14,7 @@ from wearsim.evolution.integrate import Advance
 from wearsim.evolution.limits import take_side_step
 from wearsim.evolution.pauses import opened
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.quantities import width, worn_volume
+from wearsim.evolution.quantities import mean_along, width, worn_volume
 from wearsim.evolution.state import WearState, joined_states
 from wearsim.evolution.steppers.base import Stepper
 from wearsim.evolution.steppers.loads import descents, elastic_approaches
@@ -120,9 +120,9 @@ def history_row(
         "step_passes": state.passes - (state if before is None else before).passes,
         "depth": state.cylinder_depth.max(axis=(0, 1, 3)),
         "width": np.array([width(problem.grid.y, groove, threshold) for groove in worn]),
-        "worn_volume": worn_volume(state.cylinder_depth, spacing, kinematics.track_radius).mean(
-            axis=(0, 1)
-        ),
+        "worn_volume": mean_along(
+            worn_volume(state.cylinder_depth, spacing, kinematics.track_radius)[:, 0], axis=0
+        )[0],
         "roller_depth": state.roller_depth[0].max(axis=-1),
         "roller_worn_volume": worn_volume(state.roller_depth[0], spacing, kinematics.roller_radius),
         "dissipated_energy": state.energy,

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from wearsim.scenario import Scenario
-from wearsim.studies.run.grid import fresh_patch
+from wearsim.studies.run.groove import fresh_patch
 from wearsim.studies.run.inputs import LOAD, LONGITUDINAL, TILT, YAW
 from wearsim.uq.distributions.base import MaxentDistribution
 from wearsim.uq.estimation.moments import summarise

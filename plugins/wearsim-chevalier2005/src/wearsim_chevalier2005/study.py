@@ -15,7 +15,7 @@ from wearsim.scenario.examples import shipped_scenario
 from wearsim.studies.contact.batch import LocalFriction
 from wearsim.studies.contact.monte_carlo import dissipation
 from wearsim.studies.contact.single import ContactStudy, study_contact
-from wearsim.studies.run.grid import fresh_patch
+from wearsim.studies.run.groove import fresh_patch
 from wearsim.studies.run.inputs import FRICTION, LONGITUDINAL, TILT, YAW
 from wearsim.types import FloatArray
 from wearsim_chevalier2005 import paper

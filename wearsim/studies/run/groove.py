@@ -1,0 +1,133 @@
+"""Initial contact patch of a run, and its final groove as predicted."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from wearsim.mechanics.hertz.elasticity import combine
+from wearsim.mechanics.hertz.ellipse import HertzContact, hertz
+from wearsim.plugins import WearLaw
+from wearsim.scenario import Scenario
+from wearsim.studies.cam.turn import turn_of
+from wearsim.studies.run.draws import Draws
+from wearsim.types import ContactSolution, FloatArray
+
+
+def fresh_patch(scenario: Scenario, load: float, curvature: float | None = None) -> HertzContact:
+    """Return the patch of the unworn bodies under `load` [N], that of Hertz.
+
+    Where a roller ends within it, the patch is that of a line contact as wide as the roller. The
+    relative curvature along rolling [1/m] is that of cylinder and roller unless it is given.
+    """
+    modulus = combine(scenario.cylinder.material, scenario.roller.material).contact_modulus
+    if curvature is None:
+        curvature = 1.0 / scenario.cylinder.radius + 1.0 / scenario.roller.radius
+    along = 0.5 * curvature
+    patch = hertz(along, 0.5 / scenario.roller.crown_radius, load, modulus)
+    half = 0.5 * (scenario.roller.width or math.inf)
+    if patch.b <= half:
+        return patch
+    line_load = load / (2.0 * half)
+    half_length = math.sqrt(2.0 * line_load / (math.pi * modulus * along))
+    pressure = 2.0 * line_load / (math.pi * half_length)
+    return replace(patch, a=half_length, b=half, peak_pressure=max(pressure, patch.peak_pressure))
+
+
+def widest_patch(scenario: Scenario, load: float) -> HertzContact:
+    """Return the widest patch under `load` [N] around the cylinder or the cam."""
+    if scenario.cam is None:
+        return fresh_patch(scenario, load)
+    curvatures = turn_of(scenario).curvatures
+    patches = [fresh_patch(scenario, load, max(curvature, 1e-3)) for curvature in curvatures]
+    return max(patches, key=lambda patch: patch.b)
+
+
+def predicted_half_width(draws: Draws, load: float, full_slip: bool = True) -> float:
+    """Return half the final width of the groove predicted for full slip [m].
+
+    Rigid bodies in full slip wear to a depth d = [(3/4) c N n / sqrt(2 R)]^(2/3) and a width
+    2 sqrt(2 R d), where c is the depth per pass and load of both bodies. For a nonlinear wear law c
+    is the greater value of the initial contact and the final groove. Without `full_slip` the
+    slip is less by the adhesion in the initial patch, after Carter.
+    """
+    scenario, creepage = draws.scenario, draws.scenario.creepage
+    if scenario.wear is None:
+        return 0.0
+    law, patch, roller = scenario.wear.build(), fresh_patch(scenario, load), scenario.roller
+    friction = draws.greatest_mean("friction", scenario.friction.coefficient)
+    longitudinal = draws.greatest_mean("longitudinal", creepage.longitudinal or 0.0)
+    differs = creepage.drive == "free" or creepage.differential_slip
+    if scenario.cam is not None:
+        turn, differs = turn_of(scenario), creepage.differential_slip
+        saturation = friction * patch.a * turn.curvatures[1]
+        creep = saturation * turn.greatest_demand if turn.free else 0.0
+        longitudinal = max(longitudinal, creep, turn.greatest_skid)
+    yaw, tilt = (
+        max(abs(angle) for angle in (*draws.range_of(name), *scenario.per_roller(given)))
+        for name, given in (("yaw", creepage.yaw), ("tilt", creepage.tilt))
+    )
+    curvature = 1.0 / roller.radius + 1.0 / scenario.cylinder.radius if differs else 0.0
+    crown, profile = 2.0 * roller.crown_radius, scenario.cylinder.profile
+    slipping = 1.0
+    if not full_slip:
+        saturated = friction * patch.a * (1.0 / roller.radius + 1.0 / scenario.cylinder.radius)
+        ratio = min(float(np.hypot(longitudinal, yaw)) / saturated, 1.0)
+        slipping = ratio * (2.0 - ratio)
+    start = 0.0 if profile is None else float(np.ptp(profile.height))
+    half = patch.b
+    for _ in range(20):  # the slip at the sides of the groove depends weakly on its width
+        along = longitudinal + tilt / roller.radius * half + half**2 / crown * curvature
+        line_loads = 0.75 * load / np.array([patch.b, max(half, patch.b)])
+        sliding = slipping * friction * float(np.hypot(along, yaw))
+        per_load = wear_per_load(scenario, law, line_loads, sliding)
+        depth = (0.75 * per_load * load * scenario.total_passes / np.sqrt(crown)) ** (2.0 / 3.0)
+        before, half = half, float(np.sqrt(crown * (depth + start)))
+        if half == before:
+            break
+    return half
+
+
+def wear_per_load(
+    scenario: Scenario, law: WearLaw, line_load: FloatArray, friction_slip: float
+) -> float:
+    """Return the greatest depth per pass and line load in full slip, of both bodies [m/(N/m)].
+
+    Parameters
+    ----------
+    scenario : Scenario
+    law : WearLaw
+    line_load : ndarray, shape (strips,)
+        Line loads at which it is evaluated [N/m].
+    friction_slip : float
+        Friction coefficient times slip.
+    """
+    modulus = combine(scenario.cylinder.material, scenario.roller.material).contact_modulus
+    curvature = 1.0 / scenario.cylinder.radius + 1.0 / scenario.roller.radius
+    half_length = np.sqrt(4.0 * line_load / (np.pi * modulus * curvature))
+    speed = scenario.rolling_speed
+    dissipation = friction_slip * line_load * speed
+    sliding = ContactSolution(
+        y=np.zeros_like(line_load),
+        half_length=half_length,
+        line_load=line_load,
+        dissipation=dissipation,
+        force_x=0.0,
+        force_y=0.0,
+        spin_moment=0.0,
+        approach=0.0,
+        peak_pressure=float((2.0 * line_load / (np.pi * half_length)).max()),
+        adhesion_fraction=0.0,
+        power=float(dissipation.sum()),
+        longitudinal_creepage=0.0,
+        iterations=0,
+    )
+    radius = scenario.cylinder.radius
+    if scenario.cam is not None:
+        radius = turn_of(scenario).integral("travel") / math.tau
+    share = radius / scenario.roller.radius / scenario.operation.rollers
+    depth = law.depth_per_pass("cylinder", sliding, speed)
+    depth = depth + share * law.depth_per_pass("roller", sliding, speed)
+    return float((depth / line_load).max())
