@@ -279,6 +279,20 @@ def test_splitting_patch_is_equal_from_warm_and_cold_starts(ridge, compliance):
     assert max(patches) > 1 or compliance == 1e-10
 
 
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_patch_far_from_the_start_is_found(side):
+    grid = Grid.spanning(-3e-3, 3e-3, 160)
+    y = side * grid.y
+    gap = np.minimum((y + 1.5e-3) ** 2, 0.2e-6 + (y - 1.5e-3) ** 2)
+    _, cold, (approach,), _ = solve(grid, gap, 300.0)
+    start = np.where(y < 0.0, cold, 0.0)
+    assert cold[0, y > 0.0].any()
+    status, warm, (again,), _ = solve(grid, gap, 300.0, start=start)
+    assert status == CONVERGED
+    assert again == pytest.approx(approach, rel=1e-8)
+    np.testing.assert_allclose(warm, cold, rtol=0.0, atol=RESIDUAL_LOAD["coupled"] * cold.max())
+
+
 def test_mirrored_profile_has_the_mirrored_load():
     grid = Grid.spanning(-3e-3, 3e-3, 100)
     gap = shape_of("step", grid.y)

@@ -111,19 +111,22 @@ def solve_factored(matrix: FloatArray, size: int, solution: FloatArray) -> None:
 
 @subroutine
 def _combine_rows(
-    matrix: FloatArray, size: int, i: int, first: int, last: int, inverse: FloatArray
+    matrix: FloatArray, width: int, i: int, first: int, last: int, inverse: FloatArray
 ) -> None:
-    """Subtract the inverse's rows `first` to `last`, times entries of row `i`, from its row."""
+    """Subtract the inverse's rows `first` to `last`, times entries of row `i`, from its row.
+
+    Only the first `width` columns are changed; the others of those rows are zero.
+    """
     p = first
     while p + 3 < last:
         f0, f1, f2, f3 = matrix[i, p], matrix[i, p + 1], matrix[i, p + 2], matrix[i, p + 3]
-        for j in range(size):
+        for j in range(width):
             inverse[i, j] -= (f0 * inverse[p, j] + f1 * inverse[p + 1, j]) + (
                 f2 * inverse[p + 2, j] + f3 * inverse[p + 3, j]
             )
         p += PANEL
     while p < last:
-        for j in range(size):
+        for j in range(width):
             inverse[i, j] -= matrix[i, p] * inverse[p, j]
         p += 1
 
@@ -143,7 +146,7 @@ def invert_factored(matrix: FloatArray, size: int, inverse: FloatArray) -> None:
         for j in range(size):
             inverse[i, j] = 0.0
         inverse[i, i] = 1.0
-        _combine_rows(matrix, size, i, 0, i, inverse)
+        _combine_rows(matrix, i, i, 0, i, inverse)
     for i in range(size - 1, -1, -1):
         _combine_rows(matrix, size, i, i + 1, size, inverse)
         for j in range(size):

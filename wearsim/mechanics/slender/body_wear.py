@@ -1,7 +1,8 @@
 """Wear of bodies that several contacts share, eliminated from the steps of Newton's method.
 
 The unknown worn depths of the shared bodies form one system of equations. With the responses of the
-separate contacts to their gaps it turns their separate steps into the coupled step.
+separate contacts to their gaps it turns their separate steps into the coupled step. A strip of a
+body that only one contact touches is no unknown: its wear is a compliance of that contact.
 """
 
 from __future__ import annotations
@@ -96,27 +97,54 @@ def add_depths(
 
 
 @subroutine
-def _number_unknowns(
-    bodies: IntArray, shared: FloatArray, state: NewtonState, number: IntArray
-) -> int:
-    """Assign unknowns to the strips of bodies that wear under a contact, -1 to the others."""
+def number_depths(
+    bodies: IntArray,
+    own: FloatArray,
+    shared: FloatArray,
+    state: NewtonState,
+    system: DepthSystem,
+    softness: FloatArray,
+) -> None:
+    """Assign unknowns to the strips of bodies that several contacts touch, -1 to the others.
+
+    Parameters
+    ----------
+    bodies, shared
+        As in `add_depths`.
+    own : ndarray, shape (contacts, strips)
+        Wear compliance of the separate contacts [m/(N/m)].
+    state : NewtonState
+        With the rows of the contacts. Contacts whose softness changes need a new Jacobian.
+    system : DepthSystem
+        Filled: `number`.
+    softness : ndarray, shape (contacts, strips)
+        Filled: wear compliance of each contact with that of the strips it alone touches [m/(N/m)].
+    """
+    number, place = system.number, state.place
     contacts, n = state.rows.shape
-    number[:] = -1
+    number[:] = 0
     for k in range(contacts):
         for side in range(SIDES):
             b = bodies[k, side]
-            if b >= 0:
-                for row in range(state.size[k]):
-                    i = state.place[k, row]
-                    if shared[k, side, i] > 0.0:
-                        number[b, i] = 0
+            for row in range(state.size[k] if b >= 0 else 0):
+                number[b, place[k, row]] += 1
     count = 0
     for b in range(number.shape[0]):
         for i in range(n):
-            if number[b, i] >= 0:
-                number[b, i] = count
-                count += 1
-    return count
+            several = number[b, i] > 1
+            number[b, i] = count if several else -1
+            count += int(several)
+    for k in range(contacts):
+        for row in range(state.size[k]):
+            i = place[k, row]
+            alone = own[k, i]
+            for side in range(SIDES):
+                b = bodies[k, side]
+                if b >= 0 and number[b, i] < 0:
+                    alone += shared[k, side, i]
+            if softness[k, i] != alone:
+                softness[k, i] = alone
+                state.fresh[k] = True
 
 
 @subroutine
@@ -132,7 +160,7 @@ def factor_depths(
     state : NewtonState
         With the rows of the contacts.
     system : DepthSystem
-        Filled, with the responses of the contacts from `fill_responses`.
+        Filled, with `number` and with the responses of the contacts from `fill_responses`.
 
     Returns
     -------
@@ -140,7 +168,7 @@ def factor_depths(
         False if the system is singular.
     """
     matrix, number, response, place = system.matrix, system.number, system.response, state.place
-    count = _number_unknowns(bodies, shared, state, number)
+    count = number.max() + 1
     for i in range(count):
         for j in range(count):
             matrix[i, j] = 0.0
@@ -154,7 +182,7 @@ def factor_depths(
                     unknown = number[opened, place[k, column]]
                     for row in range(size if unknown >= 0 else 0):
                         i = place[k, row]
-                        if shared[k, side, i] > 0.0:
+                        if number[worn, i] >= 0:
                             wear = shared[k, side, i] * response[k, column, row]
                             matrix[unknown, number[worn, i]] += wear
     return factor_in_place(matrix, count)
@@ -190,7 +218,7 @@ def solve_depths(
             b = bodies[k, side]
             for row in range(state.size[k] if b >= 0 else 0):
                 i = place[k, row]
-                if shared[k, side, i] > 0.0:
+                if number[b, i] >= 0:
                     depth[number[b, i]] += shared[k, side, i] * step[k, row]
     solve_factored(system.matrix, count, depth)
     for k in range(bodies.shape[0]):

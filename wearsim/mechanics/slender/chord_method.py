@@ -38,7 +38,7 @@ from wearsim.mechanics.slender.newton import (
     CONVERGED,
     GAP_TOLERANCE,
     SINGULAR,
-    log_scales_of,
+    fill_log_scales,
     solve_slender,
 )
 from wearsim.mechanics.tangential.strip_interaction import StripElasticity
@@ -107,8 +107,9 @@ class ChordState(NamedTuple):
 
 def new_chord_state(constants: ContactConstants, contacts: int, n: int) -> ChordState:
     """Return the `ChordState` of contacts without an anchor."""
-    log_scale = log_scales_of(
-        constants.contact_modulus, constants.longitudinal_curvature, constants.spacing
+    log_scale = np.empty(contacts)
+    fill_log_scales(
+        constants.contact_modulus, constants.longitudinal_curvature, constants.spacing, log_scale
     )
     return ChordState(
         np.zeros((contacts, n), np.int64),

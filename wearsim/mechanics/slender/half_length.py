@@ -162,15 +162,23 @@ def add_influences(
 
 
 @subroutine
-def _fill_near(k: int, table: FloatArray, weight: FloatArray, lengths: HalfLengths) -> None:
+def _fill_near(
+    k: int, first: int, last: int, table: FloatArray, weight: FloatArray, lengths: HalfLengths
+) -> None:
     """Fill the derivatives of the influence of each strip by its ln q and by its ln s.
 
     The influence of a strip on those up to the reach away is `weight` times F_k or C_k; it depends
     on ln q through a (`near`), and where it is divided by s, on ln s through a and 1/s (`chained`).
-    Both are 0 for strips without weight.
+    Both are 0 for strips without weight, between the strips `first` and `last` and up to the reach
+    away from them, where the slope is 0 too.
     """
     near, chained, log_ratio = lengths.near, lengths.chained, lengths.log_ratio
-    for j in range(weight.shape[0]):
+    for side in range(2):
+        start = last + 1 if side else first - REACH
+        for c in range(2 * REACH + 1):
+            for i in range(start + 2 * REACH, start + 3 * REACH):
+                near[c, i] = chained[c, i] = lengths.slope[k, c, i] = 0.0
+    for j in range(first, last + 1):
         tau = log_ratio[k, j] if weight[j] != 0.0 else 0.0
         node, (v0, v1, w0, w1), (d0, d1, e0, e1) = interpolation(table.shape[0], tau)
         for d in range(min(weight.shape[0], REACH + 1)):
@@ -282,7 +290,7 @@ def find_factors(k: int, line_load: FloatArray, sloped: bool, lengths: HalfLengt
                 weight[j] = 0.25 / factor[k, j]
         add_influences(lengths.table, k, first, last, weight, log_ratio, value, total)
         if sloped:
-            _fill_near(k, lengths.table, weight, lengths)
+            _fill_near(k, first, last, lengths.table, weight, lengths)
             _add_slopes(k, first, last, total, sweep > 0, lengths)
         for j in range(first, last + 1):
             if line_load[k, j] > 0.0:

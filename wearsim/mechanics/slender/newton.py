@@ -30,6 +30,7 @@ from wearsim.mechanics.slender.body_wear import (
     factor_depths,
     fill_responses,
     new_depth_system,
+    number_depths,
     solve_depths,
 )
 from wearsim.mechanics.slender.half_length import (
@@ -42,6 +43,7 @@ from wearsim.mechanics.slender.newton_step import (
     NewtonState,
     add_approach,
     add_displacement,
+    complete_surface,
     correct_residual,
     fill_jacobian,
     new_newton_state,
@@ -64,6 +66,8 @@ FIRST_FOUNDATION = 8.0  # elastic compliance of strips without displacement, in 
 FOUNDATION = 5.0  # the same of strips under the displacement of all
 MAX_ITERATIONS = 100
 CAUTIOUS = 12  # iterations after which the active set is changed cautiously
+MARGIN = 6  # strips followed on either side of the loaded ones
+FIRST_MARGIN = 20  # the same for a foundation, which may load many strips more than the start
 
 
 @subroutine
@@ -73,6 +77,8 @@ def rest_on_foundation(
     compliance: FloatArray,
     soft: float,
     load: float,
+    left: int,
+    right: int,
     line_load: FloatArray,
     approach: FloatArray,
 ) -> None:
@@ -82,6 +88,8 @@ def rest_on_foundation(
     ----------
     k : int
         Number of the contact.
+    left, right : int
+        The first strip that may be loaded, and the one after the last.
     gap, line_load : ndarray, shape (contacts, strips)
         Gap [m]; line load [N/m].
     compliance : ndarray, shape (contacts, strips)
@@ -93,24 +101,64 @@ def rest_on_foundation(
     approach : ndarray, shape (contacts,)
         Approach, filled [m].
     """
-    n = gap.shape[1]
-    highest, softest = gap[k, 0], 0.0
-    for i in range(n):
+    highest, softest = gap[k, left], 0.0
+    for i in range(left, right):
         highest = max(highest, gap[k, i])
         softest = max(softest, compliance[k, i])
     level = load * (soft + softest) + highest
     for _ in range(60):  # from above, Newton's method converges monotonically: convex function
         total, stiffness = -load, 0.0
-        for i in range(n):
+        for i in range(left, right):
             if level > gap[k, i]:
                 total += (level - gap[k, i]) / (soft + compliance[k, i])
                 stiffness += 1.0 / (soft + compliance[k, i])
         level -= total / stiffness
         if not total > 1e-9 * load:
             break
-    for i in range(n):
+    for i in range(left, right):
         line_load[k, i] = max(0.0, level - gap[k, i]) / (soft + compliance[k, i])
     approach[k] = level
+
+
+@subroutine
+def add_penetrated(
+    k: int,
+    left: int,
+    right: int,
+    iteration: int,
+    unit: float,
+    state: NewtonState,
+    approach: FloatArray,
+    line_load: FloatArray,
+) -> bool:
+    """Give a load to the penetrated strips of contact `k`, and return whether there are any.
+
+    A strip starts with about the load of its penetration; a much greater one would be removed by
+    the next step. After `CAUTIOUS` iterations few strips are added at a time, and the tolerance for
+    penetration grows, so that a strip at the edge cannot alternate between in and out of contact.
+
+    Parameters
+    ----------
+    left, right : int
+        The first strip with a complete surface, and the one after the last.
+    """
+    surface = state.surface
+    lowest, deepest = surface[k, left], 0.0
+    for i in range(left, right):
+        lowest = min(lowest, surface[k, i])
+        if state.rows[k, i] < 0:
+            deepest = max(deepest, approach[k] - surface[k, i])
+    tolerance = GAP_TOLERANCE * 10.0 ** max(0, iteration // 20 - 1)
+    scale = tolerance * max(abs(approach[k]), approach[k] - lowest)
+    if deepest <= scale:
+        return False
+    limit = max(scale, 0.999 * deepest) if iteration > CAUTIOUS else scale
+    for i in range(left, right):
+        inside = approach[k] - surface[k, i]
+        if state.rows[k, i] < 0 and inside > limit:
+            line_load[k, i] = 0.1 * inside / unit
+    state.fresh[k] = True
+    return True
 
 
 @subroutine
@@ -120,16 +168,11 @@ def check_convergence(
     before: float,
     change: float,
     left: bool,
-    surface: FloatArray,
     state: NewtonState,
     approach: FloatArray,
     line_load: FloatArray,
 ) -> tuple[int, float]:
     """Add penetrated strips, mark contacts that need a new Jacobian and test for convergence.
-
-    A strip starts with about the load of its penetration; a much greater one would be removed by
-    the next step. After `CAUTIOUS` iterations few strips are added at a time, and the tolerance for
-    penetration grows, so that a strip at the edge cannot alternate between in and out of contact.
 
     Parameters
     ----------
@@ -137,8 +180,6 @@ def check_convergence(
         Change of the previous step, 0 if the active set was another one.
     change, left
         From `update_loads`.
-    surface : ndarray, shape (contacts, strips)
-        Gap and displacement, after the step [m].
 
     Returns
     -------
@@ -149,26 +190,12 @@ def check_convergence(
     """
     if not change < np.inf:
         return NOT_FINITE, change
-    cautious = iteration > CAUTIOUS
-    ready = not cautious or (change < 1e-3 and not left)
-    tolerance = GAP_TOLERANCE * 10.0 ** max(0, iteration // 20 - 1)
-    contacts, n, entered = line_load.shape[0], line_load.shape[1], False
+    contacts, entered = line_load.shape[0], False
+    ready = iteration <= CAUTIOUS or (change < 1e-3 and not left)
     for k in range(contacts if ready else 0):
-        lowest, deepest = surface[k, 0], 0.0
-        for i in range(n):
-            lowest = min(lowest, surface[k, i])
-            if state.rows[k, i] < 0:
-                deepest = max(deepest, approach[k] - surface[k, i])
-        scale = tolerance * max(abs(approach[k]), approach[k] - lowest)
-        if deepest <= scale:
-            continue
-        limit = max(scale, 0.999 * deepest) if cautious else scale
-        for i in range(n):
-            inside = approach[k] - surface[k, i]
-            if state.rows[k, i] < 0 and inside > limit:
-                line_load[k, i] = 0.1 * inside / unit
-                entered = True
-                state.fresh[k] = True
+        first, end = state.left[k], state.right[k]
+        if add_penetrated(k, first, end, iteration, unit, state, approach, line_load):
+            entered = True
     shrinking = min(max(change / before, AT_BEST), 1.0) if before > 0.0 else FIRST
     if not (change < REUSED and shrinking < SHRINKING):
         for k in range(contacts):
@@ -179,15 +206,16 @@ def check_convergence(
 
 
 @subroutine
-def log_scales_of(
-    contact_modulus: float, longitudinal_curvature: FloatArray, spacing: float
-) -> FloatArray:
-    """Return ln(a/dy) of a strip of each contact under 1 N/m without interaction (s = 1)."""
-    log_scale = np.empty(longitudinal_curvature.shape[0])
+def fill_log_scales(
+    contact_modulus: float,
+    longitudinal_curvature: FloatArray,
+    spacing: float,
+    log_scale: FloatArray,
+) -> None:
+    """Fill ln(a/dy) of a strip of each contact under 1 N/m without interaction (s = 1)."""
     for k in range(longitudinal_curvature.shape[0]):
         scale = 4.0 / (np.pi * contact_modulus * longitudinal_curvature[k])
         log_scale[k] = 0.5 * math.log(scale) - math.log(spacing)
-    return log_scale
 
 
 @kernel
@@ -243,10 +271,16 @@ def solve_slender(
     """
     contacts, n = gap.shape[1], gap.shape[2]
     unit = 1.0 / (np.pi * contact_modulus)
+    state, softness = new_newton_state(contacts, n), np.empty((contacts, n))
+    lengths = new_half_lengths(curvature_influence, np.empty(contacts))
+    surface, lowest = state.surface, state.lowest
+    if bodies is not None:
+        system = new_depth_system(bodies, n)
     for number in range(gap.shape[0]):
         load, total, delta = loads[number], line_load[number], approach[number]
         own = compliance[number]
         started, finite = False, True
+        fill_log_scales(contact_modulus, longitudinal_curvature[number], spacing, lengths.log_scale)
         for k in range(contacts):
             for i in range(n):
                 started = started or total[k, i] > 0.0
@@ -255,25 +289,19 @@ def solve_slender(
         for attempt in range(2 if finite else 0):
             if attempt > 0:
                 total[:] = 0.0
-            state = new_newton_state(contacts, n)
-            surface, lowest, yielding = state.surface, state.lowest, np.empty((contacts, n))
-            log_scale = log_scales_of(contact_modulus, longitudinal_curvature[number], spacing)
-            lengths = new_half_lengths(curvature_influence, log_scale)
-            if bodies is not None:
-                system = new_depth_system(bodies, n)
             corrected = not started
             for k in range(contacts):
                 # relative to the least gap, as the displacements under a vanishing load would be
                 # lost in the rounding of a deep groove
-                lowest[k] = gap[number, k, 0]
+                lowest[k], state.fresh[k] = gap[number, k, 0], True
                 for i in range(n):
                     lowest[k] = min(lowest[k], gap[number, k, i])
-                    yielding[k, i] = own[k, i]
+                    softness[k, i] = own[k, i]
                     if bodies is not None:  # as if all contacts wore the same strips
                         both = shared[number, k, 0, i] + shared[number, k, 1, i]
-                        yielding[k, i] += contacts * both
-                    corrected = corrected or yielding[k, i] > 0.0
-                number_strips(k, total, state)
+                        softness[k, i] += contacts * both
+                    corrected = corrected or softness[k, i] > 0.0
+                number_strips(k, total, FIRST_MARGIN, state)
             # a foundation gives loads to contacts without a start; another one, under the
             # displacements of these loads, brings them within a tenth in a quarter of the time of a
             # Jacobian. A second attempt does without
@@ -283,7 +311,7 @@ def solve_slender(
                     for i in range(n):
                         surface[k, i] = gap[number, k, i] - lowest[k]
                         if sweep:
-                            surface[k, i] -= (soft + yielding[k, i] - own[k, i]) * total[k, i]
+                            surface[k, i] -= (soft + softness[k, i] - own[k, i]) * total[k, i]
                     if sweep:
                         widest = max(widest, find_factors(k, total, False, lengths))
                 if bodies is not None and sweep:
@@ -292,32 +320,37 @@ def solve_slender(
                     if sweep:
                         add_displacement(k, table, unit, total, lengths, state)
                     if sweep or state.size[k] == 0:
-                        sum_of_loads = load[k] / spacing
-                        rest_on_foundation(k, surface, yielding, soft, sum_of_loads, total, delta)
+                        sum_of_loads, first, end = load[k] / spacing, state.left[k], state.right[k]
+                        rest_on_foundation(
+                            k, surface, softness, soft, sum_of_loads, first, end, total, delta
+                        )
             outcome, before, iteration = CONTINUE, 0.0, 0
             while outcome == CONTINUE:
                 iteration += 1
+                renewed = False
                 for k in range(contacts):
                     for i in range(n):
                         surface[k, i] = gap[number, k, i] - lowest[k] + own[k, i] * total[k, i]
+                    if state.fresh[k]:
+                        number_strips(k, total, MARGIN, state)
+                        renewed = True
                 if bodies is not None:
                     add_depths(bodies, shared[number], total, surface)
-                renewed = False
+                    if renewed:
+                        number_depths(bodies, own, shared[number], state, system, softness)
                 for k in range(contacts):
                     fresh = state.fresh[k]
-                    if fresh:
-                        number_strips(k, total, state)
                     if find_factors(k, total, fresh, lengths) > HIGHEST:
                         outcome = TOO_FINE
                         break
                     if not fresh:
                         add_displacement(k, table, unit, total, lengths, state)
-                    elif fill_jacobian(k, table, unit, own, total, lengths, state):
+                    elif fill_jacobian(k, table, unit, softness, total, lengths, state):
                         solve_factored(state.matrix[k], state.size[k], state.unit_load[k])
                         state.unit_load_sum[k] = 0.0
                         for row in range(state.size[k]):
                             state.unit_load_sum[k] += state.unit_load[k, row]
-                        state.fresh[k], renewed = False, True
+                        state.fresh[k] = False
                         if bodies is not None:
                             fill_responses(k, state, system)
                     if state.fresh[k] or not abs(state.unit_load_sum[k]) > 0.0:
@@ -350,8 +383,12 @@ def solve_slender(
                 if bodies is not None:
                     add_depths(bodies, shared[number], state.change, surface)
                 outcome, before = check_convergence(
-                    iteration, unit, before, change, left, surface, state, delta, total
+                    iteration, unit, before, change, left, state, delta, total
                 )
+                for k in range(contacts if outcome == CONVERGED else 0):
+                    first, end = complete_surface(k, delta[k], table, unit, total, lengths, state)
+                    if add_penetrated(k, first, end, iteration, unit, state, delta, total):
+                        outcome, before = CONTINUE, 0.0
                 if outcome == CONTINUE and iteration == MAX_ITERATIONS:
                     outcome = NO_CONVERGENCE
             status[number], iterations[number] = outcome, iteration

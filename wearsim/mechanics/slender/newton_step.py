@@ -26,18 +26,21 @@ class NewtonState(NamedTuple):
 
     A row is a strip in contact. `fresh` marks contacts that need a new Jacobian, `size` is the
     number of rows, `place` the strip of each row, `rows` the row of each strip, -1 outside the
-    contact. `outer` is the displacement of all strips per load of each row and `matrix` the
-    factored Jacobian by columns. `unit_load` are the loads per unit of approach [N/m^2] and
+    contact. Strips from `left` to before `right` are followed, the others only at the end. `outer`
+    is the displacement of followed strips per load of each row and `matrix` the factored Jacobian
+    by columns. `unit_load` are the loads per unit of approach [N/m^2] and
     `unit_load_sum` is their sum. `diagonal` is the derivative of the displacement of each strip by
     its own load, `missing` the residual [m], `step` the step by row [N/m] and `change` the applied
     change of load by strip [N/m]. `surface` is the sum of gap and displacement above the least gap
-    `lowest` [m]; `weight`, `value` and `tangent` are work space.
+    `lowest` [m], complete for the followed strips; `weight`, `value` and `tangent` are work space.
     """
 
     fresh: BoolArray
     size: IntArray
     place: IntArray
     rows: IntArray
+    left: IntArray
+    right: IntArray
     outer: FloatArray
     matrix: FloatArray
     unit_load: FloatArray
@@ -55,12 +58,14 @@ class NewtonState(NamedTuple):
 
 @subroutine
 def new_newton_state(contacts: int, n: int) -> NewtonState:
-    """Return the `NewtonState` of contacts without a Jacobian."""
-    state = NewtonState(
+    """Return an empty `NewtonState`."""
+    return NewtonState(
         np.empty(contacts, np.bool_),
         np.empty(contacts, np.int64),
         np.empty((contacts, n), np.int64),
         np.empty((contacts, n), np.int64),
+        np.empty(contacts, np.int64),
+        np.empty(contacts, np.int64),
         np.empty((contacts, n, n)),
         np.empty((contacts, n, n)),
         np.empty((contacts, n)),
@@ -75,22 +80,26 @@ def new_newton_state(contacts: int, n: int) -> NewtonState:
         np.empty(n),
         np.empty(n),
     )
-    for k in range(contacts):  # numba compiles a loop faster than np.ones
-        state.fresh[k] = True
-    return state
 
 
 @subroutine
-def number_strips(k: int, line_load: FloatArray, state: NewtonState) -> None:
-    """Assign rows to the loaded strips of contact `k`."""
-    count = 0
-    for i in range(line_load.shape[1]):
+def number_strips(k: int, line_load: FloatArray, margin: int, state: NewtonState) -> None:
+    """Assign rows to the loaded strips of contact `k`, and follow these and a margin of others.
+
+    All strips are followed where none is loaded.
+    """
+    count, n = 0, line_load.shape[1]
+    for i in range(n):
         state.rows[k, i] = -1
         if line_load[k, i] > 0.0:
             state.rows[k, i] = count
             state.place[k, count] = i
             count += 1
     state.size[k] = count
+    state.left[k], state.right[k] = 0, n
+    if count > 0:
+        state.left[k] = max(0, state.place[k, 0] - margin)
+        state.right[k] = min(n, state.place[k, count - 1] + 1 + margin)
 
 
 @subroutine
@@ -102,11 +111,11 @@ def add_displacement(
     lengths: HalfLengths,
     state: NewtonState,
 ) -> None:
-    """Add the displacement by contact `k`'s line loads to `surface`."""
-    weight, last = state.weight, line_load.shape[1] - 1
-    for i in range(last + 1):
+    """Add the displacement by contact `k`'s line loads to `surface` of the followed strips."""
+    weight, left, last = state.weight, state.left[k], state.right[k] - 1
+    for i in range(line_load.shape[1]):
         weight[i] = unit * line_load[k, i]
-    add_influences(table, k, 0, last, weight, lengths.log_ratio, state.value, state.surface[k])
+    add_influences(table, k, left, last, weight, lengths.log_ratio, state.value, state.surface[k])
 
 
 @subroutine
@@ -121,7 +130,8 @@ def fill_jacobian(
 ) -> bool:
     """Fill and factor the Jacobian of contact `k`, and add the displacement to `surface`.
 
-    `unit_load` is filled with 1, the right-hand side of its equations.
+    The displacement is that of the followed strips. `unit_load` is filled with 1, the right-hand
+    side of its equations.
 
     Parameters
     ----------
@@ -138,26 +148,26 @@ def fill_jacobian(
     value, tangent, surface = state.value, state.tangent, state.surface[k]
     nodes, log_ratio = table.shape[0], lengths.log_ratio
     near, near_strips = lengths.near, min(n, REACH + 1) if coupled else 0
-    left = np.uint64(place[k, 0])
+    first, left, right = np.uint64(place[k, 0]), state.left[k], state.right[k]
     contiguous = place[k, size - 1] - place[k, 0] == size - 1
     for column in range(size):
         j = place[k, column]
         push, here = unit * line_load[k, j], np.uint64(j)
         node, (v0, v1, w0, w1), (d0, d1, e0, e1) = interpolation(nodes, log_ratio[k, j])
-        for d in range(max(j + 1, n - j)):
+        for d in range(max(j + 1 - left, right - j)):
             a, b = table[node, 0, d], table[node, 1, d]
             c, e = table[node + 1, 0, d], table[node + 1, 1, d]
             value[d] = v0 * a + v1 * b + w0 * c + w1 * e
             tangent[d] = d0 * a + d1 * b + e0 * c + e1 * e
-        for d in range(np.uint64(0), np.uint64(n - j)):
+        for d in range(np.uint64(0), np.uint64(right - j)):
             surface[here + d] += push * value[d]
             outer[k, column, here + d] = unit * tangent[d]
-        for d in range(np.uint64(1), np.uint64(j + 1)):
+        for d in range(np.uint64(1), np.uint64(j + 1 - left)):
             surface[here - d] += push * value[d]
             outer[k, column, here - d] = unit * tangent[d]
         if contiguous:  # without the indices, in a third of the time
             for row in range(np.uint64(0), np.uint64(size)):
-                matrix[column, row] = outer[k, column, left + row]
+                matrix[column, row] = outer[k, column, first + row]
         for row in range(0 if contiguous else size):
             matrix[column, row] = outer[k, column, place[k, row]]
         state.diagonal[k, column] = matrix[column, column]
@@ -221,16 +231,54 @@ def correct_residual(
 @subroutine
 def predict_surface(k: int, surface: FloatArray, state: NewtonState) -> None:
     """Add the first-order displacement by contact `k`'s load to the surface of unloaded strips."""
-    n, size, place, outer = surface.shape[1], state.size[k], state.place, state.outer
-    left, right = place[k, 0], place[k, size - 1] + 1
-    if right - left != size:
-        left, right = n, n  # unloaded strips between loaded ones
+    size, place, outer = state.size[k], state.place, state.outer
+    left, right = state.left[k], state.right[k]
+    first, last = place[k, 0], place[k, size - 1]
+    if last + 1 - first != size:
+        first, last = right, right  # unloaded strips between loaded ones
     for row in range(size):
         change = state.change[k, place[k, row]]
-        for i in range(left):
+        for i in range(np.uint64(left), np.uint64(first)):
             surface[k, i] += change * outer[k, row, i]
-        for i in range(np.uint64(right), np.uint64(n)):
+        for i in range(np.uint64(last + 1), np.uint64(right)):
             surface[k, i] += change * outer[k, row, i]
+
+
+@subroutine
+def complete_surface(
+    k: int,
+    approach: float,
+    table: FloatArray,
+    unit: float,
+    line_load: FloatArray,
+    lengths: HalfLengths,
+    state: NewtonState,
+) -> tuple[int, int]:
+    """Add the displacement to the strips that are not followed but may be penetrated.
+
+    A load displaces all strips away from the other body, so that a strip whose gap is greater than
+    the approach is not penetrated. Returns the first strip with complete `surface`, and the one
+    after the last.
+    """
+    surface, nodes, n = state.surface[k], table.shape[0], line_load.shape[1]
+    left, right = state.left[k], state.right[k]
+    first, last = left, right - 1
+    for i in range(left - 1, -1, -1):
+        first = i if surface[i] < approach else first
+    for i in range(right, n):
+        last = i if surface[i] < approach else last
+    for row in range(state.size[k] if last + 1 - first > right - left else 0):
+        j = state.place[k, row]
+        push = unit * line_load[k, j]
+        node, (v0, v1, w0, w1), _ = interpolation(nodes, lengths.log_ratio[k, j])
+        v0, v1, w0, w1 = v0 * push, v1 * push, w0 * push, w1 * push
+        for d in range(j + 1 - left, j + 1 - first):
+            low = v0 * table[node, 0, d] + v1 * table[node, 1, d]
+            surface[j - d] += low + (w0 * table[node + 1, 0, d] + w1 * table[node + 1, 1, d])
+        for d in range(right - j, last + 1 - j):
+            low = v0 * table[node, 0, d] + v1 * table[node, 1, d]
+            surface[j + d] += low + (w0 * table[node + 1, 0, d] + w1 * table[node + 1, 1, d])
+    return first, last + 1
 
 
 @subroutine
