@@ -128,3 +128,18 @@ def test_changed_text_holds_the_overrides(overrides: dict[str, object]) -> None:
             found = found[part]
         assert found == value
     assert data["friction"] == {"coefficient": 0.1}
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '[wear]\nlaw = "a"\ncylinder.k_over_h = "1 1/Pa"\nroller.k_over_h = "2 1/Pa"\n',
+        'wear.law = "a"\nwear.cylinder.k_over_h = "1 1/Pa"\nwear.roller.k_over_h = "2 1/Pa"\n',
+        '[wear]\nlaw = "a"\nroller.k_over_h = "2 1/Pa"\ncylinder.k_over_h.median = "1 1/Pa"\n',
+    ],
+)
+@pytest.mark.parametrize("value", ["3 1/Pa", {"distribution": "lognormal", "median": "3 1/Pa"}])
+def test_value_next_to_dotted_keys_is_replaced(text, value):
+    changed = tomllib.loads(apply_overrides(text, "file", {"wear.cylinder.k_over_h": value}))
+    roller = {"k_over_h": "2 1/Pa"}
+    assert changed == {"wear": {"law": "a", "cylinder": {"k_over_h": value}, "roller": roller}}

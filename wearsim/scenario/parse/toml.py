@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 import tomllib
 from collections.abc import Callable, Iterator, Mapping, MutableMapping
+from contextlib import suppress
 from pathlib import Path, PurePath
 from typing import Any
 
@@ -81,10 +83,6 @@ def parse_override(text: str) -> tuple[str, object]:
         "contact.mx=50" or "load.normal_force=350 N": the value is TOML if it can be parsed, and
         plain text otherwise.
 
-    Returns
-    -------
-    tuple of str and object
-
     Raises
     ------
     ValueError
@@ -124,7 +122,7 @@ def apply_overrides(text: str, file: str, overrides: Mapping[str, object]) -> st
     """
     import tomlkit  # noqa: PLC0415  (only overrides need it)
 
-    document = tomlkit.parse(text)
+    document, plain = tomlkit.parse(text), tomllib.loads(text)
     mistakes = []
     for dotted, value in overrides.items():
         *names, key = dotted.split(".")
@@ -132,25 +130,30 @@ def apply_overrides(text: str, file: str, overrides: Mapping[str, object]) -> st
             mistakes.append(Mistake("", f"{dotted:.60}", *TOO_DEEP))
             continue
         try:
-            table = _descend(document, names, key)
+            tables = [_descend(one, names, key) for one in (document, plain)]
+            unused = set()
             if dotted == PROFILE and isinstance(value, Profile):
-                for other in [name for name in table if name in _OF_PROFILE_FILES]:
-                    del table[other]
+                unused = {name for name in tables[0] if name in _OF_PROFILE_FILES}
                 value = PROFILE_FILE  # noqa: PLW2901
-            table[key] = as_toml(value)
+            prefix = ".".join(names)
+            for group in _ALTERNATIVES.get(prefix, ()):
+                others = set(group) - {key} if key in group else set()
+                unused |= {n for n in others & {*tables[0]} if f"{prefix}.{n}" not in overrides}
+            tables[0][key] = tables[1][key] = as_toml(value)
+            for table, name in itertools.product(tables, unused):
+                del table[name]
         except ValueError as error:
             unfit = isinstance(error, tomlkit.exceptions.ConvertError)
             what = "has a value that TOML cannot hold" if unfit else str(error)
             mistakes.append(Mistake("", dotted, what, shown(value)))
-            continue
-        prefix = ".".join(names)
-        for group in _ALTERNATIVES.get(prefix, ()):
-            for other in group if key in group else ():
-                if other != key and other in table and f"{prefix}.{other}" not in overrides:
-                    del table[other]
     if mistakes:
         raise ScenarioError(file, mistakes)
-    return tomlkit.dumps(document)
+    written = tomlkit.dumps(document)
+    # tables next to dotted keys are written wrongly by tomlkit; the plain text lacks comments
+    with suppress(tomllib.TOMLDecodeError):
+        if tomllib.loads(written) == plain:
+            return written
+    return tomlkit.dumps(plain)
 
 
 MAX_NESTING = 20  # a scenario has at most five levels
