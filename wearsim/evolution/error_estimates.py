@@ -277,7 +277,7 @@ def _volume_variance(problem: WearProblem, end: WearState, passes: FloatArray) -
     # differences between the means of the rollers are not random
     deviation = volume - problem.per_roller(volume)[:, problem.roller]
     variance = (problem.cylinder_share[None, :, None] * deviation**2).sum(axis=1).max(axis=0)
-    return np.asarray(passes * variance)
+    return np.asarray(passes * problem.passes_per_draw * variance)
 
 
 def _allowance(

@@ -70,6 +70,8 @@ class WearProblem:
         Inputs that are random processes in time.
     iteration_tolerance : float
         Relative change of wear and loads below which an implicit step has converged.
+    passes_per_draw : float
+        Passes that share one draw of the inputs drawn at every pass.
     """
 
     grid: Grid
@@ -88,6 +90,7 @@ class WearProblem:
     slip_profile: FloatArray | None = None
     varying: tuple[Varying, ...] = ()
     iteration_tolerance: float = 1e-8
+    passes_per_draw: float = 1.0
 
     @cached_property
     def shape(self) -> tuple[int, int, int]:
@@ -231,8 +234,8 @@ class WearProblem:
     @cached_property
     def constant_load(self) -> FloatArray | None:
         """Load before feedback, if it is constant in all realisations; as `force`."""
-        constant = all(load.constant for load in self.loads)
-        return self.force(np.zeros(len(self.loads))) if constant else None
+        times = np.zeros(len(self.loads))
+        return self.force(times) if all(load.constant for load in self.loads) else None
 
     @cached_property
     def has_spring(self) -> bool:
@@ -389,8 +392,7 @@ class WearProblem:
     def total_power(self, power: FloatArray) -> FloatArray:
         """Return the power of all physical rollers, shape (N,) [W], from (S, C, N)."""
         physical_contacts = (self.cylinder_share * self.kinematics.physical_rollers)[None, :, None]
-        total = sum_in_order(power * physical_contacts, axis=1)
-        return np.asarray(self.mean_over_turn(total)[0])
+        return np.asarray(self.mean_over_turn(sum_in_order(power * physical_contacts, axis=1))[0])
 
     def mean_over_turn(self, values: FloatArray) -> FloatArray:
         """Return the mean over the stations weighted by their time, first axis of length one."""

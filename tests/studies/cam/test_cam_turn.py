@@ -158,6 +158,16 @@ def test_change_of_flank_is_a_jump_of_the_spin_and_a_skid():
     assert all(skid.energy > 0.0 for skid in skids)
 
 
+def test_friction_of_the_bearing_grows_with_the_load():
+    rubbing = {"drive": "free", "bearing_friction": 0.01, "bearing_diameter": "15 mm"}
+    scenario = cam(creepage=rubbing, roller__inertia="1e-9 kg m^2")
+    study = wearsim.study_cam(scenario, [0.0, 1.8, 2.4])
+    torque = 0.5 * 0.01 * 15e-3 * study.point.normal_force
+    assert study.turn.drag(study.point) == pytest.approx(torque)
+    assert torque.max() > 1.2 * torque.min()
+    assert -study.contacts.force_x * scenario.roller.radius == pytest.approx(torque, rel=1e-3)
+
+
 def test_slip_of_prescribed_creepage_is_that_of_the_scenario():
     assert CamTurn(prescribed()).arcs == []
 

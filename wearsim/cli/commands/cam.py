@@ -114,7 +114,7 @@ def _columns(study: CamStudy) -> dict[str, Any]:
 
 def _data(study: CamStudy) -> dict[str, Any]:
     """Return the study in SI units."""
-    from wearsim.studies.cam.checks import HARMONIC_DEPTH
+    from wearsim.studies.cam.checks import harmonic_depth
 
     motion = study.turn.cam.motion
     return {
@@ -125,7 +125,7 @@ def _data(study: CamStudy) -> dict[str, Any]:
         "max_pressure_angle_at_rad": study.max_pressure_angle[1],
         "min_radius_of_curvature_m": study.min_radius_of_curvature,
         "harmonic_limit": study.harmonic_limit,
-        "harmonic_limit_depth_m": HARMONIC_DEPTH,
+        "harmonic_limit_depth_m": harmonic_depth(study.turn),
         "jump_speed_rad_per_s": study.jump_speed,
         "winding_number": study.winding_number,
         "winding_ratio": study.winding_ratio,
@@ -146,11 +146,11 @@ def _data(study: CamStudy) -> dict[str, Any]:
 def _summary(study: CamStudy) -> list[tuple[str, str]]:
     """Return the numbers of the turn in engineering units."""
     from wearsim.report.text import NOTHING, shown
-    from wearsim.studies.cam.checks import HARMONIC_DEPTH
+    from wearsim.studies.cam.checks import harmonic_depth
 
     turn, (angle, theta) = study.turn, study.max_pressure_angle
     least, greatest = turn.normal_range
-    depth = shown(HARMONIC_DEPTH, "um", 2)
+    depth = shown(harmonic_depth(turn), "um", 2)
     p, q = study.winding_ratio
     sweeps = "" if study.sweeps is None else f", {study.sweeps:.4g} sweeps around the roller"
     skids = sum(skid.energy for skid in study.skids)

@@ -167,7 +167,7 @@ def target_of(field: FieldInfo) -> RandomTarget | None:
     return None
 
 
-Persistence: TypeAlias = Literal["per-test", "per-roller", "per-pass"]
+Persistence: TypeAlias = Literal["per-test", "per-roller", "per-pass", "per-turn"]
 Role: TypeAlias = Literal["scalar", "joint", "field", "process"]
 
 LEAST = 1.0 - BELOW_ONE  # least uniform number of a draw
@@ -197,7 +197,8 @@ class RandomInputTable(Options):
     distribution: str = Field(description="Name of the distribution.")
     persistence: Persistence = Field(
         default="per-test",
-        description="Persistence of one draw: for the test, per roller or per pass.",
+        description="Persistence of one draw: for the test, per roller, per pass, or per turn and"
+        " shared by all rollers.",
     )
     marginal: dict[str, object] | None = Field(
         default=None,
@@ -234,8 +235,8 @@ class RandomInput:
         Dotted key of the value that it replaces, "load.normal_force".
     kind : str
         Name of the distribution, "maxent".
-    persistence : {"per-test", "per-roller", "per-pass"}
-        Persistence of one draw.
+    persistence : {"per-test", "per-roller", "per-pass", "per-turn"}
+        Persistence of one draw; that of a turn is shared by all rollers.
     distribution : Distribution, JointDistribution, FrictionField or Process
         The distribution.
     quantity : Quantity, optional
@@ -266,6 +267,11 @@ class RandomInput:
             table = self.name.rsplit(".", 1)[0]
             return tuple(f"{table}.{key}" for key in self.distribution.components)
         return (self.name,)
+
+    @property
+    def is_redrawn(self) -> bool:
+        """Whether it is drawn many times in a test."""
+        return self.persistence in {"per-pass", "per-turn"}
 
     @property
     def dimension(self) -> int:

@@ -236,9 +236,10 @@ def _one_of(roles: Collection[str]) -> str:
 def _check_persistence(
     mistakes: Mistakes, spec: RandomInputSpec, persistence: Persistence, name: str
 ) -> None:
-    places = {"per-pass": OF_A_CONTACT, "per-roller": OF_A_ROLLER}.get(persistence)
+    redrawn = persistence in {"per-pass", "per-turn"}
+    places = OF_A_CONTACT if redrawn else OF_A_ROLLER if persistence == "per-roller" else None
     what = f"is only for {', '.join(places)}" if places and name not in places else None
-    if persistence == "per-pass" and spec.role == "process":
+    if redrawn and spec.role == "process":
         what = "is not for a process, which runs through the whole test"
     if what:
         allowed = '"per-test" or "per-roller"' if name in OF_A_ROLLER else '"per-test"'

@@ -264,6 +264,10 @@ def of_follower(data: dict[str, Any]) -> dict[str, Any]:
 def assemble_cam(mistakes: Mistakes, sections: dict[str, Any]) -> None:
     """Replace the tables [cam] and [follower] by the cam and its base circle."""
     table, follower = sections["cam"], sections.pop("follower")
+    creepage = sections["creepage"]
+    if table is None and creepage is not None and creepage.bearing_friction > 0.0:
+        what = "is only for [cam], whose load differs along the angle"
+        mistakes.add("creepage", "bearing_friction", what, None, "bearing_torque")
     if table is not None:
         read = read_cam(mistakes, table, follower, sections["roller"])
         sections |= dict(zip(("cylinder", "cam"), read or (None, None), strict=True))

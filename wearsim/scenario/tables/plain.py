@@ -81,6 +81,15 @@ class CreepageTable(Options):
     bearing_torque: NonNegativeTorque | None = Field(
         default=None, description="Torque of a roller's bearing; for drive = free."
     )
+    bearing_friction: float = Field(
+        default=0.0,
+        ge=0.0,
+        description="Friction coefficient of the bearing on a cam, for drive = free: half of it"
+        " times bearing_diameter and normal force is a further torque.",
+    )
+    bearing_diameter: PositiveLength | None = Field(
+        default=None, description="Diameter at which bearing_friction acts."
+    )
     yaw: PerRoller[Angle] = Field(
         default=0.0, description="Angle about the contact normal; causes lateral creepage."
     )
@@ -200,10 +209,16 @@ def read_creepage(mistakes: Mistakes, raw: Mapping[str, object]) -> CreepageTabl
     if drive in ("creepage", "free"):
         keys = ("longitudinal", "bearing_torque")
         needed, refused = keys if drive == "creepage" else keys[::-1]
-        if needed not in raw:
+        rubs = drive == "free" and "bearing_friction" in raw
+        if needed not in raw and not rubs:
             mistakes.add("creepage", needed, f'is needed with drive = "{drive}"', "none")
         if refused in raw:
             mistakes.add("creepage", refused, f'has no meaning with drive = "{drive}"')
+        if ("bearing_friction" in raw) != ("bearing_diameter" in raw):
+            pair = "bearing_friction and bearing_diameter"
+            mistakes.add("creepage", pair, "are needed together", "one of them")
+        elif "bearing_friction" in raw and drive != "free":
+            mistakes.add("creepage", "bearing_friction", f'has no meaning with drive = "{drive}"')
     table = validate(mistakes, CreepageTable, raw, "creepage")
     if table is not None:
         check_angles(mistakes, table)

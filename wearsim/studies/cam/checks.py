@@ -12,7 +12,13 @@ from wearsim.studies.cam.turn import SHARP, STEEP, CamTurn
 
 FEWEST_SWEEPS = 10.0  # of the contact around the roller in a life, below which it wears unevenly
 
-HARMONIC_DEPTH = 50e-6  # m, worn depth at which the harmonic limit is given
+HARMONIC_DEPTH = 50e-6  # m, worn depth at which the harmonic limit is given without a depth limit
+
+
+def harmonic_depth(turn: CamTurn) -> float:
+    """Return the worn depth at which the harmonic limit is given: the depth limit, if any [m]."""
+    limit = getattr(turn.scenario, "limit", None)
+    return float(getattr(limit, "depth", None) or HARMONIC_DEPTH)
 
 
 def harmonic_limit(turn: CamTurn, depth: float) -> float | None:

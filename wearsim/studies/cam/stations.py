@@ -10,7 +10,7 @@ import numpy as np
 
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.evolution.quantities import CamStations
-from wearsim.studies.cam.checks import HARMONIC_DEPTH, harmonic_limit
+from wearsim.studies.cam.checks import harmonic_depth, harmonic_limit
 from wearsim.studies.cam.turn import CamTurn, Point
 from wearsim.types import FloatArray
 
@@ -124,7 +124,7 @@ def harmonics_of(turn: CamTurn, stations: int) -> int:
     ScenarioError
         If fewer than three are stable.
     """
-    limit = harmonic_limit(turn, HARMONIC_DEPTH)
+    limit = harmonic_limit(turn, harmonic_depth(turn))
     if limit is None or limit >= FEWEST_HARMONICS:
         return math.floor(min(limit or math.inf, stations / 3.0))
     what = "feedback of wear through the inertia is unstable above harmonic"

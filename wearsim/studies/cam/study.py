@@ -18,9 +18,9 @@ from wearsim.mechanics.film import minimum_film
 from wearsim.mechanics.hertz.elasticity import combine
 from wearsim.scenario import Scenario, as_scenario
 from wearsim.studies.cam.checks import (
-    HARMONIC_DEPTH,
     Skid,
     cam_warnings,
+    harmonic_depth,
     harmonic_limit,
     skids_of,
 )
@@ -172,7 +172,7 @@ def study_cam(
         turn.integral("load"),
         steepest,
         1.0 / sharpest if sharpest > 0.0 else None,
-        harmonic_limit(turn, HARMONIC_DEPTH),
+        harmonic_limit(turn, harmonic_depth(turn)),
         _jump_speed(turn),
         winding,
         (ratio.numerator, ratio.denominator),

@@ -176,11 +176,13 @@ class CamTurn:
         ScenarioError
             If the roller rolls nowhere.
         """
-        torque, inertia = self.scenario.creepage.bearing_torque or 0.0, self.scenario.roller.inertia
+        inertia = self.scenario.roller.inertia
         if not self.free:
             return []
         if inertia == 0.0:
-            ratio, theta = extreme(self.panels, lambda p, x: torque / self._greatest_torque(p, x))
+            ratio, theta = extreme(
+                self.panels, lambda p, x: self.drag(self.at(p, x)) / self._greatest_torque(p, x)
+            )
             if ratio > 1.0:
                 at = f"{math.degrees(theta):.4g} deg"
                 what = "exceeds the torque that friction transmits: the roller stops at"
@@ -189,8 +191,8 @@ class CamTurn:
         scale = inertia * self.speed**2
 
         def rolling(panel: Panel, theta: FloatArray) -> Rolling:
-            found, most = self.at(panel, theta).kinematics, self._greatest_torque(panel, theta)
-            drag = np.full(len(theta), torque / scale)
+            point, most = self.at(panel, theta), self._greatest_torque(panel, theta)
+            found, drag = point.kinematics, self.drag(point) / scale
             return Rolling(found.spin, found.spin_per_rad, drag, most / scale)
 
         try:
@@ -280,9 +282,16 @@ class CamTurn:
         ]
         return radius * float(max(sizes, default=0.0))
 
+    def drag(self, point: Point) -> FloatArray:
+        """Return the torque of the bearing, against the roller's rotation [N m]."""
+        creepage = self.scenario.creepage
+        arm = 0.5 * creepage.bearing_friction * (creepage.bearing_diameter or 0.0)
+        force = np.maximum(point.normal_force, 0.0)
+        return np.asarray((creepage.bearing_torque or 0.0) + arm * force)
+
     def torque(self, point: Point) -> FloatArray:
         """Return the torque that the traction gives the rolling roller [N m]."""
-        torque = np.sign(point.kinematics.spin) * (self.scenario.creepage.bearing_torque or 0.0)
+        torque = np.sign(point.kinematics.spin) * self.drag(point)
         rate = self.speed**2 * point.kinematics.spin_per_rad
         return np.asarray(torque + self.scenario.roller.inertia * rate)
 

@@ -182,7 +182,7 @@ def checked_request(
     target = None if precision is None else parse_target(precision)
     check_plan(scenario, chosen, "a target" if precision else "")
     drawer = Drawer(scenario, "monte-carlo")
-    by_pass = any(item.persistence == "per-pass" for item in scenario.random)
+    by_pass = any(item.is_redrawn for item in scenario.random)
     if not drawer.groups and not (by_pass and scenario.evolution.stepper == "per-pass"):
         what = "no random input differs between realisations"
         if scenario.random:

@@ -39,7 +39,7 @@ class Draws:
     varying : tuple of Varying
         Processes; their rollers are the scenario's.
     passes : tuple of RandomInput
-        Inputs that are drawn at every pass.
+        Inputs that are drawn at every pass or turn.
     values : mapping of str to ndarray, shape () or (rollers,)
         All values drawn for the test and for its rollers, by the scenario's key [SI].
     time_means : mapping of str to ndarray, shape () or (rollers,)
@@ -185,7 +185,7 @@ class Drawer:
         self.items = [
             item
             for item in scenario.random
-            if item.role in {"scalar", "joint"} and item.persistence != "per-pass"
+            if item.role in {"scalar", "joint"} and not item.is_redrawn
         ]
         self._processes = [item for item in scenario.random if item.role == "process"]
         self._names = {
@@ -215,7 +215,7 @@ class Drawer:
         return [
             item.name
             for item in self.scenario.random
-            if item.role == "process" or item.persistence != "per-pass"
+            if item.role == "process" or not item.is_redrawn
         ]
 
     def draw(
@@ -265,7 +265,7 @@ class Drawer:
             scenario=realise(scenario, listed) if listed else scenario,
             rollers=contact_values(self.items, unlisted),
             varying=tuple(one for found in paths.values() for one in found),
-            passes=tuple(item for item in scenario.random if item.persistence == "per-pass"),
+            passes=tuple(item for item in scenario.random if item.is_redrawn),
             values=values,
             time_means={item.name: _means(scenario, item, found) for item, found in paths.items()},
         )

@@ -164,10 +164,12 @@ def redrawing(scenario: Scenario, items: Sequence[RandomInput]) -> Redraw:
 
     def redraw(inputs: ContactInputs, first: int) -> ContactInputs:
         count = len(inputs.friction)
-        uniforms = {
-            item.name: stream.rows(first, count, item.dimension, realisation)
-            for item, stream in streams.items()
-        }
+        uniforms = {}
+        for item, stream in streams.items():
+            rollers = scenario.operation.rollers if item.persistence == "per-turn" else 1
+            draws = (first + np.arange(count)) // rollers
+            rows = stream.rows(int(draws[0]), int(np.ptp(draws)) + 1, item.dimension, realisation)
+            uniforms[item.name] = rows[draws - draws[0]]
         return _with_values(inputs, items, copula.correlate(uniforms))
 
     return redraw
@@ -199,6 +201,7 @@ def with_nodes(
         Nodes of each roller, a multiple of 4.
     """
     names = [(item.name, item.dimension) for item in items]
+    per_turn = any(item.persistence == "per-turn" for item in items)
     sampler, copula = Sampler(scenario.seed, names, "sobol"), _copula(scenario, items)
     rollers = np.arange(problem.rollers, dtype=np.int64)
 
@@ -223,6 +226,7 @@ def with_nodes(
         inputs=inputs,
         roller=np.repeat(rollers, count),
         weight=np.concatenate(weights),
+        passes_per_draw=float(max(per_turn * scenario.operation.rollers, 1)),
     )
 
 
