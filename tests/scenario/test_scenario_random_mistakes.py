@@ -27,7 +27,7 @@ MISTAKES = {
         FORCE_LINE,
         'normal_force = {distribution = "bell", men = "3 N", std = "3 m", low = "3 N", persistance = "per-pass", persistence = "per-pas"}',
         """\
-rig.toml: [load.normal_force] persistence: unknown choice (did you mean 'per-pass'?), got "per-pas", expected one of "per-test", "per-roller", "per-pass"
+rig.toml: [load.normal_force] persistence: unknown choice (did you mean 'per-pass'?), got "per-pas", expected one of "per-test", "per-roller", "per-pass", "per-turn"
 rig.toml: [load.normal_force] mean: is missing, expected a force such as "300 N"
 rig.toml: [load.normal_force] std: wrong dimension, got "3 m" (a length), expected a force above zero such as "300 N"
 rig.toml: [load.normal_force] men: unknown key (did you mean 'mean'?)
