@@ -44,6 +44,7 @@ BUILT_IN = {
     "show": "Show the content of a results file and the end state.",
     "plot": "Draw the figure of a results file of any kind.",
     "compare": "Compare runs and ensembles, with confidence intervals.",
+    "report": "Write one page on results for a browser: answers, interactive figures, inputs.",
     "export": "Write a results file as CSV, with units in the headers.",
     "maxent": "Compute a maximum-entropy distribution from moments.",
     "plugins": "List contact models, wear laws, loads, random inputs and motion laws.",

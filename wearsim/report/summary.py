@@ -15,6 +15,7 @@ from wearsim.units import engineers_unit, in_engineers_unit
 from wearsim.uq.estimation.moments import is_constant
 
 if TYPE_CHECKING:
+    from wearsim.results.content import StudyData
     from wearsim.studies.contact.single import ContactStudy
 
 
@@ -148,6 +149,21 @@ def standing(result: Result) -> str:
 def _last(value: Any) -> int:
     """Return the last value of a history, or the number itself."""
     return int(np.ravel(value)[-1])
+
+
+def sources(raw: StudyData) -> list[tuple[str, str]]:
+    """Return rows on scenario, input files, plugins and software of a study."""
+    plugins = [
+        f"{item['kind']} {item['name']} ({item['distribution']} {item['version']})"
+        for item in raw.plugins
+    ]
+    return [
+        ("scenario", raw.scenario_file),
+        ("input files", ", ".join(raw.files) or "none"),
+        ("plugins", "\n".join(plugins)),
+        ("software", ", ".join(f"{name} {number}" for name, number in raw.software.items())),
+        ("written", raw.created),
+    ]
 
 
 def run_json(result: Result) -> dict[str, Any]:

@@ -27,6 +27,7 @@ from wearsim.cli.shared import (
 )
 
 if TYPE_CHECKING:
+    from wearsim.profiles import ProfileChoice
     from wearsim.report.parts import Measured
     from wearsim.results import DissipationResult, EnsembleResult, Result
     from wearsim.results.content import StudyData
@@ -58,8 +59,6 @@ def plot(
     """Draw the figure of a results file of any kind."""
     path = figure if figure is not None else Path(f"{file.stem}.png")
     check_figure(path, force)
-    from wearsim.profiles import load_profile, sign_note
-    from wearsim.report.parts import Measured
     from wearsim.results import DissipationResult, open_results, refuse_inputs
 
     refuse_inputs(path, [file], "the figure")
@@ -69,14 +68,7 @@ def plot(
         raise typer.BadParameter(
             f"requires wear tests; {file} holds one contact without wear", param_hint="--measured"
         )
-    choice = profile_choice(columns, units, row, mean_rows, at)
-    read = [(name.stem, load_profile(name, choice)) for name in measured or []]
-    signs = [
-        sign_note(one, choice, str(name))
-        for name, (_, one) in zip(measured or [], read, strict=True)
-    ]
-    write_notes(filter(None, signs))
-    profiles = [Measured(label, one.y, one.height) for label, one in read]
+    profiles = measured_profiles(measured or [], profile_choice(columns, units, row, mean_rows, at))
     draw(result, path, profiles)
     for profile in profiles:
         from wearsim.report.parts import computed_profile, residual_text
@@ -84,6 +76,18 @@ def plot(
         assert not isinstance(result, DissipationResult)
         note(f"{profile.label}: {residual_text(profile, computed_profile(result))}")
     note(f"figure: {path}")
+
+
+def measured_profiles(files: Sequence[Path], choice: ProfileChoice) -> list[Measured]:
+    """Return the profiles of measured files; how their signs were read goes to stderr."""
+    from wearsim.profiles import load_profile, sign_note
+    from wearsim.report.parts import Measured
+
+    read = [load_profile(file, choice) for file in files]
+    each = zip(files, read, strict=True)
+    write_notes(filter(None, [sign_note(one, choice, str(file)) for file, one in each]))
+    each = zip(files, read, strict=True)
+    return [Measured(file.stem, one.y, one.height) for file, one in each]
 
 
 def draw(
@@ -133,10 +137,10 @@ def show(file: ResultsFile, json: Json = False) -> None:
         write_json({**data, **_origin(result.raw)})
         return
     if isinstance(result, DissipationResult):
-        write_spread(result, _sources(result.raw))
+        write_spread(result, summary.sources(result.raw))
     elif isinstance(result, EnsembleResult):
         groups = [(f"random {item['name']}", item["text"]) for item in result.raw.groups]
-        ensemble_table.write_ensemble(result, [*groups, *_sources(result.raw)])
+        ensemble_table.write_ensemble(result, [*groups, *summary.sources(result.raw)])
     else:
         first, last = (count(float(result.record_passes[place])) for place in (0, -1))
         rows = [
@@ -150,28 +154,13 @@ def show(file: ResultsFile, json: Json = False) -> None:
             ("strips", str(len(result.y))),
             *summary.effort(result),
         ]
-        write_table(result.title, [*rows, *_sources(result.raw)])
+        write_table(result.title, [*rows, *summary.sources(result.raw)])
         title = "end state" if result.finished else "current state"
         title = "state before the failure" if result.failure else title
         write_table(title, summary.end_state(result))
     write_notes(result.notes, result.warnings)
     if isinstance(result, EnsembleResult):
         ensemble_table.warn_of_failures(result)
-
-
-def _sources(raw: StudyData) -> list[tuple[str, str]]:
-    """Return rows on scenario, input files, plugins and software of a study."""
-    plugins = [
-        f"{item['kind']} {item['name']} ({item['distribution']} {item['version']})"
-        for item in raw.plugins
-    ]
-    return [
-        ("scenario", raw.scenario_file),
-        ("input files", ", ".join(raw.files) or "none"),
-        ("plugins", "\n".join(plugins)),
-        ("software", ", ".join(f"{name} {number}" for name, number in raw.software.items())),
-        ("written", raw.created),
-    ]
 
 
 def _origin(raw: StudyData) -> dict[str, Any]:

@@ -1,0 +1,153 @@
+"""The page on results: its content against the results, without a browser."""
+
+import re
+from dataclasses import replace
+from html import unescape
+from html.parser import HTMLParser
+from urllib.parse import unquote
+
+import numpy as np
+import pytest
+from bokeh.models import ColumnDataSource, Plot
+from made_up_ensembles import made_up
+
+import wearsim
+from wearsim.errors import WearsimError
+from wearsim.report.page.page import page_of, save_report
+from wearsim.report.page.run_plots import run_plots
+from wearsim.report.page.study_plots import comparison_plots, ensemble_plots
+from wearsim.report.parts import Measured
+from wearsim.scenario.examples import shipped_scenario
+from wearsim.studies.ensemble.compare import compare
+
+SHORT = {"operation.duration": "3 min", "outputs.records": 4}
+MEASURED = Measured("trace", np.array([-1e-3, 0.0, 1e-3]), np.array([0.0, -2e-6, 0.0]))
+
+
+@pytest.fixture(scope="module")
+def result():
+    return wearsim.run(shipped_scenario("rig-450min", SHORT))
+
+
+@pytest.fixture(scope="module")
+def cam():
+    return wearsim.run(shipped_scenario("cam-eccentric", {"operation.turns": 20_000}))
+
+
+def data_of(figure: Plot, column: str) -> list[ColumnDataSource]:
+    """Return the sources of a figure that have a column."""
+    sources = figure.select(ColumnDataSource)
+    return [source for source in sources if column in source.data]
+
+
+class Links(HTMLParser):
+    """Addresses in the tags of a page, without those in the text of scripts."""
+
+    def __init__(self):
+        super().__init__()
+        self.found = []
+
+    def handle_starttag(self, tag, attrs):
+        self.found += [value for name, value in attrs if name in {"src", "href"}]
+
+
+def titled(plots, title):
+    (found,) = [plot for plot in plots if plot.title.startswith(title)]
+    return found
+
+
+def test_slider_has_the_profile_of_every_record(result):
+    plot = titled(run_plots(result, [MEASURED]), "Worn profile")
+    (source,) = data_of(plot.figure, "shown")
+    for number, profile in enumerate(result.profiles):
+        assert source.data[str(number)] == pytest.approx(-1e6 * profile, rel=1e-6)
+    assert source.data["shown"] == pytest.approx(-1e6 * result.profiles[-1], rel=1e-6)
+    (measured,) = data_of(plot.figure, "height")
+    assert measured.data["height"] == pytest.approx([0.0, -2.0, 0.0])
+
+
+def test_columns_are_in_single_precision(result):
+    for plot in run_plots(result, []):
+        for source in plot.figure.select(ColumnDataSource):
+            arrays = [v for v in source.data.values() if isinstance(v, np.ndarray)]
+            assert all(array.dtype.itemsize <= 4 for array in arrays if array.dtype.kind == "f")
+
+
+def test_page_states_question_answer_error_and_origin(result):
+    page = unescape(page_of([result]))
+    assert "How deep does the cylinder wear in 9,000 roller passes (3.000 min)?" in page
+    assert f"{1e6 * result.depth[-1]:.4g} um ± " in page
+    assert "It does not contain the errors of the contact model" in page
+    assert "numpy " in page
+    assert "wearsim run rig-450min.toml" in page
+    (saved,) = re.findall(r'href="data:text/plain;charset=utf-8,([^"]+)"', page)
+    assert unquote(saved) == result.raw.scenario_text
+
+
+def test_page_loads_nothing(result):
+    page = page_of([result])
+    links = Links()
+    links.feed(page)
+    assert links.found
+    assert all(link.startswith("data:") for link in links.found)
+
+
+def test_text_of_a_scenario_cannot_alter_the_page(result):
+    text = result.raw.scenario_text + "# <script>alert(1)</script>"
+    raw = replace(result.raw, title="</script><b>bold</b>", scenario_text=text)
+    page = page_of([replace(result, raw=raw)])
+    assert "<b>bold</b>" not in page
+    assert "<script>alert" not in page
+
+
+def test_cam_has_a_map_and_its_lift_error(cam):
+    plots = run_plots(cam, [])
+    (image,) = data_of(titled(plots, "Worn depth over").figure, "image")
+    assert image.data["image"][0].max() == pytest.approx(1e6 * cam.final["depth_m"], rel=1e-3)
+    (curve,) = data_of(titled(plots, "Lift error").figure, "shown")
+    assert np.ptp(curve.data["shown"]) == pytest.approx(1e6 * cam.final["lift_error_m"], rel=0.02)
+    assert "How deep does the cam wear in 20,000 turns" in page_of([cam])
+
+
+def test_ensemble_shows_its_estimates():
+    result = made_up()
+    found = result.estimate("depth").mean
+    page = unescape(page_of([result]))
+    assert f"{1e6 * found.value:.2f} um [{1e6 * found.low:.2f}, {1e6 * found.high:.2f}]" in page
+    plots = ensemble_plots(result, [])
+    (bars,) = data_of(titled(plots, "Depth at the end").figure, "number")
+    assert bars.data["number"].sum() == result.count
+    (points,) = data_of(titled(plots, "Depth against friction").figure, "number")
+    assert points.data["depth"] == pytest.approx(1e6 * result.at_end("depth"), rel=1e-6)
+
+
+@pytest.mark.parametrize("options", [{"count": 1}, {"spread": 0.0}, {"count": 4, "pending": 4}])
+def test_page_of_an_ensemble_without_scatter_or_tests(options):
+    page = page_of([made_up(**options)])
+    assert "Traceback" not in page
+    assert "Repeat it" in page
+
+
+def test_ensemble_of_a_thousand_tests_is_below_three_megabytes(tmp_path):
+    save_report([made_up(1000)], tmp_path / "page.html")
+    assert (tmp_path / "page.html").stat().st_size < 3e6
+
+
+def test_several_results_are_compared(result):
+    deeper = wearsim.run(shipped_scenario("rig-450min", {**SHORT, "friction.coefficient": 0.2}))
+    page = unescape(page_of([result, deeper]))
+    assert "How do the depths at the end of these tests differ?" in page
+    assert "deeper by" in page
+    results = {"mild": result, "severe": deeper}
+    depths, profiles = comparison_plots(compare(list(results.values()), list(results)), results)
+    (source,) = data_of(depths.figure, "value")
+    assert source.data["label"] == ["severe", "mild"]
+    assert source.data["value"][1] == pytest.approx(1e6 * result.depth[-1], rel=1e-6)
+    assert len(data_of(profiles.figure, "height")) == 2
+
+
+def test_one_contact_is_not_compared_with_tests(result):
+    study = wearsim.dissipation(shipped_scenario("paper-monte-carlo"), 40)
+    assert "mean dissipated power" in page_of([study])
+    with pytest.raises(WearsimError, match="only runs and ensembles can be compared"):
+        page_of([result, study])

@@ -1,0 +1,70 @@
+"""Verb report: one page on results for a browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from wearsim.cli.commands.results import MeasuredFiles, measured_profiles
+from wearsim.cli.shared import (
+    At,
+    Columns,
+    Force,
+    MeanRows,
+    Row,
+    Units,
+    note,
+    profile_choice,
+    refuse_existing,
+)
+
+Files = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="FILE.h5...",
+        help="Results files of any kind; several runs and ensembles are also compared.",
+        show_default=False,
+    ),
+]
+Page = Annotated[
+    Path | None,
+    typer.Option(
+        "--output",
+        "-o",
+        metavar="PAGE",
+        help="Page to write, by default the name of the first file with .html.",
+        show_default=False,
+    ),
+]
+
+
+def report(
+    files: Files,
+    output: Page = None,
+    measured: MeasuredFiles = None,
+    columns: Columns = None,
+    units: Units = None,
+    row: Row = None,
+    mean_rows: MeanRows = None,
+    at: At = None,
+    force: Force = False,
+) -> None:
+    """Write one page on results for a browser: answers, interactive figures, inputs."""
+    path = output if output is not None else Path(f"{files[0].stem}.html")
+    if path.suffix.lower() not in {".html", ".htm"}:
+        raise typer.BadParameter(f"'{path}' does not end in .html", param_hint="-o")
+    if not path.parent.is_dir():
+        raise typer.BadParameter(f"folder {path.parent} does not exist", param_hint="-o")
+    refuse_existing(path, force, "-o")
+    from wearsim.report.page.page import save_report
+    from wearsim.results import refuse_inputs
+    from wearsim.results.opening import open_results
+
+    refuse_inputs(path, files, "the page")
+    refuse_inputs(path, measured or [], "a measured profile")
+    results = [open_results(file) for file in files]
+    profiles = measured_profiles(measured or [], profile_choice(columns, units, row, mean_rows, at))
+    save_report(results, path, profiles)
+    note(f"page: {path}, {path.stat().st_size / 1e6:.1f} MB")

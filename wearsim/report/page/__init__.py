@@ -1,0 +1,1 @@
+"""Report of results as one page for a browser."""
