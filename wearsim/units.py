@@ -121,6 +121,8 @@ DENSITY = Kind("a density", "kg/m^3", "7850 kg/m^3")
 
 MASS_PER_ENERGY = Kind("a mass per energy", "kg/J", "5.3 ug/J")
 
+VOLUME = Kind("a volume", "m^3", "10 mm^3")
+
 MASS = Kind("a mass", "kg", "0.5 kg")
 
 INERTIA = Kind("a moment of inertia", "kg m^2", "2.94e-5 kg m^2")
@@ -135,7 +137,7 @@ _KINDS = (
     *(LENGTH, FORCE, STIFFNESS, PRESSURE, WEAR_FACTOR, ROTATION_SPEED, DURATION, ANGLE, TORQUE),
     *(SPEED, PER_POWER, DENSITY, MASS_PER_ENERGY, MASS, INERTIA, TORSIONAL_STIFFNESS, VISCOSITY),
     Kind("an area", "m^2", "10 mm^2"),
-    Kind("a volume", "m^3", "10 mm^3"),
+    VOLUME,
     Kind("a power", "W", "0.07 W"),
     Kind("a frequency", "1/s", "16 turn/s"),
     Kind("a curvature", "1/m", "40 1/m"),

@@ -249,7 +249,10 @@ def _estimate(progress: EnsembleProgress) -> str:
         return ""
     from wearsim.report.text import OBSERVABLES, with_interval
 
-    unit = OBSERVABLES[progress.what.split(".", maxsplit=1)[0]].unit
+    name = progress.what.split(".", maxsplit=1)[0]
+    if name not in OBSERVABLES:  # a life, "b10"
+        return f"{progress.what.upper()} {progress.estimate.value:,.0f}"
+    unit = OBSERVABLES[name].unit
     return f"{progress.what} {with_interval(progress.estimate, unit)}"
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -120,6 +120,7 @@ class Evolution:
         self.stop, self.max_steps, self._next_record = stop, max_steps, next_record
         self.numbers = np.arange(problem.shape[2])
         self.failures: dict[int, Exception] = {}
+        self._ended: set[int] = set()
         self._trials: dict[int, Trial] = {}
         self._scheme: Step
         self._end_finished()
@@ -136,10 +137,17 @@ class Evolution:
         if len(self.numbers):
             self._end_finished()
 
+    def end(self, numbers: Iterable[int]) -> None:
+        """End tests, by number, before their stop."""
+        self._ended.update(numbers)
+        if len(self.numbers):
+            self._end_finished()
+
     def _end_finished(self) -> None:
-        """Leave only the tests that have not failed and have not reached their end."""
+        """Leave only the tests that have neither failed nor ended."""
         tests = enumerate(zip(self.numbers.tolist(), self.state.passes.tolist(), strict=True))
-        going = [k for k, (n, passes) in tests if passes < self.stop and n not in self.failures]
+        over = self.failures.keys() | self._ended
+        going = [k for k, (n, passes) in tests if passes < self.stop and n not in over]
         kept = np.array(going, dtype=np.int64)
         self.numbers = self.numbers[kept]
         if going:

@@ -1,50 +1,55 @@
-"""Limits at which a wear test stops, and the state at which a test first reaches one."""
+"""Limits at which a wear test stops, and the state at which tests first reach one."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from wearsim.errors import ContactError, StepError
+from wearsim.evolution import observables
 from wearsim.evolution.integrate import Advance
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.quantities import mean_along, worn_volume
-from wearsim.evolution.state import WearState
+from wearsim.evolution.state import WearState, joined_states
 from wearsim.evolution.steppers.base import SMALLEST_STEP, Step, Stepper
 from wearsim.quantities import NUMBER, quantity
-from wearsim.types import FloatArray
+from wearsim.types import FloatArray, IntArray
 from wearsim.units import QuantityError
 
-_EXAMPLES = '"depth 50 um", "roller depth 5 um", "volume 12 mm^3", "12 h" or "2e6 passes"'
-_LOCATED = 1e-9  # error of the passes at a limit, relative to the passes
+_EXAMPLES = (
+    '"depth 50 um", "roller depth 5 um", "lift error 30 um", "volume 12 mm^3", "width 14 mm",'
+    ' "peak pressure 900 MPa", "clearance 60 um", "12 h" or "2e6 passes"'
+)
+_LOCATED = 1e-9  # relative error of the quantity at a limit
+_MOST_TRIALS = 100
+_POWER = 2.0 / 3.0  # of the passes, with which a depth begins
 SAME_VALUE = 1e-6  # relative difference of a value from a limit at which the limit is reached
 
-
-def _depth(problem: WearProblem, state: WearState) -> FloatArray:
-    return np.asarray(state.cylinder_depth.max(axis=(0, 1, 3)))
-
-
-def _roller_depth(problem: WearProblem, state: WearState) -> FloatArray:
-    return np.asarray(state.roller_depth.max(axis=(0, 1, 3)))
-
-
-def _volume(problem: WearProblem, state: WearState) -> FloatArray:
-    radius, spacing = problem.kinematics.track_radius, problem.grid.spacing
-    volumes = worn_volume(state.cylinder_depth, spacing, radius)
-    return np.asarray(mean_along(volumes, axis=0)[0, 0])
-
-
 #: unit, name in the history, and value of a state by the name of the quantity
-_QUANTITIES: dict[str, tuple[str, str, Callable[[WearProblem, WearState], FloatArray]]] = {
-    "depth": ("m", "depth", _depth),
-    "roller depth": ("m", "roller_depth", _roller_depth),
-    "volume": ("m^3", "worn_volume", _volume),
-    "time": ("s", "time", lambda problem, state: problem.time(state.passes)),
-    "passes": ("1", "passes", lambda problem, state: state.passes),
+_QUANTITIES: dict[str, tuple[str, str]] = {
+    "depth": ("m", "depth"),
+    "roller depth": ("m", "roller_depth"),
+    "lift error": ("m", "lift_error"),
+    "volume": ("m^3", "worn_volume"),
+    "width": ("m", "width"),
+    "peak pressure": ("Pa", "peak_pressure"),
+    "clearance": ("m", "descent"),
+    "time": ("s", "time"),
+    "passes": ("1", "passes"),
+}
+#: quantities that end a life
+OF_LIFE = tuple(name for name in _QUANTITIES if name not in {"time", "passes"})
+_VALUES: dict[str, Callable[[WearProblem, WearState], FloatArray]] = {
+    "depth": observables.depth,
+    "roller depth": observables.roller_depth,
+    "lift error": observables.lift_error,
+    "volume": observables.volume,
+    "clearance": observables.clearance,
+    "time": lambda problem, state: problem.time(state.passes),
+    "passes": lambda problem, state: state.passes,
 }
 
 
@@ -54,22 +59,29 @@ class Limit:
 
     Parameters
     ----------
-    quantity : {"depth", "roller depth", "volume", "time", "passes"}
-        Greatest worn depth of the cylinder or of a roller [m], worn volume of the cylinder [m^3],
-        simulated time [s] or roller passes; none of them decreases during a test.
+    quantity : str
+        Greatest worn depth of the cylinder, "depth", or of a roller, "roller depth" [m]; "lift
+        error" of a cam, peak to peak [m]; worn "volume" of the cylinder [m^3]; "width" of the
+        groove [m]; "peak pressure" [Pa]; "clearance", the worn descent of a roller [m]; simulated
+        "time" [s]; roller "passes".
     value : float
         The limit, in SI.
     text : str
         The limit as written by the user.
+    threshold : float
+        Depth that bounds the width of the groove [m].
     """
 
     quantity: str
     value: float
     text: str
+    threshold: float = 1e-6
 
     @classmethod
     def parse(cls, text: str | float) -> Limit:
-        """Return the limit of a text such as "depth 50 um"; a number is a time [s].
+        """Return the limit of a text such as "depth 50 um" or "lift_error=30um".
+
+        A number is a time [s].
 
         Raises
         ------
@@ -78,7 +90,9 @@ class Limit:
         """
         if not isinstance(text, str):
             text = f"{float(text)!r} s"
-        words = " ".join(text.split())
+        named = re.fullmatch(r"\s*([A-Za-z_ ]+?)\s*=(.*)", text)
+        words = f"{named[1].replace('_', ' ')} {named[2]}" if named else text
+        words = " ".join(words.split())
         parts = re.fullmatch(r"([A-Za-z ]*?) ?([^A-Za-z ].*)", words)
         kind = parts[1].lower().removeprefix("worn ") if parts else "nothing"
         passes = re.fullmatch(rf"({NUMBER.pattern}) ?(?:roller )?passes", words)
@@ -86,7 +100,7 @@ class Limit:
             kind, value = "passes", float(passes[1])
             if value % 1.0:
                 raise ValueError(f"'{text}' is not a whole number of passes")
-        elif parts and kind in {"", "time", "depth", "roller depth", "volume"}:
+        elif parts and kind in {"", *_QUANTITIES} - {"passes"}:
             try:
                 value = quantity(parts[2], _QUANTITIES[kind or "time"][0])
             except QuantityError as error:
@@ -109,19 +123,21 @@ class Limit:
         """Name of the quantity in the history of a run."""
         return _QUANTITIES[self.quantity][1]
 
-    def values(self, problem: WearProblem, state: WearState) -> FloatArray:
-        """Return the quantity of every realisation, shape (realisations,) [SI]."""
-        return _QUANTITIES[self.quantity][2](problem, state)
+    @property
+    def key(self) -> str:
+        """Name of the quantity in [limit] of a scenario, "roller_depth"."""
+        return self.quantity.replace(" ", "_")
 
-    def is_reached(self, problem: WearProblem, state: WearState) -> FloatArray:
-        """Return whether each realisation has reached the limit, shape (realisations,)."""
-        return np.asarray(self.values(problem, state) >= self.value)
+    def values(self, stepper: Stepper, problem: WearProblem, state: WearState) -> FloatArray:
+        """Return the quantity of every realisation, shape (realisations,) [SI]."""
+        if self.quantity == "width":
+            return observables.groove_width(problem, state, self.threshold)
+        if self.quantity == "peak pressure":
+            return observables.peak_pressure(stepper, problem, state)
+        return _VALUES[self.quantity](problem, state)
 
     def crossing(self, stepper: Stepper, advance: Advance, place: int) -> WearState | None:
         """Return the state of one test of a step where it first reaches the limit.
-
-        The state is located by side steps from the last state of the step before the limit, so that
-        the integration can continue from the step without a change.
 
         Parameters
         ----------
@@ -136,58 +152,190 @@ class Limit:
         WearState or None
             With the error estimates of the end of the step; None if the limit is not reached.
         """
-        chosen = np.array([place])
-        problem = advance.problem.at(chosen)
-        for before, after in pairwise(advance.path):
-            end = after.at(chosen)
-            if not self.is_reached(problem, end)[0]:
-                continue
-            start = before.at(chosen).replaced(
-                coarse_step_solution=None, half_quadrature_solution=None
+        found = first_crossings((self,), stepper, advance, np.array([place]))
+        return found[0].state if found else None
+
+
+@dataclass(frozen=True, eq=False)
+class Crossings:
+    """Tests of a step at the first of their limits.
+
+    Parameters
+    ----------
+    places : ndarray of int, shape (tests,)
+        Places of the tests in the step.
+    problem : WearProblem
+        Their problem.
+    state : WearState
+        Their states, with the error estimates of the end of the step.
+    limit : ndarray of int, shape (tests,)
+        Number of the limit that is reached first.
+    start : WearState
+        A state of each within the step before the limit.
+    """
+
+    places: IntArray
+    problem: WearProblem
+    state: WearState
+    limit: IntArray
+    start: WearState
+
+
+def ratios(
+    limits: Sequence[Limit], stepper: Stepper, problem: WearProblem, state: WearState
+) -> FloatArray:
+    """Return each quantity over its limit, shape (limits, realisations)."""
+    return np.array([limit.values(stepper, problem, state) / limit.value for limit in limits])
+
+
+def first_crossings(
+    limits: Sequence[Limit],
+    stepper: Stepper,
+    advance: Advance,
+    places: IntArray,
+    tolerance: float = _LOCATED,
+) -> list[Crossings]:
+    """Return the tests of a step that reach a limit, where they first do.
+
+    States are located by side steps from the last state of the step before the limit, so that the
+    integration can continue from the step without a change. The states do not depend on the other
+    tests of the step.
+
+    Parameters
+    ----------
+    limits : sequence of Limit
+        The first that is reached counts.
+    stepper : Stepper
+    advance : Advance
+        The step.
+    places : ndarray of int
+        Places of tests in the step that have not reached a limit before it.
+    tolerance : float
+        Relative error of the quantity at its limit, which is never below the limit.
+
+    Raises
+    ------
+    StepError, ContactError
+        If a side step fails.
+    """
+    found = []
+    for before, after in pairwise(advance.path):
+        problem, end = advance.problem.at(places), after.at(places)
+        reached = ratios(limits, stepper, problem, end).max(axis=0) >= 1.0
+        chosen = np.flatnonzero(reached)
+        if not chosen.size:
+            continue
+        start = before.at(places[chosen]).replaced(
+            coarse_step_solution=None, half_quadrature_solution=None
+        )
+        some = problem.at(chosen), start, end.at(chosen)
+        locate = _first_passes if stepper.pass_by_pass else _between
+        state = locate(limits, stepper, *some, tolerance)
+        last = advance.end.at(places[chosen])
+        state = state.replaced(depth_error=last.depth_error, volume_error=last.volume_error)
+        first = ratios(limits, stepper, some[0], state).argmax(axis=0)
+        found.append(Crossings(places[chosen], some[0], state, first, start))
+        places = places[~reached]
+        if not places.size:
+            break
+    return found
+
+
+def _between(
+    limits: Sequence[Limit],
+    stepper: Stepper,
+    problem: WearProblem,
+    start: WearState,
+    end: WearState,
+    tolerance: float,
+) -> WearState:
+    """Return the states between two of each test at which it reaches a limit.
+
+    The greatest quantity over its limit is located by regula falsi (Illinois) on log scales, with
+    a bisection at every third trial.
+    """
+    done, span = start.passes, end.passes - start.passes
+    if len(limits) == 1 and limits[0].quantity == "passes":
+        length = limits[0].value - done
+        found = take_side_step(stepper.side_step, problem, start, length)
+        return found.replaced(passes=np.full_like(done, limits[0].value))
+
+    def trial(which: IntArray, passes: FloatArray) -> tuple[WearState, FloatArray]:
+        some = problem.at(which), start.at(which)
+        state = take_side_step(stepper.side_step, *some, passes)
+        return state, _logs(limits, stepper, some[0], state) - tolerance
+
+    every = np.arange(len(done))
+    found, high = trial(every, span)
+    low = _logs(limits, stepper, problem, start) - tolerance
+    # a single step instead of those that led to `end` may not reach the limit
+    short = np.flatnonzero(high < -tolerance)
+    if short.size:
+        found = found.with_others(short, end.at(short))
+    active = every[high > tolerance]
+    before, after = np.zeros_like(span), span.copy()
+    for count in range(_MOST_TRIALS):
+        if not active.size:
+            break
+        first, last = (done + before)[active], (done + after)[active]
+        known = np.isfinite(low[active]) & (first > 0.0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            part = low[active] / (low[active] - high[active])
+            guess = np.where(
+                known, first * (last / first) ** part, last * np.exp(-high[active] / _POWER)
             )
-            locate = self._first_pass if stepper.pass_by_pass else self._between
-            found = locate(stepper, problem, start, end)
-            last = advance.end.at(chosen)
-            return found.replaced(depth_error=last.depth_error, volume_error=last.volume_error)
-        return None
+        margin = 1e-3 * (last - first)
+        unsure = ~known | (count % 3 == 2)
+        middle = np.where(count % 3 == 2, 0.5 * (first + last), guess)
+        guess = np.where(unsure, np.clip(middle, first + margin, last - margin), guess)
+        length = guess - done[active]
+        state, value = trial(active, length)
+        beyond = value > 0.0
+        up, down = active[beyond], active[~beyond]
+        low[up] *= np.where(after[up] < span[up], 0.5, 1.0)
+        high[down] *= np.where(before[down] > 0.0, 0.5, 1.0)
+        after[up], high[up] = length[beyond], value[beyond]
+        before[down], low[down] = length[~beyond], value[~beyond]
+        ready = np.abs(value) <= tolerance
+        ready |= beyond & (after - before <= 1e-13 * (done + after))[active]
+        if ready.any():
+            places = np.flatnonzero(ready)
+            found = found.with_others(active[places], state.at(places))
+        active = active[~ready]
+    if active.size:
+        raise StepError(f"a limit was not located after pass {done[active[0]]:.0f}")
+    return found
 
-    def _between(
-        self, stepper: Stepper, problem: WearProblem, start: WearState, end: WearState
-    ) -> WearState:
-        """Return the state between two states of a single test at which it reaches the limit."""
-        from scipy.optimize import brentq  # noqa: PLC0415  (slow to load)
 
-        span, states = float(end.passes[0] - start.passes[0]), {0.0: start}
+def _logs(
+    limits: Sequence[Limit], stepper: Stepper, problem: WearProblem, state: WearState
+) -> FloatArray:
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.log(ratios(limits, stepper, problem, state).max(axis=0)))
 
-        def missing(passes: float) -> float:
-            if passes > 0.0:
-                length = np.array([passes])
-                states[passes] = take_side_step(stepper.side_step, problem, start, length)
-            return float(self.values(problem, states[passes])[0] - self.value)
 
-        if missing(span) < 0.0:  # after a single step instead of those that led to `end`
-            return end
-        if self.quantity == "passes":
-            found = self.value - float(start.passes[0])
-            missing(found)
-            return states[found].replaced(passes=np.array([self.value]))
-        found = brentq(missing, 0.0, span, xtol=_LOCATED * float(end.passes[0]))
-        # the first state at which the limit is reached, and not the last before it
-        reached = [n for n, s in states.items() if self.is_reached(problem, s)[0]]
-        return states[min(reached, key=lambda n: abs(n - found))]
-
-    def _first_pass(
-        self, stepper: Stepper, problem: WearProblem, start: WearState, end: WearState
-    ) -> WearState:
-        """Return the state after the first pass of a single test that reaches the limit."""
-        while end.passes[0] - start.passes[0] > 1.0:
-            half = np.array([float((end.passes[0] - start.passes[0]) // 2)])
-            middle = stepper.side_step(problem, start, half)
-            if self.is_reached(problem, middle)[0]:
-                end = middle
+def _first_passes(
+    limits: Sequence[Limit],
+    stepper: Stepper,
+    problem: WearProblem,
+    start: WearState,
+    end: WearState,
+    tolerance: float,
+) -> WearState:
+    """Return the states after the first pass of each test that reaches a limit."""
+    found = []
+    for place in range(len(start.passes)):
+        chosen = np.array([place])
+        own, first, last = problem.at(chosen), start.at(chosen), end.at(chosen)
+        while last.passes[0] - first.passes[0] > 1.0:
+            half = np.array([float((last.passes[0] - first.passes[0]) // 2)])
+            middle = stepper.side_step(own, first, half)
+            if _logs(limits, stepper, own, middle)[0] >= 0.0:
+                last = middle
             else:
-                start = middle
-        return end
+                first = middle
+        found.append(last)
+    return joined_states(found)
 
 
 def take_side_step(

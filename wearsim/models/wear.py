@@ -30,6 +30,9 @@ class BodyWear(Options):
 class ArchardOptions(Options):
     """Options of the wear law `archard-dissipation`."""
 
+    factor: float = Field(
+        1.0, gt=0.0, description="factor of both wear factors, such as a scatter that they share"
+    )
     cylinder: BodyWear = Field(description="wear factor of the cylinder")
     roller: BodyWear = Field(description="wear factor of each roller; '0 1/Pa' for no wear")
 
@@ -39,8 +42,8 @@ class ArchardDissipation(WearLaw):
 
     def __init__(self, options: ArchardOptions) -> None:
         self._wear_factor = {
-            "cylinder": options.cylinder.k_over_h,
-            "roller": options.roller.k_over_h,
+            "cylinder": options.factor * options.cylinder.k_over_h,
+            "roller": options.factor * options.roller.k_over_h,
         }
 
     def depth_per_pass(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from wearsim.results.dissipation import DissipationResult
+from wearsim.results.ensemble.life import ensemble_result
 from wearsim.results.ensemble.parts import read_ensemble
 from wearsim.results.ensemble.result import EnsembleResult
 from wearsim.results.io.files import kind_of, read_dissipation, read_results
@@ -62,4 +63,4 @@ def open_ensemble(path: str | Path) -> EnsembleResult:
     >>> wearsim.open_ensemble("rig-ensemble.h5").plan
     'sobol'
     """
-    return EnsembleResult(read_ensemble(path), Path(path))
+    return ensemble_result(read_ensemble(path), Path(path))

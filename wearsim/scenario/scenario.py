@@ -19,6 +19,7 @@ from wearsim.scenario.tables.plain import (
     CreepageTable,
     EvolutionTable,
     FrictionTable,
+    LimitTable,
     OperationTable,
     OutputsTable,
     SamplingTable,
@@ -61,6 +62,8 @@ class Scenario:
         Content of every file it names, by the path as written in the scenario.
     roller, cylinder, operation, load, friction, creepage, contact, evolution, outputs, sampling
         The tables; a random input is represented by its mean.
+    limit : LimitTable
+        Limits of wear.
     wear : WearChoice, optional
         The wear law; optional in a scenario of a single contact.
     cam : Cam, optional
@@ -99,6 +102,7 @@ class Scenario:
     evolution: EvolutionTable
     outputs: OutputsTable
     sampling: SamplingTable
+    limit: LimitTable = field(default_factory=LimitTable)
     cam: Cam | None = None
     lubricant: LubricantTable | None = None
     notes: tuple[str, ...] = ()
@@ -293,12 +297,7 @@ class Scenario:
 
 
 def require_run(scenario: Scenario) -> None:
-    """Check that a scenario has all that a run needs.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Any scenario, also one of a single contact.
+    """Check that a scenario, which may be one of a single contact, has all that a run needs.
 
     Raises
     ------

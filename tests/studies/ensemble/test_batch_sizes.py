@@ -20,7 +20,7 @@ def batch_sizes(monkeypatch: pytest.MonkeyPatch, total: int, batches: int) -> li
     monkeypatch.setattr(driver, "time", SimpleNamespace(monotonic=lambda: clock[0]))
     file: Any = SimpleNamespace(
         status=np.full(total, PENDING),
-        data=SimpleNamespace(wall_seconds=0.0, finished=True),
+        data=SimpleNamespace(wall_seconds=0.0, finished=True, life={}),
         put=lambda outcomes: None,
     )
     runner: Any = SimpleNamespace(plan="monte-carlo")

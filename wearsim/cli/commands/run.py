@@ -127,8 +127,10 @@ def resume(
             raise typer.BadParameter("extend the ensemble first", param_hint="--failed")
         chosen = checked_scheduler(scheduler, workers)
         from wearsim.cli.commands.ensemble import STOPPING, report
+        from wearsim.cli.commands.life import report as report_lives
         from wearsim.cli.progress import EnsembleWatcher, stop_on_signals
         from wearsim.results import open_ensemble
+        from wearsim.results.ensemble.life import LifeResult
         from wearsim.studies.ensemble.api import resume_ensemble
         from wearsim.studies.kernels import kernels_of
 
@@ -138,6 +140,8 @@ def resume(
             note(f"note: nothing to do: {nothing}")
         watcher = EnsembleWatcher(quiet, kernels=lambda: kernels_of(before.scenario))
         with stop_on_signals(STOPPING) as stop, watcher as watch:
+            if isinstance(before, LifeResult):
+                from wearsim.studies.life.api import resume_life as resume_ensemble
             result = resume_ensemble(
                 file,
                 failed=failed,
@@ -148,7 +152,10 @@ def resume(
                 stop_requested=stop.is_set,
                 on_notice=watch.notice,
             )
-        report(result, json, None, watch.workers)
+        if isinstance(result, LifeResult):
+            report_lives([result], [file.stem], json, None)
+        else:
+            report(result, json, None, watch.workers)
         return
     for option, is_given in (
         ("--failed", failed),

@@ -10,9 +10,11 @@ from matplotlib.figure import Figure
 from wearsim.report.figures.cam_run import cam_run_figure
 from wearsim.report.figures.contact import dissipation_figure, draw_density
 from wearsim.report.figures.ensemble import draw_course, ensemble_figure
+from wearsim.report.figures.life import draw_survival, life_figure
 from wearsim.report.figures.run import draw_worn_profiles, run_figure
 from wearsim.report.parts import Measured
 from wearsim.results import DissipationResult, EnsembleResult, Result
+from wearsim.results.ensemble.life import LifeResult
 
 
 def figure_of(
@@ -26,6 +28,8 @@ def figure_of(
     measured : sequence of Measured
         Profiles drawn over those of a run or an ensemble.
     """
+    if isinstance(result, LifeResult):
+        return life_figure([result], [result.title])
     if isinstance(result, EnsembleResult):
         return ensemble_figure(result, measured)
     if isinstance(result, DissipationResult):
@@ -54,7 +58,9 @@ def plot(
         return figure_of(result)
     if not isinstance(axes, Axes):
         raise TypeError(f"ax must be one Axes of matplotlib, got a {type(axes).__name__}")
-    if isinstance(result, EnsembleResult):
+    if isinstance(result, LifeResult):
+        draw_survival(axes, [result], [result.title])
+    elif isinstance(result, EnsembleResult):
         draw_course(axes, result)
     elif isinstance(result, DissipationResult):
         draw_density(axes, result)

@@ -142,6 +142,8 @@ class EnsembleData(StudyData):
         For each random input: `name`, `role`, `persistence` and a description, `text`.
     control : dict
         Mean, std and number of draws of the control variate; empty if the plan has none.
+    life : dict
+        Settings of tests that end at a limit, see `LifeSettings`; empty for others.
     variables : mapping of str to ndarray
         Variables of `wearsim.results.ensemble.schema`, and the drawn values by dotted key; those
         of a file are read on access. Rows of pending realisations are undefined, those of failed
@@ -161,6 +163,7 @@ class EnsembleData(StudyData):
     separately_stored: ClassVar[frozenset[str]] = StudyData.separately_stored.union(
         ("variables", "status", "errors")
     )
+    optional: ClassVar[frozenset[str]] = frozenset({"life"})
 
     stepper: str
     tolerance: float
@@ -174,6 +177,7 @@ class EnsembleData(StudyData):
     inputs: list[dict[str, str]]
     groups: list[dict[str, str]]
     control: dict[str, float] = field(default_factory=dict)
+    life: dict[str, Any] = field(default_factory=dict)
     variables: Mapping[str, Array] = field(default_factory=dict)
     status: Array = field(default_factory=lambda: np.zeros(0, np.uint8))
     errors: dict[int, str] = field(default_factory=dict)
@@ -184,7 +188,7 @@ class EnsembleData(StudyData):
     @property
     def schema(self) -> Schema:
         """Schema of the results file."""
-        return ensemble_schema(self.inputs, self.control)
+        return ensemble_schema(self.inputs, self.control, self.life)
 
     @property
     def done(self) -> IntArray:

@@ -329,7 +329,9 @@ def _read(path: Path) -> EnsembleData:
 def _merged(path: Path, file: h5py.File) -> tuple[EnsembleData, StoredRows]:
     """Return the content of the file of an ensemble without its parts."""
     attributes = read_attributes(path, file, ENSEMBLE, EnsembleData)
-    schema = ensemble_schema(attributes["inputs"], attributes["control"])
+    schema = ensemble_schema(
+        attributes["inputs"], attributes["control"], attributes.get("life", {})
+    )
     check_complete(path, file, schema.variables)
     datasets = {name: file[name] for name in schema.variables}
     rows = axis_lengths(datasets, schema.variables)["realisation"]

@@ -219,13 +219,15 @@ class EnsembleResult(EnsembleValues):
         if self.plan == "saltelli":
             values = np.where(self.raw.status == DONE, self.raw.column(name, -1), np.nan)
             return saltelli_indices(values.reshape(-1, len(groups) + 2), groups)
+        values, drawn = self.at_end(name), self.drawn_numbers(groups)
+        return {group: (index, None) for group, index in first_order(values, drawn).items()}
+
+    def drawn_numbers(self, groups: list[str]) -> dict[str, FloatArray]:
+        """Return the values of random inputs by name, each (count, numbers of a draw)."""
         drawn = [(item["input"], self.values(item["key"])) for item in self.raw.inputs]
-        numbers = {
+        return {
             group: np.column_stack([v.reshape(self.count, -1) for of, v in drawn if of == group])
             for group in groups
-        }
-        return {
-            group: (index, None) for group, index in first_order(self.at_end(name), numbers).items()
         }
 
     def statistics(self) -> dict[str, FloatArray]:

@@ -88,6 +88,20 @@ _OUTCOMES = by_name(
 
 _CONTROL = Variable("control", _DRAW, "1", "control variate, in the unit of its mean", "record")
 
+#: Variables of an ensemble of tests that end at a limit.
+LIFE = by_name(
+    Variable(name, _DRAW, unit, long_name, "record")
+    for name, unit, long_name in (
+        ("life", "1", "roller passes until a limit is first reached; infinite if never"),
+        ("life_low", "1", "least life by the numerical error"),
+        ("life_high", "1", "greatest life by the numerical error"),
+        ("first_limit", "1", "number of the limit that is reached first, from 0; -1 if none"),
+        ("limit_angle", "rad", "angle of a cam at which the limit is reached"),
+        ("score_mean", "1", "mean normal score of the wear factor given the other drawn values"),
+        ("log_weight", "1", "logarithm of the weight of the drawn values in rare-event estimates"),
+    )
+)
+
 #: Estimates over the realisations; nan until the ensemble is finished.
 STATISTICS: Mapping[str, Variable] = by_name(
     [
@@ -139,7 +153,9 @@ ENSEMBLE = Schema(
 )
 
 
-def ensemble_schema(inputs: Sequence[Mapping[str, str]], control: Mapping[str, Any]) -> Schema:
+def ensemble_schema(
+    inputs: Sequence[Mapping[str, str]], control: Mapping[str, Any], life: Mapping[str, Any]
+) -> Schema:
     """Return the schema of an ensemble, with its drawn values.
 
     Parameters
@@ -148,13 +164,15 @@ def ensemble_schema(inputs: Sequence[Mapping[str, str]], control: Mapping[str, A
         Key, unit and rollers of each drawn value; see `with_random_inputs`.
     control : mapping
         Mean, std and number of draws of the control variate; empty if the plan has none.
+    life : mapping
+        Settings of tests that end at a limit; empty for others.
 
     Returns
     -------
     Schema
     """
     schema = with_random_inputs(ENSEMBLE, inputs)
-    last = {"control": _CONTROL} if control else {}
+    last = {**({"control": _CONTROL} if control else {}), **(LIFE if life else {})}
     return replace(schema, variables={**schema.variables, **last})
 
 

@@ -41,6 +41,7 @@ from wearsim.scenario.tables.plain import (
     CreepageTable,
     EvolutionTable,
     FrictionTable,
+    LimitTable,
     OperationTable,
     OutputsTable,
     SamplingTable,
@@ -210,6 +211,7 @@ TABLES: dict[str, type[Options]] = {
     "wear": WearTable,
     "evolution": EvolutionTable,
     "outputs": OutputsTable,
+    "limit": LimitTable,
     "sampling": SamplingTable,
 }
 #: [cam] replaces [cylinder]
@@ -281,6 +283,8 @@ def parse_fields(
     sections = {table: _read_table(mistakes, table, tables) for table in TABLES}
     assemble_cam(mistakes, sections)
     check_lists(mistakes, data)
+    if sections["limit"] and sections["limit"].lift_error and not data.get("cam"):
+        mistakes.add("limit", "lift_error", "is a quantity of cams", None, "depth or clearance")
     check_correlation(mistakes, sections["sampling"])
     mistakes.raise_any()
     random = tuple(mistakes.random_inputs)

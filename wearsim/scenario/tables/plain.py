@@ -15,13 +15,14 @@ from wearsim.quantities import (
     PerRoller,
     PositiveDuration,
     PositiveLength,
+    PositivePressure,
     PositiveRotationSpeed,
     Quantity,
 )
 from wearsim.scenario.parse.fields import RandomTarget
 from wearsim.scenario.parse.mistakes import Mistakes, nearest
 from wearsim.scenario.parse.random_inputs import validate
-from wearsim.units import ANGLE, QuantityError, shown
+from wearsim.units import ANGLE, VOLUME, QuantityError, shown
 from wearsim.uq.sampling.sampler import GaussianCopula
 
 DEFAULT_TOLERANCE = 1e-3
@@ -163,6 +164,35 @@ class OutputsTable(Options):
     checkpoint_every: PositiveDuration = Field(
         default=30.0, description="Wall time between checkpoints."
     )
+
+
+class LimitTable(Options):
+    """Limits of wear; the first that is reached ends the life of a design."""
+
+    depth: PositiveLength | None = Field(
+        default=None, description="Worn depth of the cylinder or the cam."
+    )
+    roller_depth: PositiveLength | None = Field(default=None, description="Worn depth of a roller.")
+    lift_error: PositiveLength | None = Field(
+        default=None, description="Change of the lift of a cam by wear, peak to peak over a turn."
+    )
+    volume: Annotated[float, Quantity(VOLUME, "positive")] | None = Field(
+        default=None, description="Worn volume of the cylinder or the cam."
+    )
+    width: PositiveLength | None = Field(
+        default=None, description="Width of the groove, where it is deeper than the threshold."
+    )
+    peak_pressure: PositivePressure | None = Field(
+        default=None, description="Greatest normal pressure."
+    )
+    clearance: PositiveLength | None = Field(
+        default=None, description="Worn descent of a roller, by which the unloaded gap opens."
+    )
+
+    @property
+    def given(self) -> dict[str, float]:
+        """The limits that are given, by key [SI]."""
+        return {key: value for key, value in self if value is not None}
 
 
 class SamplingTable(Options):

@@ -4,29 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from wearsim.evolution.observables import lift_errors, peak_to_peak
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.quantities import CamStations
 from wearsim.evolution.state import WearState
-from wearsim.evolution.steppers.loads import descents
 from wearsim.types import FloatArray
-
-
-def lift_errors(problem: WearProblem, state: WearState) -> FloatArray:
-    """Return the change of the lift at every station, shape (stations, rollers, N) [m].
-
-    The roller's centre moves by -D/cos(alpha) along its path, with the rise D of the least gap of
-    the unloaded bodies, and by +D/cos(alpha) on the inner flank of a groove.
-    """
-    cam = problem.kinematics.cam
-    assert cam is not None
-    descent = problem.per_roller(descents(problem, state.depths))
-    return np.asarray(-np.sign(cam.load_factor) * descent / np.cos(cam.pressure_angle))
-
-
-def peak_to_peak(cam: CamStations, errors: FloatArray) -> FloatArray:
-    """Return greatest less smallest lift error over the angle, shape (rollers, N) [m]."""
-    between = np.tensordot(cam.between, errors, axes=1)
-    return np.asarray(between.max(axis=0) - between.min(axis=0))
 
 
 def cam_history(problem: WearProblem, state: WearState) -> dict[str, FloatArray]:

@@ -147,7 +147,7 @@ def ensemble(
         ) as pool,
     ):
         grid = shared_grid(scenario)
-        content = _content(scenario, request, grid)
+        content = ensemble_content(scenario, request, grid)
         with EnsembleFile.create(path, *content, storage) as file:
             runner = RealisationRunner(scenario, request.plan, request.realisations, grid)
             runner.compile_kernels()
@@ -279,6 +279,8 @@ def resume_ensemble(
     20
     """
     data, path = read_ensemble(file), Path(file)
+    if data.life:
+        raise ResultsFileError(f"{path}: holds a study of lives, which resume_life continues")
     check_plugins(path, data)
     if data.finished and realisations is None and not (failed and len(data.failed)):
         return open_ensemble(path)
@@ -321,7 +323,7 @@ def resume_ensemble(
     return open_ensemble(path)
 
 
-def _content(
+def ensemble_content(
     scenario: Scenario, request: EnsembleRequest, grid: Grid
 ) -> tuple[EnsembleData, dict[str, FloatArray]]:
     """Return the content of an ensemble's file before its first realisation.

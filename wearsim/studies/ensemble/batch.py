@@ -91,7 +91,7 @@ MAX_BATCH = 128  # realisations in one batch; larger batches are not faster
 MAX_STRIPS = 50_000  # strips of all contacts of a batch; about 100 arrays of this size are in use
 
 Observables = dict[str, float]
-_SCALARS = ("depth_error", "volume_error", "steps", "solves")
+SCALARS = ("depth_error", "volume_error", "steps", "solves")
 
 
 @dataclass(frozen=True)
@@ -228,7 +228,7 @@ def _observed(runs: Sequence[RealisationRun]) -> list[RunObservations | Exceptio
         end = advance.end
         for place in np.flatnonzero(end.passes >= stop).tolist():
             number, profile = int(advance.numbers[place]), end.cylinder_depth[:, 0, place]
-            scalars = {name: float(getattr(end, name)[place]) for name in _SCALARS}
+            scalars = {name: float(getattr(end, name)[place]) for name in SCALARS}
             results[number] = RunObservations(rows[number], scalars, profile.mean(axis=0))
     results |= tests.failures
     return [results[number] for number in range(len(runs))]

@@ -9,11 +9,14 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from itertools import islice
+from typing import Any
 
 import numpy as np
 
 from wearsim.errors import Interrupted, WorkerError
 from wearsim.results import EnsembleData, EnsembleFile, EnsembleResult, Outcome
+from wearsim.results.ensemble.life import ensemble_result
+from wearsim.results.ensemble.life_settings import LifeTarget
 from wearsim.results.ensemble.schema import DONE, FAILED, PENDING
 from wearsim.studies.ensemble.designs import interim_sizes
 from wearsim.studies.ensemble.realisation import RealisationRunner
@@ -63,7 +66,9 @@ class EnsembleProgress:
     workers: str
 
 
-def ensemble_warnings(result: EnsembleResult, target: Target | None, reached: bool) -> list[str]:
+def ensemble_warnings(
+    result: EnsembleResult, target: Target | LifeTarget | None, reached: bool
+) -> list[str]:
     """Return warnings about a finished ensemble.
 
     Parameters
@@ -151,7 +156,7 @@ class EnsembleWork:
         self,
         file: EnsembleFile,
         runner: RealisationRunner,
-        target: Target | None,
+        target: Target | LifeTarget | None,
         pool: Executor,
         on_progress: Callable[[EnsembleProgress], None] | None,
         stop_requested: Callable[[], bool] | None,
@@ -304,9 +309,9 @@ class EnsembleWork:
     def _is_complete(self) -> bool:
         return self._reached or not (self.file.status == PENDING).any()
 
-    def _result(self) -> EnsembleResult:
+    def _result(self) -> Any:
         """Return the present content of the file."""
-        return EnsembleResult(
+        return ensemble_result(
             replace(self.file.data, status=self.file.status.copy()), self.file.path
         )
 
@@ -319,7 +324,7 @@ class EnsembleWork:
 
     def _complete(self, data: EnsembleData) -> tuple[dict[str, object], dict[str, FloatArray]]:
         """Return the final fields of a complete ensemble, and its statistics."""
-        result = EnsembleResult(data, self.file.path)
+        result = ensemble_result(data, self.file.path)
         self.warn(ensemble_warnings(result, self.target, self._reached))
         final = {"finished": True, "statistics": result.final_estimates()}
         return self._state() | final, result.statistics() if result.count else {}
@@ -333,7 +338,8 @@ class EnsembleWork:
         )
 
     def _report_progress(self) -> None:
-        status, target, now = self.file.status, self.target or DEFAULT_TARGET, time.monotonic()
+        default = LifeTarget(0.1, 0.03) if self.file.data.life else DEFAULT_TARGET
+        status, target, now = self.file.status, self.target or default, time.monotonic()
         done, failed = int((status == DONE).sum()), int((status == FAILED).sum())
         if done and (now > self._next_estimate or self._is_complete()):
             self._estimate = target.interval(self._result().estimate_for(target))

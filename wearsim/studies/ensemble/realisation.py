@@ -243,15 +243,15 @@ class RealisationRunner:
         for number in numbers:
             drawn: dict[str, float | FloatArray] = {}
             try:
-                runs.append(self._prepare(number, drawn))
+                runs.append(self.prepare(number, drawn))
             except Exception as error:  # an error fails this realisation only
                 outcomes[number] = Outcome(number=number, values=drawn, error=failure_text(error))
         for group in batch_groups(runs):
             for run, observations in zip(group, observe(group), strict=True):
-                outcomes[run.number] = self._outcome(run, observations)
+                outcomes[run.number] = self.outcome(run, observations)
         return [outcomes[number] for number in numbers]
 
-    def _prepare(self, number: int, drawn: dict[str, float | FloatArray]) -> RealisationRun:
+    def prepare(self, number: int, drawn: dict[str, float | FloatArray]) -> RealisationRun:
         """Return the run of a realisation, and add the values of its random inputs to `drawn`."""
         draws = self.drawer.draw(number, *sources(self.plan, self.drawer.groups, number))
         drawn.update({**draws.values, **draws.time_means})
@@ -273,7 +273,7 @@ class RealisationRunner:
         if not not_cached(kernels_of(self.scenario)):
             return
         with suppress(Exception):  # an error of the realisation is reported when it is run
-            run = self._prepare(0, {})
+            run = self.prepare(0, {})
             state, steps = fresh_state(run.problem), run.draws.scenario.evolution.max_steps
             next_record = run.schedule.next_record
             test = Evolution(run.problem, state, run.stepper, run.stop, steps, next_record)
@@ -288,7 +288,8 @@ class RealisationRunner:
             self._prepared = key, prepared_model(scenario, grid)
         return self._prepared[1]
 
-    def _outcome(self, run: RealisationRun, observations: RunObservations | Exception) -> Outcome:
+    def outcome(self, run: RealisationRun, observations: RunObservations | Exception) -> Outcome:
+        """Return the outcome of a realisation with its observations, or the error of its test."""
         drawn = dict(run.drawn)
         if isinstance(observations, Exception):
             return Outcome(number=run.number, values=drawn, error=failure_text(observations))

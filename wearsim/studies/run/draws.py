@@ -16,7 +16,7 @@ from wearsim.scenario import RandomInput, Scenario, realise, require_run
 from wearsim.scenario.parse.fields import CONTACT_FIELDS
 from wearsim.studies.run.inputs import OFFSET, TILT, YAW, contact_values, origin
 from wearsim.types import FloatArray
-from wearsim.uq.sampling.sampler import REPLICATES, PlanName, Sampler
+from wearsim.uq.sampling.sampler import BELOW_ONE, REPLICATES, PlanName, Sampler
 from wearsim.uq.sampling.sobol import Stream
 
 LISTED = {OFFSET, YAW, TILT}  # a scenario may give one per roller
@@ -160,6 +160,10 @@ class Drawer:
         Realisations of the whole plan, where it depends on their number.
     replicates : int
         Number of independent, alternating sequences of the plan "sobol".
+    fixed : mapping of str to float, optional
+        Values with which tests are run instead of those drawn, by key [SI].
+    shift : mapping of str to float, optional
+        Added to the normal scores of the uniform numbers, by name of the input.
 
     Raises
     ------
@@ -173,7 +177,10 @@ class Drawer:
         plan: PlanName,
         total: int | None = None,
         replicates: int = REPLICATES,
+        fixed: Mapping[str, float] | None = None,
+        shift: Mapping[str, float] | None = None,
     ) -> None:
+        self._fixed, self._shift = dict(fixed or {}), dict(shift or {})
         for item in scenario.random:
             if item.role == "field":
                 raise CapabilityError(
@@ -259,6 +266,7 @@ class Drawer:
             for key, array in values.items()
             if array.ndim == 0 or key in LISTED
         }
+        listed.update(self._fixed)
         unlisted = {key: array for key, array in values.items() if key not in listed}
         paths = {item: _paths(scenario, item, numbers[item.name]) for item in self._processes}
         return Draws(
@@ -269,6 +277,16 @@ class Drawer:
             values=values,
             time_means={item.name: _means(scenario, item, found) for item, found in paths.items()},
         )
+
+    def uniforms(self, first: int, count: int) -> dict[str, FloatArray]:
+        """Return the uniform numbers of consecutive realisations by name, (count, dimension)."""
+        found = self._sampler.uniforms(first, count)
+        if self._shift:
+            from scipy.special import ndtr, ndtri  # noqa: PLC0415  (slow to load)
+
+            for name, shift in self._shift.items():
+                found[name] = np.clip(ndtr(ndtri(found[name]) + shift), 1.0 - BELOW_ONE, BELOW_ONE)
+        return found
 
     def columns(self, first: int, count: int) -> dict[str, FloatArray]:
         """Return the values drawn for whole tests and rollers in consecutive realisations.
@@ -292,7 +310,7 @@ class Drawer:
         }
         for start in range(0, count, BLOCK):
             stop = min(start + BLOCK, count)
-            uniforms = self._sampler.uniforms(first + start, stop - start)
+            uniforms = self.uniforms(first + start, stop - start)
             for item in self.items:
                 for roller, name in enumerate(self._names[item.name]):
                     found = item.values(uniforms[name])

@@ -12,13 +12,13 @@ import numpy as np
 
 from wearsim.evolution.integrate import Advance
 from wearsim.evolution.limits import take_side_step
-from wearsim.evolution.pauses import opened
+from wearsim.evolution.observables import depth, groove_width, present_contacts, volume
 from wearsim.evolution.problem import WearProblem
-from wearsim.evolution.quantities import mean_along, width, worn_volume
+from wearsim.evolution.quantities import worn_volume
 from wearsim.evolution.state import WearState, joined_states
 from wearsim.evolution.steppers.base import Stepper
 from wearsim.evolution.steppers.loads import descents, elastic_approaches
-from wearsim.evolution.steppers.single_step import present_problem, solve_at_record
+from wearsim.evolution.steppers.single_step import present_problem
 from wearsim.results.run_schema import ALL_VARIABLES
 from wearsim.studies.cam.observables import at_every_station, cam_history, cam_record
 from wearsim.studies.run.schedule import RecordSchedule
@@ -76,24 +76,6 @@ Variables = dict[str, FloatArray]
 _WITHOUT_REALISATION = {n for n, item in ALL_VARIABLES.items() if "realisation" not in item.dims}
 
 
-def present_contacts(
-    stepper: Stepper, problem: WearProblem, state: WearState
-) -> tuple[WearProblem, WearState, FloatArray]:
-    """Return `state` with its contacts at the present loads, their problem, and the loads.
-
-    If inputs are drawn at every pass, the contacts are those of the quadrature over passes.
-    """
-    recorded = stepper.recorded(problem)
-    contacts, loads = solve_at_record(
-        recorded,
-        state,
-        on_profile=not stepper.pass_by_pass,
-        cold=recorded is not problem,
-    )
-    contacts, loads = opened(problem, state.passes, contacts, loads)
-    return recorded, state.replaced(contacts=contacts), loads
-
-
 def history_row(
     stepper: Stepper,
     problem: WearProblem,
@@ -108,7 +90,6 @@ def history_row(
         "descent": descents(present, state.depths),
         "elastic_approach": np.where(loads > 0.0, elastic_approaches(present, state), 0.0),
     }
-    worn = state.cylinder_depth[:, 0].max(axis=0)
     kinematics, spacing = problem.kinematics, problem.grid.spacing
 
     def per_roller(name: str) -> FloatArray:
@@ -118,11 +99,9 @@ def history_row(
         "passes": state.passes,
         "time": problem.time(state.passes),
         "step_passes": state.passes - (state if before is None else before).passes,
-        "depth": state.cylinder_depth.max(axis=(0, 1, 3)),
-        "width": np.array([width(problem.grid.y, groove, threshold) for groove in worn]),
-        "worn_volume": mean_along(
-            worn_volume(state.cylinder_depth, spacing, kinematics.track_radius)[:, 0], axis=0
-        )[0],
+        "depth": depth(problem, state),
+        "width": groove_width(problem, state, threshold),
+        "worn_volume": volume(problem, state),
         "roller_depth": state.roller_depth[0].max(axis=-1),
         "roller_worn_volume": worn_volume(state.roller_depth[0], spacing, kinematics.roller_radius),
         "dissipated_energy": state.energy,

@@ -1,0 +1,370 @@
+"""`wearsim life`: the life of a design until a limit is reached, and comparison of designs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from wearsim.cli.commands.ensemble import STOPPING, parse_sweep
+from wearsim.cli.shared import (
+    FigureOption,
+    Force,
+    Json,
+    Quiet,
+    Scheduler,
+    Seed,
+    Settings,
+    Workers,
+    check_figure,
+    checked_scheduler,
+    checking,
+    note,
+    read_scenario,
+    refuse_same_file,
+    results_option,
+    write_json,
+    write_notes,
+)
+
+if TYPE_CHECKING:
+    from wearsim.results.ensemble.life import LifeResult
+
+Designs = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="SCENARIO...",
+        help="Scenario, or two to compare with common draws; or files of earlier studies, .h5.",
+        show_default=False,
+    ),
+]
+Realisations = Annotated[
+    int, typer.Option("--realisations", "-n", min=1, metavar="N", help="Number of realisations.")
+]
+Limits = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--limit",
+        metavar="NAME=VALUE",
+        help="Limit that ends the life: depth=50um, roller_depth, lift_error, volume, width,"
+        " peak_pressure or clearance. May be repeated; the first that is reached counts.",
+        show_default=False,
+    ),
+]
+Life = "a number of passes, or turns of a cam, or a time such as '200 h'"
+Target = Annotated[
+    str | None,
+    typer.Option(
+        metavar="LIFE",
+        help=f"Life of which the probability is estimated: {Life}.",
+        show_default=False,
+    ),
+]
+Shares = Annotated[
+    str,
+    typer.Option("--b", metavar="P1,P2,...", help="Percentages failed of the lives shown."),
+]
+Most = Annotated[
+    str | None,
+    typer.Option(
+        "--max",
+        metavar="LIFE",
+        help="Life at which tests are censored, as --target; default: ten times the longer of"
+        " target and test.",
+        show_default=False,
+    ),
+]
+Precision = Annotated[
+    str | None,
+    typer.Option(
+        metavar="TARGET",
+        help="Stop when the relative half-width of a 95 % confidence interval is reached:"
+        " 'b10 3%'.",
+        show_default=False,
+    ),
+]
+Sweep = Annotated[
+    str | None,
+    typer.Option(
+        metavar="KEY=V1,V2,...",
+        help="Life for each value of a key, with common draws: cam.base_radius=25mm,27mm.",
+        show_default=False,
+    ),
+]
+Output = Annotated[Path | None, results_option("-life.h5")]
+_FILES = {".h5", ".hdf5"}
+
+
+def life(
+    designs: Designs,
+    realisations: Realisations = 400,
+    limit: Limits = None,
+    target: Target = None,
+    b: Shares = "1,10,50",
+    most: Most = None,
+    precision: Precision = None,
+    output: Output = None,
+    figure: FigureOption = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    sweep: Sweep = None,
+    seed: Seed = None,
+    settings: Settings = None,
+    json: Json = False,
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Return the life of a design until a limit is first reached, with its confidence."""
+    check_figure(figure, force, "--figure")
+    with checking("--b"):
+        shares = _shares(b)
+    files = [path.suffix.lower() in _FILES for path in designs]
+    if len(designs) > 2:
+        raise typer.BadParameter("give one design, or two to compare", param_hint="SCENARIO")
+    if any(files):
+        if not all(files):
+            raise typer.BadParameter(
+                "compare two scenarios or two results files, not one of each",
+                param_hint="SCENARIO",
+            )
+        given = {
+            "--limit": limit,
+            "--max": most,
+            "--precision": precision,
+            "--sweep": sweep,
+            "--set": settings,
+            "--seed": seed,
+            "--output": output,
+        }
+        for option, value in given.items():
+            if value is not None:
+                raise typer.BadParameter("has no meaning for results files", param_hint=option)
+        results = [_opened(path, target, shares) for path in designs]
+        report(results, _labels(designs), json, figure)
+        return
+    with checking("--precision"):
+        if precision is not None:
+            from wearsim.results.ensemble.life_settings import LifeTarget
+
+            LifeTarget.parse(precision)
+    texts = [*(settings or []), *([f"seed={seed}"] if seed is not None else [])]
+    labels, variants = _variants(designs, sweep, texts)
+    options: dict[str, Any] = {
+        "limits": limit or [],
+        "target": target,
+        "b": shares,
+        "most": most,
+        "precision": precision,
+        "workers": workers,
+        "scheduler": checked_scheduler(scheduler, workers),
+        "force": force,
+    }
+    results = _run(labels, variants, realisations, output, figure, quiet, options)
+    report(results, labels, json, figure)
+
+
+def _variants(
+    designs: Sequence[Path], sweep: str | None, texts: list[str]
+) -> tuple[list[str], list[Any]]:
+    """Return the labels and scenarios of the designs; all have the seed of the first."""
+    if sweep is not None:
+        if len(designs) > 1:
+            raise typer.BadParameter("goes with one scenario", param_hint="--sweep")
+        with checking("--sweep"):
+            key, values = parse_sweep(sweep)
+        if any(text.partition("=")[0].strip() == key for text in texts):
+            raise typer.BadParameter(f"{key} is also the key of --sweep", param_hint="--set")
+        return list(values), [
+            read_scenario(designs[0], [*texts, f"{key}={value}"]) for value in values
+        ]
+    scenarios = [read_scenario(path, texts) for path in designs]
+    if len({scenario.seed for scenario in scenarios}) > 1:
+        note(f"note: {designs[1]} is drawn with the seed of {designs[0]}, for common draws")
+        scenarios[1] = scenarios[1].changed({"seed": scenarios[0].seed})
+    return _labels(designs), scenarios
+
+
+def _run(
+    labels: Sequence[str],
+    scenarios: Sequence[Any],
+    realisations: int,
+    output: Path | None,
+    figure: Path | None,
+    quiet: bool,
+    options: dict[str, Any],
+) -> list[LifeResult]:
+    """Run the studies of all designs, and return their results."""
+    from wearsim.cli.progress import EnsembleWatcher, stop_on_signals
+    from wearsim.results import check_output
+    from wearsim.studies.ensemble.sweep import path_of
+    from wearsim.studies.kernels import kernels_of
+    from wearsim.studies.life import api
+
+    several = len(scenarios) > 1
+    base = output or Path(f"{scenarios[0].name}-life.h5")
+    same = {scenario.name for scenario in scenarios}
+    if not several:
+        paths = [base]
+    elif output is None and len(same) == len(scenarios):
+        paths = [Path(f"{scenario.name}-life.h5") for scenario in scenarios]
+    else:
+        paths = [path_of(base, label) for label in labels]
+    checked = []
+    for scenario, path in zip(scenarios, paths, strict=True):
+        refuse_same_file(figure, path, scenario.paths)
+        check_output(path, options["force"], scenario.paths)
+        with checking("--limit"):
+            checked.append(api.with_limits(scenario, options["limits"]))
+    for name, option in (("target", "--target"), ("most", "--max")):
+        with checking(option):
+            for scenario in checked:
+                chosen = {"target": None, "most": None, name: options[name]}
+                if name == "most":
+                    chosen["target"] = options["target"]
+                api.settings_of(scenario, realisations, chosen["target"], (10.0,), chosen["most"])
+    results = []
+    for label, scenario, path in zip(labels, checked, paths, strict=True):
+        if several and not quiet:
+            note(f"{label}: {path}")
+        watcher = EnsembleWatcher(quiet, kernels=partial(kernels_of, scenario))
+        with stop_on_signals(STOPPING) as stop, watcher as watch:
+            found = api.life(
+                scenario,
+                realisations,
+                path,
+                on_progress=watch,
+                stop_requested=stop.is_set,
+                on_notice=watch.notice,
+                **{**options, "limits": []},
+            )
+        results.append(found)
+    return results
+
+
+def _labels(paths: Sequence[Path]) -> list[str]:
+    stems = [path.stem.removesuffix("-life") for path in paths]
+    return stems if len(set(stems)) == len(stems) else [str(path) for path in paths]
+
+
+def _shares(text: str) -> tuple[float, ...]:
+    """Return the percentages of a text such as "1,10,50"."""
+    try:
+        shares = tuple(float(part) for part in text.split(","))
+    except ValueError as error:
+        raise ValueError(f"'{text}' is not a list of percentages such as 1,10,50") from error
+    if not all(0.0 < share < 100.0 for share in shares):
+        raise ValueError(f"'{text}' has a percentage that is not between 0 and 100")
+    return shares
+
+
+def _opened(path: Path, target: str | None, shares: tuple[float, ...]) -> LifeResult:
+    """Return the result in a file, for another target and other percentages."""
+    from wearsim.errors import ResultsFileError
+    from wearsim.results import open_results
+    from wearsim.results.ensemble.life import LifeResult
+    from wearsim.studies.life.api import parse_life
+
+    result = open_results(path)
+    if not isinstance(result, LifeResult):
+        raise ResultsFileError(f"{path}: holds no study of lives; wearsim life SCENARIO makes one")
+    changed: dict[str, Any] = {"shares": list(shares)}
+    if target is not None:
+        with checking("--target"):
+            found = parse_life(target, result.unit, result.settings.rate, "target")
+            if found > result.most:
+                raise ValueError(
+                    f"{found:,.0f} {result.unit} is beyond the maximum of {path},"
+                    f" {result.most:,.0f} {result.unit}"
+                )
+        changed["target"] = found * result.settings.per_unit
+    return result.with_settings(**changed)
+
+
+def report(
+    results: Sequence[LifeResult],
+    labels: Sequence[str],
+    json: bool,
+    figure: Path | None,
+) -> None:
+    """Write the lives of designs to stdout, and compare each with the first.
+
+    Parameters
+    ----------
+    results : sequence of LifeResult
+    labels : sequence of str
+    json : bool
+        Whether to write JSON instead of tables.
+    figure : Path, optional
+        Name of the figure.
+
+    Raises
+    ------
+    ResultsFileError, SolverError
+        If the units of lives differ, or all realisations of a design failed.
+    """
+    from wearsim.cli.render import life_table
+    from wearsim.cli.render.ensemble_table import warn_of_failures
+    from wearsim.errors import ResultsFileError, SolverError
+
+    for result in results:
+        warn_of_failures(result)
+        if result.failed and not result.count:
+            raise SolverError(f"{result.path}: all realisations failed")
+    first, *others = results
+    try:
+        compared = [other.compare(first) for other in others]
+    except ValueError as error:
+        raise ResultsFileError(str(error)) from error
+    if figure is not None:
+        from wearsim.report.figures.life import life_figure
+        from wearsim.report.parts import save_figure
+
+        save_figure(life_figure(results, labels), figure)
+    if json:
+        designs = [life_table.life_json(result) for result in results]
+        if not others:
+            write_json({**designs[0], "figure": figure})
+            return
+        data: dict[str, Any] = {"unit": first.unit, "designs": designs, "labels": list(labels)}
+        if len(others) == 1:
+            data |= life_table.comparison_json(first.compare(others[0]))
+        else:
+            data["compared_with_first"] = [life_table.comparison_json(item) for item in compared]
+        write_json({**data, "figure": figure})
+        return
+    for result in results:
+        more = [("results file", str(result.path))]
+        life_table.write_life(result, more)
+        write_notes(result.notes, [*result.warnings, *_remarks(result)])
+    if len(others) == 1:
+        life_table.write_comparison(list(labels), first.compare(others[0]))
+    else:
+        for label, item in zip(labels[1:], compared, strict=True):
+            life_table.write_comparison([label, labels[0]], item)
+    if figure is not None:
+        note(f"figure: {figure}")
+
+
+def _remarks(result: LifeResult) -> list[str]:
+    """Return what a user should know of the lives."""
+    remarks = []
+    if result.count and result.at_once == result.count:
+        remarks.append("a limit is exceeded before any wear in all realisations: every life is 0")
+    elif result.at_once:
+        remarks.append(f"{result.at_once} of {result.count} realisations exceed a limit when fresh")
+    if result.count and not result.observed.any() and not result.is_exact:
+        greatest = []
+        for name, limit in result.scenario.limit.given.items():
+            stored = {"volume": "worn_volume"}.get(name, name)
+            if stored in result.observables:
+                part = float(result.at_end(stored).max()) / limit
+                greatest.append(f"{name.replace('_', ' ')} up to {100.0 * part:.3g} % of its limit")
+        reached = f" ({', '.join(greatest)})" if greatest else ""
+        remarks.append(
+            f"no realisation reaches a limit within {result.most:,.0f} {result.unit}{reached};"
+            " give a greater --max or other limits"
+        )
+    return remarks

@@ -1,0 +1,297 @@
+"""Lives of designs: tables with lives in passes or turns, and JSON."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+import typer
+
+from wearsim.cli.render.summary import Rows, input_rows
+from wearsim.cli.shared import write_list, write_table
+from wearsim.report.text import NOTHING, count, lapse, part_with_interval, shown, too_few
+from wearsim.results.ensemble.life import LifeResult
+from wearsim.results.ensemble.life_settings import LifeComparison
+from wearsim.uq.estimation.intervals import Interval
+from wearsim.uq.survival.lives import least_survival
+
+_UNITS = {"m": "um", "m^3": "mm^3", "Pa": "MPa"}
+
+
+def write_life(result: LifeResult, more: Rows) -> None:
+    """Write the life of a design to stdout.
+
+    Parameters
+    ----------
+    result : LifeResult
+    more : list of (str, str)
+        Last rows.
+    """
+    settings, unit = result.settings, result.unit
+    done = f"{count(result.count)} done, {count(result.failed)} failed"
+    if result.requested > 1:
+        done += f", of {count(settings.plain)}"
+    rows = [
+        ("life", f"{unit} until the first of: {', '.join(_limits(result))}"),
+        ("realisations", done if result.finished else f"{done}, unfinished"),
+        ("wear factor", _wear_factor(result)),
+        ("lives", _ends(result)),
+    ]
+    write_table(result.title, rows)
+    if result.count:
+        _write_lives(result)
+        _write_fits(result)
+        _write_limits(result)
+        _write_effects(result)
+    rows = [("95 % intervals", result.method)] if result.count else []
+    seconds = result.raw.wall_seconds
+    write_table("", [*rows, *input_rows(result), ("wall time", lapse(seconds)), *more])
+
+
+def _limits(result: LifeResult) -> list[str]:
+    units = {"volume": "m^3", "peak_pressure": "Pa"}
+    return [
+        f"{name.replace('_', ' ')} {shown(value, _UNITS[units.get(name, 'm')])}"
+        for name, value in result.scenario.limit.given.items()
+    ]
+
+
+def _wear_factor(result: LifeResult) -> str:
+    settings = result.settings
+    if not settings.factor:
+        return f"lives are counted: {settings.reason}"
+    alone = "; nothing else is random, so that one test is sufficient" if settings.alone else ""
+    return f"{settings.factor} is integrated exactly{alone}"
+
+
+def _ends(result: LifeResult) -> str:
+    """Return how many lives ended, were censored and were zero."""
+    text = f"{count(int(result.observed.sum()))} ended by a limit"
+    text += f", {count(result.censored)} censored at {count(result.most)} {result.unit}"
+    if result.at_once:
+        text += f"; {count(result.at_once)} reached a limit at once, when fresh"
+    return text
+
+
+def _life(value: float) -> str:
+    return count(value) if math.isfinite(value) else NOTHING
+
+
+def _write_lives(result: LifeResult) -> None:
+    heads = [f"life [{result.unit}]", "estimate", "95 % interval", "numerical error"]
+    lines = []
+    for share in result.settings.shares:
+        found, (low, high) = result.b(share), result.b_error(share)
+        error = f"{_life(low)}..{_life(high)}" if math.isfinite(low + high) else NOTHING
+        lines.append([f"B{share:g}", *_with_interval(result, share, found), error])
+    write_list(heads, lines)
+    if not result.observed.any() and not result.is_exact and result.count:
+        bound = least_survival(result.count)
+        typer.echo(
+            f"no life ended: at least {shown(bound, '%', 3)} survive {count(result.most)}"
+            f" {result.unit}, with 95 % confidence"
+        )
+    target = result.target
+    if target is not None:
+        text = part_with_interval(result.probability_before(target))
+        typer.echo(f"P(life < {count(target)} {result.unit}) = {_small(result, text)}")
+
+
+def _small(result: LifeResult, text: str) -> str:
+    """Return a probability with more digits if it is small."""
+    assert result.target is not None
+    found = result.probability_before(result.target)
+    if not 0.0 < found.value < 0.01:
+        return text
+    interval = f" [{found.low:.2g}, {found.high:.2g}]" if found.low < found.high else ""
+    return f"{found.value:.3g}{interval}"
+
+
+def _with_interval(result: LifeResult, share: float, found: Interval) -> tuple[str, str]:
+    """Return a life and its interval as cells; a one-sided bound of a small sample."""
+    if math.isnan(found.value):
+        beyond = f"above {count(result.most)}"
+        return beyond, f"from {_life(found.low)}" if math.isfinite(found.low) else NOTHING
+    if found.low == found.high:
+        return _life(found.value), ""
+    if math.isfinite(found.low) and math.isfinite(found.high):
+        return _life(found.value), f"{_life(found.low)}..{_life(found.high)}"
+    if math.isfinite(found.low):
+        return _life(found.value), f"from {_life(found.low)}"
+    bound = result.lower_bound(share)
+    if math.isfinite(bound):
+        return _life(found.value), f"from {_life(bound)} (one-sided)"
+    return _life(found.value), "too few lives"
+
+
+def _write_fits(result: LifeResult) -> None:
+    if len(result.fits) < 2:
+        return
+    typer.echo("")
+    shares = result.settings.shares
+    heads = [f"fit [{result.unit}]", *(f"B{share:g}" for share in shares), "AIC", "parameters"]
+    lines = []
+    for fit in result.fits:
+        cells = [_fitted(fit.interval(share / 100.0)) for share in shares]
+        scale = f"{count(math.exp(fit.mu))} {result.unit}"
+        parameters = (
+            f"median {scale}, sigma {fit.sigma:.3f}"
+            if fit.family == "log-normal"
+            else f"scale {scale}, shape {1.0 / fit.sigma:.3f}"
+        )
+        lines.append([fit.family, *cells, f"{fit.aic - result.fits[0].aic:+.1f}", parameters])
+    write_list(heads, lines)
+
+
+def _fitted(found: Interval) -> str:
+    return f"{_life(found.value)} ({_life(found.low)}..{_life(found.high)})"
+
+
+def _write_limits(result: LifeResult) -> None:
+    typer.echo("")
+    lines, angles = [], result.angles
+    for name, share in result.first_limits.items():
+        where = ""
+        if name in angles:
+            low, middle, high = np.degrees(np.quantile(angles[name], (0.05, 0.5, 0.95)))
+            where = f"at {middle:.1f} deg"
+            where += f" (90 % in {low:.1f} to {high:.1f} deg)" if high - low > 0.05 else ""
+        lines.append([name.replace("_", " "), shown(share, "%", 3), where])
+    write_list(["first limit", "share", ""], lines)
+
+
+def _write_effects(result: LifeResult) -> None:
+    typer.echo("")
+    head = "what moves the life: Sobol indices of its logarithm"
+    if result.settings.alone or result.count == 1:
+        only = result.settings.factor if result.settings.alone else "too few realisations"
+        write_list([f"{head}: {only}"], [])
+        return
+    effects = result.sensitivity("life")
+    if not any(math.isfinite(item.first.value) for item in effects):
+        write_list([f"{head}: {too_few(result)}"], [])
+        return
+    lines = [
+        [
+            item.name,
+            f"not significant, at most {shown(item.first.high, '%', 2)}"
+            if item.without_effect
+            else part_with_interval(item.first),
+        ]
+        for item in effects
+    ]
+    write_list([head, "first order"], lines)
+
+
+def write_comparison(labels: Sequence[str], found: LifeComparison) -> None:
+    """Write the comparison of two designs in words.
+
+    Parameters
+    ----------
+    labels : sequence of str
+        Labels of both.
+    found : LifeComparison
+    """
+    first, second = labels
+    ratio = found.b10_ratio
+    rows = [("B10 ratio", f"{first} has {_factor(ratio)} times the B10 of {second}")]
+    if found.same_machine is not None:
+        rows.append(
+            (
+                "same machine",
+                (
+                    f"{first} outlives {second} on {part_with_interval(found.same_machine)} of the"
+                    " machines, each with the same drawn values for both designs"
+                ),
+            )
+        )
+    else:
+        rows.append(("same machine", "unknown: the studies have no common draws"))
+    rows.append(
+        (
+            "two specimens",
+            (
+                f"a specimen of {first} outlives a specimen of {second}, drawn separately, with"
+                f" probability {part_with_interval(found.two_specimens)}"
+            ),
+        )
+    )
+    write_table("comparison", rows)
+
+
+def _factor(found: Interval) -> str:
+    if not math.isfinite(found.value):
+        return "an unknown number of"
+    if not math.isfinite(found.half_width):
+        return f"{found.value:.3f} [unbounded]"
+    if found.half_width == 0.0:
+        return f"{found.value:.3f}"
+    return f"{found.value:.3f} [{found.low:.3f}, {found.high:.3f}]"
+
+
+def life_json(result: LifeResult) -> dict[str, Any]:
+    """Return the life of a design, lives in its unit."""
+    settings, target = result.settings, result.target
+    probability = None
+    if target is not None:
+        probability = {"target": target, **asdict(result.probability_before(target))}
+    lives = {}
+    for share in settings.shares:
+        low, high = result.b_error(share)
+        lives[f"{share:g}"] = {
+            **asdict(result.b(share)),
+            "lower_bound": result.lower_bound(share) if not result.is_exact else None,
+            "numerical_low": low,
+            "numerical_high": high,
+        }
+    return {
+        "title": result.title,
+        "unit": result.unit,
+        "limits": result.scenario.limit.given,
+        "realisations": result.count,
+        "failed": result.failed,
+        "errors": dict(result.errors),
+        "censored": result.censored,
+        "reached_at_once": result.at_once,
+        "maximum": result.most,
+        "finished": result.finished,
+        "b": lives,
+        "probability_before_target": probability,
+        "first_limits": result.first_limits,
+        "angles_deg": {name: np.degrees(found) for name, found in result.angles.items()},
+        "fits": [
+            {
+                "family": fit.family,
+                "aic": fit.aic,
+                "mu": fit.mu,
+                "sigma": fit.sigma,
+                "b": {f"{p:g}": asdict(fit.interval(p / 100.0)) for p in settings.shares},
+            }
+            for fit in result.fits
+        ],
+        "sensitivity_of_life": [
+            {"input": item.name, "first_order": asdict(item.first)}
+            for item in (result.sensitivity("life") if result.count > 1 else [])
+        ],
+        "exact_wear_factor": settings.factor or None,
+        "counted_because": settings.reason or None,
+        "interval_method": result.method,
+        "seed": result.raw.seed,
+        "wall_seconds": result.raw.wall_seconds,
+        "output": str(result.path) if result.path else None,
+        "notes": list(result.notes),
+        "warnings": list(result.warnings),
+    }
+
+
+def comparison_json(found: LifeComparison) -> dict[str, Any]:
+    """Return the comparison of two designs."""
+    return {
+        "b10_ratio": asdict(found.b10_ratio),
+        "same_machine": asdict(found.same_machine) if found.same_machine else None,
+        "two_specimens": asdict(found.two_specimens),
+        "pairs": found.count,
+    }

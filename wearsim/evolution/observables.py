@@ -1,0 +1,96 @@
+"""Values of a state that a limit may bound: depths, volume, width, lift error, pressure."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wearsim.evolution.pauses import opened
+from wearsim.evolution.problem import WearProblem
+from wearsim.evolution.quantities import CamStations, mean_along, sum_in_order, width, worn_volume
+from wearsim.evolution.state import WearState
+from wearsim.evolution.steppers.base import Stepper
+from wearsim.evolution.steppers.loads import descents
+from wearsim.evolution.steppers.single_step import solve_at_record
+from wearsim.types import FloatArray
+
+
+def present_contacts(
+    stepper: Stepper, problem: WearProblem, state: WearState
+) -> tuple[WearProblem, WearState, FloatArray]:
+    """Return `state` with its contacts at the present loads, their problem, and the loads.
+
+    If inputs are drawn at every pass, the contacts are those of the quadrature over passes.
+    """
+    recorded = stepper.recorded(problem)
+    contacts, loads = solve_at_record(
+        recorded,
+        state,
+        on_profile=not stepper.pass_by_pass,
+        cold=recorded is not problem,
+    )
+    contacts, loads = opened(problem, state.passes, contacts, loads)
+    return recorded, state.replaced(contacts=contacts), loads
+
+
+def lift_errors(problem: WearProblem, state: WearState) -> FloatArray:
+    """Return the change of the lift at every station, shape (stations, rollers, N) [m].
+
+    The roller's centre moves by -D/cos(alpha) along its path, with the rise D of the least gap of
+    the unloaded bodies, and by +D/cos(alpha) on the inner flank of a groove.
+    """
+    cam = problem.kinematics.cam
+    assert cam is not None
+    descent = problem.per_roller(descents(problem, state.depths))
+    return np.asarray(-np.sign(cam.load_factor) * descent / np.cos(cam.pressure_angle))
+
+
+def peak_to_peak(cam: CamStations, errors: FloatArray) -> FloatArray:
+    """Return greatest less smallest lift error over the angle, shape (rollers, N) [m]."""
+    between = sum_in_order(cam.between.T[:, :, None, None] * errors[:, None], axis=0)
+    return np.asarray(between.max(axis=0) - between.min(axis=0))
+
+
+def depth(problem: WearProblem, state: WearState) -> FloatArray:
+    """Return the greatest depth of the cylinder, shape (realisations,) [m]."""
+    return np.asarray(state.cylinder_depth.max(axis=(0, 1, 3)))
+
+
+def roller_depth(problem: WearProblem, state: WearState) -> FloatArray:
+    """Return the greatest depth of a roller, shape (realisations,) [m]."""
+    return np.asarray(state.roller_depth.max(axis=(0, 1, 3)))
+
+
+def volume(problem: WearProblem, state: WearState) -> FloatArray:
+    """Return the worn volume of the cylinder, shape (realisations,) [m^3]."""
+    radius, spacing = problem.kinematics.track_radius, problem.grid.spacing
+    volumes = worn_volume(state.cylinder_depth, spacing, radius)
+    return np.asarray(mean_along(volumes, axis=0)[0, 0])
+
+
+def groove_width(problem: WearProblem, state: WearState, threshold: float) -> FloatArray:
+    """Return the width of the groove deeper than `threshold` [m], (realisations,) [m]."""
+    worn = state.cylinder_depth[:, 0].max(axis=0)
+    return np.array([width(problem.grid.y, groove, threshold) for groove in worn])
+
+
+def lift_error(problem: WearProblem, state: WearState) -> FloatArray:
+    """Return the greatest lift error, peak to peak over a turn, shape (realisations,) [m].
+
+    It is 0 of a cylinder.
+    """
+    cam = problem.kinematics.cam
+    if cam is None:
+        return np.zeros(len(state.passes))
+    return np.asarray(peak_to_peak(cam, lift_errors(problem, state)).max(axis=0))
+
+
+def clearance(problem: WearProblem, state: WearState) -> FloatArray:
+    """Return the greatest worn descent of a roller, shape (realisations,) [m]."""
+    return np.asarray(descents(problem, state.depths).max(axis=(0, 1)))
+
+
+def peak_pressure(stepper: Stepper, problem: WearProblem, state: WearState) -> FloatArray:
+    """Return the greatest pressure at the present loads, shape (realisations,) [Pa]."""
+    recorded, state, _ = present_contacts(stepper, problem, state)
+    values = recorded.values_of(state.contacts, "peak_pressure")
+    return np.asarray(values.reshape(-1, values.shape[-1]).max(axis=0))

@@ -1,0 +1,374 @@
+"""Result of an ensemble of tests that end at a limit: the life of a design, in SI."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wearsim.results.ensemble.data import EnsembleData
+from wearsim.results.ensemble.life_settings import LifeComparison, LifeSettings, LifeTarget
+from wearsim.results.ensemble.result import EnsembleResult
+from wearsim.types import BoolArray, FloatArray, IntArray
+from wearsim.uq.distributions.base import Distribution
+from wearsim.uq.estimation.estimates import Target
+from wearsim.uq.estimation.intervals import UNKNOWN, Interval
+from wearsim.uq.survival.distributions import (
+    CountedLives,
+    FactorMixture,
+    LifeDistribution,
+    score_function,
+)
+from wearsim.uq.survival.fits import FAMILIES, LifeFit, fit_lives
+from wearsim.uq.survival.lives import life_quantile, lower_bound, probability_before
+from wearsim.uq.survival.rare_events import RareProbability, weighted_probability
+
+_FEWEST = 32  # realisations below which a target is not reached
+
+
+@dataclass(frozen=True, eq=False)
+class LifeResult(EnsembleResult):
+    """Life of a design, from the tests that ended at a limit.
+
+    Parameters
+    ----------
+    raw : EnsembleData
+    path : Path, optional
+    law : Distribution, optional
+        Distribution of the wear factor, instead of that of the scenario.
+    """
+
+    law: Distribution | None = None
+
+    def __repr__(self) -> str:
+        b10 = self.b(10).value
+        return f"<LifeResult '{self.title}': {self.count} lives, B10 {b10:.4g} {self.unit}>"
+
+    @cached_property
+    def settings(self) -> LifeSettings:
+        """Settings of the study."""
+        known = {item.name for item in fields(LifeSettings)}
+        stored = {name: value for name, value in self.raw.life.items() if name in known}
+        return LifeSettings(**{**stored, "shares": tuple(stored["shares"])})
+
+    @cached_property
+    def numbers(self) -> IntArray:
+        """Numbers of the successful realisations without weights, shape (count,)."""
+        done = self.raw.done
+        return np.asarray(done[done < self.settings.plain])
+
+    @property
+    def unit(self) -> str:
+        """Unit of lives, "turns" of a cam or roller "passes"."""
+        return self.settings.unit
+
+    @property
+    def most(self) -> float:
+        """Life at which lives are censored."""
+        return self.settings.most / self.settings.per_unit
+
+    @property
+    def target(self) -> float | None:
+        """Life whose probability is estimated."""
+        target = self.settings.target
+        return None if target is None else target / self.settings.per_unit
+
+    @cached_property
+    def lives(self) -> FloatArray:
+        """Lives with the drawn values, infinite beyond the censoring, shape (count,)."""
+        return self._lives("life")
+
+    def _lives(self, name: str) -> FloatArray:
+        found = self.values(name) / self.settings.per_unit
+        return np.asarray(np.where(found <= self.most, found, np.inf))
+
+    @cached_property
+    def observed(self) -> BoolArray:
+        """Whether each life ended before the censoring, shape (count,)."""
+        return np.isfinite(self.lives)
+
+    @property
+    def censored(self) -> int:
+        """Number of lives beyond the censoring."""
+        return int((~self.observed).sum())
+
+    @property
+    def at_once(self) -> int:
+        """Number of lives of zero."""
+        return int((self.lives == 0.0).sum())
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether the wear factor is integrated exactly."""
+        return bool(self.settings.factor)
+
+    @property
+    def limits(self) -> tuple[str, ...]:
+        """Names of the limits."""
+        return tuple(self.scenario.limit.given)
+
+    @cached_property
+    def distribution(self) -> LifeDistribution:
+        """Distribution of the lives."""
+        return self._distribution("life")
+
+    def _distribution(self, name: str) -> LifeDistribution:
+        settings = self.settings
+        if not self.is_exact:
+            return CountedLives(self._lives(name))
+        kappa = self.values(name) / settings.per_unit * self.values(settings.factor)
+        return FactorMixture(
+            kappa, self._score, self.values("score_mean"), settings.spread, settings.alone
+        )
+
+    @cached_property
+    def _score(self) -> Any:
+        law = self.law
+        if law is None:
+            inputs = {item.name: item for item in self.scenario.random}
+            law = inputs[self.settings.factor].scalar
+        return score_function(law)
+
+    def with_settings(self, **changed: Any) -> LifeResult:
+        """Return the result with other settings: `target` [passes] or `shares` [per cent]."""
+        return replace(self, raw=replace(self.raw, life={**self.raw.life, **changed}))
+
+    @property
+    def method(self) -> str:
+        """Method of the intervals of lives, in words."""
+        if self.settings.alone:
+            return "none: the wear factor is integrated exactly, and nothing else is random"
+        if self.is_exact:
+            return "Student's t of the probability of failure on the logit scale, inverted"
+        if self.censored:
+            return "exact, between order statistics; lives beyond the maximum are censored"
+        return "exact, between order statistics"
+
+    def with_wear_factor(self, table: Mapping[str, object]) -> LifeResult:
+        """Return the lives with another distribution of the wear factor, without new tests.
+
+        Parameters
+        ----------
+        table : mapping of str to object
+            Random input as in a scenario, {"distribution": "lognormal", ...}.
+
+        Raises
+        ------
+        ValueError
+            If the wear factor is not integrated exactly, or correlated with other inputs.
+        """
+        settings = self.settings
+        if not settings.factor or settings.spread < 1.0:
+            reason = settings.reason or "it is correlated with other inputs"
+            raise ValueError(f"the distribution of the wear factor cannot be replaced: {reason}")
+        changed = self.scenario.changed({settings.factor: table})
+        inputs = {item.name: item for item in changed.random}
+        return replace(self, law=inputs[settings.factor].scalar)
+
+    def b(self, percent: float) -> Interval:
+        """Return the life that a percentage of the specimens does not reach, as B10.
+
+        Parameters
+        ----------
+        percent : float
+            10 for B10.
+
+        Returns
+        -------
+        Interval
+            Sampling interval; the value is nan beyond the censoring, and -inf an end for which
+            there are too few lives. See `b_error` for the numerical error.
+        """
+        return self._b(percent, "life")
+
+    def b_error(self, percent: float) -> tuple[float, float]:
+        """Return the life of a percentage if all lives are in error by their numerical bounds."""
+        low, high = (self._b(percent, name).value for name in ("life_low", "life_high"))
+        return low, high
+
+    def _b(self, percent: float, name: str) -> Interval:
+        if not self.count:
+            return UNKNOWN
+        share = percent / 100.0
+        if not self.is_exact:
+            lives = self._lives(name)
+            return life_quantile(np.minimum(lives, self.most), np.isfinite(lives), share)
+        found = self._distribution(name).quantile(share)
+        if found.value <= self.most:
+            return Interval(
+                found.value, found.low, found.high if found.high <= self.most else math.inf
+            )
+        return Interval(math.nan, min(found.low, self.most), math.inf)
+
+    def lower_bound(self, percent: float) -> float:
+        """Return the one-sided 95 % lower bound of the life of a percentage; -inf if unknown."""
+        lives = np.minimum(self.lives, self.most)
+        return lower_bound(lives, self.observed, percent / 100.0)
+
+    def probability_before(self, life: float) -> Interval:
+        """Return the probability of a life below `life`; unknown beyond the censoring."""
+        if not self.count or life > self.most:
+            return UNKNOWN
+        if self.is_exact:
+            return self.distribution.probability_before(life)
+        return probability_before(np.minimum(self.lives, self.most), self.observed, life)
+
+    def survival(self, life: float) -> Interval:
+        """Return the probability of a life above `life`."""
+        found = self.probability_before(life)
+        return Interval(1.0 - found.value, 1.0 - found.high, 1.0 - found.low)
+
+    @property
+    def first_limits(self) -> dict[str, float]:
+        """Share of the realisations in which each limit was reached first, by its name."""
+        first = self.values("first_limit")[self.observed]
+        shares = {
+            name: float((first == place).sum()) / max(self.count, 1)
+            for place, name in enumerate(self.limits)
+        }
+        return dict(sorted(shares.items(), key=lambda item: -item[1]))
+
+    @property
+    def angles(self) -> dict[str, FloatArray]:
+        """Angles of a cam at which each limit was reached [rad]; without those never first."""
+        first, angle = self.values("first_limit"), self.values("limit_angle")
+        known = self.observed & np.isfinite(angle)
+        found = {name: angle[known & (first == place)] for place, name in enumerate(self.limits)}
+        return {name: angles for name, angles in found.items() if len(angles)}
+
+    @cached_property
+    def fits(self) -> list[LifeFit]:
+        """Fits to the lives above zero, best first by Akaike's criterion."""
+        positive = self.lives > 0.0
+        lives = np.minimum(self.lives[positive], self.most)
+        if not len(lives):
+            return []
+        found = [fit_lives(family, lives, self.observed[positive]) for family in FAMILIES]
+        return sorted((fit for fit in found if fit is not None), key=lambda fit: fit.aic)
+
+    def _indices(
+        self, name: str, groups: list[str]
+    ) -> Mapping[str, tuple[Interval, Interval | None]]:
+        """Return first-order indices; those of "life" are of its logarithm."""
+        if name != "life":
+            return super()._indices(name, groups)
+        from wearsim.uq.sensitivity.sobol_indices import first_order  # noqa: PLC0415  (rarely needed)
+
+        found = first_order(self.log_lives, self.drawn_numbers(groups))
+        return {group: (index, None) for group, index in found.items()}
+
+    @property
+    def log_lives(self) -> FloatArray:
+        """Logarithms of the lives, those that are censored or zero at the ends of the range."""
+        positive = self.lives[self.lives > 0.0]
+        least = float(positive.min(initial=self.most))
+        return np.asarray(np.log(np.clip(self.lives, least, self.most)))
+
+    def tornado(self) -> dict[str, tuple[float, float]]:
+        """Return the change of life by each input, by its name, the greatest first.
+
+        Returns
+        -------
+        dict of str to (float, float)
+            Factors of the life that the input's effect exceeds with 90 % and with 10 %
+            probability, from a quadratic fit of ln life to the normal scores of its numbers.
+        """
+        from scipy.special import ndtri  # noqa: PLC0415  (slow to load)
+
+        logs, found = self.log_lives - self.log_lives.mean(), {}
+        groups = [item["name"] for item in self.raw.groups]
+        for name, numbers in self.drawn_numbers(groups).items():
+            ranks = numbers.argsort(axis=0).argsort(axis=0)
+            scores = ndtri((ranks + 0.5) / len(numbers))
+            terms = np.column_stack([np.ones(len(scores)), scores, scores**2])
+            if len(terms) < 2 * terms.shape[1]:
+                continue
+            effect = terms @ np.linalg.lstsq(terms, logs, rcond=None)[0]
+            low, high = np.exp(np.quantile(effect, (0.1, 0.9))).tolist()
+            found[name] = (low, high)
+        return dict(sorted(found.items(), key=lambda item: math.log(item[1][0] / item[1][1])))
+
+    def compare(self, other: LifeResult) -> LifeComparison:
+        """Compare the lives with those of another design.
+
+        Parameters
+        ----------
+        other : LifeResult
+            With the same unit of life; common draws if it has the same seed.
+
+        Raises
+        ------
+        ValueError
+            If the units differ.
+        """
+        from wearsim.uq.survival.comparison import (  # noqa: PLC0415  (rarely needed)
+            quantile_ratio,
+            same_machine,
+            two_specimens,
+        )
+
+        if self.unit != other.unit:
+            raise ValueError(
+                f"{self.title} is in {self.unit} and {other.title} in {other.unit}; their lives"
+                " cannot be compared"
+            )
+        most = min(self.most, other.most)
+        paired = self.raw.seed == other.raw.seed
+        first, second = self.distribution, other.distribution
+        one, two = self.lives, other.lives
+        common = np.intersect1d(self.numbers, other.numbers)
+        if paired and not (first.exact and second.exact):
+            places = [np.searchsorted(item.numbers, common) for item in (self, other)]
+            if first.exact or second.exact:
+                paired = False
+            else:
+                first, second = _at(first, places[0]), _at(second, places[1])
+                one, two = one[places[0]], two[places[1]]
+        machine = same_machine(one, two, most) if paired and len(one) == len(two) else None
+        return LifeComparison(
+            quantile_ratio(first, second, 0.1, most, paired),
+            machine,
+            two_specimens(first, second, most, paired),
+            len(common),
+        )
+
+    def estimate_for(self, target: Target | LifeTarget) -> Any:
+        """Return the estimate to which a target applies."""
+        if isinstance(target, Target):
+            return super().estimate_for(target)
+        return self.b(100.0 * target.share) if self.count >= _FEWEST else UNKNOWN
+
+    @property
+    def rare(self) -> RareProbability | None:
+        """Probability of a life before the target by importance sampling, if it was requested."""
+        weighted = self.raw.done[self.raw.done >= self.settings.plain]
+        if not len(weighted) or self.settings.target is None:
+            return None
+        log_weight = self.raw.rows("log_weight", 0, None)
+        last = weighted[weighted >= self.raw.life.get("final", self.settings.plain)]
+        lives = self.raw.rows("life", 0, None)[last]
+        return weighted_probability(lives < self.settings.target, log_weight[last], len(weighted))
+
+    def final_estimates(self) -> dict[str, Any]:
+        """Return lives and estimates at their ends, as plain values."""
+        lives = {f"b{share:g}": asdict(self.b(share)) for share in self.settings.shares}
+        return {**super().final_estimates(), "life": lives}
+
+
+def _at(distribution: LifeDistribution, places: IntArray) -> LifeDistribution:
+    """Return the distribution of some realisations."""
+    if isinstance(distribution, FactorMixture):
+        shift = np.broadcast_to(np.asarray(distribution.shift), distribution.kappa.shape)
+        return replace(distribution, kappa=distribution.kappa[places], shift=shift[places])
+    assert isinstance(distribution, CountedLives)
+    return CountedLives(distribution.life[places])
+
+
+def ensemble_result(data: EnsembleData, path: Path | None = None) -> EnsembleResult:
+    """Return the result of an ensemble, a `LifeResult` if its tests ended at a limit."""
+    return (LifeResult if data.life else EnsembleResult)(data, path)

@@ -1,0 +1,252 @@
+"""Tests stepped together until each reaches its first limit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+
+from wearsim.evolution.integrate import Advance, Evolution, bisect_failures
+from wearsim.evolution.limits import Crossings, Limit, first_crossings, ratios, take_side_step
+from wearsim.evolution.observables import depth
+from wearsim.evolution.problem import WearProblem
+from wearsim.evolution.state import WearState, fresh_state
+from wearsim.studies.ensemble.batch import (
+    SCALARS,
+    Observables,
+    RealisationRun,
+    RunObservations,
+    joined_problem,
+    observables_of,
+)
+from wearsim.types import FloatArray, IntArray
+
+TOLERANCE = 1e-6  # relative error of a quantity at its limit
+FLAT = 0.05  # log-slope below which the numerical error of a life is searched for
+_BACK = 0.01  # part of the passes over which the log-slope is taken
+
+
+@dataclass(frozen=True)
+class LifeRun(RunObservations):
+    """Test of one realisation up to its first limit.
+
+    There is a row of observables at the start, and one at the limit or the end. Among the scalars
+    are the life with its numerical bounds, infinite if the test ends before, the number of the
+    limit, and its angle.
+    """
+
+    @property
+    def reached(self) -> bool:
+        """Whether a limit was reached, and its numerical bounds are known."""
+        return math.isfinite(self.scalars["life"]) and math.isfinite(self.scalars["life_high"])
+
+
+@dataclass
+class _Test:
+    """A test in progress.
+
+    It has its quantities over their limits after each step, its result, the number of its limit,
+    and the level of that quantity, over the limit, up to which it is followed.
+    """
+
+    history: list[tuple[float, FloatArray]] = field(default_factory=list)
+    found: LifeRun | None = None
+    limit: int = -1
+    level: float = 1.0
+
+
+def observe_lives(
+    runs: Sequence[RealisationRun], limits: Sequence[Limit]
+) -> list[LifeRun | Exception]:
+    """Step the tests of a group together to their limits; return the result or error of each."""
+
+    def step(places: IntArray) -> list[LifeRun | Exception]:
+        return _Group([runs[place] for place in places], limits).results()
+
+    done, failed = bisect_failures(step, np.arange(len(runs)))
+    results: dict[int, LifeRun | Exception] = dict(failed)
+    for places, found in done:
+        results.update(zip(places.tolist(), found, strict=True))
+    return [results[place] for place in range(len(runs))]
+
+
+class _Group:
+    """Tests that are stepped together."""
+
+    def __init__(self, runs: Sequence[RealisationRun], limits: Sequence[Limit]) -> None:
+        scenario = runs[0].draws.scenario
+        self.runs, self.limits, self.stepper = runs, limits, runs[0].stepper
+        self.threshold, self.stop = scenario.outputs.width_threshold, runs[0].stop
+        self.problem = joined_problem([run.problem for run in runs])
+        self.state = fresh_state(self.problem)
+        self.evolution = Evolution(
+            self.problem,
+            self.state,
+            self.stepper,
+            self.stop,
+            scenario.evolution.max_steps,
+            lambda passes: self.stop,
+        )
+        self.tests = [_Test() for _ in runs]
+        self.first_rows = self._observed(self.problem, self.state)
+
+    def results(self) -> list[LifeRun | Exception]:
+        """Return the result or the error of each test."""
+        start = self._ratios(self.problem, self.state)
+        at_once = np.flatnonzero(start.max(axis=0) >= 1.0)
+        for number in at_once.tolist():
+            test = self.tests[number]
+            test.limit = int(start[:, number].argmax())
+            life = {"life": 0.0, "life_low": 0.0, "life_high": 0.0}
+            chosen = np.array([number])
+            self._finish(number, self.problem.at(chosen), self.state.at(chosen), life)
+        self.evolution.end(at_once.tolist())
+        for advance in self.evolution:
+            self._take(advance)
+        failures = self.evolution.failures
+        return [failures.get(k) or test.found or _missing() for k, test in enumerate(self.tests)]
+
+    def _take(self, advance: Advance) -> None:
+        """Locate the limits that are reached in a step, and end the tests that need no more."""
+        numbers = advance.numbers.tolist()
+        relative = self._ratios(advance.problem, advance.end)
+        for place, number in enumerate(numbers):
+            passes = float(advance.end.passes[place])
+            self.tests[number].history.append((passes, relative[:, place]))
+        open_places = np.array(
+            [place for place, number in enumerate(numbers) if self.tests[number].found is None],
+            dtype=np.int64,
+        )
+
+        def locate(chosen: IntArray) -> list[Crossings]:
+            some = open_places[chosen]
+            return first_crossings(self.limits, self.stepper, advance, some, TOLERANCE)
+
+        # a step without crossings solves nothing
+        done, failed = bisect_failures(locate, np.arange(len(open_places)))
+        self.evolution.fail({numbers[open_places[k]]: error for k, error in failed.items()})
+        for _, crossings in done:
+            for crossing in crossings:
+                self._reached(advance, crossing)
+        over = [number for number in numbers if self._is_over(number)]
+        self.evolution.end(over)
+        ended = np.flatnonzero(advance.end.passes >= self.stop)
+        for place in ended.tolist():
+            if self.tests[numbers[place]].found is None and numbers[place] not in failed:
+                chosen = np.array([place])
+                life = dict.fromkeys(("life", "life_low", "life_high"), math.inf)
+                some = advance.problem.at(chosen), advance.end.at(chosen)
+                self._finish(numbers[place], *some, life)
+
+    def _reached(self, advance: Advance, crossing: Crossings) -> None:
+        """Store the tests that have reached a limit, with the numerical error of their lives."""
+        state, problem = crossing.state, crossing.problem
+        slope, of_depth = self._slopes(crossing)
+        depth_error = state.depth_error / np.maximum(depth(problem, state), 1e-300)
+        for place, number in enumerate(advance.numbers[crossing.places].tolist()):
+            test, chosen = self.tests[number], np.array([place])
+            test.limit = int(crossing.limit[place])
+            limit, passes = self.limits[test.limit], float(state.passes[place])
+            if limit.unit == "m" and limit.quantity != "width":
+                error = float(state.depth_error[place]) / limit.value
+            elif limit.quantity == "volume":
+                error = float(state.volume_error[place]) / limit.value
+            else:  # by way of the passes that correspond to the error of the depth
+                error = float(depth_error[place] * abs(slope[place]) / max(of_depth[place], FLAT))
+            if slope[place] >= FLAT:
+                part = error / float(slope[place])
+                low, high = passes * max(1.0 - part, 0.0), passes * (1.0 + part)
+            else:
+                low, high = self._crossing_of(test, 1.0 - error, passes), math.inf
+                test.level = 1.0 + error
+            life = {"life": passes, "life_low": low, "life_high": high}
+            self._finish(number, problem.at(chosen), state.at(chosen), life)
+
+    def _is_over(self, number: int) -> bool:
+        """Return whether the life of a test and its numerical bounds are known.
+
+        A quantity that is nearly constant at its limit is followed to the limit plus its error.
+        """
+        test = self.tests[number]
+        if test.found is None:
+            return False
+        passes, relative = test.history[-1]
+        scalars = test.found.scalars
+        if math.isinf(scalars["life_high"]) and float(relative[test.limit]) >= test.level:
+            scalars["life_high"] = passes
+        return math.isfinite(scalars["life_high"])
+
+    def _crossing_of(self, test: _Test, level: float, before: float) -> float:
+        """Return the passes at which a quantity over its limit first reached a level."""
+        last = (0.0, 0.0)
+        for passes, relative in test.history:
+            value = float(relative[test.limit])
+            if value >= level:
+                part = (level - last[1]) / (value - last[1]) if value > last[1] else 0.0
+                return min(last[0] + part * (passes - last[0]), before)
+            last = passes, value
+        return before
+
+    def _slopes(self, crossing: Crossings) -> tuple[FloatArray, FloatArray]:
+        """Return the local log-slope of the limited quantity and of the depth, each (tests,)."""
+        state, problem, start = crossing.state, crossing.problem, crossing.start
+        back = np.maximum((1.0 - _BACK) * state.passes - start.passes, 0.0)
+        earlier, moved = start, np.flatnonzero(back > 0.0)
+        if moved.size and not self.stepper.pass_by_pass:
+            some = problem.at(moved), start.at(moved), back[moved]
+            step = partial(take_side_step, self.stepper.side_step)
+            earlier = start.with_others(moved, step(*some))
+        tests = np.arange(len(state.passes))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            span = np.log(state.passes / earlier.passes)
+            values = [
+                self._ratios(problem, item)[crossing.limit, tests] for item in (state, earlier)
+            ]
+            depths = [depth(problem, item) for item in (state, earlier)]
+            slopes = [np.log(after / before) / span for after, before in (values, depths)]
+        # from the start of the test, a depth grows with the passes to the power 2/3
+        slope, of_depth = (np.where(np.isfinite(item), item, 2.0 / 3.0) for item in slopes)
+        return slope, of_depth
+
+    def _finish(
+        self, number: int, problem: WearProblem, state: WearState, life: dict[str, float]
+    ) -> None:
+        """Store the result of a test that ends in the given state, of one realisation."""
+        test = self.tests[number]
+        rows = [self.first_rows[number], *self._observed(problem, state)]
+        scalars = {name: float(getattr(state, name)[0]) for name in SCALARS}
+        scalars |= {
+            **life,
+            "first_limit": float(test.limit),
+            "limit_angle": self._angle(test.limit, problem, state),
+        }
+        test.found = LifeRun(rows, scalars, state.cylinder_depth[:, 0, 0].mean(axis=0))
+
+    def _angle(self, limit: int, problem: WearProblem, state: WearState) -> float:
+        """Return the angle of a cam at which the limited quantity is greatest [rad]."""
+        cam = problem.kinematics.cam
+        if cam is None or limit < 0:
+            return math.nan
+        if self.limits[limit].quantity == "peak pressure":
+            values = problem.per_roller(problem.values_of(state.contacts, "peak_pressure"))
+            place = int(values.max(axis=(1, 2)).argmax())
+        elif self.limits[limit].quantity == "lift error":
+            from wearsim.evolution.observables import lift_errors  # noqa: PLC0415
+
+            place = int(np.abs(lift_errors(problem, state)).max(axis=(1, 2)).argmax())
+        else:
+            place = int(state.cylinder_depth[:, 0].max(axis=(1, 2)).argmax())
+        return float(cam.angle.ravel()[place])
+
+    def _ratios(self, problem: WearProblem, state: WearState) -> FloatArray:
+        return ratios(self.limits, self.stepper, problem, state)
+
+    def _observed(self, problem: WearProblem, state: WearState) -> list[Observables]:
+        return observables_of(self.stepper, problem, state, self.threshold)
+
+
+def _missing() -> Exception:
+    return AssertionError("a test has neither ended nor failed")

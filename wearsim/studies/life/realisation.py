@@ -1,0 +1,177 @@
+"""Realisations of a study of lives: tests run to their limits, extended as far as needed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from wearsim.errors import failure_text
+from wearsim.evolution.limits import Limit
+from wearsim.results import Outcome
+from wearsim.results.ensemble.life_settings import LifeSettings
+from wearsim.scenario import Scenario
+from wearsim.studies.ensemble.batch import RealisationRun, batch_groups
+from wearsim.studies.ensemble.realisation import RealisationRunner, closed_form_depths, shared_grid
+from wearsim.studies.life.batch import LifeRun, observe_lives
+from wearsim.studies.life.factor import ExactFactor, exact_factor
+from wearsim.studies.run.draws import Drawer
+from wearsim.types import FloatArray, Grid
+
+EXTENSION = 4.0  # ratio of the lengths of successive attempts to reach a limit
+_SAMPLE = 256  # realisations from which the length of the first attempt is chosen
+_SHARE = 0.9  # of the realisations that reach their limit in it, by the closed form
+_MARGIN = 1.3
+
+
+def limits_of(scenario: Scenario) -> list[Limit]:
+    """Return the limits of a scenario, in the order of its table."""
+    limits = []
+    for key, value in scenario.limit.given.items():
+        name = key.replace("_", " ")
+        limits.append(Limit(name, value, name, scenario.outputs.width_threshold))
+    return limits
+
+
+def first_length(scenario: Scenario, fixed: Mapping[str, float], most: float) -> float:
+    """Return the passes of the first attempt to reach the limits.
+
+    For a limit of the depth of a cylinder, most realisations reach it then by the closed form of
+    full slip; for others it is a multiple of the length of the test in the scenario.
+    """
+    length = EXTENSION * float(scenario.total_passes)
+    limit = scenario.limit.depth
+    if limit is not None and scenario.cam is None:
+        drawer = Drawer(scenario, "monte-carlo")
+        columns = drawer.columns(0, _SAMPLE)
+        columns |= {key: np.full(_SAMPLE, value) for key, value in fixed.items()}
+        with np.errstate(divide="ignore", invalid="ignore"):
+            depths = closed_form_depths(scenario, columns, _SAMPLE)
+            reached = scenario.total_passes * (limit / depths) ** 1.5
+        if np.isfinite(reached).all():
+            length = _MARGIN * float(np.quantile(reached, _SHARE))
+    return float(min(max(math.ceil(length), 1.0), most))
+
+
+def with_length(scenario: Scenario, passes: float) -> Scenario:
+    """Return a scenario whose test has a number of roller passes."""
+    return scenario.changed({"operation.passes": round(passes)})
+
+
+class LevelRunner(RealisationRunner):
+    """Runs of one length, with the wear factor of the study."""
+
+    def __init__(
+        self, scenario: Scenario, total: int, grid: Grid, fixed: Mapping[str, float]
+    ) -> None:
+        super().__init__(scenario, "monte-carlo", total, grid)
+        self.fixed = dict(fixed)
+
+    @cached_property
+    def drawer(self) -> Drawer:
+        """Sampler of the random inputs."""
+        return Drawer(self.scenario, "monte-carlo", self.total, fixed=self.fixed)
+
+
+class LifeRunner(RealisationRunner):
+    """Lives of realisations of a scenario by number; can be sent to another process.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        With limits.
+    total : int
+        Realisations of the whole study.
+    grid : Grid
+        Strips of the stored profiles.
+    settings : LifeSettings
+    base : float
+        Passes of the first attempt to reach a limit.
+    """
+
+    def __init__(
+        self, scenario: Scenario, total: int, grid: Grid, settings: LifeSettings, base: float
+    ) -> None:
+        super().__init__(scenario, "monte-carlo", total, grid)
+        self.settings, self.base = settings, base
+        self._levels: dict[int, LevelRunner] = {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the attributes to be sent, without those that each process derives from them."""
+        kept = super().__getstate__()
+        kept.pop("factor", None)
+        return {**kept, "_levels": {}}
+
+    @cached_property
+    def factor(self) -> ExactFactor | None:
+        """Wear factor that is integrated exactly."""
+        return exact_factor(self.scenario)[0] if self.settings.factor else None
+
+    @property
+    def fixed(self) -> dict[str, float]:
+        """Wear factor with which the tests are run."""
+        settings = self.settings
+        return {settings.factor: settings.reference} if settings.factor else {}
+
+    @property
+    def longest(self) -> float:
+        """Passes up to which tests are run."""
+        if self.factor is None:
+            return self.settings.most
+        return math.ceil(self.settings.most * self.factor.greatest / self.settings.reference)
+
+    def __call__(self, numbers: Sequence[int]) -> list[Outcome]:
+        """Run realisations to their limits; the outcome of one that fails holds its error.
+
+        A test that ends before its limit is repeated four times as long, so that its result does
+        not depend on other realisations.
+        """
+        outcomes: dict[int, Outcome] = {}
+        level, left = 0, list(numbers)
+        while left:
+            left, level = self._attempt(level, left, outcomes), level + 1
+        return [outcomes[number] for number in numbers]
+
+    def _attempt(self, level: int, numbers: list[int], outcomes: dict[int, Outcome]) -> list[int]:
+        """Run realisations of one length; return those that need a longer test."""
+        runner, runs, left = self._level(level), [], []
+        limits = limits_of(self.scenario)
+        for number in numbers:
+            drawn: dict[str, float | FloatArray] = {}
+            try:
+                runs.append(runner.prepare(number, drawn))
+            except Exception as error:  # an error fails this realisation only
+                outcomes[number] = Outcome(number=number, values=drawn, error=failure_text(error))
+        last = runner.scenario.total_passes >= self.longest
+        for group in batch_groups(runs):
+            for run, found in zip(group, observe_lives(group, limits), strict=True):
+                if isinstance(found, LifeRun) and not (found.reached or last):
+                    left.append(run.number)
+                else:
+                    outcomes[run.number] = self._life_outcome(run, found)
+        return sorted(left)
+
+    def _level(self, level: int) -> LevelRunner:
+        if level not in self._levels:
+            passes = min(self.base * EXTENSION**level, self.longest)
+            scenario = with_length(self.scenario, passes)
+            grid = shared_grid(scenario) if level else self.grid
+            self._levels[level] = LevelRunner(scenario, self.total, grid, self.fixed)
+        return self._levels[level]
+
+    def _life_outcome(self, run: RealisationRun, found: LifeRun | Exception) -> Outcome:
+        """Return the outcome of a realisation, with its life at the drawn wear factor."""
+        if isinstance(found, Exception):
+            return self.outcome(run, found)
+        scalars, scale, score_mean = dict(found.scalars), 1.0, 0.0
+        if self.factor is not None:
+            scale = self.settings.reference / float(run.drawn[self.settings.factor])
+            score_mean = self.factor.score_mean(self._levels[0].drawer, run.number)
+        for name in ("life", "life_low", "life_high"):
+            scalars[name] *= scale
+        scalars |= {"score_mean": score_mean, "log_weight": 0.0}
+        return self.outcome(run, replace(found, scalars=scalars))
