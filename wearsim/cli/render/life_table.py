@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import typer
 
-from wearsim.cli.render.summary import Rows, input_rows
 from wearsim.cli.shared import write_list, write_table
+from wearsim.report.summary import Rows, input_rows
 from wearsim.report.text import NOTHING, count, lapse, part_with_interval, shown, too_few
 from wearsim.results.ensemble.life import LifeResult
 from wearsim.results.ensemble.life_settings import LifeComparison
