@@ -12,7 +12,7 @@ from wearsim import load_scenario, run
 from wearsim.report.text import OBSERVABLES as LABELS
 from wearsim.report.text import si_key
 from wearsim.results.dissipation import VARIABLES as DISSIPATION
-from wearsim.results.ensemble.schema import ENSEMBLE, STATISTICS
+from wearsim.results.ensemble.schema import ENSEMBLE, LIFE, STATISTICS
 from wearsim.results.run_schema import ALL_VARIABLES as RUN
 from wearsim.scenario.examples import scenario_schema
 
@@ -70,7 +70,7 @@ def test_scenario_keys_of_the_glossary_exist():
 
 
 def test_file_variables_and_glossary_agree():
-    stored = {*RUN, *DISSIPATION, *ENSEMBLE.variables, "control"} - set(STATISTICS)
+    stored = {*RUN, *DISSIPATION, *ENSEMBLE.variables, *LIFE, "control"} - set(STATISTICS)
     stored -= {name for name in DISSIPATION if name.startswith("dissipation_")}
     assert stored == set(names("file variable"))
 

@@ -21,11 +21,16 @@ Ensembles
     ensemble(scenario, n, output)       run a wear test for each of n realisations
     resume_ensemble(file)               continue or extend an ensemble from its file
 
+Lives
+    life(scenario, n, output)           run n tests to the first limit that they reach
+    resume_life(file)                   continue or extend a study of lives from its file
+
 Results
     open_results(file)                  open a results file of any kind
     Result                              of a wear test: depth, profiles, normal_force, ...
     DissipationResult                   of a dissipation study: power, summaries, convergence
     EnsembleResult                      of an ensemble: estimate, course, band, sensitivity
+    LifeResult                          of a study of lives: b, survival, compare
     ContactSolution, ContactStudy       of one contact: dissipation, line_load, approach, ...
     CamStudy                            of a cam: kinematics, loads and contact at its stations
     to_dataframe(), to_xarray(), plot() of every result of a test or a study
@@ -113,6 +118,7 @@ if TYPE_CHECKING:
         open_ensemble,
         open_results,
     )
+    from wearsim.results.ensemble.life import LifeResult
     from wearsim.scenario import Scenario, load_scenario
     from wearsim.studies.cam.study import CamStudy, study_cam
     from wearsim.studies.contact.monte_carlo import dissipation
@@ -120,6 +126,7 @@ if TYPE_CHECKING:
     from wearsim.studies.ensemble.api import ensemble, resume_ensemble
     from wearsim.studies.ensemble.compare import compare
     from wearsim.studies.ensemble.sweep import sweep
+    from wearsim.studies.life.api import life, resume_life
     from wearsim.studies.run.run import resume, run
     from wearsim.types import ContactSolution, Profile
 
@@ -146,6 +153,7 @@ _NAMES = {
         "open_ensemble",
         "open_results",
     ],
+    "wearsim.results.ensemble.life": ["LifeResult"],
     "wearsim.scenario": ["Scenario", "load_scenario"],
     "wearsim.studies.cam.study": ["CamStudy", "study_cam"],
     "wearsim.studies.contact.monte_carlo": ["dissipation"],
@@ -153,6 +161,7 @@ _NAMES = {
     "wearsim.studies.ensemble.api": ["ensemble", "resume_ensemble"],
     "wearsim.studies.ensemble.compare": ["compare"],
     "wearsim.studies.ensemble.sweep": ["sweep"],
+    "wearsim.studies.life.api": ["life", "resume_life"],
     "wearsim.studies.run.run": ["resume", "run"],
     "wearsim.types": ["ContactSolution", "Profile"],
 }
@@ -165,18 +174,21 @@ __all__ = [
     "ContactStudy",
     "DissipationResult",
     "EnsembleResult",
+    "LifeResult",
     "Profile",
     "Result",
     "Scenario",
     "compare",
     "dissipation",
     "ensemble",
+    "life",
     "load_scenario",
     "open_dissipation",
     "open_ensemble",
     "open_results",
     "resume",
     "resume_ensemble",
+    "resume_life",
     "run",
     "solve_contact",
     "study_cam",

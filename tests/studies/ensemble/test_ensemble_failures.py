@@ -28,14 +28,14 @@ def test_only_failed_realisations_run_again(tmp_path, monkeypatch):
     from wearsim.studies.ensemble.realisation import RealisationRunner
 
     whole = ensemble(small(), 8, tmp_path / "whole.h5", **SERIAL)
-    run = RealisationRunner._prepare
+    run = RealisationRunner.prepare
 
     def failing(self, number, *rest):
         if number in {2, 5}:
             raise wearsim.errors.StepError("no step is short enough")
         return run(self, number, *rest)
 
-    monkeypatch.setattr(RealisationRunner, "_prepare", failing)
+    monkeypatch.setattr(RealisationRunner, "prepare", failing)
     path = tmp_path / "failing.h5"
     assert sorted(ensemble(small(), 8, path, **SERIAL).errors) == [2, 5]
     assert resume_ensemble(path, **SERIAL).failed == 2  # failed ones are run again on request only
@@ -45,7 +45,7 @@ def test_only_failed_realisations_run_again(tmp_path, monkeypatch):
             raise wearsim.errors.StepError("has been completed before")
         return run(self, number, *rest)
 
-    monkeypatch.setattr(RealisationRunner, "_prepare", failing_if_done_again)
+    monkeypatch.setattr(RealisationRunner, "prepare", failing_if_done_again)
     again = resume_ensemble(path, failed=True, **SERIAL)
     assert differences(again, whole) == []
 
@@ -55,14 +55,14 @@ def test_kill_during_repetition_of_failed_loses_nothing(tmp_path, monkeypatch):
 
     monkeypatch.setattr(ensemble_work.EnsembleWork, "_batch_size", lambda self: 1)
     whole = ensemble(small(), 6, tmp_path / "whole.h5", **SERIAL)
-    run = RealisationRunner._prepare
+    run = RealisationRunner.prepare
 
     def failing(self, number, *rest):
         if number in {2, 4}:
             raise wearsim.errors.StepError("no step is short enough")
         return run(self, number, *rest)
 
-    monkeypatch.setattr(RealisationRunner, "_prepare", failing)
+    monkeypatch.setattr(RealisationRunner, "prepare", failing)
     path = tmp_path / "failing.h5"
     ensemble(small(), 6, path, **SERIAL)
 
@@ -71,11 +71,11 @@ def test_kill_during_repetition_of_failed_loses_nothing(tmp_path, monkeypatch):
             raise SystemExit  # like a kill, nothing is written after it
         return run(self, number, *rest)
 
-    monkeypatch.setattr(RealisationRunner, "_prepare", killed)
+    monkeypatch.setattr(RealisationRunner, "prepare", killed)
     with pytest.raises(SystemExit):
         resume_ensemble(path, failed=True, **SERIAL)
     assert not open_ensemble(path).finished
-    monkeypatch.setattr(RealisationRunner, "_prepare", run)
+    monkeypatch.setattr(RealisationRunner, "prepare", run)
     assert differences(resume_ensemble(path, **SERIAL), whole) == []
 
 
@@ -84,17 +84,17 @@ def test_repeated_realisations_count_for_the_target(tmp_path, monkeypatch):
 
     monkeypatch.setattr("wearsim.studies.ensemble.designs.FIRST_ANALYSIS", 32)
     whole = ensemble(small(), 90, tmp_path / "whole.h5", precision="depth.mean 8%", **SERIAL)
-    run = RealisationRunner._prepare
+    run = RealisationRunner.prepare
 
     def failing(self, number, *rest):
         if number % 9 == 0:
             raise wearsim.errors.StepError("no step is short enough")
         return run(self, number, *rest)
 
-    monkeypatch.setattr(RealisationRunner, "_prepare", failing)
+    monkeypatch.setattr(RealisationRunner, "prepare", failing)
     path = tmp_path / "failing.h5"
     ensemble(small(), 90, path, precision="depth.mean 8%", **SERIAL)
-    monkeypatch.setattr(RealisationRunner, "_prepare", run)
+    monkeypatch.setattr(RealisationRunner, "prepare", run)
     again = resume_ensemble(path, failed=True, **SERIAL)
     estimate = again.estimate("depth").mean
     assert again.finished
@@ -124,12 +124,12 @@ def test_nonfinite_value_fails_one_realisation_only(tmp_path, monkeypatch):
 def test_unexpected_error_fails_one_realisation_only(tmp_path, monkeypatch):
     from wearsim.studies.ensemble.realisation import RealisationRunner
 
-    run = RealisationRunner._prepare
+    run = RealisationRunner.prepare
 
     def failing(self, number, *rest):
         return run(self, number, *rest) if number != 1 else 1 / 0
 
-    monkeypatch.setattr(RealisationRunner, "_prepare", failing)
+    monkeypatch.setattr(RealisationRunner, "prepare", failing)
     result = ensemble(small(), 3, tmp_path / "e.h5", **SERIAL)
     assert result.errors == {1: "ZeroDivisionError: division by zero"}
 

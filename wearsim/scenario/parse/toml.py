@@ -282,9 +282,7 @@ def parse_fields(
     tables = of_follower(data)
     sections = {table: _read_table(mistakes, table, tables) for table in TABLES}
     assemble_cam(mistakes, sections)
-    check_lists(mistakes, data)
-    if sections["limit"] and sections["limit"].lift_error and not data.get("cam"):
-        mistakes.add("limit", "lift_error", "is a quantity of cams", None, "depth or clearance")
+    check_lists(mistakes, data, sections["limit"])
     check_correlation(mistakes, sections["sampling"])
     mistakes.raise_any()
     random = tuple(mistakes.random_inputs)

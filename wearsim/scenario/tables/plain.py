@@ -283,8 +283,15 @@ def read_outputs(mistakes: Mistakes, raw: Mapping[str, object]) -> OutputsTable 
     return validate(mistakes, OutputsTable, raw, "outputs")
 
 
-def check_lists(mistakes: Mistakes, data: Mapping[str, Any]) -> None:
-    """Add a mistake for each list of the tables `data` without one value per roller."""
+def check_lists(
+    mistakes: Mistakes, data: Mapping[str, Any], limits: LimitTable | None = None
+) -> None:
+    """Add a mistake for each list of the tables `data` without one value per roller.
+
+    A limit of the lift error is one without a cam.
+    """
+    if limits and limits.lift_error and "cam" not in data:
+        mistakes.add("limit", "lift_error", "is a quantity of cams", None, "depth or clearance")
     tables = {table: keys for table, keys in data.items() if isinstance(keys, dict)}
     rollers = tables.get("operation", {}).get("rollers", 1)
     for table, key in (("roller", "offset"), ("creepage", "yaw"), ("creepage", "tilt")):

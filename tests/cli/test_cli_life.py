@@ -1,0 +1,144 @@
+"""The command `wearsim life`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from cli_examples import Command
+
+from tests.studies.life.test_life import design
+from wearsim.results import open_results
+from wearsim.results.ensemble.life import LifeResult
+
+HERE = ("--scheduler", "serial", "-q")
+
+
+@pytest.fixture
+def slim(tmp_path: Path) -> Path:
+    """A scenario with a limit."""
+    path = tmp_path / "slim.toml"
+    path.write_text(design().text)
+    return path
+
+
+@pytest.fixture
+def wide(tmp_path: Path) -> Path:
+    """The same with a wider crown."""
+    path = tmp_path / "wide.toml"
+    path.write_text(design(roller__crown_radius="600 mm").text)
+    return path
+
+
+def life_of(command: Command, *words: object) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(command("life", *words, "--json", *HERE).stdout)
+    return found
+
+
+def test_json_has_the_life_of_a_design(command: Command, slim: Path) -> None:
+    found = life_of(command, slim, "-n", 10, "--target", 1000, "--b", "10,50")
+    assert (found["unit"], found["realisations"], found["censored"], found["failed"]) == (
+        "passes",
+        10,
+        0,
+        0,
+    )
+    assert found["b"].keys() == {"10", "50"}
+    for life in found["b"].values():
+        assert life["low"] < life["value"] < life["high"]
+        assert life["numerical_low"] < life["value"] < life["numerical_high"]
+    probability = found["probability_before_target"]
+    assert 0.0 < probability["low"] < probability["value"] < probability["high"] < 1.0
+    assert found["first_limits"] == {"depth": 1.0}
+    assert {fit["family"] for fit in found["fits"]} == {"log-normal", "Weibull"}
+
+
+def test_two_designs_are_compared(command: Command, slim: Path, wide: Path) -> None:
+    found = life_of(command, wide, slim, "-n", 8)
+    assert found["labels"] == ["wide", "slim"]
+    for name in ("b10_ratio", "same_machine", "two_specimens"):
+        assert found[name]["low"] <= found[name]["value"] <= found[name]["high"]
+    assert found["b10_ratio"]["value"] == pytest.approx((6.0 / 5.0) ** 0.5, rel=0.02)
+    again = life_of(command, "wide-life.h5", "slim-life.h5")
+    assert again["b10_ratio"] == found["b10_ratio"]
+    text = command("life", "wide-life.h5", "slim-life.h5", *HERE).stdout
+    assert "wide outlives slim on 100.0 %" in " ".join(text.split())
+    assert "a specimen of wide outlives a specimen of slim" in " ".join(text.split())
+
+
+def test_table_states_limits_and_reason(command: Command, slim: Path) -> None:
+    logged = ("--set", "evolution.stepper=per-pass", "--set", "limit.depth=1 um")
+    text = command("life", slim, "-n", 2, *logged, *HERE).stdout
+    assert "depth 1.000 um" in text
+    assert "lives are counted: every pass is solved separately" in text
+    assert "too few lives" in text
+
+
+def test_sweep_compares_with_the_first_value(command: Command, slim: Path) -> None:
+    done = command("life", slim, "-n", 6, "--sweep", "roller.crown_radius=500mm,600mm", *HERE)
+    assert "500 mm has" in " ".join(done.stdout.split())
+    assert sorted(path.name for path in Path().glob("*.h5")) == [
+        "slim-life-500mm.h5",
+        "slim-life-600mm.h5",
+    ]
+
+
+def test_file_answers_another_target(command: Command, slim: Path) -> None:
+    command("life", slim, "-n", 6, "-o", "one.h5", *HERE)
+    one, other = (
+        life_of(command, "one.h5", "--target", target)["probability_before_target"]["value"]
+        for target in ("1000", "40 s")
+    )
+    assert 0.0 < one < other
+
+
+def test_extended_study_is_resumed(command: Command, slim: Path) -> None:
+    command("life", slim, "-n", 4, "-o", "one.h5", *HERE)
+    command("resume", "one.h5", "-n", 6, *HERE)
+    result = open_results("one.h5")
+    assert isinstance(result, LifeResult)
+    assert result.count == 6
+    assert "B10" in command("resume", "one.h5", *HERE).stdout
+
+
+def test_figure_is_written(command: Command, slim: Path, wide: Path) -> None:
+    command("life", wide, slim, "-n", 8, "--figure", "lives.png", *HERE)
+    assert Path("lives.png").stat().st_size > 20_000
+    command("plot", "slim-life.h5", "-o", "one.svg")
+    assert Path("one.svg").is_file()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--limit", "dept=5um"], "is not a limit"),
+        (["--limit", "depth=-5um"], "must be above zero"),
+        (["--limit", "lift_error=5um"], "is a quantity of cams"),
+        (["--target", "5 kg"], "is not a life"),
+        (["--target", "1e9", "--max", "1e6"], "beyond the maximum"),
+        (["--b", "10,x"], "is not a list of percentages"),
+        (["--precision", "depth"], "cannot read the target"),
+    ],
+)
+def test_bad_input_has_exit_code_2(
+    command: Command, slim: Path, words: list[str], message: str
+) -> None:
+    done = command("life", slim, *words, *HERE)
+    assert done.exit_code == 2
+    assert message in " ".join(done.output.split())
+    assert not list(Path().glob("*.h5"))
+
+
+def test_limit_that_is_never_reached_is_stated(command: Command, slim: Path) -> None:
+    done = command("life", slim, "-n", 3, "--limit", "depth=5mm", "--max", "3000", *HERE)
+    text = " ".join(done.output.split())
+    assert "3 censored at 3,000 passes" in text
+    assert "B50 above 3,000" in text
+
+
+def test_all_failed_has_exit_code_1(command: Command, slim: Path) -> None:
+    done = command("life", slim, "-n", 3, "--set", "evolution.max_steps=2", *HERE)
+    assert done.exit_code == 1
+    assert "all realisations failed" in done.output
