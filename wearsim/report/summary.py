@@ -48,6 +48,7 @@ def end_state(result: Result) -> Rows:
         ("peak pressure", _by_roller(result.peak_pressure[-1], "MPa")),
         ("worn descent", _by_roller(result.descent[-1], "um")),
         ("elastic approach", _by_roller(result.elastic_approach[-1], "um")),
+        *_of_cam(result),
     ]
     if result.stepper == "per-pass":
         return [*rows, ("error of depth", "no stepping error: every roller pass is solved")]
@@ -56,6 +57,28 @@ def end_state(result: Result) -> Rows:
     depth = float(max(np.max(result.depth[-1]), np.max(result.roller_depth[-1])))
     part = f", {shown(error / depth, '%', 2)}" if depth > 0.0 else ""
     return [*rows, ("estimated error of depth", f"{shown(error, 'um', 2)}{part}")]
+
+
+def _of_cam(result: Result) -> Rows:
+    """Return rows on angles and lift error of a cam; none of a cylinder."""
+    final = result.final
+    if "turns" not in final:
+        return []
+    angles = {name: _by_roller(final[f"{name}_rad"], "deg") for name in _CAM_ANGLES}
+    return [
+        ("turns of the cam", f"{float(np.max(final['turns'])):,.0f}"),
+        ("angle of the depth", angles["depth_angle"]),
+        ("angle of the peak pressure", angles["peak_pressure_angle"]),
+        ("lift error, peak to peak", _by_roller(final["lift_error_m"], "um")),
+        ("least wear of the lift", f"at {angles['lift_error_greatest_at']}"),
+        ("greatest wear of the lift", f"at {angles['lift_error_smallest_at']}"),
+    ]
+
+
+_CAM_ANGLES = (
+    *("depth_angle", "peak_pressure_angle"),
+    *("lift_error_greatest_at", "lift_error_smallest_at"),
+)
 
 
 def draws(result: Result) -> Rows:

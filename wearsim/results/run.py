@@ -324,7 +324,9 @@ class Result(StudyResult[RunData]):
         curve = self.raw.records["lift_error_curve"][-1].mean(axis=(1, 2))
         worst = self.raw.history["peak_pressure"][-1].argmax(axis=0)[None]
         places = last["peak_pressure_angle"]
-        dwell = curve[int(np.argmax(self.raw.static["station_weight"]))]
+        numbers = self.raw.static["station_segment"].tolist()
+        dwells = [k for k, number in enumerate(numbers) if numbers.count(number) == 1]
+        dwell = curve[dwells[0] if dwells else 0]  # a dwell has one station
         return {
             "turns": _number(last["turns"]),
             "depth_angle_rad": _number(last["depth_angle"]),

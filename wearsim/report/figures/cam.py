@@ -9,11 +9,11 @@ from matplotlib.figure import Figure
 from wearsim.mechanics.cam import Motion, Stations, surface_points
 from wearsim.report.parts import BLUE, GREEN, GREY, ORANGE, RED, name_axes, titled_figure
 from wearsim.report.text import PER_SI
-from wearsim.studies.cam.study import CamStudy
+from wearsim.studies.cam.study import CamStudy, peak_pressures
 from wearsim.studies.cam.turn import CamTurn, Point
 from wearsim.types import FloatArray
 
-MM, DEG = PER_SI["mm"], PER_SI["deg"]
+MM, DEG, MPA = PER_SI["mm"], PER_SI["deg"], PER_SI["MPa"]
 _SAMPLES = 121  # of a panel
 
 
@@ -65,8 +65,9 @@ def cam_figure(study: CamStudy, title: str) -> Figure:
         axes.plot(angle, fine.normal_force, color=BLUE)
         axes.plot(study.point.angle * DEG, study.point.normal_force, ".", color=BLUE, ms=4.0)
         name_axes(axes, "normal force, and peak pressure", "angle [deg]", "normal force [N]")
-        peak = study.peak_pressure * PER_SI["MPa"]
-        _second(axes, study.point.angle * DEG, peak, "peak pressure [MPa]", ".")
+        curve = peak_pressures(turn.scenario, fine)
+        other = _second(axes, *broken(angle, curve * MPA), "peak pressure [MPa]")
+        other.plot(study.point.angle * DEG, study.peak_pressure * MPA, ".", color=ORANGE, ms=4.0)
         for name in ("motion", "pressure", "speed", "load"):
             name_segments(panels[name], turn.cam.motion, names=name in {"motion", "load"})
         for skid in study.skids:
@@ -75,15 +76,18 @@ def cam_figure(study: CamStudy, title: str) -> Figure:
     return figure
 
 
-def _second(
-    axes: Axes, angle: FloatArray, values: FloatArray, label: str, style: str = "-"
-) -> None:
-    """Draw values on a second axis at the right."""
+def _second(axes: Axes, angle: FloatArray, values: FloatArray, label: str) -> Axes:
+    """Draw values on a second axis at the right, and return it."""
     other = axes.twinx()
-    other.plot(angle, values, style, ms=4.0, color=ORANGE)
+    other.plot(angle, values, color=ORANGE, ls=(0, (4, 2)))  # may coincide with the first
+    low, high = np.nanmin(values), np.nanmax(values)
+    if high - low <= 1e-6 * abs(high):  # constant but for rounding
+        around = 0.2 * abs(high) or 1.0
+        other.set_ylim(low - around, high + around)
     other.set_ylabel(label, color=ORANGE)
     other.spines["right"].set_visible(True)
     other.grid(visible=False)
+    return other
 
 
 def name_segments(axes: Axes, motion: Motion, *, names: bool) -> None:
@@ -124,5 +128,5 @@ def draw_shape(axes: Axes, turn: CamTurn, point: Point) -> None:
     axes.plot(*(base * MM), color=GREY, lw=0.6, ls=":", label="base circle")
     axes.plot(0.0, 0.0, "+", color="black", ms=8.0)
     axes.set_aspect("equal")
-    axes.legend(loc="upper left")
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=2)
     name_axes(axes, "cam", "x [mm]", "y [mm]")

@@ -26,7 +26,7 @@ from wearsim.types import FloatArray
 
 UM, MM, DEG = PER_SI["um"], PER_SI["mm"], PER_SI["deg"]
 _MAGNIFIED = 0.2  # greatest depth in the drawing of the worn cam, of the base radius
-_SAMPLES = 25  # of a panel between its stations
+_SAMPLES = 97  # of a panel between its stations
 
 
 def cam_run_figure(result: Result, measured: tuple[Measured, ...] = ()) -> Figure:
@@ -57,6 +57,7 @@ def cam_run_figure(result: Result, measured: tuple[Measured, ...] = ()) -> Figur
         _draw_shape(panels["shape"], turn, stations, depth)
         _draw_lift(panels["lift"], turn, stations, result, colours)
         draw_depth(panels["depth"], result)
+        panels["depth"].legend(loc="lower right")
         _draw_groove(panels["groove"], result, depth, colours)
         draw_measured(panels["groove"], measured)
         _draw_roller(panels["roller"], result, colours)
@@ -85,12 +86,13 @@ def _draw_map(
     angle, values = stations.values_at(depth, _SAMPLES)
     worn = values.max(axis=0) > 0.0
     extent = y[worn] if worn.any() else y
+    values = np.maximum(values, 0.0)  # interpolation overshoots next to an edge
     mesh = axes.pcolormesh(angle * DEG, y * MM, values.T * UM, shading="nearest", cmap="magma_r")
     mesh.set_rasterized(True)
     axes.set_ylim(1.05 * extent[0] * MM, 1.05 * extent[-1] * MM)
     axes.grid(visible=False)
     figure.colorbar(mesh, ax=axes, label="depth [um]", pad=0.01, aspect=30)
-    name_axes(axes, "Worn depth of the cam", "angle [deg]", "y [mm]")
+    name_axes(axes, "Worn depth of the cam", "angle [deg]", "y across the track [mm]")
     name_segments(axes, turn.cam.motion, names=True)
 
 
@@ -115,7 +117,7 @@ def _draw_shape(axes: Axes, turn: CamTurn, stations: Stations, depth: FloatArray
         axes.plot([0.0, edge[0]], [0.0, edge[1]], color=GREY, lw=0.6, ls=":")
     axes.plot(0.0, 0.0, "+", color="black", ms=8.0)
     axes.set_aspect("equal")
-    axes.legend(loc="upper left")
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2)
     name_axes(axes, "Worn cam", "x [mm]", "y [mm]")
 
 

@@ -182,6 +182,13 @@ def study_cam(
     )
 
 
+def peak_pressures(scenario: Scenario, point: Point) -> FloatArray:
+    """Return the peak pressure of the fresh contact after Hertz, shape (points,) [Pa]."""
+    loads = point.normal_force.tolist()
+    each = zip(loads, point.kinematics.relative_curvature.tolist(), strict=True)
+    return np.array([fresh_patch(scenario, load, curve).peak_pressure for load, curve in each])
+
+
 def _fresh_problem(scenario: Scenario, turn: CamTurn, angles: FloatArray | None) -> WearProblem:
     grid = contact_grid(scenario, turn.normal_range[1])
     return build_problem(scenario, prepared_model(scenario, grid), grid, {}, angles=angles)

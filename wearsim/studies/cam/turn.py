@@ -384,7 +384,8 @@ class CamTurn:
         """Return an angle and its segment in words."""
         motion = self.cam.motion
         number = int(motion.segment_at(np.array([theta]))[0])
-        return f"{math.degrees(theta) % 360.0:.4g} deg, {motion.segment_label(number)}"
+        degrees = round(math.degrees(theta), 4) % 360.0
+        return f"{degrees:.4g} deg, {motion.segment_label(number)}"
 
 
 @lru_cache(maxsize=16)

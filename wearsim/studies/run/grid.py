@@ -10,6 +10,7 @@ import numpy as np
 from wearsim.errors import Mistake, ScenarioError
 from wearsim.scenario import Scenario
 from wearsim.scenario.tables.plain import DEFAULT_TOLERANCE
+from wearsim.studies.cam.turn import turn_of
 from wearsim.studies.run.draws import Draws
 from wearsim.studies.run.groove import fresh_patch, predicted_half_width, widest_patch
 from wearsim.studies.run.inputs import OFFSET, TILT, contact_inputs, load_range
@@ -178,7 +179,7 @@ def strips_of_run(draws: Draws) -> Grid:
         return roller_grid(scenario, choice.strips or strips_of_roller(scenario, least, load))
     width = choice.width if choice.width is not None else 2.0 * half
     resolved = 0.0
-    if scenario.cam is not None:  # it has many contacts
+    if scenario.cam is not None and turn_of(scenario).stations.count > 1:  # many contacts
         resolved = predicted_half_width(draws, load, full_slip=False)
     strips = choice.strips or strips_over(width, patch.b, scenario.evolution.tolerance, resolved)
     if width < 2.0 * (shift + patch.b):
