@@ -54,7 +54,7 @@ def alternatives_of(name: str) -> list[tuple[str, str, str]]:
 def with_alternative(name: str, table: str, line: str, remark: str) -> str:
     """Return a starter scenario with one alternative applied according to its remark."""
     replaced = re.findall(r"instead of (\w+)", remark)
-    companions = re.findall(r'with (\w+ = "[^"]+")', remark)
+    companions = re.findall(r'with (\w+ = (?:"[^"]+"|[0-9.]*[0-9]))', remark)
     added = [line, *companions]
     removed = {*replaced, *(item.split(" = ")[0] for item in added)}
     lines, here = [], ""
