@@ -189,6 +189,12 @@ def test_winding_number_and_sweeps():
     assert study.harmonic_limit is None
 
 
+def test_harmonic_limit_is_that_at_the_depth_limit():
+    whole, half = (study_cam(cam("eccentric", limit={"depth": d})) for d in ("50 um", "25 um"))
+    assert whole.harmonic_limit == study_cam(cam("eccentric")).harmonic_limit
+    assert half.harmonic_limit > 1.4 * whole.harmonic_limit
+
+
 def test_harmonic_limit_of_the_cycloidal_cam():
     turn = turn_of(cam())
     least, omega = turn.normal_range[0], turn.speed

@@ -17,8 +17,7 @@ HARMONIC_DEPTH = 50e-6  # m, worn depth at which the harmonic limit is given wit
 
 def harmonic_depth(turn: CamTurn) -> float:
     """Return the worn depth at which the harmonic limit is given: the depth limit, if any [m]."""
-    limit = getattr(turn.scenario, "limit", None)
-    return float(getattr(limit, "depth", None) or HARMONIC_DEPTH)
+    return turn.scenario.limit.depth or HARMONIC_DEPTH
 
 
 def harmonic_limit(turn: CamTurn, depth: float) -> float | None:

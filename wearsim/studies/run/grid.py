@@ -181,6 +181,8 @@ def strips_of_run(draws: Draws) -> Grid:
     resolved = 0.0
     if scenario.cam is not None and turn_of(scenario).stations.count > 1:  # many contacts
         resolved = predicted_half_width(draws, load, full_slip=False)
+        depth = scenario.limit.depth or math.inf
+        resolved = min(resolved, math.sqrt(2.0 * scenario.roller.crown_radius * depth))
     strips = choice.strips or strips_over(width, patch.b, scenario.evolution.tolerance, resolved)
     if width < 2.0 * (shift + patch.b):
         raise ScenarioError(
