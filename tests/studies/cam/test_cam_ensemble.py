@@ -30,7 +30,7 @@ def runner(name: str, **changes: str) -> RealisationRunner:
 @pytest.mark.parametrize("name", ["cycloidal", "swinging"])
 def test_cam_in_a_batch_equals_the_cam_alone(name):
     run = runner(name)
-    groups = batch_groups([run._prepare(number, {}) for number in range(3)])
+    groups = batch_groups([run.prepare(number, {}) for number in range(3)])
     assert [len(group) for group in groups] == [3]
     together = run(range(3))
     for number, outcome in enumerate(together):
@@ -42,5 +42,5 @@ def test_cam_in_a_batch_equals_the_cam_alone(name):
 
 def test_cams_with_other_skids_are_stepped_alone():
     run = runner("cycloidal", **{'inertia = "2.94e-5 kg m^2"': 'inertia = "3e-3 kg m^2"'})
-    groups = batch_groups([run._prepare(number, {}) for number in range(3)])
+    groups = batch_groups([run.prepare(number, {}) for number in range(3)])
     assert [len(group) for group in groups] == [1, 1, 1]
