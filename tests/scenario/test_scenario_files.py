@@ -40,6 +40,7 @@ def test_rig_has_the_corrected_radii() -> None:
     assert rig.rolling_speed == pytest.approx(2.618, abs=5e-4)
     assert rig.wear is not None
     assert rig.wear.options.model_dump() == {
+        "factor": 1.0,
         "cylinder": {"k_over_h": 1.1e-11},
         "roller": {"k_over_h": 0.0},
     }

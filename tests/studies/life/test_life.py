@@ -17,9 +17,10 @@ from wearsim.results import open_results, read_ensemble
 from wearsim.results.ensemble.life import LifeResult
 from wearsim.scenario import Scenario
 from wearsim.studies.ensemble.api import resume_ensemble
-from wearsim.studies.life.api import life, parse_life, resume_life
+from wearsim.studies.life.api import life, resume_life
 from wearsim.studies.life.factor import exact_factor
 from wearsim.studies.life.realisation import LifeRunner
+from wearsim.studies.life.settings import parse_life
 from wearsim.studies.run.run import run
 
 LOAD = {"distribution": "lognormal", "median": "300 N", "factor": 1.1}
@@ -311,3 +312,49 @@ def test_lives_are_read_in_passes_and_time() -> None:
     assert parse_life("200 h", "turns", 16.0, "target") == 200 * 3600 * 16.0
     assert parse_life("5e6 turns", "turns", 16.0, "target") == 5e6
     assert parse_life(675000, "passes", 50.0, "target") == 675000.0
+
+
+def test_rare_end_of_life_agrees_with_the_exact_factor(tmp_path: Path, exact: LifeResult) -> None:
+    scenario = design(wear__roller__k_over_h={**LOGNORMAL, "median": "1e-20 1/Pa"})
+    found = lives(tmp_path / "rare.h5", scenario, 40, target=250, rare=600)
+    rare = found.rare
+    assert found.count == 40
+    assert rare is not None
+    assert rare.is_reliable
+    many = lives(tmp_path / "many.h5", count=200, target=250).probability_before(250.0)
+    assert many.value < 2e-3
+    assert rare.probability.low < many.high
+    assert rare.probability.high > many.low
+    assert rare.variation < 0.25
+
+
+def test_stopped_rare_events_continue_bit_for_bit(tmp_path: Path) -> None:
+    scenario = design(wear__roller__k_over_h={**LOGNORMAL, "median": "1e-20 1/Pa"})
+    whole = lives(tmp_path / "whole.h5", scenario, 20, target=250, rare=200)
+    path, calls = tmp_path / "stopped.h5", []
+
+    def stop() -> bool:
+        calls.append(1)
+        return len(read_ensemble(path).status) > 80 and len(calls) % 2 == 0
+
+    with pytest.raises(Interrupted):
+        lives(path, scenario, 20, target=250, rare=200, stop_requested=stop)
+    assert not read_ensemble(path).finished
+    result = resume_life(path, scheduler="serial")
+    assert differences(result, whole) == []
+    assert result.rare == whole.rare
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"rare": 200}, "need a target"),
+        ({"rare": 200, "target": 250}, "is integrated exactly"),
+        ({"rare": -5, "target": 250}, "is integrated exactly"),
+    ],
+)
+def test_rare_events_without_meaning_are_refused(
+    tmp_path: Path, options: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        lives(tmp_path / "bad.h5", **options)

@@ -148,3 +148,19 @@ def test_counted_quantile_of_a_bootstrap_is_that_of_numpy():
     lives = np.random.default_rng(4).random(57)
     ratio = quantile_ratio(CountedLives(lives), CountedLives(np.ones(57)), 0.1)
     assert ratio.value == pytest.approx(np.quantile(lives, 0.1), rel=1e-12)
+
+
+def test_designs_agree_with_twenty_thousand_lives_of_each():
+    first, second, _ = designs(400, 5)
+    score = score_function(LogNormal(1.0, 0.405))
+    pair = FactorMixture(second, score), FactorMixture(first, score)
+    one, other, factor = designs(20_000, 6)
+    many = CountedLives(other / factor), CountedLives(one / factor)
+    found = [two_specimens(*pair), quantile_ratio(*pair, 0.1)]
+    reference = [two_specimens(*many), quantile_ratio(*many, 0.1, samples=400)]
+    for estimate, truth in zip(found, reference, strict=True):
+        error = math.hypot(estimate.half_width, truth.half_width) / 1.96
+        assert abs(estimate.value - truth.value) < 3.0 * error
+    for design, counted in zip(pair, many, strict=True):
+        estimate, share = design.quantile(0.1), float(np.quantile(counted.life, 0.1))
+        assert abs(estimate.value - share) < 3.0 * estimate.half_width / 1.96 * 1.2

@@ -86,6 +86,16 @@ Precision = Annotated[
         show_default=False,
     ),
 ]
+Rare = Annotated[
+    int,
+    typer.Option(
+        min=0,
+        metavar="N",
+        help="Number of further tests for a small probability of a life before --target, by"
+        " importance sampling.",
+        show_default=False,
+    ),
+]
 Sweep = Annotated[
     str | None,
     typer.Option(
@@ -106,6 +116,7 @@ def life(
     b: Shares = "1,10,50",
     most: Most = None,
     precision: Precision = None,
+    rare: Rare = 0,
     output: Output = None,
     figure: FigureOption = None,
     workers: Workers = None,
@@ -117,7 +128,7 @@ def life(
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
-    """Return the life of a design until a limit is first reached, with its confidence."""
+    """Compute the life of a design until a limit is reached, and compare two designs."""
     check_figure(figure, force, "--figure")
     with checking("--b"):
         shares = _shares(b)
@@ -158,6 +169,7 @@ def life(
         "b": shares,
         "most": most,
         "precision": precision,
+        "rare": rare,
         "workers": workers,
         "scheduler": checked_scheduler(scheduler, workers),
         "force": force,
@@ -201,7 +213,7 @@ def _run(
     from wearsim.results import check_output
     from wearsim.studies.ensemble.sweep import path_of
     from wearsim.studies.kernels import kernels_of
-    from wearsim.studies.life import api
+    from wearsim.studies.life import api, settings
 
     several = len(scenarios) > 1
     base = output or Path(f"{scenarios[0].name}-life.h5")
@@ -217,14 +229,19 @@ def _run(
         refuse_same_file(figure, path, scenario.paths)
         check_output(path, options["force"], scenario.paths)
         with checking("--limit"):
-            checked.append(api.with_limits(scenario, options["limits"]))
+            checked.append(settings.with_limits(scenario, options["limits"]))
     for name, option in (("target", "--target"), ("most", "--max")):
         with checking(option):
             for scenario in checked:
-                chosen = {"target": None, "most": None, name: options[name]}
-                if name == "most":
-                    chosen["target"] = options["target"]
-                api.settings_of(scenario, realisations, chosen["target"], (10.0,), chosen["most"])
+                aim = options["target"]
+                most = options["most"] if name == "most" else None
+                settings.settings_of(scenario, realisations, aim, (10.0,), most)
+    with checking("--rare"):
+        for scenario in checked:
+            chosen = settings.settings_of(
+                scenario, realisations, options["target"], (10.0,), options["most"]
+            )
+            settings.with_rare_events(scenario, chosen, options["rare"], options["precision"])
     results = []
     for label, scenario, path in zip(labels, checked, paths, strict=True):
         if several and not quiet:
@@ -265,7 +282,7 @@ def _opened(path: Path, target: str | None, shares: tuple[float, ...]) -> LifeRe
     from wearsim.errors import ResultsFileError
     from wearsim.results import open_results
     from wearsim.results.ensemble.life import LifeResult
-    from wearsim.studies.life.api import parse_life
+    from wearsim.studies.life.settings import parse_life
 
     result = open_results(path)
     if not isinstance(result, LifeResult):

@@ -17,6 +17,7 @@ from wearsim.results.ensemble.life import LifeResult
 from wearsim.results.ensemble.life_settings import LifeComparison
 from wearsim.uq.estimation.intervals import Interval
 from wearsim.uq.survival.lives import least_survival
+from wearsim.uq.survival.rare_events import LEAST_SIZE, RareProbability
 
 _UNITS = {"m": "um", "m^3": "mm^3", "Pa": "MPa"}
 
@@ -98,6 +99,23 @@ def _write_lives(result: LifeResult) -> None:
     if target is not None:
         text = part_with_interval(result.probability_before(target))
         typer.echo(f"P(life < {count(target)} {result.unit}) = {_small(result, text)}")
+    if result.rare is not None:
+        typer.echo(_rare(result.rare))
+
+
+def _rare(found: RareProbability) -> str:
+    """Return a probability by importance sampling, or why there is none."""
+    size = f"effective sample size {found.effective_size or 0.0:.0f}"
+    if not found.is_reliable:
+        return (
+            f"by importance sampling: refused, {size} of {count(found.tests)} tests is below"
+            f" {LEAST_SIZE:.0f}; give a greater --rare"
+        )
+    chance = found.probability
+    return (
+        f"by importance sampling: {chance.value:.3g} [{chance.low:.2g}, {chance.high:.2g}],"
+        f" {count(found.tests)} tests, variation {shown(found.variation, '%', 2)}, {size}"
+    )
 
 
 def _small(result: LifeResult, text: str) -> str:
@@ -260,6 +278,7 @@ def life_json(result: LifeResult) -> dict[str, Any]:
         "finished": result.finished,
         "b": lives,
         "probability_before_target": probability,
+        "rare": _rare_json(result),
         "first_limits": result.first_limits,
         "angles_deg": {name: np.degrees(found) for name, found in result.angles.items()},
         "fits": [
@@ -285,6 +304,14 @@ def life_json(result: LifeResult) -> dict[str, Any]:
         "notes": list(result.notes),
         "warnings": list(result.warnings),
     }
+
+
+def _rare_json(result: LifeResult) -> dict[str, Any] | None:
+    found = result.rare
+    if found is None:
+        return None
+    known = asdict(found.probability) if found.is_reliable else None
+    return {**asdict(found), "probability": known, "refused": not found.is_reliable}
 
 
 def comparison_json(found: LifeComparison) -> dict[str, Any]:

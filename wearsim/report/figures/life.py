@@ -210,6 +210,7 @@ def _draw_tornado(
         high = np.array([ends[1] for ends in found.values()])
         axes.barh(places, high - low, height, left=low, color=colour, alpha=0.8, label=label)
     axes.axvline(1.0, color="0.3", lw=0.8)
+    axes.use_sticky_edges = False
     axes.margins(x=0.08)
     axes.set_yticks(range(len(names)), names)
     axes.invert_yaxis()

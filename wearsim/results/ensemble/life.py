@@ -346,13 +346,15 @@ class LifeResult(EnsembleResult):
     @property
     def rare(self) -> RareProbability | None:
         """Probability of a life before the target by importance sampling, if it was requested."""
-        weighted = self.raw.done[self.raw.done >= self.settings.plain]
-        if not len(weighted) or self.settings.target is None:
+        settings = self.settings
+        done = sum(stage["count"] for stage in settings.stages)
+        if settings.target is None or not settings.rare or done < settings.rare:
             return None
-        log_weight = self.raw.rows("log_weight", 0, None)
-        last = weighted[weighted >= self.raw.life.get("final", self.settings.plain)]
-        lives = self.raw.rows("life", 0, None)[last]
-        return weighted_probability(lives < self.settings.target, log_weight[last], len(weighted))
+        chosen = self.raw.done[self.raw.done >= settings.stages[-1]["first"]]
+        if not len(chosen):
+            return None
+        lives, weights = (self.raw.rows(name, 0, None)[chosen] for name in ("life", "log_weight"))
+        return weighted_probability(lives < settings.target, weights, settings.rare)
 
     def final_estimates(self) -> dict[str, Any]:
         """Return lives and estimates at their ends, as plain values."""

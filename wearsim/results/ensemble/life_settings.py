@@ -104,6 +104,11 @@ class LifeSettings:
         Whether nothing else is random.
     plain : int
         Number of realisations that are drawn without weights, the first ones.
+    rare : int
+        Number of further tests for the probability of a life before the target.
+    stages : tuple of dict
+        Of these tests: number of the first, their count and the shift of the normal scores of their
+        draws by name of the input.
     """
 
     most: float
@@ -118,6 +123,8 @@ class LifeSettings:
     spread: float
     alone: bool
     plain: int
+    rare: int = 0
+    stages: tuple[dict[str, Any], ...] = ()
 
 
 @dataclass(frozen=True)

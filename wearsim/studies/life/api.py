@@ -9,9 +9,7 @@ from typing import cast
 
 import numpy as np
 
-from wearsim.errors import Mistake, ResultsFileError, ScenarioError
-from wearsim.evolution.limits import OF_LIFE, Limit
-from wearsim.quantities import quantity
+from wearsim.errors import ResultsFileError
 from wearsim.results import (
     DISK,
     EnsembleData,
@@ -28,15 +26,13 @@ from wearsim.studies.ensemble.api import PRELOAD, Watcher, checked_request, ense
 from wearsim.studies.ensemble.driver import EnsembleWork
 from wearsim.studies.ensemble.realisation import shared_grid
 from wearsim.studies.execution.factory import executor
-from wearsim.studies.life.factor import exact_factor
+from wearsim.studies.execution.processes import Executor
+from wearsim.studies.life.rare import next_stage
 from wearsim.studies.life.realisation import LifeRunner, first_length, with_length
+from wearsim.studies.life.settings import SHARES, settings_of, with_limits, with_rare_events
 from wearsim.studies.preparation import changed_origins, check_plugins
 from wearsim.studies.progress import shown_progress
 from wearsim.types import FloatArray, Grid
-from wearsim.units import QuantityError
-
-SHARES = (1.0, 10.0, 50.0)
-LONGEST = 10.0  # default censoring over the target or the length of the test
 
 
 def life(
@@ -49,6 +45,7 @@ def life(
     b: Sequence[float] = SHARES,
     most: float | str | None = None,
     precision: str | None = None,
+    rare: int = 0,
     workers: int | None = None,
     scheduler: str = "processes",
     force: bool = False,
@@ -81,6 +78,9 @@ def life(
     precision : str, optional
         Target that ends the study early, such as "b10 3%": the relative half-width of the 95 %
         confidence interval.
+    rare : int
+        Number of further tests, 200 or more, for a small probability of a life before the target by
+        importance sampling; where the wear factor is integrated exactly, none are needed.
     workers, scheduler, force, progress, on_progress, stop_requested, on_notice, storage
         As in `ensemble`.
 
@@ -109,6 +109,7 @@ def life(
     scenario = with_limits(as_scenario(scenario), limits)
     aim = None if precision is None else LifeTarget.parse(precision)
     settings = settings_of(scenario, realisations, target, b, most)
+    settings = with_rare_events(scenario, settings, rare, precision)
     path = Path(f"{scenario.name}-life.h5") if output is None else Path(output)
     check_output(path, force, scenario.paths)
     runner, content = _prepared(scenario, settings, aim)
@@ -127,6 +128,7 @@ def life(
         runner.compile_kernels()
         work = EnsembleWork(file, runner, aim, pool, watch, stop_requested)
         work.finish()
+        _finish_stages(file, runner, pool, watch, stop_requested)
     return cast("LifeResult", open_ensemble(path))
 
 
@@ -174,10 +176,16 @@ def resume_life(
     if not data.life:
         raise ResultsFileError(f"{path}: holds no study of lives; resume_ensemble continues it")
     check_plugins(path, data)
-    if data.finished and realisations is None and not (failed and len(data.failed)):
-        return cast("LifeResult", open_ensemble(path))
+    before = LifeResult(data, path)
+    settings = before.settings
+    is_over = data.finished and next_stage(before) is None
+    if is_over and realisations is None and not (failed and len(data.failed)):
+        return before
     scenario = parse_scenario(data.scenario_text, data.scenario_file, data.files.__getitem__)
-    settings = LifeResult(data, path).settings
+    if realisations is not None and settings.rare:
+        raise ResultsFileError(
+            f"{path}: has tests for rare events after its realisations, and cannot be extended"
+        )
     total = settings.plain if realisations is None else realisations
     if total < settings.plain or (data.finished and not failed and total == settings.plain):
         raise ResultsFileError(
@@ -211,121 +219,30 @@ def resume_life(
             work.run_failed_again()
         else:
             work.finish()
+            _finish_stages(opened, runner, pool, watch, stop_requested)
     return cast("LifeResult", open_ensemble(path))
 
 
-def with_limits(scenario: Scenario, limits: Sequence[str]) -> Scenario:
-    """Return a scenario with limits added to its table [limit].
-
-    Raises
-    ------
-    ValueError
-        If one is not a limit of a life, or given twice.
-    ScenarioError
-        If there is none, or one is of no meaning for the scenario.
-    """
-    found: dict[str, str] = {}
-    for text in limits:
-        limit = Limit.parse(text)
-        if limit.quantity not in OF_LIFE:
-            raise ValueError(
-                f"'{text}' does not end a life, expected a limit of {', '.join(OF_LIFE)}; a time"
-                " after which lives are censored is the maximum"
-            )
-        if f"limit.{limit.key}" in found:
-            raise ValueError(f"'{text}': a limit of {limit.quantity} is given twice")
-        found[f"limit.{limit.key}"] = limit.text.removeprefix(limit.quantity).strip()
-    changed = scenario.changed(found) if found else scenario
-    if not changed.limit.given:
-        what, expected = "is needed for a life", 'one limit or more, such as depth = "50 um"'
-        raise ScenarioError(scenario.file, [Mistake("limit", "", what, "none", expected)])
-    return changed
-
-
-def settings_of(
-    scenario: Scenario,
-    realisations: int,
-    target: float | str | None,
-    shares: Sequence[float],
-    most: float | str | None,
-) -> LifeSettings:
-    """Return the settings of a study, with lives in roller passes; parameters as in `life`.
-
-    Raises
-    ------
-    ValueError
-        If a life or a percentage is invalid.
-    ScenarioError
-        If nothing is random.
-    """
-    cam = scenario.cam is not None
-    per_unit = float(scenario.operation.rollers) if cam else 1.0
-    rate, unit = scenario.pass_rate / per_unit, "turns" if cam else "passes"
-    aim = None if target is None else per_unit * parse_life(target, unit, rate, "target")
-    for share in shares:
-        if not 0.0 < share < 100.0:
-            raise ValueError(f"B{share:g} is not a life, expected percentages between 0 and 100")
-    if most is not None:
-        longest = per_unit * parse_life(most, unit, rate, "max")
-    else:
-        own = float(scenario.total_passes) if scenario.has_length else 0.0
-        longest = LONGEST * max(own, aim or 0.0)
-        if longest == 0.0:
-            raise ValueError(
-                "a maximum is needed at which lives are censored, such as 1e7, since the scenario"
-                " has no length"
-            )
-    span = scenario.load.build().span
-    if span is not None:  # the log cannot be extended
-        longest = min(longest, span[1] * scenario.pass_rate)
-    if aim is not None and aim > longest:
-        raise ValueError(
-            f"the target of {aim / per_unit:g} {unit} is beyond the maximum of"
-            f" {longest / per_unit:g} {unit}; give a greater maximum"
+def _finish_stages(
+    file: EnsembleFile,
+    runner: LifeRunner,
+    pool: Executor,
+    watch: Watcher | None,
+    stop_requested: Callable[[], bool] | None,
+) -> None:
+    """Run the tests for rare events that are left, stage by stage; raises as `EnsembleWork`."""
+    while stage := next_stage(LifeResult(file.data, file.path)):
+        stages = [*file.data.life["stages"], stage]
+        file.put_state(life={**file.data.life, "stages": stages})
+        file.grow(stage["first"] + stage["count"])
+        runner = LifeRunner(
+            runner.scenario,
+            len(file.status),
+            runner.grid,
+            replace(runner.settings, stages=tuple(stages)),
+            runner.base,
         )
-    if not scenario.has_length:
-        scenario = with_length(scenario, longest)
-    request = checked_request(scenario, realisations, "monte-carlo", None)
-    factor, reason = exact_factor(scenario)
-    alone = factor is not None and len(scenario.random) == 1
-    return LifeSettings(
-        most=longest,
-        unit=unit,
-        per_unit=per_unit,
-        rate=rate,
-        target=aim,
-        shares=tuple(map(float, shares)),
-        factor=factor.item.name if factor else "",
-        reason=reason,
-        reference=factor.reference if factor else 0.0,
-        spread=factor.spread if factor else 1.0,
-        alone=alone,
-        plain=1 if alone else request.realisations,
-    )
-
-
-def parse_life(value: float | str, unit: str, rate: float, what: str) -> float:
-    """Return a life in its unit, from a number, "5e6 turns" or a time such as "200 h".
-
-    Raises
-    ------
-    ValueError
-        If it cannot be read, or is not above zero.
-    """
-    text = str(value).strip()
-    try:
-        found = float(text.removesuffix(unit))
-    except ValueError:
-        try:
-            found = rate * quantity(text, "s")
-        except QuantityError as error:
-            raise ValueError(
-                f"{what} '{text}' is not a life, expected a number of {unit} such as 675000, or a"
-                " time such as '200 h'"
-            ) from error
-    if not 0.0 < found < np.inf:
-        raise ValueError(f"{what} '{text}' must be above zero")
-    return found
+        EnsembleWork(file, runner, None, pool, watch, stop_requested).finish()
 
 
 def _prepared(

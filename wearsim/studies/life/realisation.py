@@ -19,6 +19,7 @@ from wearsim.studies.ensemble.batch import RealisationRun, batch_groups
 from wearsim.studies.ensemble.realisation import RealisationRunner, closed_form_depths, shared_grid
 from wearsim.studies.life.batch import LifeRun, observe_lives
 from wearsim.studies.life.factor import ExactFactor, exact_factor
+from wearsim.studies.life.rare import log_weight
 from wearsim.studies.run.draws import Drawer
 from wearsim.types import FloatArray, Grid
 
@@ -66,15 +67,20 @@ class LevelRunner(RealisationRunner):
     """Runs of one length, with the wear factor of the study."""
 
     def __init__(
-        self, scenario: Scenario, total: int, grid: Grid, fixed: Mapping[str, float]
+        self,
+        scenario: Scenario,
+        total: int,
+        grid: Grid,
+        fixed: Mapping[str, float],
+        shift: Mapping[str, float],
     ) -> None:
         super().__init__(scenario, "monte-carlo", total, grid)
-        self.fixed = dict(fixed)
+        self.fixed, self.shift = dict(fixed), dict(shift)
 
     @cached_property
     def drawer(self) -> Drawer:
         """Sampler of the random inputs."""
-        return Drawer(self.scenario, "monte-carlo", self.total, fixed=self.fixed)
+        return Drawer(self.scenario, "monte-carlo", self.total, fixed=self.fixed, shift=self.shift)
 
 
 class LifeRunner(RealisationRunner):
@@ -98,7 +104,7 @@ class LifeRunner(RealisationRunner):
     ) -> None:
         super().__init__(scenario, "monte-carlo", total, grid)
         self.settings, self.base = settings, base
-        self._levels: dict[int, LevelRunner] = {}
+        self._levels: dict[tuple[int, int], LevelRunner] = {}
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the attributes to be sent, without those that each process derives from them."""
@@ -131,14 +137,20 @@ class LifeRunner(RealisationRunner):
         not depend on other realisations.
         """
         outcomes: dict[int, Outcome] = {}
-        level, left = 0, list(numbers)
-        while left:
-            left, level = self._attempt(level, left, outcomes), level + 1
+        ends = [stage["first"] for stage in self.settings.stages]
+        stages = np.searchsorted(ends, numbers, side="right")
+        for stage in np.unique(stages).tolist():
+            level = 0
+            left = [n for n, own in zip(numbers, stages.tolist(), strict=True) if own == stage]
+            while left:
+                left, level = self._attempt(level, stage, left, outcomes), level + 1
         return [outcomes[number] for number in numbers]
 
-    def _attempt(self, level: int, numbers: list[int], outcomes: dict[int, Outcome]) -> list[int]:
-        """Run realisations of one length; return those that need a longer test."""
-        runner, runs, left = self._level(level), [], []
+    def _attempt(
+        self, level: int, stage: int, numbers: list[int], outcomes: dict[int, Outcome]
+    ) -> list[int]:
+        """Run realisations of one length and stage; return those that need a longer test."""
+        runner, runs, left = self._level(level, stage), [], []
         limits = limits_of(self.scenario)
         for number in numbers:
             drawn: dict[str, float | FloatArray] = {}
@@ -152,26 +164,31 @@ class LifeRunner(RealisationRunner):
                 if isinstance(found, LifeRun) and not (found.reached or last):
                     left.append(run.number)
                 else:
-                    outcomes[run.number] = self._life_outcome(run, found)
+                    outcomes[run.number] = self._life_outcome(runner, run, found)
         return sorted(left)
 
-    def _level(self, level: int) -> LevelRunner:
-        if level not in self._levels:
+    def _level(self, level: int, stage: int) -> LevelRunner:
+        """Return the runner of a length and a stage, 0 for draws without weights."""
+        if (level, stage) not in self._levels:
             passes = min(self.base * EXTENSION**level, self.longest)
             scenario = with_length(self.scenario, passes)
             grid = shared_grid(scenario) if level else self.grid
-            self._levels[level] = LevelRunner(scenario, self.total, grid, self.fixed)
-        return self._levels[level]
+            shift = self.settings.stages[stage - 1]["shift"] if stage else {}
+            self._levels[level, stage] = LevelRunner(scenario, self.total, grid, self.fixed, shift)
+        return self._levels[level, stage]
 
-    def _life_outcome(self, run: RealisationRun, found: LifeRun | Exception) -> Outcome:
+    def _life_outcome(
+        self, runner: LevelRunner, run: RealisationRun, found: LifeRun | Exception
+    ) -> Outcome:
         """Return the outcome of a realisation, with its life at the drawn wear factor."""
         if isinstance(found, Exception):
             return self.outcome(run, found)
         scalars, scale, score_mean = dict(found.scalars), 1.0, 0.0
         if self.factor is not None:
             scale = self.settings.reference / float(run.drawn[self.settings.factor])
-            score_mean = self.factor.score_mean(self._levels[0].drawer, run.number)
+            score_mean = self.factor.score_mean(runner.drawer, run.number)
         for name in ("life", "life_low", "life_high"):
             scalars[name] *= scale
-        scalars |= {"score_mean": score_mean, "log_weight": 0.0}
+        weight = log_weight(runner.drawer, runner.shift, run.number) if runner.shift else 0.0
+        scalars |= {"score_mean": score_mean, "log_weight": weight}
         return self.outcome(run, replace(found, scalars=scalars))

@@ -1,0 +1,164 @@
+"""Arguments of a study of lives: limits, targets in passes and time, tests for rare events."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from wearsim.errors import Mistake, ScenarioError
+from wearsim.evolution.limits import OF_LIFE, Limit
+from wearsim.quantities import quantity
+from wearsim.results.ensemble.life_settings import LifeSettings
+from wearsim.scenario import Scenario
+from wearsim.studies.ensemble.api import checked_request
+from wearsim.studies.life.factor import exact_factor
+from wearsim.studies.life.rare import LEAST_TESTS, shifted_inputs
+from wearsim.studies.life.realisation import with_length
+from wearsim.units import QuantityError
+
+SHARES = (1.0, 10.0, 50.0)
+LONGEST = 10.0  # default censoring over the target or the length of the test
+
+
+def with_rare_events(
+    scenario: Scenario, settings: LifeSettings, rare: int, precision: str | None
+) -> LifeSettings:
+    """Return settings with further tests for rare events.
+
+    Raises
+    ------
+    ValueError
+        If there is no target, or the tests have no meaning.
+    """
+    if not rare:
+        return settings
+    if settings.target is None:
+        raise ValueError("rare events need a target, the life of which the probability is small")
+    if settings.factor:
+        raise ValueError(
+            f"{settings.factor} is integrated exactly, which gives small probabilities without"
+            " further tests"
+        )
+    if precision is not None:
+        raise ValueError("rare events go with a fixed number of realisations, not a precision")
+    if rare < LEAST_TESTS:
+        raise ValueError(f"rare events take {LEAST_TESTS} tests or more, got {rare}")
+    if not shifted_inputs(scenario):
+        raise ValueError("no random input of one number per test can be shifted")
+    return replace(settings, rare=rare)
+
+
+def with_limits(scenario: Scenario, limits: Sequence[str]) -> Scenario:
+    """Return a scenario with limits added to its table [limit].
+
+    Raises
+    ------
+    ValueError
+        If one is not a limit of a life, or given twice.
+    ScenarioError
+        If there is none, or one is of no meaning for the scenario.
+    """
+    found: dict[str, str] = {}
+    for text in limits:
+        limit = Limit.parse(text)
+        if limit.quantity not in OF_LIFE:
+            raise ValueError(
+                f"'{text}' does not end a life, expected a limit of {', '.join(OF_LIFE)}; a time"
+                " after which lives are censored is the maximum"
+            )
+        if f"limit.{limit.key}" in found:
+            raise ValueError(f"'{text}': a limit of {limit.quantity} is given twice")
+        found[f"limit.{limit.key}"] = limit.text.removeprefix(limit.quantity).strip()
+    changed = scenario.changed(found) if found else scenario
+    if not changed.limit.given:
+        what, expected = "is needed for a life", 'one limit or more, such as depth = "50 um"'
+        raise ScenarioError(scenario.file, [Mistake("limit", "", what, "none", expected)])
+    return changed
+
+
+def settings_of(
+    scenario: Scenario,
+    realisations: int,
+    target: float | str | None,
+    shares: Sequence[float],
+    most: float | str | None,
+) -> LifeSettings:
+    """Return the settings of a study, with lives in roller passes; parameters as in `life`.
+
+    Raises
+    ------
+    ValueError
+        If a life or a percentage is invalid.
+    ScenarioError
+        If nothing is random.
+    """
+    cam = scenario.cam is not None
+    per_unit = float(scenario.operation.rollers) if cam else 1.0
+    rate, unit = scenario.pass_rate / per_unit, "turns" if cam else "passes"
+    aim = None if target is None else per_unit * parse_life(target, unit, rate, "target")
+    for share in shares:
+        if not 0.0 < share < 100.0:
+            raise ValueError(f"B{share:g} is not a life, expected percentages between 0 and 100")
+    if most is not None:
+        longest = per_unit * parse_life(most, unit, rate, "max")
+    else:
+        own = float(scenario.total_passes) if scenario.has_length else 0.0
+        longest = LONGEST * max(own, aim or 0.0)
+        if longest == 0.0:
+            raise ValueError(
+                "a maximum is needed at which lives are censored, such as 1e7, since the scenario"
+                " has no length"
+            )
+    span = scenario.load.build().span
+    if span is not None:  # the log cannot be extended
+        longest = min(longest, span[1] * scenario.pass_rate)
+    if aim is not None and aim > longest:
+        raise ValueError(
+            f"the target of {aim / per_unit:g} {unit} is beyond the maximum of"
+            f" {longest / per_unit:g} {unit}; give a greater maximum"
+        )
+    if not scenario.has_length:
+        scenario = with_length(scenario, longest)
+    request = checked_request(scenario, realisations, "monte-carlo", None)
+    factor, reason = exact_factor(scenario)
+    alone = factor is not None and len(scenario.random) == 1
+    return LifeSettings(
+        most=longest,
+        unit=unit,
+        per_unit=per_unit,
+        rate=rate,
+        target=aim,
+        shares=tuple(map(float, shares)),
+        factor=factor.item.name if factor else "",
+        reason=reason,
+        reference=factor.reference if factor else 0.0,
+        spread=factor.spread if factor else 1.0,
+        alone=alone,
+        plain=1 if alone else request.realisations,
+    )
+
+
+def parse_life(value: float | str, unit: str, rate: float, what: str) -> float:
+    """Return a life in its unit, from a number, "5e6 turns" or a time such as "200 h".
+
+    Raises
+    ------
+    ValueError
+        If it cannot be read, or is not above zero.
+    """
+    text = str(value).strip()
+    try:
+        found = float(text.removesuffix(unit))
+    except ValueError:
+        try:
+            found = rate * quantity(text, "s")
+        except QuantityError as error:
+            raise ValueError(
+                f"{what} '{text}' is not a life, expected a number of {unit} such as 675000, or a"
+                " time such as '200 h'"
+            ) from error
+    if not 0.0 < found < np.inf:
+        raise ValueError(f"{what} '{text}' must be above zero")
+    return found
