@@ -21,6 +21,8 @@ Ensembles
     ensemble(scenario, n, output)       run a wear test for each of n realisations
     resume_ensemble(file)               continue or extend an ensemble from its file
 
+Identification
+    identify(scenario, profiles)        wear factor K/H of measured tests, and its scatter
 Lives
     life(scenario, n, output)           run n tests to the first limit that they reach
     resume_life(file)                   continue or extend a study of lives from its file
@@ -30,6 +32,7 @@ Results
     Result                              of a wear test: depth, profiles, normal_force, ...
     DissipationResult                   of a dissipation study: power, summaries, convergence
     EnsembleResult                      of an ensemble: estimate, course, band, sensitivity
+    IdentificationResult                of an identification: tests, verdict, posterior
     LifeResult                          of a study of lives: b, survival, compare
     ContactSolution, ContactStudy       of one contact: dissipation, line_load, approach, ...
     CamStudy                            of a cam: kinematics, loads and contact at its stations
@@ -113,6 +116,7 @@ if TYPE_CHECKING:
     from wearsim.results import (
         DissipationResult,
         EnsembleResult,
+        IdentificationResult,
         Result,
         open_dissipation,
         open_ensemble,
@@ -126,6 +130,7 @@ if TYPE_CHECKING:
     from wearsim.studies.ensemble.api import ensemble, resume_ensemble
     from wearsim.studies.ensemble.compare import compare
     from wearsim.studies.ensemble.sweep import sweep
+    from wearsim.studies.identify.api import identify
     from wearsim.studies.life.api import life, resume_life
     from wearsim.studies.run.run import resume, run
     from wearsim.types import ContactSolution, Profile
@@ -148,6 +153,7 @@ _NAMES = {
     "wearsim.results": [
         "DissipationResult",
         "EnsembleResult",
+        "IdentificationResult",
         "Result",
         "open_dissipation",
         "open_ensemble",
@@ -161,6 +167,7 @@ _NAMES = {
     "wearsim.studies.ensemble.api": ["ensemble", "resume_ensemble"],
     "wearsim.studies.ensemble.compare": ["compare"],
     "wearsim.studies.ensemble.sweep": ["sweep"],
+    "wearsim.studies.identify.api": ["identify"],
     "wearsim.studies.life.api": ["life", "resume_life"],
     "wearsim.studies.run.run": ["resume", "run"],
     "wearsim.types": ["ContactSolution", "Profile"],
@@ -174,6 +181,7 @@ __all__ = [
     "ContactStudy",
     "DissipationResult",
     "EnsembleResult",
+    "IdentificationResult",
     "LifeResult",
     "Profile",
     "Result",
@@ -181,6 +189,7 @@ __all__ = [
     "compare",
     "dissipation",
     "ensemble",
+    "identify",
     "life",
     "load_scenario",
     "open_dissipation",

@@ -165,6 +165,41 @@ def read_profile(content: str | bytes, file: str, choice: ProfileChoice | None =
     return Profile(columns[y], (-1.0 if downwards else 1.0) * columns[height])
 
 
+def load_lines(path: str | Path) -> list[Profile]:
+    """Read all lines of a surface without gaps, or the only profile of another file.
+
+    Parameters
+    ----------
+    path : path
+        CSV, SDF or X3P.
+
+    Returns
+    -------
+    list of Profile
+        Lines of a surface at the same positions; one that was not measured at all of them is left
+        out.
+
+    Raises
+    ------
+    ScenarioError
+        With all mistakes of the file.
+    """
+    try:
+        content = Path(path).read_bytes()
+    except OSError as error:
+        raise _error(str(path), f"the file cannot be read ({error.strerror})") from error
+    if not is_surface(content):
+        return [read_profile(content, str(path))]
+    import numpy as np  # noqa: PLC0415
+
+    surface = _surface(content, str(path))
+    whole = np.isfinite(surface.height).all(axis=1)
+    if not whole.any():
+        raise _error(str(path), "no line was measured at all of its points")
+    y = surface.along - 0.5 * (surface.along[0] + surface.along[-1])
+    return [Profile(y, line) for line in surface.height[whole]]
+
+
 def sign_note(profile: Profile, choice: ProfileChoice, file: str) -> str | None:
     """Return a note if a column chosen by its name seems to hold depths read as heights.
 

@@ -4,6 +4,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from wearsim.results.dissipation import DissipationData, DissipationResult
+from wearsim.results.identification import IdentificationData, IdentificationResult
 from wearsim.results.io.atomic_write import DISK, Storage, check_output, refuse_inputs, same_file
 from wearsim.results.io.files import kind_of, read_dissipation, read_results, write_results
 from wearsim.results.run import Result, RunData
@@ -36,6 +37,8 @@ __all__ = [
     "EnsembleData",
     "EnsembleFile",
     "EnsembleResult",
+    "IdentificationData",
+    "IdentificationResult",
     "Outcome",
     "Result",
     "RunData",

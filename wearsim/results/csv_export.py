@@ -19,6 +19,7 @@ from wearsim.results.dissipation import DissipationData, DissipationResult
 from wearsim.results.ensemble.data import EnsembleData
 from wearsim.results.ensemble.result import EnsembleResult
 from wearsim.results.ensemble.schema import FAILED, OBSERVABLES, PENDING
+from wearsim.results.identification import IdentificationResult
 from wearsim.results.io.atomic_write import replacement
 from wearsim.results.run import Result, RunData
 from wearsim.results.run_schema import ALL_VARIABLES, AXES
@@ -79,20 +80,20 @@ def _with_decimal_comma(pieces: Iterable[str]) -> Iterator[str]:
 
 
 def export_csv(
-    result: Result | DissipationResult | EnsembleResult,
+    result: Result | DissipationResult | EnsembleResult | IdentificationResult,
     folder: str | Path,
     *,
     force: bool = False,
     decimal: Literal[".", ","] = ".",
 ) -> list[Path]:
-    """Write a run, a study or an ensemble as CSV, and the scenario with its files.
+    """Write a result of any kind as CSV, and the scenario with its files.
 
     Parameters
     ----------
-    result : Result, DissipationResult or EnsembleResult
+    result : Result, DissipationResult, EnsembleResult or IdentificationResult
         Of a run, its history and records are written; of a dissipation study, its realisations
         and strips; of an ensemble, its realisations, the estimates at all records and the profile
-        at the end.
+        at the end; of an identification, its tests and traces.
     folder : str or Path
         Target folder, which is created if it does not exist.
     force : bool
@@ -131,6 +132,8 @@ def export_csv(
             # by name, since the kinematics of a cam belong to a layer above
             table = import_module("wearsim.studies.cam.export").worn_cam(result)
             contents["worn_cam.csv"] = [_table(table.items())]
+    elif isinstance(result, IdentificationResult):
+        contents = _identification_tables(result)
     else:
         contents = _study_tables(result.raw)
     if decimal == ",":
@@ -289,3 +292,28 @@ def _study_tables(raw: DissipationData) -> dict[str, Iterable[str]]:
         "realisations.csv": [_table([numbers, *(drawn | found).values()])],
         "strips.csv": [_table(columns("y").values())],
     }
+
+
+def _identification_tables(result: IdentificationResult) -> dict[str, Iterable[str]]:
+    """Return the tables of an identification: tests, and all traces below each other."""
+    heads = ("file", "specimen", "passes", "depth [um]", "K/H [1/Pa]", "low [1/Pa]", "high [1/Pa]")
+    rows = [
+        [
+            test["file"],
+            test["specimen"],
+            *(f"{value:.12g}" for value in (test["passes"], 1e6 * test["depth_m"])),
+            *(f"{test['k_over_h_per_Pa'][name]:.12g}" for name in ("value", "low", "high")),
+        ]
+        for test in result.tests
+    ]
+    names = ("height", "fitted", "low", "high")
+    columns = [result.values(f"trace_{name}") for name in ("y", *names)]
+    known = np.isfinite(columns[0])
+    number = np.broadcast_to(np.arange(1.0, len(known) + 1.0)[:, None], known.shape)
+    traces = [_column("test", number[known], ("1", 1.0))]
+    traces += [_column("y", columns[0][known], ("mm", 1e-3))]
+    traces += [
+        _column(name, column[known], ("um", 1e-6))
+        for name, column in zip(names, columns[1:], strict=True)
+    ]
+    return {"tests.csv": [_csv([heads, *rows])], "traces.csv": [_table(traces)]}

@@ -8,11 +8,19 @@ from wearsim.results.dissipation import DissipationResult
 from wearsim.results.ensemble.life import ensemble_result
 from wearsim.results.ensemble.parts import read_ensemble
 from wearsim.results.ensemble.result import EnsembleResult
-from wearsim.results.io.files import kind_of, read_dissipation, read_results
+from wearsim.results.identification import IdentificationResult
+from wearsim.results.io.files import (
+    kind_of,
+    read_dissipation,
+    read_identification,
+    read_results,
+)
 from wearsim.results.run import Result
 
 
-def open_results(path: str | Path) -> Result | DissipationResult | EnsembleResult:
+def open_results(
+    path: str | Path,
+) -> Result | DissipationResult | EnsembleResult | IdentificationResult:
     """Open a results file of any kind.
 
     Parameters
@@ -22,8 +30,8 @@ def open_results(path: str | Path) -> Result | DissipationResult | EnsembleResul
 
     Returns
     -------
-    Result, DissipationResult or EnsembleResult
-        Of a wear test, of a dissipation study, or of an ensemble.
+    Result, DissipationResult, EnsembleResult or IdentificationResult
+        Of a wear test, of a dissipation study, of an ensemble, or of an identification.
 
     Raises
     ------
@@ -38,6 +46,8 @@ def open_results(path: str | Path) -> Result | DissipationResult | EnsembleResul
     kind = kind_of(path)
     if kind == "run":
         return Result(read_results(path), Path(path))
+    if kind == "identification":
+        return IdentificationResult(read_identification(path), Path(path))
     return open_ensemble(path) if kind == "ensemble" else open_dissipation(path)
 
 

@@ -29,7 +29,12 @@ from wearsim.cli.shared import (
 if TYPE_CHECKING:
     from wearsim.profiles import ProfileChoice
     from wearsim.report.parts import Measured
-    from wearsim.results import DissipationResult, EnsembleResult, Result
+    from wearsim.results import (
+        DissipationResult,
+        EnsembleResult,
+        IdentificationResult,
+        Result,
+    )
     from wearsim.results.content import StudyData
 
 
@@ -59,21 +64,26 @@ def plot(
     """Draw the figure of a results file of any kind."""
     path = figure if figure is not None else Path(f"{file.stem}.png")
     check_figure(path, force)
-    from wearsim.results import DissipationResult, open_results, refuse_inputs
+    from wearsim.results import (
+        DissipationResult,
+        IdentificationResult,
+        open_results,
+        refuse_inputs,
+    )
 
     refuse_inputs(path, [file], "the figure")
     refuse_inputs(path, measured or [], "a measured profile")
     result = open_results(file)
-    if measured and isinstance(result, DissipationResult):
+    if measured and isinstance(result, DissipationResult | IdentificationResult):
         raise typer.BadParameter(
-            f"requires wear tests; {file} holds one contact without wear", param_hint="--measured"
+            f"requires wear tests; {file} holds {result.raw.schema.holds}", param_hint="--measured"
         )
     profiles = measured_profiles(measured or [], profile_choice(columns, units, row, mean_rows, at))
     draw(result, path, profiles)
     for profile in profiles:
         from wearsim.report.parts import computed_profile, residual_text
 
-        assert not isinstance(result, DissipationResult)
+        assert not isinstance(result, DissipationResult | IdentificationResult)
         note(f"{profile.label}: {residual_text(profile, computed_profile(result))}")
     note(f"figure: {path}")
 
@@ -91,7 +101,7 @@ def measured_profiles(files: Sequence[Path], choice: ProfileChoice) -> list[Meas
 
 
 def draw(
-    result: Result | DissipationResult | EnsembleResult,
+    result: Result | DissipationResult | EnsembleResult | IdentificationResult,
     path: Path,
     measured: Sequence[Measured] = (),
 ) -> None:
@@ -99,7 +109,7 @@ def draw(
 
     Parameters
     ----------
-    result : Result, DissipationResult or EnsembleResult
+    result : Result, DissipationResult, EnsembleResult or IdentificationResult
     path : Path
         Name of the figure.
     measured : sequence of Measured
@@ -118,9 +128,22 @@ def show(file: ResultsFile, json: Json = False) -> None:
     from wearsim.cli.render.failure import failure_rows
     from wearsim.report import summary
     from wearsim.report.text import count
-    from wearsim.results import DissipationResult, EnsembleResult, open_results
+    from wearsim.results import (
+        DissipationResult,
+        EnsembleResult,
+        IdentificationResult,
+        open_results,
+    )
 
     result = open_results(file)
+    if isinstance(result, IdentificationResult):
+        from wearsim.cli.render.identification import identification_json, write_identification
+
+        if json:
+            write_json({**identification_json(result), **_origin(result.raw)})
+        else:
+            write_identification(result, summary.sources(result.raw))
+        return
     if json:
         data: dict[str, Any]
         if isinstance(result, DissipationResult):
@@ -228,14 +251,17 @@ def compare(
 
 def _open(file: Path) -> Result | EnsembleResult:
     from wearsim.errors import ResultsFileError
-    from wearsim.results import DissipationResult, EnsembleResult, open_results
+    from wearsim.results import (
+        DissipationResult,
+        EnsembleResult,
+        IdentificationResult,
+        open_results,
+    )
 
     result = open_results(file)
-    if isinstance(result, DissipationResult):
-        from wearsim.results.dissipation import DISSIPATION
-
+    if isinstance(result, DissipationResult | IdentificationResult):
         raise ResultsFileError(
-            f"{file}: holds {DISSIPATION.holds}; only runs and ensembles can be compared"
+            f"{file}: holds {result.raw.schema.holds}; only runs and ensembles can be compared"
         )
     if isinstance(result, EnsembleResult) and result.count == 0:
         raise ResultsFileError(f"{file}: has no completed realisation; nothing to compare")

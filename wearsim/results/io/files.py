@@ -28,6 +28,7 @@ from wearsim.results.dissipation import (
     DissipationData,
 )
 from wearsim.results.ensemble.schema import ENSEMBLE
+from wearsim.results.identification import IDENTIFICATION, IdentificationData
 from wearsim.results.io.atomic_write import DISK, Storage
 from wearsim.results.run import RunData
 from wearsim.results.run_schema import CAM_RUN, RUN
@@ -40,12 +41,13 @@ _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _SMALLEST = 96  # bytes: no HDF5 file is shorter
 # exceptions of h5py, json and numpy on damaged content
 _DAMAGE = (OSError, RuntimeError, ValueError, TypeError, KeyError, AttributeError, OverflowError)
-FileKind: TypeAlias = Literal["run", "dissipation", "ensemble"]
+FileKind: TypeAlias = Literal["run", "dissipation", "ensemble", "identification"]
 # kind and schema by format
 _KINDS: dict[str, tuple[FileKind, Schema]] = {
     RUN.format: ("run", RUN),
     DISSIPATION.format: ("dissipation", DISSIPATION),
     ENSEMBLE.format: ("ensemble", ENSEMBLE),
+    IDENTIFICATION.format: ("identification", IDENTIFICATION),
 }
 
 Stored = TypeVar("Stored")
@@ -76,6 +78,16 @@ def read_dissipation(path: str | Path) -> DissipationData:
     return read_file(path, lambda file: _dissipation_data(path, file))
 
 
+def read_identification(path: str | Path) -> IdentificationData:
+    """Read the file of an identification; see `read_results`."""
+
+    def take(file: h5py.File) -> IdentificationData:
+        attributes = read_attributes(path, file, IDENTIFICATION, IdentificationData)
+        return IdentificationData(**attributes, variables=_variables(file, IDENTIFICATION))
+
+    return read_file(path, take)
+
+
 def kind_of(path: str | Path) -> FileKind:
     """Return the kind of a results file.
 
@@ -86,7 +98,7 @@ def kind_of(path: str | Path) -> FileKind:
 
     Returns
     -------
-    {"run", "dissipation", "ensemble"}
+    {"run", "dissipation", "ensemble", "identification"}
 
     Raises
     ------
@@ -285,7 +297,9 @@ def check_complete(path: str | Path, present: Container[str], names: Iterable[st
 
 
 def write_results(
-    path: str | Path, data: RunData | DissipationData, storage: Storage = DISK
+    path: str | Path,
+    data: RunData | DissipationData | IdentificationData,
+    storage: Storage = DISK,
 ) -> None:
     """Write a results file, replacing an existing one.
 
@@ -293,7 +307,7 @@ def write_results(
     ----------
     path : str or Path
         The file.
-    data : RunData or DissipationData
+    data : RunData, DissipationData or IdentificationData
         Content of the file.
     storage : Storage
         File operations.

@@ -1,0 +1,185 @@
+"""Identification: wear factors of synthetic grooves with known truth, and the verdict."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import wearsim
+from tests.studies.identify.grooves import NOISE, PASSES, RANDOM, K, groove, grown, rig, write
+from wearsim.errors import CapabilityError, ScenarioError
+from wearsim.studies.identify import trajectories
+from wearsim.studies.identify.likelihood import TraceLikelihood
+from wearsim.studies.identify.measurements import Measurement
+from wearsim.studies.identify.trajectories import Grower
+
+
+def depth(value: float, **options: object) -> Measurement:
+    """Return a measured depth [um] with an error of 1 um."""
+    name = f"{value:g} um"
+    return Measurement(name, depth=value * 1e-6, depth_std=1e-6, **options)  # type: ignore[arg-type]
+
+
+def test_known_inputs_give_the_wear_factor_of_a_groove(tmp_path: Path):
+    path = write(tmp_path / "t.csv", *groove(np.random.default_rng(1)))
+    found = wearsim.identify(rig(), [path])
+    (test,) = found.tests
+    k = test["k_over_h_per_Pa"]
+    assert k["low"] < K < k["high"]
+    assert k["high"] / k["low"] < 1.08
+    assert test["depth_m"] == pytest.approx(48.1e-6, abs=0.8e-6)
+    assert 0.8 < test["residual_ratio"] < 1.25
+    assert abs(test["residual_autocorrelation"]) < 0.15
+    assert found.summary["scatter_seen"] is None
+
+
+def test_records_between_are_those_of_a_run():
+    run = wearsim.run(rig().changed({"wear.cylinder.k_over_h": "0.8e-11 1/Pa"}))
+    worn = run.values("cylinder_depth_profile")[-1].ravel()
+    model = TraceLikelihood(run.y, np.zeros_like(run.y), NOISE, grown())
+    found = model.worn(np.array([0]), np.log([0.8e-11]), np.zeros(1))[:, 0]
+    # except in the strips at the edges of the groove
+    assert np.sort(np.abs(found - worn))[-3] < 0.002 * worn.max()
+    assert np.abs(found - worn).max() < 0.02 * worn.max()
+
+
+def test_grid_of_wear_factors_agrees_with_one_trajectory(monkeypatch: pytest.MonkeyPatch):
+    scenario = rig(random=True)
+    tests = [depth(40.0), depth(52.0)]
+    one = wearsim.identify(scenario, tests, draws=16)
+    monkeypatch.setattr(trajectories, "time_dependence", lambda *_: ("a process",))
+    grid = wearsim.identify(scenario, tests, draws=16)
+    assert any("each of several K/H" in note for note in grid.notes)
+    values = [[t["k_over_h_per_Pa"]["value"] for t in found.tests] for found in (one, grid)]
+    assert values[1] == pytest.approx(values[0], rel=0.01)
+
+
+def test_process_needs_a_grid_of_wear_factors():
+    load = {
+        "distribution": "ornstein-uhlenbeck",
+        "correlation_time": "30 min",
+        "marginal": {"distribution": "uniform", "low": "280 N", "high": "320 N"},
+    }
+    grower = Grower(rig().changed({"load.normal_force": load}), 2)
+    assert grower.reasons == ("load.normal_force follow random processes in time",)
+    assert Grower(rig(), 2).reasons == ()
+
+
+def test_wear_of_the_roller_needs_a_shared_factor():
+    scenario = rig().changed({"wear.roller.k_over_h": "2e-12 1/Pa"})
+    (reason,) = Grower(scenario, 2).reasons
+    assert "--share k=cylinder,roller" in reason
+    assert Grower(scenario, 2, shared=True).reasons == ()
+    with pytest.raises(ScenarioError, match="wear of the roller is measured"):
+        wearsim.identify(scenario, [depth(5.0, body="roller")])
+    both = [depth(48.0), depth(1.6, body="roller")]
+    found = wearsim.identify(scenario, both, share=("roller", "cylinder"))
+    assert [test["body"] for test in found.tests] == ["cylinder", "roller"]
+
+
+def test_known_and_measured_inputs_narrow_the_wear_factor():
+    known = {"friction.coefficient": 0.1, "creepage.longitudinal": 1e-3}
+    error = {"creepage.longitudinal": 1e-4}
+    tests = [depth(48.0), depth(48.0, values=known, errors=error), depth(48.0, values=known)]
+    found = wearsim.identify(rig(random=True), tests, draws=64)
+    widths = [
+        np.log(t["k_over_h_per_Pa"]["high"] / t["k_over_h_per_Pa"]["low"]) / 3.92
+        for t in found.tests
+    ]
+    inputs = np.hypot(np.log(1.2), np.log(1.3))
+    assert widths[0] == pytest.approx(inputs, rel=0.15)
+    # the prior of 0.26 and the measurement of 0.1, combined
+    assert widths[1] == pytest.approx(0.1, rel=0.2)
+    assert widths[2] == pytest.approx(1.5 / 48.0, rel=0.05)
+    assert found.tests[1]["k_over_h_per_Pa"]["value"] == pytest.approx(K, rel=0.05)
+
+
+def test_measured_value_out_of_the_distribution_is_refused():
+    values, errors = {"friction.coefficient": 0.9}, {"friction.coefficient": 0.01}
+    test = depth(48.0, values=values, errors=errors)
+    with pytest.raises(ScenarioError, match="out of the scenario's distribution"):
+        wearsim.identify(rig(random=True), [test], draws=16)
+
+
+def test_traces_of_one_test_share_its_inputs():
+    late = depth(48.1, group="A")
+    early = depth(48.1 * (100.0 / 450.0) ** (2.0 / 3.0), group="A", at="100 min")
+    found = wearsim.identify(rig(random=True), [early, late, depth(48.1)], draws=64)
+    assert found.raw.specimens == ["A", "48.1 um"]
+    slope = found.summary["exponents"]["A"]
+    assert slope["low"] < 2.0 / 3.0 < slope["high"]
+    assert slope["value"] == pytest.approx(2.0 / 3.0, abs=0.01)
+    # inputs are common to both traces, so that the second one adds little
+    first, second = (
+        np.exp(np.diff(np.log([r["low"], r["high"]]))[0])
+        for r in (found.tests[0]["k_over_h_per_Pa"], found.tests[1]["k_over_h_per_Pa"])
+    )
+    assert first == pytest.approx(second, rel=0.2)
+    with pytest.raises(ScenarioError, match="is not within the test"):
+        wearsim.identify(rig(), [depth(48.0, at="500 min")])
+
+
+def test_paper_depths_are_undecided_and_reproducible():
+    one = wearsim.identify(rig(random=True), [depth(d) for d in (28.0, 48.0, 62.0)], draws=64)
+    two = wearsim.identify(rig(random=True), [depth(d) for d in (28.0, 48.0, 62.0)], draws=64)
+    assert one.summary == two.summary
+    assert one.summary["scatter_seen"] == pytest.approx(0.609, abs=0.02)
+    alone = one.summary["scatter_from_inputs"]
+    assert alone == pytest.approx(np.hypot(np.log(1.2), np.log(1.3)), rel=0.1)
+
+
+def test_results_file_and_posterior_are_used_again(tmp_path: Path):
+    tests = [depth(45.0), depth(48.0), depth(52.0)]
+    path = tmp_path / "k.h5"
+    found = wearsim.identify(rig(random=True), tests, path, draws=32)
+    again = wearsim.open_results(path)
+    assert isinstance(again, wearsim.IdentificationResult)
+    assert again.summary == found.summary
+    assert np.array_equal(again.posterior, found.posterior)
+    text = found.posterior_toml()
+    import tomllib
+
+    table = tomllib.loads(text)["wear"]["cylinder"]["k_over_h"]
+    scenario = rig().changed({"wear.cylinder.k_over_h": table})
+    (item,) = scenario.random
+    low, high = item.scalar.quantile(np.array([0.025, 0.975]))
+    following = found.summary["next_specimen"]
+    assert high / low == pytest.approx(following["high_per_Pa"] / following["low_per_Pa"], rel=1e-3)
+    with pytest.raises(wearsim.ResultsFileError, match="exists"):
+        wearsim.identify(rig(), tests, path)
+
+
+def test_groove_of_another_rig_is_refused(tmp_path: Path):
+    y, height = groove(np.random.default_rng(1))
+    wide = write(tmp_path / "t.csv", 1.45 * y, height)
+    with pytest.raises(ScenarioError, match="is it of another rig"):
+        wearsim.identify(rig(), [wide])
+    found = wearsim.identify(rig(), [write(tmp_path / "u.csv", 1.15 * y, height)])
+    assert any("another rig" in text for text in found.warnings)
+
+
+def test_groove_wider_than_the_trace_is_refused(tmp_path: Path):
+    path = write(tmp_path / "t.csv", *groove(np.random.default_rng(1), half=4e-3))
+    with pytest.raises(ScenarioError, match="wider than the trace"):
+        wearsim.identify(rig(), [path])
+
+
+def test_trace_without_shoulders_knows_less(tmp_path: Path):
+    path = write(tmp_path / "t.csv", *groove(np.random.default_rng(1), half=7.2e-3))
+    (test,) = wearsim.identify(rig(), [path]).tests
+    k = test["k_over_h_per_Pa"]
+    assert k["low"] < K < k["high"]
+    assert k["high"] / k["low"] > 1.15
+
+
+def test_scenarios_without_a_wear_factor_are_refused():
+    text = rig().text[: rig().text.index("[wear]")]
+    scenario = wearsim.Scenario.from_toml(text + '[wear]\nlaw = "t-gamma"\n')
+    with pytest.raises(CapabilityError, match="needs the wear factor"):
+        wearsim.identify(scenario, [depth(48.0)])
+    with pytest.raises(ScenarioError, match="where the search begins"):
+        wearsim.identify(rig().changed({"wear.cylinder.k_over_h": "0 1/Pa"}), [depth(48.0)])
+    assert set(RANDOM) == {item.name for item in rig(random=True).random}
+    assert rig().total_passes == PASSES

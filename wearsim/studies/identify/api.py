@@ -1,0 +1,301 @@
+"""Identification of the wear factor from measured profiles of several tests."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+
+from wearsim.errors import Mistake, ScenarioError
+from wearsim.profiles import ProfileChoice
+from wearsim.quantities import quantity
+from wearsim.results import IdentificationResult, check_output, write_results
+from wearsim.scenario import Scenario, as_scenario, require_run
+from wearsim.studies.identify.analysis import Identified, identified
+from wearsim.studies.identify.inputs import with_known
+from wearsim.studies.identify.measurements import (
+    Measurement,
+    key_of,
+    measurements_of,
+    read_tests,
+)
+from wearsim.studies.identify.pooling import content, specimens_of
+from wearsim.studies.identify.traces import Trace, read_trace
+from wearsim.studies.identify.trajectories import Grower, Trajectories, check_law
+from wearsim.studies.progress import shown_progress
+from wearsim.uq.hierarchy.verdict import NEGLIGIBLE
+
+_LEAST_SIGNAL = 3.0  # depth over the noise
+_SHARE = ("cylinder", "roller")
+
+
+def identify(
+    scenario: Scenario | str | Path,
+    tests: Sequence[str | Path | Measurement] | str | Path,
+    output: str | Path | None = None,
+    *,
+    before: Sequence[str | Path] = (),
+    shoulders: float | str | None = None,
+    share: Sequence[str] = (),
+    fix: Mapping[str, object] | None = None,
+    choice: ProfileChoice | None = None,
+    draws: int | None = None,
+    negligible: float = NEGLIGIBLE,
+    force: bool = False,
+    progress: bool = False,
+    on_progress: Callable[[int, int], None] | None = None,
+) -> IdentificationResult:
+    """Identify the wear factor K/H from measured grooves, and whether it scatters.
+
+    The worn profile of a test is computed for draws of its other inputs, and compared with the
+    measured one for all wear factors. The wear factors of the tests are then described by
+    ln K/H ~ N(m, t^2).
+
+    Parameters
+    ----------
+    scenario : Scenario or path
+        A scenario of a run, or its file. Its random inputs are those that may differ between the
+        tests; a random K/H of it is not used.
+    tests : sequence of path, or path
+        Profiles, each of one test, or a tests file (TOML); items may be `Measurement` too.
+    output : path, optional
+        Results file; without it the result is kept in memory only.
+    before : sequence of path
+        Profiles of the same places before the tests, in the order of the tests.
+    shoulders : float or str, optional
+        Distance from the middle of a groove beyond which the surface is unworn, "9 mm" or in
+        metres; found by default.
+    share : sequence of str
+        ("cylinder", "roller") if both bodies have one unknown factor of their K/H.
+    fix : mapping of str to object, optional
+        Inputs that are known and equal in all tests, {"friction": 0.1}.
+    choice : ProfileChoice, optional
+        Columns, units and rows of the profiles.
+    draws : int, optional
+        Number of draws of the other inputs; by default 256, or 128 where a wear test is needed
+        for each of several K/H.
+    negligible : float
+        Scatter of ln K/H below which it is negligible.
+    force : bool
+        Overwrite an existing file.
+    progress : bool
+        Whether to show the progress, on a terminal or in a notebook.
+    on_progress : callable, optional
+        Called with the numbers of completed and of all wear tests.
+
+    Returns
+    -------
+    IdentificationResult
+
+    Raises
+    ------
+    ScenarioError, CapabilityError, ResultsFileError
+        If scenario, tests file or a profile cannot be used.
+    TypeError, ValueError
+        If an argument is invalid.
+    SolverError
+        If a wear test fails.
+
+    Examples
+    --------
+    >>> from wearsim.studies.identify.measurements import Measurement
+    >>> depths = [Measurement(f"test {d}", depth=d * 1e-6, depth_std=1e-6) for d in (28, 48, 62)]
+    >>> found = wearsim.identify("rig.toml", depths)
+    >>> found.verdict
+    'random'
+    """
+    started, created = time.monotonic(), datetime.now(UTC).isoformat(timespec="seconds")
+    scenario = as_scenario(scenario)
+    if fix:
+        scenario = scenario.changed({key_of(key): value for key, value in fix.items()})
+    require_run(scenario)
+    check_law(scenario)
+    shared = _checked_share(share)
+    width = quantity(shoulders, "m") if isinstance(shoulders, str) else shoulders
+    items = _measurements(tests, before, choice, width)
+    files = [path for item in items for path in (item.profile, item.before) if path is not None]
+    if output is not None:
+        check_output(Path(output), force, [*scenario.paths, *files])
+    study = _Study(scenario, items, draws, shared)
+    with shown_progress(progress, "Counter", on_progress, scenario) as watch:
+        rows = study.rows(watch)
+    specimens = specimens_of(rows)
+    data = content(
+        study.scenario, specimens, negligible, study.notes, created, time.monotonic() - started
+    )
+    if output is not None:
+        write_results(Path(output), data)
+    return IdentificationResult(data, Path(output) if output is not None else None)
+
+
+def _measurements(
+    tests: Sequence[str | Path | Measurement] | str | Path,
+    before: Sequence[str | Path],
+    choice: ProfileChoice | None,
+    shoulders: float | None,
+) -> list[Measurement]:
+    """Return the measurements given by files, by a tests file, or as they are."""
+    if isinstance(tests, str | Path):
+        if Path(tests).suffix.lower() == ".toml":
+            return read_tests(tests)
+        tests = [tests]
+    given = [item for item in tests if isinstance(item, Measurement)]
+    if given and (before or len(given) < len(tests)):
+        raise TypeError("tests are either files or Measurement objects, not both")
+    if not tests:
+        raise ValueError("no test is given; name its profile, or a tests file")
+    if given:
+        return given
+    files = [item for item in tests if not isinstance(item, Measurement)]
+    return measurements_of(files, before, choice, shoulders)
+
+
+def _checked_share(share: Sequence[str]) -> bool:
+    """Return whether both bodies share one unknown factor."""
+    if not share:
+        return False
+    if sorted(share) != sorted(_SHARE):
+        raise ValueError(f"share must be {', '.join(_SHARE)}, got {', '.join(share)}")
+    return True
+
+
+@dataclass(frozen=True)
+class _Ready:
+    """A measurement with its scenario, trace, passes and range of depths."""
+
+    item: Measurement
+    scenario: Scenario
+    trace: Trace | None
+    passes: float
+    depths: tuple[float, float]
+
+
+class _Study:
+    """Traces and trajectories of an identification."""
+
+    def __init__(
+        self, scenario: Scenario, items: Sequence[Measurement], draws: int | None, shared: bool
+    ) -> None:
+        self.scenario, self.items, self.draws, self.shared = scenario, items, draws, shared
+        self.notes: list[str] = list(scenario.notes)
+        self._by_inputs: dict[str, list[_Ready]] = {}
+        for item in items:
+            ready = self._ready(item)
+            known = sorted(item.values.items()), sorted(item.errors.items())
+            self._by_inputs.setdefault(repr(known), []).append(ready)
+
+    def _ready(self, item: Measurement) -> _Ready:
+        """Read a measurement."""
+        if item.body == "roller" and not self.shared:
+            what = "wear of the roller is measured, and its K/H is that of the scenario"
+            expected = "share = cylinder, roller (--share k=cylinder,roller)"
+            raise ScenarioError(item.name, [Mistake("", "body", what, None, expected)])
+        scenario = with_known(self.scenario, item.values, item.errors, item.name)
+        require_run(scenario)
+        passes = _passes(scenario, item)
+        crown = scenario.roller.crown_radius
+        if item.profile is None:
+            assert item.depth is not None
+            return _Ready(item, scenario, None, passes, (item.depth, item.depth))
+        trace = read_trace(item, crown)
+        self.notes += [f"{item.name}: {text}" for text in trace.notes]
+        if trace.depth is None or trace.noise is None:
+            greatest = 0.125 * (trace.y[-1] - trace.y[0]) ** 2 / crown
+            return _Ready(item, scenario, trace, passes, (0.2 * greatest, 1.2 * greatest))
+        if trace.depth < _LEAST_SIGNAL * trace.noise.std:
+            what = (
+                f"the groove is {1e6 * trace.depth:.3g} um deep, and the noise of the shoulders is"
+                f" {1e6 * trace.noise.std:.3g} um: no wear can be seen"
+            )
+            raise ScenarioError(item.name, [Mistake("", "", what)])
+        return _Ready(item, scenario, trace, passes, (trace.depth, trace.depth))
+
+    def rows(self, watch: Callable[[int, int], None] | None) -> list[Identified]:
+        """Run the wear tests, and return the wear factor of each groove in the given order."""
+        found: dict[int, Identified] = {}
+        counts = {"done": 0, "before": 0}
+
+        def report(done: int, total: int) -> None:
+            if watch is not None:
+                watch(counts["before"] + done, counts["before"] + total)
+            counts["done"] = counts["before"] + done
+
+        for group in self._by_inputs.values():
+            grower = Grower(group[0].scenario, self.draws, self.shared, report)
+            low = min(ready.depths[0] for ready in group)
+            high = max(ready.depths[1] for ready in group)
+            trajectories = grower.grow((low, high), [ready.passes for ready in group])
+            counts["before"] = counts["done"]
+            for reason in trajectories.reasons:
+                note = f"a wear test for each of several K/H, since {reason}"
+                self.notes += [note] if note not in self.notes else []
+            if trajectories.lost:
+                self.notes.append(
+                    f"{trajectories.lost} of {grower.count} draws are left out, whose tests failed"
+                )
+            for ready in group:
+                found[id(ready.item)] = self._identified(ready, trajectories)
+        return [found[id(item)] for item in self.items]
+
+    def _identified(self, ready: _Ready, trajectories: Trajectories) -> Identified:
+        crown = ready.scenario.roller.crown_radius
+        row = identified(ready.item, ready.trace, trajectories, ready.passes, crown)
+        return replace(row, shares=shares(row, trajectories))
+
+
+def shares(row: Identified, trajectories: Trajectories) -> dict[str, float]:
+    """Return the part of the variance of ln K/H that follows each input, by rank correlation.
+
+    Parameters
+    ----------
+    row : Identified
+    trajectories : Trajectories
+        Those of its draws.
+    """
+    weight = np.exp(row.likelihood.log_evidence - row.likelihood.log_evidence.max())
+    used = weight > 1e-3
+    if used.sum() < 16:
+        return {}
+    mean = row.likelihood.mean[used].argsort().argsort()
+    found = {}
+    for key, values in trajectories.values.items():
+        size = np.abs(values[used])
+        if np.ptp(size) > 0.0:
+            rank = size.argsort().argsort()
+            found[key] = float(np.corrcoef(rank, mean)[0, 1] ** 2)
+    return found
+
+
+def _passes(scenario: Scenario, item: Measurement) -> float:
+    """Return the passes at which a groove was measured."""
+    if item.at is None:
+        return float(scenario.total_passes)
+    text = item.at.strip()
+    try:
+        if text.endswith("passes"):
+            found = float(text.removesuffix("passes"))
+        else:
+            found = quantity(text, "s") * scenario.pass_rate
+    except ValueError as error:
+        expected = "a time such as '100 min', or '2e5 passes'"
+        raise ScenarioError(
+            item.name, [Mistake("", "at", str(error), repr(item.at), expected)]
+        ) from error
+    if not 0.0 < found <= scenario.total_passes * (1.0 + 1e-9):
+        raise ScenarioError(
+            item.name,
+            [
+                Mistake(
+                    "",
+                    "at",
+                    "is not within the test",
+                    item.at,
+                    f"up to {scenario.total_time / 60.0:.6g} min",
+                )
+            ],
+        )
+    return found

@@ -1,0 +1,176 @@
+"""Inputs of each test: fixed, known, measured with an error, or drawn from the scenario."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from wearsim.errors import Mistake, ScenarioError
+from wearsim.models.random.distributions import TableDistribution
+from wearsim.quantities import quantity
+from wearsim.scenario import RandomInput, Scenario
+from wearsim.studies.identify.measurements import key_of
+
+_SPAN = 6.0  # standard deviations of a measured value that are considered
+_POINTS = 801
+_EITHER_SIGN = {"creepage.yaw", "creepage.tilt", "roller.offset"}
+_LEAST = 1e-9  # probability of the values within that span by the scenario
+
+
+def with_known(
+    scenario: Scenario, values: Mapping[str, object], errors: Mapping[str, object], file: str
+) -> Scenario:
+    """Return the scenario of one test.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    values : mapping of str to object
+        Known or measured inputs by the scenario's key, "310 N".
+    errors : mapping of str to object
+        Standard deviations of the measured ones, "10 N". The distribution of the scenario and the
+        measurement are combined by Bayes' theorem.
+    file : str
+        Name of the test, for messages.
+
+    Raises
+    ------
+    ScenarioError
+        If a key or value is wrong, or a measured value is out of the distribution.
+    """
+    if not values:
+        return scenario
+    before = {key: item for item in scenario.random for key in item.keys}
+    found = scenario.changed(dict(values))
+    random = list(found.random)
+    for key, error in errors.items():
+        value = _number(found, key)
+        std = _std(before.get(key), error, file, key)
+        item = before.get(key)
+        if item is None:
+            changed = found.changed({key: _normal(key, values[key], error)})
+            random += [one for one in changed.random if one.name == key]
+        else:
+            random.append(_measured(item, value, std, file))
+    return replace(found, random=tuple(sorted(random, key=lambda one: one.name)))
+
+
+def _normal(key: str, value: object, error: object) -> dict[str, object]:
+    """Return the normal distribution of a measured value, above 0 unless it may be negative."""
+    if key in _EITHER_SIGN:
+        return {"distribution": "normal", "mean": value, "std": error}
+    unit = str(value).strip().partition(" ")[2]
+    zero = f"0 {unit}" if unit else 0
+    parent = {"parent_mean": value, "parent_std": error}
+    return {"distribution": "truncated-normal", **parent, "support": [zero, "inf"]}
+
+
+def _number(scenario: Scenario, key: str) -> float:
+    """Return the number at a dotted key of a scenario [SI]."""
+    table, *inner = key.split(".")
+    value: Any = getattr(scenario, table)
+    value = getattr(value, "options", value)
+    for name in inner:
+        value = getattr(value, name)
+    return float(value)
+
+
+def _std(item: RandomInput | None, error: object, file: str, key: str) -> float:
+    """Return a standard deviation in SI."""
+    unit = item.quantity.kind.unit if item is not None and item.quantity else "1"
+    try:
+        found = quantity(str(error), unit) if unit != "1" else float(str(error))
+    except ValueError as failure:
+        raise ScenarioError(file, [Mistake("std", key, str(failure), repr(error))]) from failure
+    if found <= 0.0:
+        raise ScenarioError(file, [Mistake("std", key, "must be above 0", repr(error))])
+    return found
+
+
+def _measured(item: RandomInput, value: float, std: float, file: str) -> RandomInput:
+    """Return an input whose distribution is combined with a measurement."""
+    uniform = 0.5 * (1.0 + np.tanh(np.linspace(-11.0, 11.0, 20001)))
+    quantiles = item.scalar.quantile(uniform)
+    grid = value + std * np.linspace(-_SPAN, _SPAN, _POINTS)
+    below = np.interp(grid, quantiles, uniform, left=0.0, right=1.0)
+    middle = 0.5 * (grid[1:] + grid[:-1])
+    weight = np.diff(below) * np.exp(-0.5 * ((middle - value) / std) ** 2)
+    if below[-1] - below[0] < _LEAST:
+        raise ScenarioError(
+            file,
+            [
+                Mistake(
+                    "set",
+                    item.name,
+                    f"the measured value is out of the scenario's distribution: {item.describe()}",
+                    f"{value:.6g} with std {std:.3g} (SI)",
+                )
+            ],
+        )
+    probability = np.concatenate([[0.0], np.cumsum(weight)])
+    inside = np.concatenate([[True], weight > 0.0])
+    table = TableDistribution(probability[inside] / probability[-1], grid[inside])
+    return replace(item, kind="measured", persistence="per-test", distribution=table, marginal="")
+
+
+def fixed(text: str) -> dict[str, object]:
+    """Return the overrides of ``--fix friction=0.1,load=310 N``.
+
+    Raises
+    ------
+    ValueError
+        If a part is no key with a value.
+    """
+    found: dict[str, object] = {}
+    for part in text.split(","):
+        name, equals, value = part.partition("=")
+        if not equals or not name.strip() or not value.strip():
+            raise ValueError(f"'{part}' is not an input with a value, such as friction=0.1")
+        try:
+            found[key_of(name.strip())] = float(value)
+        except ValueError:
+            found[key_of(name.strip())] = value.strip()
+    return found
+
+
+def with_measured(scenario: Scenario, stds: Mapping[str, float]) -> Scenario:
+    """Return a scenario whose inputs scatter as if they had been measured.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    stds : mapping of str to float
+        Standard deviation of the logarithm by the scenario's key, 0.1.
+
+    Raises
+    ------
+    ScenarioError
+        If an input is not random in the scenario, or sets several values.
+    """
+    random = list(scenario.random)
+    names = [item.name for item in random]
+    for key, std in stds.items():
+        if key not in names or random[names.index(key)].role == "joint":
+            single = [item.name for item in random if item.role != "joint"]
+            expected = ", ".join(single) or "a random input"
+            what = "is not a random number of the scenario, so measuring it changes nothing"
+            raise ScenarioError(scenario.file, [Mistake("", key, what, None, expected)])
+        place = names.index(key)
+        item = random[place]
+        uniform = (np.arange(2001) + 0.5) / 2001
+        from scipy.special import ndtri  # noqa: PLC0415  (slow to import)
+
+        median = float(item.scalar.quantile(np.array([0.5]))[0])
+        values = median * np.exp(std * ndtri(uniform))
+        low, high = item.scalar.support
+        values = np.clip(values, low if math.isfinite(low) else None, high)
+        ends = np.concatenate([[0.0], uniform, [1.0]])
+        table = TableDistribution(ends, np.concatenate([values[:1], values, values[-1:]]))
+        random[place] = replace(
+            item, kind="measured", persistence="per-test", distribution=table, marginal=""
+        )
+    return replace(scenario, random=tuple(random))

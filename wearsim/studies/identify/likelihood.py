@@ -1,0 +1,290 @@
+"""Likelihood of the wear factor by one trace, for each draw of the other inputs.
+
+A trace is z(y) = c0 + c1 y + h(y - s) - u(y - s; ln K) + noise, where u is the worn depth and h the
+height before wear. Offset c0 and inclination c1 have flat priors and are integrated in closed form;
+ln K and the lateral shift s are integrated on a lattice, which is centred and scaled by the
+moments of the integrand itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from wearsim.studies.identify.trajectories import Grown
+from wearsim.types import FloatArray, IntArray
+from wearsim.uq.hierarchy.noise import Noise
+
+_STARTS = 9  # values of ln K from which the maximum is sought
+_ITERATIONS = 8
+_LATTICE = np.array([[a, b] for a in np.arange(-4.0, 4.5) for b in np.arange(-4.0, 4.1, 4.0 / 3.0)])
+_CELL = 4.0 / 3.0  # area of a cell of the lattice
+_ROUNDS = 3  # of centring the lattice
+_VALUES = 3_000_000  # of an array
+_DROPPED = 80.0  # of chi2 above that of the best draw
+_LONGEST = np.array([0.4, 1e-3])  # greatest change of ln K and shift in one iteration
+
+
+@dataclass(frozen=True)
+class TraceLikelihood:
+    """Likelihood of a trace.
+
+    Parameters
+    ----------
+    y, height : ndarray, shape (points,)
+        Rising positions and heights, positive up [m].
+    noise : Noise
+    grown : Grown
+        Worn profiles at the passes of the trace.
+    body : str
+        "cylinder" or "roller".
+    lateral : bool
+        Whether the lateral position of the trace is unknown.
+    start : bool
+        Whether the model includes the height of the cylinder before wear; false for a difference
+        of traces.
+    """
+
+    y: FloatArray
+    height: FloatArray
+    noise: Noise
+    grown: Grown
+    body: str = "cylinder"
+    lateral: bool = True
+    start: bool = True
+
+    @cached_property
+    def _centroid(self) -> FloatArray:
+        """Centroid of each worn profile, shape (draws, records) [m]."""
+        depth = np.maximum(self.grown.depth[self.body], 0.0)
+        total = np.maximum(depth.sum(axis=2), 1e-300)
+        return np.asarray((depth * self.grown.y).sum(axis=2) / total)
+
+    @cached_property
+    def _lines(self) -> FloatArray:
+        """Orthonormal whitened lines, shape (points, 2)."""
+        scaled = (self.y - self.y.mean()) / np.ptp(self.y)
+        lines = np.column_stack([np.ones_like(self.y), scaled])
+        return np.linalg.qr(self.noise.whitened(self.y, lines))[0]
+
+    def worn(self, draw: IntArray, ln_k: FloatArray, shift: FloatArray) -> FloatArray:
+        """Return worn depth less start height, shape (points, columns) [m].
+
+        Between two records each is scaled as a groove of constant curvature: K/H times s^3 makes it
+        s times wider and s^2 times deeper, which is exact for rigid bodies in full slip.
+
+        Parameters
+        ----------
+        draw : ndarray of int, shape (columns,)
+        ln_k, shift : ndarray, shape (columns,)
+        """
+        grown = self.grown
+        known = grown.ln_k[draw]
+        last = known.shape[1] - 1
+        record = np.clip((known <= ln_k[:, None]).sum(axis=1) - 1, 0, max(last - 1, 0))
+        columns = np.arange(len(draw))
+        low = known[columns, record]
+        high = known[columns, np.minimum(record + 1, last)]
+        part = np.clip((ln_k - low) / np.where(high > low, high - low, 1.0), 0.0, 1.0)
+        total = np.zeros((len(self.y), len(draw)))
+        for step, weight in ((0, 1.0 - part), (1, part)):
+            place = np.minimum(record + step, last)
+            stretch = np.exp((ln_k - known[columns, place]) / 3.0)
+            centre = self._centroid[draw, place]
+            position = (self.y[:, None] - shift - centre) / stretch + centre
+            depth = self.grown.depth[self.body][draw, place]
+            total += (weight * stretch**2) * _interpolated(position, grown.y, depth)
+        if self.start and grown.start.any():
+            total -= np.interp(self.y[:, None] - shift, grown.y, grown.start)
+        return total
+
+    def residual(self, draw: IntArray, ln_k: FloatArray, shift: FloatArray) -> FloatArray:
+        """Return whitened residuals without offset and inclination, shape (points, columns)."""
+        sum_ = self.height[:, None] + self.worn(draw, ln_k, shift)
+        white = self.noise.whitened(self.y, sum_)
+        return np.asarray(white - self._lines @ (self._lines.T @ white))
+
+    def chi2(self, draw: IntArray, ln_k: FloatArray, shift: FloatArray) -> FloatArray:
+        """Return the sum of squared residuals, shape (columns,)."""
+        found = np.empty(len(draw))
+        block = max(_VALUES // len(self.y), 1)
+        for start in range(0, len(draw), block):
+            some = slice(start, start + block)
+            found[some] = (self.residual(draw[some], ln_k[some], shift[some]) ** 2).sum(axis=0)
+        return found
+
+    def _start(self) -> tuple[FloatArray, FloatArray]:
+        """Return ln K and shift from which the maximum is sought, for each draw."""
+        draws = np.arange(len(self.grown.ln_k))
+        ends = self.grown.ln_k[:, [0, -1]]
+        below = self.height.max() - self.height
+        weight = np.maximum(below - 0.5 * below.max(), 0.0)
+        centre = float((weight * self.y).sum() / weight.sum())
+        shift = centre - self._centroid.mean(axis=1)
+        if not self.lateral:
+            shift = np.zeros_like(shift)
+        tried = np.linspace(ends[:, 0], ends[:, 1], _STARTS, axis=1)
+        owner = np.repeat(draws, _STARTS)
+        found = self.chi2(owner, tried.ravel(), shift[owner]).reshape(tried.shape)
+        return tried[draws, found.argmin(axis=1)], shift
+
+    def maximum(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the maximum for each draw by the Gauss-Newton method.
+
+        Returns
+        -------
+        position : ndarray, shape (draws, 2)
+            ln K and shift.
+        covariance : ndarray, shape (draws, 2, 2)
+        chi2 : ndarray, shape (draws,)
+        """
+        ln_k, shift = self._start()
+        position = np.column_stack([ln_k, shift])
+        draws, count = np.arange(len(ln_k)), len(self.y)
+        small = np.array([2e-3, 2e-6])
+        damping = np.full(len(draws), 1e-3)
+        chi2 = self.chi2(draws, *position.T)
+        normal = np.zeros((len(draws), 2, 2))
+        block = max(_VALUES // (3 * count), 1)
+        for _ in range(_ITERATIONS):
+            gradient = np.zeros((len(draws), 2))
+            for start in range(0, len(draws), block):
+                some = draws[start : start + block]
+                here = position[some]
+                moves = np.array([[0.0, 0.0], [small[0], 0.0], [0.0, small[1]]])
+                tried = (moves[:, None] + here).reshape(-1, 2)
+                found = self.residual(np.tile(some, 3), *tried.T).reshape(count, 3, -1)
+                base = found[:, 0]
+                # derivatives, shape (2, points, columns)
+                slope = (found[:, 1:] - base[:, None]).transpose(1, 0, 2) / small[:, None, None]
+                normal[some] = np.einsum("apc,bpc->cab", slope, slope)
+                gradient[some] = np.einsum("apc,pc->ca", slope, base)
+            if not self.lateral:
+                normal[:, 0, 1] = normal[:, 1, 0] = gradient[:, 1] = 0.0
+                normal[:, 1, 1] = 1.0
+            diagonal = np.einsum("caa->ca", normal)
+            damped = normal + (damping[:, None] * diagonal)[:, :, None] * np.eye(2)
+            step = -np.linalg.solve(damped, gradient[..., None])[..., 0]
+            step = np.clip(step, -_LONGEST, _LONGEST)
+            new = self.chi2(draws, *(position + step).T)
+            better = new <= chi2
+            change = np.where(better, chi2 - new, 0.0)
+            position[better] += step[better]
+            chi2 = np.where(better, new, chi2)
+            damping = np.where(better, 0.2 * damping, 10.0 * damping)
+            if (better & (change < 1e-2)).all():
+                break
+        return position, np.asarray(np.linalg.inv(normal)), chi2
+
+    def integrated(self) -> DrawLikelihood:
+        """Return evidence, mean and standard deviation of ln K for each draw."""
+        centre, covariance, chi2 = self.maximum()
+        best = float(chi2.min())
+        kept = np.flatnonzero(chi2 < best + _DROPPED)
+        lattice = _LATTICE if self.lateral else _LATTICE[np.abs(_LATTICE[:, 1]) < 0.1]
+        log_evidence = np.full(len(centre), -np.inf)
+        pending = kept
+        for _ in range(_ROUNDS):
+            root = np.linalg.cholesky(covariance[pending])
+            if not self.lateral:
+                root[:, 1] = 0.0
+            points = centre[pending][:, None] + lattice @ root.transpose(0, 2, 1)
+            owner = np.repeat(pending, len(lattice))
+            values = self.chi2(owner, *points.reshape(-1, 2).T).reshape(len(pending), -1)
+            weight = np.exp(-0.5 * (values - best))
+            weight *= np.exp(0.5 * (values.min(axis=1) - best))[:, None]
+            total = weight.sum(axis=1)
+            mean = np.einsum("cp,cpa->ca", weight, points) / total[:, None]
+            away = points - mean[:, None]
+            second = np.einsum("cp,cpa,cpb->cab", weight, away, away) / total[:, None, None]
+            if not self.lateral:
+                second[:, 1, 1] = 1.0
+            area = root[:, 0, 0] * (root[:, 1, 1] if self.lateral else 1.0)
+            log_evidence[pending] = np.log(total * area) - 0.5 * (values.min(axis=1) - best)
+            unfit = np.sqrt(second[:, 0, 0] / covariance[pending, 0, 0])
+            unfit = np.maximum(unfit, 1.0 / unfit)
+            off = np.abs(mean[:, 0] - centre[pending, 0]) / np.sqrt(covariance[pending, 0, 0])
+            centre[pending], covariance[pending] = mean, second
+            pending = pending[(unfit > 1.25) | (off > 0.7)]
+            if not len(pending):
+                break
+        return DrawLikelihood(
+            log_evidence, centre[:, 0], np.sqrt(covariance[:, 0, 0]), centre[:, 1], chi2
+        )
+
+
+@dataclass(frozen=True)
+class DrawLikelihood:
+    """Likelihood of ln K for each draw, as a normal density times an evidence; shape (draws,).
+
+    Parameters
+    ----------
+    log_evidence : ndarray
+        Minus infinity where the draw is far from the trace.
+    mean, std : ndarray
+        Of ln K.
+    shift : ndarray
+        Lateral shift [m]; zeros for a measured depth.
+    chi2 : ndarray
+        Least sum of squares.
+    """
+
+    log_evidence: FloatArray
+    mean: FloatArray
+    std: FloatArray
+    shift: FloatArray
+    chi2: FloatArray
+
+    def times(self, other: DrawLikelihood) -> DrawLikelihood:
+        """Return the product with the likelihood of another trace of the same test."""
+        variance = self.std**2 + other.std**2
+        away = self.mean - other.mean
+        evidence = -0.5 * away**2 / variance - 0.5 * np.log(variance)
+        precision = self.std**-2 + other.std**-2
+        mean = (self.mean * self.std**-2 + other.mean * other.std**-2) / precision
+        return DrawLikelihood(
+            self.log_evidence + other.log_evidence + evidence,
+            mean,
+            precision**-0.5,
+            other.shift,
+            self.chi2 + other.chi2,
+        )
+
+
+def depth_likelihood(depth: float, std: float, grown: Grown, body: str) -> DrawLikelihood:
+    """Return the likelihood of a measured depth for each draw.
+
+    Parameters
+    ----------
+    depth, std : float
+        Greatest depth, and its standard deviation [m].
+    grown : Grown
+    body : str
+        "cylinder" or "roller".
+    """
+    greatest = np.log(np.maximum(grown.depth[body].max(axis=2), 1e-12))
+    mean, slope = np.empty((2, len(greatest)))
+    for draw, (ln_depth, ln_k) in enumerate(zip(greatest, grown.ln_k, strict=True)):
+        mean[draw] = np.interp(np.log(depth), ln_depth, ln_k)
+        place = int(np.clip(np.searchsorted(ln_depth, np.log(depth)), 1, len(ln_k) - 1))
+        rise = ln_depth[place] - ln_depth[place - 1]
+        slope[draw] = (ln_k[place] - ln_k[place - 1]) / max(rise, 1e-12)
+    zero = np.zeros_like(mean)
+    # the same density of depth at every draw: a steeper curve has a narrower density of ln K
+    return DrawLikelihood(np.log(slope), mean, slope * std / depth, zero, zero)
+
+
+def _interpolated(position: FloatArray, y: FloatArray, rows: FloatArray) -> FloatArray:
+    """Return rows on equally spaced strips at positions, shape (points, rows); 0 outside."""
+    count = len(y)
+    place = (position - y[0]) * ((count - 1) / (y[-1] - y[0]))
+    inside = (place >= 0.0) & (place <= count - 1)
+    first = np.clip(place, 0.0, count - 1.001).astype(np.int64)
+    part = place - first
+    flat, offset = np.ascontiguousarray(rows).ravel(), count * np.arange(len(rows))
+    index = first + offset
+    value = flat[index]
+    value = value + part * (flat[index + 1] - value)
+    return np.asarray(np.where(inside, value, 0.0))

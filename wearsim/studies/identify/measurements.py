@@ -1,0 +1,238 @@
+"""Measured tests: files named on the command line, and the tables of a tests file."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from wearsim.errors import Mistake, ScenarioError
+from wearsim.profiles import ProfileChoice
+from wearsim.quantities import quantity
+
+#: Short names of inputs.
+SHORT = {
+    "load": "load.normal_force",
+    "friction": "friction.coefficient",
+    "creepage": "creepage.longitudinal",
+    "yaw": "creepage.yaw",
+    "tilt": "creepage.tilt",
+    "stiffness": "load.stiffness",
+}
+_ROWS = ("row", "mean_rows", "row_at")
+_KEYS = (
+    *("profile", "depth", "depth_std", "before", "at", "group", "set", "std", "body", "shoulders"),
+    *("columns", "units", *_ROWS),
+)
+_EXAMPLE = '[[test]] tables with profile = "t1.csv", or depth = "48 um" and depth_std = "1 um"'
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """One measured groove.
+
+    Parameters
+    ----------
+    name : str
+        File, or "test 2".
+    profile, before : Path, optional
+        Files of the worn profile, and of the same place before the test.
+    choice : ProfileChoice
+        Columns, units and rows of these files.
+    depth, depth_std : float, optional
+        Measured depth instead of a profile, and its standard deviation [m].
+    at : str, optional
+        Time or passes of the measurement; the end of the test by default.
+    group : str, optional
+        Name of the specimen.
+    values : mapping of str to object
+        Known inputs of this test, by the scenario's key.
+    errors : mapping of str to object
+        Standard deviations of measured inputs, by key.
+    body : {"cylinder", "roller"}
+        Body of which the wear was measured.
+    shoulders : float, optional
+        Distance from the middle of the groove beyond which the surface is unworn [m].
+    """
+
+    name: str
+    profile: Path | None = None
+    before: Path | None = None
+    choice: ProfileChoice = field(default_factory=ProfileChoice)
+    depth: float | None = None
+    depth_std: float | None = None
+    at: str | None = None
+    group: str | None = None
+    values: Mapping[str, object] = field(default_factory=dict)
+    errors: Mapping[str, object] = field(default_factory=dict)
+    body: str = "cylinder"
+    shoulders: float | None = None
+
+
+def key_of(name: str) -> str:
+    """Return the scenario's key of an input, which may be given by a short name."""
+    return SHORT.get(name, name)
+
+
+def measurements_of(
+    files: Sequence[str | Path],
+    before: Sequence[str | Path] = (),
+    choice: ProfileChoice | None = None,
+    shoulders: float | None = None,
+) -> list[Measurement]:
+    """Return the measurements in profile files, each of one test.
+
+    Parameters
+    ----------
+    files, before : sequence of path
+        Profiles after the tests, and before them if they were measured.
+    choice : ProfileChoice, optional
+        Columns, units and rows of all files.
+    shoulders : float, optional
+        As in `Measurement` [m].
+
+    Raises
+    ------
+    ValueError
+        If there are not as many files before as after.
+    """
+    if before and len(before) != len(files):
+        raise ValueError(
+            f"{len(before)} profiles before the tests for {len(files)} after them; give one for"
+            " each, in the same order"
+        )
+    firsts: Sequence[str | Path | None] = before or [None] * len(files)
+    pairs = zip(files, firsts, strict=True)
+    return [
+        Measurement(
+            str(file),
+            Path(file),
+            Path(first) if first is not None else None,
+            choice or ProfileChoice(),
+            shoulders=shoulders,
+        )
+        for file, first in pairs
+    ]
+
+
+def read_tests(path: str | Path) -> list[Measurement]:
+    """Read a tests file; the files that it names are relative to its folder.
+
+    Parameters
+    ----------
+    path : path
+        TOML with ``[[test]]`` tables.
+
+    Returns
+    -------
+    list of Measurement
+
+    Raises
+    ------
+    ScenarioError
+        With all mistakes of the file.
+    """
+    file = Path(path)
+    try:
+        tables = tomllib.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        what = f"the file cannot be read ({error.strerror})"
+        raise ScenarioError(str(path), [Mistake("", "", what)]) from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ScenarioError(str(path), [Mistake("", "", f"is not TOML: {error}")]) from error
+    tests = tables.pop("test", None)
+    mistakes = [Mistake("", key, "is unknown", None, _EXAMPLE) for key in tables]
+    if not isinstance(tests, list) or not all(isinstance(test, dict) for test in tests or []):
+        raise ScenarioError(str(path), [*mistakes, Mistake("", "", "has no tests", None, _EXAMPLE)])
+    found = []
+    for number, table in enumerate(tests, 1):
+        found.append(_read_test(table, f"test {number}", file.parent, mistakes))
+    if mistakes:
+        raise ScenarioError(str(path), mistakes)
+    return found
+
+
+def _read_test(
+    table: dict[str, Any], place: str, folder: Path, mistakes: list[Mistake]
+) -> Measurement:
+    """Return one test, and add its mistakes."""
+
+    def wrong(key: str, what: str, got: object, expected: str) -> None:
+        mistakes.append(Mistake(place, key, what, None if got is None else repr(got), expected))
+
+    def length(key: str) -> float | None:
+        if key not in table:
+            return None
+        try:
+            value = quantity(table[key], "m")
+        except ValueError as error:
+            wrong(key, str(error), None, "a length such as '48 um'")
+            return None
+        if value <= 0.0:
+            wrong(key, "must be above 0", table[key], "a length such as '48 um'")
+        return value
+
+    def text(key: str) -> str | None:
+        value = table.get(key)
+        if value is not None and not isinstance(value, str):
+            wrong(key, "is not a text", value, "a text in quotes")
+            return None
+        return value
+
+    for key in table:
+        if key not in _KEYS:
+            wrong(key, "is unknown", None, ", ".join(_KEYS))
+    for key in ("set", "std"):
+        if not isinstance(table.get(key, {}), dict):
+            wrong(key, "is not a table", table[key], 'such as {load.normal_force = "310 N"}')
+            return Measurement(place)
+    if ("profile" in table) == ("depth" in table):
+        wrong("profile or depth", "exactly one of them is needed", None, _EXAMPLE)
+    if "depth" in table and "depth_std" not in table:
+        wrong("depth_std", "is needed with depth", None, "its standard deviation, such as '1 um'")
+    if table.get("body", "cylinder") not in {"cylinder", "roller"}:
+        wrong("body", "is unknown", table["body"], '"cylinder" or "roller"')
+    values, errors = _flat(table.get("set", {})), _flat(table.get("std", {}))
+    for key in errors:
+        if key not in values:
+            wrong(f"std.{key}", "needs the measured value", None, f"{key} in set")
+    names = {key: text(key) for key in ("profile", "before", "at", "group")}
+    profile, before = (folder / name if (name := names[k]) else None for k in ("profile", "before"))
+    choice = ProfileChoice()
+    try:
+        choice = ProfileChoice(
+            tuple(table["columns"]) if "columns" in table else None,
+            tuple(table["units"]) if "units" in table else None,
+            table.get("row"),
+            tuple(table["mean_rows"]) if "mean_rows" in table else None,
+            quantity(table["row_at"], "m") if "row_at" in table else None,
+        )
+    except (TypeError, ValueError) as error:
+        wrong("columns, units or rows", str(error), None, 'such as columns = ["y", "-z"]')
+    return Measurement(
+        names["profile"] or place,
+        profile,
+        before,
+        choice,
+        length("depth"),
+        length("depth_std"),
+        names["at"],
+        names["group"],
+        values,
+        errors,
+        str(table.get("body", "cylinder")),
+        length("shoulders"),
+    )
+
+
+def _flat(table: Mapping[str, Any], start: str = "") -> dict[str, object]:
+    """Return values by the scenario's dotted key."""
+    found: dict[str, object] = {}
+    for key, value in table.items():
+        if isinstance(value, dict):
+            found |= _flat(value, f"{start}{key}.")
+        else:
+            found[key_of(f"{start}{key}")] = value
+    return found

@@ -1,0 +1,148 @@
+"""Planning of tests: power of the verdict against the number of tests and the measured inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from wearsim.scenario import Scenario, as_scenario, require_run
+from wearsim.studies.ensemble.realisation import closed_form_depths
+from wearsim.studies.identify.analysis import kernel_of
+from wearsim.studies.identify.inputs import with_measured
+from wearsim.studies.identify.likelihood import depth_likelihood
+from wearsim.studies.identify.measurements import key_of
+from wearsim.studies.identify.trajectories import CYLINDER, ROLLER, Grower, check_law, factors
+from wearsim.uq.hierarchy.kernels import Kernel
+from wearsim.uq.hierarchy.verdict import NEGLIGIBLE, Design
+
+SCATTERS = (0.2, 0.4, 0.8)
+DRAWS = 512
+SETS = 1000  # simulated sets of tests
+DEPTH_ERROR = 0.01  # relative error of a measured depth
+_MOST_SIZES = 9
+
+
+@dataclass(frozen=True)
+class PlannedDesign:
+    """Rates of the verdicts for some numbers of tests.
+
+    Parameters
+    ----------
+    name : str
+        "as in the scenario", or the measured inputs.
+    scatter_from_inputs : float
+        Scatter of ln K/H of tests that the inputs cause.
+    tests : tuple of int
+        Numbers of tests.
+    random : dict of float to tuple of float
+        Rate of the verdict "random" for each number of tests, by the scatter of ln K/H.
+    explained : dict of float to tuple of float
+        Rate of the verdict "explained".
+    """
+
+    name: str
+    scatter_from_inputs: float
+    tests: tuple[int, ...]
+    random: Mapping[float, tuple[float, ...]]
+    explained: Mapping[float, tuple[float, ...]]
+
+    def tests_for(self, power: float, scatter: float) -> int | None:
+        """Return the least of these numbers of tests with a power, or None."""
+        pairs = zip(self.tests, self.random[scatter], strict=True)
+        return next((tests for tests, rate in pairs if rate >= power), None)
+
+
+def plan_tests(
+    scenario: Scenario | str | Path,
+    tests: Sequence[int],
+    measured: Mapping[str, float] | None = None,
+    *,
+    negligible: float = NEGLIGIBLE,
+    draws: int = DRAWS,
+    sets: int = SETS,
+    on_progress: Callable[[int, int], None] | None = None,
+) -> list[PlannedDesign]:
+    """Return the power of tests of a scenario to show whether the wear factor scatters.
+
+    Parameters
+    ----------
+    scenario : Scenario or path
+        Its random inputs differ between the tests.
+    tests : sequence of int
+        Numbers of tests, each 2 or more.
+    measured : mapping of str to float, optional
+        Inputs that are measured in every test: standard deviation of the logarithm, {"load": 0.1}.
+    negligible : float
+        Scatter of ln K/H below which it is negligible.
+    draws : int
+        Number of draws of the inputs.
+    sets : int
+        Number of simulated sets of tests.
+    on_progress : callable, optional
+        Called with the numbers of completed and of all wear tests.
+
+    Returns
+    -------
+    list of PlannedDesign
+        For the inputs of the scenario, and for measured ones if there are any.
+
+    Raises
+    ------
+    ScenarioError, CapabilityError
+        If the scenario cannot be used.
+    ValueError
+        If a number of tests is below 2.
+    """
+    scenario = as_scenario(scenario)
+    require_run(scenario)
+    check_law(scenario)
+    if not tests or min(tests) < 2:
+        raise ValueError("scatter needs 2 tests or more")
+    designs = [("as in the scenario", scenario)]
+    if measured:
+        stds = {key_of(key): std for key, std in measured.items()}
+        name = ", ".join(f"{key} measured to {std:.3g}" for key, std in stds.items())
+        designs.append((name, with_measured(scenario, stds)))
+    return [
+        _planned(name, _kernel(one, draws, on_progress), tests, negligible, sets, scenario.seed)
+        for name, one in designs
+    ]
+
+
+def sizes(first: int, last: int) -> list[int]:
+    """Return at most nine numbers of tests from the first to the last, about equal in ratio."""
+    found = np.geomspace(first, last, _MOST_SIZES).round().astype(int)
+    return sorted({first, last, *found.tolist()})
+
+
+def _kernel(
+    scenario: Scenario, draws: int, on_progress: Callable[[int, int], None] | None
+) -> Kernel:
+    """Return the likelihood of ln K/H by a test of mean inputs that wears as the scenario."""
+    cylinder, roller = factors(scenario)
+    known = {CYLINDER: np.array([cylinder]), ROLLER: np.array([roller])}
+    depth = float(closed_form_depths(scenario, known, 1)[0])
+    passes = float(scenario.total_passes)
+    grown = Grower(scenario, draws, on_progress=on_progress).grow((depth, depth), [passes])
+    found = depth_likelihood(depth, DEPTH_ERROR * depth, grown.by_passes[passes], "cylinder")
+    return kernel_of(found, scenario.file)
+
+
+def _planned(
+    name: str, kernel: Kernel, tests: Sequence[int], negligible: float, sets: int, seed: int
+) -> PlannedDesign:
+    rates: dict[float, list[tuple[float, float]]] = {t: [] for t in (0.0, *SCATTERS)}
+    for count in tests:
+        design = Design([kernel], count, negligible=negligible, seed=seed, sets=sets)
+        for t, found in rates.items():
+            found.append(design.rates(t))
+    return PlannedDesign(
+        name,
+        kernel.variance**0.5,
+        tuple(tests),
+        {t: tuple(random for random, _ in found) for t, found in rates.items()},
+        {t: tuple(explained for _, explained in found) for t, found in rates.items()},
+    )

@@ -1,0 +1,316 @@
+"""Wear factors of all specimens together: hierarchy, verdict, and the content of the results."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from wearsim.errors import Mistake, ScenarioError
+from wearsim.results import IdentificationData
+from wearsim.scenario import Scenario
+from wearsim.studies.identify.analysis import Identified, exponent, kernel_of
+from wearsim.studies.identify.likelihood import DrawLikelihood
+from wearsim.studies.preparation import origin_of
+from wearsim.types import FloatArray
+from wearsim.uq.hierarchy.kernels import Kernel
+from wearsim.uq.hierarchy.pooled import PRIOR_SCALE, Posterior
+from wearsim.uq.hierarchy.verdict import ALPHA, Design, needed_tests, normal_power, word
+
+PRIORS = (0.25, 0.5, 1.0, 2.0)  # scales of the half-normal prior of t
+SHOWN = 0.4  # scatter of ln K/H for which the power is stated
+MEASURED = 0.1  # standard deviation of ln K/H if the inputs are measured
+_FEW_DRAWS = 25.0
+_CURVE = 601  # values of ln K/H of a stored density
+_NODES = 81  # parts of the likelihood of a specimen that joins several tests
+
+
+@dataclass(frozen=True)
+class Specimen:
+    """Traces of one specimen.
+
+    Parameters
+    ----------
+    name : str
+    tests : list of list of Identified
+        Traces of each test in the order of passes.
+    kernel : Kernel
+        Likelihood of ln K/H.
+    """
+
+    name: str
+    tests: list[list[Identified]]
+    kernel: Kernel
+
+
+def specimens_of(rows: Sequence[Identified]) -> list[Specimen]:
+    """Return the specimens of measured grooves.
+
+    Grooves of a group are of one specimen. A groove at more passes than the one before it in the
+    group is of the same test, and shares all inputs with it; otherwise it begins another test.
+
+    Parameters
+    ----------
+    rows : sequence of Identified
+
+    Raises
+    ------
+    ScenarioError
+        If traces of one test do not agree on any draw of its inputs.
+    """
+    groups: dict[str, list[Identified]] = {}
+    for number, row in enumerate(rows):
+        groups.setdefault(row.item.group or f"\0{number}", []).append(row)
+    found = []
+    for name, members in groups.items():
+        tests: list[list[Identified]] = []
+        for row in members:
+            continues = tests and row.passes > tests[-1][-1].passes
+            same = continues and len(row.likelihood.mean) == len(tests[-1][-1].likelihood.mean)
+            if same:
+                tests[-1].append(row)
+            else:
+                tests.append([row])
+        label = members[0].item.name if name.startswith("\0") else name
+        found.append(Specimen(label, tests, _kernel(label, tests)))
+    return found
+
+
+def _kernel(name: str, tests: Sequence[Sequence[Identified]]) -> Kernel:
+    """Return the likelihood of ln K/H of a specimen from all of its tests."""
+    kernels = []
+    for test in tests:
+        product: DrawLikelihood = test[0].likelihood
+        for row in test[1:]:
+            product = product.times(row.likelihood)
+        kernels.append(kernel_of(product, name))
+    if len(kernels) == 1:
+        return kernels[0]
+    # the product of mixtures, on a grid
+    middle = np.average([k.mean for k in kernels], weights=[1.0 / k.variance for k in kernels])
+    low = min(k.mean - 5.0 * k.variance**0.5 for k in kernels)
+    high = max(k.mean + 5.0 * k.variance**0.5 for k in kernels)
+    grid = np.linspace(low, high, 2001)
+    score = np.sum([log_density(k, grid) for k in kernels], axis=0)
+    weight = np.exp(score - score.max())
+    if not np.isfinite(middle) or weight.sum() < 1.5:
+        what = "its tests contradict each other: no K/H describes them all"
+        raise ScenarioError(name, [Mistake("", "group", what)])
+    step = grid[1] - grid[0]
+    return Kernel.of(np.log(np.maximum(weight, 1e-300)), grid, np.full_like(grid, step))
+
+
+def log_density(kernel: Kernel, grid: FloatArray) -> FloatArray:
+    """Return the logarithm of the likelihood of ln K/H of a specimen, whose integral is 1."""
+    away = (grid[:, None] - kernel.centre) / kernel.std
+    parts = -0.5 * away**2 + np.log(kernel.weight / kernel.std) - 0.5 * np.log(2.0 * np.pi)
+    top = parts.max(axis=1)
+    return np.asarray(top + np.log(np.exp(parts - top[:, None]).sum(axis=1)))
+
+
+def content(
+    scenario: Scenario,
+    specimens: Sequence[Specimen],
+    negligible: float,
+    notes: Sequence[str],
+    created: str,
+    seconds: float,
+) -> IdentificationData:
+    """Return the content of a results file.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    specimens : sequence of Specimen
+    negligible : float
+        Scatter of ln K/H below which it is negligible.
+    notes : sequence of str
+    created : str
+        Start of the study, ISO 8601.
+    seconds : float
+        Its duration.
+    """
+    kernels = [specimen.kernel for specimen in specimens]
+    posterior = Posterior.of(kernels)
+    centres = np.array([kernel.mean for kernel in kernels])
+    summary = _summary(scenario, specimens, posterior, negligible)
+    spread = float(np.sqrt(max(kernel.variance for kernel in kernels)))
+    ends = centres.min() - 4.0 * spread, centres.max() + 4.0 * spread
+    grid = np.linspace(*ends, _CURVE)
+    rows = [row for specimen in specimens for test in specimen.tests for row in test]
+    return IdentificationData(
+        **origin_of(scenario),
+        finished=True,
+        wall_seconds=seconds,
+        created=created,
+        notes=list(dict.fromkeys(notes)),
+        warnings=_warnings(specimens, rows),
+        tests=[_test(row, specimen) for specimen in specimens for t in specimen.tests for row in t],
+        specimens=[specimen.name for specimen in specimens],
+        summary=summary,
+        variables={
+            "scatter": posterior.t,
+            "mean_ln_k": posterior.m,
+            "posterior": posterior.density(),
+            "ln_k": grid,
+            "test_density": np.exp([log_density(kernel, grid) for kernel in kernels]),
+            **_traces(rows),
+        },
+    )
+
+
+def _three(quantiles: Sequence[float]) -> dict[str, float]:
+    """Return a value with its 95 and 90 % intervals from five quantiles."""
+    low, low_90, value, high_90, high = map(float, quantiles)
+    return {"value": value, "low": low, "high": high, "low_90": low_90, "high_90": high_90}
+
+
+_FIVE = (0.025, 0.05, 0.5, 0.95, 0.975)
+
+
+def _test(row: Identified, specimen: Specimen) -> dict[str, Any]:
+    """Return the numbers of one measured groove."""
+    alone = np.exp(row.kernel.quantile(np.array(_FIVE))).tolist()
+    names = ("value", "low", "high")
+    fit = row.fit
+    noise = None if fit is None else fit.trace.noise
+    return {
+        "file": row.item.name,
+        "specimen": specimen.name,
+        "body": row.item.body,
+        "levelled_on": "a measured depth" if fit is None else fit.trace.levelled,
+        "passes": row.passes,
+        "depth_m": row.depth[0],
+        "depth_interval_m": list(row.depth[1:]),
+        "area_m2": row.area[0],
+        "area_interval_m2": list(row.area[1:]),
+        "k_over_h_per_Pa": _three(alone),
+        "energy_J": dict(zip(names, row.energy, strict=True)),
+        "share_of_inputs": row.kernel.variance_of_inputs / row.kernel.variance,
+        "shares": dict(row.shares),
+        "effective_draws": row.kernel.effective_size,
+        "inclination_rad": None if fit is None else fit.trace.inclination,
+        "noise_m": None if noise is None else noise.std,
+        "noise_length_m": None if noise is None else noise.length,
+        "residual_ratio": None if fit is None else fit.ratio,
+        "residual_probability": None if fit is None else fit.probability,
+        "residual_autocorrelation": None if fit is None else fit.correlation,
+    }
+
+
+def _summary(
+    scenario: Scenario, specimens: Sequence[Specimen], posterior: Posterior, negligible: float
+) -> dict[str, Any]:
+    """Return scatter, verdict and what would decide."""
+    kernels = [specimen.kernel for specimen in specimens]
+    centres = np.array([kernel.mean for kernel in kernels])
+    count = len(kernels)
+    variance = float(np.mean([kernel.variance for kernel in kernels]))
+    seen = float(centres.std(ddof=1)) if count > 1 else None
+    ratio = limit = None
+    random = False
+    if count > 1:
+        design = Design(kernels, negligible=negligible, seed=scenario.seed)
+        ratio, limit = design.ratio(centres), design.quantile
+        random = ratio > limit
+    upper = posterior.scatter([1.0 - ALPHA])[0]
+    verdict = word(random, upper, negligible)
+    exponents = {
+        specimen.name: exponent(test)
+        for specimen in specimens
+        for test in specimen.tests
+        if len(test) > 1
+    }
+    low, middle, high = posterior.next((0.025, 0.5, 0.975))
+    return {
+        "scatter_seen": seen,
+        "scatter_from_inputs": variance**0.5,
+        "scatter_of_k": _three(posterior.scatter(_FIVE)),
+        "scatter_upper_95": upper,
+        "negligible": negligible,
+        "bayes_factor": posterior.bayes_factor(),
+        "prior_scale": PRIOR_SCALE,
+        "sensitivity": [
+            {
+                "prior_scale": scale,
+                "bayes_factor": posterior.bayes_factor(scale),
+                "scatter_of_k": posterior.scatter([0.5], scale)[0],
+            }
+            for scale in PRIORS
+        ],
+        "likelihood_ratio": ratio,
+        "likelihood_ratio_95": limit,
+        "verdict": verdict,
+        "k_over_h_median_per_Pa": _three(np.exp(posterior.mean(_FIVE)).tolist()),
+        "next_specimen": {
+            "median_per_Pa": float(np.exp(middle)),
+            "low_per_Pa": float(np.exp(low)),
+            "high_per_Pa": float(np.exp(high)),
+            "factor": float(np.exp((high - low) / 3.92)),
+        },
+        "exponents": {
+            name: dict(zip(("value", "low", "high"), found, strict=True))
+            for name, found in exponents.items()
+            if found is not None
+        },
+        "to_decide": _to_decide(specimens, variance, verdict),
+    }
+
+
+def _to_decide(specimens: Sequence[Specimen], variance: float, verdict: str) -> dict[str, Any]:
+    """Return what would decide, by the power of the variance test of normal values."""
+    rows = [row for specimen in specimens for test in specimen.tests for row in test]
+    shares: dict[str, float] = {}
+    for row in rows:
+        for key, part in row.shares.items():
+            shares[key] = shares.get(key, 0.0) + part / len(rows)
+    measure = [key for key, part in sorted(shares.items(), key=lambda item: -item[1]) if part > 0.1]
+    count = len(specimens)
+    known = float(np.mean([k.kernel.variance - k.kernel.variance_of_inputs for k in specimens]))
+    return {
+        "scatter": SHOWN,
+        "power": normal_power(count, variance, SHOWN) if count > 1 else 0.0,
+        "tests": needed_tests(variance, SHOWN),
+        "measure": measure[:3],
+        "tests_if_measured": needed_tests(MEASURED**2 + known, SHOWN),
+        "power_if_measured": (
+            normal_power(count, MEASURED**2 + known, SHOWN) if count > 1 else 0.0
+        ),
+        "needed": verdict == "undecided",
+    }
+
+
+def _warnings(specimens: Sequence[Specimen], rows: Sequence[Identified]) -> list[str]:
+    """Return remarks on fits and on the number of draws."""
+    found = [row.fit.warning for row in rows if row.fit is not None and row.fit.warning]
+    few = [
+        specimen.name
+        for specimen in specimens
+        if len(specimen.tests[0][0].likelihood.mean) > 1
+        and specimen.kernel.effective_size < _FEW_DRAWS
+        and len(specimen.tests) == 1
+    ]
+    if few:
+        found.append(
+            f"{', '.join(few)}: fewer than {_FEW_DRAWS:.0f} draws describe the shape of the groove;"
+            " give more with --draws"
+        )
+    return found
+
+
+def _traces(rows: Sequence[Identified]) -> dict[str, FloatArray]:
+    """Return all traces as rows of equal length, filled with NaN."""
+    fits = [row.fit for row in rows]
+    points = max([len(fit.trace.y) for fit in fits if fit is not None], default=1)
+    names = ("y", "height", "fitted", "low", "high", "unworn")
+    found = {f"trace_{name}": np.full((len(rows), points), np.nan) for name in names}
+    for place, fit in enumerate(fits):
+        if fit is None:
+            continue
+        trace = fit.trace
+        columns = (trace.y, trace.height, fit.fitted, fit.low, fit.high, trace.unworn)
+        for name, column in zip(names, columns, strict=True):
+            found[f"trace_{name}"][place, : len(trace.y)] = column
+    return found

@@ -1,0 +1,387 @@
+"""Worn profiles for every wear factor: one wear test for each draw of the other inputs.
+
+Where nothing depends on time, the worn profile depends on the wear factor and on the number of
+passes only through their product tau = (K/H) n, so that the records of one test are the profiles
+of all wear factors. Otherwise a test is run for each of several wear factors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from wearsim.errors import CapabilityError, Mistake, ScenarioError, SolverError
+from wearsim.evolution.integrate import Evolution, bisect_failures
+from wearsim.evolution.state import fresh_state
+from wearsim.scenario import Scenario
+from wearsim.studies.ensemble.batch import RealisationRun, batch_groups, joined_problem
+from wearsim.studies.ensemble.realisation import closed_form_depths
+from wearsim.studies.run.assemble import assemble_problem, prepared_model, start_height
+from wearsim.studies.run.draws import Drawer, Draws
+from wearsim.studies.run.grid import strips_of_run
+from wearsim.studies.run.recorder import due_records, states_at
+from wearsim.studies.run.schedule import RecordSchedule
+from wearsim.types import FloatArray, Grid, IntArray
+
+CYLINDER, ROLLER = "wear.cylinder.k_over_h", "wear.roller.k_over_h"
+RATIO = 1.3  # of tau between records
+RATIO_OF_TESTS = 1.7  # of K/H between tests
+DRAWS, DRAWS_OF_MANY = 256, 128  # by default, with one test for each draw and with several
+BELOW, ABOVE = 0.75, 1.35  # depths that are covered, over the least and the greatest measured
+TOLERANCE = 1e-2  # of each of many tests, whose scatter is far greater
+_FEW = 8  # draws
+_MOST_LOST = 0.05  # fraction of the draws whose tests may fail
+
+
+@dataclass(frozen=True)
+class ListedPasses(RecordSchedule):
+    """Schedule of records at given passes.
+
+    Parameters
+    ----------
+    passes : tuple of float
+        Rising.
+    """
+
+    passes: tuple[float, ...] = ()
+
+    def next_record(self, passes: float) -> float:
+        """Return the passes of the first record after `passes`, infinity after the last."""
+        return next((one for one in self.passes if one > passes), np.inf)
+
+
+@dataclass(frozen=True)
+class Grown:
+    """Worn profiles at one number of passes, for rising wear factors.
+
+    Parameters
+    ----------
+    y : ndarray, shape (strips,)
+        Axial position of the strips [m].
+    start : ndarray, shape (strips,)
+        Height of the cylinder before wear [m].
+    ln_k : ndarray, shape (draws, records)
+        Logarithm of K/H of the cylinder [1/Pa].
+    depth : mapping of str to ndarray, shape (draws, records, strips)
+        Worn depth of "cylinder" and "roller" [m].
+    energy : ndarray, shape (draws, records)
+        Dissipated energy of all rollers [J].
+    """
+
+    y: FloatArray
+    start: FloatArray
+    ln_k: FloatArray
+    depth: Mapping[str, FloatArray]
+    energy: FloatArray
+
+
+@dataclass(frozen=True)
+class Trajectories:
+    """Wear of a test for draws of its other inputs.
+
+    Parameters
+    ----------
+    values : mapping of str to ndarray, shape (draws,)
+        Drawn values by the scenario's key; the mean over the rollers where they differ.
+    reasons : tuple of str
+        Why the wear factor and the passes do not act through their product; empty if they do.
+    by_passes : mapping of float to Grown
+        Profiles by the number of passes.
+    lost : int
+        Number of draws that were left out, since a test failed.
+    """
+
+    values: Mapping[str, FloatArray]
+    reasons: tuple[str, ...]
+    by_passes: Mapping[float, Grown]
+    lost: int = 0
+
+
+def time_dependence(scenario: Scenario, shared: bool) -> tuple[str, ...]:
+    """Return the reasons why K/H and the passes do not act through their product.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    shared : bool
+        Whether the wear factors of both bodies have a common unknown factor.
+    """
+    processes = [item.name for item in scenario.random if item.role == "process"]
+    load = scenario.load.build()
+    worn = factors(scenario)[1]
+    random = any(item.name == ROLLER for item in scenario.random)
+    reasons = (
+        (bool(processes), f"{' and '.join(processes)} follow random processes in time"),
+        (not load.constant, f"the load '{scenario.load.kind}' depends on time"),
+        (
+            bool(scenario.load.terms),
+            f"the load has terms ({', '.join(term.name for term in scenario.load.terms)})",
+        ),
+        (
+            (worn > 0.0 or random) and not shared,
+            (
+                "the roller's wear factor is that of the scenario (--share k=cylinder,roller gives"
+                " both bodies one unknown factor)"
+            ),
+        ),
+    )
+    return tuple(text for applies, text in reasons if applies)
+
+
+def check_law(scenario: Scenario) -> None:
+    """Check that a scenario has a wear factor to be identified.
+
+    Raises
+    ------
+    CapabilityError, ScenarioError
+        If the scenario is of a cam, if the wear law has none, or if it is zero.
+    """
+    if scenario.cam is not None:
+        raise CapabilityError(
+            f"{scenario.file}: holds a cam; identification needs a test of a cylinder, whose groove"
+            " is the same all around"
+        )
+    if scenario.wear is None or scenario.wear.law != "archard-dissipation":
+        law = "none" if scenario.wear is None else f"'{scenario.wear.law}'"
+        raise CapabilityError(
+            f"{scenario.file}: identification needs the wear factor K/H of"
+            f" wear.law = 'archard-dissipation', and the wear law is {law}"
+        )
+    if factors(scenario)[0] <= 0.0:
+        what = "must be above 0: it is where the search begins"
+        mistake = Mistake("wear.cylinder", "k_over_h", what, "0", "such as '1e-11 1/Pa'")
+        raise ScenarioError(scenario.file, [mistake])
+
+
+def factors(scenario: Scenario) -> tuple[float, float]:
+    """Return the wear factors of cylinder and roller [1/Pa]."""
+    assert scenario.wear is not None
+    options: Any = scenario.wear.options
+    return float(options.cylinder.k_over_h), float(options.roller.k_over_h)
+
+
+def with_factors(scenario: Scenario, cylinder: float, roller: float) -> Scenario:
+    """Return a scenario with other wear factors [1/Pa]."""
+    assert scenario.wear is not None
+    options: Any = scenario.wear.options
+    changed = {
+        name: getattr(options, name).model_copy(update={"k_over_h": value})
+        for name, value in (("cylinder", cylinder), ("roller", roller))
+    }
+    return replace(
+        scenario, wear=replace(scenario.wear, options=options.model_copy(update=changed))
+    )
+
+
+class Grower:
+    """Wear tests of one scenario for draws of its inputs other than the wear factor.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    draws : int, optional
+        Number of draws.
+    shared : bool
+        Whether the wear factors of both bodies have a common unknown factor.
+    on_progress : callable, optional
+        Called with the numbers of completed and of all wear tests.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        draws: int | None = None,
+        shared: bool = False,
+        on_progress: Callable[[int, int], None] | None = None,
+    ) -> None:
+        check_law(scenario)
+        dropped = {CYLINDER, ROLLER} if shared else {CYLINDER}
+        random = tuple(item for item in scenario.random if item.name not in dropped)
+        self.scenario, self.shared = replace(scenario, random=random), shared
+        self.drawer = Drawer(self.scenario, "sobol", replicates=1)
+        self.reasons = time_dependence(self.scenario, shared)
+        chosen = draws or (DRAWS_OF_MANY if self.reasons else DRAWS)
+        self.count = chosen if self.drawer.groups else 1
+        self.draws: list[Draws] = [self.drawer.draw(number) for number in range(self.count)]
+        self._report = on_progress or (lambda done, total: None)
+        self._grid: Grid | None = None
+
+    def values(self) -> dict[str, FloatArray]:
+        """Return the drawn values by key, shape (draws,); means over rollers and time."""
+        found: dict[str, list[float]] = {}
+        for draws in self.draws:
+            for key, value in {**draws.values, **draws.time_means}.items():
+                found.setdefault(key, []).append(float(np.mean(value)))
+        return {key: np.array(value) for key, value in found.items()}
+
+    def grow(self, depths: tuple[float, float], passes: Sequence[float]) -> Trajectories:
+        """Run the wear tests.
+
+        Parameters
+        ----------
+        depths : tuple of float
+            Least and greatest depth of the measured grooves [m].
+        passes : sequence of float
+            Numbers of passes of the measurements.
+
+        Returns
+        -------
+        Trajectories
+
+        Raises
+        ------
+        SolverError
+            If the tests of more than a twentieth of the draws fail; others are left out.
+        """
+        times = sorted(set(passes))
+        low, high = BELOW * depths[0], ABOVE * depths[1]
+        start = self._factor_for(high)
+        span = (high / low) ** 1.5
+        count = int(np.ceil(np.log(span) / np.log(RATIO))) + 1
+        if self.reasons:
+            span *= times[-1] / times[0]
+            count = int(np.ceil(np.log(span) / np.log(RATIO_OF_TESTS))) + 1
+            scale = span ** (np.arange(count) / (count - 1) - 1.0)
+            tests = [(d, start[d] * s) for d in range(self.count) for s in scale]
+            kept, states = self._run(tests, times)
+            shape = (len(kept), count)
+            ln_k = np.log(start[kept])[:, None] + np.log(scale)
+            by_passes = {
+                one: self._grown(ln_k, [state[place] for state in states], shape)
+                for place, one in enumerate(times)
+            }
+        else:
+            stop = times[-1]
+            records = stop * span ** (np.arange(count) / (count - 1) - 1.0)
+            records[-1] = stop
+            kept, states = self._run(list(enumerate(start)), records.tolist())
+            flat = [one for state in states for one in state]
+            ln_tau = np.log(start[kept])[:, None] + np.log(records)
+            grown = self._grown(ln_tau, flat, ln_tau.shape)
+            by_passes = {one: replace(grown, ln_k=ln_tau - np.log(one)) for one in times}
+        values = {key: column[kept] for key, column in self.values().items()}
+        return Trajectories(values, self.reasons, by_passes, self.count - len(kept))
+
+    def _factor_for(self, depth: float) -> FloatArray:
+        """Return the wear factor with which each draw wears to a depth, for rigid bodies."""
+        cylinder, roller = factors(self.scenario)
+        columns = self.drawer.columns(0, self.count)
+        found = np.full(self.count, cylinder)
+        for _ in range(8):  # a mounting spring slows the wear as the groove deepens
+            share = {ROLLER: found * (roller / cylinder)} if self.shared else {}
+            known = {**columns, CYLINDER: found, **share}
+            reached = closed_form_depths(self.scenario, known, self.count)
+            found = found * np.clip(depth / np.maximum(reached, 1e-3 * depth), 0.1, 10.0) ** 1.5
+        return found
+
+    def _grown(
+        self, ln_k: FloatArray, states: Sequence[tuple[Any, ...]], shape: tuple[int, ...]
+    ) -> Grown:
+        assert self._grid is not None
+        columns = [np.array(column) for column in zip(*states, strict=True)]
+        cylinder, roller, energy = (c.reshape(*shape, *c.shape[1:]) for c in columns)
+        return Grown(
+            self._grid.y,
+            start_height(self.scenario, self._grid),
+            ln_k,
+            {"cylinder": cylinder, "roller": roller},
+            energy,
+        )
+
+    def _run(
+        self, tests: Sequence[tuple[int, float]], passes: Sequence[float]
+    ) -> tuple[list[int], list[list[tuple[FloatArray, FloatArray, float]]]]:
+        """Run tests, given by draw and wear factor.
+
+        Returns the draws without a failed test, and profiles and energy at the passes for each of
+        their tests.
+        """
+        cylinder, roller = factors(self.scenario)
+        table = self.scenario.operation.model_copy(
+            update={"passes": max(1, round(passes[-1])), "duration": None}
+        )
+        ready: list[Draws] = []
+        evolution = self.scenario.evolution
+        if self.count > _FEW and evolution.tolerance < TOLERANCE:
+            evolution = evolution.model_copy(update={"tolerance": TOLERANCE})
+        for number, k in tests:
+            draws = self.draws[number]
+            ratio = roller / cylinder if self.shared else 0.0
+            own = factors(draws.scenario)[1]
+            scenario = with_factors(draws.scenario, k, k * ratio if self.shared else own)
+            scenario = replace(scenario, operation=table, evolution=evolution)
+            ready.append(replace(draws, scenario=scenario))
+        last = {number: place for place, (number, _) in enumerate(tests)}  # of the greatest wear
+        grids = [strips_of_run(ready[place]) for place in last.values()]
+        self._grid = grid = _covering(grids)
+        model = prepared_model(self.scenario, grid)
+        schedule = ListedPasses(0.0, 1.0, 1.0, tuple(passes))
+        runs, results = [], {}
+        for number, draws in enumerate(ready):
+            problem, stepper, _ = assemble_problem(draws, grid, model)
+            runs.append(RealisationRun(number, {}, draws, problem, stepper))
+        failures: dict[int, Exception] = {}
+        done = 0
+        for group in batch_groups(runs):
+            found, failed = _step(group, schedule)
+            results.update(found)
+            failures.update(failed)
+            done += len(group)
+            self._report(done, len(runs))
+        lost = {tests[number][0] for number in failures}
+        if len(lost) > _MOST_LOST * self.count:
+            raise SolverError(
+                f"{len(failures)} of {len(runs)} wear tests failed; the first:"
+                f" {failures[min(failures)]}"
+            )
+        kept = [number for number in range(self.count) if number not in lost]
+        return kept, [results[n] for n, (draw, _) in enumerate(tests) if draw not in lost]
+
+
+def _covering(grids: Sequence[Grid]) -> Grid:
+    """Return strips that cover others, of their median width."""
+    spacing = float(np.median([grid.spacing for grid in grids]))
+    low = min(grid.edges[0] for grid in grids)
+    high = max(grid.edges[1] for grid in grids)
+    strips = int(np.ceil((high - low) / spacing - 1e-9))
+    strips += (strips + 1) % 2
+    middle, half = 0.5 * (low + high), 0.5 * strips * spacing
+    return Grid.spanning(middle - half, middle + half, strips)
+
+
+def _step(
+    group: Sequence[RealisationRun], schedule: ListedPasses
+) -> tuple[dict[int, list[Any]], dict[int, Exception]]:
+    """Step through a group of tests; return their states at the records, and errors."""
+    results: dict[int, list[Any]] = {run.number: [] for run in group}
+    failures: dict[int, Exception] = {}
+
+    def work(places: IntArray) -> None:
+        runs = [group[place] for place in places]
+        stepper, stop = runs[0].stepper, schedule.passes[-1]
+        problem = joined_problem([run.problem for run in runs])
+        steps = runs[0].draws.scenario.evolution.max_steps
+        for run in runs:
+            results[run.number].clear()
+        tests = Evolution(problem, fresh_state(problem), stepper, stop, steps, schedule.next_record)
+        for advance in tests:
+            due = due_records(advance, schedule, stop, stepper.pass_by_pass)
+            # tests that are not stepped together have individual steppers, and one record each
+            for part in [due] if len(runs) > 1 else [[one] for one in due]:
+                _, states = states_at(stepper, advance, part) if part else (None, advance.end)
+                for row, (_, place, _) in enumerate(part):
+                    number = runs[int(advance.numbers[place])].number
+                    results[number].append(
+                        (
+                            states.cylinder_depth[:, 0, row].mean(axis=0),
+                            states.roller_depth[0, :, row].mean(axis=0),
+                            float(states.energy[row]),
+                        )
+                    )
+        failures.update({runs[place].number: error for place, error in tests.failures.items()})
+
+    _, failed = bisect_failures(work, np.arange(len(group)))
+    return results, failures | {group[place].number: error for place, error in failed.items()}

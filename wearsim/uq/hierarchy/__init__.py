@@ -1,0 +1,1 @@
+"""Wear factors of several tests: noise of traces, hierarchical model, verdict and power."""
