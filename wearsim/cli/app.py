@@ -41,7 +41,6 @@ BUILT_IN = {
     "run": "Run a wear test and write its results file.",
     "ensemble": "Run a wear test for each realisation of the random inputs.",
     "identify": "Identify the wear factor from measured grooves, and whether it scatters.",
-    "life": "Life of a design until a limit is reached, with its confidence; compare designs.",
     "life": "Compute the life of a design until a limit is reached, and compare two designs.",
     "resume": "Continue a run or an ensemble from its results file.",
     "show": "Show the content of a results file and the end state.",
