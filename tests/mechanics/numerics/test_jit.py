@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import gc
+import sys
 from types import SimpleNamespace
+from typing import NamedTuple
 
 import numba
 import numpy as np
 import pytest
 
 from wearsim.mechanics.numerics import jit
-from wearsim.mechanics.numerics.jit import compile_alongside, kernel, subroutine
+from wearsim.mechanics.numerics.jit import borrowed, compile_alongside, kept, kernel, subroutine
 
 
 def _third_of_root(x: float) -> float:
@@ -46,6 +48,47 @@ def _combined(x: float, count: int) -> float:
 @kernel
 def _misnamed(x: float) -> float:
     return x.no_such_attribute
+
+
+class _Rows(NamedTuple):
+    first: np.ndarray
+    second: np.ndarray
+
+
+@subroutine
+def _add_row(number: int, rows: _Rows, total: np.ndarray) -> None:
+    for i in range(total.shape[0]):
+        rows.second[i] = 2.0 * rows.first[i]
+        total[i] += rows.second[i] + number
+
+
+@kernel
+def _row_sums(first: np.ndarray, total: np.ndarray, count: int) -> None:
+    owned = _Rows(first, np.empty(first.shape[0]))
+    rows, total = borrowed(owned), borrowed(total)
+    for number in range(count):
+        other = np.full(first.shape[0], np.nan)  # would reuse memory that is free too early
+        _add_row(number, rows, total)
+        total[0] += np.isnan(other[0]) - 1.0
+    kept(owned)
+
+
+def test_borrowed_arrays_are_not_counted_and_kept_ones_not_freed():
+    first, total = np.arange(50.0), np.zeros(50)
+    counts = sys.getrefcount(first), sys.getrefcount(total)
+    _row_sums(first, total, 20)
+    assert (sys.getrefcount(first), sys.getrefcount(total)) == counts
+    np.testing.assert_array_equal(total, 20 * 2.0 * first + 190.0)
+
+
+def test_arrays_of_a_kernel_that_borrows_them_are_freed():
+    resource = pytest.importorskip("resource")  # not on every platform
+    first, total = np.arange(1e5), np.zeros(100_000)
+    _row_sums(first, total, 1)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    for _ in range(300):  # 240 MB
+        _row_sums(first, total, 1)
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 100_000
 
 
 @pytest.mark.parametrize("collecting", [True, False])

@@ -114,8 +114,51 @@ def _prepared_numba() -> Any:
             """Do nothing at the end of a compilation."""
 
     event.register("numba:compile", Compilations())
+    _compile_borrowed()
     typeof_impl.register(Kernel)(lambda kernel, _: numba.typeof(kernel.dispatcher))
     return numba
+
+
+def _compile_borrowed() -> None:
+    """Let compiled functions call `borrowed`: arrays without an owner are not counted."""
+    from numba.core import cgutils, types  # noqa: PLC0415
+    from numba.extending import intrinsic, overload  # noqa: PLC0415
+
+    def without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+        if isinstance(kind, types.BaseTuple):
+            parts: Any = kind
+            for place, part in enumerate(parts.types):
+                item = builder.extract_value(value, place)
+                item = without_owner(context, builder, part, item)
+                value = builder.insert_value(value, item, place)
+        elif isinstance(kind, types.Array):
+            array = cgutils.create_struct_proxy(kind)(context, builder, value=value)
+            array.meminfo = cgutils.get_null_value(array.meminfo.type)
+            return array._getvalue()
+        return value
+
+    def typed(_: Any, values: Any) -> Any:
+        return values(values), lambda context, builder, signature, arguments: without_owner(
+            context, builder, signature.args[0], arguments[0]
+        )
+
+    uncounted: Any = intrinsic(typed)
+    overload(borrowed)(lambda values: lambda values: uncounted(values))  # noqa: PLW0108
+    overload(kept)(lambda values: lambda values: None)
+
+
+def borrowed(values: R) -> R:
+    """Return an array, or a tuple of arrays, whose references compiled functions do not count.
+
+    numba counts the references to each array of a tuple at most calls of a subroutine, which takes
+    up to half of the time of short loops. The owner of the memory must be in use until the last use
+    of the arrays returned: an argument of a kernel is, for other arrays see `kept`.
+    """
+    return values
+
+
+def kept(values: object) -> None:
+    """Do nothing; arrays that a kernel has allocated remain allocated up to this call."""
 
 
 def _register_subroutines() -> None:

@@ -48,7 +48,7 @@ from wearsim.types import FloatArray, IntArray
 RESIDUAL = 1e-8  # of the elastic approach
 STRAY = 0.01  # change of a strip's load, of the peak load, that moves the anchor
 DOUBLED = 0.8  # change of a strip's load, of that load, that moves the anchor
-TAYLOR = 0.005  # relative change up to which N is approximated by its quadratic term
+TAYLOR = 0.015  # relative change up to which N is approximated by two terms of its series
 BAND = 12  # strips on either side within which N is evaluated
 MAX_CHORD = 4
 
@@ -79,12 +79,12 @@ class ChordState(NamedTuple):
     """Anchor of each contact, with the contact as the first axis, and work space.
 
     `active` are the loaded strips and `loaded` is their number. `inverse` is the transposed inverse
-    of the Jacobian, `unit_load` the loads per unit of approach, `near` phi, its tangent and half
-    its second derivative near each loaded strip. `guard` are the unloaded strips next to loaded
-    ones, -1 after the last, and `guard_row` their rows of J. `surface` is the displacement at the
-    anchor, `remainder` is N, and `lengths` contains s at the anchor. `gap`, `change` of the loads,
-    `strip_inputs` (half-lengths, friction and longitudinal slip, (3, strips)) and `tractions`
-    belong to the current contact.
+    of the Jacobian, `unit_load` the loads per unit of approach, `near` the first four coefficients
+    of the Taylor series of phi, (contacts, 4, distances, strips). `guard` are the unloaded strips
+    next to loaded ones, -1 after the last, and `guard_row` their rows of J. `surface` is the
+    displacement at the anchor, `remainder` is N, and `lengths` contains s at the anchor. `gap`,
+    `change` of the loads, `strip_inputs` (half-lengths, friction and longitudinal slip,
+    (3, strips)) and `tractions` belong to the current contact.
     """
 
     active: IntArray
@@ -116,7 +116,7 @@ def new_chord_state(constants: ContactConstants, contacts: int, n: int) -> Chord
         np.zeros(contacts, np.int64),
         np.empty((contacts, n, n)),
         np.empty((contacts, n)),
-        np.empty((contacts, n, 3, BAND)),
+        np.zeros((contacts, 4, BAND, n)),
         np.zeros((contacts, n), np.int64),
         np.empty((contacts, n, n)),
         np.empty((contacts, n)),
@@ -124,7 +124,7 @@ def new_chord_state(constants: ContactConstants, contacts: int, n: int) -> Chord
         new_half_lengths(constants.curvature_influence, log_scale),
         np.empty(n),
         np.empty(n),
-        np.empty((6, max(n, BAND))),
+        np.empty((6, max(n, BAND) + 4 * REACH)),
         np.empty((n, n)),
         np.zeros((3, n)),
         new_tractions(n),
@@ -172,7 +172,7 @@ def set_anchor(
     """
     find_factors(g, line_load, True, state.lengths)
     n = line_load.shape[1]
-    reach, small = min(BAND, n), 1e-3
+    reach, small, unit = min(BAND, n), 1e-3, constants.unit
     guards, count = _number_strips(g, line_load, state), state.loaded[g]
     matrix, work, near = state.matrix, state.work, state.lengths.near
     state.surface[g] = 0.0
@@ -186,11 +186,13 @@ def set_anchor(
         for r in range(count):
             matrix[c, r] = constants.unit * work[1, abs(state.active[g, r] - j)]
         for k in range(reach):
-            state.near[g, c, 0, k] = constants.unit * q * work[0, k]
-            state.near[g, c, 1, k] = constants.unit * work[1, k]
-            state.near[g, c, 2, k] = (
-                0.125 * constants.unit * (work[3, k] - work[5, k]) / (small * q)
-            )
+            # derivatives of the tangent by ln(a/dy), which is half of ln q and a constant
+            first = 0.5 * (work[3, k] - work[5, k]) / small
+            second = (work[3, k] - 2.0 * work[1, k] + work[5, k]) / (small * small)
+            state.near[g, 0, k, j] = unit * q * work[0, k]
+            state.near[g, 1, k, j] = unit * work[1, k]
+            state.near[g, 2, k, j] = 0.25 * unit * first / q
+            state.near[g, 3, k, j] = unit * (second - 2.0 * first) / (24.0 * q * q)
         for r in range(guards):
             state.guard_row[g, r, c] = constants.unit * work[1, abs(state.guard[g, r] - j)]
         add_around(j, 0, n - 1, constants.unit * q, work[0], state.surface[g])
@@ -216,23 +218,35 @@ def set_anchor(
 def fill_remainder(g: int, loads: Loads, constants: ContactConstants, state: ChordState) -> None:
     """Fill N of contact `g`: displacement of every strip beyond the anchor's tangent [m]."""
     n = loads.line_load.shape[1]
-    reach, remainder, work = min(BAND, n), state.remainder[g], state.work
-    remainder[:] = 0.0
-    for c in range(state.loaded[g]):
-        j = state.active[g, c]
+    reach, remainder, near = min(BAND, n), state.remainder, state.near
+    square, cube, value, tangent = state.work[0], state.work[1], state.work[2], state.work[3]
+    first, last = state.active[g, 0], state.active[g, state.loaded[g] - 1]
+    far = 0  # counted, as a maximum is not vectorised
+    for i in range(n):
+        remainder[g, i] = 0.0
+    for i in range(first, last + 1):
+        q0 = loads.anchor[g, i]
+        x = loads.line_load[g, i] - q0
+        excess = abs(x) - TAYLOR * q0
+        x = x if excess <= 0.0 else 0.0
+        far += int(excess > 0.0)
+        square[i], cube[i] = x * x, x * x * x
+    for k in range(reach):
+        shift = np.uint64(k)
+        for i in range(np.uint64(first), np.uint64(min(last + 1, n - k))):
+            remainder[g, i + shift] += near[g, 2, k, i] * square[i] + near[g, 3, k, i] * cube[i]
+        for i in range(np.uint64(max(first, k)), np.uint64(last + 1 if k > 0 else 0)):
+            remainder[g, i - shift] += near[g, 2, k, i] * square[i] + near[g, 3, k, i] * cube[i]
+    for j in range(first, last + 1 if far > 0 else first):
         q, q0 = loads.line_load[g, j], loads.anchor[g, j]
         x = q - q0
-        if abs(x) <= TAYLOR * q0:
-            for k in range(reach):
-                work[0, k] = state.near[g, c, 2, k] * x * x
-        else:
+        if abs(x) > TAYLOR * q0:
             tau = log_half_length(g, j, loads.line_load, state.lengths)
-            read_influence(constants.table, tau, reach, work[2], work[3])
+            read_influence(constants.table, tau, reach, value, tangent)
             for k in range(reach):
-                phi = constants.unit * q * work[2, k]
-                work[0, k] = phi - state.near[g, c, 0, k] - state.near[g, c, 1, k] * x
-        first, last = max(0, j - reach + 1), min(n, j + reach) - 1
-        add_around(j, first, last, 1.0, work[0], remainder)
+                phi = constants.unit * q * value[k]
+                value[k] = phi - near[g, 0, k, j] - near[g, 1, k, j] * x
+            add_around(j, max(0, j - reach + 1), min(n, j + reach) - 1, 1.0, value, remainder[g])
 
 
 @subroutine
@@ -293,10 +307,16 @@ def _has_penetrated_strip(g: int, approach: float, tolerance: float, state: Chor
         i = state.guard[g, r]
         if i < 0:
             break
-        surface = state.gap[i] + state.surface[g, i]
-        for c in range(state.loaded[g]):
-            surface += state.guard_row[g, r, c] * state.change[c]
-        if approach - surface > tolerance:
+        surface, count = state.gap[i] + state.surface[g, i], state.loaded[g]
+        s0 = s1 = s2 = s3 = 0.0  # one sum alone would wait for every addition
+        for c in range(0, count - 3, 4):
+            s0 += state.guard_row[g, r, c] * state.change[c]
+            s1 += state.guard_row[g, r, c + 1] * state.change[c + 1]
+            s2 += state.guard_row[g, r, c + 2] * state.change[c + 2]
+            s3 += state.guard_row[g, r, c + 3] * state.change[c + 3]
+        for c in range(count - count % 4, count):
+            s0 += state.guard_row[g, r, c] * state.change[c]
+        if approach - (surface + ((s0 + s1) + (s2 + s3))) > tolerance:
             return True
     return False
 

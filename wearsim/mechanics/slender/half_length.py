@@ -86,12 +86,24 @@ def log_half_length(k: int, j: int, line_load: FloatArray, lengths: HalfLengths)
 
 
 @subroutine
-def factor_growth(k: int, j: int, growth: FloatArray, lengths: HalfLengths) -> float:
-    """Return the growth of ln s of strip `j` from that of ln q, (strips,), to first order."""
-    n, total, slope = growth.shape[0], 0.0, lengths.slope
-    for c in range(max(-REACH, -j), min(REACH, n - 1 - j) + 1):
-        total += slope[k, REACH + c, j + 2 * REACH] * growth[j + c]
-    return total
+def fill_factor_growth(
+    k: int, first: int, last: int, growth: FloatArray, lengths: HalfLengths, result: FloatArray
+) -> None:
+    """Fill the growth of ln s of the strips `first` to `last` from that of ln q, to first order.
+
+    Parameters
+    ----------
+    growth : ndarray
+        Growth of ln q of strip i in element ``i + 2 * REACH``, zero beyond the strips.
+    result : ndarray, shape (strips,)
+        Filled.
+    """
+    for i in range(first, last + 1):
+        result[i] = 0.0
+    for c in range(2 * REACH + 1):
+        shift = np.uint64(c + REACH)
+        for i in range(np.uint64(first), np.uint64(last + 1)):
+            result[i] += lengths.slope[k, c, i + np.uint64(2 * REACH)] * growth[i + shift]
 
 
 @subroutine

@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from wearsim.mechanics.numerics.jit import kernel, subroutine
+from wearsim.mechanics.numerics.jit import borrowed, kept, kernel, subroutine
 from wearsim.mechanics.numerics.lu import solve_factored
 from wearsim.mechanics.slender.body_wear import (
     add_depths,
@@ -49,6 +49,7 @@ from wearsim.mechanics.slender.newton_step import (
     new_newton_state,
     number_strips,
     predict_surface,
+    rest_on_foundation,
     update_loads,
 )
 from wearsim.types import FloatArray, IntArray
@@ -68,56 +69,6 @@ MAX_ITERATIONS = 100
 CAUTIOUS = 12  # iterations after which the active set is changed cautiously
 MARGIN = 6  # strips followed on either side of the loaded ones
 FIRST_MARGIN = 20  # the same for a foundation, which may load many strips more than the start
-
-
-@subroutine
-def rest_on_foundation(
-    k: int,
-    gap: FloatArray,
-    compliance: FloatArray,
-    soft: float,
-    load: float,
-    left: int,
-    right: int,
-    line_load: FloatArray,
-    approach: FloatArray,
-) -> None:
-    """Fill the line load of contact `k` on strips that are displaced by their own loads only.
-
-    Parameters
-    ----------
-    k : int
-        Number of the contact.
-    left, right : int
-        The first strip that may be loaded, and the one after the last.
-    gap, line_load : ndarray, shape (contacts, strips)
-        Gap [m]; line load [N/m].
-    compliance : ndarray, shape (contacts, strips)
-        Wear compliance of the separate contacts [m/(N/m)].
-    soft : float
-        Elastic compliance of each strip [m/(N/m)].
-    load : float
-        Sum of the line loads [N/m].
-    approach : ndarray, shape (contacts,)
-        Approach, filled [m].
-    """
-    highest, softest = gap[k, left], 0.0
-    for i in range(left, right):
-        highest = max(highest, gap[k, i])
-        softest = max(softest, compliance[k, i])
-    level = load * (soft + softest) + highest
-    for _ in range(60):  # from above, Newton's method converges monotonically: convex function
-        total, stiffness = -load, 0.0
-        for i in range(left, right):
-            if level > gap[k, i]:
-                total += (level - gap[k, i]) / (soft + compliance[k, i])
-                stiffness += 1.0 / (soft + compliance[k, i])
-        level -= total / stiffness
-        if not total > 1e-9 * load:
-            break
-    for i in range(left, right):
-        line_load[k, i] = max(0.0, level - gap[k, i]) / (soft + compliance[k, i])
-    approach[k] = level
 
 
 @subroutine
@@ -271,11 +222,15 @@ def solve_slender(
     """
     contacts, n = gap.shape[1], gap.shape[2]
     unit = 1.0 / (np.pi * contact_modulus)
-    state, softness = new_newton_state(contacts, n), np.empty((contacts, n))
-    lengths = new_half_lengths(curvature_influence, np.empty(contacts))
+    gap, compliance, loads = borrowed((gap, compliance, loads))
+    line_load, approach = borrowed((line_load, approach))
+    table, half_length, softness = borrowed(table), borrowed(half_length), np.empty((contacts, n))
+    owned = new_newton_state(contacts, n), new_half_lengths(curvature_influence, np.empty(contacts))
+    state, lengths = borrowed(owned)
     surface, lowest = state.surface, state.lowest
     if bodies is not None:
-        system = new_depth_system(bodies, n)
+        depths = new_depth_system(bodies, n)
+        members, worn, system = borrowed((bodies, shared, depths))
     for number in range(gap.shape[0]):
         load, total, delta = loads[number], line_load[number], approach[number]
         own = compliance[number]
@@ -298,7 +253,7 @@ def solve_slender(
                     lowest[k] = min(lowest[k], gap[number, k, i])
                     softness[k, i] = own[k, i]
                     if bodies is not None:  # as if all contacts wore the same strips
-                        both = shared[number, k, 0, i] + shared[number, k, 1, i]
+                        both = worn[number, k, 0, i] + worn[number, k, 1, i]
                         softness[k, i] += contacts * both
                     corrected = corrected or softness[k, i] > 0.0
                 number_strips(k, total, FIRST_MARGIN, state)
@@ -315,7 +270,7 @@ def solve_slender(
                     if sweep:
                         widest = max(widest, find_factors(k, total, False, lengths))
                 if bodies is not None and sweep:
-                    add_depths(bodies, shared[number], total, surface)
+                    add_depths(members, worn[number], total, surface)
                 for k in range(contacts if widest <= HIGHEST else 0):
                     if sweep:
                         add_displacement(k, table, unit, total, lengths, state)
@@ -335,9 +290,9 @@ def solve_slender(
                         number_strips(k, total, MARGIN, state)
                         renewed = True
                 if bodies is not None:
-                    add_depths(bodies, shared[number], total, surface)
+                    add_depths(members, worn[number], total, surface)
                     if renewed:
-                        number_depths(bodies, own, shared[number], state, system, softness)
+                        number_depths(members, own, worn[number], state, system, softness)
                 for k in range(contacts):
                     fresh = state.fresh[k]
                     if find_factors(k, total, fresh, lengths) > HIGHEST:
@@ -363,7 +318,7 @@ def solve_slender(
                 if (
                     bodies is not None
                     and renewed
-                    and not factor_depths(bodies, shared[number], state, system)
+                    and not factor_depths(members, worn[number], state, system)
                 ):
                     outcome = SINGULAR
                     break
@@ -376,12 +331,12 @@ def solve_slender(
                         solve_factored(state.matrix[k], state.size[k], state.step[k])
                         add_approach(k, load[k] / spacing, total, state, delta)
                     if bodies is not None:
-                        solve_depths(bodies, shared[number], state, system, delta)
+                        solve_depths(members, worn[number], state, system, delta)
                 change, left = update_loads(total, state, iteration > CAUTIOUS)
                 for k in range(contacts):
                     predict_surface(k, surface, state)
                 if bodies is not None:
-                    add_depths(bodies, shared[number], state.change, surface)
+                    add_depths(members, worn[number], state.change, surface)
                 outcome, before = check_convergence(
                     iteration, unit, before, change, left, state, delta, total
                 )
@@ -397,3 +352,6 @@ def solve_slender(
                 for k in range(contacts):
                     delta[k] += lowest[k]
                 break
+    if bodies is not None:
+        kept(depths)
+    kept(owned)

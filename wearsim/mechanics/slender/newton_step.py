@@ -103,6 +103,56 @@ def number_strips(k: int, line_load: FloatArray, margin: int, state: NewtonState
 
 
 @subroutine
+def rest_on_foundation(
+    k: int,
+    gap: FloatArray,
+    compliance: FloatArray,
+    soft: float,
+    load: float,
+    left: int,
+    right: int,
+    line_load: FloatArray,
+    approach: FloatArray,
+) -> None:
+    """Fill the line load of contact `k` on strips that are displaced by their own loads only.
+
+    Parameters
+    ----------
+    k : int
+        Number of the contact.
+    left, right : int
+        The first strip that may be loaded, and the one after the last.
+    gap, line_load : ndarray, shape (contacts, strips)
+        Gap [m]; line load [N/m].
+    compliance : ndarray, shape (contacts, strips)
+        Wear compliance of the separate contacts [m/(N/m)].
+    soft : float
+        Elastic compliance of each strip [m/(N/m)].
+    load : float
+        Sum of the line loads [N/m].
+    approach : ndarray, shape (contacts,)
+        Approach, filled [m].
+    """
+    highest, softest = gap[k, left], 0.0
+    for i in range(left, right):
+        highest = max(highest, gap[k, i])
+        softest = max(softest, compliance[k, i])
+    level = load * (soft + softest) + highest
+    for _ in range(60):  # from above, Newton's method converges monotonically: convex function
+        total, stiffness = -load, 0.0
+        for i in range(left, right):
+            if level > gap[k, i]:
+                total += (level - gap[k, i]) / (soft + compliance[k, i])
+                stiffness += 1.0 / (soft + compliance[k, i])
+        level -= total / stiffness
+        if not total > 1e-9 * load:
+            break
+    for i in range(left, right):
+        line_load[k, i] = max(0.0, level - gap[k, i]) / (soft + compliance[k, i])
+    approach[k] = level
+
+
+@subroutine
 def add_displacement(
     k: int,
     table: FloatArray,

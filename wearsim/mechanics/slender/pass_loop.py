@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wearsim.mechanics.numerics.jit import kernel, subroutine
+from wearsim.mechanics.numerics.jit import borrowed, kernel, subroutine
 from wearsim.mechanics.slender.chord_method import (
     ChordState,
     ContactConstants,
@@ -19,7 +19,7 @@ from wearsim.mechanics.slender.chord_method import (
     solve_from_anchor,
     solve_fully,
 )
-from wearsim.mechanics.slender.half_length import factor_growth
+from wearsim.mechanics.slender.half_length import REACH, fill_factor_growth
 from wearsim.mechanics.slender.newton import CONVERGED, NO_CONVERGENCE, SINGULAR
 from wearsim.mechanics.tangential.strip_theory import solve_strips
 from wearsim.types import FloatArray, IntArray
@@ -27,6 +27,7 @@ from wearsim.types import FloatArray, IntArray
 UNLOADED = 10  # status: the load is not positive
 LOAD_TOLERANCE = 1e-6  # relative change of the load of a spring by the approach it causes
 MAX_LOAD_ITERATIONS = 40
+SMALL = 0.02  # up to which logarithms and exponential functions are five terms of their series
 APPROACH_EXPONENT = 0.75  # approach as a power of the load: 2/3 in a Hertzian contact, 1 in a flat
 
 
@@ -52,16 +53,22 @@ class Wear(NamedTuple):
 
 
 @subroutine
-def _local_slip(g: int, i: int, spin: float, wear: Wear) -> float:
-    """Return the variation of the longitudinal creepage at strip `i`, including the worn depth."""
-    return float(
-        wear.slip_base[g, i]
-        - spin * wear.spin_arm[g, i]
-        + (
-            wear.slip_rates[0] * wear.roller_depth[g, i]
-            - wear.slip_rates[1] * wear.cylinder_depth[i]
+def _fill_growth(
+    g: int, first: int, last: int, loads: Loads, growth: FloatArray, size: int
+) -> None:
+    """Fill the growth of ln q beyond the anchor; parameters as of `fill_factor_growth`."""
+    line_load, anchor, great = loads.line_load, loads.anchor, 0
+    for i in range(size):
+        growth[i] = 0.0
+    for i in range(first, last + 1):
+        x = (line_load[g, i] - anchor[g, i]) / max(anchor[g, i], 1e-300)
+        great += int(abs(x) > SMALL)
+        growth[i + 2 * REACH] = x * (
+            1.0 - x * (1 / 2 - x * (1 / 3 - x * (1 / 4 - x * (1 / 5 - x / 6))))
         )
-    )
+    for i in range(first, last + 1 if great > 0 else first):
+        if abs(line_load[g, i] - anchor[g, i]) > SMALL * anchor[g, i]:
+            growth[i + 2 * REACH] = np.log(line_load[g, i] / anchor[g, i])
 
 
 @subroutine
@@ -81,29 +88,44 @@ def _wear_strips(
     the interaction factors of the anchor would change the worn profile by 1e-4.
     """
     mean, total, dissipated, spin = 0.0, 0.0, 0.0, passes.spin[p]
-    line_load = loads.line_load
-    for r in range(state.loaded[g]):
-        i = state.active[g, r]
-        mean += line_load[g, i] * _local_slip(g, i, spin, wear)
-        total += line_load[g, i]
-    mean /= total
+    line_load, work, factor = loads.line_load, state.tractions.work, state.lengths.factor
     half_length, friction, slip_x = (
         state.strip_inputs[0],
         state.strip_inputs[1],
         state.strip_inputs[2],
     )
-    growth, factor = state.work[0], state.lengths.factor
-    growth[:] = 0.0
-    for r in range(state.loaded[g] if anchored else 0):
-        i = state.active[g, r]
-        growth[i] = np.log(line_load[g, i] / loads.anchor[g, i])
-    scale = constants.spacing * np.exp(state.lengths.log_scale[g])
-    for r in range(state.loaded[g]):
-        i = state.active[g, r]
-        change = factor_growth(g, i, growth, state.lengths)
-        half_length[i] = scale * np.sqrt(line_load[g, i] * factor[g, i] * np.exp(change))
+    # loops over the unloaded strips between loaded ones too are vectorised
+    first, last = state.active[g, 0], state.active[g, state.loaded[g] - 1]
+    for i in range(first, last + 1):
+        slip_x[i] = (
+            wear.slip_base[g, i]
+            - spin * wear.spin_arm[g, i]
+            + (
+                wear.slip_rates[0] * wear.roller_depth[g, i]
+                - wear.slip_rates[1] * wear.cylinder_depth[i]
+            )
+        )
+    for i in range(first, last + 1):
+        mean += line_load[g, i] * slip_x[i]
+        total += line_load[g, i]
+    mean = passes.creepage[p, 0] - mean / total
+    scale, change, great = constants.spacing * np.exp(state.lengths.log_scale[g]), work, 0
+    for i in range(first, last + 1):
+        change[i] = 0.0
+    if anchored:
+        growth = state.work[0]
+        _fill_growth(g, first, last, loads, growth, line_load.shape[1] + 4 * REACH)
+        fill_factor_growth(g, first, last, growth, state.lengths, change)
+    for i in range(first, last + 1):
+        x = change[i]
+        great += int(abs(x) > SMALL)
+        grown = 1.0 + x * (1.0 + x * (1 / 2 + x * (1 / 6 + x * (1 / 24 + x / 120))))
+        half_length[i] = scale * np.sqrt(line_load[g, i] * factor[g, i] * grown)
         friction[i] = passes.friction[p]
-        slip_x[i] = passes.creepage[p, 0] - mean + _local_slip(g, i, spin, wear)
+        slip_x[i] += mean
+    for i in range(first, last + 1 if great > 0 else first):
+        if abs(change[i]) > SMALL:
+            half_length[i] = scale * np.sqrt(line_load[g, i] * factor[g, i] * np.exp(change[i]))
     solve_strips(
         half_length,
         line_load[g],
@@ -115,12 +137,11 @@ def _wear_strips(
         constants.elasticity,
         state.tractions,
     )
-    for r in range(state.loaded[g]):
-        i = state.active[g, r]
-        work = state.tractions.work[i]
-        wear.cylinder_depth[i] += wear.depth_per_work[0] * work
-        wear.roller_depth[g, i] += wear.depth_per_work[1 + g] * work
-        dissipated += work
+    for i in range(first, last + 1):
+        wear.cylinder_depth[i] += wear.depth_per_work[0] * work[i]
+        wear.roller_depth[g, i] += wear.depth_per_work[1 + g] * work[i]
+    for i in range(first, last + 1):
+        dissipated += work[i]
     return dissipated
 
 
@@ -189,6 +210,8 @@ def run_passes(
     status, done, full_solves : int
         CONVERGED or the cause of failure; number of passes done, and of those solved in full.
     """
+    passes, constants, wear = borrowed(passes), borrowed(constants), borrowed(wear)
+    loads, state = borrowed(loads), borrowed(state)
     full_solves, count = 0, passes.base_load.shape[0]
     for g in range(nominal_gap.shape[0]):
         if loads.anchor[g].max() > 0.0:
