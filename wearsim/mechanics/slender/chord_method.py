@@ -198,7 +198,7 @@ def set_anchor(
         add_around(j, 0, n - 1, constants.unit * q, work[0], state.surface[g])
         for d in range(min(n, REACH + 1)):
             slope = constants.unit * q * (work[1, d] - work[0, d])
-            near[REACH - d, j + 2 * REACH] = near[REACH + d, j + 2 * REACH] = slope
+            near[d, j + 2 * REACH] = slope
     if constants.curvature_influence.shape[0] > 0:
         row = np.full(line_load.shape, -1)
         for r in range(count):

@@ -40,9 +40,9 @@ class HalfLengths(NamedTuple):
     `table` is from `curvature_table`, or from `no_table` for strips without interaction, and
     `log_scale` is ln(a/dy) of such a strip at 1 N/m, (contacts,). `factor` is s and `log_ratio` is
     ln(a/dy), (contacts, strips). `slope[k, REACH + c, i + 2 REACH]` is the derivative of ln s of
-    strip i by ln q of strip i + c, and `near[REACH + d, i + 2 REACH]` is the derivative by the ln s
-    of strip i of its influence on strip i + d; both are zero beyond the strips. `chained`,
-    `gathered` and `work` are work space.
+    strip i by ln q of strip i + c, and `near[d, i + 2 REACH]` is the derivative by the ln s
+    of strip i of its influence on the strips i + d and i - d; both are zero beyond the strips.
+    `chained`, `gathered` and `work` are work space.
     """
 
     table: FloatArray
@@ -59,7 +59,7 @@ class HalfLengths(NamedTuple):
 @subroutine
 def new_half_lengths(table: FloatArray, log_scale: FloatArray) -> HalfLengths:
     """Return the `HalfLengths` of contacts, to be filled."""
-    contacts, n = log_scale.shape[0], table.shape[2]
+    contacts, n = log_scale.shape[0], (table.shape[2] + 1) // 2
     wide = n + 4 * REACH
     slopes = np.empty((contacts + 2, 2 * REACH + 1, wide))
     for k in range(contacts + 2):  # numba compiles loops faster than np.zeros
@@ -75,7 +75,7 @@ def new_half_lengths(table: FloatArray, log_scale: FloatArray) -> HalfLengths:
         slopes[contacts],
         slopes[contacts + 1],
         np.empty((4 * REACH + 1, n)),
-        np.empty((4, n)),
+        np.empty((2, n)),
     )
 
 
@@ -140,21 +140,18 @@ def add_influences(
     right: int,
     weight: FloatArray,
     log_ratio: FloatArray,
-    value: FloatArray,
     total: FloatArray,
 ) -> None:
     """Add the influence of the loaded strips of contact `k` to the strips `left` to `right`.
 
     Parameters
     ----------
-    table : ndarray, shape (nodes, 2, strips)
+    table : ndarray, shape (nodes, 2, 2 * strips - 1)
         Of F_k or C_k.
     weight : ndarray, shape (strips,)
         Factors of the influence of each strip; 0 for strips without load.
     log_ratio : ndarray, shape (contacts, strips)
         ln(a/dy).
-    value : ndarray, shape (strips,)
-        Work space.
     total : ndarray, shape (strips,)
         Increased.
     """
@@ -163,14 +160,11 @@ def add_influences(
             continue
         node, (v0, v1, w0, w1), _ = interpolation(table.shape[0], log_ratio[k, j])
         v0, v1, w0, w1 = v0 * weight[j], v1 * weight[j], w0 * weight[j], w1 * weight[j]
-        for d in range(max(right - j, j - left) + 1):
-            low = v0 * table[node, 0, d] + v1 * table[node, 1, d]
-            value[d] = low + (w0 * table[node + 1, 0, d] + w1 * table[node + 1, 1, d])
-        here = np.uint64(j)
-        for d in range(np.uint64(0), np.uint64(right - j + 1)):
-            total[here + d] += value[d]
-        for d in range(np.uint64(1), np.uint64(j - left + 1)):
-            total[here - d] += value[d]
+        shift = np.uint64(table.shape[2] // 2 - j)
+        for i in range(np.uint64(left), np.uint64(right + 1)):
+            low = v0 * table[node, 0, i + shift] + v1 * table[node, 1, i + shift]
+            high = w0 * table[node + 1, 0, i + shift] + w1 * table[node + 1, 1, i + shift]
+            total[i] += low + high
 
 
 @subroutine
@@ -193,17 +187,16 @@ def _fill_near(
     for j in range(first, last + 1):
         tau = log_ratio[k, j] if weight[j] != 0.0 else 0.0
         node, (v0, v1, w0, w1), (d0, d1, e0, e1) = interpolation(table.shape[0], tau)
+        middle = table.shape[2] // 2
         for d in range(min(weight.shape[0], REACH + 1)):
             by_length = by_factor = 0.0
             if weight[j] != 0.0:
-                a, b = table[node, 0, d], table[node, 1, d]
-                c, e = table[node + 1, 0, d], table[node + 1, 1, d]
+                a, b = table[node, 0, middle + d], table[node, 1, middle + d]
+                c, e = table[node + 1, 0, middle + d], table[node + 1, 1, middle + d]
                 value = v0 * a + v1 * b + w0 * c + w1 * e
                 by_length = weight[j] * (d0 * a + d1 * b + e0 * c + e1 * e - value)
                 by_factor = by_length - weight[j] * value
-            here = j + 2 * REACH
-            near[REACH - d, here] = near[REACH + d, here] = by_length
-            chained[REACH - d, here] = chained[REACH + d, here] = by_factor
+            near[d, j + 2 * REACH], chained[d, j + 2 * REACH] = by_length, by_factor
 
 
 @subroutine
@@ -229,7 +222,7 @@ def _gather(
         for d in range(max(-REACH, c - REACH), min(REACH, c + REACH) + 1):
             shift = np.uint64(2 * REACH + d)
             for i in range(start, stop):
-                derivative = part[REACH + d, i + shift] * slope[k, REACH + c - d, i + shift]
+                derivative = part[abs(d), i + shift] * slope[k, REACH + c - d, i + shift]
                 gathered[far + c, i] += derivative
 
 
@@ -242,13 +235,13 @@ def _add_slopes(
     if chained:
         _gather(k, first, last, REACH, lengths.chained, lengths)
     for c in range(2 * REACH + 1):
-        shift = np.uint64(c + REACH)
+        shift, distance = np.uint64(c + REACH), abs(c - REACH)
         for i in range(np.uint64(first), np.uint64(last + 1)):
             here = i + np.uint64(2 * REACH)
             if chained:
-                slope[k, c, here] += (gathered[c, i] + near[c, i + shift]) / total[i]
+                slope[k, c, here] += (gathered[c, i] + near[distance, i + shift]) / total[i]
             else:
-                slope[k, c, here] = near[c, i + shift] / total[i]
+                slope[k, c, here] = near[distance, i + shift] / total[i]
 
 
 @subroutine
@@ -282,7 +275,7 @@ def find_factors(k: int, line_load: FloatArray, sloped: bool, lengths: HalfLengt
     float
         The greatest ln(a/dy) encountered; where it exceeds HIGHEST the results are incomplete.
     """
-    total, value, weight = lengths.work[0], lengths.work[1], lengths.work[3]
+    total, weight = lengths.work[0], lengths.work[1]
     factor, log_ratio = lengths.factor, lengths.log_ratio
     first, last = _find_span(k, line_load)
     widest, log_scale = -np.inf, lengths.log_scale[k]
@@ -300,7 +293,7 @@ def find_factors(k: int, line_load: FloatArray, sloped: bool, lengths: HalfLengt
             total[j] = 0.0
             if line_load[k, j] > 0.0:
                 weight[j] = 0.25 / factor[k, j]
-        add_influences(lengths.table, k, first, last, weight, log_ratio, value, total)
+        add_influences(lengths.table, k, first, last, weight, log_ratio, total)
         if sloped:
             _fill_near(k, first, last, lengths.table, weight, lengths)
             _add_slopes(k, first, last, total, sweep > 0, lengths)

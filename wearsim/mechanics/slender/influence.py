@@ -111,11 +111,11 @@ def influence_table(strips: int) -> FloatArray:
     Parameters
     ----------
     strips : int
-        Number of strips; k runs from 0 to strips - 1.
+        Number of strips; k runs from 1 - strips to strips - 1.
 
     Returns
     -------
-    ndarray, shape (nodes, 2, strips)
+    ndarray, shape (nodes, 2, 2 * strips - 1)
         F_k and STEP * dF_k/dln(a/dy) at ln(a/dy) = LOWEST, LOWEST + STEP, ..., HIGHEST.
     """
     return _tabulated(mean_asinh, strips)
@@ -133,7 +133,7 @@ def curvature_table(strips: int) -> FloatArray:
 @cache
 def no_table(strips: int) -> FloatArray:
     """Return a table without nodes, for half-lengths without interaction of the strips."""
-    table = np.empty((0, 2, strips))
+    table = np.empty((0, 2, 2 * strips - 1))
     table.setflags(write=False)
     return table
 
@@ -141,14 +141,19 @@ def no_table(strips: int) -> FloatArray:
 def _tabulated(
     function: Callable[[FloatArray], tuple[FloatArray, FloatArray]], strips: int
 ) -> FloatArray:
-    """Return a table of the differences of an odd function over the strips k places away."""
+    """Return a table of the differences of an odd function over the strips k places away.
+
+    Both signs of k are stored, so that the influence on neighbouring strips is read in one loop.
+    """
     tau = LOWEST + STEP * np.arange(round((HIGHEST - LOWEST) / STEP) + 1)
     t = (np.arange(strips) + 0.5) * np.exp(-tau)[:, None]
     value, slope = (part.reshape(t.shape) for part in function(t.ravel()))
-    table = np.empty((len(tau), 2, strips))
-    table[:, 0, 0], table[:, 1, 0] = 2.0 * value[:, 0], -2.0 * STEP * slope[:, 0]
-    table[:, 0, 1:] = np.diff(value, axis=1)
-    table[:, 1, 1:] = -STEP * np.diff(slope, axis=1)
+    table = np.empty((len(tau), 2, 2 * strips - 1))
+    right = table[..., strips - 1 :]
+    right[:, 0, 0], right[:, 1, 0] = 2.0 * value[:, 0], -2.0 * STEP * slope[:, 0]
+    right[:, 0, 1:] = np.diff(value, axis=1)
+    right[:, 1, 1:] = -STEP * np.diff(slope, axis=1)
+    table[..., : strips - 1] = right[..., :0:-1]
     table.setflags(write=False)
     return table
 
@@ -188,8 +193,9 @@ def interpolation(
 def read_value(table: FloatArray, tau: float, distance: int) -> float:
     """Interpolate F_k or C_k of one strip at one distance k; arguments as in `read_influence`."""
     node, (v0, v1, w0, w1), _ = interpolation(table.shape[0], tau)
-    low = v0 * table[node, 0, distance] + v1 * table[node, 1, distance]
-    high = w0 * table[node + 1, 0, distance] + w1 * table[node + 1, 1, distance]
+    place = table.shape[2] // 2 + distance
+    low = v0 * table[node, 0, place] + v1 * table[node, 1, place]
+    high = w0 * table[node + 1, 0, place] + w1 * table[node + 1, 1, place]
     return float(low + high)
 
 
@@ -201,7 +207,7 @@ def read_influence(
 
     Parameters
     ----------
-    table : ndarray, shape (nodes, 2, strips)
+    table : ndarray, shape (nodes, 2, 2 * strips - 1)
         From `influence_table` or `curvature_table`.
     tau : float
         As in `interpolation`.
@@ -211,9 +217,10 @@ def read_influence(
         Filled: F_k (or C_k) and its tangent.
     """
     node, (v0, v1, w0, w1), (d0, d1, e0, e1) = interpolation(table.shape[0], tau)
-    for k in range(count):
+    middle = np.uint64(table.shape[2] // 2)
+    for k in range(np.uint64(0), np.uint64(count)):
         # indices instead of rows: numba counts the references to every row
-        a, b = table[node, 0, k], table[node, 1, k]
-        c, d = table[node + 1, 0, k], table[node + 1, 1, k]
+        a, b = table[node, 0, middle + k], table[node, 1, middle + k]
+        c, d = table[node + 1, 0, middle + k], table[node + 1, 1, middle + k]
         value[k] = v0 * a + v1 * b + w0 * c + w1 * d
         tangent[k] = d0 * a + d1 * b + e0 * c + e1 * d

@@ -32,7 +32,7 @@ class NewtonState(NamedTuple):
     `unit_load_sum` is their sum. `diagonal` is the derivative of the displacement of each strip by
     its own load, `missing` the residual [m], `step` the step by row [N/m] and `change` the applied
     change of load by strip [N/m]. `surface` is the sum of gap and displacement above the least gap
-    `lowest` [m], complete for the followed strips; `weight`, `value` and `tangent` are work space.
+    `lowest` [m], complete for the followed strips; `weight` is work space.
     """
 
     fresh: BoolArray
@@ -52,8 +52,6 @@ class NewtonState(NamedTuple):
     surface: FloatArray
     lowest: FloatArray
     weight: FloatArray
-    value: FloatArray
-    tangent: FloatArray
 
 
 @subroutine
@@ -76,8 +74,6 @@ def new_newton_state(contacts: int, n: int) -> NewtonState:
         np.empty((contacts, n)),
         np.empty((contacts, n)),
         np.empty(contacts),
-        np.empty(n),
-        np.empty(n),
         np.empty(n),
     )
 
@@ -165,7 +161,7 @@ def add_displacement(
     weight, left, last = state.weight, state.left[k], state.right[k] - 1
     for i in range(line_load.shape[1]):
         weight[i] = unit * line_load[k, i]
-    add_influences(table, k, left, last, weight, lengths.log_ratio, state.value, state.surface[k])
+    add_influences(table, k, left, last, weight, lengths.log_ratio, state.surface[k])
 
 
 @subroutine
@@ -195,26 +191,20 @@ def fill_jacobian(
     """
     n, size, coupled = line_load.shape[1], state.size[k], lengths.table.shape[0] > 0
     place, outer, matrix = state.place, state.outer, state.matrix[k]
-    value, tangent, surface = state.value, state.tangent, state.surface[k]
+    surface, middle = state.surface[k], table.shape[2] // 2
     nodes, log_ratio = table.shape[0], lengths.log_ratio
     near, near_strips = lengths.near, min(n, REACH + 1) if coupled else 0
     first, left, right = np.uint64(place[k, 0]), state.left[k], state.right[k]
     contiguous = place[k, size - 1] - place[k, 0] == size - 1
     for column in range(size):
         j = place[k, column]
-        push, here = unit * line_load[k, j], np.uint64(j)
+        push, shift = unit * line_load[k, j], np.uint64(middle - j)
         node, (v0, v1, w0, w1), (d0, d1, e0, e1) = interpolation(nodes, log_ratio[k, j])
-        for d in range(max(j + 1 - left, right - j)):
-            a, b = table[node, 0, d], table[node, 1, d]
-            c, e = table[node + 1, 0, d], table[node + 1, 1, d]
-            value[d] = v0 * a + v1 * b + w0 * c + w1 * e
-            tangent[d] = d0 * a + d1 * b + e0 * c + e1 * e
-        for d in range(np.uint64(0), np.uint64(right - j)):
-            surface[here + d] += push * value[d]
-            outer[k, column, here + d] = unit * tangent[d]
-        for d in range(np.uint64(1), np.uint64(j + 1 - left)):
-            surface[here - d] += push * value[d]
-            outer[k, column, here - d] = unit * tangent[d]
+        for i in range(np.uint64(left), np.uint64(right)):
+            a, b = table[node, 0, i + shift], table[node, 1, i + shift]
+            c, e = table[node + 1, 0, i + shift], table[node + 1, 1, i + shift]
+            surface[i] += push * (v0 * a + v1 * b + w0 * c + w1 * e)
+            outer[k, column, i] = unit * (d0 * a + d1 * b + e0 * c + e1 * e)
         if contiguous:  # without the indices, in a third of the time
             for row in range(np.uint64(0), np.uint64(size)):
                 matrix[column, row] = outer[k, column, first + row]
@@ -222,8 +212,10 @@ def fill_jacobian(
             matrix[column, row] = outer[k, column, place[k, row]]
         state.diagonal[k, column] = matrix[column, column]
         for d in range(near_strips):
-            slope = push * (tangent[d] - value[d])
-            near[REACH - d, j + 2 * REACH] = near[REACH + d, j + 2 * REACH] = slope
+            a, b = table[node, 0, middle + d], table[node, 1, middle + d]
+            c, e = table[node + 1, 0, middle + d], table[node + 1, 1, middle + d]
+            value = v0 * a + v1 * b + w0 * c + w1 * e
+            near[d, j + 2 * REACH] = push * (d0 * a + d1 * b + e0 * c + e1 * e - value)
     if coupled:
         add_length_slopes(k, line_load, state.rows, lengths, matrix)
     for row in range(size):
@@ -261,7 +253,7 @@ def correct_residual(
     far smaller than the step.
     """
     nodes, log_ratio, place, steps = table.shape[0], lengths.log_ratio, state.place, state.step
-    missing, diagonal = state.missing, state.diagonal
+    missing, diagonal, own = state.missing, state.diagonal, table.shape[2] // 2
     for row in range(state.size[k]):
         j = place[k, row]
         old, step = line_load[k, j], steps[k, row]
@@ -269,12 +261,12 @@ def correct_residual(
             continue
         tau = log_ratio[k, j]
         node, (v0, v1, w0, w1), _ = interpolation(nodes, tau)
-        low = v0 * table[node, 0, 0] + v1 * table[node, 1, 0]
-        before = old * (low + (w0 * table[node + 1, 0, 0] + w1 * table[node + 1, 1, 0]))
+        low = v0 * table[node, 0, own] + v1 * table[node, 1, own]
+        before = old * (low + (w0 * table[node + 1, 0, own] + w1 * table[node + 1, 1, own]))
         tau = min(tau + 0.5 * np.log1p(step / old), HIGHEST)
         node, (v0, v1, w0, w1), _ = interpolation(nodes, tau)
-        low = v0 * table[node, 0, 0] + v1 * table[node, 1, 0]
-        after = (old + step) * (low + (w0 * table[node + 1, 0, 0] + w1 * table[node + 1, 1, 0]))
+        low = v0 * table[node, 0, own] + v1 * table[node, 1, own]
+        after = (old + step) * (low + (w0 * table[node + 1, 0, own] + w1 * table[node + 1, 1, own]))
         missing[k, row] -= unit * (after - before) - diagonal[k, row] * step
 
 
@@ -322,12 +314,11 @@ def complete_surface(
         push = unit * line_load[k, j]
         node, (v0, v1, w0, w1), _ = interpolation(nodes, lengths.log_ratio[k, j])
         v0, v1, w0, w1 = v0 * push, v1 * push, w0 * push, w1 * push
-        for d in range(j + 1 - left, j + 1 - first):
-            low = v0 * table[node, 0, d] + v1 * table[node, 1, d]
-            surface[j - d] += low + (w0 * table[node + 1, 0, d] + w1 * table[node + 1, 1, d])
-        for d in range(right - j, last + 1 - j):
-            low = v0 * table[node, 0, d] + v1 * table[node, 1, d]
-            surface[j + d] += low + (w0 * table[node + 1, 0, d] + w1 * table[node + 1, 1, d])
+        for i in range(first, last + 1):
+            if i < left or i >= right:
+                d = table.shape[2] // 2 + i - j
+                low = v0 * table[node, 0, d] + v1 * table[node, 1, d]
+                surface[i] += low + (w0 * table[node + 1, 0, d] + w1 * table[node + 1, 1, d])
     return first, last + 1
 
 
