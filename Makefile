@@ -3,6 +3,7 @@
 # make test-slow       the other tests: every kill of the writers, hard cases, installs, Dask: 18 minutes
 # make bench           speed against error, hard cases: out/bench/, out/benchmarks.md, out/models.md; a quarter of an hour
 # make bench-ensembles persistence and cost of ensembles: out/persistence.md, out/ensembles.md; a quarter of an hour
+# make docs            the site: docs/_build/html/index.html; two minutes, no network; make linkcheck looks at external links
 # make clean           remove what these targets made, including the environment
 
 PYTHON ?= python3
@@ -10,7 +11,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 JOBS ?= 2
 
-.PHONY: demo test test-slow lint bench bench-ensembles clean
+.PHONY: demo test test-slow lint bench bench-ensembles docs linkcheck clean
 .DEFAULT_GOAL := demo
 
 demo: $(VENV)/.installed
@@ -40,6 +41,12 @@ bench-ensembles: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.benchmarks.persistence -o out/persistence.md
 	$(BIN)/python -m tests.benchmarks.ensembles -o out/ensembles.md
 
+docs: $(VENV)/.installed-dev
+	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
+
+linkcheck: $(VENV)/.installed-dev
+	$(BIN)/python -m sphinx -q -b linkcheck docs docs/_build/linkcheck
+
 # the stamps record what the environment holds; a change of any pyproject.toml renews it
 $(VENV)/bin/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
@@ -56,6 +63,6 @@ $(VENV)/.installed-dev: pyproject.toml $(wildcard plugins/*/pyproject.toml) | $(
 	@touch $@ $(VENV)/.installed
 
 clean:
-	rm -rf $(VENV) out build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis .benchmarks \
+	rm -rf $(VENV) out docs/_build docs/reference/generated build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis .benchmarks \
 		.import_linter_cache
 	find wearsim tests plugins -name __pycache__ -type d -prune -exec rm -rf {} +

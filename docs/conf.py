@@ -1,0 +1,127 @@
+"""Settings of the site: `make docs` builds it in docs/_build/html."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+import tomllib
+from pathlib import Path
+
+import jupyter_server_mathjax
+
+DOCS = Path(__file__).parent
+BUILD = DOCS / "_build"
+sys.path.insert(0, str(DOCS / "_ext"))
+
+PROJECT = tomllib.loads((DOCS.parent / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+project = "wearsim"
+author = "The wearsim team"
+copyright = author  # noqa: A001
+release = version = PROJECT["version"]
+needs_sphinx = "8.0"
+
+extensions = [
+    "myst_nb",
+    "numpydoc",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.mathjax",
+    "sphinx_design",
+    "wearsim_reference",
+]
+exclude_patterns = ["_build", "_static", "_templates", "**/.ipynb_checkpoints"]
+templates_path = ["_templates"]
+highlight_language = "none"
+default_role = "autolink"
+os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"  # of notebooks
+
+# links to other projects need a network; elsewhere they are plain names
+if os.environ.get("WEARSIM_DOCS_ONLINE"):
+    extensions.append("sphinx.ext.intersphinx")
+    intersphinx_mapping = {
+        "python": ("https://docs.python.org/3", None),
+        "numpy": ("https://numpy.org/doc/stable", None),
+        "matplotlib": ("https://matplotlib.org/stable", None),
+        "pandas": ("https://pandas.pydata.org/docs", None),
+        "xarray": ("https://docs.xarray.dev/en/stable", None),
+    }
+
+myst_enable_extensions = ["colon_fence", "deflist", "dollarmath", "attrs_inline"]
+myst_heading_anchors = 4
+
+nb_execution_mode = "cache"
+nb_execution_cache_path = str(BUILD / "notebooks")
+nb_execution_in_temp = True
+nb_execution_timeout = 300
+nb_execution_raise_on_error = True
+nb_execution_show_tb = True
+nb_merge_streams = True
+
+autosummary_generate = ["reference/generated/python.md"]  # written before the build
+autodoc_typehints = "none"  # the docstrings have them
+autodoc_member_order = "bysource"
+numpydoc_show_class_members = False
+numpydoc_xref_param_type = False
+
+# MathJax without a network: the parts that draw TeX as SVG
+MATHJAX_PARTS = (
+    "MathJax.js",
+    "LICENSE",
+    "extensions/AssistiveMML.js",
+    "extensions/MathEvents.js",
+    "extensions/TeX",
+    "extensions/tex2jax.js",
+    "extensions/toMathML.js",
+    "jax/element",
+    "jax/input/TeX",
+    "jax/output/SVG",
+    "localization/en",
+)
+
+
+def _mathjax() -> Path:
+    """Return a folder with these parts of MathJax, for the static files of the site."""
+    source = Path(jupyter_server_mathjax.__file__).parent / "static"
+    target = BUILD / "static"
+    for part in MATHJAX_PARTS:
+        place = target / "mathjax" / part
+        if place.exists():
+            continue
+        place.parent.mkdir(parents=True, exist_ok=True)
+        if (source / part).is_dir():
+            shutil.copytree(source / part, place)
+        else:
+            shutil.copy(source / part, place)
+    return target
+
+
+mathjax_path = "mathjax/MathJax.js"
+mathjax2_config = {
+    "jax": ["input/TeX", "output/SVG"],
+    "extensions": ["tex2jax.js", "AssistiveMML.js"],
+    "TeX": {"extensions": ["AMSmath.js", "AMSsymbols.js", "noErrors.js", "noUndefined.js"]},
+    "SVG": {"font": "STIX-Web"},
+    "showMathMenu": False,
+    "messageStyle": "none",
+}
+
+html_theme = "pydata_sphinx_theme"
+html_title = "wearsim"
+html_static_path = ["_static", str(_mathjax())]
+html_css_files = ["wearsim.css"]
+html_show_sourcelink = False
+html_theme_options = {
+    "header_links_before_dropdown": 7,
+    "navigation_with_keys": False,
+    "secondary_sidebar_items": ["page-toc"],
+    "footer_start": ["copyright"],
+    "footer_end": ["theme-version"],
+    "pygments_light_style": "a11y-high-contrast-light",
+    "pygments_dark_style": "a11y-high-contrast-dark",
+}
+html_sidebars = {"index": [], "start": []}
+
+linkcheck_timeout = 20
+linkcheck_retries = 2
+linkcheck_anchors = False
