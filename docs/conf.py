@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import shutil
 import sys
@@ -34,7 +35,9 @@ exclude_patterns = ["_build", "_static", "_templates", "**/.ipynb_checkpoints"]
 templates_path = ["_templates"]
 highlight_language = "none"
 default_role = "autolink"
-os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"  # of notebooks
+os.environ["PATH"] = (
+    f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"  # of notebooks
+)
 
 # links to other projects need a network; elsewhere they are plain names
 if os.environ.get("WEARSIM_DOCS_ONLINE"):
@@ -47,11 +50,20 @@ if os.environ.get("WEARSIM_DOCS_ONLINE"):
         "xarray": ("https://docs.xarray.dev/en/stable", None),
     }
 
+
+def _sources_digest() -> str:
+    """Return a digest of the package, so that notebooks run again where it has changed."""
+    digest = hashlib.sha256()
+    for path in sorted((DOCS.parent / "wearsim").rglob("*.py")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:12]
+
+
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath", "attrs_inline"]
 myst_heading_anchors = 4
 
 nb_execution_mode = "cache"
-nb_execution_cache_path = str(BUILD / "notebooks")
+nb_execution_cache_path = str(BUILD / "notebooks" / _sources_digest())
 nb_execution_in_temp = True
 nb_execution_timeout = 300
 nb_execution_raise_on_error = True
@@ -111,7 +123,9 @@ html_title = "wearsim"
 html_static_path = ["_static", str(_mathjax())]
 html_css_files = ["wearsim.css"]
 html_show_sourcelink = False
+html_context = {"default_mode": "auto"}
 html_theme_options = {
+    "collapse_navigation": True,
     "header_links_before_dropdown": 7,
     "navigation_with_keys": False,
     "secondary_sidebar_items": ["page-toc"],

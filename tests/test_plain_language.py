@@ -30,7 +30,13 @@ SOURCES = [
     )
     for path in sorted(ROOT.glob(pattern))
 ]
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+GENERATED = {"_build", "generated"}
+PAGES_OF_SITE = [
+    page
+    for page in sorted((ROOT / "docs").rglob("*.md"))
+    if not GENERATED.intersection(page.relative_to(ROOT).parts)
+]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *PAGES_OF_SITE]
 PAGES += sorted(ROOT.glob("plugins/**/README.md"))
 
 

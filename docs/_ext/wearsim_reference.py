@@ -91,8 +91,10 @@ def verbs() -> str:
         plugin = f"A verb of the plugin `{FIRST_PARTY[name]}`.\n" if name in FIRST_PARTY else ""
         parts.append(f"## wearsim {name}\n\n{plugin}\n```\n{_help([name])}```\n")
         inner = _help([name]).partition("Commands:")[2]
-        for verb in re.findall(r"^  ([a-z]+)  ", inner, flags=re.MULTILINE):
-            parts.append(f"### wearsim {name} {verb}\n\n```\n{_help([name, verb])}```\n")
+        parts.extend(
+            f"### wearsim {name} {verb}\n\n```\n{_help([name, verb])}```\n"
+            for verb in re.findall(r"^  ([a-z]+)  ", inner, flags=re.MULTILINE)
+        )
     return "\n".join(parts)
 
 
@@ -113,14 +115,14 @@ def scenario_keys() -> str:
     """Return the page of the scenario keys, one table for each table of a scenario."""
     schema = scenario_schema()
     definitions = schema["$defs"]
-    parts = [
-        "# Scenario keys\n",
+    introduction = (
         "From the JSON Schema, `wearsim schema`, of this version with its built-in models. A value"
-        " with a unit is a string, such as `\"20 mm\"`; any unit of the same kind is accepted, and"
+        ' with a unit is a string, such as `"20 mm"`; any unit of the same kind is accepted, and'
         " the column *unit* has an example. A key without default is needed where it says so, and"
         " optional elsewhere. *Random* marks values that may be [distributions]"
-        "(../../random-inputs.md#distributions).\n",
-    ]
+        "(../../random-inputs.md#distributions).\n"
+    )
+    parts = ["# Scenario keys\n", introduction]
     plain = {
         name: part
         for name, part in schema["properties"].items()
@@ -146,7 +148,7 @@ def _title(name: str) -> str:
 
 
 def _is_choice(name: str, tables: Sequence[str]) -> bool:
-    return name.split("_")[0] in tables and "_" in name
+    return name.split("_", maxsplit=1)[0] in tables and "_" in name
 
 
 def _tables(name: str, part: Table, definitions: Table) -> Iterator[str]:
@@ -161,7 +163,7 @@ def _tables(name: str, part: Table, definitions: Table) -> Iterator[str]:
         (key, value) = next(
             (key, item["const"]) for key, item in inner["properties"].items() if "const" in item
         )
-        yield f"### `{name}.{key} = \"{value}\"`\n\n{inner.get('description', '')}\n"
+        yield f'### `{name}.{key} = "{value}"`\n\n{inner.get("description", "")}\n'
         rest = {key: item for key, item in inner["properties"].items() if "const" not in item}
         if rest:
             yield _keys(rest, inner.get("required", []))
@@ -193,7 +195,13 @@ def _keys(properties: Table, required: Sequence[str]) -> str:
         else:
             default = "needed" if key in required else ""
         rows.append(
-            [f"`{key}`", ", ".join(kinds), ", ".join(units), default, cell(part.get("description", ""))]
+            [
+                f"`{key}`",
+                ", ".join(kinds),
+                ", ".join(units),
+                default,
+                cell(part.get("description", "")),
+            ]
         )
     return table(["key", "type", "unit, e.g.", "default", "meaning"], rows)
 
@@ -241,13 +249,13 @@ def _kinds(part: Table) -> tuple[list[str], list[str]]:
 
 def result_files() -> str:
     """Return the page of the variables in results files."""
-    parts = [
-        "# Results files\n",
+    introduction = (
         "One HDF5 file for each result, in SI units; a unit 1 is a plain number."
-        " `xarray.open_dataset(\"file.h5\", engine=\"h5netcdf\")` opens it, and"
+        ' `xarray.open_dataset("file.h5", engine="h5netcdf")` opens it, and'
         " `to_xarray` of every result has the same names. [Compatibility]"
-        "(../../compatibility.md) has the rules of the layout numbers.\n",
-    ]
+        "(../../compatibility.md) has the rules of the layout numbers.\n"
+    )
+    parts = ["# Results files\n", introduction]
     for schema in (RUN, DISSIPATION, ENSEMBLE):
         parts.append(f"## `{schema.format}`, layout {schema.version}\n\n{_sentence(schema)}\n")
         axes = [[f"`{axis.name}`", cell(axis.long_name)] for axis in schema.axes.values()]

@@ -8,7 +8,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wearsim.errors import PluginError, ScenarioError
-from wearsim.report.text import NOTHING, Named, brief, count, lapse, shown
+from wearsim.report.text import (
+    NINETY_PERCENT,
+    NOTHING,
+    OBSERVABLES,
+    Named,
+    brief,
+    count,
+    in_unit,
+    lapse,
+    shown,
+    with_interval,
+)
 from wearsim.results import DissipationResult, EnsembleResult, Result
 from wearsim.types import FloatArray
 from wearsim.units import engineers_unit, in_engineers_unit
@@ -104,6 +115,28 @@ def input_rows(result: DissipationResult | EnsembleResult) -> Rows:
             text += f", std {in_engineers_unit(std, unit, 4)}"
         rows.append((f"drawn {item['key']}", text))
     return [*rows, *_random_rows(result)]
+
+
+def estimates(result: EnsembleResult) -> Rows:
+    """Return the estimates of an ensemble with their intervals, the mean depth first."""
+    if result.count == 0:
+        return [("depth", "no test is completed")]
+    found = result.estimate("depth", -1, (*NINETY_PERCENT, 0.5))
+    rows = [("mean depth", with_interval(found.mean, "um"))]
+    if result.count > 1 and not result.is_constant("depth"):
+        low, high = (found.quantile(p) for p in NINETY_PERCENT)
+        rows += [
+            ("90 % of the tests", f"{in_unit(low.value, 'um', 3)} to {shown(high.value, 'um', 3)}"),
+            ("median", with_interval(found.quantile(0.5), "um")),
+            ("95 % of the tests are below", with_interval(high, "um")),
+            ("standard deviation", with_interval(found.std, "um")),
+        ]
+    for name in ("width", "worn_volume", "roller_depth", "dissipated_energy", "peak_pressure"):
+        if result.at_end(name).any():
+            words, unit = OBSERVABLES[name]
+            mean = result.estimate(name, -1, ()).mean
+            rows.append((f"mean {words}", with_interval(mean, unit)))
+    return rows
 
 
 def input_data(result: DissipationResult | EnsembleResult) -> dict[str, Any]:

@@ -324,6 +324,9 @@ class StudyResult(Generic[Data]):
         # by name, since the figures belong to a layer above
         return import_module("wearsim.report.figures.result").plot(self, ax)
 
+    def _repr_html_(self) -> str:
+        return str(import_module("wearsim.report.notebook").result_html(self))
+
     @cached_property
     def scenario(self) -> Scenario:
         """The scenario, parsed from the text and the files stored with the results."""

@@ -6,6 +6,7 @@ import hashlib
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path, PurePath
 from typing import TypeAlias
 
@@ -35,13 +36,8 @@ _NO_LENGTH = Mistake(
     "none",
     'one of them, such as duration = "450 min"',
 )
-_NO_WEAR = Mistake(
-    "wear",
-    "",
-    "the table is needed for a run",
-    None,
-    'law = "archard-dissipation" and its options',
-)
+_WEAR = 'law = "archard-dissipation" and its options'
+_NO_WEAR = Mistake("wear", "", "the table is needed for a run", None, _WEAR)
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,6 +104,9 @@ class Scenario:
     notes: tuple[str, ...] = ()
     random: tuple[RandomInput, ...] = ()
     drawn: Mapping[str, Drawn] = field(default_factory=dict)
+
+    def _repr_html_(self) -> str:  # by name, since figures belong to a layer above
+        return str(import_module("wearsim.report.notebook").scenario_html(self))
 
     @classmethod
     def from_toml(

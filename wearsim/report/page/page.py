@@ -14,8 +14,6 @@ from wearsim.errors import PluginError, WearsimError
 from wearsim.report import summary
 from wearsim.report.parts import Measured, computed_profile, residual_text, save_text
 from wearsim.report.text import (
-    NINETY_PERCENT,
-    OBSERVABLES,
     against,
     count,
     in_unit,
@@ -198,7 +196,7 @@ def _of_ensemble(result: EnsembleResult, measured: Sequence[Measured]) -> Part:
         title=result.title,
         question=f"How deep do {number_of_realisations(result.count)} of a test of"
         f" {count(raw.total_passes)} roller passes ({time}) wear the cylinder?",
-        answer=_estimates(result),
+        answer=summary.estimates(result),
         error=SAMPLING,
         plots=ensemble_plots(result, measured),
         tables=_tables(result, ("Tests", tests), summary.input_rows(result), measured),
@@ -206,28 +204,6 @@ def _of_ensemble(result: EnsembleResult, measured: Sequence[Measured]) -> Part:
         files=_files(result),
         command=_command(result, "ensemble", *options),
     )
-
-
-def _estimates(result: EnsembleResult) -> summary.Rows:
-    """Return the estimates of an ensemble with their intervals, the mean depth first."""
-    if result.count == 0:
-        return [("depth", "no test is completed")]
-    found = result.estimate("depth", -1, (*NINETY_PERCENT, 0.5))
-    rows = [("mean depth", with_interval(found.mean, "um"))]
-    if result.count > 1 and not result.is_constant("depth"):
-        low, high = (found.quantile(p) for p in NINETY_PERCENT)
-        rows += [
-            ("90 % of the tests", f"{in_unit(low.value, 'um', 3)} to {shown(high.value, 'um', 3)}"),
-            ("median", with_interval(found.quantile(0.5), "um")),
-            ("95 % of the tests are below", with_interval(high, "um")),
-            ("standard deviation", with_interval(found.std, "um")),
-        ]
-    for name in ("width", "worn_volume", "roller_depth", "dissipated_energy", "peak_pressure"):
-        if result.at_end(name).any():
-            words, unit = OBSERVABLES[name]
-            mean = result.estimate(name, -1, ()).mean
-            rows.append((f"mean {words}", with_interval(mean, unit)))
-    return rows
 
 
 def _of_dissipation(result: DissipationResult) -> Part:
