@@ -7,7 +7,8 @@ import pytest
 from cam_text import SCENARIOS
 
 import wearsim
-from wearsim.studies.ensemble.batch import batch_groups
+from wearsim.evolution.observables import peak_to_peak
+from wearsim.studies.ensemble.batch import batch_groups, joined_problem
 from wearsim.studies.ensemble.realisation import RealisationRunner, shared_grid
 
 RANDOM = {
@@ -44,3 +45,14 @@ def test_cams_with_other_skids_are_stepped_alone():
     run = runner("cycloidal", **{'inertia = "2.94e-5 kg m^2"': 'inertia = "3e-3 kg m^2"'})
     groups = batch_groups([run.prepare(number, {}) for number in range(3)])
     assert [len(group) for group in groups] == [1, 1, 1]
+
+
+def test_lift_error_does_not_depend_on_the_batch():
+    run = runner("cycloidal")
+    problems = [run.prepare(number, {}).problem for number in range(3)]
+    together = joined_problem(problems)
+    errors = np.random.default_rng(3).normal(size=(len(together.kinematics.cam.angle), 1, 3))
+    spread = peak_to_peak(together.kinematics.cam, errors)
+    for number, problem in enumerate(problems):
+        own = peak_to_peak(problem.kinematics.cam, errors[..., [number]])
+        assert (spread[:, [number]] == own).all()
