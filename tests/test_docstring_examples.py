@@ -16,6 +16,7 @@ import wearsim
 from wearsim.cli.app import app
 
 OPTIONS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+WEAR = {"distribution": "lognormal", "median": "1.1e-11 1/Pa", "factor": 1.5}
 FRICTION = {"distribution": "uniform", "low": 0.08, "high": 0.12}
 
 
@@ -43,6 +44,8 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert done.exit_code == 0, done.output
     random = wearsim.load_scenario(folder / "rig.toml", {"friction.coefficient": FRICTION})
     wearsim.ensemble(random, 16, folder / "rig-ensemble.h5", scheduler="serial")
+    scattered = random.changed({"wear.cylinder.k_over_h": WEAR, "limit.depth": "50 um"})
+    wearsim.life(scattered, 16, folder / "rig-life.h5", target=675_000, scheduler="serial")
     return folder
 
 

@@ -55,7 +55,8 @@ or a `ValueError`.
 Examples
 --------
 The examples of this package use a file ``rig.toml``, written by ``wearsim new scenario rig.toml``,
-and an ensemble of 16 tests with random friction, ``rig-ensemble.h5``.
+an ensemble of 16 tests with random friction, ``rig-ensemble.h5``, and a study of 16 lives with
+random friction and K/H, ``rig-life.h5``.
 
 >>> import wearsim
 >>> result = wearsim.run("rig.toml", "rig.h5")

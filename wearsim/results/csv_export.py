@@ -18,7 +18,7 @@ from wearsim.results.content import ERRORS, Array
 from wearsim.results.dissipation import DissipationData, DissipationResult
 from wearsim.results.ensemble.data import EnsembleData
 from wearsim.results.ensemble.result import EnsembleResult
-from wearsim.results.ensemble.schema import FAILED, OBSERVABLES, PENDING
+from wearsim.results.ensemble.schema import FAILED, LIFE, OBSERVABLES, PENDING
 from wearsim.results.identification import IdentificationResult
 from wearsim.results.io.atomic_write import replacement
 from wearsim.results.run import Result, RunData
@@ -202,7 +202,7 @@ def _block(raw: EnsembleData, start: int, stop: int) -> Iterator[Column]:
         else:
             for number, column in enumerate(values.T, 1):
                 yield _column(f"{key} roller {number}", column, _drawn_unit(item["unit"]))
-    for name in (*OBSERVABLES, *_SCALARS):
+    for name in (*OBSERVABLES, *_SCALARS, *LIFE):
         if name in raw.schema.variables:
             values = raw.rows(name, start, stop)
             final = np.where(failed, np.nan, values[:, -1] if values.ndim > 1 else values)

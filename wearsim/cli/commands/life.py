@@ -135,6 +135,8 @@ def life(
     files = [path.suffix.lower() in _FILES for path in designs]
     if len(designs) > 2:
         raise typer.BadParameter("give one design, or two to compare", param_hint="SCENARIO")
+    if len({path.resolve() for path in designs}) < len(designs):
+        raise typer.BadParameter(f"{designs[0]} is given twice", param_hint="SCENARIO")
     if any(files):
         if not all(files):
             raise typer.BadParameter(
@@ -356,6 +358,8 @@ def report(
         more = [("results file", str(result.path))]
         life_table.write_life(result, more)
         write_notes(result.notes, [*result.warnings, *_remarks(result)])
+    if others:
+        life_table.write_lives_of(labels, results)
     if len(others) == 1:
         life_table.write_comparison(list(labels), first.compare(others[0]))
     else:
@@ -372,7 +376,7 @@ def _remarks(result: LifeResult) -> list[str]:
         remarks.append("a limit is exceeded before any wear in all realisations: every life is 0")
     elif result.at_once:
         remarks.append(f"{result.at_once} of {result.count} realisations exceed a limit when fresh")
-    if result.count and not result.observed.any() and not result.is_exact:
+    if result.count and not result.observed.any():
         greatest = []
         for name, limit in result.scenario.limit.given.items():
             stored = {"volume": "worn_volume"}.get(name, name)

@@ -123,7 +123,7 @@ def draw(
 
 def show(file: ResultsFile, json: Json = False) -> None:
     """Show the content of a results file and the end state."""
-    from wearsim.cli.render import ensemble_table
+    from wearsim.cli.render import ensemble_table, life_table
     from wearsim.cli.render.dissipation_table import write_spread
     from wearsim.cli.render.failure import failure_rows
     from wearsim.report import summary
@@ -134,6 +134,7 @@ def show(file: ResultsFile, json: Json = False) -> None:
         IdentificationResult,
         open_results,
     )
+    from wearsim.results.ensemble.life import LifeResult
 
     result = open_results(file)
     if isinstance(result, IdentificationResult):
@@ -148,6 +149,8 @@ def show(file: ResultsFile, json: Json = False) -> None:
         data: dict[str, Any]
         if isinstance(result, DissipationResult):
             data = summary.dissipation_json(result)
+        elif isinstance(result, LifeResult):
+            data = life_table.life_json(result)
         elif isinstance(result, EnsembleResult):
             data = ensemble_table.ensemble_json(result)
         else:
@@ -161,6 +164,8 @@ def show(file: ResultsFile, json: Json = False) -> None:
         return
     if isinstance(result, DissipationResult):
         write_spread(result, summary.sources(result.raw))
+    elif isinstance(result, LifeResult):
+        life_table.write_life(result, summary.sources(result.raw))
     elif isinstance(result, EnsembleResult):
         groups = [(f"random {item['name']}", item["text"]) for item in result.raw.groups]
         ensemble_table.write_ensemble(result, [*groups, *summary.sources(result.raw)])

@@ -204,6 +204,20 @@ def _write_effects(result: LifeResult) -> None:
     write_list([head, "first order"], lines)
 
 
+def write_lives_of(labels: Sequence[str], results: Sequence[LifeResult]) -> None:
+    """Write the lives of several designs below each other, with their intervals."""
+    shares = results[0].settings.shares
+    lines = []
+    for label, result in zip(labels, results, strict=True):
+        cells = []
+        for share in shares:
+            value, interval = _with_interval(result, share, result.b(share))
+            cells.append(f"{value} ({interval})" if interval else value)
+        lines.append([label, *cells])
+    typer.echo("")
+    write_list([f"lives [{results[0].unit}]", *(f"B{share:g}" for share in shares)], lines)
+
+
 def write_comparison(labels: Sequence[str], found: LifeComparison) -> None:
     """Write the comparison of two designs in words.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -12,17 +12,16 @@ from typing import Any
 import numpy as np
 
 from wearsim.results.ensemble.data import EnsembleData
-from wearsim.results.ensemble.life_settings import LifeComparison, LifeSettings, LifeTarget
+from wearsim.results.ensemble.life_settings import LifeComparison, LifeTarget
+from wearsim.results.ensemble.life_values import LifeValues
 from wearsim.results.ensemble.result import EnsembleResult
-from wearsim.types import BoolArray, FloatArray, IntArray
-from wearsim.uq.distributions.base import Distribution
+from wearsim.types import IntArray
 from wearsim.uq.estimation.estimates import Target
 from wearsim.uq.estimation.intervals import UNKNOWN, Interval
 from wearsim.uq.survival.distributions import (
     CountedLives,
     FactorMixture,
     LifeDistribution,
-    score_function,
 )
 from wearsim.uq.survival.fits import FAMILIES, LifeFit, fit_lives
 from wearsim.uq.survival.lives import life_quantile, lower_bound, probability_before
@@ -32,7 +31,7 @@ _FEWEST = 32  # realisations below which a target is not reached
 
 
 @dataclass(frozen=True, eq=False)
-class LifeResult(EnsembleResult):
+class LifeResult(LifeValues):
     """Life of a design, from the tests that ended at a limit.
 
     Parameters
@@ -41,101 +40,29 @@ class LifeResult(EnsembleResult):
     path : Path, optional
     law : Distribution, optional
         Distribution of the wear factor, instead of that of the scenario.
-    """
 
-    law: Distribution | None = None
+    Examples
+    --------
+    >>> lives = wearsim.open_results("rig-life.h5")
+    >>> lives
+    <LifeResult 'a wear test': 16 lives, B10 8.5e+05 passes>
+    >>> lives.limits, lives.is_exact
+    (('depth',), True)
+    """
 
     def __repr__(self) -> str:
         b10 = self.b(10).value
         return f"<LifeResult '{self.title}': {self.count} lives, B10 {b10:.4g} {self.unit}>"
 
-    @cached_property
-    def settings(self) -> LifeSettings:
-        """Settings of the study."""
-        known = {item.name for item in fields(LifeSettings)}
-        stored = {name: value for name, value in self.raw.life.items() if name in known}
-        return LifeSettings(**{**stored, "shares": tuple(stored["shares"])})
-
-    @cached_property
-    def numbers(self) -> IntArray:
-        """Numbers of the successful realisations without weights, shape (count,)."""
-        done = self.raw.done
-        return np.asarray(done[done < self.settings.plain])
-
-    @property
-    def unit(self) -> str:
-        """Unit of lives, "turns" of a cam or roller "passes"."""
-        return self.settings.unit
-
-    @property
-    def most(self) -> float:
-        """Life at which lives are censored."""
-        return self.settings.most / self.settings.per_unit
-
-    @property
-    def target(self) -> float | None:
-        """Life whose probability is estimated."""
-        target = self.settings.target
-        return None if target is None else target / self.settings.per_unit
-
-    @cached_property
-    def lives(self) -> FloatArray:
-        """Lives with the drawn values, infinite beyond the censoring, shape (count,)."""
-        return self._lives("life")
-
-    def _lives(self, name: str) -> FloatArray:
-        found = self.values(name) / self.settings.per_unit
-        return np.asarray(np.where(found <= self.most, found, np.inf))
-
-    @cached_property
-    def observed(self) -> BoolArray:
-        """Whether each life ended before the censoring, shape (count,)."""
-        return np.isfinite(self.lives)
-
-    @property
-    def censored(self) -> int:
-        """Number of lives beyond the censoring."""
-        return int((~self.observed).sum())
-
-    @property
-    def at_once(self) -> int:
-        """Number of lives of zero."""
-        return int((self.lives == 0.0).sum())
-
-    @property
-    def is_exact(self) -> bool:
-        """Whether the wear factor is integrated exactly."""
-        return bool(self.settings.factor)
-
-    @property
-    def limits(self) -> tuple[str, ...]:
-        """Names of the limits."""
-        return tuple(self.scenario.limit.given)
-
-    @cached_property
-    def distribution(self) -> LifeDistribution:
-        """Distribution of the lives."""
-        return self._distribution("life")
-
-    def _distribution(self, name: str) -> LifeDistribution:
-        settings = self.settings
-        if not self.is_exact:
-            return CountedLives(self._lives(name))
-        kappa = self.values(name) / settings.per_unit * self.values(settings.factor)
-        return FactorMixture(
-            kappa, self._score, self.values("score_mean"), settings.spread, settings.alone
-        )
-
-    @cached_property
-    def _score(self) -> Any:
-        law = self.law
-        if law is None:
-            inputs = {item.name: item for item in self.scenario.random}
-            law = inputs[self.settings.factor].scalar
-        return score_function(law)
-
     def with_settings(self, **changed: Any) -> LifeResult:
-        """Return the result with other settings: `target` [passes] or `shares` [per cent]."""
+        """Return the result with other settings: `target` [passes] or `shares` [per cent].
+
+        Examples
+        --------
+        >>> lives = wearsim.open_results("rig-life.h5")
+        >>> lives.with_settings(target=1e6).target
+        1000000.0
+        """
         return replace(self, raw=replace(self.raw, life={**self.raw.life, **changed}))
 
     @property
@@ -161,6 +88,13 @@ class LifeResult(EnsembleResult):
         ------
         ValueError
             If the wear factor is not integrated exactly, or correlated with other inputs.
+
+        Examples
+        --------
+        >>> lives = wearsim.open_results("rig-life.h5")
+        >>> faster = {"distribution": "lognormal", "median": "2.2e-11 1/Pa", "factor": 1.5}
+        >>> print(f"{lives.b(10).value / lives.with_wear_factor(faster).b(10).value:.3f}")
+        2.000
         """
         settings = self.settings
         if not settings.factor or settings.spread < 1.0:
@@ -182,12 +116,27 @@ class LifeResult(EnsembleResult):
         -------
         Interval
             Sampling interval; the value is nan beyond the censoring, and -inf an end for which
-            there are too few lives. See `b_error` for the numerical error.
+            which there are too few lives. See `b_error` for the numerical error.
+
+        Examples
+        --------
+        >>> lives = wearsim.open_results("rig-life.h5")
+        >>> found = lives.b(10)
+        >>> print(f"{found.value:.3g}, 95 % interval {found.low:.3g} to {found.high:.3g}")
+        8.5e+05, 95 % interval 7.98e+05 to 9.03e+05
         """
         return self._b(percent, "life")
 
     def b_error(self, percent: float) -> tuple[float, float]:
-        """Return the life of a percentage if all lives are in error by their numerical bounds."""
+        """Return the life of a percentage if all lives are in error by their numerical bounds.
+
+        Examples
+        --------
+        >>> lives = wearsim.open_results("rig-life.h5")
+        >>> low, high = lives.b_error(10)
+        >>> low < lives.b(10).value < high
+        True
+        """
         low, high = (self._b(percent, name).value for name in ("life_low", "life_high"))
         return low, high
 
@@ -206,12 +155,27 @@ class LifeResult(EnsembleResult):
         return Interval(math.nan, min(found.low, self.most), math.inf)
 
     def lower_bound(self, percent: float) -> float:
-        """Return the one-sided 95 % lower bound of the life of a percentage; -inf if unknown."""
+        """Return the one-sided 95 % lower bound of the life of a percentage; -inf if unknown.
+
+        It is that of the lives as counted.
+
+        Examples
+        --------
+        >>> wearsim.open_results("rig-life.h5").lower_bound(10)  # takes 29 lives
+        -inf
+        """
         lives = np.minimum(self.lives, self.most)
         return lower_bound(lives, self.observed, percent / 100.0)
 
     def probability_before(self, life: float) -> Interval:
-        """Return the probability of a life below `life`; unknown beyond the censoring."""
+        """Return the probability of a life below `life`; unknown beyond the censoring.
+
+        Examples
+        --------
+        >>> lives = wearsim.open_results("rig-life.h5")
+        >>> print(f"{lives.probability_before(675_000).value:.2%}")
+        3.36%
+        """
         if not self.count or life > self.most:
             return UNKNOWN
         if self.is_exact:
@@ -219,27 +183,16 @@ class LifeResult(EnsembleResult):
         return probability_before(np.minimum(self.lives, self.most), self.observed, life)
 
     def survival(self, life: float) -> Interval:
-        """Return the probability of a life above `life`."""
+        """Return the probability of a life above `life`.
+
+        Examples
+        --------
+        >>> lives = wearsim.open_results("rig-life.h5")
+        >>> print(f"{lives.survival(675_000).value:.2%}")
+        96.64%
+        """
         found = self.probability_before(life)
         return Interval(1.0 - found.value, 1.0 - found.high, 1.0 - found.low)
-
-    @property
-    def first_limits(self) -> dict[str, float]:
-        """Share of the realisations in which each limit was reached first, by its name."""
-        first = self.values("first_limit")[self.observed]
-        shares = {
-            name: float((first == place).sum()) / max(self.count, 1)
-            for place, name in enumerate(self.limits)
-        }
-        return dict(sorted(shares.items(), key=lambda item: -item[1]))
-
-    @property
-    def angles(self) -> dict[str, FloatArray]:
-        """Angles of a cam at which each limit was reached [rad]; without those never first."""
-        first, angle = self.values("first_limit"), self.values("limit_angle")
-        known = self.observed & np.isfinite(angle)
-        found = {name: angle[known & (first == place)] for place, name in enumerate(self.limits)}
-        return {name: angles for name, angles in found.items() if len(angles)}
 
     @cached_property
     def fits(self) -> list[LifeFit]:
@@ -262,13 +215,6 @@ class LifeResult(EnsembleResult):
         found = first_order(self.log_lives, self.drawn_numbers(groups))
         return {group: (index, None) for group, index in found.items()}
 
-    @property
-    def log_lives(self) -> FloatArray:
-        """Logarithms of the lives, those that are censored or zero at the ends of the range."""
-        positive = self.lives[self.lives > 0.0]
-        least = float(positive.min(initial=self.most))
-        return np.asarray(np.log(np.clip(self.lives, least, self.most)))
-
     def tornado(self) -> dict[str, tuple[float, float]]:
         """Return the change of life by each input, by its name, the greatest first.
 
@@ -277,6 +223,11 @@ class LifeResult(EnsembleResult):
         dict of str to (float, float)
             Factors of the life that the input's effect exceeds with 90 % and with 10 %
             probability, from a quadratic fit of ln life to the normal scores of its numbers.
+
+        Examples
+        --------
+        >>> list(wearsim.open_results("rig-life.h5").tornado())
+        ['wear.cylinder.k_over_h', 'friction.coefficient']
         """
         from scipy.special import ndtri  # noqa: PLC0415  (slow to load)
 
@@ -305,6 +256,16 @@ class LifeResult(EnsembleResult):
         ------
         ValueError
             If the units differ.
+
+        Examples
+        --------
+        >>> lives = wearsim.open_results("rig-life.h5")
+        >>> faster = {"distribution": "lognormal", "median": "2.2e-11 1/Pa", "factor": 1.5}
+        >>> found = lives.compare(lives.with_wear_factor(faster))
+        >>> print(f"{found.b10_ratio.value:.2f} {found.same_machine.value:.2f}")
+        2.00 1.00
+        >>> print(f"{found.two_specimens.value:.2f}")
+        0.88
         """
         from wearsim.uq.survival.comparison import (  # noqa: PLC0415  (rarely needed)
             quantile_ratio,
@@ -338,7 +299,15 @@ class LifeResult(EnsembleResult):
         )
 
     def estimate_for(self, target: Target | LifeTarget) -> Any:
-        """Return the estimate to which a target applies."""
+        """Return the estimate to which a target applies.
+
+        Examples
+        --------
+        >>> lives = wearsim.open_results("rig-life.h5")
+        >>> from wearsim.results.ensemble.life_settings import LifeTarget
+        >>> lives.estimate_for(LifeTarget.parse("b10 3%")).value  # takes 32 realisations
+        nan
+        """
         if isinstance(target, Target):
             return super().estimate_for(target)
         return self.b(100.0 * target.share) if self.count >= _FEWEST else UNKNOWN
@@ -357,7 +326,14 @@ class LifeResult(EnsembleResult):
         return weighted_probability(lives < settings.target, weights, settings.rare)
 
     def final_estimates(self) -> dict[str, Any]:
-        """Return lives and estimates at their ends, as plain values."""
+        """Return lives and estimates at their ends, as plain values.
+
+        Examples
+        --------
+        >>> lives = wearsim.open_results("rig-life.h5")
+        >>> lives.final_estimates()["life"]["b10"]["value"] == lives.b(10).value
+        True
+        """
         lives = {f"b{share:g}": asdict(self.b(share)) for share in self.settings.shares}
         return {**super().final_estimates(), "life": lives}
 

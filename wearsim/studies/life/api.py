@@ -104,7 +104,7 @@ def life(
     >>> scenario = wearsim.load_scenario("rig.toml", {"wear.cylinder.k_over_h": factor})
     >>> lives = wearsim.life(scenario, 1, "life.h5", limits=["depth 50 um"], scheduler="serial")
     >>> print(f"B10 {lives.b(10).value:.3g} {lives.unit}")
-    B10 8.53e+05 passes
+    B10 8.51e+05 passes
     """
     scenario = with_limits(as_scenario(scenario), limits)
     aim = None if precision is None else LifeTarget.parse(precision)
@@ -169,8 +169,8 @@ def resume_life(
 
     Examples
     --------
-    >>> wearsim.resume_life("life.h5", scheduler="serial").finished
-    True
+    >>> wearsim.resume_life("rig-life.h5", realisations=20, scheduler="serial").count
+    20
     """
     data, path = read_ensemble(file), Path(file)
     if not data.life:
