@@ -272,6 +272,9 @@ def test_designs_are_compared_with_common_draws(exact: LifeResult, tmp_path: Pat
     assert found.same_machine.value == 1.0
     assert 0.5 < found.two_specimens.value < 0.7
     assert found.count == 12
+    short = lives(tmp_path / "short.h5", most=2000).compare(exact)
+    assert 0.0 < short.two_specimens.low < short.two_specimens.high < 1.0
+    assert short.b10_ratio.value == pytest.approx(1.0, rel=5e-3)
     other = lives(tmp_path / "seed.h5", design().changed({"seed": 5}))
     assert other.compare(exact).same_machine is None
 

@@ -278,13 +278,20 @@ class LifeResult(LifeValues):
                 f"{self.title} is in {self.unit} and {other.title} in {other.unit}; their lives"
                 " cannot be compared"
             )
-        most = min(self.most, other.most)
+        # kappa is known beyond the maximum, and with it the survival
+        both = (self, other)
+        most = (
+            math.inf
+            if all(item.is_known_throughout for item in both)
+            else min(item.most for item in both)
+        )
         paired = self.raw.seed == other.raw.seed
         first, second = self.distribution, other.distribution
-        one, two = self.lives, other.lives
+        name = "known_lives" if math.isinf(most) else "lives"
+        one, two = (getattr(item, name) for item in both)
         common = np.intersect1d(self.numbers, other.numbers)
         if paired and not (first.exact and second.exact):
-            places = [np.searchsorted(item.numbers, common) for item in (self, other)]
+            places = [np.searchsorted(item.numbers, common) for item in both]
             if first.exact or second.exact:
                 paired = False
             else:

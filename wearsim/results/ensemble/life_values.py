@@ -60,7 +60,21 @@ class LifeValues(EnsembleResult):
         """Lives with the drawn values, infinite beyond the censoring, shape (count,)."""
         return self._lives("life")
 
+    @property
+    def known_lives(self) -> FloatArray:
+        """Lives with the drawn values, also beyond the censoring, shape (count,)."""
+        return self._known_lives("life")
+
+    @property
+    def is_known_throughout(self) -> bool:
+        """Whether the distribution of lives is known beyond the censoring too."""
+        return self.is_exact and bool(np.isfinite(self.known_lives).all())
+
     def _lives(self, name: str) -> FloatArray:
+        found = self._known_lives(name)
+        return np.asarray(np.where(found <= self.most, found, np.inf))
+
+    def _known_lives(self, name: str) -> FloatArray:
         found = self.values(name) / self.settings.per_unit
         if self.law is not None:  # at the same quantile as the drawn factor
             from scipy.special import ndtr  # noqa: PLC0415  (slow to load)
@@ -68,7 +82,7 @@ class LifeValues(EnsembleResult):
             drawn = self.values(self.settings.factor)
             chance = ndtr(score_function(self._drawn_law)(drawn))
             found = found * drawn / self.law.quantile(chance)
-        return np.asarray(np.where(found <= self.most, found, np.inf))
+        return found
 
     @cached_property
     def observed(self) -> BoolArray:
