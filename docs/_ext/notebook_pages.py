@@ -1,0 +1,38 @@
+"""IPython extension of the notebooks on the site: shell cells as in a terminal, figures as SVG."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from typing import Any
+
+# the kernel asks programs for colours and control codes, which pages do not show
+FORCED = {"FORCE_COLOR", "CLICOLOR_FORCE", "CLICOLOR", "JPY_PARENT_PID"}
+
+
+def run_shell(_line: str, cell: str) -> None:
+    """Run the commands of a cell and print their output in one piece.
+
+    Raises
+    ------
+    RuntimeError
+        If a command fails.
+    """
+    kept = {name: value for name, value in os.environ.items() if name not in FORCED}
+    done = subprocess.run(
+        ["sh", "-e", "-c", cell],
+        env={**kept, "COLUMNS": "88", "TERM": "dumb", "NO_COLOR": "1"},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        check=False,
+    )
+    print("\n".join(line.rstrip() for line in done.stdout.splitlines()))  # noqa: T201
+    if done.returncode:
+        raise RuntimeError(f"exit status {done.returncode}: {cell}")
+
+
+def load_ipython_extension(shell: Any) -> None:
+    """Register the cell magic `%%sh`, and show figures of pyplot and of wearsim as SVG."""
+    shell.register_magic_function(run_shell, "cell", "sh")
+    shell.run_line_magic("config", "InlineBackend.figure_formats = ['svg']")
