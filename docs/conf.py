@@ -35,9 +35,9 @@ exclude_patterns = ["_build", "_static", "_templates", "**/.ipynb_checkpoints"]
 templates_path = ["_templates"]
 highlight_language = "none"
 default_role = "autolink"
-os.environ["PATH"] = (
-    f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"  # of notebooks
-)
+# notebooks load `notebook_pages`, and call the command wearsim of this environment
+for name, folder in {"PATH": Path(sys.executable).parent, "PYTHONPATH": DOCS / "_ext"}.items():
+    os.environ[name] = os.pathsep.join([str(folder), *filter(None, [os.environ.get(name)])])
 
 # links to other projects need a network; elsewhere they are plain names
 if os.environ.get("WEARSIM_DOCS_ONLINE"):
