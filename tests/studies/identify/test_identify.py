@@ -10,7 +10,7 @@ import pytest
 import wearsim
 from tests.studies.identify.grooves import NOISE, PASSES, RANDOM, K, groove, grown, rig, write
 from wearsim.errors import CapabilityError, ScenarioError
-from wearsim.studies.identify import trajectories
+from wearsim.studies.identify import api, trajectories
 from wearsim.studies.identify.likelihood import TraceLikelihood
 from wearsim.studies.identify.measurements import Measurement
 from wearsim.studies.identify.trajectories import Grower
@@ -183,3 +183,36 @@ def test_scenarios_without_a_wear_factor_are_refused():
         wearsim.identify(rig().changed({"wear.cylinder.k_over_h": "0 1/Pa"}), [depth(48.0)])
     assert set(RANDOM) == {item.name for item in rig(random=True).random}
     assert rig().total_passes == PASSES
+
+
+def test_more_draws_are_taken_where_few_describe_a_groove(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(trajectories, "DRAWS", 16)
+    monkeypatch.setattr(api, "FEW_DRAWS", 0.0)
+    few = wearsim.identify(rig(random=True), [depth(48.0)])
+    assert few.tests[0]["effective_draws"] <= 16
+    monkeypatch.setattr(api, "FEW_DRAWS", 20.0)
+    monkeypatch.setattr(api, "MOST_DRAWS", 32)
+    more = wearsim.identify(rig(random=True), [depth(48.0)])
+    assert more.tests[0]["effective_draws"] > 25
+    given = wearsim.identify(rig(random=True), [depth(48.0)], draws=16)
+    assert given.tests[0]["effective_draws"] <= 16
+    assert any("give more with --draws" in text for text in given.warnings)
+
+
+def test_repeated_tests_of_a_specimen_share_the_wear_factor():
+    alone = wearsim.identify(rig(random=True), [depth(48.0)], draws=64)
+    tests = [depth(48.0, group="A"), depth(48.5, group="A"), depth(47.5, group="A")]
+    found = wearsim.identify(rig(random=True), tests, draws=64)
+    assert found.raw.specimens == ["A"]
+    assert found.summary["exponents"] == {}
+    widths = [r.summary["scatter_from_inputs"] for r in (alone, found)]
+    assert widths[1] == pytest.approx(widths[0] / np.sqrt(3.0), rel=0.15)
+
+
+def test_result_is_a_dataset_of_xarray():
+    found = wearsim.identify(rig(), [depth(48.0), depth(50.0)])
+    dataset = found.to_xarray()
+    assert dataset["posterior"].dims == ("scatter", "mean")
+    total = (np.gradient(dataset["ln_k"]) * dataset["test_density"][0]).sum()
+    assert float(total) == pytest.approx(1.0, abs=1e-3)
+    assert found.plot(ax=None) is not None

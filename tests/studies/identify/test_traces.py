@@ -9,8 +9,10 @@ import pytest
 
 from tests.studies.identify.grooves import NOISE, groove, write
 from wearsim.errors import ScenarioError
+from wearsim.studies.identify import traces
 from wearsim.studies.identify.measurements import Measurement, measurements_of
 from wearsim.studies.identify.traces import Trace, half_depth_width, read_trace
+from wearsim.types import Profile
 
 CROWN = 0.5
 DEPTH = 48.1e-6
@@ -97,3 +99,34 @@ def test_width_at_half_depth_of_a_parabola():
     worn = np.maximum(50e-6 - y**2, 0.0)  # metres: a radius of 0.5 m
     assert half_depth_width(y, worn) == pytest.approx(2.0 * np.sqrt(25e-6), rel=1e-3)
     assert np.isnan(half_depth_width(y[100:-300], worn[100:-300] + 40e-6))
+
+
+def test_lines_of_a_map_are_averaged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    rng = np.random.default_rng(1)
+    lines = [Profile(*groove(rng)) for _ in range(9)]
+    path = write(tmp_path / "map.csv", lines[0].y, lines[0].height)
+    monkeypatch.setattr(traces, "load_lines", lambda _: lines)
+    found = trace(path)
+    monkeypatch.setattr(traces, "load_lines", lambda _: lines[:1])
+    single = trace(path)
+    assert found.noise is not None
+    assert single.noise is not None
+    # a median scatters 1.25 times as much as a mean
+    assert found.noise.std == pytest.approx(1.25 * single.noise.std / 3.0, rel=0.3)
+    assert "mean of 9 lines" in found.notes
+
+
+def test_spread_of_lines_is_noise(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    rng = np.random.default_rng(1)
+    lines = []
+    for number in range(5):
+        y, height = groove(rng)
+        # the groove differs around the circumference, the shoulders do not
+        inside = np.abs(y - 0.2e-3) < 6e-3
+        lines.append(Profile(y, height + 4e-6 * (number - 2) * inside))
+    monkeypatch.setattr(traces, "load_lines", lambda _: lines)
+    found = trace(write(tmp_path / "map.csv", lines[0].y, lines[0].height))
+    assert found.noise is not None
+    # offsets are removed from the lines, which leaves half of the scatter
+    assert found.noise.std == pytest.approx(0.5 * 4e-6 * np.sqrt(2.5 / 5.0), rel=0.2)
+    assert any("spread of the lines" in note for note in found.notes)

@@ -127,8 +127,8 @@ Draws = Annotated[
     typer.Option(
         min=16,
         metavar="M",
-        help="Draws of the inputs other than K/H; default: 256, 128 where a wear test"
-        " is needed for each of several K/H, or 512 with --plan.",
+        help="Draws of the inputs other than K/H; default: 256, 768 where traces leave few of them,"
+        " 128 where a wear test is needed for each of several K/H, or 512 with --plan.",
         show_default=False,
     ),
 ]

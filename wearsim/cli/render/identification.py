@@ -172,7 +172,7 @@ def deciding(found: Mapping[str, Any], tests: int) -> str:
     tests : int
         Number of tests at hand.
     """
-    measure = " and ".join(found["measure"]) or "all inputs"
+    measure = ", ".join(found["measure"]) or "all inputs"
     many = found["tests"]
     lines = [
         f"a scatter of {found['scatter']:g} is seen with probability {found['power']:.2f} by these"

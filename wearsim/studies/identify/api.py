@@ -23,12 +23,13 @@ from wearsim.studies.identify.measurements import (
     measurements_of,
     read_tests,
 )
-from wearsim.studies.identify.pooling import content, specimens_of
+from wearsim.studies.identify.pooling import FEW_DRAWS, content, specimens_of
 from wearsim.studies.identify.traces import Trace, read_trace
 from wearsim.studies.identify.trajectories import Grower, Trajectories, check_law
 from wearsim.studies.progress import shown_progress
 from wearsim.uq.hierarchy.verdict import NEGLIGIBLE
 
+MOST_DRAWS = 768  # where a trace leaves few of the first ones
 _LEAST_SIGNAL = 3.0  # depth over the noise
 _SHARE = ("cylinder", "roller")
 
@@ -76,8 +77,8 @@ def identify(
     choice : ProfileChoice, optional
         Columns, units and rows of the profiles.
     draws : int, optional
-        Number of draws of the other inputs; by default 256, or 128 where a wear test is needed
-        for each of several K/H.
+        Number of draws of the other inputs; by default 256, and 768 where the shape of a groove
+        leaves few of them, or 128 where a wear test is needed for each of several K/H.
     negligible : float
         Scatter of ln K/H below which it is negligible.
     force : bool
@@ -225,21 +226,30 @@ class _Study:
             counts["done"] = counts["before"] + done
 
         for group in self._by_inputs.values():
-            grower = Grower(group[0].scenario, self.draws, self.shared, report)
-            low = min(ready.depths[0] for ready in group)
-            high = max(ready.depths[1] for ready in group)
-            trajectories = grower.grow((low, high), [ready.passes for ready in group])
+            some, trajectories = self._group(group, self.draws, report)
             counts["before"] = counts["done"]
+            few = min(row.kernel.effective_size for row in some) < FEW_DRAWS
+            if few and self.draws is None and trajectories.values and not trajectories.reasons:
+                # the shape of a groove leaves few draws of the slack of several rollers
+                some, trajectories = self._group(group, MOST_DRAWS, report)
+                counts["before"] = counts["done"]
             for reason in trajectories.reasons:
                 note = f"a wear test for each of several K/H, since {reason}"
                 self.notes += [note] if note not in self.notes else []
             if trajectories.lost:
-                self.notes.append(
-                    f"{trajectories.lost} of {grower.count} draws are left out, whose tests failed"
-                )
-            for ready in group:
-                found[id(ready.item)] = self._identified(ready, trajectories)
+                self.notes.append(f"{trajectories.lost} draws are left out, whose tests failed")
+            found.update({id(row.item): row for row in some})
         return [found[id(item)] for item in self.items]
+
+    def _group(
+        self, group: Sequence[_Ready], draws: int | None, report: Callable[[int, int], None]
+    ) -> tuple[list[Identified], Trajectories]:
+        """Return the wear factors of tests with the same inputs, and their trajectories."""
+        low = min(ready.depths[0] for ready in group)
+        high = max(ready.depths[1] for ready in group)
+        grower = Grower(group[0].scenario, draws, self.shared, report)
+        trajectories = grower.grow((low, high), [ready.passes for ready in group])
+        return [self._identified(ready, trajectories) for ready in group], trajectories
 
     def _identified(self, ready: _Ready, trajectories: Trajectories) -> Identified:
         crown = ready.scenario.roller.crown_radius

@@ -22,7 +22,7 @@ from wearsim.uq.hierarchy.verdict import ALPHA, Design, needed_tests, normal_pow
 PRIORS = (0.25, 0.5, 1.0, 2.0)  # scales of the half-normal prior of t
 SHOWN = 0.4  # scatter of ln K/H for which the power is stated
 MEASURED = 0.1  # standard deviation of ln K/H if the inputs are measured
-_FEW_DRAWS = 25.0
+FEW_DRAWS = 25.0
 _CURVE = 601  # values of ln K/H of a stored density
 _NODES = 81  # parts of the likelihood of a specimen that joins several tests
 
@@ -68,7 +68,7 @@ def specimens_of(rows: Sequence[Identified]) -> list[Specimen]:
         tests: list[list[Identified]] = []
         for row in members:
             continues = tests and row.passes > tests[-1][-1].passes
-            same = continues and len(row.likelihood.mean) == len(tests[-1][-1].likelihood.mean)
+            same = continues and _same_inputs(row, tests[-1][-1])
             if same:
                 tests[-1].append(row)
             else:
@@ -76,6 +76,12 @@ def specimens_of(rows: Sequence[Identified]) -> list[Specimen]:
         label = members[0].item.name if name.startswith("\0") else name
         found.append(Specimen(label, tests, _kernel(label, tests)))
     return found
+
+
+def _same_inputs(one: Identified, other: Identified) -> bool:
+    """Return whether two grooves have the same draws of the inputs."""
+    known = (one.item.values, one.item.errors) == (other.item.values, other.item.errors)
+    return known and len(one.likelihood.mean) == len(other.likelihood.mean)
 
 
 def _kernel(name: str, tests: Sequence[Sequence[Identified]]) -> Kernel:
@@ -289,12 +295,12 @@ def _warnings(specimens: Sequence[Specimen], rows: Sequence[Identified]) -> list
         specimen.name
         for specimen in specimens
         if len(specimen.tests[0][0].likelihood.mean) > 1
-        and specimen.kernel.effective_size < _FEW_DRAWS
+        and specimen.kernel.effective_size < FEW_DRAWS
         and len(specimen.tests) == 1
     ]
     if few:
         found.append(
-            f"{', '.join(few)}: fewer than {_FEW_DRAWS:.0f} draws describe the shape of the groove;"
+            f"{', '.join(few)}: fewer than {FEW_DRAWS:.0f} draws describe the shape of the groove;"
             " give more with --draws"
         )
     return found

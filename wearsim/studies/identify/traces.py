@@ -115,9 +115,9 @@ def _mean_line(path: object, item: Measurement, notes: list[str]) -> tuple[Profi
         y = lines[0].y
         inside = [line for line in lines if len(line.y) == len(y)]
         heights = np.array([line.height for line in inside])
-        heights = heights - np.median(heights, axis=1, keepdims=True)
+        heights = heights - heights.mean(axis=1, keepdims=True)
         mean = np.median(heights, axis=0) if len(inside) > 4 else heights.mean(axis=0)
-        spread = float(np.median((heights - mean).std(axis=0, ddof=1)) / np.sqrt(len(inside)))
+        spread = float(np.sqrt(heights.var(axis=0, ddof=1).mean() / len(inside)))
         profile = Profile(y, mean)
         notes.append(f"mean of {len(inside)} lines")
     else:
