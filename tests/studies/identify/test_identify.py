@@ -16,6 +16,9 @@ from wearsim.studies.identify.measurements import Measurement
 from wearsim.studies.identify.trajectories import Grower
 
 
+SCENARIOS = Path(__file__).parents[3] / "scenarios"
+
+
 def depth(value: float, **options: object) -> Measurement:
     """Return a measured depth [um] with an error of 1 um."""
     name = f"{value:g} um"
@@ -65,6 +68,15 @@ def test_process_needs_a_grid_of_wear_factors():
     grower = Grower(rig().changed({"load.normal_force": load}), 2)
     assert grower.reasons == ("load.normal_force follow random processes in time",)
     assert Grower(rig(), 2).reasons == ()
+
+
+def test_logged_load_needs_a_grid_of_wear_factors():
+    logged = wearsim.load_scenario(SCENARIOS / "rig-logged-load.toml")
+    reasons = trajectories.time_dependence(logged, shared=True)
+    assert reasons[0] == "the load 'recorded' depends on time"
+    assert "the load has terms (thermal)" in reasons
+    spring = rig().changed({"load.kind": "spring", "load.stiffness": "690 N/mm"})
+    assert trajectories.time_dependence(spring, shared=True) == ()
 
 
 def test_wear_of_the_roller_needs_a_shared_factor():

@@ -19,8 +19,8 @@ from wearsim.uq.hierarchy.noise import Noise
 
 _STARTS = 9  # values of ln K from which the maximum is sought
 _ITERATIONS = 8
-_LATTICE = np.array([[a, b] for a in np.arange(-4.0, 4.5) for b in np.arange(-4.0, 4.1, 4.0 / 3.0)])
-_CELL = 4.0 / 3.0  # area of a cell of the lattice
+# in standard deviations; the trapezoidal rule on a normal density errs by less than 1e-3
+_LATTICE = np.array([[1.2 * a, 1.6 * b] for a in range(-3, 4) for b in range(-2, 3)])
 _ROUNDS = 3  # of centring the lattice
 _VALUES = 3_000_000  # of an array
 _DROPPED = 80.0  # of chi2 above that of the best draw
