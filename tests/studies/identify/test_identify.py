@@ -15,7 +15,6 @@ from wearsim.studies.identify.likelihood import TraceLikelihood
 from wearsim.studies.identify.measurements import Measurement
 from wearsim.studies.identify.trajectories import Grower
 
-
 SCENARIOS = Path(__file__).parents[3] / "scenarios"
 
 
