@@ -76,7 +76,7 @@ def dry_run(scenario: Scenario) -> Data:
         "shear_modulus_Pa": pair.shear_modulus,
         "rolling_speed_m_per_s": scenario.rolling_speed,
         "load": {
-            "kind": scenario.load.kind,
+            "kind": scenario.load.kind.removesuffix("-arm"),  # as the scenario names it
             **fixed_load,
             "stiffness_N_per_m": load.stiffness,
             "feedback": getattr(load, "feedback", None),
