@@ -20,12 +20,16 @@ def with_law(law: str, scenario):
 
 CASES = {
     "one station on a segment": prescribed(cam__stations=1, **SHORT),
-    "many stations": prescribed(cam__stations=100, **{**SHORT, "operation__turns": 5}),
+    "500 stations": prescribed(cam__stations=250, **{**SHORT, "operation__turns": 2}),
     "jump of the acceleration": with_law("harmonic", prescribed(**SHORT)),
     "jump of the acceleration of a free roller": with_law("harmonic", cam(**SHORT)),
     "jump of the jerk": with_law("modified-trapezoid", prescribed(**SHORT)),
     "nearly a cusp": prescribed(roller__radius="37.5 mm", **SHORT),
-    "load close to zero": prescribed(load__preload="83 N", **SHORT),
+    "load close to zero": prescribed(load__preload="75.61 N", **SHORT),
+    "load close to zero of a free roller": cam(load__preload="76 N", **SHORT),
+    "feedback close to the harmonic limit": prescribed(
+        load__feedback="inertia", load__preload="78 N", **SHORT
+    ),
     "several rollers": prescribed(operation__rollers=3, **SHORT),
     "rollers that differ": prescribed(
         operation__rollers=2, creepage__yaw=["0 mrad", "1 mrad"], **SHORT
