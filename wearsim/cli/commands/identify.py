@@ -128,7 +128,7 @@ Draws = Annotated[
         min=16,
         metavar="M",
         help="Draws of the inputs other than K/H; default: 256, 768 where traces leave few of them,"
-        " 128 where a wear test is needed for each of several K/H, or 512 with --plan.",
+        " 128 where a wear test is needed for each of several K/H.",
         show_default=False,
     ),
 ]
@@ -277,7 +277,7 @@ def _plan(
     """Write the power of planned tests."""
     from wearsim.cli.progress import Counter
     from wearsim.cli.render.identification import plan_json, write_plan
-    from wearsim.studies.identify.planning import DRAWS, plan_tests, sizes
+    from wearsim.studies.identify.planning import plan_tests, sizes
     from wearsim.studies.kernels import kernels_of
 
     if numbers is None:
@@ -312,7 +312,7 @@ def _plan(
             counts,
             stds,
             negligible=negligible,
-            draws=draws or DRAWS,
+            draws=draws,
             on_progress=counter,
         )
     if figure is not None:

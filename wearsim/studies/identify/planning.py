@@ -19,7 +19,6 @@ from wearsim.uq.hierarchy.kernels import Kernel
 from wearsim.uq.hierarchy.verdict import NEGLIGIBLE, Design
 
 SCATTERS = (0.2, 0.4, 0.8)
-DRAWS = 512
 SETS = 1000  # simulated sets of tests
 DEPTH_ERROR = 0.01  # relative error of a measured depth
 _MOST_SIZES = 9
@@ -61,7 +60,7 @@ def plan_tests(
     measured: Mapping[str, float] | None = None,
     *,
     negligible: float = NEGLIGIBLE,
-    draws: int = DRAWS,
+    draws: int | None = None,
     sets: int = SETS,
     on_progress: Callable[[int, int], None] | None = None,
 ) -> list[PlannedDesign]:
@@ -77,8 +76,9 @@ def plan_tests(
         Inputs that are measured in every test: standard deviation of the logarithm, {"load": 0.1}.
     negligible : float
         Scatter of ln K/H below which it is negligible.
-    draws : int
-        Number of draws of the inputs.
+    draws : int, optional
+        Number of draws of the inputs; by default 256, or 128 where a wear test is needed for each
+        of several K/H.
     sets : int
         Number of simulated sets of tests.
     on_progress : callable, optional
@@ -119,7 +119,7 @@ def sizes(first: int, last: int) -> list[int]:
 
 
 def _kernel(
-    scenario: Scenario, draws: int, on_progress: Callable[[int, int], None] | None
+    scenario: Scenario, draws: int | None, on_progress: Callable[[int, int], None] | None
 ) -> Kernel:
     """Return the likelihood of ln K/H by a test of mean inputs that wears as the scenario."""
     cylinder, roller = factors(scenario)
