@@ -13,7 +13,7 @@ from made_up_ensembles import made_up
 
 import wearsim
 from wearsim.errors import WearsimError
-from wearsim.report.page.page import page_of, save_report
+from wearsim.report.page.page import _part, page_of, save_report
 from wearsim.report.page.run_plots import run_plots
 from wearsim.report.page.study_plots import comparison_plots, ensemble_plots
 from wearsim.report.parts import Measured
@@ -118,7 +118,7 @@ def test_ensemble_shows_its_estimates():
     (bars,) = data_of(titled(plots, "Depth at the end").figure, "number")
     assert bars.data["number"].sum() == result.count
     (points,) = data_of(titled(plots, "Depth against friction").figure, "number")
-    assert points.data["depth"] == pytest.approx(1e6 * result.at_end("depth"), rel=1e-6)
+    assert points.data["value"] == pytest.approx(1e6 * result.at_end("depth"), rel=1e-6)
 
 
 @pytest.mark.parametrize("options", [{"count": 1}, {"spread": 0.0}, {"count": 4, "pending": 4}])
@@ -149,5 +149,52 @@ def test_several_results_are_compared(result):
 def test_one_contact_is_not_compared_with_tests(result):
     study = wearsim.dissipation(shipped_scenario("paper-monte-carlo"), 40)
     assert "mean dissipated power" in page_of([study])
-    with pytest.raises(WearsimError, match="only runs and ensembles can be compared"):
+    with pytest.raises(WearsimError, match="runs and ensembles, or lives, with each other only"):
         page_of([result, study])
+
+
+@pytest.fixture(scope="module")
+def life(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("life")
+    scenario = shipped_scenario("rig-life", {"contact.strips": 61})
+    return wearsim.life(scenario, 40, folder / "life.h5", limits=["depth 5 um"], target=20_000)
+
+
+def test_life_shows_its_quantiles_and_survival(life):
+    page = unescape(page_of([life]))
+    assert "How many passes does the design last, until the first of: depth 5.000 um?" in page
+    found = life.b(10)
+    assert f"{found.value:,.0f} passes [{found.low:,.0f}, {found.high:,.0f}]" in page
+    assert "P(life < 20,000 passes)" in page
+    plots = _part(life, []).plots
+    (curve,) = data_of(titled(plots, "Survival").figure, "survival")
+    places = np.searchsorted(-curve.data["survival"], -90.0)
+    assert curve.data["life"][places] * 1e3 == pytest.approx(found.value, rel=0.05)
+    (points,) = data_of(titled(plots, "Life against").figure, "number")
+    assert points.data["value"] == pytest.approx(life.lives, rel=1e-6)
+
+
+def test_two_lives_are_compared(life, tmp_path):
+    scenario = shipped_scenario("rig-life", {"contact.strips": 61, "friction.coefficient": 0.15})
+    other = wearsim.life(scenario, 40, tmp_path / "rough.h5", limits=["depth 5 um"])
+    page = unescape(page_of([life, other]))
+    assert "Which design lasts more passes?" in page
+    assert f"{life.compare(other).b10_ratio.value:.2f}"[:3] in page
+    assert "lasts longer on" in page
+
+
+def test_identification_shows_its_verdict_and_traces(tmp_path):
+    scenario = shipped_scenario("rig-450min")
+    truth = wearsim.run(scenario)
+    y = np.arange(-10e-3, 10e-3, 50e-6)
+    noise = 1e-6 * np.random.default_rng(2).standard_normal(len(y))
+    height = noise - np.interp(y, truth.y, truth.profiles[-1])
+    rows = [f"{1e3 * place:.4f},{1e6 * value:.4f}" for place, value in zip(y, height, strict=True)]
+    (tmp_path / "t1.csv").write_text("\n".join(["y [mm],height [um]", *rows]))
+    found = wearsim.identify(shipped_scenario("rig-identify"), [tmp_path / "t1.csv"], draws=32)
+    page = unescape(page_of([found]))
+    assert "Is K/H random?" in page
+    k = found.tests[0]["k_over_h_per_Pa"]["value"]
+    assert f"K/H {1e12 * k:.3g}" in page
+    (trace,) = data_of(titled(_part(found, []).plots, "Groove t1.csv").figure, "fitted")
+    assert trace.data["fitted"].min() == pytest.approx(-1e6 * truth.depth[-1], rel=0.05)

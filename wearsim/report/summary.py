@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -205,6 +206,15 @@ def standing(result: Result) -> str:
 def _last(value: Any) -> int:
     """Return the last value of a history, or the number itself."""
     return int(np.ravel(value)[-1])
+
+
+_LIMIT_UNITS = {"volume": "mm^3", "peak_pressure": "MPa"}
+
+
+def limits_of(limits: Mapping[str, float]) -> list[str]:
+    """Return limits of a life by name in SI units as texts, "depth 50.00 um"."""
+    each = ((name, _LIMIT_UNITS.get(name, "um"), value) for name, value in limits.items())
+    return [f"{name.replace('_', ' ')} {shown(value, unit)}" for name, unit, value in each]
 
 
 def sources(raw: StudyData) -> list[tuple[str, str]]:

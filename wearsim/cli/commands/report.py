@@ -58,21 +58,13 @@ def report(
     if not path.parent.is_dir():
         raise typer.BadParameter(f"folder {path.parent} does not exist", param_hint="-o")
     refuse_existing(path, force, "-o")
-    from wearsim.errors import ResultsFileError
     from wearsim.report.page.page import save_report
-    from wearsim.results import IdentificationResult, refuse_inputs
+    from wearsim.results import refuse_inputs
     from wearsim.results.opening import open_results
 
     refuse_inputs(path, files, "the page")
     refuse_inputs(path, measured or [], "a measured profile")
-    results = []
-    for file in files:
-        result = open_results(file)
-        if isinstance(result, IdentificationResult):
-            raise ResultsFileError(
-                f"{file}: holds {result.raw.schema.holds}; show and plot present it"
-            )
-        results.append(result)
+    results = [open_results(file) for file in files]
     profiles = measured_profiles(measured or [], profile_choice(columns, units, row, mean_rows, at))
     save_report(results, path, profiles)
     note(f"page: {path}, {path.stat().st_size / 1e6:.1f} MB")

@@ -11,15 +11,13 @@ import numpy as np
 import typer
 
 from wearsim.cli.shared import write_list, write_table
-from wearsim.report.summary import Rows, input_rows
+from wearsim.report.summary import Rows, input_rows, limits_of
 from wearsim.report.text import NOTHING, count, lapse, part_with_interval, shown, too_few
 from wearsim.results.ensemble.life import LifeResult
 from wearsim.results.ensemble.life_settings import LifeComparison
 from wearsim.uq.estimation.intervals import Interval
 from wearsim.uq.survival.lives import least_survival
 from wearsim.uq.survival.rare_events import LEAST_SIZE, RareProbability
-
-_UNITS = {"m": "um", "m^3": "mm^3", "Pa": "MPa"}
 
 
 def write_life(result: LifeResult, more: Rows) -> None:
@@ -36,7 +34,7 @@ def write_life(result: LifeResult, more: Rows) -> None:
     if result.requested > 1:
         done += f", of {count(settings.plain)}"
     rows = [
-        ("life", f"{unit} until the first of: {', '.join(_limits(result))}"),
+        ("life", f"{unit} until the first of: {', '.join(limits_of(result.scenario.limit.given))}"),
         ("realisations", done if result.finished else f"{done}, unfinished"),
         ("wear factor", _wear_factor(result)),
         ("lives", _ends(result)),
@@ -50,14 +48,6 @@ def write_life(result: LifeResult, more: Rows) -> None:
     rows = [("95 % intervals", result.method)] if result.count else []
     seconds = result.raw.wall_seconds
     write_table("", [*rows, *input_rows(result), ("wall time", lapse(seconds)), *more])
-
-
-def _limits(result: LifeResult) -> list[str]:
-    units = {"volume": "m^3", "peak_pressure": "Pa"}
-    return [
-        f"{name.replace('_', ' ')} {shown(value, _UNITS[units.get(name, 'm')])}"
-        for name, value in result.scenario.limit.given.items()
-    ]
 
 
 def _wear_factor(result: LifeResult) -> str:

@@ -76,7 +76,7 @@ def draw_survival(
 ) -> None:
     """Draw the survival of designs with its 95 % band, censored lives and target."""
     for result, label, colour in zip(results, labels, colours, strict=False):
-        life, survival, low, high = _survival(result)
+        life, survival, low, high = survival_of(result)
         step: Literal["post"] | None = None if result.is_exact else "post"
         (line,) = axes.plot(life, 100.0 * survival, color=colour, label=label)
         line.set_drawstyle("default" if result.is_exact else "steps-post")
@@ -104,7 +104,7 @@ def draw_survival(
     _legend(axes, labels)
 
 
-def _survival(result: LifeResult) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+def survival_of(result: LifeResult) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return lives, and the survival with its band at each."""
     if not result.is_exact:
         curve = survival_curve(np.minimum(result.lives, result.most), result.observed)

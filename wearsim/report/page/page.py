@@ -23,12 +23,14 @@ from wearsim.report.text import (
     with_interval,
 )
 from wearsim.results import DissipationResult, EnsembleResult, Result
+from wearsim.results.ensemble.life import LifeResult
+from wearsim.results.identification import IdentificationResult
 from wearsim.studies.ensemble.compare import compare
 
 if TYPE_CHECKING:
     from wearsim.report.page.plots import Plot
 
-Reported: TypeAlias = Result | EnsembleResult | DissipationResult
+Reported: TypeAlias = Result | EnsembleResult | DissipationResult | IdentificationResult
 NO_STEPPING_ERROR = "Every roller pass is solved: there is no stepping error."
 NOT_MODEL = (
     "The stated error is that of the steps in time. It does not contain the errors of the contact"
@@ -82,7 +84,7 @@ def save_report(results: Sequence[Reported], path: Path, measured: Sequence[Meas
 
     Parameters
     ----------
-    results : sequence of Result, EnsembleResult or DissipationResult
+    results : sequence of Result, EnsembleResult, DissipationResult or IdentificationResult
         Several runs and ensembles are also compared.
     path : Path
         An existing file is replaced.
@@ -131,6 +133,14 @@ def page_of(results: Sequence[Reported], measured: Sequence[Measured] = ()) -> s
 
 
 def _part(result: Reported, measured: Sequence[Measured]) -> Part:
+    if isinstance(result, LifeResult):
+        from wearsim.report.page.life_part import of_life  # noqa: PLC0415  (imports bokeh)
+
+        return of_life(result)
+    if isinstance(result, IdentificationResult):
+        from wearsim.report.page.identification_part import of_identification  # noqa: PLC0415
+
+        return of_identification(result)
     if isinstance(result, EnsembleResult):
         return _of_ensemble(result, measured)
     if isinstance(result, DissipationResult):
@@ -165,11 +175,11 @@ def _of_run(result: Result, measured: Sequence[Measured]) -> Part:
         answer=answer,
         error=error,
         plots=run_plots(result, measured),
-        tables=_tables(result, ("Test", test), summary.draws(result), measured),
+        tables=tables_of(result, ("Test", test), summary.draws(result), measured),
         warnings=[*filter(None, [result.failure]), *result.warnings, *result.notes],
         steps=[_position(result, record) for record in records_of(result)],
-        files=_files(result),
-        command=_command(result, "run"),
+        files=files_of(result),
+        command=command_of(result, "run"),
     )
 
 
@@ -199,10 +209,10 @@ def _of_ensemble(result: EnsembleResult, measured: Sequence[Measured]) -> Part:
         answer=summary.estimates(result),
         error=SAMPLING,
         plots=ensemble_plots(result, measured),
-        tables=_tables(result, ("Tests", tests), summary.input_rows(result), measured),
+        tables=tables_of(result, ("Tests", tests), summary.input_rows(result), measured),
         warnings=[*failures, *result.warnings, *result.notes],
-        files=_files(result),
-        command=_command(result, "ensemble", *options),
+        files=files_of(result),
+        command=command_of(result, "ensemble", *options),
     )
 
 
@@ -229,10 +239,10 @@ def _of_dissipation(result: DissipationResult) -> Part:
         answer=answer,
         error=SAMPLING,
         plots=dissipation_plots(result),
-        tables=_tables(result, ("Study", study), summary.input_rows(result)),
+        tables=tables_of(result, ("Study", study), summary.input_rows(result)),
         warnings=[*result.warnings, *result.notes],
-        files=_files(result),
-        command=_command(result, "dissipation", *options),
+        files=files_of(result),
+        command=command_of(result, "dissipation", *options),
     )
 
 
@@ -240,14 +250,20 @@ def _comparison(results: Sequence[Reported]) -> Part:
     """Return the comparison of runs and ensembles by their depths."""
     from wearsim.report.page.study_plots import comparison_plots  # noqa: PLC0415  (bokeh)
 
-    tests = [one for one in results if not isinstance(one, DissipationResult)]
-    if len(tests) < len(results):
-        raise WearsimError(
-            "only runs and ensembles can be compared; write the page of one contact without others"
-        )
-    labels = [one.path.stem if one.path else one.title for one in tests]
+    labels = [one.path.stem if one.path else one.title for one in results]
     if len(set(labels)) < len(labels):
         labels = [f"{number}: {label}" for number, label in enumerate(labels, 1)]
+    lives = [one for one in results if isinstance(one, LifeResult)]
+    if len(lives) == len(results):
+        from wearsim.report.page.life_part import of_lives  # noqa: PLC0415  (imports bokeh)
+
+        return of_lives(lives, labels)
+    tests = [one for one in results if isinstance(one, Result | EnsembleResult) and not lives]
+    if len(tests) < len(results):
+        raise WearsimError(
+            "a page compares runs and ensembles, or lives, with each other only; write one page for"
+            " each of the others"
+        )
     found = compare(tests, labels)
     each = [(row.label, f"{with_interval(row.value, 'um')}, {kind(row)}") for row in found.rows]
     return Part(
@@ -261,7 +277,7 @@ def _comparison(results: Sequence[Reported]) -> Part:
     )
 
 
-def _tables(
+def tables_of(
     result: Reported,
     first: tuple[str, summary.Rows],
     inputs: summary.Rows,
@@ -269,20 +285,20 @@ def _tables(
 ) -> list[tuple[str, summary.Rows]]:
     """Return the tables of a part: the study, its inputs, measured profiles, and its origin."""
     residuals = []
-    if measured and not isinstance(result, DissipationResult):
+    if measured and isinstance(result, Result | EnsembleResult):
         computed = computed_profile(result)
         residuals = [(one.label, residual_text(one, computed)) for one in measured]
     origin = summary.sources(result.raw)
     return [first, ("Random inputs", inputs), ("Measured profiles", residuals), ("Origin", origin)]
 
 
-def _files(result: Reported) -> list[tuple[str, str]]:
+def files_of(result: Reported) -> list[tuple[str, str]]:
     """Return names and texts of the scenario and of its input files."""
     raw = result.raw
     files = {raw.scenario_file: raw.scenario_text, **raw.files}
     return [(Path(name).name, text) for name, text in files.items()]
 
 
-def _command(result: Reported, verb: str, *options: str) -> str:
+def command_of(result: Reported, verb: str, *options: str) -> str:
     """Return the command that repeats a computation from the files of the page."""
     return shlex.join(["wearsim", verb, Path(result.raw.scenario_file).name, *options])

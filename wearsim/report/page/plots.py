@@ -60,7 +60,9 @@ def axes(x: str, y: str, **options: Any) -> Any:
         axis.major_label_text_font_size = "13px"
         axis.axis_label_text_color = axis.major_label_text_color = "#222222"
         if isinstance(axis.formatter, BasicTickFormatter):
-            axis.formatter = BasicTickFormatter(power_limit_low=-4, precision="auto")
+            axis.formatter = BasicTickFormatter(
+                power_limit_low=-4, power_limit_high=8, precision="auto"
+            )
     plot.grid.grid_line_color = "#e4e4e4"
     return plot
 

@@ -48,7 +48,11 @@ def ensemble_plots(result: EnsembleResult, measured: Sequence[Measured]) -> list
         return []
     plots = [_course(result), _band(result, measured)]
     if result.count > 1 and not result.is_constant("depth"):
-        plots = [_density(result), *plots, *_effects(result)]
+        plots = [
+            _density(result),
+            *plots,
+            *effect_plots(result, "depth", result.at_end("depth") * UM),
+        ]
     return plots
 
 
@@ -142,16 +146,26 @@ def _band(result: EnsembleResult, measured: Sequence[Measured]) -> Plot:
     return Plot("Worn profile at the end", text, plot)
 
 
-def _effects(result: EnsembleResult) -> list[Plot]:
-    """Return the Sobol indices, and the depth against the draws of the most influential input."""
-    effects = [item for item in result.sensitivity("depth") if math.isfinite(item.first.value)]
+def effect_plots(result: EnsembleResult, name: str, values: FloatArray) -> list[Plot]:
+    """Return the Sobol indices of an observable, and its values against the first input.
+
+    Parameters
+    ----------
+    result : EnsembleResult
+    name : str
+        The observable, "depth" [um] or "life", of which the indices are those of its logarithm.
+    values : ndarray, shape (count,)
+        Its values in the unit shown.
+    """
+    effects = [item for item in result.sensitivity(name) if math.isfinite(item.first.value)]
     if not effects:
         return []
+    of = "logarithm of the life" if name == "life" else name
     names = [item.name for item in effects][::-1]
     first = [item.first for item in effects][::-1]
     low, high = [item.low for item in first], [item.high for item in first]
     extent = Range1d(start=min(0.0, *low), end=max(1.0, *high))
-    plot = axes("part of the variance of the depth", "", y_range=names, x_range=extent)
+    plot = axes(f"part of the variance of the {of}", "", y_range=names, x_range=extent)
     data = columns(name=names, value=[item.value for item in first], low=low, high=high)
     bars = plot.hbar("name", right="value", height=0.5, source=data, color=BLUE, alpha=0.6)
     plot.add_layout(Whisker(base="name", source=data, **WIDTH))
@@ -159,26 +173,28 @@ def _effects(result: EnsembleResult) -> list[Plot]:
     hover(plot, [bars], ("input", "@name"), *tips)
     largest = effects[0]
     text = f"{largest.name} explains {100.0 * largest.first.value:.0f} % of the variance."
-    title = "What the scatter of the depth is due to (Sobol indices)"
-    return [Plot(title, text, plot), _draws(result, largest)]
+    title = f"What the scatter of the {name} is due to (Sobol indices)"
+    return [Plot(title, text, plot), _draws(result, largest, name, values)]
 
 
-def _draws(result: EnsembleResult, effect: Effect) -> Plot:
-    """Return the depth against the drawn values of an input."""
+def _draws(result: EnsembleResult, effect: Effect, name: str, shown_values: FloatArray) -> Plot:
+    """Return the values of an observable against the drawn values of an input."""
     item = next(item for item in result.raw.inputs if item["input"] == effect.name)
     unit, size = engineers_unit(item["unit"])
     values = result.inputs[item["key"]].reshape(result.count, -1).mean(axis=1) / size
-    every = evenly_spaced(result.count, MOST_POINTS)
-    depth = result.at_end("depth")[every] * UM
-    plot = axes(f"{item['key']} [{unit}]", "depth at the end [um]")
+    drawn = np.flatnonzero(np.isfinite(shown_values))
+    every = drawn[evenly_spaced(len(drawn), MOST_POINTS)]
+    label = "depth at the end [um]" if name == "depth" else name
+    plot = axes(f"{item['key']} [{unit}]", label)
     plot.xaxis.ticker = BasicTicker(desired_num_ticks=3)
-    data = columns(x=values[every], depth=depth, number=result.numbers[every])
-    points = plot.scatter("x", "depth", source=data, size=5, color=BLUE, alpha=0.5)
+    data = columns(x=values[every], value=shown_values[every], number=result.numbers[every])
+    points = plot.scatter("x", "value", source=data, size=5, color=BLUE, alpha=0.5)
     digits = "{0.000e+0}" if np.abs(values).max() < 1e-3 else "{0.0000}"
-    tips = (item["key"], f"@x{digits} {unit}"), ("depth", "@depth{0.00} um")
+    value = "@value{0.00} um" if name == "depth" else "@value{0,0}"
+    tips = (item["key"], f"@x{digits} {unit}"), (name, value)
     hover(plot, [points], ("realisation", "@number"), *tips)
     text = f"One point for each of {count(len(every))} tests."
-    return Plot(f"Depth against {item['key']}", text, plot)
+    return Plot(f"{name.capitalize()} against {item['key']}", text, plot)
 
 
 def dissipation_plots(result: DissipationResult) -> list[Plot]:

@@ -1,0 +1,147 @@
+"""Part of the page on an identification of the wear factor."""
+
+from __future__ import annotations
+
+import numpy as np
+from bokeh.models.ranges import Range1d
+
+from wearsim.report.page.page import Part, command_of, files_of, tables_of
+from wearsim.report.page.plots import COLOURS, MM, UM, Plot, axes, columns, hover, legend
+from wearsim.report.parts import BLUE, GREY, ORANGE, evenly_spaced
+from wearsim.report.text import in_unit, shown
+from wearsim.results.identification import IdentificationResult
+
+MOST_TRACES, MOST_POINTS = 12, 1200
+_SCALE = 1e12  # K/H is shown in 1e-12 1/Pa
+_VERDICTS = {
+    "explained": "explained: the inputs explain the scatter",
+    "random": "random: K/H itself scatters",
+    "undecided": "undecided: these tests cannot tell",
+}
+_ERROR = (
+    "Intervals hold 95 %. In full slip a groove shows the product of K/H and dissipated energy: a"
+    " K/H holds for the stated energy. The error of the contact model is not contained."
+)
+
+
+def of_identification(result: IdentificationResult) -> Part:
+    """Return the part of the page on an identification."""
+    found, scatter = result.summary, result.scatter_of_k
+    middle, following = found["k_over_h_median_per_Pa"], found["next_specimen"]
+    seen, ends = found["scatter_seen"], _ends(scatter["low"], scatter["high"])
+    answer = [
+        ("Is K/H random?", _VERDICTS[result.verdict]),
+        (
+            "scatter t of ln K/H",
+            f"{scatter['value']:.2f} ({ends})",
+        ),
+        ("scatter of ln K/H seen", "-" if seen is None else f"{seen:.3f}"),
+        ("scatter that inputs explain", f"{found['scatter_from_inputs']:.3f}"),
+        ("Bayes factor of t = 0", f"{result.bayes_factor:.2f}"),
+        ("K/H, median of specimens", _factor(middle["value"], middle["low"], middle["high"])),
+        ("K/H, next specimen", _factor(*(following[name] for name in _NEXT))),
+    ]
+    tests = []
+    for test in result.tests:
+        k, depth = test["k_over_h_per_Pa"], test["depth_interval_m"]
+        depths = f"{in_unit(depth[0], 'um')} to {shown(depth[1], 'um')}"
+        energy = shown(test["energy_J"]["value"], "J", 3)
+        text = f"K/H {_factor(k['value'], k['low'], k['high'])}, for {energy}; depth {depths}"
+        tests.append((_name(test["file"]), text))
+    return Part(
+        title=result.title,
+        question=f"Which K/H do {len(tests)} measured grooves have, and does it scatter?",
+        answer=answer,
+        error=_ERROR,
+        plots=[_factors(result), _scatter(result), *_traces(result)],
+        tables=tables_of(result, ("Tests", tests), []),
+        warnings=[*result.warnings, *result.notes],
+        files=files_of(result),
+        command=command_of(result, "identify", *(_name(test["file"]) for test in result.tests)),
+    )
+
+
+_NEXT = ("median_per_Pa", "low_per_Pa", "high_per_Pa")
+
+
+def _name(file: str) -> str:
+    return file.rpartition("/")[2]
+
+
+def _ends(low: float, high: float) -> str:
+    return f"{low:.2f} to {high:.2f}"
+
+
+def _factor(value: float, low: float, high: float) -> str:
+    """Return a wear factor with its interval."""
+    texts = [in_unit(_SCALE * one, "1", 3) for one in (value, low, high)]
+    return f"{texts[0]}e-12 1/Pa ({texts[1]} to {texts[2]})"
+
+
+def _factors(result: IdentificationResult) -> Plot:
+    """Return the densities of K/H of the specimens and of the next one."""
+    plot = axes("K/H [1e-12 1/Pa]", "probability density of ln K/H", x_axis_type="log")
+    k, next_one = _SCALE * np.exp(result.ln_k), result.summary["next_specimen"]
+    step = float(result.ln_k[1] - result.ln_k[0])
+    distance = (result.ln_k - np.log(next_one["median_per_Pa"])) / np.log(next_one["factor"])
+    named = [*zip(result.raw.specimens, result.test_density, strict=True)]
+    named.append(("next specimen", np.exp(-0.5 * distance**2)))
+    for number, (name, values) in enumerate(named):
+        density = values / (values.sum() * step)
+        last = number == len(named) - 1
+        data = columns(k=k, density=density)
+        style = {"color": "black" if last else COLOURS[number % len(COLOURS)], "width": 2}
+        dash = "dashed" if last else "solid"
+        line = plot.line(
+            "k", "density", source=data, line_dash=dash, legend_label=_name(name), **style
+        )
+        hover(plot, [line], (_name(name), "K/H @k{0.00}e-12 1/Pa"))
+    visible = k[np.max([values / values.max() for _, values in named], axis=0) > 1e-3]
+    plot.x_range.update(start=float(visible.min()), end=float(visible.max()))
+    legend(plot)
+    text = "Density of the wear factor of each specimen, and of the next one."
+    return Plot("Wear factors", text, plot)
+
+
+def _scatter(result: IdentificationResult) -> Plot:
+    """Return the density of the scatter of ln K/H."""
+    t = result.scatter
+    density = (result.posterior * np.gradient(result.values("mean_ln_k"), axis=1)).sum(axis=1)
+    density /= np.trapezoid(density, t)
+    visible = Range1d(start=0.0, end=max(1.3 * result.scatter_of_k["high"], 0.3))
+    plot = axes("scatter t of ln K/H", "probability density", x_range=visible)
+    data = columns(t=t, density=density)
+    plot.varea("t", 0.0, "density", source=data, color=BLUE, alpha=0.22)
+    line = plot.line("t", "density", source=data, color=BLUE, width=2)
+    hover(plot, [line], ("t", "@t{0.000}"), ("density", "@density{0.00}"))
+    negligible = float(result.summary["negligible"])
+    plot.line([negligible] * 2, [0.0, float(density.max())], color=GREY, line_dash="dashed")
+    found = result.scatter_of_k
+    text = f"95 %: {_ends(found['low'], found['high'])}. Dashed: a negligible scatter."
+    return Plot("Scatter of the wear factor itself", text, plot)
+
+
+def _traces(result: IdentificationResult) -> list[Plot]:
+    """Return the measured traces against the profiles of the model."""
+    names, plots = ("y", "height", "fitted", "low", "high"), []
+    for place, test in enumerate(result.tests[:MOST_TRACES]):
+        rows = [result.values(f"trace_{name}")[place] for name in names]
+        known = np.flatnonzero(np.isfinite(rows[0]))
+        if len(known) == 0:  # only a depth was measured
+            continue
+        every = known[evenly_spaced(len(known), MOST_POINTS)]
+        y, *heights = (row[every] for row in rows)
+        each = dict(zip(names[1:], (UM * height for height in heights), strict=True))
+        data = columns(y=y * MM, **each)
+        plot = axes("y [mm]", "height [um]")
+        plot.varea("y", "low", "high", source=data, color=ORANGE, alpha=0.4)
+        style = {"size": 3, "color": GREY, "legend_label": "measured"}
+        plot.scatter("y", "height", source=data, **style)
+        style = {"color": BLUE, "width": 2, "legend_label": "best profile, with 95 % band"}
+        line = plot.line("y", "fitted", source=data, **style)
+        tips = ("measured", "@height{0.00} um"), ("model", "@fitted{0.00} um")
+        hover(plot, [line], ("y", "@y{0.000} mm"), *tips)
+        legend(plot)
+        text = f"Greatest depth {shown(test['depth_m'], 'um')}, after levelling."
+        plots.append(Plot(f"Groove {_name(test['file'])}", text, plot))
+    return plots
