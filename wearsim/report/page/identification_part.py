@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from bokeh.models.ranges import Range1d
 
-from wearsim.report.page.page import Part, command_of, files_of, tables_of
+from wearsim.report.page.part import Part, command_of, files_of, tables_of
 from wearsim.report.page.plots import COLOURS, MM, UM, Plot, axes, columns, hover, legend
 from wearsim.report.parts import BLUE, GREY, ORANGE, evenly_spaced
 from wearsim.report.text import in_unit, shown
@@ -16,7 +16,7 @@ _SCALE = 1e12  # K/H is shown in 1e-12 1/Pa
 _VERDICTS = {
     "explained": "explained: the inputs explain the scatter",
     "random": "random: K/H itself scatters",
-    "undecided": "undecided: these tests cannot tell",
+    "undecided": "undecided: these tests cannot show it",
 }
 _ERROR = (
     "Intervals hold 95 %. In full slip a groove shows the product of K/H and dissipated energy: a"

@@ -10,7 +10,7 @@ import numpy as np
 
 from wearsim.report import summary
 from wearsim.report.figures.life import survival_of
-from wearsim.report.page.page import SAMPLING, Part, command_of, files_of, tables_of
+from wearsim.report.page.part import SAMPLING, Part, command_of, files_of, tables_of
 from wearsim.report.page.plots import COLOURS, Plot, axes, columns, hover, legend
 from wearsim.report.page.study_plots import effect_plots
 from wearsim.report.text import count, part_with_interval, pass_unit, with_interval
