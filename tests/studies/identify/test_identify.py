@@ -65,7 +65,7 @@ def test_process_needs_a_grid_of_wear_factors():
         "marginal": {"distribution": "uniform", "low": "280 N", "high": "320 N"},
     }
     grower = Grower(rig().changed({"load.normal_force": load}), 2)
-    assert grower.reasons == ("load.normal_force follow random processes in time",)
+    assert grower.reasons == ("a random process in time sets load.normal_force",)
     assert Grower(rig(), 2).reasons == ()
 
 

@@ -174,9 +174,11 @@ def deciding(found: Mapping[str, Any], tests: int) -> str:
     """
     measure = ", ".join(found["measure"]) or "all inputs"
     many = found["tests"]
+    now = f"{found['power']:.2f} by these {tests} tests" if tests > 1 else "0 by one test"
     lines = [
-        f"a scatter of {found['scatter']:g} is seen with probability {found['power']:.2f} by these"
-        f" {tests} tests, and 0.8 by " + (f"{many}" if many else "no number of") + " such tests"
+        f"a scatter of {found['scatter']:g} is seen with probability {now}, and 0.8 by "
+        + (f"{many}" if many else "no number of")
+        + " such tests"
     ]
     if found["tests_if_measured"]:
         lines.append(

@@ -114,7 +114,7 @@ def time_dependence(scenario: Scenario, shared: bool) -> tuple[str, ...]:
     worn = factors(scenario)[1]
     random = any(item.name == ROLLER for item in scenario.random)
     reasons = (
-        (bool(processes), f"{' and '.join(processes)} follow random processes in time"),
+        (bool(processes), f"a random process in time sets {' and '.join(processes)}"),
         (not load.constant, f"the load '{scenario.load.kind}' depends on time"),
         (
             bool(scenario.load.terms),
