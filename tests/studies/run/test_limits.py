@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 from study_examples import LOADS, ROLLERS, STEPPERS, after, run_differences, short
 
+from tests.evolution import SCENARIOS
 from wearsim.errors import Interrupted, ResultsFileError
 from wearsim.evolution.integrate import Evolution
 from wearsim.evolution.limits import Limit
 from wearsim.evolution.state import WearState, fresh_state
 from wearsim.results import Result, open_results
+from wearsim.scenario import load_scenario
 from wearsim.studies.ensemble.batch import joined_problem
 from wearsim.studies.run import run as studies
 from wearsim.studies.run.assemble import assemble_problem
@@ -35,6 +37,10 @@ def path(tmp_path: Path) -> Path:
         ("worn depth 0.05 mm", "depth", 50e-6),
         ("Roller depth 5um", "roller depth", 5e-6),
         ("volume 12 mm^3", "volume", 12e-9),
+        ("lift_error=30um", "lift error", 30e-6),
+        ("peak pressure 900 MPa", "peak pressure", 9e8),
+        ("clearance = 60 um", "clearance", 60e-6),
+        ("width=14mm", "width", 14e-3),
         ("12 h", "time", 43_200.0),
         ("time 500 min", "time", 30_000.0),
         ("2e6 passes", "passes", 2e6),
@@ -177,3 +183,27 @@ def test_limit_of_each_test_of_a_batch_is_that_of_the_test_alone() -> None:
     for number, run in enumerate(alone):
         assert found[number].passes[0] == run.passes[-1]
         np.testing.assert_array_equal(found[number].cylinder_depth[0, 0, 0], run.profiles[-1])
+
+
+@pytest.mark.parametrize(
+    ("limit", "variable"),
+    [
+        ("width 2 mm", "width"),
+        ("clearance 0.7 um", "descent"),
+        ("volume 0.05 mm^3", "worn_volume"),
+    ],
+)
+def test_run_stops_at_limits_of_other_quantities(limit: str, variable: str) -> None:
+    result = studies.run(short(), until=limit)
+    values = np.asarray(result.raw.history[variable]).reshape(len(result.passes), -1).max(axis=1)
+    reached = Limit.parse(limit).value
+    assert values[-1] == pytest.approx(reached, rel=1e-7)
+    assert (values[:-1] < reached).all()
+
+
+def test_run_of_a_cam_stops_at_its_lift_error() -> None:
+    scenario = load_scenario(SCENARIOS / "cam-eccentric.toml", {"evolution.tolerance": 1e-2})
+    result = studies.run(scenario, until="lift_error=2um")
+    errors = np.asarray(result.raw.history["lift_error"]).reshape(len(result.passes), -1)
+    assert errors[-1].max() == pytest.approx(2e-6, rel=1e-7)
+    assert (errors[:-1] < 2e-6).all()

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+
 from wearsim.errors import ResultsFileError, ScenarioError
 from wearsim.evolution.limits import Limit
 from wearsim.evolution.state import WearState
@@ -180,7 +182,9 @@ def _run_to_limit(run: RunInProgress) -> Result:
     while run.limit is not None and not run.reached:
         data, state, reason = run.data(finished=True), run.recorder.state, ""
         last = last_value(data, run.limit)
-        if last <= 0.0:
+        # a groove has a width from a certain depth on
+        worn = np.max(data.history["depth"][-1]) if run.limit.quantity == "width" else last
+        if worn <= 0.0:
             reason = "nothing is worn"
         elif extensions == EXTENSIONS:
             reason = f"the test has been extended {2**EXTENSIONS}-fold"
