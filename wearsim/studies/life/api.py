@@ -187,7 +187,9 @@ def resume_life(
             f"{path}: has tests for rare events after its realisations, and cannot be extended"
         )
     total = settings.plain if realisations is None else realisations
-    if total < settings.plain or (data.finished and not failed and total == settings.plain):
+    if realisations is not None and (
+        total < settings.plain or (data.finished and not failed and total == settings.plain)
+    ):
         raise ResultsFileError(
             f"{path}: has {settings.plain} realisations",
             python="give a larger number of realisations to extend it",

@@ -1,0 +1,52 @@
+"""A study of lives that is killed at any stage of writing continues to the same numbers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.faulty_storage import WatchedStorage
+from tests.studies.ensemble_cases import LOGNORMAL, differences
+from tests.studies.life.test_life import design
+from wearsim.results.ensemble.life import LifeResult
+from wearsim.studies.life.api import life, resume_life
+
+COUNT = 4
+
+
+class Killed(BaseException):
+    """End of the process, after which nothing is written."""
+
+
+def counted(stages: list[str], last: int | None = None) -> WatchedStorage:
+    """Return file operations that list their stages, and end at one of them."""
+
+    def hook(stage: str) -> None:
+        stages.append(stage)
+        if last is not None and len(stages) > last:
+            raise Killed
+
+    return WatchedStorage(hook)
+
+
+def study(path: Path, storage: WatchedStorage) -> LifeResult:
+    """Run a study with tests for rare ends of life."""
+    scenario = design(wear__roller__k_over_h={**LOGNORMAL, "median": "1e-20 1/Pa"})
+    return life(scenario, COUNT, path, target=600, rare=200, scheduler="serial", storage=storage)
+
+
+@pytest.mark.parametrize(
+    "part",
+    [0.4, *(pytest.param(k / 20.0, marks=pytest.mark.slow) for k in range(1, 20))],
+)
+def test_killed_study_continues_bit_for_bit(tmp_path: Path, part: float) -> None:
+    stages: list[str] = []
+    whole = study(tmp_path / "whole.h5", counted(stages))
+    path, done = tmp_path / "killed.h5", list[str]()
+    with pytest.raises(Killed):
+        study(path, counted(done, int(part * len(stages))))
+    result = resume_life(path, scheduler="serial") if path.exists() else study(path, counted([]))
+    assert differences(result, whole) == []
+    assert result.rare == whole.rare
+    assert result.b(50) == whole.b(50)
