@@ -76,18 +76,16 @@ autodoc_member_order = "bysource"
 numpydoc_show_class_members = False
 numpydoc_xref_param_type = False
 
-# MathJax without a network: the parts that draw TeX as SVG
+# MathJax without a network: the parts that draw TeX with fonts of their own
 MATHJAX_PARTS = (
     "MathJax.js",
     "LICENSE",
-    "extensions/AssistiveMML.js",
-    "extensions/MathEvents.js",
-    "extensions/TeX",
-    "extensions/tex2jax.js",
-    "extensions/toMathML.js",
+    "config/TeX-AMS-MML_HTMLorMML-full.js",
+    "extensions",
+    "fonts",
     "jax/element",
     "jax/input/TeX",
-    "jax/output/SVG",
+    "jax/output/HTML-CSS",
     "localization/en",
 )
 
@@ -102,7 +100,7 @@ def _mathjax() -> Path:
             continue
         place.parent.mkdir(parents=True, exist_ok=True)
         if (source / part).is_dir():
-            shutil.copytree(source / part, place)
+            shutil.copytree(source / part, place, ignore=shutil.ignore_patterns("a11y"))
         else:
             shutil.copy(source / part, place)
     return target
@@ -110,10 +108,9 @@ def _mathjax() -> Path:
 
 mathjax_path = "mathjax/MathJax.js"
 mathjax2_config = {
-    "jax": ["input/TeX", "output/SVG"],
-    "extensions": ["tex2jax.js", "AssistiveMML.js"],
-    "TeX": {"extensions": ["AMSmath.js", "AMSsymbols.js", "noErrors.js", "noUndefined.js"]},
-    "SVG": {"font": "STIX-Web"},
+    "config": ["TeX-AMS-MML_HTMLorMML-full.js"],
+    "HTML-CSS": {"availableFonts": [], "webFont": "STIX-Web", "imageFont": None},
+    "menuSettings": {"zoom": "None"},
     "showMathMenu": False,
     "messageStyle": "none",
 }
@@ -122,6 +119,8 @@ html_theme = "pydata_sphinx_theme"
 html_title = "wearsim"
 html_static_path = ["_static", str(_mathjax())]
 html_css_files = ["wearsim.css"]
+html_js_files = ["wearsim.js"]
+html_favicon = "_static/wearsim.svg"
 html_show_sourcelink = False
 html_context = {"default_mode": "auto"}
 html_theme_options = {
