@@ -103,12 +103,17 @@ def _mathjax() -> Path:
             shutil.copytree(source / part, place, ignore=shutil.ignore_patterns("a11y"))
         else:
             shutil.copy(source / part, place)
+    # an empty font that browsers load without an error
+    combined = target / "mathjax" / "config" / "TeX-AMS-MML_HTMLorMML-full.js"
+    text = combined.read_text(encoding="utf-8")
+    combined.write_text(text.replace("about:blank", "data:font/woff,"), encoding="utf-8")
     return target
 
 
 mathjax_path = "mathjax/MathJax.js"
 mathjax2_config = {
     "config": ["TeX-AMS-MML_HTMLorMML-full.js"],
+    "tex2jax": {"processClass": "math|output_area"},  # MyST excludes the other text
     "HTML-CSS": {"availableFonts": [], "webFont": "STIX-Web", "imageFont": None},
     "menuSettings": {"zoom": "None"},
     "showMathMenu": False,
