@@ -112,9 +112,9 @@ def _figure(draw: Callable[[Axes], Any], alt: str) -> str:
     from wearsim.report.parts import titled_figure  # noqa: PLC0415
 
     content = io.BytesIO()
-    with titled_figure(4.2, 2.8) as figure:
+    with titled_figure(5.2, 3.1) as figure:  # as wide as the longest title
         draw(figure.subplots())
-        figure.savefig(content, format="png", dpi=110)
+        figure.savefig(content, format="png", dpi=100)
     data = base64.b64encode(content.getvalue()).decode()
     return f'<img alt="{escape(alt)}" src="data:image/png;base64,{data}">'
 
