@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -18,7 +18,11 @@ from wearsim.results.content import (
     Variable,
     by_name,
 )
+from wearsim.results.tables import dataset_of
 from wearsim.types import FloatArray
+
+if TYPE_CHECKING:
+    import xarray
 
 _TRACE = ("groove", "point")
 
@@ -154,6 +158,43 @@ class IdentificationResult(StudyResult[IdentificationData]):
     def bayes_factor(self) -> float:
         """Evidence of equal wear factors over that of scattered ones."""
         return float(self.raw.summary["bayes_factor"])
+
+    def samples(self, draws: int = 500, seed: int = 1) -> xarray.Dataset:
+        """Return samples of mean, scatter and every ln K/H together, as arviz reads them.
+
+        Parameters
+        ----------
+        draws : int
+            Samples of each walker of the sampler emcee.
+        seed : int
+            Seed of the random numbers.
+
+        Returns
+        -------
+        xarray.Dataset
+            Variables ``m``, ``t`` and ``ln_k`` over chain, draw and specimen;
+            ``to_netcdf("k.nc", group="posterior")`` writes a file for ``arviz.from_netcdf``.
+
+        Raises
+        ------
+        ModuleNotFoundError
+            If emcee or xarray is not installed, which are part of the extra ``wearsim[sampling]``.
+
+        Examples
+        --------
+        >>> from wearsim.studies.identify.measurements import Measurement
+        >>> depths = [Measurement(f"test {d}", depth=d * 1e-6, depth_std=1e-6) for d in (45, 51)]
+        >>> wearsim.identify("rig.toml", depths).samples(draws=20)["ln_k"].dims
+        ('chain', 'draw', 'specimen')
+        """
+        from wearsim.uq.hierarchy.sampling import sample_hierarchy  # noqa: PLC0415  (rarely needed)
+
+        m, t, ln_k = sample_hierarchy(self.ln_k, self.test_density, draws, seed)
+        dims = ("chain", "draw")
+        return dataset_of(
+            {"m": (dims, m), "t": (dims, t), "ln_k": ((*dims, "specimen"), ln_k)},
+            {"specimen": self.raw.specimens},
+        )
 
     def posterior_toml(self) -> str:
         """Return the distribution of K/H of the next specimen, as a table of a scenario.

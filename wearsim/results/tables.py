@@ -52,6 +52,14 @@ def as_dataset(
     return dataset
 
 
+def dataset_of(
+    variables: Mapping[str, tuple[tuple[str, ...], Array]], axes: Mapping[str, list[str]]
+) -> xarray.Dataset:
+    """Return arrays with the names of their axes as a dataset of xarray."""
+    dataset: xarray.Dataset = _library("xarray").Dataset(dict(variables), coords=dict(axes))
+    return dataset
+
+
 def as_frame(
     columns: Iterable[tuple[str, str, Array]], axis: str, numbers: Iterable[int]
 ) -> pandas.DataFrame:
