@@ -223,7 +223,19 @@ class EnsembleResult(EnsembleValues):
         return {group: (index, None) for group, index in first_order(values, drawn).items()}
 
     def drawn_numbers(self, groups: list[str]) -> dict[str, FloatArray]:
-        """Return the values of random inputs by name, each (count, numbers of a draw)."""
+        """Return the values of random inputs by name, each (count, numbers of a draw).
+
+        Parameters
+        ----------
+        groups : list of str
+            Names of random inputs.
+
+        Examples
+        --------
+        >>> tests = wearsim.open_results("rig-ensemble.h5")
+        >>> tests.drawn_numbers(["friction.coefficient"])["friction.coefficient"].shape
+        (16, 1)
+        """
         drawn = [(item["input"], self.values(item["key"])) for item in self.raw.inputs]
         return {
             group: np.column_stack([v.reshape(self.count, -1) for of, v in drawn if of == group])
