@@ -242,7 +242,8 @@ def cluster(
 @contextmanager
 def _without_log() -> Iterator[None]:
     """Silence the client's log, which repeats with tracebacks what is raised as an error here."""
-    logs = [logging.getLogger(f"distributed.{name}") for name in ("client", "batched")]
+    names = ("distributed.client", "distributed.batched", "tornado.application")
+    logs = [logging.getLogger(name) for name in names]
     levels = [log.level for log in logs]
     for log in logs:
         log.setLevel(logging.CRITICAL + 1)
