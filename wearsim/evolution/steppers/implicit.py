@@ -97,6 +97,8 @@ class ImplicitStepper(StepDoublingStepper):
         if unknown.any():
             excess = self.excess(problem, state, doubled, stop)
             over, ratio = np.where(unknown, (excess, self.ratio(excess)), (over, ratio))
+        if self.forced_step is not None:  # steps of a fixed length may be too long for fourth order
+            order = np.minimum(order, MAX_ORDER - 1)
         others = {name: one.replaced(order=order) for name, one in end.auxiliary.items()}
         return Attempt((half, end.replaced(order=order, **others)), over, ratio)
 

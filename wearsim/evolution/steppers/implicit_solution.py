@@ -24,6 +24,7 @@ from wearsim.plugins import SharedWear
 from wearsim.types import BoolArray, FloatArray
 
 MAX_FIXED_POINT = 60
+DAMPED_FROM = 10  # iterations; far fewer are usual
 CONVERGED = 500.0  # change of wear over the whole depth, relative to the tolerance of iterations
 LEAST_GUESS = 0.1  # first guess of a load over that without feedback; ratio of its iterates
 LOST = 1e-9  # load over that without feedback, below which contact is lost
@@ -98,14 +99,15 @@ class EndOfStep:
         target = loads
         gap = problem.gap(*start.with_stacked(self.base).depths)
         depths, ends, contacts = guess, start.with_stacked(guess), start.contacts
-        wear = self._parts(contacts)
+        # line loads and wear about which the wear is linearised
+        line_load, wear = contacts.line_load, self._parts(contacts)
         exponents = np.asarray(start.wear_exponents).reshape(contacts.line_load.shape)
         active = np.ones(problem.shape[REALISATION], dtype=np.bool_)
         iterations = np.zeros(len(active), dtype=np.int64)
         worn = np.empty_like(self.base)
         for iteration in range(1, MAX_FIXED_POINT + 1):
             compliance = np.empty((len(active), len(problem.bodies), 2, gap.shape[-1]))
-            constant = linearised_wear(contacts.line_load, wear, exponents, compliance)
+            constant = linearised_wear(line_load, wear, exponents, compliance)
             batch = contact_batch(problem, gap + self._opening(constant), loads, *ends.depths)
             shared = SharedWear(problem.bodies, compliance)
             solved = solve_compliant(problem, batch, shared, contacts, active)
@@ -113,7 +115,7 @@ class EndOfStep:
             new, exponents = self._parts(solved), exponents.copy()
             rest, opening, depth = wear_of_bodies(
                 solved.line_load,
-                contacts.line_load,
+                line_load,
                 new,
                 wear,
                 compliance,
@@ -150,7 +152,11 @@ class EndOfStep:
                     wear_exponents=exponents.reshape(*problem.shape, -1),
                 )
                 return end, worn, None if feedback is None else target - prescribed
-            contacts, wear, loads = solved, new, target
+            contacts, loads = solved, target
+            if iteration < DAMPED_FROM:
+                line_load, wear = solved.line_load, new
+            else:  # strips at an edge enter and leave the contact in turn
+                line_load, wear = 0.5 * (line_load + solved.line_load), 0.5 * (wear + new)
         raise StepError(
             f"an implicit step of {self.passes[0]:.4g} passes from pass {start.passes[0]:.0f} did"
             f" not converge (last relative change {(change / depth).max():.1e})",
