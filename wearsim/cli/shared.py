@@ -310,6 +310,14 @@ def check_figure(path: Path | None, force: bool, option: str = "-o") -> None:
         raise typer.BadParameter(
             f"'{path}' has no known figure format, expected .png, .pdf or .svg", param_hint=option
         )
+    check_new_file(path, force, option)
+
+
+def check_new_file(path: Path, force: bool, option: str = "-o") -> None:
+    """Check the folder of a file to be written, and that nothing is overwritten unasked.
+
+    Parameters and errors as of `check_figure`.
+    """
     if not path.parent.is_dir():
         raise typer.BadParameter(f"folder {path.parent} does not exist", param_hint=option)
     refuse_existing(path, force, option)

@@ -112,12 +112,22 @@ def set_depth_axes(
     name : str
         Label of the axis of passes.
     """
-    worn = (passes > 0.0) & (depth > 0.0)
-    if worn.sum() > 3 and passes[worn][-1] > 100.0 * passes[worn][0]:
+    drawn, logarithmic, unit, name = depth_scales(passes, depth)
+    if logarithmic:
         axes.set(xscale="log", yscale="log")
         axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        return worn, 1.0, "roller passes"
-    return passes >= 0.0, *pass_unit(float(passes[-1]))
+    return drawn, unit, name
+
+
+def depth_scales(passes: FloatArray, depth: FloatArray) -> tuple[BoolArray, bool, float, str]:
+    """Return drawn points, whether scales are logarithmic, and unit and label of the passes.
+
+    Parameters as of `set_depth_axes`.
+    """
+    worn = (passes > 0.0) & (depth > 0.0)
+    if worn.sum() > 3 and passes[worn][-1] > 100.0 * passes[worn][0]:
+        return worn, True, 1.0, "roller passes"
+    return passes >= 0.0, False, *pass_unit(float(passes[-1]))
 
 
 DPI = 150

@@ -15,9 +15,9 @@ from wearsim.cli.shared import (
     MeanRows,
     Row,
     Units,
+    check_new_file,
     note,
     profile_choice,
-    refuse_existing,
 )
 
 Files = Annotated[
@@ -55,9 +55,7 @@ def report(
     path = output if output is not None else Path(f"{files[0].stem}.html")
     if path.suffix.lower() not in {".html", ".htm"}:
         raise typer.BadParameter(f"'{path}' does not end in .html", param_hint="-o")
-    if not path.parent.is_dir():
-        raise typer.BadParameter(f"folder {path.parent} does not exist", param_hint="-o")
-    refuse_existing(path, force, "-o")
+    check_new_file(path, force)
     from wearsim.report.page.page import save_report
     from wearsim.results import refuse_inputs
     from wearsim.results.opening import open_results

@@ -15,8 +15,8 @@ from bokeh.models.tickers import SingleIntervalTicker
 from bokeh.models.tools import HoverTool
 from bokeh.plotting import figure
 
-from wearsim.report.parts import BLUE, GREEN, ORANGE, RED, Measured, evenly_spaced
-from wearsim.report.text import PER_SI, pass_unit
+from wearsim.report.parts import BLUE, GREEN, ORANGE, RED, Measured, depth_scales, evenly_spaced
+from wearsim.report.text import PER_SI
 from wearsim.types import BoolArray, FloatArray
 
 UM, MM, MIN, W_MM, DEG = (PER_SI[unit] for unit in ("um", "mm", "min", "W/mm", "deg"))
@@ -121,10 +121,9 @@ def add_measured(plot: Any, measured: Sequence[Measured]) -> None:
 
 def pass_axes(passes: FloatArray, depth: FloatArray, y: str) -> tuple[Any, BoolArray, float]:
     """Return axes for a depth against passes, the drawn points, and the unit of the passes."""
-    worn = (passes > 0.0) & (depth > 0.0)
-    if worn.sum() > 3 and passes[worn][-1] > 100.0 * passes[worn][0]:
-        plot = axes("roller passes", y, x_axis_type="log", y_axis_type="log")
-        plot.yaxis.formatter = NumeralTickFormatter(format="0.[00000]")
-        return plot, worn, 1.0
-    unit, name = pass_unit(float(passes[-1]))
-    return axes(name, y), passes >= 0.0, unit
+    drawn, logarithmic, unit, name = depth_scales(passes, depth)
+    if not logarithmic:
+        return axes(name, y), drawn, unit
+    plot = axes(name, y, x_axis_type="log", y_axis_type="log")
+    plot.yaxis.formatter = NumeralTickFormatter(format="0.[00000]")
+    return plot, drawn, unit

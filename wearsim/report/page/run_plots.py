@@ -46,7 +46,9 @@ def run_plots(result: Result, measured: Sequence[Measured]) -> list[Plot]:
     profile, depth = _profile(result, measured), _depth(result)
     pressure = _history(result, "peak_pressure", "peak pressure", "MPa")
     if "station_angle" in result.raw.static:
-        return [_map(result), _lift_error(result), profile, depth, pressure]
+        stations = CamTurn(result.scenario).stations
+        of_cam = _map(result, stations), _lift_error(result, stations)
+        return [*of_cam, profile, depth, pressure]
     force = _history(result, "normal_force", "normal force", "N")
     return [profile, depth, _dissipation(result), force, pressure]
 
@@ -165,10 +167,10 @@ def _history(result: Result, name: str, words: str, unit: str) -> Plot:
     return Plot(f"{words.capitalize()} of the rollers", text, plot)
 
 
-def _map(result: Result) -> Plot:
+def _map(result: Result, stations: Stations) -> Plot:
     """Return the worn depth of a cam at the end over angle and width."""
     worn = np.asarray(result.raw.records["cylinder_depth_profile"])[-1, :, 0]
-    angle, depth = _over_a_turn(CamTurn(result.scenario).stations, worn)
+    angle, depth = _over_a_turn(stations, worn)
     inside = worn.max(axis=0) > 1e-3 * worn.max()
     inside = inside if inside.any() else np.ones_like(inside)
     y, regular = result.y[inside] * MM, np.linspace(0.0, 360.0, 361)
@@ -193,10 +195,10 @@ def _over_a_turn(stations: Stations, values: FloatArray) -> tuple[FloatArray, Fl
     return stations.values_at(values, LEAST_SAMPLES // len(stations.panels) + 1)
 
 
-def _lift_error(result: Result) -> Plot:
+def _lift_error(result: Result, stations: Stations) -> Plot:
     """Return the lift error of a cam over the angle, at the record of the slider."""
     curves = np.asarray(result.raw.records["lift_error_curve"])[:, :, 0, 0]
-    stations, records = CamTurn(result.scenario).stations, records_of(result)
+    records = records_of(result)
     angle, _ = _over_a_turn(stations, curves[0])
     values = np.zeros((len(curves), len(angle)))
     for record in records:
