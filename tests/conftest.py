@@ -10,9 +10,8 @@ from pathlib import Path
 import pytest
 
 #: tests.benchmarks imports wearsim_bench
-IMPORT = re.compile(
-    r"^\s*(?:from|import)\s+(wearsim_bench|wearsim_chevalier2005|tests\.benchmarks import)", re.M
-)
+NAMES = r"wearsim_bench|wearsim_chevalier2005|wearsim_halfspace|tests\.benchmarks import"
+IMPORT = re.compile(rf"^\s*(?:from|import)\s+({NAMES})", re.M)
 
 
 @cache

@@ -292,6 +292,9 @@ class ContactModelSpec(Spec):
         ``suggest_grid(options, gap_curvature, longitudinal_curvature, normal_force, materials)``
         returns a Grid for one contact of unworn bodies centred on y = 0, or None. `gap_curvature`
         is the relative curvature across the track [1/m].
+    reference : bool
+        Whether the model is costly and meant for the errors of others. A comparison of all models
+        leaves it out unless it is named.
     """
 
     kind: ClassVar[str] = "contact model"
@@ -299,6 +302,7 @@ class ContactModelSpec(Spec):
     factory: Callable[[Any, Grid, Materials], ContactModel] = field(kw_only=True)
     capabilities: Capabilities = field(kw_only=True, default=Capabilities())
     suggest_grid: SuggestGrid | None = field(kw_only=True, default=None)
+    reference: bool = field(kw_only=True, default=False)
 
     def describe(self) -> list[str]:
         """Return the names of the capabilities."""

@@ -22,7 +22,13 @@ from wearsim.studies.run.draws import draw
 from wearsim.studies.run.grid import fresh_patch, strips_of_run
 from wearsim_bench.contact.accuracy import choose_model, errors_of, random_case_errors, solved
 from wearsim_bench.contact.cases import elliptic_cases, worn_cases
-from wearsim_bench.contact.methods import COMPARISON_MODEL, Method, methods, normal_methods
+from wearsim_bench.contact.methods import (
+    COMPARISON_MODEL,
+    Method,
+    compared_models,
+    methods,
+    normal_methods,
+)
 from wearsim_bench.contact.topic import HARD, contact
 from wearsim_bench.contact.worn_profiles import measure
 from wearsim_bench.exact_solutions import rows
@@ -61,7 +67,10 @@ class Faulty(ws.SingleContactModel):
 def faulty_plugin():
     module = ModuleType("faulty_plugin")
     spec = ContactModelSpec("choosy", ChoosyOptions, "a faulty model", factory=Faulty, protocol=2)
-    module.wearsim_contact_models = ws.hookimpl(lambda: [spec], specname="wearsim_contact_models")
+    costly = replace(spec, name="costly", reference=True)
+    module.wearsim_contact_models = ws.hookimpl(
+        lambda: [spec, costly], specname="wearsim_contact_models"
+    )
     return module
 
 
@@ -95,7 +104,7 @@ def test_all_models_are_measured_in_all_groups(topic, progress):
     assert topic.groups == GROUPS
     for group in GROUPS:
         named = {item.method.split(",")[0] for item in topic.of(group)}
-        assert named == set(registry().names(ContactModelSpec)) >= {"slender", "winkler"}
+        assert named == set(compared_models()) >= {"slender", "winkler"}
     parts = [part for _, part in progress]
     assert parts == sorted(parts)
     assert parts[0] == 0.0
@@ -106,7 +115,7 @@ def test_all_models_are_measured_in_all_groups(topic, progress):
 def test_all_choices_of_all_options_are_measured():
     every = methods()
     assert len({method.name for method in every}) == len(every)
-    for name in registry().names(ContactModelSpec):
+    for name in compared_models():
         of_model = [method for method in every if method.model == name]
         options = of_model[0].spec.options
         theories = issubclass(options, TangentialOptions) and name != COMPARISON_MODEL
@@ -128,6 +137,13 @@ def test_choice_is_combined_with_the_choice_it_requires():
         "choosy, shape flat, fine on",
         "slender, strip",
     ]
+
+
+@pytest.mark.usefixtures("plugins")
+def test_reference_is_measured_only_where_it_is_named():
+    assert "costly" in registry().names(ContactModelSpec)
+    assert "costly" not in {method.model for method in [*methods(), *normal_methods()]}
+    assert {method.model for method in methods("costly")} == {"costly", "slender"}
 
 
 def test_worn_profiles_omit_tangential_choices():

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from wearsim.models.contact.strip_model import SemiHertzian
-from wearsim.plugins import ContactModelSpec, registry
-from wearsim_bench.contact.methods import Method
+from wearsim_bench.contact.methods import Method, compared_models
 from wearsim_bench.measure.measurement import Effort
 from wearsim_bench.savings.contacts import (
     MeanContact,
@@ -78,7 +77,7 @@ def test_savings_keep_the_result(topic, group, most):
 
 def test_all_models_are_included():
     named = {saving.method.split(",")[0] for saving in strips_outside()}
-    assert named == set(registry().names(ContactModelSpec))
+    assert named == set(compared_models())
     assert {"hertz, strip", "hertz, fastrip", *STEPPED_THEORIES} == {
         saving.method for saving in closed_forms()
     }
@@ -89,7 +88,7 @@ def test_all_models_are_included():
     [
         (stepper, model)
         for stepper in STEPPERS
-        for model in registry().names(ContactModelSpec)
+        for model in compared_models()
         if stepper != "implicit" or Method(model).spec.capabilities.coupled
     ],
 )

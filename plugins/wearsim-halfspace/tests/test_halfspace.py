@@ -5,15 +5,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from wearsim_halfspace import SPEC, Halfspace, HalfspaceOptions
-from wearsim_halfspace.influence import Elements
-from wearsim_halfspace.normal import solve_normal
-from wearsim_halfspace.rolling import solve_rolling
 
 import wearsim
 from wearsim.scenario.examples import shipped_scenario
 from wearsim.testing import contact_model_tests
 from wearsim.types import Creepage, Grid, Material, OperatingPoint
+from wearsim_halfspace import SPEC, Halfspace, HalfspaceOptions
+from wearsim_halfspace.influence import Elements
+from wearsim_halfspace.normal import solve_normal
+from wearsim_halfspace.rolling import solve_rolling
 
 STEEL = Material(youngs_modulus=200e9, poisson_ratio=0.3)
 CONTACT = json.loads((Path(__file__).parent / "contact_rig.json").read_text())

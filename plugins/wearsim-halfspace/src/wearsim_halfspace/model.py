@@ -322,6 +322,7 @@ SPEC = ws.ContactModelSpec(
     *("halfspace", HalfspaceOptions, "exact theory of elastic half-spaces in steady rolling"),
     factory=Halfspace,
     capabilities=Halfspace.capabilities,
+    reference=True,
     protocol=2,
 )
 

@@ -81,8 +81,14 @@ class Method:
         return options
 
 
+def compared_models() -> list[str]:
+    """Return the registered contact models without references, which cost hours."""
+    specs = [registry().get(ContactModelSpec, name) for name in registry().names(ContactModelSpec)]
+    return [spec.name for spec in specs if not spec.reference]
+
+
 def methods(plugin: str | None = None) -> list[Method]:
-    """Return the registered contact models with all their choices, one choice at a time.
+    """Return contact models with all their choices, one choice at a time.
 
     A choice that is invalid with the defaults of the other options is combined with the choice it
     requires: `bound = "parabolic"` with `tangential = "fastsim"`. Choices of a tangential theory
@@ -91,7 +97,7 @@ def methods(plugin: str | None = None) -> list[Method]:
     Parameters
     ----------
     plugin : str, optional
-        Model to return in addition to the default; None for all.
+        Model to return in addition to the default; None for all except references.
 
     Raises
     ------
@@ -99,7 +105,7 @@ def methods(plugin: str | None = None) -> list[Method]:
         If there is no such model.
     """
     if plugin is None:
-        names, varied = registry().names(ContactModelSpec), COMPARISON_MODEL
+        names, varied = compared_models(), COMPARISON_MODEL
     else:
         registry().get(ContactModelSpec, plugin)
         names, varied = list(dict.fromkeys((plugin, DEFAULT_MODEL))), plugin

@@ -10,11 +10,10 @@ import numpy as np
 
 from wearsim.contact_batch import ContactBatch
 from wearsim.models.contact.strip_model import grid_about_hertz
-from wearsim.plugins import ContactModelSpec, registry
 from wearsim.scenario.examples import shipped_scenario
 from wearsim.studies.contact.single import study_contact
 from wearsim.types import Creepage, FloatArray, Grid, OperatingPoint
-from wearsim_bench.contact.methods import COMPARISON_MODEL, Method, methods
+from wearsim_bench.contact.methods import COMPARISON_MODEL, Method, compared_models, methods
 from wearsim_bench.savings.saving import Alternatives, Saving
 
 FINE = 1000  # steps along rolling of the reference
@@ -72,7 +71,7 @@ def _theories() -> list[Method]:
 
 
 def _models() -> list[Method]:
-    return [Method(name) for name in registry().names(ContactModelSpec)]
+    return [Method(name) for name in compared_models()]
 
 
 def _slipping(point: OperatingPoint, longitudinal: float, spin: float) -> OperatingPoint:

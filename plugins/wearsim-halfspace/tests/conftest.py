@@ -1,0 +1,17 @@
+"""The marker `bench` for all tests of this folder, which are skipped without the plugin."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+FOLDER = Path(__file__).parent
+collect_ignore_glob = [] if find_spec("wearsim_halfspace") else ["*"]
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        if item.path.is_relative_to(FOLDER):
+            item.add_marker(pytest.mark.bench)
