@@ -383,3 +383,18 @@ def test_figure_replaces_no_profile(command: Command) -> None:
     assert result.exit_code == 2
     assert "the profile is read from worn.png" in result.stderr
     assert profile.read_text().startswith("y [mm]")
+
+
+def test_contact_is_compared_with_another_model(command: Command, scenario: Path) -> None:
+    result = command("contact", scenario, "--against", "hertz", "-o", "both.png")
+    assert result.exit_code == 0
+    assert "difference from 'hertz'" in result.stdout
+    assert "its own error" in result.stdout
+    assert Path("both.png").stat().st_size > 10_000
+    data = json.loads(command("contact", scenario, "--against", "hertz", "--json").stdout)
+    assert 0.0 < data["against"]["errors"]["dissipation"] < 0.01
+    assert len(data["against"]["strips"]["dissipation_W_per_m"]) == 121
+    missing = command("contact", scenario, "--against", "none-such")
+    assert missing.exit_code == 2
+    assert "--against" in missing.stderr
+    assert "no contact model 'none-such' is installed" in missing.stderr

@@ -268,3 +268,11 @@ def test_plugin_option_measures_one_model_and_the_default():
 def test_unknown_model_raises_plugin_error():
     with pytest.raises(PluginError, match="'winklerr'"):
         contact(Effort(quick=True, plugin="winklerr"), lambda what, part: None)
+
+
+def test_solutions_of_a_reference_replace_the_stored_ones():
+    effort = Effort(quick=True, repetitions=1, plugin="winkler", against="slender")
+    found = contact(effort, lambda what, part: None)
+    assert "relative to 'slender'" in found.about
+    own = [item for item in found.of("fresh rig") if item.method == "slender, strip"]
+    assert min(item.errors["dissipation"] for item in own) < 1e-9

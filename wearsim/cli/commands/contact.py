@@ -60,6 +60,15 @@ Cutoff = Annotated[
         show_default=False,
     ),
 ]
+Against = Annotated[
+    str | None,
+    typer.Option(
+        metavar="MODEL",
+        help="Also solve the contact with this contact model, such as halfspace, and show the"
+        " difference.",
+        show_default=False,
+    ),
+]
 
 
 def contact(
@@ -72,6 +81,7 @@ def contact(
     at: At = None,
     cutoff: Cutoff = None,
     settings: Settings = None,
+    against: Against = None,
     figure: Figure = None,
     json: Json = False,
     force: Force = False,
@@ -80,14 +90,21 @@ def contact(
     check_figure(figure, force)
     loaded = read_scenario(scenario, settings)
     from wearsim.cli.progress import Display
+    from wearsim.errors import PluginError
     from wearsim.input_files import read_input
     from wearsim.profiles import ProfileChoice, gaussian_filtered, load_profile, sign_note
     from wearsim.quantities import quantity
     from wearsim.results import refuse_inputs
+    from wearsim.studies.contact.comparison import reference_spec
     from wearsim.studies.contact.single import study_contact
     from wearsim.studies.dry_run import profile_data, profile_rows
     from wearsim.studies.kernels import kernels_of
 
+    if against is not None:
+        try:
+            reference_spec(against)
+        except PluginError as error:
+            raise typer.BadParameter(str(error), param_hint="--against") from error
     if figure is not None:
         refuse_inputs(figure, loaded.paths)
         refuse_inputs(figure, [profile] if profile else [], "the profile")
@@ -114,7 +131,7 @@ def contact(
         return kernels_of(loaded, "contact", with_fields)
 
     with Display(quiet=False, kernels=kernels, transient=True):
-        study = study_contact(loaded, cylinder.profile, with_fields, with_error=True)
+        study = study_contact(loaded, cylinder.profile, with_fields, True, against)
     notes = [*study.notes, *_notes_on_means(loaded)]
     if cylinder.profile and profile and (sign := sign_note(cylinder.profile, choice, str(profile))):
         notes.append(sign)
@@ -126,6 +143,8 @@ def contact(
         from wearsim.report.summary import contact_line
 
         write_table(loaded.title, [*profile_rows(start), *_rows(study)])
+        if study.reference is not None:
+            write_table(f"difference from '{study.reference.model}'", _difference_rows(study))
         typer.echo(contact_line(study))
     if figure is not None:
         from wearsim.report.figures.contact import contact_figure
@@ -180,6 +199,53 @@ def _rows(study: ContactStudy) -> list[tuple[str, str]]:
     ]
 
 
+def _difference_rows(study: ContactStudy) -> list[tuple[str, str]]:
+    """Return the differences from the reference, each with the reference's own error."""
+    from wearsim.report.text import lapse, shown
+
+    assert study.reference is not None
+    assert study.errors is not None
+    own = vars(study.reference.own)
+    rows = []
+    for name, error in vars(study.errors).items():
+        sign = "" if name in {"dissipation", "greatest"} else "+" if error >= 0.0 else "-"
+        text = f"{sign}{shown(abs(error), '%', 2)}"
+        rows.append((_DIFFERENCES[name], f"{text}, its own error {shown(own[name], '%', 2)}"))
+    return [*rows, ("time of the reference", lapse(study.reference.seconds))]
+
+
+_DIFFERENCES = {
+    "dissipation": "P_l(y), L2 over the strips",
+    "greatest": "P_l(y), greatest over its maximum",
+    "power": "dissipated power",
+    "peak_pressure": "peak pressure",
+    "half_length": "greatest half-length",
+    "adhesion_fraction": "adhesion fraction, in points",
+}
+
+
+def _reference_data(study: ContactStudy) -> dict[str, Any] | None:
+    """Return the reference in SI units, the differences from it and its own errors."""
+    reference, errors = study.reference, study.errors
+    if reference is None or errors is None:
+        return None
+    return {
+        "model": reference.model,
+        "errors": vars(errors),
+        "own_errors": vars(reference.own),
+        "power_W": reference.power,
+        "peak_pressure_Pa": reference.peak_pressure,
+        "half_length_m": reference.half_length,
+        "adhesion_fraction": reference.adhesion_fraction,
+        "seconds": reference.seconds,
+        "strips": {
+            "y_m": reference.y,
+            "line_load_N_per_m": reference.line_load,
+            "dissipation_W_per_m": reference.dissipation,
+        },
+    }
+
+
 def _times(error: float | None, value: float) -> float | None:
     """Return an error from a relative one, if there is any."""
     return None if error is None else error * value
@@ -222,6 +288,7 @@ def _data(
             "line_load_N_per_m": solution.line_load,
             "dissipation_W_per_m": solution.dissipation,
         },
+        "against": _reference_data(study),
         "notes": notes,
         "warnings": study.warnings,
         "figure": figure,

@@ -33,6 +33,7 @@ from wearsim.report.text import (
     without_rounding,
 )
 from wearsim.results import DissipationResult
+from wearsim.studies.contact.comparison import ContactErrors, ContactReference
 from wearsim.studies.contact.single import ContactStudy
 from wearsim.types import ContactFields, ContactSolution, FloatArray, IntArray
 from wearsim.uq.distributions.base import MaxentDistribution
@@ -72,6 +73,8 @@ def contact_figure(study: ContactStudy, title: str) -> Figure:
         if study.fields is not None:
             _draw_fields(panels, study.fields, study.solution)
         _draw_strips(panels, study.solution)
+        if study.reference is not None and study.errors is not None:
+            _draw_reference(panels, study.reference, study.errors)
     return figure
 
 
@@ -184,6 +187,23 @@ def _draw_strips(panels: dict[str, Axes], solution: ContactSolution) -> None:
         panels[name].plot(y, value[inside], color=colour)
         name_axes(panels[name], title, Y_LABEL, label)
         panels[name].set_ylim(bottom=0.0)
+
+
+def _draw_reference(
+    panels: dict[str, Axes], reference: ContactReference, errors: ContactErrors
+) -> None:
+    """Draw line load and dissipated power per length of a reference."""
+    first, last = np.flatnonzero(reference.line_load > 0.0)[[0, -1]].tolist()
+    inside = slice(max(first - 1, 0), last + 2)
+    y = reference.y[inside] * MM
+    error = f"{reference.model}; difference {shown(errors.dissipation, '%', 2)} (L2)"
+    for name, value, label in (
+        ("line load", reference.line_load * N_MM, reference.model),
+        ("dissipation", reference.dissipation * W_MM, error),
+    ):
+        panels[name].plot(y, value[inside], "k--", lw=1.0, label=label)
+        panels[name].set_ylim(0.0, 1.25 * max(panels[name].get_ylim()[1], float(value.max())))
+        panels[name].legend(loc="upper center")
 
 
 MOST_LINES = 200

@@ -13,6 +13,13 @@ from wearsim.plugins import ContactModel
 from wearsim.profiles import load_profile
 from wearsim.scenario import Scenario, as_scenario, described_model
 from wearsim.studies.cam.turn import turn_of
+from wearsim.studies.contact.comparison import (
+    ContactErrors,
+    ContactReference,
+    at_creepage,
+    reference_spec,
+    solve_reference,
+)
 from wearsim.studies.plausibility import plausibility_warnings
 from wearsim.studies.run.assemble import build_problem, prepared_model
 from wearsim.studies.run.grid import contact_grid, wider_grid
@@ -27,6 +34,7 @@ from wearsim.types import (
 )
 
 GRID_DEPENDENT = 0.1  # relative change of the peak pressure with half as many strips
+_BEYOND = 0.15  # strips beyond either end of those of a model that ends them with its contact
 _FEWEST = 5  # minimum number of strips for an error estimate
 
 
@@ -60,6 +68,10 @@ class ContactStudy:
         Warnings of implausible inputs, and of a peak pressure that depends on the strips.
     widened : bool
         Whether the contact is wider than the profile, and strips were added.
+    reference : ContactReference, optional
+        The same contact by a reference model, if one was named.
+    errors : ContactErrors, optional
+        Differences of the solution from the reference.
 
     Examples
     --------
@@ -81,6 +93,8 @@ class ContactStudy:
     notes: tuple[str, ...]
     warnings: tuple[str, ...]
     widened: bool = False
+    reference: ContactReference | None = None
+    errors: ContactErrors | None = None
 
     def __repr__(self) -> str:
         return f"<ContactStudy '{self.described_model}': {self.solution!r}>"
@@ -91,6 +105,7 @@ def study_contact(
     profile: Profile | str | Path | None = None,
     with_fields: bool = False,
     with_error: bool = False,
+    against: str | None = None,
 ) -> ContactStudy:
     """Solve the contact of the scenario's first roller at the start of its load.
 
@@ -104,6 +119,8 @@ def study_contact(
         Also return tractions and slip inside the contact.
     with_error : bool
         Also time a second solution, and solve with half as many strips.
+    against : str, optional
+        Contact model that also solves this contact on the same strips, as a reference: "halfspace".
 
     Returns
     -------
@@ -111,6 +128,8 @@ def study_contact(
 
     Raises
     ------
+    PluginError
+        If the reference is not installed.
     ContactError
         If the contact has no solution.
     CapabilityError
@@ -125,6 +144,8 @@ def study_contact(
     True
     """
     scenario = as_scenario(scenario)
+    if against is not None:
+        reference_spec(against)
     if isinstance(profile, str | Path):
         profile = load_profile(profile)
     if profile is not None:
@@ -159,6 +180,11 @@ def study_contact(
         start = perf_counter()
         model.solve_one(gap, curvature, point)
         seconds = perf_counter() - start
+    reference = None
+    if against is not None:
+        reference = _reference(scenario, against, grid, solution)
+        if point.bearing_torque is not None:
+            notes = (*notes, f"'{against}' has the longitudinal creepage of this solution")
     return ContactStudy(
         solution,
         fields,
@@ -172,6 +198,8 @@ def study_contact(
         notes,
         tuple(warnings),
         any(note.startswith("the contact is wider") for note in notes),
+        reference,
+        None if reference is None else reference.errors_of(solution),
     )
 
 
@@ -182,6 +210,25 @@ def _contact(
     model = prepared_model(scenario, grid)
     batch = unworn_contacts(build_problem(scenario, model, grid, {}))
     return model, batch.gap[0], float(batch.longitudinal_curvature[0]), batch.point(0)
+
+
+def _reference(
+    scenario: Scenario, against: str, grid: Grid, solution: ContactSolution
+) -> ContactReference:
+    """Return the contact by a reference model; strips that it extends beyond are continued."""
+    materials, failure = (scenario.cylinder.material, scenario.roller.material), None
+    for beyond in (0, math.ceil(_BEYOND * grid.strips)):
+        margin = beyond * grid.spacing
+        edges = grid.edges[0] - margin, grid.edges[1] + margin
+        wider = Grid.spanning(*edges, grid.strips + 2 * beyond) if beyond else grid
+        _, gap, curvature, point = _contact(scenario, wider)
+        prescribed = at_creepage(point, solution)
+        try:
+            return solve_reference(against, wider, materials, gap, curvature, prescribed)
+        except ContactError as error:
+            failure = failure or error
+    assert failure is not None
+    raise failure
 
 
 def _grid_errors(

@@ -44,6 +44,15 @@ Plugin: TypeAlias = Annotated[
         metavar="NAME", help="Only this contact model and the default.", show_default=False
     ),
 ]
+Against: TypeAlias = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME",
+        help="Contact model, such as halfspace, whose solutions replace the stored ones in the"
+        " topic contact.",
+        show_default=False,
+    ),
+]
 Hard: TypeAlias = Annotated[
     bool, typer.Option("--hard", help="Run the hard cases and list which of them pass.")
 ]
@@ -90,6 +99,7 @@ app = typer.Typer(
 def bench(
     topics: Topics = None,
     plugin: Plugin = None,
+    against: Against = None,
     hard: Hard = False,
     quick: Quick = False,
     tests: Tests = None,
@@ -102,6 +112,8 @@ def bench(
     quiet: Quiet = False,
 ) -> None:
     """Measure time and error of models, steppers and sampling; --hard runs the hard cases."""
+    if against is not None:
+        topics = _topics_against(topics, against)
     selected = list(dict.fromkeys(topics or ([] if hard else TopicName)))
     if plugin is not None:
         selected = _topics_of_model(selected, topics, plugin)
@@ -122,7 +134,7 @@ def bench(
     from wearsim_bench.measure.measurement import Effort
     from wearsim_bench.output import Output
 
-    effort = Effort(quick, 1 if quick else 5, plugin)
+    effort = Effort(quick, 1 if quick else 5, plugin, against)
     machine = this_machine()
     results = Output(output, machine, effort, show_all, json)
     results.begin()
@@ -158,6 +170,24 @@ def _check_paths(folder: Path, paths: list[Path]) -> None:
     for path in paths:
         if path.is_dir():
             raise typer.BadParameter(f"{path} is a folder; name another", param_hint="-o")
+
+
+def _topics_against(topics: list[TopicName] | None, against: str) -> list[TopicName]:
+    """Return the topic that a reference model serves; refuse others and a missing model."""
+    from wearsim.errors import PluginError
+    from wearsim.studies.contact.comparison import reference_spec
+
+    try:
+        reference_spec(against)
+    except PluginError as error:
+        raise typer.BadParameter(str(error), param_hint="--against") from error
+    others = [name.value for name in topics or () if name != TopicName.contact]
+    if others:
+        raise typer.BadParameter(
+            f"{others[0]} has no contacts with exact solutions; omit --against, or name contact",
+            param_hint="--against",
+        )
+    return [TopicName.contact]
 
 
 def _topics_of_model(

@@ -7,8 +7,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 
+import numpy as np
+
+from wearsim.errors import ContactError
 from wearsim.scenario.tables.plain import DEFAULT_TOLERANCE
 from wearsim.studies.run.grid import strips_over
+from wearsim_bench.contact.against import solved_by
 from wearsim_bench.contact.cases import Case, all_worn_cases, elliptic_cases
 from wearsim_bench.contact.methods import Method, methods, normal_methods
 from wearsim_bench.contact.worn_profiles import failure_reason, measure
@@ -31,10 +35,13 @@ ERRORS = {
     "peak_pressure": "peak pressure, rms",
 }
 COUNTS = {"warm_seconds": "warm-started", "prepare_seconds": "first prepared"}
-ABOUT = (
+_TIMES = (
     "The time is that of one solve without a starting solution, by a model that has been built for"
     " its strips; it is the mean over the contacts of a group. A warm start begins with the"
-    " solution under a load that is 1 % lower. Errors are relative to half-space solutions by"
+    " solution under a load that is 1 % lower."
+)
+ABOUT = (
+    f"{_TIMES} Errors are relative to half-space solutions by"
     " CONTACT, whose own errors are"
     f" {100.0 * POWER_ERRORS[0]:g} to {100.0 * POWER_ERRORS[1]:g} % in power, up to"
     f" {100.0 * PURE_SPIN_ERROR:g} % with pure spin, and {100.0 * STRIPS_ERROR:g} % in P_l(y);"
@@ -75,7 +82,13 @@ def contact(effort: Effort, on_progress: OnProgress) -> Topic:
         If the requested contact model is not registered.
     """
     measurements: list[Measurement] = []
-    groups = _groups(effort)
+    groups, about, floor = _groups(effort), ABOUT, STRIPS_ERROR
+    if effort.against is not None:
+        groups, floor = _solved_by(groups, effort.against, on_progress)
+        about = (
+            f"{_TIMES} Errors are relative to '{effort.against}' on the default strips, whose own"
+            f" error of P_l(y) is {100.0 * floor:.2g} % (median over the contacts)."
+        )
     total = sum(len(group.methods) for group in groups)
     done = 0
     for group in groups:
@@ -86,13 +99,13 @@ def contact(effort: Effort, on_progress: OnProgress) -> Topic:
     return Topic(
         name="contact",
         title="One contact: every model, option and number of strips",
-        about=ABOUT,
+        about=about,
         seconds="one contact",
         error="dissipation",
         errors=ERRORS,
         counts=COUNTS,
         measurements=tuple(measurements),
-        floor=STRIPS_ERROR,
+        floor=floor,
     )
 
 
@@ -109,6 +122,35 @@ def _groups(effort: Effort) -> list[_Group]:
     if effort.quick:
         groups = [replace(group, cases=group.cases[::_EVERY]) for group in groups]
     return groups
+
+
+def _solved_by(
+    groups: Sequence[_Group], reference: str, on_progress: OnProgress
+) -> tuple[list[_Group], float]:
+    """Return the groups with the contacts that a reference solves, and its median error.
+
+    Raises
+    ------
+    ContactError
+        If it solves none of them.
+    """
+    total, errors, found = sum(len(group.cases) for group in groups), [], []
+    failure = ContactError(f"'{reference}' solves none of the contacts")
+    for group in groups:
+        cases = []
+        for case in group.cases:
+            on_progress(f"{reference}: {case.name}", len(errors) / total)
+            try:
+                solved, error = solved_by(case, reference)
+            except ContactError as other:
+                failure = other
+                continue
+            cases.append(solved)
+            errors.append(error)
+        found += [replace(group, cases=cases)] if cases else []
+    if not errors:
+        raise failure
+    return found, float(np.median(errors))
 
 
 def _hard_cases() -> dict[str, Sequence[Case]]:

@@ -23,11 +23,15 @@ class Effort:
         Repetitions of each timing; the smallest time is used.
     plugin : str, optional
         Contact model to measure in addition to the default; None for all.
+    against : str, optional
+        Contact model whose solutions are the exact ones of the topic "contact"; None for the
+        stored solutions.
     """
 
     quick: bool = False
     repetitions: int = 5
     plugin: str | None = None
+    against: str | None = None
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,256 @@
+"""Error of a contact model on one contact, relative to another contact model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from time import perf_counter
+
+import numpy as np
+
+from wearsim.errors import ContactError, PluginError
+from wearsim.plugins import ContactModel, ContactModelSpec, Options, registry
+from wearsim.types import ContactSolution, FloatArray, Grid, Material, OperatingPoint
+
+#: Numbers of elements along rolling at which a reference is solved, over its usual number.
+RESOLUTIONS = (0.5, 0.7, 1.0, 1.4)
+_LEAST_SOLVED = 3  # of them
+_INSTALL = {"halfspace": "pip install 'wearsim[halfspace]'"}  # models of the project's plugins
+
+#: Builds a model with some options for strips.
+Build = Callable[[Options, Grid], ContactModel]
+
+
+@dataclass(frozen=True)
+class ContactErrors:
+    """Differences of a contact from a reference; signed except those of P_l(y).
+
+    Parameters
+    ----------
+    dissipation : float
+        L2 norm over the strips of the difference of P_l(y), over that of the reference.
+    greatest : float
+        Greatest difference of P_l(y), over the greatest value of the reference.
+    power, peak_pressure, half_length : float
+        Relative differences of power, peak pressure and greatest half-length.
+    adhesion_fraction : float
+        Difference of the adhesion fraction.
+    """
+
+    dissipation: float
+    greatest: float
+    power: float
+    peak_pressure: float
+    half_length: float
+    adhesion_fraction: float
+
+
+@dataclass(frozen=True, eq=False)
+class ContactReference:
+    """Values of a contact by a reference model, and their own discretisation errors.
+
+    Parameters
+    ----------
+    model : str
+        Name of the model.
+    y : ndarray, shape (strips,)
+        Axial position of its strips [m], which may extend beyond those of the contact.
+    dissipation : ndarray, shape (strips,)
+        P_l(y) [W/m].
+    line_load : ndarray, shape (strips,)
+        q(y) [N/m].
+    power, peak_pressure, half_length, adhesion_fraction : float
+        Power [W], peak pressure [Pa], greatest half-length [m], adhesion fraction.
+    own : ContactErrors
+        Estimated errors of these values that are due to the elements, not negative.
+    seconds : float
+        Time of all solutions [s].
+    """
+
+    model: str
+    y: FloatArray
+    dissipation: FloatArray
+    line_load: FloatArray
+    power: float
+    peak_pressure: float
+    half_length: float
+    adhesion_fraction: float
+    own: ContactErrors
+    seconds: float
+
+    def errors_of(self, solution: ContactSolution) -> ContactErrors:
+        """Return the differences of a solution on strips of the same width from the reference."""
+        beyond = (len(self.y) - len(solution.y)) // 2
+        scalars = self.power, self.peak_pressure, self.half_length, self.adhesion_fraction
+        own = np.concatenate([scalars, self.line_load, self.dissipation])
+        return _differences(_values(solution, beyond), own)
+
+
+def reference_spec(name: str) -> ContactModelSpec:
+    """Return an installed contact model.
+
+    Parameters
+    ----------
+    name : str
+        Its registered name.
+
+    Raises
+    ------
+    PluginError
+        If it is not installed, with the remedy.
+    """
+    names = registry().names(ContactModelSpec)
+    if name not in names:
+        remedy = f"there are {', '.join(names)}"
+        if name in _INSTALL:
+            remedy = f"install it with: {_INSTALL[name]}"
+        raise PluginError(f"no contact model '{name}' is installed; {remedy}")
+    return registry().get(ContactModelSpec, name)
+
+
+def solve_reference(
+    name: str,
+    grid: Grid,
+    materials: tuple[Material, Material],
+    gap: FloatArray,
+    longitudinal_curvature: float,
+    point: OperatingPoint,
+    resolutions: tuple[float, ...] = RESOLUTIONS,
+) -> ContactReference:
+    """Solve a contact with a reference model, and estimate the reference's own errors.
+
+    A model whose elements along rolling are chosen by the option `mx` is solved with several
+    numbers of them. Its error decreases with 1/mx, and varies irregularly as single elements enter
+    and leave the contact and the adhesion zone; the straight line over 1/mx that fits all solutions
+    gives the value at 1/mx = 0. The error stated is half the difference between the values by every
+    other solution. Another model is solved with half as many strips too, and the change is stated.
+
+    Parameters
+    ----------
+    name : str
+        Registered name of the model, with its default options.
+    grid, materials, gap, longitudinal_curvature, point
+        The contact, as for `ContactModel.solve_one`.
+    resolutions : tuple of float
+        Numbers of elements along rolling, over the usual number.
+
+    Returns
+    -------
+    ContactReference
+
+    Raises
+    ------
+    PluginError
+        If the model is not installed.
+    ContactError, CapabilityError
+        If it does not solve the contact.
+
+    Examples
+    --------
+    >>> study = wearsim.study_contact("rig.toml", against="semi-hertzian")
+    >>> study.reference.model, study.errors.power < 0.01
+    ('semi-hertzian', True)
+    """
+    spec = reference_spec(name)
+    start = perf_counter()
+
+    def solve(options: Options, on: Grid) -> FloatArray:
+        heights = gap if on is grid else np.interp(on.y, grid.y, gap)
+        model = spec.factory(options, on, materials)
+        return _values(model.solve_one(heights, longitudinal_curvature, _on(point, grid, on)))
+
+    if spec.reference and "mx" in spec.options.model_fields:
+        usual = float(spec.options.model_fields["mx"].default)
+        found, inverse = [], []
+        for part in resolutions:
+            number = round(part * usual)
+            try:
+                found.append(solve(spec.options.model_validate({"mx": number}), grid))
+                inverse.append(1.0 / number)
+            except ContactError as error:
+                failure = error
+        if len(found) < min(_LEAST_SOLVED, len(resolutions)):
+            raise failure
+        values, own = _extrapolated(np.array(inverse), np.array(found))
+    else:
+        values = solve(spec.options(), grid)
+        half = Grid.spanning(*grid.edges, (grid.strips + 1) // 2)
+        coarse, scalars = solve(spec.options(), half), len(_SCALARS)
+        fields = coarse[scalars:].reshape(2, -1)
+        there = [np.interp(grid.y, half.y, field) for field in fields]
+        own = _differences(np.concatenate([coarse[:scalars], *there]), values)
+    line_load, dissipation = values[len(_SCALARS) :].reshape(2, -1)
+    own = replace(own, **{name: abs(error) for name, error in vars(own).items()})
+    scalars_of = dict(zip(_SCALARS, values[: len(_SCALARS)].tolist(), strict=True))
+    return ContactReference(
+        name, grid.y, dissipation, line_load, **scalars_of, own=own, seconds=perf_counter() - start
+    )
+
+
+def at_creepage(point: OperatingPoint, solution: ContactSolution) -> OperatingPoint:
+    """Return the operating point with the longitudinal creepage of a solution prescribed."""
+    creepage = replace(point.creepage, longitudinal=solution.longitudinal_creepage)
+    return replace(point, creepage=creepage, bearing_torque=None, rolling_radius=None)
+
+
+_SCALARS = ("power", "peak_pressure", "half_length", "adhesion_fraction")
+
+
+def _values(solution: ContactSolution, beyond: int = 0) -> FloatArray:
+    """Return scalars, q(y) and P_l(y) of a solution in one array, with zeros for strips beyond."""
+    scalars = solution.power, solution.peak_pressure, float(solution.half_length.max())
+    fields = (np.pad(each, beyond) for each in (solution.line_load, solution.dissipation))
+    return np.concatenate([[*scalars, solution.adhesion_fraction], *fields])
+
+
+def _extrapolated(inverse: FloatArray, found: FloatArray) -> tuple[FloatArray, ContactErrors]:
+    """Return the values at 1/mx = 0 and their errors; `found` has one row per number."""
+
+    def value(rows: slice) -> FloatArray:
+        line = np.vander(inverse[rows], 2)
+        return np.asarray(np.linalg.lstsq(line, found[rows], rcond=None)[0][-1])
+
+    values = value(slice(None))
+    if len(inverse) < 4:  # too few for two straight lines
+        return values, _differences(found[np.argmin(inverse)], values)
+    twice = _differences(value(slice(0, None, 2)), value(slice(1, None, 2)))
+    return values, replace(twice, **{name: 0.5 * error for name, error in vars(twice).items()})
+
+
+def _differences(values: FloatArray, reference: FloatArray) -> ContactErrors:
+    """Return the differences of values from those of a reference, ordered as by `_values`."""
+    count = len(_SCALARS)
+    power, pressure, length = (
+        values[: count - 1] / _nonzero(reference[: count - 1]) - 1.0
+    ).tolist()
+    found, exact = (each[count:].reshape(2, -1)[1] for each in (values, reference))
+    norms = [float(np.linalg.norm(each)) for each in (found - exact, exact)]
+    peaks = [float(np.abs(each).max()) for each in (found - exact, exact)]
+    return ContactErrors(
+        norms[0] / (norms[1] or 1.0),
+        peaks[0] / (peaks[1] or 1.0),
+        power if reference[0] else float(values[0] != 0.0),
+        pressure,
+        length,
+        float(values[count - 1] - reference[count - 1]),
+    )
+
+
+def _nonzero(values: FloatArray) -> FloatArray:
+    return np.where(values != 0.0, values, 1.0)
+
+
+def _on(point: OperatingPoint, grid: Grid, other: Grid) -> OperatingPoint:
+    """Return an operating point on other strips."""
+    if other is grid:
+        return point
+
+    def moved(values: FloatArray) -> FloatArray:
+        return np.interp(other.y, grid.y, values)
+
+    variation, friction = point.creepage.variation, point.friction
+    if variation is not None:
+        point = replace(point, creepage=replace(point.creepage, variation=moved(variation)))
+    if isinstance(friction, np.ndarray):
+        point = replace(point, friction=moved(friction))
+    return point
